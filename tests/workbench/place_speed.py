@@ -6,7 +6,6 @@ test depends on them.
 
     tests/workbench/place_speed.py SOURCE BUILD [WIDTH_PX ...]
 """
-import json
 import os
 import pathlib
 import shutil

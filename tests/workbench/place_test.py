@@ -3,73 +3,13 @@
 """The page "Place" of `marrow open`: where a dragged bone comes to lie, its steps, and a registration from there."""
 import json
 import math
-import pathlib
 import shlex
-import shutil
 import subprocess
-import tempfile
 import time
-import unittest
 
 import bench
-from bench import MARROW, SOURCE, BenchTest, PageTest
-
-CASE = {}
-
-
-def case_folder():
-    """A simulated femur, made once. Its true pose is known."""
-    if not CASE:
-        scratch = pathlib.Path(tempfile.mkdtemp(prefix="marrow-place-"))
-        unittest.addModuleCleanup(shutil.rmtree, scratch, ignore_errors=True)
-        pipeline = SOURCE / "pipelines" / "simulate.yaml"
-        subprocess.run([MARROW, "run", pipeline, "--out", scratch / "sim", "--quiet"], check=True, stdout=-3)
-        CASE["folder"] = scratch / "sim" / "outputs" / "case"
-    return CASE["folder"]
-
-
-def truth():
-    import yaml
-
-    return yaml.safe_load((case_folder() / "case.yaml").read_text())["fragments"]["distal"]["truth"]["matrix"]
-
-
-def times(a, b):
-    return [[sum(a[i][k] * b[k][j] for k in range(4)) for j in range(4)] for i in range(4)]
-
-
-def at(pose, point):
-    return [sum(pose[i][k] * point[k] for k in range(3)) + pose[i][3] for i in range(3)]
-
-
-def seen(camera, point):
-    """Pixel and depth of a world point."""
-    x, y, z = at(camera["camera_from_world"], point)
-    (fx, skew, u0), (_, fy, v0), _ = camera["intrinsics"]
-    return [(fx * x + skew * y) / z + u0, fy * y / z + v0, z]
-
-
-def angle_deg(a, b):
-    """Of the rotation from one pose to the other."""
-    trace = sum(a[i][j] * b[i][j] for i in range(3) for j in range(3))
-    return math.degrees(math.acos(max(-1, min(1, (trace - 1) / 2))))
-
-
-class Placing:
-    def setUp(self):
-        super().setUp()
-        shutil.copytree(case_folder(), self.folder / "case")
-
-    def opened(self, server):
-        if server.cookie is None:
-            server.enter()
-        state = server.finish(server.json("POST", "/api/place/open", {"case": "case"})["job"])
-        self.assertEqual((state["state"], state["error"]), ("done", ""))
-        return state["result"]
-
-    def overlay(self, server, **changes):
-        asked = {"case": "case", "view": "frontal", "what": "radiograph", "step_px": 1, **changes}
-        return server.ask("POST", "/api/place/overlay", asked)
+from bench import MARROW, BenchTest, PageTest
+from placing import PageOfCase, Placing, angle_deg, at, seen, truth
 
 
 class RequestsTest(Placing, BenchTest):
@@ -194,65 +134,6 @@ class RequestsTest(Placing, BenchTest):
         self.assertEqual(server.finish(job)["state"], "stopped")
 
 
-class PageOfCase:
-    """The page with a case, and what a person does there."""
-
-    bone = "distal"
-
-    def place(self, **options):
-        server = self.open()
-        self.browser.logs()  # those of the page before
-        self.show(server, "place=case", **options)
-        self.js("PlacePage.current().judges = false; PlacePage.current().stopVerdict()")
-        self.about = self.js("return PlacePage.current().about")
-        return server
-
-    def js(self, text, *arguments):
-        return self.browser.js(text, *arguments)
-
-    def pose(self):
-        return self.js("return PlacePage.current().placed[arguments[0]]", self.bone)
-
-    def kept(self):
-        """The pose of the draft, after all changes were kept."""
-        self.browser.wait("return !PlacePage.current().keyMoves && !PlacePage.current().isKeeping")
-        return self.js("return PlacePage.current().draft.document.fragments[arguments[0]].start", self.bone)
-
-    def pointer(self, kind, view, pixel, button="left", modifiers=0):
-        place = self.js(
-            "const view = PlacePage.current().views.find((one) => one.name === arguments[0]);"
-            "const r = view.canvas.getBoundingClientRect(), camera = view.camera;"
-            "return [r.left + (arguments[1][0] + 0.5) / camera.width_px * r.width,"
-            " r.top + (arguments[1][1] + 0.5) / camera.height_px * r.height]",
-            view,
-            pixel,
-        )
-        self.browser.driver.execute_cdp_cmd(
-            "Input.dispatchMouseEvent",
-            {
-                "type": kind,
-                "x": place[0],
-                "y": place[1],
-                "button": button,
-                "buttons": {"left": 1, "right": 2}[button] * (kind != "mouseReleased"),
-                "clickCount": 1,
-                "modifiers": modifiers,
-            },
-        )
-
-    def drag(self, view, *pixels, **options):
-        self.pointer("mousePressed", view, pixels[0], **options)
-        for pixel in pixels[1:]:
-            self.pointer("mouseMoved", view, pixel, **options)
-        self.pointer("mouseReleased", view, pixels[-1], **options)
-
-    def camera(self, view):
-        return next(one["camera"] for one in self.about["views"] if one["name"] == view)
-
-    def middle(self, pose):
-        return at(pose, self.about["bones"][0]["middle_mm"])
-
-
 class PageOfCaseTest(PageOfCase, Placing, PageTest):
     def test_what_is_under_the_pointer_stays_under_it(self):
         self.place()
@@ -348,13 +229,15 @@ class PageOfCaseTest(PageOfCase, Placing, PageTest):
     def test_the_overlay_is_that_of_the_newest_pose(self):
         server = self.place()
         self.js(
-            "for (let i = 0; i < 30; ++i) PlacePage.current().move(PlacePage.current().placed, Geometry.shift([0.5, 0, 0]), true)"
+            "const page = PlacePage.current();"
+            "for (let i = 0; i < 30; ++i) page.move(page.placed, Geometry.shift([0.5, 0, 0]), true)"
         )
         self.browser.wait("return PlacePage.current().views.every((view) => !view.inFlight && !view.wanted)")
         server.cookie = "; ".join("%s=%s" % (c["name"], c["value"]) for c in self.browser.driver.get_cookies())
         _, headers, content = self.overlay(server, poses={"distal": self.pose()})
         drawn = self.js(
-            "const l = PlacePage.current().views[0].paint.layers.get('distal'); return [l.u_px, l.columns, [...l.bytes]]"
+            "const layer = PlacePage.current().views[0].paint.layers.get('distal');"
+            "return [layer.u_px, layer.columns, [...layer.bytes]]"
         )
         layer = json.loads(headers["X-Marrow-About"])["layers"][0]
         self.assertEqual(drawn[:2], [layer["u_px"], layer["columns"]])

@@ -21,8 +21,8 @@ import unittest
 import yaml
 
 import bench
-import place_test
-from place_test import at, seen, times
+import placing
+from placing import at, seen, times
 
 WRIST = pathlib.Path(sys.argv[3]) if len(sys.argv) > 3 else pathlib.Path("nowhere")
 PICTURES = pathlib.Path(sys.argv[4]) if len(sys.argv) > 4 else None
@@ -80,7 +80,7 @@ def make_case(folder):
     (folder / "case.yaml").write_text(json.dumps(case))
 
 
-class Wrist(place_test.PageOfCase, bench.PageTest):
+class Wrist(placing.PageOfCase, bench.PageTest):
     bone = "radius"
 
     def setUp(self):
@@ -116,23 +116,21 @@ class Wrist(place_test.PageOfCase, bench.PageTest):
         """Keys that turn the bone about its long axis until it looks as it should."""
         for step, key, other in ((5, "a", "d"), (1, "a", "d")):
             self.js("document.querySelector('.place-tools [data-value=\"%d\"]').click()" % step)
-            best = place_test.angle_deg(self.pose(), goal)
+            best = placing.angle_deg(self.pose(), goal)
             for name in (key, other):
                 while True:
-                    before = self.pose()
                     self.browser.key(name, "[data-view=camera1]")
-                    now = place_test.angle_deg(self.pose(), goal)
+                    now = placing.angle_deg(self.pose(), goal)
                     if now >= best:
                         self.browser.key(other if name == key else key, "[data-view=camera1]")
                         break
                     best = now
-                    del before
             self.kept()
 
     def off(self, pose, goal):
         return "%.2f mm and %.2f degrees" % (
             math.dist(self.middle(pose), self.middle(goal)),
-            place_test.angle_deg(pose, goal),
+            placing.angle_deg(pose, goal),
         )
 
     def picture(self, name):

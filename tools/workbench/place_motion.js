@@ -49,8 +49,7 @@ const PlaceMotion = (() => {
     return Geometry.rotation(length(across) > 0.05 ? across : direction(camera, [1, 0, 0]), angle_rad, middle_mm);
   }
 
-  // The angle of a roll for a pointer that went across the bone's axis: a tenth of a degree for each tenth of a
-  // millimetre, which is about what a finger does on a bone of the width of a thumb.
+  // The angle of a roll for a pointer that went across the bone's axis: a degree for each millimetre.
   function rollAngle(camera, axis, middle_mm, from, to) {
     const at_mm = depth_mm(camera, middle_mm), away = unit(minus(middle_mm, source_mm(camera)));
     const across = Geometry.cross(axis, away);
@@ -59,15 +58,5 @@ const PlaceMotion = (() => {
     return Geometry.dot(went, unit(across)) * Math.PI / 180;
   }
 
-  // A whole-number-free step between two poses: the rotation turns evenly about one axis, the middle goes straight.
-  function between(from, to, middle_mm, fraction) {
-    const change = Geometry.multiply(to, inverse(from));
-    const cosine = Math.max(-1, Math.min(1, (change[0][0] + change[1][1] + change[2][2] - 1) / 2));
-    const angle = Math.acos(cosine), a = moved(from, middle_mm), b = moved(to, middle_mm);
-    const axis = [change[2][1] - change[1][2], change[0][2] - change[2][0], change[1][0] - change[0][1]];
-    const turn = length(axis) > 1e-9 ? Geometry.rotation(axis, fraction * angle, a) : Geometry.identity();
-    return Geometry.multiply(Geometry.shift(times(minus(b, a), fraction)), Geometry.multiply(turn, from));
-  }
-
-  return {direction, shiftInView, turnInView, angleAbout, shiftInDepth, roll, rollAngle, tip, between};
+  return {direction, shiftInView, turnInView, angleAbout, shiftInDepth, roll, rollAngle, tip};
 })();
