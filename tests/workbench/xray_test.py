@@ -208,7 +208,7 @@ class LandmarksTest(XrayTest):
 
     def test_too_few_landmarks(self):
         self.begin({"views": self.views, "landmarks": self.landmarks()[:2]})
-        self.wait_text("[data-fit]", "if two views show three of them")
+        self.wait_text("[data-fit]", "if two views show three")
         self.assertFalse(self.find('[data-do="use-as-start"]').is_enabled())
 
 

@@ -12,10 +12,7 @@ const XrayAdd = (() => {
   // The keys of docs/case.md: [key, label, first value, least, most].
   const C_ARM = [
     ['alpha_deg', 'Cranio-caudal angle, degrees: positive if the detector is towards the head', 0, -90, 90],
-    [
-      'beta_deg', 'Right/left anterior angle, degrees: positive if the detector is on the patient’s left', 0, -180,
-      180
-    ],
+    ['beta_deg', 'Right/left anterior angle, degrees: positive if the detector is on the patient’s left', 0, -180, 180],
     ['source_to_detector_mm', 'Source to detector, mm', 1000, 1, 10000],
     ['source_to_isocentre_mm', 'Source to isocentre, mm', 600, 1, 10000],
     ['pixel_mm', 'Size of a pixel on the detector, mm', 0.3, 0.001, 100]

@@ -81,10 +81,9 @@ const XrayTable = (() => {
       const {fit, fit_fault} = bench;
       state.className = fit_fault ? 'fault' : 'note';
       state.textContent = fit_fault ||
-          (fit ?
-               `Fitted pose: ${figure(fit.residual_px)} px root mean square` +
+          (fit ? `Fitted pose: ${figure(fit.residual_px)} px root mean square` +
                    (fit.warnings.length ? '. ' + fit.warnings.join(' ') : '') :
-               'Landmarks that also have a place in the CT give the pose of the bone, if two views show three of them.');
+                 'Landmarks that have a place in the CT, too, give the pose of the bone, if two views show three.');
       command.hidden = !fit;
       if (fit) command.replaceChildren(command.firstChild, Dom.command(fit.command));
       place.replaceChildren(
