@@ -79,9 +79,9 @@ std::string overlay_bytes(const OverlayWish& wish, nlohmann::json& about);
 /// of a registration.
 nlohmann::json costs_of(const PlacedCase& placed, const PlacedBone& bone, const RigidTransform& world_from_model);
 
-/// Writes a pose file for each bone into a new folder `placed/CASE/NUMBER` of the opened folder, and returns its path
+/// Writes a pose file for each bone into a new folder `INTO/CASE/NUMBER` of the opened folder, and returns its path
 /// relative to that. A folder that holds the same poses is taken again.
-std::string write_starts(const OpenedFolder& folder, const PlacedCase& placed,
+std::string write_starts(const OpenedFolder& folder, const std::string& into, const PlacedCase& placed,
                          const std::map<std::string, RigidTransform>& poses);
 
 /// Pipelines that register a case from its starts: [{file, name, help}], those of marrow first. `file` is relative to

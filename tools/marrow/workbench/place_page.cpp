@@ -10,6 +10,8 @@ namespace {
 using nlohmann::json;
 
 constexpr int kCoarsest_px = 16;
+/// Poses that are only judged, at each pause, are not shown among the files of the folder.
+constexpr const char* kHidden = ".marrow/placed";
 
 /// What the page needs of an opened case.
 json about_case(const PlacedCase& placed) {
@@ -80,8 +82,8 @@ Answer overlay(const PlacedCase& placed, const Request& request) {
 
 /// Begins a job that runs a pipeline from the poses of the request.
 json start_from(const Request& request, const PlacedCase& placed, Workbench& workbench, const std::string& title,
-                const std::filesystem::path& pipeline, const std::string& shown) {
-  const std::string starts = write_starts(workbench.folder, placed, poses_in(request));
+                const std::string& into, const std::filesystem::path& pipeline, const std::string& shown) {
+  const std::string starts = write_starts(workbench.folder, into, placed, poses_in(request));
   const std::string command = command_from_starts(workbench, shown, placed.path, starts);
   const std::string job =
       workbench.jobs.start(title, command, [&workbench, pipeline, path = placed.path, starts](Job& j) {
@@ -122,14 +124,14 @@ void add_place_page(Server& server, Workbench& workbench) {
   server.post("/api/place/verdict", [&workbench, cases](const Request& request) {
     const std::filesystem::path file = workbench_pipeline("place_verdict");
     return json_answer(
-        start_from(request, *cases->find(request.text("case")), workbench, "Verdict", file, file.string()));
+        start_from(request, *cases->find(request.text("case")), workbench, "Verdict", kHidden, file, file.string()));
   });
   server.post("/api/place/register", [&workbench, cases](const Request& request) {
     const std::string pipeline = request.text("pipeline");
     const json known = pipelines_from_starts(workbench);
     if (std::none_of(known.begin(), known.end(), [&](const json& one) { return one["file"] == pipeline; }))
       throw Error("this pipeline cannot start from a placement; choose one of the list");
-    return json_answer(start_from(request, *cases->find(request.text("case")), workbench, "Registration",
+    return json_answer(start_from(request, *cases->find(request.text("case")), workbench, "Registration", "placed",
                                   workbench.folder.path() / pipeline, pipeline));
   });
 }

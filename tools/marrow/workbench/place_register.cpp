@@ -81,7 +81,7 @@ std::string shown_path(const OpenedFolder& folder, const fs::path& path) {
 
 }  // namespace
 
-std::string write_starts(const OpenedFolder& folder, const PlacedCase& placed,
+std::string write_starts(const OpenedFolder& folder, const std::string& into, const PlacedCase& placed,
                          const std::map<std::string, RigidTransform>& poses) {
   constexpr int kMost = 100'000;
   std::map<std::string, std::string> texts;
@@ -93,7 +93,7 @@ std::string write_starts(const OpenedFolder& folder, const PlacedCase& placed,
     pose.frame = bone.frame;
     texts[file_name_of(bone.name) + ".yaml"] = files::pose(pose);
   }
-  const std::string all = "placed/" + file_name_of(placed.path);
+  const std::string all = into + "/" + file_name_of(placed.path);
   for (int number = 1; number < kMost; ++number) {
     const std::string name = all + "/" + std::to_string(number);
     const fs::path place = folder.inside(name);
