@@ -24,7 +24,8 @@ FILES = """
 """
 SCRIPTS = [REPORT / (name + ".js") for name in ("dom", "orbit", "graph")]
 SCRIPTS += [FOLDER / (name + ".js") for name in FILES.split()]
-STYLES = [REPORT / "report.css", FOLDER / "workbench.css"]
+STYLES = [REPORT / "report.css"]
+STYLES += [FOLDER / (name + ".css") for name in "workbench ct xray place pipeline".split()]
 
 
 def main():

@@ -70,7 +70,7 @@
             el('div', {class: 'scroll', tabindex: 0, role: 'region', 'aria-label': 'Runs and comparisons'},
                el('table', {class: 'results'},
                   el('thead', {},
-                     el('tr', {}, head(el('span', {class: 'unseen'}, 'Compare')), head('Folder'), head('When'),
+                     el('tr', {}, head(el('span', {class: 'hidden'}, 'Compare')), head('Folder'), head('When'),
                         head('Verdict'), head('Figures of merit'))),
                   el('tbody', {}, results.map(row)))) :
             el('p', {class: 'note'}, 'There is no run in ' + folder + ' yet. The page "Pipeline" makes some.'));

@@ -118,7 +118,7 @@ const XrayTable = (() => {
     const table =
         el('div', {class: 'scroll'},
            el('table', {class: 'landmarks'},
-              el('thead', {}, el('tr', {}, head, el('th', {scope: 'col'}, el('span', {class: 'unseen'}, 'Actions')))),
+              el('thead', {}, el('tr', {}, head, el('th', {scope: 'col'}, el('span', {class: 'hidden'}, 'Actions')))),
               body));
     const fit = fitPart(bench);
     const update = () => {
