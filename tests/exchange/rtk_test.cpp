@@ -166,7 +166,7 @@ TEST(Rtk, DiagnosesWhatTheImageLacks) {
   EXPECT_SAYS(
       read(folder / "g.xml", {{"mirror", "none"}}),
       "g.xml: projection 0: its images are seen from the detector, or have their rows from below; turn them over "
-      "by mirror: left_right or upside_down of read.view or read.image, and give the same mirror here");
+      "by mirror: left_right or upside_down when they are read, and give the same mirror here");
   EXPECT_SAYS(read(folder / "g.xml", {{"size_px", std::vector<double>{}}}),
               "g.xml: projection 0: does not say how many pixels the image has; wire the image, or give size_px");
   EXPECT_SAYS(read(folder / "g.xml", {{"pixel_mm", std::vector<double>{}}}),

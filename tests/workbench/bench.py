@@ -15,7 +15,9 @@ import unittest
 SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
 MARROW = BUILD / "bin" / "marrow"
 sys.path.insert(0, str(SOURCE / "tests" / "report"))
+sys.path.insert(0, str(SOURCE / "tests"))
 import browser as chromium  # noqa: E402
+from sample import sample  # noqa: E402
 
 
 class Server:
@@ -135,9 +137,23 @@ class PageTest(BenchTest):
         self.browser.wait("return document.documentElement.dataset.ready === '%s'" % name, seconds)
 
 
-def main():
+def named_tests(suite):
+    """The ids of the tests in a suite of unittest, as they are given on the command line: Class.test."""
+    for one in suite:
+        if isinstance(one, unittest.TestSuite):
+            yield from named_tests(one)
+        else:
+            yield ".".join(one.id().split(".")[-2:])
+
+
+def main(part=3):
+    """Runs the tests that the command line names; without names, one of `part` of them, another each day."""
     missing = chromium.missing()
     if missing:
         print("skipped:", missing)
         sys.exit(77)
-    unittest.main(argv=sys.argv[:1] + sys.argv[3:], verbosity=2)
+    names = sys.argv[3:]
+    if not names:
+        every = list(named_tests(unittest.defaultTestLoader.loadTestsFromModule(sys.modules["__main__"])))
+        names = sample(every, max(4, len(every) // part))
+    unittest.main(argv=sys.argv[:1] + names, verbosity=2)

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""The whole way in the browser: from a DICOM CT, two X-rays and the C-arm's angles to a registered pose. Mouse clicks are
-counted, and the command line finds the same pose from the saved case."""
+"""The whole way in the browser: from a DICOM CT, two X-rays and the C-arm's angles to a registered pose. Mouse clicks
+are counted, and the command line finds the same pose from the saved case."""
 import json
 import os
 import shlex

@@ -9,7 +9,7 @@ const XrayFrame = (() => {
   // press() returns {move(pixel), end(pixel), cancel()}, or nothing if the image is to be moved instead. said(text)
   // gets what is under the pointer.
   function make(name, tool) {
-    const canvas = el('canvas', {});
+    const canvas = el('canvas', {role: 'img', 'aria-label': 'X-ray ' + name});
     const overlay = svg('svg', {class: 'xray-marks', 'aria-hidden': 'true'});
     const box =
         el('div', {

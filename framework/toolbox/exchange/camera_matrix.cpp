@@ -82,7 +82,7 @@ Camera camera_of(const Eigen::Matrix<double, 3, 4>& pixel_from_world, const Eige
   if (f_u < 0 && mirror == Mirror::none)
     throw Error(what +
                 ": its images are seen from the detector, or have their rows from below; turn them over by mirror: "
-                "left_right or upside_down of read.view or read.image, and give the same mirror here");
+                "left_right or upside_down when they are read, and give the same mirror here");
   if (f_u < 0) throw Error(what + ": its images are seen from the source as marrow's are; leave mirror out");
   Camera camera;
   camera.width_px = size_px.x();
