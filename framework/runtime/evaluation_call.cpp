@@ -110,7 +110,9 @@ void Evaluation::make_inputs(const NodeDefinition& definition, std::vector<Value
   for (std::size_t i = 0; i < inputs.size(); ++i)
     for_leaves(inputs[i], [&](Value& leaf) {
       if (leaf.data || !leaf.source) return;
-      leaf.data = leaf.source->data(definition.info.inputs[i].type);
+      const TypeInfo& type = definition.info.inputs[i].type;
+      leaf.data = leaf.source->data(type);
+      leaf.type.content = type.content;  // what is read back does not know it, and another process may need it
     });
 }
 

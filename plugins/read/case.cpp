@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads a case: a patient's folder with case.yaml. This file names all other files of the case (docs/case.md).
+#include <charconv>
+#include <map>
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/names.hpp"
@@ -18,6 +20,7 @@ constexpr std::size_t kMostViews = 1000;
 
 struct Options {
   fs::path path;
+  fs::path starts;
 };
 
 /// The file that a key names. The key of this node's result covers only the content of the case's folder, so no file
@@ -194,6 +197,43 @@ void read_fragments(const YamlMap& map, marrow::Case& result) {
               "fragments: some of the fragments to register have a truth; give it for all of them or for none");
 }
 
+/// The name of a fragment from that of its file, in which some characters are written as in web addresses.
+std::string decoded(const std::string& file_name) {
+  std::string name;
+  for (std::size_t i = 0; i < file_name.size(); ++i) {
+    unsigned byte = 0;
+    const char* code = file_name.data() + i + 1;
+    const bool is_code =
+        file_name[i] == '%' && i + 2 < file_name.size() && std::from_chars(code, code + 2, byte, 16).ptr == code + 2;
+    name += is_code ? char(byte) : file_name[i];
+    if (is_code) i += 2;
+  }
+  return name;
+}
+
+/// The poses in a folder that holds a file FRAGMENT.yaml for each fragment to register.
+marrow::List<marrow::Pose> read_starts(const fs::path& folder, const marrow::List<marrow::Seeds>& fragments) {
+  std::error_code failure;
+  if (!fs::is_directory(folder, failure))
+    throw marrow::Error(folder.string() +
+                        ": expected a folder with a pose for each fragment, such as the output 'pose' of a run");
+  std::map<std::string, fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    if (entry.path().extension() == ".yaml") files[decoded(entry.path().stem().string())] = entry.path();
+  marrow::List<marrow::Pose> starts;
+  for (std::size_t i = 0; i < fragments.size(); ++i) {
+    if (!fragments[i].wanted) continue;
+    const auto file = files.find(fragments.name(i));
+    if (file == files.end())
+      throw marrow::Error(folder.string() + ": there is no pose of the fragment '" + fragments.name(i) +
+                          "'; a pose file is named after its fragment, such as distal.yaml");
+    marrow::Pose start;
+    start.world_from_model = marrow::files::read_pose_file(file->second).world_from_model;
+    starts.add(fragments.name(i), start);
+  }
+  return starts;
+}
+
 marrow::Case read_case(const Options& options) {
   std::error_code failure;
   if (!fs::is_directory(options.path, failure))
@@ -209,6 +249,7 @@ marrow::Case read_case(const Options& options) {
   read_views(options.path, map, result);
   read_ct(options.path, map, result);
   file.finish();
+  if (!options.starts.empty()) result.start = read_starts(options.starts, result.seeds);
   return result;
 }
 
@@ -225,5 +266,8 @@ MARROW_PLUGIN(plugin) {
       .out("views", &Case::views, "X-ray views with cameras", marrow::over("view"))
       .out("start", &Case::start, "pose to start from, if the case gives one", marrow::over("fragment"))
       .out("truth", &Case::truth, "exact pose, if the case gives one (simulated cases)", marrow::over("fragment"))
-      .option("path", &Options::path, "folder of the case, with case.yaml", marrow::required());
+      .option("path", &Options::path, "folder of the case, with case.yaml", marrow::required())
+      .option("starts", &Options::starts,
+              "folder with a pose file for each fragment, such as the output 'pose' of a run; these poses take the "
+              "place of the case's starts");
 }

@@ -8,9 +8,12 @@ namespace {
 struct Options {
   std::filesystem::path path;
   int frame = 0;
+  std::string mirror = "none";
 };
 
-marrow::Image image(const Options& options) { return marrow::files::read_image_file(options.path, options.frame); }
+marrow::Image image(const Options& options) {
+  return marrow::files::turned_over(marrow::files::read_image_file(options.path, options.frame), options.mirror);
+}
 
 }  // namespace
 
@@ -22,5 +25,8 @@ MARROW_PLUGIN(plugin) {
            "mirrored and inverted if needed, so that it fits the camera of its header")
       .option("path", &Options::path, "image file", marrow::required())
       .option("frame", &Options::frame, "frame of a multi-frame file, counted from 1; 0: the file has only one frame",
-              marrow::at_least(0));
+              marrow::at_least(0))
+      .option("mirror", &Options::mirror,
+              "turns the image over, if it is seen from the detector or has its rows from below",
+              marrow::one_of({"none", "left_right", "upside_down"}));
 }

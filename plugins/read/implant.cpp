@@ -2,7 +2,7 @@
 #include <marrow/plugin.hpp>
 #include <tuple>
 
-#include "marrow/toolbox/files/mesh_file.hpp"
+#include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
 
@@ -57,7 +57,7 @@ std::vector<Hole> read_holes(const std::filesystem::path& path) {
 std::tuple<Implant, Mesh> implant(const Options& options) {
   Implant implant;
   implant.holes = read_holes(options.holes);
-  implant.surface = files::read_mesh_file(options.surface, options.scale);
+  implant.surface = exchange::read_surface_file(options.surface, options.scale);
   implant.surface.frame = "implant";
   geometry::check_implant(implant, "read.implant: " + options.surface.string());
   return {implant, implant.surface};
@@ -67,11 +67,11 @@ std::tuple<Implant, Mesh> implant(const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.implant", implant)
-      .summary("Reads an implant: its closed surface from STL or PLY, and its holes from YAML")
+      .summary("Reads an implant: its closed surface from STL, PLY, OBJ or VTP, and its holes from YAML")
       .out("implant", "surface and holes, in mm")
       .out("surface", "the surface alone")
       .option("holes", &Options::holes, "YAML file with the centre, the axis and the diameter of each hole", required())
-      .option("surface", &Options::surface, "STL or PLY file", required())
+      .option("surface", &Options::surface, "file of the surface: .stl, .ply, .obj or .vtp", required())
       .option("scale", &Options::scale, "factor that converts the surface's unit to mm: 1000 for metres",
               at_least(1e-6));
 }

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/names.hpp"
+#include "marrow/toolbox/exchange/marked_values.hpp"
+#include "marrow/toolbox/exchange/xreg_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 
 namespace {
@@ -11,6 +14,10 @@ using files::FreeKeys, files::YamlFile, files::YamlMap;
 
 struct Options {
   std::filesystem::path path;
+  std::string fragment = "bone";
+  std::filesystem::path seen;
+  std::vector<std::string> views;
+  std::string mirror = "none";
 };
 
 /// Notes a fault if the points in the CT have none with the name of a seen or tracked point.
@@ -53,11 +60,45 @@ Landmarks landmarks_of(const YamlMap& fragment, YamlFile& file) {
   return landmarks;
 }
 
+/// Adds where xReg's projections show the landmarks.
+void add_seen(Landmarks& landmarks, const Options& options) {
+  const std::string what = options.seen.string();
+  const std::vector<exchange::XregProjection> projections = exchange::read_xreg(options.seen);
+  if (options.views.size() != projections.size())
+    throw Error(what + ": has " + std::to_string(projections.size()) +
+                " projections; give in views as many names, got " + std::to_string(options.views.size()));
+  for (std::size_t i = 0; i < projections.size(); ++i) {
+    check_item_name("view", options.views[i]);
+    for (const auto& shown : exchange::landmarks_of(projections[i], exchange::mirror_of(options.mirror))) {
+      const auto is_it = [&](const Landmarks::Point& point) { return point.name == shown.name; };
+      if (std::none_of(landmarks.points.begin(), landmarks.points.end(), is_it))
+        throw Error(what + ": projection " + std::to_string(i) + " shows '" + shown.name + "', which " +
+                    options.path.string() + " has not; give its place in the CT there");
+      landmarks.seen.push_back({shown.name, options.views[i], shown.pixel});
+    }
+  }
+}
+
+List<Landmarks> marked_landmarks(const Options& options) {
+  check_item_name("fragment", options.fragment);
+  Landmarks landmarks = exchange::read_marked_landmarks(options.path);
+  if (!options.seen.empty()) add_seen(landmarks, options);
+  List<Landmarks> by_fragment;
+  by_fragment.add(options.fragment, std::move(landmarks));
+  return by_fragment;
+}
+
 List<Landmarks> landmarks(const Options& options) {
+  if (options.seen.empty() && (!options.views.empty() || options.mirror != "none"))
+    throw Error(options.path.string() + ": views and mirror are about the file of seen; give it, or leave them out");
+  if (exchange::is_markups_file(options.path)) return marked_landmarks(options);
+  if (!options.seen.empty())
+    throw Error(options.path.string() +
+                ": says itself where views show the landmarks; seen is only for points of 3D Slicer, so leave it out");
+  List<Landmarks> landmarks;
   YamlFile file(options.path);
   const YamlMap map(file, file.root(), "landmarks", {"marrow-landmarks", "fragments"});
   files::check_version(map, "marrow-landmarks");
-  List<Landmarks> landmarks;
   if (const auto fragments = map.required("fragments")) {
     const YamlMap by_name(file, *fragments, "fragments", FreeKeys{});
     if (by_name.valid() && by_name.keys().empty())
@@ -77,8 +118,16 @@ MARROW_PLUGIN(plugin) {
   plugin.node("read.landmarks", landmarks)
       .summary(
           "Reads landmarks or markers of each fragment from marrow's YAML: their positions in the CT, in the images, "
-          "and in the world as measured by a tracking system")
+          "and in the world as measured by a tracking system; or their positions in the CT from 3D Slicer's points")
       .out("landmarks", "points in CT coordinates (mm), in pixels of views, and in world coordinates (mm)",
            over("fragment"))
-      .option("path", &Options::path, "file with landmarks", required());
+      .option("path", &Options::path,
+              "file with landmarks; .mrk.json or .fcsv: 3D Slicer's points, any other: marrow's YAML", required())
+      .option("fragment", &Options::fragment, "only for 3D Slicer's files: the fragment of the points")
+      .option(
+          "seen", &Options::seen,
+          "only for 3D Slicer's files: projection data of xReg (.h5), which say where its images show the landmarks")
+      .option("views", &Options::views, "names of the views that xReg's projections are, in their order")
+      .option("mirror", &Options::mirror, "how xReg's images are turned over before use, as for read.camera",
+              one_of({"none", "left_right", "upside_down"}));
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/files/mesh_file.hpp"
+#include "marrow/toolbox/exchange/surface_file.hpp"
 
 namespace {
 
@@ -12,7 +12,7 @@ struct Options {
 };
 
 marrow::Mesh mesh(const Options& options, marrow::Context& context) {
-  marrow::Mesh mesh = marrow::files::read_mesh_file(options.path, options.scale);
+  marrow::Mesh mesh = marrow::exchange::read_surface_file(options.path, options.scale);
   mesh.frame = options.frame;
   const auto largest = [&] {
     Eigen::AlignedBox3d box;
@@ -29,9 +29,11 @@ marrow::Mesh mesh(const Options& options, marrow::Context& context) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.mesh", mesh)
-      .summary("Reads a triangle surface from STL or PLY; equal vertices are merged")
+      .summary("Reads a surface from STL, PLY, OBJ or VTP; equal vertices are merged")
       .out("mesh", "the surface in mm")
-      .option("path", &Options::path, "STL or PLY file", marrow::required())
+      .option("path", &Options::path,
+              "file; its end says the format: .stl, .ply, .obj or .vtp; where an .obj or .vtp says RAS, it becomes LPS",
+              marrow::required())
       .option("scale", &Options::scale, "factor that converts the file's unit to mm: 1000 for metres",
               marrow::at_least(1e-6))
       .option("frame", &Options::frame,

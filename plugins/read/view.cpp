@@ -11,13 +11,14 @@ struct Options {
   std::filesystem::path camera;
   std::filesystem::path calibration;
   int frame = 0;
+  std::string mirror = "none";
 };
 
 marrow::View view(const marrow::Camera* camera, const Options& options) {
   if (!camera && options.camera.empty())
     throw marrow::Error("view '" + options.name + "': the node that is wired to 'camera' gave none");
   return marrow::files::read_view_files(
-      {options.name, options.image, camera, options.camera, options.calibration, options.frame});
+      {options.name, options.image, camera, options.camera, options.calibration, options.frame, options.mirror});
 }
 
 }  // namespace
@@ -35,5 +36,9 @@ MARROW_PLUGIN(plugin) {
               "calibration file; its camera matrix replaces that of the camera, and its distortion is removed from the "
               "image")
       .option("frame", &Options::frame, "frame of a multi-frame file, counted from 1; 0: the file has only one frame",
-              marrow::at_least(0));
+              marrow::at_least(0))
+      .option("mirror", &Options::mirror,
+              "turns the image over, if it is seen from the detector or has its rows from below; the camera must be "
+              "that of the image that was turned over, as read.camera gives it with the same option",
+              marrow::one_of({"none", "left_right", "upside_down"}));
 }

@@ -11,6 +11,7 @@ struct Options {
   std::vector<std::filesystem::path> cameras;
   std::filesystem::path calibration;
   int frame = 0;
+  std::string mirror = "none";
 };
 
 marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, const Options& options) {
@@ -18,10 +19,10 @@ marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, co
   marrow::List<marrow::View> views;
   for (std::size_t i = 0; i < options.names.size(); ++i) {
     const std::string& name = options.names[i];
-    views.add(name,
-              marrow::files::read_view_files(
-                  {name, options.images.at(i), cameras ? &marrow::files::camera_of(name, *cameras) : nullptr,
-                   cameras ? std::filesystem::path() : options.cameras.at(i), options.calibration, options.frame}));
+    views.add(name, marrow::files::read_view_files({name, options.images.at(i),
+                                                    cameras ? &marrow::files::camera_of(name, *cameras) : nullptr,
+                                                    cameras ? std::filesystem::path() : options.cameras.at(i),
+                                                    options.calibration, options.frame, options.mirror}));
   }
   return views;
 }
@@ -45,5 +46,10 @@ MARROW_PLUGIN(plugin) {
               "calibration file of the device that took all views; its camera matrix replaces those of the cameras, "
               "and its distortion is removed from the images")
       .option("frame", &Options::frame, "frame of a multi-frame file, counted from 1; 0: the file has only one frame",
-              marrow::at_least(0));
+              marrow::at_least(0))
+      .option(
+          "mirror", &Options::mirror,
+          "turns all images over, if they are seen from the detector or have their rows from below; the cameras must "
+          "be those of the images that were turned over, as read.cameras gives them with the same option",
+          marrow::one_of({"none", "left_right", "upside_down"}));
 }

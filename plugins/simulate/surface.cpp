@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/field/mesh_field.hpp"
-#include "marrow/toolbox/files/mesh_file.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 #include "marrow/toolbox/phantom/polygonise.hpp"
 #include "marrow/toolbox/phantom/shape_functions.hpp"
@@ -31,7 +31,7 @@ struct SurfaceOptions {
 };
 
 Mesh placed(const std::filesystem::path& path, const SurfaceOptions& options) {
-  Mesh mesh = files::read_mesh_file(path, 1);
+  Mesh mesh = exchange::read_surface_file(path, 1);
   const auto about = [&](std::size_t k, const Eigen::Vector3d& axis) {
     return Eigen::AngleAxisd(radians(options.rotation_deg[k]), axis).toRotationMatrix();
   };
@@ -102,9 +102,9 @@ Bone surface(const SurfaceOptions& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.surface", surface)
-      .summary("Makes a bone from closed surfaces in files (STL or PLY)")
+      .summary("Makes a bone from closed surfaces in files (STL, PLY, OBJ or VTP)")
       .out("bone", "bone with a closed outer and a closed inner surface")
-      .option("outer", &SurfaceOptions::outer, "file of the outer surface, STL or PLY", required())
+      .option("outer", &SurfaceOptions::outer, "file of the outer surface: .stl, .ply, .obj or .vtp", required())
       .option("inner", &SurfaceOptions::inner,
               "file of the endosteal surface; empty: solid cortical bone, or as cortex_mm says")
       .option("cortex_mm", &SurfaceOptions::cortex_mm,

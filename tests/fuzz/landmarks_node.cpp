@@ -5,4 +5,8 @@
 
 #include "plugins/read/landmarks.cpp"
 
-void marrow::fuzz::read_landmarks(const std::filesystem::path& path) { landmarks({path}); }
+void marrow::fuzz::read_landmarks(const std::filesystem::path& path) {
+  Options options;
+  options.path = path;
+  landmarks(options);
+}

@@ -104,6 +104,40 @@ TEST_F(ReadCase, WithoutStartAndTruthTheirListsAreEmpty) {
   EXPECT_TRUE(read().truth.empty());
 }
 
+const std::string kPose = R"(marrow-pose: 1
+target: world
+source: ct
+matrix: [[1, 0, 0, 7], [0, 1, 0, 8], [0, 0, 1, 9], [0, 0, 0, 1]]
+)";
+
+TEST_F(ReadCase, StartsOfAnotherFolderTakeThePlaceOfItsOwn) {
+  const TemporaryFolder starts;
+  put(starts / "distal.yaml", kPose);
+  const marrow::Case value = case_at(folder.path(), starts.path());
+  ASSERT_EQ(value.start.names(), std::vector<std::string>{"distal"});
+  EXPECT_EQ(value.start[0].world_from_model.translation_mm, Eigen::Vector3d(7, 8, 9));
+  EXPECT_EQ(value.truth[0].world_from_model.translation_mm, Eigen::Vector3d(4, 5, 6));
+}
+
+TEST_F(ReadCase, StartsOfAFragmentWhoseNameIsNoFileName) {
+  const TemporaryFolder starts;
+  put(folder / "case.yaml", with(kCase, "  distal:", "  \"a/b%\":"));
+  put(starts / "a%2Fb%25.yaml", kPose);
+  EXPECT_EQ(case_at(folder.path(), starts.path()).start.names(), std::vector<std::string>{"a/b%"});
+}
+
+TEST_F(ReadCase, StartsThatAreMissing) {
+  const TemporaryFolder starts;
+  const auto message = [&](const auto& place) { return message_of([&] { case_at(folder.path(), place); }); };
+  EXPECT_EQ(message(starts / "nowhere"), (starts / "nowhere").string() +
+                                             ": expected a folder with a pose for each fragment, such as the output "
+                                             "'pose' of a run");
+  put(starts / "proximal.yaml", kPose);
+  EXPECT_EQ(message(starts.path()), starts.path().string() +
+                                        ": there is no pose of the fragment 'distal'; a pose file is named after its "
+                                        "fragment, such as distal.yaml");
+}
+
 TEST_F(ReadCase, CtWithWhatItsFileDoesNotSay) {
   put(folder / "case.yaml",
       with(kCase, "ct: ct.mha", "ct: {file: ct.mha, voxel_size_mm: [1, 2, 3], value_offset_hu: -1024, flip: [z]}"));

@@ -24,6 +24,17 @@ ItkGrid<T> ramp(unsigned width, unsigned height, double step) {
   return grid;
 }
 
+TEST(ReadImage, IsTurnedOverWhereThatIsAskedFor) {
+  const TemporaryFolder folder;
+  write_itk(folder / "a.png", ramp<std::uint8_t>(7, 5, 1));
+  const auto turned = [&](const std::string& mirror) {
+    return marrow::test::read_by<marrow::Image>("read.image", folder / "a.png", {{"mirror", mirror}}).pixels;
+  };
+  EXPECT_EQ(turned("none").at<std::uint8_t>(1, 2), 7 + 2);
+  EXPECT_EQ(turned("left_right").at<std::uint8_t>(1, 7 - 1 - 2), 7 + 2);
+  EXPECT_EQ(turned("upside_down").at<std::uint8_t>(5 - 1 - 1, 2), 7 + 2);
+}
+
 TEST(ReadImage, KeepsBitsAndOrientation) {
   const TemporaryFolder folder;
   for (const char* name : {"a.png", "a.tif"}) {

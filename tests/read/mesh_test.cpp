@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "marrow/toolbox/files/mesh_file.hpp"
 #include "read/files.hpp"
 #include "read/reading.hpp"
 
@@ -161,8 +162,9 @@ TEST(ReadMesh, HeadersThatClaimTooMuchAreRefused) {
   EXPECT_SAYS(read(folder / "empty.stl"), "empty.stl");
   put(folder / "nan.stl", with(stl_text(), "1.000000", "nan"));
   EXPECT_SAYS(read(folder / "nan.stl"), "nan.stl");
-  put(folder / "a.obj", "v 0 0 0");
-  EXPECT_SAYS(read(folder / "a.obj"), "known are .stl and .ply");
+  put(folder / "a.off", "OFF");
+  EXPECT_SAYS(read(folder / "a.off"), "known are .stl, .ply, .obj and .vtp");
+  EXPECT_SAYS(marrow::files::read_mesh_file(folder / "a.off", 1), "known are .stl and .ply");
 }
 
 TEST(ReadMesh, MoreThanTheHeaderClaimsIsRefused) {

@@ -17,8 +17,10 @@ T read_by(const std::string& node, const std::filesystem::path& path, shipped::O
   return shipped::call(node, {}, options, context).begin()->second.as<T>();
 }
 
-inline Case case_at(const std::filesystem::path& folder) {
-  const shipped::Outputs outputs = shipped::call("read.case", {}, {{"path", folder.string()}});
+/// `starts`: the folder of poses that take the place of the case's starts; empty for none.
+inline Case case_at(const std::filesystem::path& folder, const std::filesystem::path& starts = {}) {
+  const shipped::Outputs outputs =
+      shipped::call("read.case", {}, {{"path", folder.string()}, {"starts", starts.string()}});
   Case read;
   read.ct = outputs.at("ct").as<Volume>();
   read.seeds = outputs.at("seeds").as_list<Seeds>();

@@ -30,6 +30,21 @@ TEST(ReadView, TakesItsCameraFromAFileOrAValue) {
               "view 'frontal': the image has 6 x 4 pixels, but its camera is for 7 x 4");
 }
 
+// The camera is that of the image that was turned over, so it stays as it is.
+TEST(ReadView, TheImageIsTurnedOverAndItsCameraStays) {
+  const marrow::test::TemporaryFolder folder;
+  marrow::test::ItkGrid<std::uint8_t> pixels{.size = {6, 4}};
+  for (std::uint8_t i = 0; i < 24; ++i) pixels.samples.push_back(i);
+  write_itk(folder / "a.png", pixels);
+  marrow::Camera camera{6, 4, Eigen::Matrix3d::Identity(), {"camera", "world"}};
+  const marrow::View view = shipped::call("read.view", {{"camera", shipped::item(camera)}},
+                                          {{"image", (folder / "a.png").string()}, {"mirror", "upside_down"}})
+                                .at("view")
+                                .as<marrow::View>();
+  EXPECT_EQ(view.image.pixels.at<std::uint8_t>(0, 2), 3 * 6 + 2);
+  EXPECT_EQ(marrow::hash_of(view.camera), marrow::hash_of(camera));
+}
+
 TEST(ReadView, ValuesThatGoThroughATableAreRefused) {
   const marrow::test::TemporaryFolder folder;
   auto elements = marrow::test::fluoroscopy();

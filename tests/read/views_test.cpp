@@ -37,6 +37,14 @@ class ReadViews : public testing::Test {
   shipped::Options options;
 };
 
+TEST_F(ReadViews, AllImagesAreTurnedOver) {
+  ItkGrid<std::uint8_t> pixels{.size = {6, 4}};
+  for (std::uint8_t i = 0; i < 24; ++i) pixels.samples.push_back(i);
+  write_itk(folder / "b.png", pixels);
+  options["mirror"] = "left_right";
+  EXPECT_EQ(views()[1].image.pixels.at<std::uint8_t>(1, 6 - 1 - 2), 6 + 2);
+}
+
 TEST_F(ReadViews, ImagesWithTheirCameras) {
   const auto value = views();
   EXPECT_EQ(value.names(), (std::vector<std::string>{"one", "two"}));

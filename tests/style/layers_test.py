@@ -23,6 +23,7 @@ TOPICS = {
     "analytic": {"image"},
     "calibration": {"files"},
     "draw": {"image"},
+    "exchange": {"files"},
     "match": {"image"},
     "phantom": {"calibration", "files"},
     "shaft": {"image"},

@@ -60,6 +60,7 @@ void add_cache(CLI::App& app, int& code);
 void add_list(CLI::App& app, int& code);
 void add_inspect(CLI::App& app, int& code);
 void add_watch(CLI::App& app, int& code);
+void add_open(CLI::App& app, int& code);
 void add_new(CLI::App& app, int& code);
 void add_graph(CLI::App& app, int& code);
 void add_schema(CLI::App& app, int& code);
@@ -96,6 +97,9 @@ void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& fo
 
 /// Prints what is to be thought of each pose, with reasons and remedies; coloured on a terminal.
 void print_verdicts(const std::vector<NamedVerdict>& verdicts);
+
+/// What a run would do with a node, and why: "cached", "runs: ...".
+std::string planned_text(const PlannedNode& node);
 
 /// Prints the most important results: poses and figures of merit.
 void print_results(const Pipeline& pipeline, const RunResult& result);

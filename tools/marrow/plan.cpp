@@ -10,7 +10,9 @@ namespace {
 
 using What = PlannedNode::What;
 
-std::string text_of(const PlannedNode& node) {
+}  // namespace
+
+std::string planned_text(const PlannedNode& node) {
   switch (node.what) {
     case What::not_needed:
       return "not needed";
@@ -28,6 +30,8 @@ std::string text_of(const PlannedNode& node) {
   return "runs unless " + names + (node.waits_for.size() == 1 ? " comes" : " come") + " out unchanged";
 }
 
+namespace {
+
 int plan(const PipelineRequest& request, std::uint64_t seed) {
   const Catalogue catalogue;
   Pipeline pipeline;
@@ -43,7 +47,7 @@ int plan(const PipelineRequest& request, std::uint64_t seed) {
   double seconds = 0;
   for (std::size_t i = 0; i < planned.size(); ++i) {
     std::printf("%-16s %-34s %s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(),
-                printable(text_of(planned[i])).c_str());
+                printable(planned_text(planned[i])).c_str());
     ++counts[int(planned[i].what)];
     seconds += planned[i].seconds;
   }

@@ -11,6 +11,8 @@ const Dom = (() => {
       if (value === null || value === undefined || value === false) continue;
       if (typeof value === 'function')
         node.addEventListener(name.slice(2), value);
+      else if (name === 'style')
+        node.style.cssText = value;  // as an attribute, the policy of a page may forbid it
       else
         node.setAttribute(name, value === true ? '' : value);
     }

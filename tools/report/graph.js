@@ -170,7 +170,8 @@ const Graph = (() => {
     ].filter(Boolean);
   }
 
-  function draw(graph) {
+  // chose(node) is called for a node that is clicked. Without it, the node's options are shown below the graph.
+  function draw(graph, chose) {
     const {all, chains, width, height} = layOut(graph), boxes = all.filter((item) => item.node);
     const root = svg('svg', {
       class: 'graph',
@@ -196,13 +197,15 @@ const Graph = (() => {
       root.querySelectorAll('.chosen').forEach((item) => item.classList.remove('chosen'));
       group.classList.add('chosen');
       lines.filter((line) => line.ends.includes(node.id)).forEach((line) => line.classList.add('chosen'));
+      if (chose) return chose(node);
       details.replaceChildren(...about(node));
+      return undefined;
     };
     root.append(...lines, ...boxes.map((item) => drawNode(item, chosen)));
     const box = el('div', {class: 'scroll graph-box', tabindex: 0, role: 'region', 'aria-label': 'Pipeline'}, root);
     requestAnimationFrame(
         () => (box.scrollLeft = (box.scrollWidth - box.clientWidth) / 2));  // on a narrow screen: the middle first
-    return el('div', {}, box, details);
+    return el('div', {}, box, chose ? '' : details);
   }
 
   return {draw};

@@ -95,6 +95,13 @@ bool is_dicom(const fs::path& path) {
 
 }  // namespace
 
+Image turned_over(Image image, const std::string& mirror) {
+  if (mirror == "none") return image;
+  cv::Mat turned;
+  cv::flip(image.pixels, turned, mirror == "left_right" ? 1 : 0);
+  return {turned};
+}
+
 bool is_mirrored_as_read(const fs::path& path, int frame) {
   return is_dicom(path) && read_xray_pixels(path, std::max(1, frame)).mirrored;
 }

@@ -77,6 +77,9 @@ class Words {
   std::size_t at_ = 0;
 };
 
+/// Adds a face as triangles, as a fan from one of its corners. Throws Error if no fan covers it exactly once.
+void add_polygon(const std::vector<std::uint32_t>& polygon, MeshBuilder& builder, const std::string& what);
+
 /// A surface from the bytes of a PLY file. `what` names it in messages. Throws Error if it is damaged or not supported.
 Mesh read_ply(const std::string& bytes, const std::string& what);
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // PLY as text or binary in either byte order. The file's size bounds all work, because each item takes at least one
 // byte.
-#include <Eigen/Geometry>
-#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <map>
@@ -236,45 +234,6 @@ std::vector<std::uint32_t> read_vertices(const Element& element, Body& body, Mes
   return index;
 }
 
-constexpr std::size_t kMostStarts = 64;  // for a fan: no program makes faces of more corners that are not convex
-
-/// Whether a fan of triangles from one corner covers the face exactly once: all triangles face the same side, and the
-/// fan turns less than once around that corner.
-bool is_covered_from(std::size_t start, const std::vector<Eigen::Vector3d>& corners) {
-  const std::size_t count = corners.size();
-  Eigen::Vector3d all = Eigen::Vector3d::Zero();
-  const auto edges = [&](std::size_t i) {
-    return std::pair<Eigen::Vector3d, Eigen::Vector3d>{corners[(start + i) % count] - corners[start],
-                                                       corners[(start + i + 1) % count] - corners[start]};
-  };
-  for (std::size_t i = 1; i + 1 < count; ++i) all += edges(i).first.cross(edges(i).second);
-  double size = 0, turned = 0;
-  for (std::size_t i = 1; i + 1 < count; ++i) {
-    const auto [from, to] = edges(i);
-    const Eigen::Vector3d normal = from.cross(to);
-    if (normal.dot(all) < -1e-3 * all.squaredNorm()) return false;  // more than the rounding of a straight corner
-    size += normal.norm();
-    turned += std::atan2(normal.norm(), from.dot(to));
-  }
-  return !(size > 2 * all.norm()) && !(turned > 6.2832);
-}
-
-/// The corner from which a face of more than three corners is cut into a fan of triangles. Throws Error if there is
-/// none.
-std::size_t start_of_fan(const std::vector<std::uint32_t>& polygon, const MeshBuilder& builder,
-                         const std::string& what) {
-  std::vector<Eigen::Vector3d> corners;
-  for (const std::uint32_t vertex : polygon) corners.push_back(builder.mesh.vertices_mm[vertex]);
-  for (std::size_t start = 0; start < std::min(polygon.size(), kMostStarts); ++start) {
-    if (is_covered_from(start, corners)) return start;
-    if (polygon.size() > kMostStarts) break;
-  }
-  throw Error(
-      what + ": a face of " + std::to_string(polygon.size()) +
-      " corners is far from convex or flat, or crosses itself, so its triangles are not certain; save the surface as "
-      "triangles");
-}
-
 void read_polygon(const Property& property, Body& body, MeshBuilder& builder, const std::vector<std::uint32_t>& index,
                   const std::string& what) {
   std::vector<std::uint32_t> polygon(body.length(property));
@@ -287,9 +246,7 @@ void read_polygon(const Property& property, Body& body, MeshBuilder& builder, co
     }
     vertex = index[std::size_t(corner)];
   }
-  const std::size_t count = polygon.size(), start = count > 3 ? start_of_fan(polygon, builder, what) : 0;
-  for (std::size_t i = 1; i + 1 < count; ++i)
-    builder.triangle(polygon[start], polygon[(start + i) % count], polygon[(start + i + 1) % count]);
+  add_polygon(polygon, builder, what);
 }
 
 void read_faces(const Element& element, Body& body, MeshBuilder& builder, const std::vector<std::uint32_t>& index,

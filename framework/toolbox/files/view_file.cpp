@@ -46,7 +46,7 @@ View view_of(const std::string& name, Image image, const ViewCamera& camera) {
 
 View read_view_files(const ViewSource& source) {
   check_item_name("view", source.name);
-  Image image = read_image_file(source.image, source.frame);
+  Image image = turned_over(read_image_file(source.image, source.frame), source.mirror);
   return view_of(source.name, std::move(image), read_view_camera(source));
 }
 

@@ -6,6 +6,7 @@ import pathlib
 import sys
 
 import dicom
+import exchange
 import images
 import records
 import sequences
@@ -18,6 +19,7 @@ SEEDS = {
     "image": images.seeds,
     "dicom": dicom.seeds,
     "mesh": surfaces.seeds,
+    "exchange": exchange.seeds,
     "sequence": sequences.seeds,
     "case": texts.case_seeds,
     "pipeline": texts.pipeline_seeds,

@@ -42,6 +42,13 @@ std::string picture_url(const std::filesystem::path& png_file, int size_px);
 /// Writes the page with these data.
 void write_page(const nlohmann::json& data, const std::filesystem::path& file, Kinds kinds = Kinds::files);
 
+/// The figures of merit that a run wrote: one table for each folder of files, one column for each file in it.
+nlohmann::json figures_of(const std::filesystem::path& folder, const nlohmann::json& record);
+
+/// Writes the page of a single run, and returns the file. An empty `file` means RUN/report.html. Throws Error if the
+/// folder is not that of a run.
+std::filesystem::path write_run_page(const std::filesystem::path& folder, std::filesystem::path file = {});
+
 /// {nodes, edges} of a pipeline. Each node also has its differences in each of `variants`.
 nlohmann::json graph_of(const Pipeline& pipeline, const std::vector<std::pair<std::string, Pipeline>>& variants);
 

@@ -34,7 +34,8 @@ std::optional<json> metrics_in(const fs::path& folder, const std::string& name) 
   }
 }
 
-/// The figures of merit that the run wrote: one table for each folder of files, one column for each file in it.
+}  // namespace
+
 json figures_of(const fs::path& folder, const json& record) {
   json tables = json::array();
   for (const json& output : record.value("outputs", json::array()))
@@ -61,6 +62,8 @@ json figures_of(const fs::path& folder, const json& record) {
     }
   return tables;
 }
+
+namespace {
 
 /// The passes of the nodes that have bodies.
 json passes_of(const json& record) {
@@ -159,8 +162,9 @@ json page_of(const fs::path& folder, const json& record, ReportMaterial& materia
   return data;
 }
 
-/// Writes the page of a single run. An empty `file` means RUN/report.html.
-int show(const fs::path& folder, fs::path file) {
+}  // namespace
+
+fs::path write_run_page(const fs::path& folder, fs::path file) {
   std::error_code error;
   if (!fs::exists(folder / "run.json", error))
     throw Error(folder.string() +
@@ -177,18 +181,18 @@ int show(const fs::path& folder, fs::path file) {
     refuse_record(folder, "what it should say is missing in it, or of another type");
   }
   material.print_left_out();
-  std::printf("%s\n", printable(plain_path(fs::absolute(file)).string()).c_str());
-  return 0;
+  return file;
 }
-
-}  // namespace
 
 void add_show(CLI::App& app, int& code) {
   const auto run = std::make_shared<fs::path>(), file = std::make_shared<fs::path>();
   CLI::App* command = app.add_subcommand("show", "write a page that shows a run: figures, pictures, 3D view");
   command->add_option("run", *run, "folder of the run")->required();
   command->add_option("--out", *file, "HTML file to write; one that is there is replaced (default: RUN/report.html)");
-  command->callback([run, file, &code] { code = show(*run, *file); });
+  command->callback([run, file, &code] {
+    std::printf("%s\n", printable(plain_path(fs::absolute(write_run_page(*run, *file))).string()).c_str());
+    code = 0;
+  });
 }
 
 }  // namespace marrow::cli

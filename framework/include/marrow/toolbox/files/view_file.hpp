@@ -18,6 +18,7 @@ struct ViewSource {
   std::filesystem::path camera_file;
   std::filesystem::path calibration;  ///< may be empty
   int frame = 0;                      ///< of the image file, from 1; 0: the file must have only one
+  std::string mirror = "none";        ///< as turned_over() takes it; the camera is that of the image afterwards
 };
 
 /// The camera of this name. Throws Error, with the names that there are, if there is none.

@@ -29,6 +29,9 @@ Volume read_volume_file(const std::filesystem::path& path, const VolumeReading& 
 /// or not supported, has no such frame, or has more than one channel.
 Image read_image_file(const std::filesystem::path& path, int frame = 0);
 
+/// The image with its columns (left_right) or rows (upside_down) in reverse order; as it is for "none".
+Image turned_over(Image image, const std::string& mirror);
+
 /// Whether read_image_file() mirrors this image. If so, drawings made on the stored file must be mirrored too.
 bool is_mirrored_as_read(const std::filesystem::path& path, int frame = 0);
 

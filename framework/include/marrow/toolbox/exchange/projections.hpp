@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <filesystem>
+#include <vector>
+
+#include "marrow/toolbox/exchange/camera_matrix.hpp"
+
+namespace marrow::exchange {
+
+/// Files that hold the cameras of several projections, by the end of their names: RTK's geometry (.xml) and xReg's
+/// projection data (.h5, .hdf5).
+enum class Projections { none, rtk, xreg };
+Projections projections_in(const std::filesystem::path& path);
+
+/// The cameras of the projections with these numbers, from 0; of all if `numbers` is empty. `size` is only for RTK.
+/// Throws Error as the readers of the two formats do, and if there is no such projection.
+std::vector<Camera> read_projections(const std::filesystem::path& path, const std::vector<int>& numbers,
+                                     const ImageSize& size, Mirror mirror);
+
+}  // namespace marrow::exchange

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Files of HDF5: numbers, texts and groups by their keys. Only small values are read, so neither images in the file nor
+// a damaged file take much memory. What is written is made in memory.
+#include <hdf5.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace marrow::exchange {
+
+/// Something of HDF5 that must be closed.
+class Hdf5Id {
+ public:
+  Hdf5Id(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
+  ~Hdf5Id() {
+    if (id_ >= 0) close_(id_);
+  }
+  Hdf5Id(const Hdf5Id&) = delete;
+  Hdf5Id& operator=(const Hdf5Id&) = delete;
+  operator hid_t() const { return id_; }
+  bool is_open() const { return id_ >= 0; }
+
+ private:
+  hid_t id_;
+  herr_t (*close_)(hid_t);
+};
+
+class Hdf5Reader {
+ public:
+  /// Throws Error if the file cannot be read, or is no HDF5.
+  explicit Hdf5Reader(const std::filesystem::path& path);
+
+  /// Throws Error if a part of the key is a link, which could lead to a file that nobody named.
+  bool has(const std::string& key) const;
+  /// The names in a group, in their order; empty if there is no such group.
+  std::vector<std::string> names_in(const std::string& key) const;
+  /// The numbers of a dataset, and its shape. Throw Error if there is none, if it holds no numbers, or has another
+  /// number of them than `count`.
+  std::vector<double> numbers(const std::string& key, std::size_t count) const;
+  double number(const std::string& key) const { return numbers(key, 1)[0]; }
+  std::string text(const std::string& key) const;
+  [[noreturn]] void refuse(const std::string& key, const std::string& what) const;
+
+ private:
+  void check_is_inside(hid_t data, const std::string& key) const;
+  std::string path_;
+  Hdf5Id file_;
+};
+
+class Hdf5Writer {
+ public:
+  Hdf5Writer();
+  void group(const std::string& key);
+  void attribute(const std::string& key, const std::string& name, const std::string& value);
+  void text(const std::string& key, const std::string& value);
+  void whole_number(const std::string& key, unsigned long value);
+  void number(const std::string& key, double value);
+  void matrix(const std::string& key, const std::vector<double>& values, std::size_t rows, std::size_t columns);
+  /// The file so far.
+  std::string bytes() const;
+
+ private:
+  void dataset(const std::string& key, hid_t type, hid_t space, const void* values);
+  Hdf5Id file_;
+};
+
+}  // namespace marrow::exchange

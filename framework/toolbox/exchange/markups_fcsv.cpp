@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+// 3D Slicer's lists of fiducials: comments with the version, the coordinate system and the columns, then a line a
+// point.
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <sstream>
+
+#include "markups_file.hpp"
+#include "marrow/domain/error.hpp"
+#include "marrow/domain/printable.hpp"
+#include "marrow/toolbox/files/input_file.hpp"
+#include "marrow/toolbox/files/yaml_text.hpp"
+
+namespace marrow::exchange {
+namespace {
+
+const char* const kColumns = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID";
+
+struct Line {
+  const std::filesystem::path& path;
+  std::size_t number = 0;
+  [[noreturn]] void refuse(const std::string& what) const {
+    throw Error(path.string() + ":" + std::to_string(number) + ": " + what);
+  }
+};
+
+std::string in_quotes(const std::string& text) { return "'" + printable(text.substr(0, 40)) + "'"; }
+
+/// The cells of a line. A cell with commas is in quotes, and a quote in it is doubled.
+std::vector<std::string> cells_of(const std::string& text, const Line& line) {
+  std::vector<std::string> cells{""};
+  bool is_quoted = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '"' && is_quoted && i + 1 < text.size() && text[i + 1] == '"')
+      cells.back() += text[i++];
+    else if (text[i] == '"')
+      is_quoted = !is_quoted;
+    else if (text[i] == ',' && !is_quoted)
+      cells.emplace_back();
+    else
+      cells.back() += text[i];
+  }
+  if (is_quoted) line.refuse("a quotation mark is not closed; the file is cut off or damaged");
+  return cells;
+}
+
+/// What a comment "# key = value" says.
+std::optional<std::string> said(const std::string& text, const std::string& key) {
+  const std::size_t begin = text.find_first_not_of("# \t");
+  if (begin == std::string::npos || text.compare(begin, key.size(), key) != 0) return std::nullopt;
+  const std::size_t sign = text.find_first_not_of(" \t", begin + key.size());
+  if (sign == std::string::npos || text[sign] != '=') return std::nullopt;
+  const std::size_t value = text.find_first_not_of(" \t", sign + 1);
+  return value == std::string::npos ? "" : text.substr(value);
+}
+
+double coordinate(const std::string& text, const Line& line) {
+  const char *first = text.data(), *last = text.data() + text.size();
+  while (first != last && (*first == ' ' || *first == '+')) ++first;
+  double value = 0;
+  const auto [end, failure] = std::from_chars(first, last, value);
+  if (failure != std::errc() || end != last || !(std::abs(value) <= kLargestCoordinate_mm))
+    line.refuse("expected a coordinate in mm of at most 1 km, got " + in_quotes(text));
+  return value;
+}
+
+/// What the comments at the beginning say.
+struct Header {
+  bool has_version = false;
+  std::optional<bool> is_ras;
+  std::size_t x = 1, label = 11, columns = 12;
+
+  void read(const std::string& text, const Line& line) {
+    if (const auto version = said(text, "Markups fiducial file version")) {
+      if (version->rfind("4.", 0) != 0 && version->rfind("5.", 0) != 0)
+        line.refuse("expected a version 4 or 5 of 3D Slicer's file, got " + in_quotes(*version));
+      has_version = true;
+    } else if (const auto system = said(text, "CoordinateSystem")) {
+      if (*system != "LPS" && *system != "RAS" && *system != "0" && *system != "1")
+        line.refuse("expected the coordinate system LPS or RAS (also 1 or 0), got " + in_quotes(*system));
+      is_ras = *system == "RAS" || *system == "0";
+    } else if (const auto names = said(text, "columns")) {
+      const std::vector<std::string> cells = cells_of(*names, line);
+      const auto place_of = [&](const char* name) {
+        const auto found = std::find(cells.begin(), cells.end(), name);
+        if (found == cells.end()) line.refuse("there is no column '" + std::string(name) + "'; expected " + kColumns);
+        return std::size_t(found - cells.begin());
+      };
+      x = place_of("x");
+      if (place_of("y") != x + 1 || place_of("z") != x + 2)
+        line.refuse("the columns x, y, z do not follow each other; expected " + std::string(kColumns));
+      label = place_of("label");
+      columns = std::max(label, x + 2) + 1;
+    }
+  }
+};
+
+/// In small or capital letters.
+bool ends_with(const std::filesystem::path& path, const std::string& end) {
+  std::string name = path.filename().string();
+  for (char& c : name) c = char(std::tolower(static_cast<unsigned char>(c)));
+  return name.size() > end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0;
+}
+
+std::string quoted(const std::string& text) {
+  std::string clean;
+  for (const char c : text) {
+    if (c == '"') clean += c;
+    clean += c == '\n' || c == '\r' ? ' ' : c;
+  }
+  return clean.find_first_of(",\"") == std::string::npos ? clean : '"' + clean + '"';
+}
+
+}  // namespace
+
+std::vector<MarkedPoint> read_markups_fcsv(const std::filesystem::path& path) {
+  std::istringstream lines(files::read_bytes(path, kMostMarkupsBytes));
+  Header header;
+  std::vector<MarkedPoint> points;
+  std::string text;
+  for (Line line{path}; std::getline(lines, text);) {
+    ++line.number;
+    while (!text.empty() && (text.back() == '\r' || text.back() == ' ')) text.pop_back();
+    if (text.empty()) continue;
+    if (text[0] == '#') {
+      header.read(text, line);
+      continue;
+    }
+    if (!header.has_version) line.refuse("expected 3D Slicer's '# Markups fiducial file version = ' first");
+    if (!header.is_ras)
+      line.refuse("no line '# CoordinateSystem = ' came before; add it, with LPS or RAS after the sign");
+    const std::vector<std::string> cells = cells_of(text, line);
+    if (cells.size() < header.columns)
+      line.refuse("expected at least " + std::to_string(header.columns) + " cells, got " +
+                  std::to_string(cells.size()));
+    Eigen::Vector3d at_mm;
+    for (int i = 0; i < 3; ++i) at_mm[i] = coordinate(cells[header.x + std::size_t(i)], line);
+    points.push_back({cells[header.label], in_lps(at_mm, *header.is_ras)});
+  }
+  if (points.empty()) throw Error(path.string() + ": there is no point in it; expected 3D Slicer's list of fiducials");
+  return points;
+}
+
+std::string markups_fcsv(const std::vector<MarkedPoint>& points) {
+  std::string text = "# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n# columns = ";
+  text += std::string(kColumns) + "\n";
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    text += std::to_string(i + 1);
+    for (const double coordinate : points[i].at_mm) text += "," + files::number(coordinate);
+    text += ",0,0,0,1,1,1,0," + quoted(points[i].label) + ",,\n";
+  }
+  return text;
+}
+
+bool is_markups_file(const std::filesystem::path& path) {
+  return ends_with(path, ".mrk.json") || ends_with(path, ".fcsv");
+}
+
+std::vector<MarkedPoint> read_markups(const std::filesystem::path& path) {
+  return ends_with(path, ".fcsv") ? read_markups_fcsv(path) : read_markups_json(path);
+}
+
+}  // namespace marrow::exchange

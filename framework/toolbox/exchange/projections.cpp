@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/exchange/projections.hpp"
+
+#include <numeric>
+
+#include "marrow/domain/error.hpp"
+#include "marrow/toolbox/exchange/rtk_geometry.hpp"
+#include "marrow/toolbox/exchange/xreg_file.hpp"
+
+namespace marrow::exchange {
+namespace {
+
+/// The cameras of those of `all` that are named. `camera(one, what)` makes one.
+template <class Projection, class MakeCamera>
+std::vector<Camera> cameras_of(const std::vector<Projection>& all, std::vector<int> numbers, const std::string& what,
+                               MakeCamera camera) {
+  if (numbers.empty()) {
+    numbers.resize(all.size());
+    std::iota(numbers.begin(), numbers.end(), 0);
+  }
+  std::vector<Camera> cameras;
+  for (const int number : numbers) {
+    if (number < 0 || std::size_t(number) >= all.size())
+      throw Error(what + ": has " + std::to_string(all.size()) +
+                  " projections, counted from 0; there is no projection " + std::to_string(number));
+    cameras.push_back(camera(all[std::size_t(number)], what + ": projection " + std::to_string(number)));
+  }
+  return cameras;
+}
+
+}  // namespace
+
+Projections projections_in(const std::filesystem::path& path) {
+  std::string end = path.extension().string();
+  for (char& c : end) c = char(std::tolower(static_cast<unsigned char>(c)));
+  return end == ".xml" ? Projections::rtk : end == ".h5" || end == ".hdf5" ? Projections::xreg : Projections::none;
+}
+
+std::vector<Camera> read_projections(const std::filesystem::path& path, const std::vector<int>& numbers,
+                                     const ImageSize& size, Mirror mirror) {
+  if (projections_in(path) == Projections::none)
+    throw Error(path.string() + ": expected RTK's geometry (.xml) or xReg's projection data (.h5)");
+  if (projections_in(path) == Projections::rtk)
+    return cameras_of(read_rtk(path), numbers, path.string(), [&](const RtkProjection& one, const std::string& what) {
+      return camera_of(one, size, mirror, what);
+    });
+  return cameras_of(read_xreg(path), numbers, path.string(),
+                    [&](const XregProjection& one, const std::string& what) { return camera_of(one, mirror, what); });
+}
+
+}  // namespace marrow::exchange

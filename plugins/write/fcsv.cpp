@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Points for 3D Slicer, in its older format .fcsv. Coordinates are LPS, and the file says so.
+#include <marrow/plugin.hpp>
+
+#include "marrow/toolbox/exchange/marked_values.hpp"
+#include "marrow/toolbox/exchange/written_files.hpp"
+
+namespace {
+
+using namespace marrow;
+using exchange::FcsvFile;
+
+FcsvFile fcsv(const Landmarks* landmarks, const Seeds* seeds) {
+  if (!landmarks && !seeds) throw Error("the node that is wired to 'landmarks' or 'seeds' gave none");
+  return {exchange::markups_fcsv(landmarks ? exchange::marked_points(*landmarks) : exchange::marked_points(*seeds))};
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("write.fcsv", fcsv)
+      .summary("Gives landmarks or seeds as points of 3D Slicer (.fcsv)")
+      .in("landmarks", "landmarks of one fragment; those seen in views and tracked ones are left out")
+      .in("seeds", "seeds of one fragment; their labels are its name with a number")
+      .out("fcsv", "a list of points in LPS, mm")
+      .relation(exactly_one({"in.landmarks", "in.seeds"}));
+  plugin.writer<FcsvFile>(".fcsv", exchange::write_file, "points of 3D Slicer in LPS, in its older format");
+}

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Formats of other programs: points, transforms, surfaces and cameras. HDF5 and VTK read .h5 and .vtp themselves, and
+// reserve what a damaged file claims to hold, which the limits of the nodes' own process stop. So those two are not
+// tried here.
+#include "marrow/toolbox/exchange/itk_transform.hpp"
+#include "marrow/toolbox/exchange/marked_values.hpp"
+#include "marrow/toolbox/exchange/plastimatch_camera.hpp"
+#include "marrow/toolbox/exchange/projections.hpp"
+#include "marrow/toolbox/exchange/surface_file.hpp"
+#include "target.hpp"
+
+namespace {
+
+using namespace marrow::exchange;
+using marrow::fuzz::put;
+
+void read(char format, std::string_view text) {
+  const ImageSize size{{64, 48}, {0.5}, {}};
+  if (format == 'j') read_marked_landmarks(put("a.mrk.json", text));
+  if (format == 'f') read_marked_seeds(put("a.fcsv", text), "");
+  if (format == 't') read_itk_transform(put("a.tfm", text), "world", "ct");
+  if (format == 'o') read_surface_file(put("a.obj", text), 1);
+  if (format == 'p') read_plastimatch_camera(put("a.txt", text), size);
+  if (format == 'r') read_projections(put("a.xml", text), {}, size, Mirror::upside_down);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  marrow::fuzz::Input input(data, size);
+  const char format = input.choice("jftopr");
+  marrow::fuzz::expect_value_or_error([&] { read(format, input.rest); });
+  return 0;
+}

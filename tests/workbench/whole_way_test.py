@@ -1,0 +1,171 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""The whole way in the browser: from a DICOM CT, two X-rays and the C-arm's angles to a registered pose. Mouse clicks
+are counted, and the command line finds the same pose from the saved case."""
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import zlib
+
+import numpy
+import yaml
+from selenium.webdriver.common.keys import Keys
+
+import bench
+import ct_cases
+from bench import MARROW, SOURCE, PageTest
+
+MOST_CLICKS = 25
+
+
+def read_mha(path):
+    """(size, spacing, origin, values) of a MetaImage that marrow wrote."""
+    data = path.read_bytes()
+    end = data.index(b"ElementDataFile = LOCAL\n") + len(b"ElementDataFile = LOCAL\n")
+    header = dict(line.split(" = ", 1) for line in data[:end].decode().strip().splitlines())
+    numbers = lambda key: [float(part) for part in header[key].split()]
+    size = [int(n) for n in numbers("DimSize")]
+    values = numpy.frombuffer(
+        zlib.decompress(data[end:]), {"MET_SHORT": "<i2", "MET_FLOAT": "<f4"}[header["ElementType"]]
+    )
+    return size, numbers("ElementSpacing"), numbers("Offset"), values
+
+
+class WholeWayTest(PageTest):
+    def setUp(self):
+        super().setUp()
+        simulated = self.scratch / "simulated"
+        command = [MARROW, "run", SOURCE / "pipelines" / "simulate.yaml", "--out", simulated, "--quiet"]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        case = simulated / "outputs" / "case"
+        self.given = yaml.safe_load((case / "case.yaml").read_text())
+        size, spacing, origin, values = read_mha(case / self.given["ct"])
+        self.grid = {"size": size, "spacing_mm": spacing, "origin_mm": origin}
+        values = numpy.clip(numpy.round(values), -1024, 32767).astype("<i2")
+        ct_cases.dicom_series(self.folder / "scan", size, values, spacing_mm=spacing, origin_mm=origin)
+        for view in self.given["views"]:
+            shutil.copy(case / view["image"], self.folder)
+        self.clicks = 0
+
+    def css(self, selector):
+        self.browser.wait("return !!document.querySelector(%s)" % json.dumps(selector), 120)
+        return self.browser.driver.find_element("css selector", selector)
+
+    def click(self, selector):
+        element = self.css(selector)
+        self.browser.js("arguments[0].scrollIntoView({block: 'center'})", element)
+        element.click()
+        self.clicks += 1
+
+    def document(self):
+        return self.browser.driver.execute_async_script(
+            "const done = arguments[0]; Ask.json('api/draft', {case: 'mine'}).then((state) => done(state.document))"
+        )
+
+    def until(self, condition):
+        """Waits until what the server keeps fulfils it."""
+        for _ in range(400):
+            if condition(self.document()):
+                return
+        raise AssertionError(self.document())
+
+    def choose_ct(self):
+        self.click('[data-do="choose-ct"]')
+        self.click('#dialog [data-open="scan"]')
+        self.click('#dialog [data-choose="scan"]')
+        self.browser.wait(
+            "return document.querySelectorAll('[data-slice]').length === 3 &&"
+            " [...document.querySelectorAll('[data-slice]')].every((one) => one.dataset.shown)"
+        )
+
+    def add_fragment(self, name, seed_mm):
+        """Its seed is put at the crosshair of the slices, which a click in one slice and the wheel have moved there."""
+        box = 'section[aria-label="Fragments"] input[type="text"]'
+        self.click(box)
+        self.css(box).send_keys(name + Keys.ENTER)
+        self.until(lambda document: name in document["fragments"])
+        self.click('[data-tool="seed %s"]' % name)
+        index = [
+            round((mm - origin) / spacing)
+            for mm, origin, spacing in zip(seed_mm, self.grid["origin_mm"], self.grid["spacing_mm"])
+        ]
+        slider = self.css('input[aria-label="axial slice"]')
+        self.browser.js(
+            "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'))", slider, index[2]
+        )
+        self.browser.wait("return document.querySelector('[data-slice=axial]').dataset.shown === '%d'" % index[2])
+        self.click_axial(index)
+        self.until(lambda document: document["fragments"][name]["seeds"])
+
+    def click_axial(self, index):
+        from selenium.webdriver import ActionChains
+
+        canvas = self.css('[data-slice="axial"]')
+        self.browser.js("arguments[0].scrollIntoView({block: 'center'})", canvas)
+        width, height = self.browser.js(
+            "const r = arguments[0].getBoundingClientRect(); return [r.width, r.height]", canvas
+        )
+        extent = [n * s for n, s in zip(self.grid["size"], self.grid["spacing_mm"])]
+        scale = min(width / extent[0], height / extent[1])
+        x, y = (((index[k] + 0.5) * self.grid["spacing_mm"][k] - extent[k] / 2) * scale for k in range(2))
+        chain = ActionChains(self.browser.driver, duration=0)
+        chain.move_to_element_with_offset(canvas, round(x), round(y)).click().perform()
+        self.clicks += 1
+
+    def add_view(self, view, beta_deg):
+        self.click('[data-do="add-view"]')
+        self.click('#dialog [data-choose="%s"]' % view["image"])
+        self.click("#dialog details summary")
+        self.click('#dialog [data-arm="beta_deg"]')
+        for key, value in (("beta_deg", beta_deg), ("pixel_mm", 0.586)):
+            box = self.css('#dialog [data-arm="%s"]' % key)
+            box.clear()
+            box.send_keys(str(value))
+        box.send_keys(Keys.ENTER)
+        self.until(lambda document: any(one["name"] == view["name"] for one in document["views"]))
+
+    def test_from_dicom_to_a_pose(self):
+        server = self.open()
+        self.show(server, "case=mine")
+        self.choose_ct()
+        for name, fragment in self.given["fragments"].items():
+            self.add_fragment(name, fragment["seeds"][0])
+        for name, fragment in self.given["fragments"].items():
+            if not fragment.get("register", True):
+                self.click('[data-fragment="%s"] input[type="checkbox"]' % name)
+        for view, beta_deg in zip(self.given["views"], (0, 90)):
+            self.add_view(view, beta_deg)
+        self.click('[data-do="save"]')
+        self.browser.wait("return document.querySelector('[data-saved]').textContent.includes('Saved in')", 120)
+
+        self.click('#pages a[data-page="place"]')
+        self.click('a[href="#place=mine"]')
+        self.click('[data-do="register"]:not(:disabled)')
+        self.until(lambda document: "start" in document["fragments"]["distal"])
+        self.browser.wait("return !!document.querySelector('[data-judgement]')", 120)
+        print("clicks: %d" % self.clicks)
+        self.assertLessEqual(self.clicks, MOST_CLICKS)
+
+        found = numpy.array(self.document()["fragments"]["distal"]["start"])
+        off = numpy.linalg.inv(numpy.array(self.given["fragments"]["distal"]["truth"]["matrix"])) @ found
+        angle_deg = numpy.degrees(numpy.arccos(numpy.clip((numpy.trace(off[:3, :3]) - 1) / 2, -1, 1)))
+        print("off by %.3f degrees" % angle_deg)
+        self.assertLess(angle_deg, 1)
+        self.same_on_the_command_line(found)
+
+    def same_on_the_command_line(self, found):
+        text = self.browser.js("return document.querySelector('.place-command code').textContent")
+        words = shlex.split(text)
+        self.assertEqual(words[:2], ["marrow", "run"])
+        environment = {**os.environ, "MARROW_CACHE": str(self.scratch / "other-store")}
+        arguments = [MARROW, *words[1:], "--out", self.scratch / "again"]
+        ended = subprocess.run(arguments, capture_output=True, text=True, cwd=self.folder, env=environment)
+        self.assertIn(ended.returncode, (0, 3), ended.stderr)
+        pose = yaml.safe_load((self.scratch / "again" / "outputs" / "pose" / "distal.yaml").read_text())
+        self.assertEqual(numpy.array(pose["matrix"]).tolist(), found.tolist())
+
+
+if __name__ == "__main__":
+    bench.main()

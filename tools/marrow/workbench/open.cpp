@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// `marrow open`: the workbench in the browser.
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+
+#include "command_options.hpp"
+#include "commands.hpp"
+#include "marrow/domain/error.hpp"
+#include "marrow/domain/printable.hpp"
+#include "process.hpp"
+#include "runtime/text_file.hpp"
+#include "workbench/workbench.hpp"
+
+namespace fs = std::filesystem;
+
+namespace marrow::cli {
+namespace {
+
+struct OpenRequest {
+  fs::path place = ".";
+  int port = 0;
+  bool no_browser = false;
+};
+
+/// What is opened, and which page shows it, as the part of the address behind '#'.
+struct Target {
+  fs::path folder;
+  std::string page;
+};
+
+std::string encoded(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    char code[8];
+    std::snprintf(code, sizeof code, "%%%02X", unsigned(static_cast<unsigned char>(c)));
+    result += std::isalnum(static_cast<unsigned char>(c)) || c == '/' || c == '-' || c == '_' || c == '.'
+                  ? std::string(1, c)
+                  : code;
+  }
+  return result;
+}
+
+/// A case, a run or a comparison is shown at once; its folder is opened together with what is beside it, because a
+/// case may name files there.
+Target target_of(const fs::path& place) {
+  std::error_code error;
+  const fs::path full = fs::canonical(place, error);
+  if (error) throw Error(printable(place.string()) + ": " + error.message());
+  if (fs::is_directory(full)) {
+    for (const auto& [file, page] :
+         {std::pair("case.yaml", "case"), std::pair("run.json", "results"), std::pair("comparison.json", "results")})
+      if (fs::exists(full / file) && full.has_parent_path())
+        return {full.parent_path(), "#" + std::string(page) + "=" + encoded(full.filename().string())};
+    return {full, ""};
+  }
+  if (full.filename() == "case.yaml") return target_of(full.parent_path());
+  if (full.extension() == ".yaml") return {full.parent_path(), "#pipeline=" + encoded(full.filename().string())};
+  throw Error(printable(place.string()) + ": open a folder, a case.yaml or a pipeline");
+}
+
+/// Starts the desktop's browser and does not wait for it. Nothing is said if there is none: the address is printed.
+void start_browser(const std::string& address) {
+  const pid_t child = fork();
+  if (child != 0) {
+    if (child > 0) waitpid(child, nullptr, 0);
+    return;
+  }
+  if (fork() != 0) _exit(0);  // the browser belongs to nobody, and outlives marrow
+  setsid();
+  const int nothing = ::open("/dev/null", O_RDWR);
+  for (const int stream : {0, 1, 2}) dup2(nothing, stream);
+  execlp("xdg-open", "xdg-open", address.c_str(), nullptr);
+  _exit(127);
+}
+
+int open(const OpenRequest& request) {
+  const std::atomic<bool>& stop = stop_on_signals();
+  const Target target = target_of(request.place);
+  workbench::Server server;
+  workbench::Workbench bench(target.folder);
+  using namespace workbench;
+  for (const auto add : {
+           add_shell, add_case_page, add_ct_page, add_xray_page,  //
+           add_place_page, add_pipeline_page, add_results_page,   //
+       })
+    add(server, bench);
+  server.listen(request.port);
+  const std::string address = server.access().address(target.page);
+  std::printf("%s is open at\n\n  %s\n\nThe address works once, in one browser. Ctrl-C ends.\n",
+              printable(target.folder.string()).c_str(), address.c_str());
+  std::fflush(stdout);
+  if (!request.no_browser) start_browser(address);
+  server.run(stop);
+  std::fprintf(stderr, "closed; %s\n", stopped_text().c_str());
+  return 0;
+}
+
+}  // namespace
+
+void add_open(CLI::App& app, int& code) {
+  const auto request = std::make_shared<OpenRequest>();
+  CLI::App* command = app.add_subcommand(
+      "open", "open a folder in the browser: make cases, place bones, edit pipelines, look at results");
+  command->add_option("place", request->place, "folder, case.yaml or pipeline (default: this folder)");
+  show_default(add_whole_number(command, "--port", request->port, "port at 127.0.0.1; 0: any that is free", 0, 65535),
+               request->port);
+  command->add_flag("--no-browser", request->no_browser, "only print the address");
+  command->callback([request, &code] { code = open(*request); });
+  say_that_libraries_are_described(command);
+}
+
+}  // namespace marrow::cli

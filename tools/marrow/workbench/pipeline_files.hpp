@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Pipeline files that are being edited: their text, and the changes that can be taken back. The file is the truth: when
+// another program changes it, this shows here, and is a change like any other.
+#include <functional>
+#include <map>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "workbench/opened_folder.hpp"
+
+namespace marrow::workbench {
+
+class PipelineFiles {
+ public:
+  explicit PipelineFiles(const OpenedFolder& folder) : folder_(folder) {}
+
+  /// {file, text, revision, undo, redo}: `undo` and `redo` say what would be taken back or made again, or are null. The
+  /// revision is the digest of the text. Throws Error if the file cannot be read.
+  nlohmann::json open(const std::string& file);
+  std::string revision(const std::string& file) const;
+  /// Writes what `changed` makes of the text, and returns what open() does then. Throws Conflict unless the file is of
+  /// this revision, and Error if it cannot be written; then nothing has changed.
+  nlohmann::json change(const std::string& file, const std::string& revision, const std::string& what,
+                        const std::function<std::string(const std::string&)>& changed);
+  nlohmann::json undo(const std::string& file, const std::string& revision) { return step(file, revision, -1); }
+  nlohmann::json redo(const std::string& file, const std::string& revision) { return step(file, revision, +1); }
+
+ private:
+  struct Step {
+    std::string what, text;
+  };
+  struct History {
+    std::vector<Step> steps;  ///< the first is the file as it was found
+    std::size_t at = 0;       ///< the step that the file holds
+  };
+  History& find(const std::string& file);
+  History& find(const std::string& file, const std::string& revision);
+  nlohmann::json step(const std::string& file, const std::string& revision, int by);
+  nlohmann::json shown(const std::string& file, const History& history) const;
+  static void add(History& history, Step step);
+
+  const OpenedFolder& folder_;
+  std::mutex mutex_;
+  std::map<std::string, History> histories_;
+};
+
+}  // namespace marrow::workbench

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What the page "Place" keeps in memory of a case: its views, and of each bone the projectors and costs.
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "marrow/domain/functions.hpp"
+#include "marrow/domain/list.hpp"
+#include "workbench/value_json.hpp"
+#include "workbench/workbench.hpp"
+
+namespace marrow::workbench {
+
+/// One bone of an opened case.
+struct PlacedBone {
+  std::string name;
+  std::shared_ptr<const RadiographProjector> radiograph;
+  std::shared_ptr<const OutlineProjector> outline;
+  std::shared_ptr<const Cost> contour, grey_values;
+  FragmentFrame frame;
+  RigidTransform start;     ///< world_from_model to begin with
+  std::string start_is;     ///< where it comes from, in words
+  double brightest_mm = 1;  ///< the line integral that is drawn brightest
+};
+
+/// An opened case. Nothing in it changes, so requests may use it at the same time.
+struct PlacedCase {
+  std::string path;
+  List<View> views;
+  std::vector<PlacedBone> bones;
+
+  /// Throw Error if there is none of that name.
+  const View& view(const std::string& name) const;
+  const PlacedBone& bone(const std::string& name) const;
+};
+
+/// Runs pipelines/workbench/place.yaml on a case of the opened folder.
+std::shared_ptr<const PlacedCase> open_case(const std::string& path, const Workbench& workbench, Job& job);
+
+/// The cases that were opened last. All methods may be called from several threads.
+class PlacedCases {
+ public:
+  /// Keeps it, and forgets all but the last two, because each holds a CT.
+  void keep(std::shared_ptr<const PlacedCase> one);
+  /// Throws Conflict if it is not there: the page then opens it again.
+  std::shared_ptr<const PlacedCase> find(const std::string& path) const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<std::shared_ptr<const PlacedCase>> cases_;
+};
+
+/// A placement of a request: a 4 x 4 matrix as rows. Throws Error unless it is a rigid motion.
+RigidTransform placement_of(const nlohmann::json& matrix);
+
+/// The point nearest to the middle rays of all views: where the views look at.
+Eigen::Vector3d common_centre_mm(const List<View>& views);
+
+/// The image as 8 bit, every `step_px`-th pixel as the mean of its square. From dark to bright as in the image, without
+/// the darkest and brightest half per cent.
+std::string grey_bytes(const View& view, int step_px);
+
+/// What a request wants to see of a bone in a view.
+struct OverlayWish {
+  const View* view = nullptr;
+  const PlacedBone* bone = nullptr;
+  RigidTransform world_from_model;
+  int step_px = 1;
+  std::string what = "radiograph";  ///< radiograph, edges (how fast the radiograph changes) or outline
+};
+/// The part of the image that shows the bone: 8 bit for each pixel of a grid, or for an outline pairs of float (u, v).
+/// `about` becomes {u_px, v_px, step_px, columns, rows} of the grid, or {points}.
+std::string overlay_bytes(const OverlayWish& wish, nlohmann::json& about);
+
+/// {contour: {value, views: [...]}, grey_values: {...}} of a bone: smaller is better. Coarser and faster than those
+/// of a registration.
+nlohmann::json costs_of(const PlacedCase& placed, const PlacedBone& bone, const RigidTransform& world_from_model);
+
+/// Writes a pose file for each bone into a new folder `INTO/CASE/NUMBER` of the opened folder, and returns its path
+/// relative to that. A folder that holds the same poses is taken again.
+std::string write_starts(const OpenedFolder& folder, const std::string& into, const PlacedCase& placed,
+                         const std::map<std::string, RigidTransform>& poses);
+
+/// Pipelines that register a case from its starts: [{file, name, help}], those of marrow first. `file` is relative to
+/// the opened folder, or absolute.
+nlohmann::json pipelines_from_starts(const Workbench& workbench);
+
+/// The command that does what run_from_starts() does.
+std::string command_from_starts(const Workbench& workbench, const std::string& pipeline, const std::string& case_path,
+                                const std::string& starts);
+/// Runs a pipeline on the case from these starts: {poses: {BONE: {matrix, deviations, warnings}}, verdicts: {BONE:
+/// {...}}}.
+nlohmann::json run_from_starts(const Workbench& workbench, const std::filesystem::path& pipeline,
+                               const std::string& case_path, const std::string& starts, Job& job);
+
+}  // namespace marrow::workbench

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What the requests about X-rays share: the files that pipelines read, and what is shown of a run.
+#include <string>
+#include <vector>
+
+#include "marrow/domain/camera.hpp"
+#include "workbench/value_json.hpp"
+#include "workbench/workbench.hpp"
+
+namespace marrow::workbench {
+
+/// Text of a value that is given by `--set`: a JSON string or list, in which '$' stands for itself.
+std::string set_text(const nlohmann::json& value);
+
+/// The camera file of a view: the one that `camera` names by {file}, or one in .marrow/drafts with the keys that are
+/// written in place. Throws Error if there is neither.
+std::filesystem::path camera_file(const Workbench& workbench, const nlohmann::json& camera);
+
+/// Writes it to .marrow/drafts/NAME-DIGEST.ENDING, where the digest is that of the text, and returns this place.
+std::filesystem::path working_file(const Workbench& workbench, const std::string& name, const std::string& ending,
+                                   const std::string& text);
+
+/// The overrides that name these views, a list of {name, image, camera}, for the node `views` of a pipeline.
+std::vector<Override> overrides_of(const Workbench& workbench, const nlohmann::json& views);
+
+/// The command that runs the pipeline in a shell.
+std::string command_of(const PipelineCall& call);
+
+/// A run of a small pipeline that is waited for: its outputs and its warnings.
+struct Ran {
+  std::map<std::string, Value> outputs;
+  std::vector<std::string> warnings;
+};
+/// Throws Error as outputs_of() does.
+Ran run(const PipelineCall& call, const Workbench& workbench);
+
+/// Each adds a part of the requests.
+void add_xray_views(Server& server, Workbench& workbench);
+void add_xray_checks(Server& server, Workbench& workbench);
+void add_xray_masks(Server& server, Workbench& workbench);
+void add_xray_exchange(Server& server, Workbench& workbench);
+
+}  // namespace marrow::workbench

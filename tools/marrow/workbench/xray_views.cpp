@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pixels and cameras of X-ray views, for the page to show.
+#include <cstring>
+
+#include "marrow/domain/printable.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
+#include "workbench/xray.hpp"
+
+namespace marrow::workbench {
+namespace {
+
+using nlohmann::json;
+
+/// An image as 16 bit numbers, low byte first, and `about`: width, height, and the grey value of a number n, which is
+/// offset + scale * n.
+std::string pixels_of(const Image& image, json& about) {
+  cv::Mat stored;
+  double offset = 0, scale = 1;
+  if (image.pixels.depth() == CV_32F) {
+    double least = 0, most = 0;
+    cv::minMaxLoc(image.pixels, &least, &most);
+    offset = least;
+    scale = most > least ? (most - least) / 65535 : 1;
+    image.pixels.convertTo(stored, CV_16U, 1 / scale, -offset / scale);
+  } else {
+    image.pixels.convertTo(stored, CV_16U);
+  }
+  about["width_px"] = stored.cols;
+  about["height_px"] = stored.rows;
+  about["offset"] = offset;
+  about["scale"] = scale;
+  std::string bytes(stored.total() * 2, '\0');
+  for (int row = 0; row < stored.rows; ++row)
+    std::memcpy(bytes.data() + std::size_t(row) * std::size_t(stored.cols) * 2, stored.ptr(row),
+                std::size_t(stored.cols) * 2);
+  return bytes;
+}
+
+PipelineCall image_call(const Workbench& workbench, const std::string& image) {
+  return {workbench_pipeline("image"), {{{"image", workbench.folder.inside(image).string()}}, {}}, {}, {}, false};
+}
+
+/// The view if it can be read. If not, the image alone, and why not as `fault`. Throws Error if the image cannot be
+/// read.
+Answer view_answer(const Workbench& workbench, const Request& request) {
+  const std::string image = request.text("image");
+  json about;
+  std::string fault;
+  try {
+    const std::filesystem::path camera = camera_file(workbench, request.body.value("camera", json()));
+    const PipelineCall call{workbench_pipeline("view"),
+                            {{{"image", workbench.folder.inside(image).string()}, {"camera", camera.string()}}, {}},
+                            {},
+                            {},
+                            false};
+    about["command"] = command_of(call);
+    const Ran ran = run(call, workbench);
+    const View& view = ran.outputs.at("view").as<View>();
+    about["camera"] = json_of(view.camera);
+    about["warnings"] = ran.warnings;
+    about["is_mirrored"] = files::is_mirrored_as_read(workbench.folder.inside(image));
+    std::string pixels = pixels_of(view.image, about);
+    return bytes_answer(std::move(pixels), about);
+  } catch (const Error& error) {
+    fault = error.what();
+  }
+  const PipelineCall call = image_call(workbench, image);
+  about = {{"fault", printable_lines(fault)}, {"command", command_of(call)}, {"warnings", json::array()}};
+  const Ran ran = run(call, workbench);
+  about["is_mirrored"] = files::is_mirrored_as_read(workbench.folder.inside(image));
+  std::string pixels = pixels_of(ran.outputs.at("image").as<Image>(), about);
+  return bytes_answer(std::move(pixels), about);
+}
+
+}  // namespace
+
+void add_xray_views(Server& server, Workbench& workbench) {
+  server.post("/api/xray/view", [&](const Request& request) { return view_answer(workbench, request); });
+  server.get("/api/xray/image", [&](const Request& request) {
+    const Ran ran = run(image_call(workbench, request.parameter("path")), workbench);
+    json about;
+    std::string bytes = pixels_of(ran.outputs.at("image").as<Image>(), about);
+    return bytes_answer(std::move(bytes), about);
+  });
+  server.get("/api/xray/header-camera", [&](const Request& request) {
+    const PipelineCall call{workbench_pipeline("header-camera"),
+                            {{{"image", workbench.folder.inside(request.parameter("image")).string()}}, {}},
+                            {},
+                            {},
+                            false};
+    const Ran ran = run(call, workbench);
+    json camera = json_of(ran.outputs.at("camera").as<Camera>());
+    camera["camera_from_world"] = {{"target", "camera"}, {"source", "world"}, {"matrix", camera["camera_from_world"]}};
+    return json_answer({{"camera", camera}, {"warnings", ran.warnings}, {"command", command_of(call)}});
+  });
+}
+
+}  // namespace marrow::workbench

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// The CT of the case that is open, and what its panels share: the crosshair, the window, what a click does, and what is
+// drawn over the slices. Events: 'ct' (another CT, or a fault), 'slice' (values of a slice have come), 'view' (anything
+// else).
+'use strict';
+
+class CtState extends EventTarget {
+  // The panels of one page share one.
+  static of(draft) {
+    if (!CtState.known.has(draft)) CtState.known.set(draft, new CtState(draft));
+    return CtState.known.get(draft);
+  }
+
+  constructor(draft) {
+    super();
+    Object.assign(this, {
+      draft,
+      ct: null,  // as about_ct() of the server tells it, or null
+      fault: '',
+      command: '',
+      isReading: false,
+      read: 'null',  // the document's `ct` that was read
+      cursor_mm: [0, 0, 0],
+      window: {level: 400, width: 1800},
+      tool: null,          // {key, hint, place(point_mm)} or null: a click moves the crosshair
+      marks: new Map(),    // name: () => [{key, point_mm, colour, label, moveTo(point_mm), remove()}]
+      pointed() {},        // is told what is under the pointer: {view, index, value_hu} or null
+      contours: new Map()  // name: {lines(axis, slice, later) => [{colour, ends}]}; ends: i, j, k of both ends of each
+                           // line; later() is called when there is more
+    });
+  }
+
+  tell(name) {
+    this.dispatchEvent(new Event(name));
+  }
+
+  // Reads the CT that the document names, unless it is read already.
+  async follow(isAgain) {
+    const wanted = JSON.stringify(this.draft.document.ct);
+    if (wanted === this.read && !isAgain) return;
+    this.read = wanted;
+    const before = this.ct;
+    Object.assign(this, {isReading: wanted !== 'null', fault: '', ct: wanted === 'null' ? null : before});
+    this.tell('ct');
+    if (wanted === 'null') return;
+    let ct = null, fault = '';
+    try {
+      const {job, command} = await Ask.post('api/ct/open', {ct: JSON.parse(wanted)});
+      this.command = command;
+      ct = await Shell.follow('Reading the CT', job);
+    } catch (error) {
+      fault = error.message;
+    }
+    if (this.read !== wanted) return;  // another one was chosen in the meantime
+    const is_other = !isAgain && ct && !(before && before.name === ct.name);
+    Object.assign(this, {ct, fault, isReading: false});
+    if (is_other) this.cursor_mm = SliceGeometry.point(ct, ct.size.map((n) => Math.floor(n / 2)));
+    this.tell('ct');
+  }
+
+  // int16 in HU, as slice_of() of the server tells them.
+  async slice(axis, index, signal) {
+    const name = this.ct.name;
+    try {
+      return new Int16Array((await Ask.bytes('api/ct/slice', {ct: name, axis, index}, signal)).bytes);
+    } catch (error) {
+      if (error.status !== 409) throw error;
+      if (this.ct && this.ct.name === name && !this.isReading) await this.follow(true);
+      return null;
+    }
+  }
+
+  cursorIndex() {
+    return SliceGeometry.index(this.ct, this.cursor_mm);
+  }
+  sliceAt(axis) {
+    return Math.max(0, Math.min(this.ct.size[axis] - 1, Math.round(this.cursorIndex()[axis])));
+  }
+  // The crosshair stays inside the CT.
+  moveCursor(index) {
+    const inside = index.map((value, k) => Math.max(0, Math.min(this.ct.size[k] - 1, value)));
+    this.cursor_mm = SliceGeometry.point(this.ct, inside);
+    this.tell('view');
+  }
+  goTo(point_mm) {
+    if (this.ct) this.moveCursor(SliceGeometry.index(this.ct, point_mm));
+  }
+  setWindow(level, width) {
+    this.window = {level: Math.round(level), width: Math.max(1, Math.round(width))};
+    this.tell('view');
+  }
+  setTool(tool) {
+    this.tool = tool;
+    this.tell('view');
+  }
+  allMarks() {
+    return [...this.marks.values()].flatMap((list) => list());
+  }
+}
+CtState.known = new WeakMap();

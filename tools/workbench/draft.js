@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// A case that is being made, as the server keeps it. drafts.hpp says what its document holds. Events: 'change'.
+'use strict';
+
+class CaseDraft extends EventTarget {
+  static async open(path) {
+    const draft = new CaseDraft();
+    draft.take(await Ask.json('api/draft', {case: path}));
+    return draft;
+  }
+
+  take(state) {
+    Object.assign(this, {
+      path: state.case,
+      revision: state.revision,
+      document: state.document,
+      state_undo: state.undo,  // what would be undone, or null
+      state_redo: state.redo,
+      is_saved: state.is_saved
+    });
+    this.dispatchEvent(new Event('change'));
+  }
+
+  // Changes a copy of the document and has it kept. `what` is shown at "Undo", such as "move landmark tip". Changes are
+  // made one after the other. Resolves to whether it was kept; if not, the page says why.
+  change(what, mutate) {
+    return this.after(() => {
+      const document = structuredClone(this.document);
+      mutate(document);
+      return Ask.post('api/draft/change', {case: this.path, revision: this.revision, what, document});
+    });
+  }
+  undo() {
+    return this.after(() => Ask.post('api/draft/undo', {case: this.path, revision: this.revision}));
+  }
+  redo() {
+    return this.after(() => Ask.post('api/draft/redo', {case: this.path, revision: this.revision}));
+  }
+
+  // Does something on the server with the newest revision, and takes the state that it answers.
+  after(action) {
+    const turn = (this.last || Promise.resolve()).then(async () => {
+      try {
+        this.take(await action());
+        return true;
+      } catch (error) {
+        Shell.notice(error.message, 'fault');
+        if (error.status === 409) this.take(await Ask.json('api/draft', {case: this.path}));
+        return false;
+      }
+    });
+    this.last = turn.catch(() => {});
+    return turn;
+  }
+}

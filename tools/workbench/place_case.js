@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: Apache-2.0
+// A case on the page "Place": the poses of its bones, how they are moved, kept, judged and registered.
+'use strict';
+
+class PlacedCase extends PlaceControls {
+  constructor(path) {
+    super();
+    Object.assign(this, {
+      path,
+      isOpen: true,
+      mode: 'blend',
+      strength: 0.6,
+      wipe: 0.5,
+      step: 1,
+      placed: {},
+      keyMoves: null,
+      costsBusy: false,
+      costsWanted: false,
+      timings: []
+    });
+    this.steps = new PlaceSteps((step) => this.goTo(step));
+  }
+
+  async open(place) {
+    const {job} = await Ask.post('api/place/open', {case: this.path});
+    const [about, draft] = await Promise.all([Shell.follow('Opening the case', job), CaseDraft.open(this.path)]);
+    if (!this.isOpen) return;
+    Object.assign(this, {about, draft, pipeline: (about.pipelines[0] || {}).file});
+    this.moving = new Set(about.bones.map((bone) => bone.name));
+    this.placed = this.kept() || Object.fromEntries(about.bones.map((bone) => [bone.name, bone.start]));
+    this.views = await Promise.all(about.views.map((view) => PlaceView.make(view, this.forViews())));
+    if (!this.isOpen) return;
+    this.active = this.views[0];
+    this.fill(place);
+    this.steps.add(
+        this.kept() && !draft.is_saved ? 'begin: the draft' : 'begin: ' + about.bones[0].start_is, this.placed);
+    draft.addEventListener('change', () => this.draftChanged());
+    this.draftChanged();
+    await this.redraw();
+    this.views[0].canvas.focus({preventScroll: true});
+    this.askCosts(true);
+    this.pause();
+  }
+
+  forViews() {
+    return {
+      casePath: this.path,
+      style: () => this,
+      poses: () => ({...this.placed}),
+      drag: (drag) => this.drag(drag),
+      dragEnded: (drag) => this.dragEnded(drag),
+      wheel: (view, notches) => this.byKeys(
+          view, 'move in depth', ({middle}) => PlaceMotion.shiftInDepth(view.camera, middle, notches * this.step)),
+      chosen: (view) => (this.active = view),
+      painted: (view, since) => this.painted(view, since),
+      failed: (error) => this.failed(error)
+    };
+  }
+
+  // The poses in the draft, if it has one for each bone.
+  kept() {
+    const fragments = this.draft.document.fragments || {};
+    const starts = this.about.bones.map((bone) => [bone.name, (fragments[bone.name] || {}).start]);
+    return starts.every(([, start]) => start) ? Object.fromEntries(starts) : null;
+  }
+
+  bones() {
+    return this.about.bones.filter((bone) => this.moving.has(bone.name));
+  }
+
+  // The bones to look at when all are locked.
+  watched() {
+    return this.bones().length ? this.bones() : this.about.bones;
+  }
+
+  // Where the bones are that are moved: the middle of all, and the long axis of the first.
+  hold(poses) {
+    const bones = this.watched(), middles = bones.map((bone) => Geometry.moved(poses[bone.name], bone.middle_mm));
+    const middle = Geometry.times(middles.reduce(Geometry.plus, [0, 0, 0]), 1 / bones.length);
+    return {middle, axis: Geometry.turned(poses[bones[0].name], bones[0].long_axis)};
+  }
+
+  // Moves the bones that are not locked from these poses.
+  move(from, motion, isMoving) {
+    const changed =
+        Object.fromEntries(this.bones().map((bone) => [bone.name, Geometry.multiply(motion, from[bone.name])]));
+    Object.assign(this.placed, changed);
+    for (const view of this.views) view.want(changed, isMoving);
+    this.askCosts();
+    this.stopVerdict();
+  }
+
+  drag(drag) {
+    if (!this.bones().length) return;
+    const {camera} = drag.view, {middle, axis} = this.hold(drag.poses), {from, to, kind} = drag;
+    if (kind === 'turn') drag.turned += PlaceMotion.angleAbout(camera, middle, drag.previous, to);
+    const motion = kind === 'shift' ? PlaceMotion.shiftInView(camera, middle, from, to) :
+        kind === 'roll' ? PlaceMotion.roll(axis, middle, PlaceMotion.rollAngle(camera, axis, middle, from, to)) :
+                          PlaceMotion.turnInView(camera, middle, drag.turned);
+    drag.moved = true;
+    this.move(drag.poses, motion, true);
+  }
+
+  dragEnded(drag) {
+    if (!drag.moved) return;
+    for (const view of this.views) view.want(this.placed, false);
+    this.keep(drag.kind === 'shift' ? 'move' : drag.kind === 'roll' ? 'turn about the long axis of' : 'turn');
+  }
+
+  // A key or a notch of the wheel. What follows within a moment belongs to the same step.
+  byKeys(view, what, motionOf) {
+    if (!view || !this.bones().length) return;
+    this.move(this.placed, motionOf({...this.hold(this.placed), camera: view.camera}), false);
+    clearTimeout(this.keyMoves);
+    this.keyMoves = setTimeout(() => this.keep(what), 500);
+  }
+
+  // Keeps the present poses as a step. Those of all bones are kept, because a case has all starts or none.
+  async keep(what) {
+    clearTimeout(this.keyMoves);
+    this.keyMoves = null;
+    await this.keepPoses(what + ' ' + this.bones().map((bone) => bone.name).join(' and '), {});
+  }
+
+  async keepPoses(text, more) {
+    const poses = structuredClone(this.placed);
+    const step = this.steps.add(text, poses, more);
+    this.isKeeping = true;
+    await this.draft.change(text, (document) => {
+      document.fragments = document.fragments || {};
+      for (const [bone, pose] of Object.entries(poses))
+        document.fragments[bone] = {...(document.fragments[bone] || {}), start: pose};
+    });
+    this.isKeeping = false;
+    this.askCosts(step);
+    if (!more.verdicts) this.pause();
+  }
+
+  async undo() {
+    if (this.keyMoves) await this.keep('move');
+    this.draft.undo();
+  }
+
+  async goTo(step) {
+    this.show(step.poses);
+    await this.keepPoses(
+        'back to: ' + step.what.replace(/^(back to: )+/, ''),
+        {costs: step.costs, verdicts: step.verdicts, deviations: step.deviations});
+  }
+
+  show(poses) {
+    Object.assign(this.placed, structuredClone(poses));
+    for (const view of this.views) view.want(poses, false);
+  }
+
+  async draftChanged() {
+    this.updateBar();
+    if (this.isKeeping) return;
+    const kept = this.kept() || (this.steps.steps[0] || {}).poses;
+    if (!kept || JSON.stringify(kept) === JSON.stringify(this.placed)) return;
+    this.show(kept);
+    const step = this.steps.find(kept);
+    this.steps.showVerdict(step && step.verdicts);
+    this.askCosts();
+    this.pause();
+  }
+
+  async redraw() {
+    for (const view of this.views) {
+      view.paint.layers.clear();
+      view.want(this.placed, false);
+    }
+  }
+
+  painted(view, since) {
+    const took_ms = performance.now() - since;
+    this.timings.push([view.name, took_ms]);
+    if (this.timings.length > 5000) this.timings.splice(0, 2500);
+    view.canvas.dataset.painted = Number(view.canvas.dataset.painted || 0) + 1;
+  }
+
+  // A case that the server has forgotten is opened again.
+  failed(error) {
+    if (!this.isOpen || error.name === 'AbortError') return;
+    Shell.notice(error.message, 'fault');
+  }
+
+  // Costs of the present poses, at most one request at a time. `step`: the step to note them at.
+  async askCosts(step) {
+    if (step) this.costsFor = step;
+    this.costsWanted = true;
+    if (this.costsBusy) return;
+    this.costsBusy = true;
+    try {
+      while (this.costsWanted && this.isOpen) {
+        this.costsWanted = false;
+        const noted = this.costsFor === true ? this.steps.steps[0] : this.costsFor;
+        this.costsFor = null;
+        const poses = noted ? noted.poses : this.placed;
+        const costs = await Ask.post('api/place/costs', {case: this.path, poses});
+        if (noted) noted.costs = costs;
+        this.steps.showCosts(costs, (this.bones()[0] || this.about.bones[0]).name);
+        if (noted) this.steps.show();
+        await new Promise((resolve) => setTimeout(resolve, 250));
+      }
+    } catch (error) {
+      this.failed(error);
+    } finally {
+      this.costsBusy = false;
+    }
+  }
+
+  // The present pose is judged when nothing has moved for a while.
+  pause() {
+    this.stopVerdict();
+    if (!this.judges) return;
+    const step = this.steps.current;
+    this.verdictTimer = setTimeout(() => this.judge(step), 1500);
+  }
+
+  stopVerdict() {
+    clearTimeout(this.verdictTimer);
+    if (this.verdictJob) Ask.stop(this.verdictJob).catch(() => {});
+    this.verdictJob = null;
+    if (this.isOpen) this.steps.showVerdict(null);
+  }
+
+  async judge(step) {
+    try {
+      const {job, command} = await Ask.post('api/place/verdict', {case: this.path, poses: step.poses});
+      this.verdictJob = job;
+      this.steps.showVerdict(null, 'is being judged ...');
+      const result = await Ask.follow(job);
+      if (this.verdictJob !== job) return;
+      this.verdictJob = null;
+      step.verdicts = result.verdicts;
+      this.steps.showVerdict(result.verdicts);
+      this.steps.show();
+      this.showCommand(command);
+    } catch (error) {
+      if (error.status !== 499) this.failed(error);
+    }
+  }
+
+  showCommand(command) {
+    this.commandPlace.replaceChildren(
+        Dom.el('p', {class: 'note'}, 'The same on the command line, in the folder that is open:'),
+        Dom.command(command));
+  }
+
+  // A registration from the present poses.
+  async fromHere() {
+    if (this.isRegistering) return;
+    if (this.keyMoves) await this.keep('move');
+    this.stopVerdict();
+    const name = this.about.pipelines.find((one) => one.file === this.pipeline).name;
+    this.isRegistering = true;
+    this.updateBar();
+    await Shell.guarded(async () => {
+      const {job, command} =
+          await Ask.post('api/place/register', {case: this.path, pipeline: this.pipeline, poses: this.placed});
+      this.showCommand(command);
+      const result = await Shell.follow('Registration by ' + name, job);
+      if (!this.isOpen) return;
+      const found = Object.entries(result.poses).filter(([bone]) => this.moving.has(bone));
+      this.show(Object.fromEntries(found.map(([bone, pose]) => [bone, pose.matrix])));
+      const deviations = Object.fromEntries(found.map(([bone, pose]) => [bone, pose.deviations]));
+      const verdicts = Object.keys(result.verdicts).length ? result.verdicts : undefined;
+      await this.keepPoses(
+          'register ' + found.map(([bone]) => bone).join(' and ') + ' by ' + name, {verdicts, deviations});
+      if (verdicts) this.steps.showVerdict(verdicts);
+      for (const [bone, pose] of found)
+        for (const warning of pose.warnings) Shell.notice(bone + ': ' + warning);
+    });
+    this.isRegistering = false;
+    if (this.isOpen) this.updateBar();
+  }
+
+  leave() {
+    if (this.keyMoves) this.keep('move');
+    this.stopVerdict();
+    this.isOpen = false;
+  }
+}

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+// The controls of the page "Place": its bar, the ways to show the bones, and the side with costs, verdict and steps.
+'use strict';
+
+class PlaceControls {
+  updateBar() {
+    if (!this.bar) return;
+    const {undo, redo, from, state} = this.bar, {draft} = this;
+    undo.disabled = draft.state_undo === null;
+    redo.disabled = draft.state_redo === null;
+    undo.title = draft.state_undo ? 'Undo: ' + draft.state_undo : 'There is nothing to undo';
+    redo.title = draft.state_redo ? 'Redo: ' + draft.state_redo : 'There is nothing to redo';
+    from.disabled = Boolean(this.isRegistering) || !this.pipeline;
+    state.textContent = draft.is_saved ? 'saved' : 'kept as a draft';
+  }
+
+  restyle(change) {
+    Object.assign(this, change);
+    for (const view of this.views) view.draw();
+  }
+
+  fill(place) {
+    this.commandPlace = Dom.el('div', {class: 'place-command'});
+    this.bar = {
+      undo: Dom.button('Undo', () => this.undo(), {'data-do': 'undo'}),
+      redo: Dom.button('Redo', () => this.draft.redo(), {'data-do': 'redo'}),
+      from: Dom.button('From here', () => this.fromHere(), {'data-do': 'register', class: 'primary'}),
+      state: Dom.el('span', {class: 'note', role: 'status'})
+    };
+    place.append(
+        Dom.el(
+            'div', {class: 'page-head'}, Dom.el('h1', {}, this.path || '(this folder)'),
+            Dom.el('div', {class: 'toolbar'}, this.bar.undo, this.bar.redo, this.bar.state),
+            Dom.el('div', {class: 'toolbar'}, this.pipelineChoice(), this.bar.from)),
+        this.tools(),
+        Dom.el(
+            'div', {class: 'place-work'}, Dom.el('div', {class: 'place-views'}, this.views.map((view) => view.element)),
+            Dom.el(
+                'aside', {class: 'place-side', 'aria-label': 'The present poses'},
+                Dom.el('section', {'aria-label': 'Costs'}, Dom.el('h2', {}, 'Costs'), this.steps.costTable),
+                Dom.el(
+                    'section', {'aria-label': 'Verdict'}, Dom.el('h2', {}, 'Verdict'), this.judgeBox(),
+                    this.steps.verdict),
+                Dom.el('section', {'aria-label': 'Steps'}, Dom.el('h2', {}, 'Steps'), this.steps.list),
+                this.commandPlace)));
+    this.steps.showVerdict(null);
+    this.updateBar();
+  }
+
+  pipelineChoice() {
+    const options = this.about.pipelines.map((one) => [one.file, one.name]);
+    const help = () => (this.about.pipelines.find((one) => one.file === this.pipeline) || {help: ''}).help;
+    const field = Dom.select('register by', options, this.pipeline, (file) => {
+      this.pipeline = file;
+      field.title = help();
+    });
+    field.title = help();
+    return field;
+  }
+
+  judgeBox() {
+    this.judges = true;
+    return Dom.checkbox('judge each pose after a pause', true, (judges) => {
+      this.judges = judges;
+      this.pause();
+    });
+  }
+
+  tools() {
+    const strength = Dom.slider('strength', this.strength, (value) => this.restyle({strength: value}));
+    const wipe = Dom.slider('line', this.wipe, (value) => this.restyle({wipe: value}));
+    const shown = () => {
+      strength.hidden = !['blend', 'edges'].includes(this.mode);
+      wipe.hidden = this.mode !== 'wipe';
+    };
+    this.modes = Dom.choice('show', PlaceControls.MODES, this.mode, (mode) => {
+      this.mode = mode;
+      shown();
+      this.redraw();
+    });
+    shown();
+    this.stepChoice = Dom.choice(
+        'step of keys (mm, °)', [['0.1', '0.1'], ['0.5', '0.5'], ['1', '1'], ['5', '5']], String(this.step),
+        (step) => (this.step = Number(step)));
+    this.zoomChoice =
+        Dom.choice('zoom', [['1', '1'], ['2', '2'], ['4', '4']], '1', (factor) => this.zoom(Number(factor)));
+    const bones = this.about.bones.length > 1 &&
+        Dom.el(
+            'fieldset', {class: 'place-bones'}, Dom.el('legend', {}, 'moved'),
+            this.about.bones.map((bone) => this.boneBox(bone)));
+    return Dom.el(
+        'div', {class: 'toolbar place-tools'}, this.modes, strength, wipe, this.zoomChoice, this.stepChoice, bones);
+  }
+
+  zoom(factor) {
+    const {middle} = this.hold(this.placed);
+    for (const view of this.views) view.zoom(factor, Geometry.pixel(view.camera, middle) || [0, 0]);
+  }
+
+  boneBox(bone) {
+    const box = Dom.checkbox(bone.name, true, (isMoved) => {
+      this.moving[isMoved ? 'add' : 'delete'](bone.name);
+      this.askCosts();
+    });
+    const [r, g, b] = this.colours[bone.name];
+    box.prepend(Dom.el('span', {class: 'swatch', style: `background: rgb(${r} ${g} ${b})`, 'aria-hidden': 'true'}));
+    return box;
+  }
+
+  get colours() {
+    const COLOURS = [[255, 138, 31], [64, 196, 255], [150, 230, 90], [255, 110, 200]];
+    return Object.fromEntries(this.about.bones.map((bone, i) => [bone.name, COLOURS[i % COLOURS.length]]));
+  }
+}
+PlaceControls.MODES = [
+  ['blend', 'Blend'], ['wipe', 'Wipe'], ['checkerboard', 'Checkerboard'], ['edges', 'Edges'], ['outline', 'Outline']
+];
+let page = null;  // of the case that is shown; a new object for each

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+// One X-ray view of the page "Place": asks the server for the bones at their newest poses, paints them, and tells what
+// the pointer does.
+'use strict';
+
+class PlaceView {
+  // page: {casePath, style(), poses(), drag(view, drag), dragEnded(), wheel(view, notches), chosen(view)}
+  static async make(view, page) {
+    const made = new PlaceView();
+    const MOST_PX = 1024, size = Math.max(view.camera.width_px, view.camera.height_px);
+    Object.assign(made, {
+      name: view.name,
+      camera: view.camera,
+      page,
+      step_px: Math.ceil(size / MOST_PX),
+      pointers: new Map(),
+      wanted: null,
+      inFlight: false,
+      drag: null
+    });
+    const {camera, step_px} = made;
+    const {bytes} = await Ask.bytes('api/place/image', {case: page.casePath, view: view.name, step_px});
+    made.canvas = Dom.el('canvas', {
+      class: 'place-canvas',
+      tabindex: 0,
+      role: 'application',
+      'aria-label': 'X-ray ' + view.name + ', the bone over it. Arrow keys move the bone.',
+      'data-view': view.name
+    });
+    made.paint = new PlacePaint(
+        made.canvas, new Uint8Array(bytes), Math.floor(camera.width_px / step_px),
+        Math.floor(camera.height_px / step_px), step_px);
+    made.window = Dom.el('div', {class: 'place-window'}, made.canvas);
+    made.element = Dom.el('figure', {class: 'place-view'}, Dom.el('figcaption', {}, view.name), made.window);
+    made.listen();
+    return made;
+  }
+
+  listen() {
+    const {canvas} = this;
+    canvas.addEventListener('pointerdown', (event) => this.down(event));
+    canvas.addEventListener('pointermove', (event) => this.move(event));
+    for (const name of ['pointerup', 'pointercancel']) canvas.addEventListener(name, (event) => this.up(event));
+    canvas.addEventListener('contextmenu', (event) => event.preventDefault());
+    canvas.addEventListener('focus', () => this.page.chosen(this));
+    canvas.addEventListener('wheel', (event) => {
+      if (!event.ctrlKey) return;
+      event.preventDefault();
+      this.page.wheel(this, -Math.sign(event.deltaY));
+    }, {passive: false});
+  }
+
+  // Shows the image larger, with a place of the X-ray in the middle.
+  zoom(factor, [u, v]) {
+    this.canvas.style.width = 100 * factor + '%';
+    const size = this.paint.width * this.step_px / this.canvas.getBoundingClientRect().width;
+    this.window.scrollTo(u / size - this.window.clientWidth / 2, v / size - this.window.clientHeight / 2);
+  }
+
+  // The place in the X-ray under the pointer.
+  pixel(event) {
+    const box = this.canvas.getBoundingClientRect();
+    return [
+      (event.clientX - box.left) / box.width * this.paint.width * this.step_px - 0.5,
+      (event.clientY - box.top) / box.height * this.paint.height * this.step_px - 0.5
+    ];
+  }
+
+  down(event) {
+    event.preventDefault();
+    this.canvas.focus({preventScroll: true});
+    this.canvas.setPointerCapture(event.pointerId);
+    this.pointers.set(event.pointerId, this.pixel(event));
+    const kind = this.pointers.size > 1      ? 'two' :
+        event.altKey                         ? 'roll' :
+        event.shiftKey || event.button === 2 ? 'turn' :
+                                               'shift';
+    if (this.drag) this.page.dragEnded(this.drag);
+    this.drag = {kind, view: this, from: this.pixel(event), to: this.pixel(event), poses: this.page.poses(), turned: 0};
+  }
+
+  move(event) {
+    if (!this.drag || !this.pointers.has(event.pointerId)) return;
+    const before = this.pointers.get(event.pointerId), now = this.pixel(event);
+    this.pointers.set(event.pointerId, now);
+    if (this.drag.kind === 'two') {
+      const other = [...this.pointers].find(([id]) => id !== event.pointerId);
+      if (!other) return;
+      const angle = (point) => Math.atan2(point[1] - other[1][1], point[0] - other[1][0]);
+      const turn = angle(now) - angle(before);
+      this.drag.turned += Math.atan2(Math.sin(turn), Math.cos(turn));
+    }
+    this.drag.previous = this.drag.to;
+    this.drag.to = now;
+    this.page.drag(this.drag);
+  }
+
+  up(event) {
+    this.pointers.delete(event.pointerId);
+    if (!this.drag || this.pointers.size) return;
+    const {drag} = this;
+    this.drag = null;
+    this.page.dragEnded(drag);
+  }
+
+  // While a bone moves, every second pixel must do where all of them take too long. On release all are drawn.
+  judgeSpeed(took_ms, isMoving) {
+    const LONG_MS = 40, SHORT_MS = 8;
+    if (!isMoving) return;
+    this.usual_ms = 0.8 * (this.usual_ms || took_ms) + 0.2 * took_ms;
+    if (this.usual_ms > LONG_MS && !this.isSlow)
+      Object.assign(this, {isSlow: true, usual_ms: LONG_MS / 2});
+    else if (this.usual_ms < SHORT_MS && this.isSlow)
+      Object.assign(this, {isSlow: false, usual_ms: LONG_MS / 2});
+  }
+
+  // Asks for bones: {BONE: pose}. There is one request at a time; after it, the newest wish is asked for.
+  want(poses, isMoving) {
+    this.wanted = {poses: {...(this.wanted || {}).poses, ...poses}, isMoving, since: performance.now()};
+    if (!this.inFlight) this.ask();
+  }
+
+  async ask() {
+    this.inFlight = true;
+    try {
+      while (this.wanted) {
+        const {poses, since, isMoving} = this.wanted, style = this.page.style(), begin = performance.now();
+        this.wanted = null;
+        const what = {edges: 'edges', outline: 'outline'}[style.mode] || 'radiograph';
+        const answer = await Ask.postForBytes('api/place/overlay', {
+          case: this.page.casePath,
+          view: this.name,
+          what,
+          step_px: what === 'outline' ? 1 : this.step_px * (isMoving && this.isSlow ? 2 : 1),
+          poses
+        });
+        this.take(answer);
+        this.draw();
+        this.judgeSpeed(performance.now() - begin, isMoving);
+        this.page.painted(this, since);
+      }
+    } catch (error) {
+      this.page.failed(error);
+    } finally {
+      this.inFlight = false;
+    }
+  }
+
+  take({bytes, about}) {
+    let at = 0;
+    for (const layer of about.layers) {
+      const isOutline = layer.columns === undefined;
+      const part = bytes.slice(at, at + layer.bytes);
+      this.paint.layers.set(
+          layer.bone, isOutline ? {points: new Float32Array(part)} : {...layer, bytes: new Uint8Array(part)});
+      at += layer.bytes;
+    }
+  }
+
+  draw() {
+    this.paint.paint(this.page.style());
+  }
+}

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// The panel "Save": writes the draft as a case that `marrow run` reads.
+'use strict';
+
+(() => {
+  const {el} = Dom;
+  const PIPELINES = [['femur-best', 'A fractured femur:'], ['bone', 'Any other bone:']];
+
+  function make(draft) {
+    const outcome = el('div', {role: 'status', 'data-saved': ''});
+    const button = Dom.button('Save the case', () => save(), {'data-do': 'save'});
+
+    async function save() {
+      await draft.last;  // changes on their way come first
+      button.disabled = true;
+      outcome.replaceChildren();
+      try {
+        const {job} = await Ask.post('api/case/save', {case: draft.path, revision: draft.revision});
+        const result = await Shell.follow('Saving the case', job);
+        draft.take(result.draft);
+        outcome.replaceChildren(...written(result));
+      } catch (error) {
+        outcome.replaceChildren(
+            el('p', {}, 'Not saved:'),
+            el('ul', {class: 'faults'},
+               error.message.split('\n').map((line) => line.trim()).filter(Boolean).map((line) => el('li', {}, line))));
+      }
+      button.disabled = false;
+    }
+
+    const written = ({folder, copied, pipelines}) =>
+        [el('p', {}, 'Saved in ', el('strong', {}, folder),
+            copied.length ? '; copied into it: ' + copied.join(', ') : '', '.'),
+         ...PIPELINES.flatMap(
+             ([name, words]) =>
+                 [el('p', {class: 'note'}, words),
+                  Dom.command(
+                      'marrow run ' + Dom.shellPath(pipelines + '/' + name + '.yaml') + ' ' +
+                      'case=' + Dom.shellWord(folder))])];
+
+    return {
+      element: el(
+          'div', {},
+          el('p', {class: 'note'},
+             'Writes case.yaml and landmarks.yaml into the case\'s folder, copies files that lie elsewhere into it, ' +
+                 'and reads the case back before anything is replaced.'),
+          el('div', {class: 'toolbar'}, button), outcome),
+      update() {
+        button.textContent = draft.is_saved ? 'Save again' : 'Save the case';
+      }
+    };
+  }
+
+  CasePage.panel('Save', 90, make);
+})();
