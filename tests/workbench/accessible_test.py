@@ -1,0 +1,103 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""All pages of `marrow open` for people who see little, or use no mouse: contrast by WCAG 2.1 AA in light and dark,
+names for screen readers, and no page wider than a narrow screen."""
+import itertools
+import os
+import shutil
+import subprocess
+
+import bench
+from bench import MARROW, SOURCE, PageTest, sample
+
+# Text whose contrast to what is behind it is too low: [ratio, text, its element]. By WCAG 2.1, 1.4.3: 4.5, and 3 for
+# large text. Controls that are switched off, and text over pictures, do not count.
+LOW_CONTRAST = """
+const numbers = (colour) => (colour.match(/[\\d.]+/g) || []).map(Number);
+const light = ([r, g, b]) => [r, g, b].map((v) => (v /= 255, v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4))
+    .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+const over = (top, below) => {
+  const a = top.length > 3 ? top[3] : 1;
+  return [0, 1, 2].map((i) => a * top[i] + (1 - a) * below[i]);
+};
+function behind(node) {
+  const layers = [];
+  for (; node; node = node.parentElement) {
+    const colour = numbers(getComputedStyle(node).backgroundColor);
+    if (colour.length === 3 || colour[3] > 0) layers.push(colour);
+    if (colour.length === 3 || colour[3] === 1) break;
+  }
+  const paper = numbers(getComputedStyle(document.body).backgroundColor);
+  return layers.reverse().reduce((below, top) => over(top, below), paper);
+}
+const found = [];
+const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+while (walker.nextNode()) {
+  const text = walker.currentNode.textContent.trim(), node = walker.currentNode.parentElement;
+  if (!text || node.closest('script, noscript, svg, [hidden], :disabled, .hidden, canvas')) continue;
+  if (!node.checkVisibility()) continue;
+  const style = getComputedStyle(node), size = parseFloat(style.fontSize);
+  const large = size >= 24 || (size >= 18.66 && Number(style.fontWeight) >= 700);
+  const ground = behind(node), ink = over(numbers(style.color), ground);
+  const [a, b] = [light(ink), light(ground)].sort((x, y) => y - x), ratio = (a + 0.05) / (b + 0.05);
+  if (ratio < (large ? 3 : 4.5)) found.push([ratio.toFixed(2), text.slice(0, 40), node.outerHTML.slice(0, 120)]);
+}
+return found;
+"""
+# What can be reached by the keyboard and has no name that a screen reader could say.
+UNNAMED = """
+const reached = 'a[href], button, input, select, textarea, canvas, [tabindex], dialog[open]';
+return [...document.querySelectorAll(reached)].filter(
+    (one) => !one.closest('[hidden], [aria-hidden="true"]') && one.checkVisibility() && one.id !== 'page' &&
+        !one.textContent.trim() && !one.getAttribute('aria-label') && !one.getAttribute('aria-labelledby') &&
+        !one.title && !(one.labels && one.labels.length)).map((one) => one.outerHTML.slice(0, 120));
+"""
+PAGES = ("home", "case=case", "place=case", "pipeline=femur.yaml", "results=run")
+
+
+class AccessibleTest(PageTest):
+    def setUp(self):
+        super().setUp()
+        environment = {**os.environ, "MARROW_CACHE": str(self.scratch / "store")}
+        run = lambda *words: subprocess.run(
+            [MARROW, "run", *words, "--quiet"], check=True, stdout=subprocess.DEVNULL, env=environment, cwd=self.folder
+        )
+        run(SOURCE / "pipelines/simulate.yaml", "--out", self.scratch / "simulated")
+        shutil.copytree(self.scratch / "simulated/outputs/case", self.folder / "case")
+        shutil.copy(SOURCE / "pipelines/femur.yaml", self.folder)
+        shutil.copytree(SOURCE / "pipelines/verdict", self.folder / "verdict")
+        run("femur.yaml", "case=case", "--out", "run")
+        self.server = self.open()
+        self.is_entered = False
+
+    def page(self, page, **how):
+        """The page, when the work that it begins with is done."""
+        if self.is_entered:
+            self.server.address = "http://127.0.0.1:%d/" % self.server.port
+            self.browser.driver.get("about:blank")
+        self.show(self.server, page, **how)
+        self.is_entered = True
+        self.browser.wait("return !document.querySelector('.notice.job')", 120)
+        faults = "return [...document.querySelectorAll('.fault')].map((one) => one.textContent).filter(Boolean)"
+        self.assertEqual(self.browser.js(faults), [], page)
+
+    def test_contrast_and_names_on_all_pages(self):
+        for theme, page in sample(itertools.product(("light", "dark"), PAGES), 4):
+            with self.subTest(page=page, theme=theme):
+                self.page(page, theme=theme)
+                self.assertEqual(self.browser.js(LOW_CONTRAST), [])
+                self.assertEqual(self.browser.js(UNNAMED), [])
+
+    def test_no_page_is_wider_than_the_screen(self):
+        for width_px, page in sample(itertools.product((1440, 1024, 400), PAGES), 5):
+            with self.subTest(page=page, width_px=width_px):
+                self.page(page, width_px=width_px)
+                self.assertLessEqual(self.browser.js("return document.documentElement.scrollWidth - innerWidth"), 0)
+                for theme in ("light", "dark") if "MARROW_PICTURES" in os.environ else ():
+                    self.page(page, width_px=width_px, theme=theme)
+                    name = "%s-%d-%s.png" % (page.split("=")[0], width_px, theme)
+                    self.browser.picture(os.path.join(os.environ["MARROW_PICTURES"], name))
+
+
+if __name__ == "__main__":
+    bench.main(part=1)
