@@ -24,8 +24,8 @@ using robot::RobotReport;
 struct Options : geometry::FragmentPair, robot::StepLimits, robot::ApproachOptions, robot::HandEyeNoise {
   std::string hand_eye = "estimated";
   double astray_mm = 12;
-  double tolerance_deg = 0.65;
-  double tolerance_mm = 0.65;
+  double tolerance_deg = 0.5;
+  double tolerance_mm = 0.5;
   int most_pairs = 8;
   double most_deviation_deg = 2;
   double most_deviation_mm = 2;
