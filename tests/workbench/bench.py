@@ -146,7 +146,7 @@ def named_tests(suite):
             yield ".".join(one.id().split(".")[-2:])
 
 
-def main(part=3):
+def main(part=5):
     """Runs the tests that the command line names; without names, one of `part` of them, another each day."""
     missing = chromium.missing()
     if missing:
@@ -155,5 +155,5 @@ def main(part=3):
     names = sys.argv[3:]
     if not names:
         every = list(named_tests(unittest.defaultTestLoader.loadTestsFromModule(sys.modules["__main__"])))
-        names = sample(every, max(4, len(every) // part))
+        names = sample(every, max(3, len(every) // part))
     unittest.main(argv=sys.argv[:1] + names, verbosity=2)
