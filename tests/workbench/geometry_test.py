@@ -3,14 +3,13 @@
 """The geometry of the X-rays in the page "Case": what is clicked, projected and triangulated over random cameras and
 random ways to show an image. Expected values are computed with numpy by the formulas of docs/case.md, and by marrow."""
 import json
-import struct
 import subprocess
 import unittest
-import zlib
 
 import numpy
 
 from bench import MARROW, SOURCE, PageTest, main
+from xray_bench import write_png
 
 COUNT = 1000
 
@@ -54,13 +53,6 @@ def ray(camera, at):
     motion = numpy.array(camera["camera_from_world"])
     direction = motion[:3, :3].T @ numpy.linalg.solve(camera["intrinsics"], [*at, 1])
     return -motion[:3, :3].T @ motion[:3, 3], direction / numpy.linalg.norm(direction)
-
-
-def grey_png(path, width, height):
-    chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    rows = zlib.compress((b"\0" + bytes(width)) * height)
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", rows) + chunk(b"IEND", b""))
 
 
 class GeometryTest(PageTest):
@@ -200,7 +192,9 @@ class GeometryTest(PageTest):
         )
         names = ["v%d" % i for i in range(len(cameras))]
         for name, camera in zip(names, cameras):
-            grey_png(self.scratch / (name + ".png"), camera["width_px"], camera["height_px"])
+            write_png(
+                self.scratch / (name + ".png"), numpy.zeros((camera["height_px"], camera["width_px"]), int), bits=8
+            )
             transform = {"target": "camera", "source": "world", "matrix": camera["camera_from_world"]}
             text = {"marrow-camera": 1, **camera, "camera_from_world": transform}
             (self.scratch / (name + ".yaml")).write_text(json.dumps(text))

@@ -14,6 +14,7 @@
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/run_folder.hpp"
 #include "process.hpp"
+#include "run_event.hpp"
 #include "runtime/place_of_results.hpp"
 #include "runtime/verdict_json.hpp"
 
@@ -100,16 +101,7 @@ class RunProgress {
   }
 
   static void print_json(const RunEvent& event) {
-    static constexpr const char* kNames[] = {"started", "progress", "finished", "failed",  "skipped",
-                                             "message", "warning",  "cached",   "waiting", "waited"};
-    json j = {{"event", kNames[int(event.kind)]}, {"node", event.node}};
-    if (!event.item.empty()) j["item"] = event.item;
-    if (!event.text.empty()) j["text"] = event.text;
-    if (event.kind == Kind::message || event.kind == Kind::warning || event.kind == Kind::failed)
-      j["level"] = level_name(event.level);
-    if (event.kind == Kind::progress) j["fraction"] = event.fraction;
-    if (event.kind == Kind::finished || event.kind == Kind::cached) j["seconds"] = event.seconds;
-    std::printf("%s\n", j.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::printf("%s\n", json_of(event).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
     std::fflush(stdout);
   }
 

@@ -24,19 +24,6 @@ PipelineCall call_of(const fs::path& place, const json& ct) {
   return call;
 }
 
-std::string quoted(const std::string& text) {
-  std::string word = "'";
-  for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
-  return word + "'";
-}
-
-std::string command_of(const std::string& file, const json& ct) {
-  std::string command = "marrow run " + quoted(workbench_pipeline("volume").string()) + " ct=" + quoted(file);
-  for (const char* option : kOptions)
-    if (ct.contains(option)) command += " --set " + quoted(std::string("ct.") + option + "=" + ct[option].dump());
-  return command;
-}
-
 /// Reads it unless it is in memory already.
 std::shared_ptr<const OpenCt> opened(const fs::path& place, const json& ct, Workbench& workbench, CtMemory& memory,
                                      Job& job) {
@@ -61,9 +48,9 @@ void add_ct_reading(Server& server, Workbench& workbench, const std::shared_ptr<
     const std::string file = ct["file"];
     const fs::path place = workbench.folder.inside(file);
     const std::string job = workbench.jobs.start(
-        "Reading the CT", command_of(file, ct),
+        "Reading the CT", command_of(call_of(file, ct)),
         [&workbench, memory, place, ct](Job& job) { return about_ct(*opened(place, ct, workbench, *memory, job)); });
-    return json_answer({{"job", job}, {"command", command_of(file, ct)}});
+    return json_answer({{"job", job}, {"command", command_of(call_of(file, ct))}});
   });
   server.get("/api/ct/slice", [memory](const Request& request) {
     const auto ct = memory->by_name(request.parameter("ct"));

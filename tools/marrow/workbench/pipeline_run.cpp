@@ -4,6 +4,7 @@
 #include "commands.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/run_folder.hpp"
+#include "run_event.hpp"
 #include "runtime/place_of_results.hpp"
 #include "runtime/verdict_json.hpp"
 
@@ -93,7 +94,7 @@ json run_into_folder(std::shared_ptr<LastRun> run, const PipelineArguments& argu
   settings.cancelled = &job.stopped();
   settings.observer = [&](const RunEvent& event) {
     log_event(folder.log(), event);
-    job.tell(json_of(event));
+    job.tell(cli::json_of(event));
   };
   run->result = run_pipeline(run->pipeline, workbench.catalogue, settings);
   const auto written = folder.write_outputs(run->pipeline, run->result, workbench.catalogue);

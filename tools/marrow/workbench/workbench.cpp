@@ -5,24 +5,24 @@
 
 #include "marrow/domain/error.hpp"
 #include "new/templates.hpp"
+#include "report/report.hpp"
+#include "run_event.hpp"
 
 namespace marrow::workbench {
-
-using nlohmann::json;
 
 std::filesystem::path workbench_pipeline(const std::string& name) {
   return cli::shared_files(std::filesystem::path("pipelines/workbench") / (name + ".yaml"));
 }
 
-json json_of(const RunEvent& event) {
-  static constexpr const char* kNames[] = {"started", "progress", "finished", "failed",  "skipped",
-                                           "message", "warning",  "cached",   "waiting", "waited"};
-  json j = {{"event", kNames[int(event.kind)]}, {"node", event.node}};
-  if (!event.item.empty()) j["item"] = event.item;
-  if (!event.text.empty()) j["text"] = event.text;
-  if (event.kind == RunEvent::Kind::progress) j["fraction"] = event.fraction;
-  if (event.kind == RunEvent::Kind::finished || event.kind == RunEvent::Kind::cached) j["seconds"] = event.seconds;
-  return j;
+std::string command_of(const PipelineCall& call) {
+  std::string command = "marrow run " + cli::shell_path(call.file);
+  const auto add = [&](const std::string& before, const std::string& word) {
+    command += before + cli::shell_word(word);
+  };
+  for (const InputValue& input : call.arguments.inputs) add(" ", input.name + "=" + input.value);
+  for (const Override& one : call.arguments.overrides) add(" --set ", one.key + "=" + one.value);
+  for (const std::string& output : call.only) add(" --only ", output);
+  return command;
 }
 
 std::map<std::string, Value> outputs_of(const PipelineCall& call, const Workbench& workbench, Job& job) {
@@ -35,7 +35,7 @@ std::map<std::string, Value> outputs_of(const PipelineCall& call, const Workbenc
     });
   RunSettings settings;
   settings.cancelled = &job.stopped();
-  settings.observer = [&](const RunEvent& event) { job.tell(json_of(event)); };
+  settings.observer = [&](const RunEvent& event) { job.tell(cli::json_of(event)); };
   settings.given = call.given;
   settings.remember = false;
   if (call.keep && workbench.store.fault().empty() && workbench.store.prepare().empty())

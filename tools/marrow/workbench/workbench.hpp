@@ -40,8 +40,8 @@ std::filesystem::path workbench_pipeline(const std::string& name);
 /// failed.
 std::map<std::string, Value> outputs_of(const PipelineCall& call, const Workbench& workbench, Job& job);
 
-/// An event of a run for the page: {event, node, item, text, fraction, seconds}.
-nlohmann::json json_of(const RunEvent& event);
+/// The command that runs it in a shell.
+std::string command_of(const PipelineCall& call);
 
 /// Each adds the requests of one page to the server.
 void add_shell(Server& server, Workbench& workbench);

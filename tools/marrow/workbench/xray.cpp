@@ -51,28 +51,6 @@ std::vector<Override> overrides_of(const Workbench& workbench, const json& views
   return {{"views.names", set_text(names)}, {"views.images", set_text(images)}, {"views.cameras", set_text(cameras)}};
 }
 
-namespace {
-
-/// One word of a POSIX shell's command line.
-std::string shell_word(const std::string& text) {
-  std::string word = "'";
-  for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
-  const bool is_plain =
-      text.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_@%+=:,./-") ==
-      std::string::npos;
-  return is_plain && !text.empty() ? text : word + "'";
-}
-
-}  // namespace
-
-std::string command_of(const PipelineCall& call) {
-  std::string command = "marrow run " + shell_word(call.file.string());
-  for (const InputValue& input : call.arguments.inputs) command += " " + shell_word(input.name + "=" + input.value);
-  for (const Override& one : call.arguments.overrides) command += " --set " + shell_word(one.key + "=" + one.value);
-  for (const std::string& output : call.only) command += " --only " + shell_word(output);
-  return command;
-}
-
 Ran run(const PipelineCall& call, const Workbench& workbench) {
   Job job("", "");
   Ran ran{outputs_of(call, workbench, job), {}};

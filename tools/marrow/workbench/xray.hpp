@@ -24,9 +24,6 @@ std::filesystem::path working_file(const Workbench& workbench, const std::string
 /// The overrides that name these views, a list of {name, image, camera}, for the node `views` of a pipeline.
 std::vector<Override> overrides_of(const Workbench& workbench, const nlohmann::json& views);
 
-/// The command that runs the pipeline in a shell.
-std::string command_of(const PipelineCall& call);
-
 /// A run of a small pipeline that is waited for: its outputs and its warnings.
 struct Ran {
   std::map<std::string, Value> outputs;
