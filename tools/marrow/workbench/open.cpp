@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // `marrow open`: the workbench in the browser.
 #include <fcntl.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -76,7 +79,17 @@ void start_browser(const std::string& address) {
   _exit(127);
 }
 
+/// Large blocks go back to the system when they are freed. Otherwise glibc keeps them in the heap of each thread that
+/// answers, where aligned blocks are seldom used again (glibc bug 14581): the server grew by megabytes with a request.
+void give_large_blocks_back() {
+#ifdef __GLIBC__
+  constexpr int kLarge_bytes = 4 << 20;
+  mallopt(M_MMAP_THRESHOLD, kLarge_bytes);
+#endif
+}
+
 int open(const OpenRequest& request) {
+  give_large_blocks_back();
   const std::atomic<bool>& stop = stop_on_signals();
   const Target target = target_of(request.place);
   workbench::Server server;

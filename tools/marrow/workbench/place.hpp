@@ -19,7 +19,7 @@ struct PlacedBone {
   std::string name;
   std::shared_ptr<const RadiographProjector> radiograph;
   std::shared_ptr<const OutlineProjector> outline;
-  std::shared_ptr<const Cost> contour, grey_values;
+  std::shared_ptr<const Cost> contour, grey_values;  ///< coarser and faster than those of a registration
   FragmentFrame frame;
   RigidTransform start;     ///< world_from_model to begin with
   std::string start_is;     ///< where it comes from, in words
@@ -75,8 +75,7 @@ struct OverlayWish {
 /// `about` becomes {u_px, v_px, step_px, columns, rows} of the grid, or {points}.
 std::string overlay_bytes(const OverlayWish& wish, nlohmann::json& about);
 
-/// {contour: {value, views: [...]}, grey_values: {...}} of a bone: smaller is better. Coarser and faster than those
-/// of a registration.
+/// {contour: {value, views: {NAME: value}}, grey_values: {...}} of a bone: smaller is better.
 nlohmann::json costs_of(const PlacedCase& placed, const PlacedBone& bone, const RigidTransform& world_from_model);
 
 /// Writes a pose file for each bone into a new folder `INTO/CASE/NUMBER` of the opened folder, and returns its path

@@ -34,6 +34,16 @@ List<Pose> poses_of(const Value& value) {
   return poses;
 }
 
+/// A cost for the figures that follow a drag. It keeps the fine one alive, whose images it may use. It is made once:
+/// for grey values the CT is smoothed, which takes longer than the comparison.
+std::shared_ptr<const Cost> coarse(std::shared_ptr<const Cost> fine) {
+  constexpr double kSpacing_px = 4, kReach_px = 24;
+  constexpr int kPixelStep = 4;
+  std::shared_ptr<const Cost> made = fine->at_level({kSpacing_px, kReach_px, kPixelStep});
+  const Cost* cost = made.get();
+  return {cost, [fine = std::move(fine), made = std::move(made)](const Cost*) {}};
+}
+
 void begin_at(PlacedBone& bone, const Pose* placed, const Pose* by_landmarks, const Pose& nominal,
               const List<View>& views) {
   bone.frame = nominal.frame;
@@ -116,8 +126,8 @@ std::shared_ptr<const PlacedCase> open_case(const std::string& path, const Workb
     bone.name = nominal.name(i);
     bone.radiograph = radiographs.shared(i);
     bone.outline = outlines.shared(i);
-    bone.contour = contour.shared(i);
-    bone.grey_values = grey_values.shared(i);
+    bone.contour = coarse(contour.shared(i));
+    bone.grey_values = coarse(grey_values.shared(i));
     begin_at(bone, starts.find(bone.name), by_landmarks.find(bone.name), nominal[i], placed->views);
     bone.brightest_mm = brightest_mm(bone, placed->views);
     placed->bones.push_back(std::move(bone));

@@ -113,15 +113,12 @@ std::string overlay_bytes(const OverlayWish& wish, json& about) {
 }
 
 json costs_of(const PlacedCase& placed, const PlacedBone& bone, const RigidTransform& world_from_model) {
-  constexpr double kSpacing_px = 4, kReach_px = 24;
-  constexpr int kPixelStep = 4;
   json costs;
   for (const auto& [name, cost] : {std::pair("contour", &bone.contour), std::pair("grey_values", &bone.grey_values)}) {
-    const auto coarse = (*cost)->at_level({kSpacing_px, kReach_px, kPixelStep});
     json views = json::object();
-    for (std::size_t i = 0; i < std::min(coarse->view_count(), placed.views.size()); ++i)
-      views[placed.views.name(i)] = coarse->value_in_view(i, world_from_model);
-    costs[name] = {{"value", coarse->value(world_from_model)}, {"views", std::move(views)}};
+    for (std::size_t i = 0; i < std::min((*cost)->view_count(), placed.views.size()); ++i)
+      views[placed.views.name(i)] = (*cost)->value_in_view(i, world_from_model);
+    costs[name] = {{"value", (*cost)->value(world_from_model)}, {"views", std::move(views)}};
   }
   return costs;
 }
