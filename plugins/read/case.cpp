@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads a case: a patient's folder with case.yaml. This file names all other files of the case (docs/case.md).
-#include <charconv>
 #include <map>
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/names.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
+#include "marrow/toolbox/files/escaped_name.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
@@ -197,20 +197,6 @@ void read_fragments(const YamlMap& map, marrow::Case& result) {
               "fragments: some of the fragments to register have a truth; give it for all of them or for none");
 }
 
-/// The name of a fragment from that of its file, in which some characters are written as in web addresses.
-std::string decoded(const std::string& file_name) {
-  std::string name;
-  for (std::size_t i = 0; i < file_name.size(); ++i) {
-    unsigned byte = 0;
-    const char* code = file_name.data() + i + 1;
-    const bool is_code =
-        file_name[i] == '%' && i + 2 < file_name.size() && std::from_chars(code, code + 2, byte, 16).ptr == code + 2;
-    name += is_code ? char(byte) : file_name[i];
-    if (is_code) i += 2;
-  }
-  return name;
-}
-
 /// The poses in a folder that holds a file FRAGMENT.yaml for each fragment to register.
 marrow::List<marrow::Pose> read_starts(const fs::path& folder, const marrow::List<marrow::Seeds>& fragments) {
   std::error_code failure;
@@ -219,7 +205,8 @@ marrow::List<marrow::Pose> read_starts(const fs::path& folder, const marrow::Lis
                         ": expected a folder with a pose for each fragment, such as the output 'pose' of a run");
   std::map<std::string, fs::path> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder))
-    if (entry.path().extension() == ".yaml") files[decoded(entry.path().stem().string())] = entry.path();
+    if (entry.path().extension() == ".yaml")
+      files[marrow::files::unescaped_name(entry.path().stem().string())] = entry.path();
   marrow::List<marrow::Pose> starts;
   for (std::size_t i = 0; i < fragments.size(); ++i) {
     if (!fragments[i].wanted) continue;

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A bone's poses for Autoscoper: a line a frame, the 16 numbers of the 4x4 matrix world from bone row by row, in mm,
-// and NaN for a frame in which the bone is lost.
-#include <cstdio>
+// A bone's poses for Autoscoper. A frame in which the bone is lost has none.
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/files/atomic_write.hpp"
-#include "marrow/toolbox/track/track_state.hpp"
+#include "marrow/toolbox/track/tra_file.hpp"
 
 namespace {
 
@@ -20,23 +17,7 @@ AutoscoperTrack autoscoper(const List<TrackState>& states) {
   return result;
 }
 
-void write_tra(const AutoscoperTrack& track, const std::string& path) {
-  std::string text;
-  for (const auto& pose : track.world_from_bone) {
-    for (int row = 0; row < 4; ++row)
-      for (int column = 0; column < 4; ++column) {
-        char number[40] = "NaN";
-        const double value = !pose        ? 0
-                             : row == 3   ? double(column == 3)
-                             : column < 3 ? pose->rotation(row, column)
-                                          : pose->translation_mm[row];
-        if (pose) std::snprintf(number, sizeof number, "%.17g", value);
-        text += (row + column > 0 ? "," : "") + std::string(number);
-      }
-    text += "\n";
-  }
-  files::write_text(path, text);
-}
+void write_tra(const AutoscoperTrack& track, const std::string& path) { track::write_tra_file(track, path); }
 
 }  // namespace
 

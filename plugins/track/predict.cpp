@@ -6,15 +6,47 @@
 namespace {
 
 using namespace marrow;
+using track::AutoscoperTrack;
 using track::TrackState;
+
+struct Options {
+  double keyframe_deg = 3;
+  double keyframe_mm = 3;
+  double keyframe_speed_deg_s = 100;
+  double keyframe_speed_mm_s = 200;
+};
 
 struct Prediction {
   TrackState state;
   Pose pose;
 };
 
-Prediction predict(const TrackState& before) {
-  const TrackState state = track::predicted(before);
+/// The keyframe of the frame whose number, from 0 on, is that of the state.
+const RigidTransform* keyframe_of(const AutoscoperTrack* keyframes, int frame) {
+  if (!keyframes || keyframes->world_from_bone.empty()) return nullptr;
+  const std::size_t at = std::size_t(frame), count = keyframes->world_from_bone.size();
+  if (at >= count)
+    throw Error("there are keyframes for " + std::to_string(count) + " frames, but this is frame " +
+                std::to_string(at + 1) + "; give a line for each frame, with NaN where there is no keyframe");
+  return keyframes->world_from_bone[at] ? &*keyframes->world_from_bone[at] : nullptr;
+}
+
+/// The bone is where a person says. How fast it moves is still best known from the frames before, but they may have
+/// been wrong.
+void begin_again_at(const RigidTransform& keyframe, TrackState& state, const Options& options) {
+  check_rigid(keyframe, "the keyframe");
+  state.predicted.world_from_model = keyframe;
+  track::Vector12d deviation;
+  deviation << Eigen::Vector3d::Constant(radians(options.keyframe_deg)), Eigen::Vector3d::Constant(options.keyframe_mm),
+      Eigen::Vector3d::Constant(radians(options.keyframe_speed_deg_s)),
+      Eigen::Vector3d::Constant(options.keyframe_speed_mm_s);
+  state.predicted.covariance = deviation.cwiseAbs2().asDiagonal();
+  state.now = state.predicted;
+}
+
+Prediction predict(const TrackState& before, const AutoscoperTrack* keyframes, const Options& options) {
+  TrackState state = track::predicted(before);
+  if (const RigidTransform* keyframe = keyframe_of(keyframes, state.frame)) begin_again_at(*keyframe, state, options);
   return {state, track::pose_of(state)};
 }
 
@@ -22,8 +54,15 @@ Prediction predict(const TrackState& before) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("track.predict", predict)
-      .summary("Where the bone is in the next frame, if it keeps its velocity")
+      .summary("Where the bone is in the next frame, if it keeps its velocity, or where a keyframe says")
       .in("state", "what is known after the frame before")
+      .in("keyframes", "poses that a person placed in some frames; they take the place of the prediction there")
       .out("state", &Prediction::state, "what is known before the frame is looked at")
-      .out("pose", &Prediction::pose, "predicted pose with its covariance, to start the frame's registration from");
+      .out("pose", &Prediction::pose, "predicted pose with its covariance, to start the frame's registration from")
+      .option("keyframe_deg", &Options::keyframe_deg, "standard deviation of a keyframe's rotations", at_least(1e-6))
+      .option("keyframe_mm", &Options::keyframe_mm, "standard deviation of a keyframe's translations", at_least(1e-6))
+      .option("keyframe_speed_deg_s", &Options::keyframe_speed_deg_s,
+              "standard deviation of the angular velocity at a keyframe", at_least(1e-6), unit("deg/s"))
+      .option("keyframe_speed_mm_s", &Options::keyframe_speed_mm_s, "standard deviation of the velocity at a keyframe",
+              at_least(1e-6), unit("mm/s"));
 }

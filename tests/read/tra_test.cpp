@@ -61,7 +61,7 @@ TEST_F(ReadTra, WhatIsWrittenIsReadBack) {
 
 TEST_F(ReadTra, SaysWhatIsWrong) {
   EXPECT_EQ(refusal(kQuarter + "1,2,3\n"), ":2: expected the 16 numbers of a 4x4 matrix, got 3");
-  EXPECT_EQ(refusal("0,-1,0,1,1,0,0,x,0,0,1,300,0,0,0,1\n"), ":1: expected a number, got 'x'");
+  EXPECT_EQ(refusal("0,-1,0,1,1,0,0,x,0,0,1,300,0,0,0,1\n"), ":1:16: expected a number, got 'x'");
   EXPECT_EQ(refusal("2,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1\n"),
             ":1: the matrix is no rigid motion; Autoscoper writes 4x4 matrices row by row, with 0, 0, 0, 1 at the end");
   EXPECT_EQ(refusal(kLost), ": there is no tracked frame in it");

@@ -27,6 +27,7 @@ TOPICS = {
     "match": {"image"},
     "phantom": {"calibration", "files"},
     "shaft": {"image"},
+    "track": {"files"},
 }
 
 
