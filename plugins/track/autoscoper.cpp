@@ -2,6 +2,7 @@
 // A bone's poses for Autoscoper. A frame in which the bone is lost has none.
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/track/tra_file.hpp"
 
 namespace {
@@ -17,7 +18,9 @@ AutoscoperTrack autoscoper(const List<TrackState>& states) {
   return result;
 }
 
-void write_tra(const AutoscoperTrack& track, const std::string& path) { track::write_tra_file(track, path); }
+void write_tra(const AutoscoperTrack& track, const std::string& path) {
+  files::write_text(path, track::tra_text(track));
+}
 
 }  // namespace
 

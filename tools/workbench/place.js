@@ -21,6 +21,8 @@ const PlacePage = (() => {
   const tip = (sign) =>
       inView('tip', ({camera, middle, axis}) => PlaceMotion.tip(camera, axis, middle, radians(sign * page.step)));
 
+  const inSequence = (action) => page && page.sequence.isOn && action(page.sequence);
+
   function nextView() {
     if (!page || !page.views) return;
     const at = page.views.indexOf(page.active);
@@ -70,9 +72,18 @@ const PlacePage = (() => {
       ['v', 'the next view', nextView],
       ['m', 'show the bone in another way', nextMode],
       ['z', 'zoom in to the bone, and out', nextZoom],
+      ['[ or ,', 'the frame before', () => inSequence((sequence) => sequence.step(-1))],
+      ['] or .', 'the next frame', () => inSequence((sequence) => sequence.step(1))],
+      ['{ or <', 'the keyframe before', () => inSequence((sequence) => sequence.stepKeyframe(-1))],
+      ['} or >', 'the next keyframe', () => inSequence((sequence) => sequence.stepKeyframe(1))],
+      ['k', 'make the present pose a keyframe', () => inSequence((sequence) => sequence.set())],
+      ['K', 'remove the keyframe', () => inSequence((sequence) => sequence.remove())],
       ['+', 'larger steps', () => nextStep(1)],
       ['-', 'smaller steps', () => nextStep(-1)],
-      ['Enter', 'register from here', (event) => page && page.bar && event.target.matches('canvas') && page.fromHere()],
+      [
+        'Enter', 'register or track from here',
+        (event) => page && page.bar && event.target.matches('canvas') && page.fromHere()
+      ],
       ['Ctrl+z', 'undo', () => page && page.draft && page.undo()],
       ['Ctrl+y or Ctrl+Z', 'redo', () => page && page.draft && page.draft.redo()],
       ['drag', 'move in the view; with Shift or the right button: turn; with Alt: turn about the long axis'],

@@ -19,6 +19,7 @@ class PlacedCase extends PlaceControls {
       timings: []
     });
     this.steps = new PlaceSteps((step) => this.goTo(step));
+    this.sequence = new PlaceSequence(this);
   }
 
   async open(place) {
@@ -35,7 +36,8 @@ class PlacedCase extends PlaceControls {
     this.steps.add(
         this.kept() && !draft.is_saved ? 'begin: the draft' : 'begin: ' + about.bones[0].start_is, this.placed);
     draft.addEventListener('change', () => this.draftChanged());
-    this.draftChanged();
+    await this.draftChanged();
+    if (!this.isOpen) return;
     await this.redraw();
     this.views[0].canvas.focus({preventScroll: true});
     this.askCosts(true);
@@ -57,11 +59,16 @@ class PlacedCase extends PlaceControls {
     };
   }
 
-  // The poses in the draft, if it has one for each bone.
+  // The poses in the draft, if it has one for each bone; in a sequence, those of the frame that is shown.
   kept() {
+    if (this.sequence.isOn) return this.sequence.poses();
     const fragments = this.draft.document.fragments || {};
     const starts = this.about.bones.map((bone) => [bone.name, (fragments[bone.name] || {}).start]);
     return starts.every(([, start]) => start) ? Object.fromEntries(starts) : null;
+  }
+
+  startOf(bone) {
+    return ((this.draft.document.fragments || {})[bone.name] || {}).start || bone.start;
   }
 
   bones() {
@@ -122,11 +129,13 @@ class PlacedCase extends PlaceControls {
     await this.keepPoses(what + ' ' + this.bones().map((bone) => bone.name).join(' and '), {});
   }
 
-  async keepPoses(text, more) {
-    const poses = structuredClone(this.placed);
-    const step = this.steps.add(text, poses, more);
+  async keepPoses(what, more) {
+    const poses = structuredClone(this.placed), {sequence} = this;
+    const frame = sequence.isOn ? sequence.frame : null, text = frame ? `frame ${frame}: ${what}` : what;
+    const step = this.steps.add(text, poses, {...more, frame});
     this.isKeeping = true;
     await this.draft.change(text, (document) => {
+      if (frame) return sequence.put(document, frame, poses);
       document.fragments = document.fragments || {};
       for (const [bone, pose] of Object.entries(poses))
         document.fragments[bone] = {...(document.fragments[bone] || {}), start: pose};
@@ -142,9 +151,10 @@ class PlacedCase extends PlaceControls {
   }
 
   async goTo(step) {
+    if (step.frame) await this.sequence.go(step.frame);
     this.show(step.poses);
     await this.keepPoses(
-        'back to: ' + step.what.replace(/^(back to: )+/, ''),
+        'back to: ' + step.what.replace(/^(frame \d+: )?(back to: )*/, ''),
         {costs: step.costs, verdicts: step.verdicts, deviations: step.deviations});
   }
 
@@ -154,8 +164,10 @@ class PlacedCase extends PlaceControls {
   }
 
   async draftChanged() {
+    const {isKeeping} = this;
     this.updateBar();
-    if (this.isKeeping) return;
+    await this.sequence.update(isKeeping);
+    if (isKeeping || !this.isOpen) return;
     const kept = this.kept() || (this.steps.steps[0] || {}).poses;
     if (!kept || JSON.stringify(kept) === JSON.stringify(this.placed)) return;
     this.show(kept);
@@ -163,6 +175,17 @@ class PlacedCase extends PlaceControls {
     this.steps.showVerdict(step && step.verdicts);
     this.askCosts();
     this.pause();
+  }
+
+  // A sequence was opened or left. Costs and verdicts are of the case's own images.
+  sequenceChanged() {
+    const {isOn} = this.sequence;
+    this.pipelineField.hidden = isOn;
+    for (const section of this.ofOneFrame) section.hidden = isOn;
+    this.updateBar();
+    this.stopVerdict();
+    if (!isOn)
+      for (const view of this.views) view.showImage(view.image);
   }
 
   async redraw() {
@@ -187,6 +210,7 @@ class PlacedCase extends PlaceControls {
 
   // Costs of the present poses, at most one request at a time. `step`: the step to note them at.
   async askCosts(step) {
+    if (this.sequence.isOn) return;
     if (step) this.costsFor = step;
     this.costsWanted = true;
     if (this.costsBusy) return;
@@ -213,7 +237,7 @@ class PlacedCase extends PlaceControls {
   // The present pose is judged when nothing has moved for a while.
   pause() {
     this.stopVerdict();
-    if (!this.judges) return;
+    if (!this.judges || this.sequence.isOn) return;
     const step = this.steps.current;
     this.verdictTimer = setTimeout(() => this.judge(step), 1500);
   }
@@ -252,6 +276,7 @@ class PlacedCase extends PlaceControls {
   async fromHere() {
     if (this.isRegistering) return;
     if (this.keyMoves) await this.keep('move');
+    if (this.sequence.isOn) return this.track();
     this.stopVerdict();
     const name = this.about.pipelines.find((one) => one.file === this.pipeline).name;
     this.isRegistering = true;
@@ -276,8 +301,18 @@ class PlacedCase extends PlaceControls {
     if (this.isOpen) this.updateBar();
   }
 
+  // The same for a sequence.
+  async track() {
+    this.isRegistering = true;
+    this.updateBar();
+    await Shell.guarded(() => this.sequence.track());
+    this.isRegistering = false;
+    if (this.isOpen) this.updateBar();
+  }
+
   leave() {
     if (this.keyMoves) this.keep('move');
+    this.sequence.leave();
     this.stopVerdict();
     this.isOpen = false;
   }

@@ -10,7 +10,8 @@ class PlaceControls {
     redo.disabled = draft.state_redo === null;
     undo.title = draft.state_undo ? 'Undo: ' + draft.state_undo : 'There is nothing to undo';
     redo.title = draft.state_redo ? 'Redo: ' + draft.state_redo : 'There is nothing to redo';
-    from.disabled = Boolean(this.isRegistering) || !this.pipeline;
+    from.disabled = Boolean(this.isRegistering) || !(this.pipeline || this.sequence.isOn);
+    from.textContent = this.sequence.isOn ? 'Track from here' : 'From here';
     state.textContent = draft.is_saved ? 'saved' : 'kept as a draft';
   }
 
@@ -25,24 +26,25 @@ class PlaceControls {
       undo: Dom.button('Undo', () => this.undo(), {'data-do': 'undo'}),
       redo: Dom.button('Redo', () => this.draft.redo(), {'data-do': 'redo'}),
       from: Dom.button('From here', () => this.fromHere(), {'data-do': 'register', class: 'primary'}),
+      sequence: Dom.button(
+          'Sequence', () => this.sequence.timeline.toggle(this.bar.sequence),
+          {'data-do': 'open-sequence', 'aria-expanded': 'false'}),
       state: Dom.el('span', {class: 'note', role: 'status'})
     };
+    const part = (title, ...content) => Dom.el('section', {'aria-label': title}, Dom.el('h2', {}, title), ...content);
+    this.pipelineField = this.pipelineChoice();
+    this.ofOneFrame = [part('Costs', this.steps.costTable), part('Verdict', this.judgeBox(), this.steps.verdict)];
     place.append(
         Dom.el(
             'div', {class: 'page-head'}, Dom.el('h1', {}, this.path || '(this folder)'),
             Dom.el('div', {class: 'toolbar'}, this.bar.undo, this.bar.redo, this.bar.state),
-            Dom.el('div', {class: 'toolbar'}, this.pipelineChoice(), this.bar.from)),
-        this.tools(),
+            Dom.el('div', {class: 'toolbar'}, this.bar.sequence, this.pipelineField, this.bar.from)),
+        this.sequence.timeline.setup, this.tools(), this.sequence.timeline.element,
         Dom.el(
             'div', {class: 'place-work'}, Dom.el('div', {class: 'place-views'}, this.views.map((view) => view.element)),
             Dom.el(
-                'aside', {class: 'place-side', 'aria-label': 'The present poses'},
-                Dom.el('section', {'aria-label': 'Costs'}, Dom.el('h2', {}, 'Costs'), this.steps.costTable),
-                Dom.el(
-                    'section', {'aria-label': 'Verdict'}, Dom.el('h2', {}, 'Verdict'), this.judgeBox(),
-                    this.steps.verdict),
-                Dom.el('section', {'aria-label': 'Steps'}, Dom.el('h2', {}, 'Steps'), this.steps.list),
-                this.commandPlace)));
+                'aside', {class: 'place-side', 'aria-label': 'The present poses'}, this.ofOneFrame,
+                part('Steps', this.steps.list), this.commandPlace)));
     this.steps.showVerdict(null);
     this.updateBar();
   }

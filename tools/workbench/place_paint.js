@@ -6,12 +6,18 @@
 class PlacePaint {
   // grey: 8 bit pixels of the image, each a square of `step_px` pixels of the X-ray
   constructor(canvas, grey, width, height, step_px) {
-    Object.assign(this, {canvas, grey, width, height, step_px, layers: new Map(), last: null});
+    Object.assign(this, {canvas, width, height, step_px, layers: new Map(), last: null});
     canvas.width = width;
     canvas.height = height;
     this.context = canvas.getContext('2d', {alpha: false});
     this.image = this.context.createImageData(width, height);
     this.out = new Uint32Array(this.image.data.buffer);
+    this.show(grey);
+  }
+
+  // Another image of the same size.
+  show(grey) {
+    this.grey = grey;
     this.base = Uint32Array.from(grey, PlacePaint.greyColour);
   }
 

@@ -27,9 +27,10 @@ class PlaceView {
       'aria-label': 'X-ray ' + view.name + ', the bone over it. Arrow keys move the bone.',
       'data-view': view.name
     });
+    made.image = new Uint8Array(bytes);  // of the case
     made.paint = new PlacePaint(
-        made.canvas, new Uint8Array(bytes), Math.floor(camera.width_px / step_px),
-        Math.floor(camera.height_px / step_px), step_px);
+        made.canvas, made.image, Math.floor(camera.width_px / step_px), Math.floor(camera.height_px / step_px),
+        step_px);
     made.window = Dom.el('div', {class: 'place-window'}, made.canvas);
     made.element = Dom.el('figure', {class: 'place-view'}, Dom.el('figcaption', {}, view.name), made.window);
     made.listen();
@@ -155,6 +156,12 @@ class PlaceView {
           layer.bone, isOutline ? {points: new Float32Array(part)} : {...layer, bytes: new Uint8Array(part)});
       at += layer.bytes;
     }
+  }
+
+  // Another image than that of the case.
+  showImage(grey) {
+    this.paint.show(grey);
+    this.draw();
   }
 
   draw() {

@@ -70,7 +70,8 @@ const Shell = (() => {
     }
   }
 
-  // Shows the progress of a job and a button that stops it. Resolves to the job's result; rejects as Ask.follow().
+  // Shows the progress of a job and a button that stops it. told(event) may return how much is done, from 0 to 1, where
+  // the events themselves tell it of a part only. Resolves to the job's result; rejects as Ask.follow().
   async function follow(title, job, told) {
     const bar = el('progress', {'aria-label': title, max: 1}), text = el('span', {class: 'job-text'});
     const line =
@@ -79,10 +80,13 @@ const Shell = (() => {
     document.getElementById('notices').append(line);
     try {
       return await Ask.follow(job, (event) => {
-        if (event.event === 'progress') bar.value = event.fraction;
+        const share = told && told(event);
+        if (Number.isFinite(share))
+          bar.value = share;
+        else if (event.event === 'progress')
+          bar.value = event.fraction;
         if (['started', 'progress', 'message', 'warning'].includes(event.event))
           text.textContent = [event.node, event.item, event.text].filter(Boolean).join(' ');
-        if (told) told(event);
       });
     } finally {
       line.remove();

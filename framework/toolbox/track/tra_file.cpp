@@ -10,7 +10,6 @@
 
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
-#include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 
 namespace marrow::track {
@@ -84,7 +83,7 @@ AutoscoperTrack read_tra_file(const std::filesystem::path& path) {
   return track;
 }
 
-void write_tra_file(const AutoscoperTrack& track, const std::filesystem::path& path) {
+std::string tra_text(const AutoscoperTrack& track) {
   std::string text;
   for (const auto& pose : track.world_from_bone) {
     for (int row = 0; row < 4; ++row)
@@ -99,7 +98,7 @@ void write_tra_file(const AutoscoperTrack& track, const std::filesystem::path& p
       }
     text += "\n";
   }
-  files::write_text(path, text);
+  return text;
 }
 
 }  // namespace marrow::track

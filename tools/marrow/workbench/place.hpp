@@ -78,8 +78,17 @@ std::string overlay_bytes(const OverlayWish& wish, nlohmann::json& about);
 /// {contour: {value, views: {NAME: value}}, grey_values: {...}} of a bone: smaller is better.
 nlohmann::json costs_of(const PlacedCase& placed, const PlacedBone& bone, const RigidTransform& world_from_model);
 
-/// Writes a pose file for each bone into a new folder `INTO/CASE/NUMBER` of the opened folder, and returns its path
-/// relative to that. A folder that holds the same poses is taken again.
+/// The poses {BONE: matrix} that a request has by this name. Throws Error unless each is a rigid motion.
+std::map<std::string, RigidTransform> poses_in(const Request& request, const char* name = "poses");
+
+/// A pose file BONE.yaml for each bone, as texts by name. Throws Error if the pose of a bone is missing.
+std::map<std::string, std::string> start_files(const PlacedCase& placed,
+                                               const std::map<std::string, RigidTransform>& poses);
+/// Writes files into a new folder `INTO/CASE/NUMBER` of the opened folder, and returns its path relative to that. A
+/// folder that holds the same files is taken again.
+std::string write_placement(const OpenedFolder& folder, const std::string& into, const PlacedCase& placed,
+                            const std::map<std::string, std::string>& texts);
+/// Writes a pose file for each bone in this way.
 std::string write_starts(const OpenedFolder& folder, const std::string& into, const PlacedCase& placed,
                          const std::map<std::string, RigidTransform>& poses);
 
@@ -94,5 +103,9 @@ std::string command_from_starts(const Workbench& workbench, const std::string& p
 /// {...}}}.
 nlohmann::json run_from_starts(const Workbench& workbench, const std::filesystem::path& pipeline,
                                const std::string& case_path, const std::string& starts, Job& job);
+
+/// Add the requests about a sequence.
+void add_place_frames(Server& server, Workbench& workbench, const std::shared_ptr<PlacedCases>& cases);
+void add_place_tracking(Server& server, Workbench& workbench, const std::shared_ptr<PlacedCases>& cases);
 
 }  // namespace marrow::workbench

@@ -46,12 +46,6 @@ const json& object_in(const Request& request, const char* name) {
   return *found;
 }
 
-std::map<std::string, RigidTransform> poses_in(const Request& request) {
-  std::map<std::string, RigidTransform> poses;
-  for (const auto& [name, matrix] : object_in(request, "poses").items()) poses[name] = placement_of(matrix);
-  return poses;
-}
-
 int step_in(const Request& request) {
   const json step = request.body.value("step_px", json(1));
   if (!step.is_number_integer() || step < 1 || step > kCoarsest_px)
@@ -94,8 +88,16 @@ json start_from(const Request& request, const PlacedCase& placed, Workbench& wor
 
 }  // namespace
 
+std::map<std::string, RigidTransform> poses_in(const Request& request, const char* name) {
+  std::map<std::string, RigidTransform> poses;
+  for (const auto& [bone, matrix] : object_in(request, name).items()) poses[bone] = placement_of(matrix);
+  return poses;
+}
+
 void add_place_page(Server& server, Workbench& workbench) {
   const auto cases = std::make_shared<PlacedCases>();
+  add_place_frames(server, workbench, cases);
+  add_place_tracking(server, workbench, cases);
   server.post("/api/place/open", [&workbench, cases](const Request& request) {
     const std::string path = request.text("case");
     workbench.folder.inside(path);

@@ -79,11 +79,21 @@ std::string shown_path(const OpenedFolder& folder, const fs::path& path) {
   return relative.empty() || relative.starts_with("..") ? path.string() : relative;
 }
 
+/// Whether the files of a folder are these. Folders in it do not count.
+bool holds_only(const fs::path& folder, const std::map<std::string, std::string>& texts) {
+  std::size_t count = 0;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) count += entry.is_regular_file();
+  return count == texts.size() && std::all_of(texts.begin(), texts.end(), [&](const auto& one) {
+           const fs::path file = folder / one.first;
+           return fs::exists(file) && fs::file_size(file) == one.second.size() &&
+                  read_text_file(file, one.second.size()) == one.second;
+         });
+}
+
 }  // namespace
 
-std::string write_starts(const OpenedFolder& folder, const std::string& into, const PlacedCase& placed,
-                         const std::map<std::string, RigidTransform>& poses) {
-  constexpr int kMost = 100'000;
+std::map<std::string, std::string> start_files(const PlacedCase& placed,
+                                               const std::map<std::string, RigidTransform>& poses) {
   std::map<std::string, std::string> texts;
   for (const PlacedBone& bone : placed.bones) {
     const auto found = poses.find(bone.name);
@@ -93,16 +103,19 @@ std::string write_starts(const OpenedFolder& folder, const std::string& into, co
     pose.frame = bone.frame;
     texts[file_name_of(bone.name) + ".yaml"] = files::pose(pose);
   }
+  return texts;
+}
+
+std::string write_placement(const OpenedFolder& folder, const std::string& into, const PlacedCase& placed,
+                            const std::map<std::string, std::string>& texts) {
+  constexpr int kMost = 100'000;
   const std::string all = into + "/" + file_name_of(placed.path);
   for (int number = 1; number < kMost; ++number) {
     const std::string name = all + "/" + std::to_string(number);
     const fs::path place = folder.inside(name);
     std::error_code error;
     if (fs::exists(place)) {
-      const bool is_same = std::all_of(texts.begin(), texts.end(), [&](const auto& one) {
-        return fs::exists(place / one.first) && read_text_file(place / one.first, kMostSourceBytes) == one.second;
-      });
-      if (is_same) return name;
+      if (holds_only(place, texts)) return name;
       continue;
     }
     fs::create_directories(place, error);
@@ -111,6 +124,11 @@ std::string write_starts(const OpenedFolder& folder, const std::string& into, co
     return name;
   }
   throw Error("there are too many folders in " + printable(folder.inside(all).string()) + "; remove some");
+}
+
+std::string write_starts(const OpenedFolder& folder, const std::string& into, const PlacedCase& placed,
+                         const std::map<std::string, RigidTransform>& poses) {
+  return write_placement(folder, into, placed, start_files(placed, poses));
 }
 
 json pipelines_from_starts(const Workbench& workbench) {

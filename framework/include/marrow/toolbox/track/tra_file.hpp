@@ -12,7 +12,7 @@ namespace marrow::track {
 /// is not 16 numbers or no rigid motion.
 AutoscoperTrack read_tra_file(const std::filesystem::path& path);
 
-/// With all digits, so that the same numbers are read back. Throws Error if it cannot be written.
-void write_tra_file(const AutoscoperTrack& track, const std::filesystem::path& path);
+/// The text of such a file, with all digits, so that the same numbers are read back.
+std::string tra_text(const AutoscoperTrack& track);
 
 }  // namespace marrow::track

@@ -1,0 +1,387 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""Sequences on the page "Place" of `marrow open`: frames, keyframes, the poses between them, and the tracking."""
+import json
+import math
+import shlex
+import subprocess
+import time
+import urllib.parse
+
+import bench
+from bench import MARROW, BenchTest, PageTest
+from moving import FRAMES, VIEWS, Moving, truth
+from placing import PageOfCase, angle_deg, at
+
+NONE = ",".join(["NaN"] * 16)
+
+
+def shifted(pose, x_mm):
+    return [[*row[:3], row[3] + (x_mm if i == 0 else 0)] for i, row in enumerate(pose)]
+
+
+def line(pose):
+    return ",".join("%.17g" % value for row in pose for value in row)
+
+
+class RequestsTest(Moving, BenchTest):
+    def setUp(self):
+        super().setUp()
+        self.server = self.open()
+        self.server.enter()
+        state = self.server.finish(self.server.json("POST", "/api/place/open", {"case": "case"})["job"])
+        self.assertEqual(state["error"], "")
+
+    def opened(self, views):
+        return self.server.finish(
+            self.server.json("POST", "/api/place/sequence", {"case": "case", "views": views})["job"]
+        )
+
+    def fault(self, path, body=None):
+        status, _, content = self.server.ask("POST" if body else "GET", path, body)
+        self.assertEqual(status, 400, content)
+        return json.loads(content)["error"]
+
+    def frames(self, **changes):
+        asked = {"case": "case", "view": "frontal", **VIEWS["frontal"], "first": 2, "last": 3, "step_px": 1, **changes}
+        return "/api/place/frames?" + urllib.parse.urlencode(asked)
+
+    def test_frames_are_read_where_they_are(self):
+        self.assertEqual(self.opened(VIEWS)["result"], {"frames": FRAMES})
+        status, headers, content = self.server.ask("GET", self.frames())
+        self.assertEqual((status, json.loads(headers["X-Marrow-About"])), (200, {"bytes": 256 * 256, "frames": 2}))
+        self.assertEqual(len(content), 2 * 256 * 256)
+        second = self.server.ask("GET", self.frames(first=3))[2]
+        self.assertEqual(content[256 * 256 :], second)
+        self.assertNotEqual(content[: 256 * 256], second)
+        self.assertEqual(len(self.server.ask("GET", self.frames(first=3, step_px=2))[2]), 128 * 128)
+
+    def test_what_is_wrong_with_a_sequence_is_said(self):
+        asked = {"case": "case", "views": {"frontal": VIEWS["frontal"]}}
+        self.assertEqual(
+            self.fault("/api/place/sequence", asked),
+            "view 'lateral': say where its frames are: a folder of images, or a file with several frames",
+        )
+        (self.folder / "film" / "0006" / "lateral" / "image.png").unlink()
+        self.assertEqual(
+            self.opened(VIEWS)["error"],
+            "view 'lateral' has 5 frames, but view 'frontal' has 6; all views must show the same moments",
+        )
+        wrong = {**VIEWS, "frontal": {"images": "film", "pattern": "*.png"}}
+        self.assertIn("no file in it fits the pattern '*.png'", self.opened(wrong)["error"])
+        outside = {**VIEWS, "frontal": {"images": "../..", "pattern": ""}}
+        self.assertIn(
+            " leads out of the folder that is open, ", self.fault("/api/place/sequence", {**asked, "views": outside})
+        )
+        self.assertEqual(self.fault(self.frames(last=99)), "'last' must be a whole number from 2 to 33, got '99'")
+
+    def test_what_is_wrong_with_keyframes_is_said(self):
+        good = {
+            "case": "case",
+            "views": VIEWS,
+            "frame_rate_hz": 60,
+            "frames": FRAMES,
+            "starts": {"bone": truth(1)},
+            "keyframes": {},
+        }
+        for change, fault in (
+            ({"frame_rate_hz": 0}, "the frame rate must be a number above 0"),
+            ({"frames": 0}, "'frames' must be a whole number from 1 to 1000000"),
+            (
+                {"keyframes": {"bone": {"7": truth(1)}}},
+                "a keyframe of 'bone' is in frame '7', but the sequence has frames 1 to 6; remove it",
+            ),
+            ({"keyframes": {"tibia": {"1": truth(1)}}}, "the case has no bone 'tibia' that is registered"),
+            ({"keyframes": {"bone": {"1": [[1]]}}}, "a pose must be 4 rows of 4 numbers"),
+            ({"starts": {}}, "the request lacks the pose of 'bone'"),
+        ):
+            self.assertEqual(self.fault("/api/place/track", {**good, **change}), fault)
+        self.assertEqual(
+            self.fault("/api/place/tracked?case=case&folder=nowhere"),
+            "'nowhere': the tracked poses are gone; track the bones again",
+        )
+
+    def test_the_command_line_tracks_the_same(self):
+        keyframes = {"1": truth(1), "4": shifted(truth(4), 1)}
+        asked = {
+            "case": "case",
+            "views": VIEWS,
+            "frame_rate_hz": 60,
+            "frames": FRAMES,
+            "starts": {"bone": truth(1)},
+            "keyframes": {"bone": keyframes},
+        }
+        begun = self.server.json("POST", "/api/place/track", asked)
+        state = self.server.finish(begun["job"])
+        self.assertEqual(state["error"], "")
+        found = state["result"]
+        self.assertEqual(found["tracked"], "placed/case/1/tracked")
+        for i, pose in enumerate(found["poses"]["bone"]):
+            self.assertLess(math.dist(at(pose, [0, 0, 160]), at(truth(i + 1), [0, 0, 160])), 1)
+        lines = (self.folder / "placed/case/1/bone.tra").read_text().splitlines()
+        self.assertEqual(lines, [line(keyframes["1"]), NONE, NONE, line(keyframes["4"]), NONE, NONE])
+        subprocess.run(
+            [MARROW, *shlex.split(begun["command"])[1:], "--out", self.scratch / "run", "--quiet"],
+            cwd=self.folder,
+            check=True,
+            env={**bench.os.environ, "MARROW_CACHE": str(self.scratch / "another-store")},
+        )
+        written = (self.scratch / "run" / "outputs" / "tra" / "bone.tra").read_bytes()
+        self.assertEqual(written, (self.folder / "placed/case/1/tracked/bone.tra").read_bytes())
+        again = self.server.json("GET", "/api/place/tracked?case=case&folder=placed/case/1/tracked")
+        self.assertEqual(again["bone"], found["poses"]["bone"])
+
+    def test_without_keyframes_the_command_names_none(self):
+        asked = {"case": "case", "views": VIEWS, "frame_rate_hz": 60, "frames": FRAMES, "starts": {"bone": truth(1)}}
+        begun = self.server.json("POST", "/api/place/track", asked)
+        self.assertNotIn("keyframes=", begun["command"])
+        self.server.json("POST", "/api/job/stop", {"job": begun["job"]})
+        self.assertEqual(self.server.finish(begun["job"])["state"], "stopped")
+
+
+class PageOfSequenceTest(PageOfCase, Moving, PageTest):
+    bone = "bone"
+
+    def place(self, **options):
+        """The page with the sequence open, whose places were typed in."""
+        server = super().place(**options)
+        self.press("open-sequence")
+        for view, one in VIEWS.items():
+            for key, value in one.items():
+                self.js("document.querySelector('[data-%s=%s]').value = arguments[0]" % (key, view), value)
+        self.js("document.querySelector('[name=rate]').value = 60")
+        self.press("sequence")
+        self.browser.wait(
+            "return PlacePage.current().sequence.isOn && !document.querySelector('.place-sequence').hidden"
+        )
+        self.arrived(1)
+        return server
+
+    def press(self, name):
+        self.js("document.querySelector('[data-do=%s]').click()" % name)
+
+    def arrived(self, frame):
+        self.browser.wait(
+            "const s = PlacePage.current().sequence; return s.frame === %d && s.wanted === %d" % (frame, frame)
+        )
+
+    def keys(self, *names):
+        for name in names:
+            self.browser.key(name, "[data-view=frontal]")
+
+    def settled(self):
+        self.browser.wait("return !PlacePage.current().keyMoves && !PlacePage.current().isKeeping")
+
+    def keyframes(self):
+        self.settled()
+        sequence = self.js("return PlacePage.current().draft.document.sequence")
+        return {int(frame): one["pose"] for frame, one in (sequence["keyframes"].get("bone") or {}).items()}
+
+    def put(self, frame, pose):
+        """Places the bone in a frame, as a person does who then sets the keyframe."""
+        self.js("PlacePage.current().sequence.go(%d)" % frame)
+        self.arrived(frame)
+        self.js("PlacePage.current().show({bone: arguments[0]})", pose)
+        self.keys("k")
+        self.browser.wait("return !!PlacePage.current().sequence.keyframes('bone')[%d]" % frame)
+        self.settled()
+
+    def status(self):
+        return self.js("return document.querySelector('.place-frame').textContent")
+
+    def picture(self):
+        return self.js("return PlacePage.current().views[0].paint.grey.join()")
+
+    def test_frames_and_keyframes_by_keys(self):
+        self.place()
+        first = self.picture()
+        self.keys("]", "]")
+        self.arrived(3)
+        self.assertNotEqual(self.picture(), first)
+        self.assertEqual(self.status(), "Frame 3 of 6 · 0.033 s · bone: the start")
+        self.keys("ARROW_RIGHT")
+        self.browser.wait("return !!PlacePage.current().sequence.keyframes('bone')[3]")
+        self.assertEqual(sorted(self.keyframes()), [3])
+        self.assertEqual(self.js("return PlacePage.current().draft.state_undo"), "frame 3: move bone")
+        self.assertEqual(self.status(), "Frame 3 of 6 · 0.033 s · bone: keyframe")
+        self.keys("[")
+        self.arrived(2)
+        self.assertEqual(self.pose(), self.keyframes()[3], "before the first keyframe, it is as in that")
+        self.assertEqual(self.status(), "Frame 2 of 6 · 0.017 s · bone: as in frame 3")
+        self.keys("]", "]", "]", "k")
+        self.browser.wait("return !!PlacePage.current().sequence.keyframes('bone')[5]")
+        self.keys("{")
+        self.arrived(3)
+        self.keys("}")
+        self.arrived(5)
+        marks = "return [...document.querySelectorAll('[data-keyframe]')].map((one) => one.dataset.keyframe)"
+        self.assertEqual(self.js(marks), ["3", "5"])
+        self.keys("K")
+        self.browser.wait("return !PlacePage.current().sequence.keyframes('bone')[5]")
+        self.assertEqual(self.js(marks), ["3"])
+        self.assertEqual(
+            self.js("return PlacePage.current().draft.state_undo"), "remove the keyframe of bone in frame 5"
+        )
+        self.js("document.querySelector('[data-remove]').click()")
+        self.browser.wait("return document.querySelectorAll('[data-keyframe]').length === 0")
+        self.assertEqual(self.browser.logs()[0], [])
+
+    def test_undo_shows_the_frame_that_it_changes(self):
+        self.place()
+        self.put(2, truth(2))
+        self.put(5, truth(5))
+        self.press("undo")
+        self.browser.wait("return !PlacePage.current().sequence.keyframes('bone')[5]")
+        self.js("return PlacePage.current().sequence.go(6)")
+        self.arrived(6)
+        self.press("undo")
+        self.arrived(2)
+        self.assertEqual(self.keyframes(), {})
+        self.press("redo")
+        self.browser.wait("return !!PlacePage.current().sequence.keyframes('bone')[2]")
+        self.assertEqual(self.pose(), truth(2))
+
+    def test_between_keyframes_the_middle_goes_straight_and_the_rotation_evenly(self):
+        self.place()
+        self.put(1, truth(1))
+        self.put(5, truth(5))
+        poses = {}
+        for frame in (2, 3, 6):
+            self.js("PlacePage.current().sequence.go(%d)" % frame)
+            self.arrived(frame)
+            poses[frame] = self.pose()
+        begin, end = (self.middle(truth(frame)) for frame in (1, 5))
+        for frame, share in ((2, 0.25), (3, 0.5)):
+            expected = [a + share * (b - a) for a, b in zip(begin, end)]
+            self.assertLess(math.dist(self.middle(poses[frame]), expected), 1e-9)
+            self.assertAlmostEqual(angle_deg(truth(1), poses[frame]), share * angle_deg(truth(1), truth(5)), delta=1e-4)
+        self.assertEqual(poses[6], truth(5))
+        self.assertIn(
+            "between frames 1 and 5",
+            self.js("PlacePage.current().sequence.go(3); return document.querySelector('.place-frame').textContent"),
+        )
+
+    def test_large_turns_take_the_shorter_way(self):
+        self.place()
+        script = (
+            "const turn = (deg) => Geometry.rotation([1, 2, 3], deg * Math.PI / 180, [5, 6, 7]);"
+            "return PlaceBetween.between(turn(arguments[0]), turn(arguments[1]), arguments[2], [5, 6, 7])"
+        )
+        turn = lambda begin, end, share: self.js(script, begin, end, share)
+        for begin, end, share, expected in (
+            (0, 178, 0.5, 89),
+            (100, 260, 0.25, 140),
+            (170, -170, 0.5, 180),
+            (3, 3, 0.5, 3),
+        ):
+            self.assertLess(angle_deg(turn(begin, end, share), turn(expected, expected, 0)), 1e-4)
+            self.assertLess(math.dist(at(turn(begin, end, share), [5, 6, 7]), [5, 6, 7]), 1e-9)
+
+    def test_it_tracks_from_the_keyframes(self):
+        server = self.place()
+        self.put(1, truth(1))
+        self.put(4, shifted(truth(4), 1))
+        self.keys("ENTER")
+        self.browser.wait("return !!PlacePage.current().sequence.kept.tracked && !PlacePage.current().isRegistering")
+        command = shlex.split(self.js("return document.querySelector('.command code').textContent"))
+        self.assertIn("keyframes=placed/case/1", command)
+        self.assertIn(
+            "bone was found in all 6 frames", self.js("return document.querySelector('#notices').textContent")
+        )
+        for frame, what in (
+            (2, "tracked, trusted"),
+            (4, "tracked from the keyframe, trusted"),
+            (6, "tracked, trusted"),
+        ):
+            self.js("PlacePage.current().sequence.go(%d)" % frame)
+            self.arrived(frame)
+            self.assertLess(math.dist(self.middle(self.pose()), self.middle(truth(frame))), 1)
+            self.assertTrue(self.status().endswith("bone: " + what), self.status())
+        self.assertEqual(self.js("return document.querySelectorAll('.place-marks rect.tracked').length"), 1)
+        tracked = self.pose()
+        self.keys("ARROW_RIGHT")
+        self.browser.wait("return !!PlacePage.current().sequence.keyframes('bone')[6]")
+        self.settled()
+        self.assertTrue(self.status().endswith("bone: keyframe"), self.status())
+        self.assertAlmostEqual(math.dist(self.middle(self.pose()), self.middle(tracked)), 1, places=6)
+        self.press("undo")
+        self.browser.wait("return !PlacePage.current().sequence.keyframes('bone')[6]")
+        self.assertEqual(self.pose(), tracked)
+        self.press("undo")
+        self.browser.wait("return !PlacePage.current().sequence.kept.tracked")
+        self.browser.wait("return document.querySelectorAll('.place-marks rect').length === 0")
+        self.press("redo")
+        self.browser.wait("return document.querySelectorAll('.place-marks rect.tracked').length === 1")
+        self.show(server, "home")
+        self.show(server, "place=case")
+        self.js("PlacePage.current().sequence.go(6)")
+        self.arrived(6)
+        self.assertEqual(self.pose(), tracked, "the tracked poses outlive the page")
+        self.assertEqual(self.browser.logs()[0], [])
+
+    def test_a_lost_bone_is_shown_as_lost(self):
+        for view in ("frontal", "lateral"):
+            blank = self.folder / "film" / "0004" / view / "image.png"
+            from xray_bench import write_png
+            import numpy
+
+            write_png(blank, numpy.full((256, 256), 30000))
+        self.place()
+        self.put(1, truth(1))
+        self.press("register")
+        self.browser.wait("return !!PlacePage.current().sequence.kept.tracked && !PlacePage.current().isRegistering")
+        self.assertIn(
+            "bone is lost in 1 of 6 frames, first in 4: place it there, and track again",
+            self.js("return document.querySelector('#notices').textContent"),
+        )
+        self.js("PlacePage.current().sequence.go(4)")
+        self.arrived(4)
+        self.assertTrue(self.status().endswith("bone: lost; between frames 3 and 5"), self.status())
+        self.assertEqual(self.js("return document.querySelectorAll('.place-marks rect.lost').length"), 1)
+
+    def test_keyframes_are_saved_as_files_of_autoscoper(self):
+        self.place()
+        self.put(2, truth(2))
+        self.press("save-tra")
+        self.browser.wait("return document.querySelector('#notices').textContent.includes('The keyframes are in')")
+        lines = (self.folder / "placed" / "case" / "1" / "bone.tra").read_text().splitlines()
+        self.assertEqual(lines, [NONE, line(truth(2))] + 4 * [NONE])
+
+    def test_few_images_are_kept_in_memory(self):
+        self.place()
+        self.js(
+            "PlaceFrames.MOST_BYTES = 5 * 65536; const images = PlacePage.current().sequence.images;"
+            "images.blocks.clear(); PlaceFrames.BLOCK = 1"
+        )
+        for frame in (1, 2, 3, 4, 5, 6, 1):
+            self.js("PlacePage.current().sequence.go(%d)" % frame)
+            self.arrived(frame)
+        held = (
+            "const blocks = [...PlacePage.current().sequence.images.blocks.values()];"
+            "return blocks.reduce((sum, one) => sum + (one.bytes || 0), 0)"
+        )
+        time.sleep(0.5)
+        self.assertLessEqual(self.js(held), 5 * 65536)
+        self.assertGreater(self.js(held), 65536)
+
+    def test_without_the_sequence_the_case_is_shown_again(self):
+        self.place()
+        self.assertTrue(self.js("return document.querySelector('[aria-label=Costs]').hidden"))
+        self.press("open-sequence")
+        self.press("remove-sequence")
+        self.browser.wait("return !PlacePage.current().sequence.isOn")
+        self.assertTrue(self.js("return document.querySelector('.place-sequence').hidden"))
+        self.assertFalse(self.js("return document.querySelector('[aria-label=Costs]').hidden"))
+        self.assertTrue(self.js("return PlacePage.current().views.every((view) => view.paint.grey === view.image)"))
+        self.press("undo")
+        self.browser.wait("return PlacePage.current().sequence.isOn")
+
+    def test_nothing_is_cut_off_on_a_narrow_page(self):
+        for width_px in (1440, 1024, 400):
+            self.place(width_px=width_px)
+            self.press("open-sequence")
+            self.assertLessEqual(self.js("return document.documentElement.scrollWidth"), width_px)
+
+
+if __name__ == "__main__":
+    bench.main()
