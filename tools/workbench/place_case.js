@@ -182,10 +182,12 @@ class PlacedCase extends PlaceControls {
     const {isOn} = this.sequence;
     this.pipelineField.hidden = isOn;
     for (const section of this.ofOneFrame) section.hidden = isOn;
+    this.ofSequence.hidden = !isOn;
     this.updateBar();
     this.stopVerdict();
-    if (!isOn)
-      for (const view of this.views) view.showImage(view.image);
+    if (isOn) return;
+    for (const view of this.views) view.showImage(view.image);
+    this.askCosts();
   }
 
   async redraw() {

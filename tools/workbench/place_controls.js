@@ -33,6 +33,7 @@ class PlaceControls {
     };
     const part = (title, ...content) => Dom.el('section', {'aria-label': title}, Dom.el('h2', {}, title), ...content);
     this.pipelineField = this.pipelineChoice();
+    this.ofSequence = part('Keyframes', this.sequence.timeline.list);
     this.ofOneFrame = [part('Costs', this.steps.costTable), part('Verdict', this.judgeBox(), this.steps.verdict)];
     place.append(
         Dom.el(
@@ -43,8 +44,9 @@ class PlaceControls {
         Dom.el(
             'div', {class: 'place-work'}, Dom.el('div', {class: 'place-views'}, this.views.map((view) => view.element)),
             Dom.el(
-                'aside', {class: 'place-side', 'aria-label': 'The present poses'}, this.ofOneFrame,
+                'aside', {class: 'place-side', 'aria-label': 'The present poses'}, this.ofOneFrame, this.ofSequence,
                 part('Steps', this.steps.list), this.commandPlace)));
+    this.ofSequence.hidden = true;
     this.steps.showVerdict(null);
     this.updateBar();
   }

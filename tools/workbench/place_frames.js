@@ -13,21 +13,15 @@ class PlaceFrames {
   async get(frame) {
     const block = this.blockOf(frame), at = frame - 1 - block * PlaceFrames.BLOCK;
     const images = await this.load(block);
-    this.ahead(frame);
     return Object.fromEntries(
         Object.entries(images).map(([name, {bytes, size}]) => [name, new Uint8Array(bytes, at * size, size)]));
-  }
-
-  has(frame) {
-    const held = this.blocks.get(this.blockOf(frame));
-    return Boolean(held && held.bytes);
   }
 
   blockOf(frame) {
     return Math.floor((frame - 1) / PlaceFrames.BLOCK);
   }
 
-  // The block behind the nearer end of the present one.
+  // Reads the block behind the nearer end of the present one.
   ahead(frame) {
     const block = this.blockOf(frame), at = frame - 1 - block * PlaceFrames.BLOCK;
     const next = at >= PlaceFrames.BLOCK / 2 ? block + 1 : block - 1;

@@ -6,7 +6,7 @@
 
 class PlaceSequence {
   constructor(page) {
-    Object.assign(this, {page, frame: 1, wanted: 1, frames: 0, tracked: {}, arriving: Promise.resolve()});
+    Object.assign(this, {page, frame: 1, wanted: 1, frames: 0, tracked: {}, arriving: Promise.resolve(), opened: null});
     this.timeline = new PlaceTimeline(this);
   }
 
@@ -69,7 +69,10 @@ class PlaceSequence {
       this.frame = this.wanted = Math.min(this.frame, frames);
     });
     this.page.sequenceChanged();
-    if (this.images) await this.go(this.frame);
+    if (this.images) {
+      await this.arriving;  // of the sequence before
+      await this.go(this.frame);
+    }
   }
 
   async loadTracked(folder) {
@@ -96,20 +99,37 @@ class PlaceSequence {
     if (!this.isOn) return this.arriving;
     this.wanted = Math.max(1, Math.min(this.frames, frame));
     this.timeline.moved();
-    return this.arriving = this.arrive(this.wanted);
+    if (!this.isArriving) this.arriving = this.arrive();
+    return this.arriving;
   }
 
-  async arrive(frame) {
-    await Shell.guarded(async () => {
-      const {page, images} = this;
+  // One frame is asked for at a time; after it, the newest wish.
+  async arrive() {
+    const {page, images} = this;
+    this.isArriving = true;
+    try {
       if (page.keyMoves) await page.keep('move');
-      const shown = await images.get(frame);
-      if (frame !== this.wanted || images !== this.images || !page.isOpen) return;
-      this.frame = frame;
-      for (const view of page.views) view.showImage(shown[view.name]);
-      page.show(this.poses());
-      this.timeline.moved();
-    });
+      for (let frame = null; frame !== this.wanted;) {
+        frame = this.wanted;
+        const shown = await images.get(frame);
+        if (images !== this.images || !page.isOpen) return;
+        if (frame === this.wanted) this.present(frame, shown);
+      }
+      images.ahead(this.frame);
+    } catch (error) {
+      this.wanted = this.frame;
+      page.failed(error);
+    } finally {
+      this.isArriving = false;
+      if (this.isOn && page.isOpen) this.timeline.moved();
+    }
+  }
+
+  present(frame, images) {
+    const {page} = this;
+    this.frame = frame;
+    for (const view of page.views) view.showImage(images[view.name]);
+    page.show(this.poses());
   }
 
   step(by) {

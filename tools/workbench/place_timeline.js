@@ -122,8 +122,7 @@ class PlaceTimeline {
            Dom.button('Save as .tra', () => sequence.save(), {'data-do': 'save-tra'})),
         el('div', {class: 'place-slider'}, this.slider, this.rows), this.text,
         el('p', {class: 'note place-legend'}, '◆ keyframe ', el('span', {class: 'tracked', 'aria-hidden': 'true'}),
-           ' tracked ', el('span', {class: 'lost', 'aria-hidden': 'true'}), ' lost'),
-        el('details', {}, el('summary', {}, 'Keyframes'), this.list));
+           ' tracked ', el('span', {class: 'lost', 'aria-hidden': 'true'}), ' lost'));
   }
 
   // A bone's keyframes and tracked frames, under the slider. Frames in a row are one mark.
