@@ -3,6 +3,7 @@
 each frame."""
 import pathlib
 import shutil
+import struct
 import subprocess
 import tempfile
 import unittest
@@ -46,6 +47,23 @@ def truth(frame):
     import yaml
 
     return yaml.safe_load((made() / "truths" / ("%04d" % frame) / "bone.yaml").read_text())["matrix"]
+
+
+def write_tiff(path, images):
+    """Pages of 16 bits, one strip each."""
+    data, at = b"", []
+    for image in images:
+        pixels, (height, width) = image.astype("<u2").tobytes(), image.shape
+        entries = [(256, 4, width), (257, 4, height), (258, 3, 16), (259, 3, 1), (262, 3, 1), (273, 4, 8 + len(data))]
+        entries += [(277, 3, 1), (278, 4, height), (279, 4, len(pixels))]
+        data += pixels
+        at.append(8 + len(data))
+        data += struct.pack("<H", len(entries)) + b"".join(struct.pack("<HHII", a, b, 1, c) for a, b, c in entries)
+        data += b"NEXT"
+    for page, begin in enumerate(at):
+        end = begin - 8 + 2 + 12 * 9
+        data = data[:end] + struct.pack("<I", at[page + 1] if page + 1 < len(at) else 0) + data[end + 4 :]
+    path.write_bytes(struct.pack("<2sHI", b"II", 42, at[0]) + data)
 
 
 class Moving:

@@ -8,10 +8,15 @@ import subprocess
 import time
 import urllib.parse
 
+import numpy
+import yaml
+
 import bench
+from accessible_test import LOW_CONTRAST, UNNAMED
 from bench import MARROW, BenchTest, PageTest
-from moving import FRAMES, VIEWS, Moving, truth
+from moving import FRAMES, VIEWS, Moving, truth, write_tiff
 from placing import PageOfCase, angle_deg, at
+from xray_bench import write_png
 
 NONE = ",".join(["NaN"] * 16)
 
@@ -55,6 +60,30 @@ class RequestsTest(Moving, BenchTest):
         self.assertEqual(content[256 * 256 :], second)
         self.assertNotEqual(content[: 256 * 256], second)
         self.assertEqual(len(self.server.ask("GET", self.frames(first=3, step_px=2))[2]), 128 * 128)
+
+    def test_a_file_with_several_frames_and_a_camera_in_case_yaml(self):
+        images = [numpy.full((256, 256), 1000 * (frame + 1)) for frame in range(3)]
+        for frame, image in enumerate(images):
+            image[:, : 64 * (frame + 1)] = 60000
+        write_tiff(self.folder / "film.tif", images)
+        file = self.folder / "case" / "case.yaml"
+        arm = "source_to_detector_mm: 1000, source_to_isocentre_mm: 600, pixel_mm: 1.1, alpha_deg: 0, beta_deg: 0"
+        camera = "{marrow-camera: 1, width_px: 256, height_px: 256, c_arm: {%s}}" % arm
+        text = file.read_text()
+        self.assertEqual(text.count("frontal.camera.yaml"), 1)
+        file.write_text(text.replace("frontal.camera.yaml", camera))
+        self.server.finish(self.server.json("POST", "/api/place/open", {"case": "case"})["job"])
+        film = {"images": "film.tif", "pattern": ""}
+        state = self.opened({"frontal": film, "lateral": film})
+        self.assertEqual((state["error"], state["result"]), ("", {"frames": 3}))
+        content = self.server.ask("GET", self.frames(**film))[2]
+        for at, frame in ((0, 2), (1, 3)):
+            row = content[256 * 256 * at :][:256]
+            self.assertEqual(row, b"\xff" * (64 * frame) + b"\0" * (256 - 64 * frame))
+        self.assertIn(
+            "a pattern chooses files of a folder, but this is no folder; leave it out",
+            self.opened({"frontal": {**film, "pattern": "*.tif"}, "lateral": film})["error"],
+        )
 
     def test_what_is_wrong_with_a_sequence_is_said(self):
         asked = {"case": "case", "views": {"frontal": VIEWS["frontal"]}}
@@ -322,9 +351,6 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
     def test_a_lost_bone_is_shown_as_lost(self):
         for view in ("frontal", "lateral"):
             blank = self.folder / "film" / "0004" / view / "image.png"
-            from xray_bench import write_png
-            import numpy
-
             write_png(blank, numpy.full((256, 256), 30000))
         self.place()
         self.put(1, truth(1))
@@ -375,6 +401,47 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.assertTrue(self.js("return PlacePage.current().views.every((view) => view.paint.grey === view.image)"))
         self.press("undo")
         self.browser.wait("return PlacePage.current().sequence.isOn")
+
+    def test_a_dragged_slider_asks_for_the_newest_frame(self):
+        self.place()
+        self.js("PlaceFrames.BLOCK = 1; PlacePage.current().sequence.images.blocks.clear()")
+        self.browser.logs()
+        self.js(
+            "const slider = document.querySelector('[aria-label=Frame]');"
+            "for (let frame = 2; frame <= 6; ++frame) {"
+            "  slider.value = frame;"
+            "  slider.dispatchEvent(new Event('input'));"
+            "}"
+        )
+        self.arrived(6)
+        asked = [url for url in self.browser.logs()[1] if "api/place/frames" in url and "view=frontal" in url]
+        first = [int(urllib.parse.parse_qs(url)["first"][0]) for url in asked]
+        self.assertEqual(first[:2], [2, 6], "the first wish, and then the newest")
+
+    def test_a_bone_that_is_locked_gets_no_keyframe(self):
+        file = self.folder / "case" / "case.yaml"
+        case = yaml.safe_load(file.read_text())
+        seeds = case["fragments"]["bone"]["seeds"]
+        halves = {"bone": seeds[: len(seeds) // 2], "other": seeds[len(seeds) // 2 :]}
+        case["fragments"] = {name: {"seeds": half} for name, half in halves.items()}
+        file.write_text(yaml.safe_dump(case, sort_keys=False))
+        self.place()
+        self.assertEqual([bone["name"] for bone in self.about["bones"]], ["bone", "other"])
+        self.js("document.querySelectorAll('.place-bones input')[1].click()")
+        self.keys("k")
+        self.browser.wait("return !!PlacePage.current().sequence.keyframes('bone')[1]")
+        self.settled()
+        self.assertEqual(self.js("return PlacePage.current().sequence.keyframes('other')"), {})
+        self.assertEqual(self.status(), "Frame 1 of 6 · 0.000 s · bone: keyframe · other: the start")
+        self.assertEqual(self.js("return document.querySelector('[data-frame]').textContent"), "Frame 1: bone")
+
+    def test_contrast_and_names(self):
+        for theme in ("light", "dark"):
+            self.place(theme=theme)
+            self.put(2, truth(2))
+            self.press("open-sequence")
+            self.assertEqual(self.js(LOW_CONTRAST), [])
+            self.assertEqual(self.js(UNNAMED), [])
 
     def test_nothing_is_cut_off_on_a_narrow_page(self):
         for width_px in (1440, 1024, 400):

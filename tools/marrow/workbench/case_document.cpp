@@ -2,6 +2,8 @@
 // A case.yaml as the document of a draft.
 #include <yaml-cpp/yaml.h>
 
+#include <cstdint>
+
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "runtime/text_file.hpp"
@@ -20,6 +22,8 @@ json json_of_scalar(const YAML::Node& node) {
   if (node.Tag() == "!") return node.Scalar();  // it was quoted
   bool truth = false;
   double number = 0;
+  std::int64_t whole = 0;
+  if (YAML::convert<std::int64_t>::decode(node, whole)) return whole;  // the width of an image must stay a whole number
   if (YAML::convert<double>::decode(node, number)) return number;
   if (YAML::convert<bool>::decode(node, truth)) return truth;
   return node.Scalar();
