@@ -142,7 +142,7 @@ class PipelineReader {
     const auto no_names = [](const std::string& text, const Place&) { return std::optional(text); };
     if (!yaml_.option(value->value, value->place, info, "input " + in_quotes(input.key), no_names)) return;
     std::string text = value->value.Scalar();
-    if (info.type == OptionType::path) text = plain_path(value->folder / text).string();
+    if (info.type == OptionType::path && !text.empty()) text = plain_path(value->folder / text).string();
     pipeline_.inputs[input.key] = text;
   }
 

@@ -31,17 +31,25 @@ const RigidTransform* keyframe_of(const AutoscoperTrack* keyframes, int frame) {
   return keyframes->world_from_bone[at] ? &*keyframes->world_from_bone[at] : nullptr;
 }
 
-/// The bone is where a person says. How fast it moves is still best known from the frames before, but they may have
-/// been wrong.
+/// The bone is where a person says. The usual cost, covariance and noise of poses are found anew, because the frames
+/// before may have followed something else. Their velocity is kept only if it led to the keyframe.
 void begin_again_at(const RigidTransform& keyframe, TrackState& state, const Options& options) {
   check_rigid(keyframe, "the keyframe");
-  state.predicted.world_from_model = keyframe;
+  constexpr double kMostSurprise = 22.46;  // 0.1 % of right poses are farther off: chi-squared, 6 degrees of freedom
   track::Vector12d deviation;
   deviation << Eigen::Vector3d::Constant(radians(options.keyframe_deg)), Eigen::Vector3d::Constant(options.keyframe_mm),
       Eigen::Vector3d::Constant(radians(options.keyframe_speed_deg_s)),
       Eigen::Vector3d::Constant(options.keyframe_speed_mm_s);
-  state.predicted.covariance = deviation.cwiseAbs2().asDiagonal();
+  const track::Matrix12d covariance = deviation.cwiseAbs2().asDiagonal();
+  if (track::surprise(state, {keyframe, covariance.topLeftCorner<6, 6>()}) > kMostSurprise)
+    state.predicted.velocity_per_s.setZero();
+  state.predicted.world_from_model = keyframe;
+  state.predicted.covariance = covariance;
   state.now = state.predicted;
+  const TrackState fresh;
+  state.usual_cost = fresh.usual_cost;
+  state.usual_covariance = fresh.usual_covariance;
+  state.noise_scale = fresh.noise_scale;
 }
 
 Prediction predict(const TrackState& before, const AutoscoperTrack* keyframes, const Options& options) {

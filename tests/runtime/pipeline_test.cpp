@@ -84,6 +84,18 @@ TEST_F(PipelineTest, APathThroughALinkStaysTheOneThatWasWritten) {
   EXPECT_EQ(path_read((here / "./../f").string(), 0), (scratch.path / "f").string());
   EXPECT_EQ(path_read("x", 1), (link / "../f").string());
 }
+
+TEST_F(PipelineTest, AnEmptyPathStaysEmpty) {
+  const std::string text =
+      "marrow: 1\ninputs: {x: {type: path, default: \"\"}}\nnodes:\n  c: {uses: test.constant, with: {path: $x}}\n"
+      "outputs: {c: c}\n";
+  for (const PipelineArguments& arguments : {PipelineArguments{}, PipelineArguments{{{"x", ""}}, {}}}) {
+    const Pipeline p = read(text, arguments);
+    ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+    EXPECT_EQ(std::get<std::string>(p.nodes[0].options[6]), "") << "not the folder of the pipeline";
+  }
+}
+
 const char* const kTwoNodes =
     "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: 2}}\n  a: {uses: test.add, in: {a: c}}\noutputs: {o: "
     "a}\n";

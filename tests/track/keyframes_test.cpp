@@ -114,12 +114,31 @@ TEST_F(TrackPredict, AKeyframeTakesThePlaceOfThePrediction) {
   EXPECT_EQ(pose.world_from_model.rotation, keyframe.rotation);
   EXPECT_EQ(pose.frame.origin_mm, state.fragment.origin_mm);
   EXPECT_EQ(next.predicted.world_from_model.rotation, keyframe.rotation);
-  EXPECT_EQ(next.now.velocity_per_s, state.now.velocity_per_s);
+  EXPECT_EQ(next.now.velocity_per_s, Vector6d(Vector6d::Zero())) << "the frames before were wrong";
   marrow::track::Vector12d deviation;
   deviation << six(2, 2, 2, 4, 4, 4), six(50, 50, 50, 70, 70, 70);
   EXPECT_LT((next.now.covariance - marrow::track::Matrix12d(deviation.cwiseAbs2().asDiagonal())).norm(), 1e-9);
   EXPECT_EQ(next.frame, 0);
   EXPECT_FALSE(next.is_found());
+}
+
+TEST_F(TrackPredict, OnlyTheVelocityIsKeptAndOnlyIfItLedToTheKeyframe) {
+  state.usual_cost = 0.3;
+  state.noise_scale = 5;
+  state.usual_covariance = marrow::Matrix6d(marrow::Matrix6d::Identity());
+  const RigidTransform expected = predicted(nullptr).at("pose").as<marrow::Pose>().world_from_model;
+  const auto state_at = [&](const Vector6d& from_prediction) {
+    const AutoscoperTrack keyframes{{moved(expected, state.fragment, from_prediction)}};
+    return predicted(&keyframes).at("state").as<TrackState>();
+  };
+  const TrackState near = state_at(six(2, 1, -2, 3, -2, 1)), far = state_at(six(0, 0, 0, 80, 0, 0));
+  EXPECT_EQ(near.now.velocity_per_s, state.now.velocity_per_s);
+  EXPECT_EQ(far.now.velocity_per_s, Vector6d(Vector6d::Zero()));
+  for (const TrackState& one : {near, far}) {
+    EXPECT_TRUE(std::isnan(one.usual_cost));
+    EXPECT_EQ(one.noise_scale, 1);
+    EXPECT_FALSE(one.usual_covariance);
+  }
 }
 
 TEST_F(TrackPredict, WithoutAKeyframeInTheFrameItIsAsBefore) {

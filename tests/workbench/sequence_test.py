@@ -13,7 +13,7 @@ import yaml
 
 import bench
 from accessible_test import LOW_CONTRAST, UNNAMED
-from bench import MARROW, BenchTest, PageTest
+from bench import MARROW, SOURCE, BenchTest, PageTest
 from moving import FRAMES, VIEWS, Moving, truth, write_tiff
 from placing import PageOfCase, angle_deg, at
 from xray_bench import write_png
@@ -159,6 +159,49 @@ class RequestsTest(Moving, BenchTest):
         self.assertEqual(written, (self.folder / "placed/case/1/tracked/bone.tra").read_bytes())
         again = self.server.json("GET", "/api/place/tracked?case=case&folder=placed/case/1/tracked")
         self.assertEqual(again["bone"], found["poses"]["bone"])
+
+    def test_the_pipeline_for_two_views_takes_the_folder_too(self):
+        asked = {
+            "case": "case",
+            "views": VIEWS,
+            "frame_rate_hz": 60,
+            "frames": FRAMES,
+            "starts": {"bone": truth(1)},
+            "keyframes": {"bone": {"3": shifted(truth(3), 1)}},
+        }
+        self.server.finish(self.server.json("POST", "/api/place/track", asked)["job"])
+        words = ["case=case", "frame_rate_hz=60", "keyframes=placed/case/1"]
+        for view, one in VIEWS.items():
+            words += ["%s=%s" % (view, one["images"]), "%s_pattern=%s" % (view, one["pattern"])]
+            words.append("%s_camera=case/%s.camera.yaml" % (view, view))
+        subprocess.run(
+            [MARROW, "run", SOURCE / "pipelines" / "track.yaml", *words, "--set", "case.starts=placed/case/1"]
+            + ["--only", "tra", "--out", self.scratch / "run", "--quiet"],
+            cwd=self.folder,
+            check=True,
+        )
+        written = (self.scratch / "run" / "outputs" / "tra" / "bone.tra").read_bytes()
+        self.assertEqual(written, (self.folder / "placed/case/1/tracked/bone.tra").read_bytes())
+
+    def test_a_keyframe_finds_a_bone_that_was_lost(self):
+        asked = {
+            "case": "case",
+            "views": VIEWS,
+            "frame_rate_hz": 60,
+            "frames": FRAMES,
+            "starts": {"bone": shifted(truth(1), 20)},
+            "keyframes": {},
+        }
+        far_off = lambda result: [
+            frame
+            for frame, pose in enumerate(result["poses"]["bone"], 1)
+            if not pose or math.dist(at(pose, [0, 0, 160]), at(truth(frame), [0, 0, 160])) > 1
+        ]
+        begun = self.server.json("POST", "/api/place/track", asked)
+        self.assertEqual(far_off(self.server.finish(begun["job"])["result"]), [1, 2, 3, 4, 5, 6])
+        asked["keyframes"] = {"bone": {"3": shifted(truth(3), 2)}}
+        begun = self.server.json("POST", "/api/place/track", asked)
+        self.assertEqual(far_off(self.server.finish(begun["job"])["result"]), [1, 2])
 
     def test_without_keyframes_the_command_names_none(self):
         asked = {"case": "case", "views": VIEWS, "frame_rate_hz": 60, "frames": FRAMES, "starts": {"bone": truth(1)}}

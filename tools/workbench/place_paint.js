@@ -18,7 +18,8 @@ class PlacePaint {
   // Another image of the same size.
   show(grey) {
     this.grey = grey;
-    this.base = Uint32Array.from(grey, PlacePaint.greyColour);
+    this.base = this.base || new Uint32Array(grey.length);
+    for (let i = 0; i < grey.length; ++i) this.base[i] = 0xff000000 | grey[i] * 0x010101;
   }
 
   static greyColour(value) {

@@ -77,7 +77,7 @@ class PlaceSequence {
 
   async loadTracked(folder) {
     this.trackedFolder = folder;
-    this.tracked = {};
+    Object.assign(this, {tracked: {}, verdicts: null});
     if (!folder) return;
     await Shell.guarded(async () => {
       const poses = await Ask.json('api/place/tracked', {case: this.page.path, folder});
