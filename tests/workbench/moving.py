@@ -66,6 +66,18 @@ def write_tiff(path, images):
     path.write_bytes(struct.pack("<2sHI", b"II", 42, at[0]) + data)
 
 
+NONE = ",".join(["NaN"] * 16)  # of a .tra file: no pose in this frame
+
+
+def line(pose):
+    """Of a .tra file."""
+    return ",".join("%.17g" % value for row in pose for value in row)
+
+
+def shifted(pose, x_mm):
+    return [[*row[:3], row[3] + (x_mm if i == 0 else 0)] for i, row in enumerate(pose)]
+
+
 class Moving:
     """The open folder holds the case `case` and the images of its sequence in `film`."""
 
