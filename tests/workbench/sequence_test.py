@@ -124,7 +124,8 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.put(2, truth(2))
         self.put(5, truth(5))
         self.js(
-            "[...document.querySelectorAll('.place-steps button')].find((b) => b.textContent.includes('frame 2')).click()"
+            "const steps = [...document.querySelectorAll('.place-steps button')];"
+            "steps.find((step) => step.textContent.includes('frame 2')).click()"
         )
         self.arrived(2)
         self.browser.wait("return PlacePage.current().draft.state_undo === 'frame 2: back to: keyframe of bone'")
@@ -261,6 +262,23 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.assertTrue(self.js("return PlacePage.current().views.every((view) => view.paint.grey === view.image)"))
         self.press("undo")
         self.browser.wait("return PlacePage.current().sequence.isOn")
+
+    def test_other_images_have_no_tracked_poses(self):
+        self.place()
+        self.put(1, truth(1))
+        self.press("register")
+        self.browser.wait("return !!PlacePage.current().sequence.kept.tracked && !PlacePage.current().isRegistering")
+        self.press("open-sequence")
+        self.js("document.querySelector('[data-pattern=frontal]').value = '000[1-3]/frontal/image.png'")
+        self.js("document.querySelector('[data-pattern=lateral]').value = '000[1-3]/lateral/image.png'")
+        self.press("sequence")
+        self.browser.wait("return PlacePage.current().sequence.frames === 3 && PlacePage.current().sequence.isOn")
+        self.arrived(1)
+        self.assertEqual(self.status(), "Frame 1 of 3 · 0.000 s · bone: keyframe")
+        self.assertEqual(self.js("return document.querySelectorAll('.place-marks rect').length"), 0)
+        self.press("undo")
+        self.browser.wait("return PlacePage.current().sequence.frames === 6 && PlacePage.current().sequence.isOn")
+        self.browser.wait("return document.querySelectorAll('.place-marks rect.tracked').length === 1")
 
     def test_a_dragged_slider_asks_for_the_newest_frame(self):
         self.place()

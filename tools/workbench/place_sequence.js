@@ -35,9 +35,9 @@ class PlaceSequence {
 
   async refresh(isKeeping) {
     const kept = this.kept, sources = kept && JSON.stringify(kept.views);
-    if (sources !== this.opened) await this.reopen(kept, sources);
     const folder = (kept && kept.tracked) || null;
     if (folder !== this.trackedFolder) await this.loadTracked(folder);
+    if (sources !== this.opened) await this.reopen(kept, sources);
     this.timeline.update();
     const changed = this.changedFrames();
     if (!isKeeping && changed.length && !changed.includes(this.wanted)) await this.go(changed[0]);
@@ -68,8 +68,10 @@ class PlaceSequence {
       Object.assign(this, {frames, images: new PlaceFrames(path, views, kept.views, frames)});
       this.frame = this.wanted = Math.min(this.frame, frames);
     });
+    if (!this.page.isOpen) return;
     this.page.sequenceChanged();
     if (this.images) {
+      this.timeline.update();
       await this.arriving;  // of the sequence before
       await this.go(this.frame);
     }

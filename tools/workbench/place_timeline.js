@@ -44,7 +44,14 @@ class PlaceTimeline {
       const frame_rate_hz = Number(rate.value);
       if (!(frame_rate_hz > 0)) return Shell.notice('The frame rate must be a number above 0', 'fault');
       const is_kept = await page.draft.change('the sequence', (document) => {
-        document.sequence = {keyframes: {}, ...document.sequence, views, frame_rate_hz};
+        const before = document.sequence || {};
+        document.sequence = {keyframes: {}, ...before, views, frame_rate_hz};
+        // Poses that were tracked in other images do not belong to these.
+        const isAsBefore = ([name, {images, pattern}]) => {
+          const one = (before.views || {})[name] || {};
+          return one.images === images && one.pattern === pattern;
+        };
+        if (!Object.entries(views).every(isAsBefore)) delete document.sequence.tracked;
       });
       await sequence.updated;
       if (is_kept && sequence.isOn) this.close();
