@@ -31,6 +31,7 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.press("sequence")
         self.browser.wait(
             "return PlacePage.current().sequence.isOn && !document.querySelector('.place-sequence').hidden"
+            " && document.querySelector('.place-setup').hidden"
         )
         self.arrived(1)
         return server
@@ -39,9 +40,8 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.js("document.querySelector('[data-do=%s]').click()" % name)
 
     def arrived(self, frame):
-        self.browser.wait(
-            "const s = PlacePage.current().sequence; return s.frame === %d && s.wanted === %d" % (frame, frame)
-        )
+        script = "const s = PlacePage.current().sequence; return s.frame === %d && s.wanted === %d && !s.isArriving"
+        self.browser.wait(script % (frame, frame))
 
     def keys(self, *names):
         for name in names:
