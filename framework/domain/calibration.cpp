@@ -43,6 +43,35 @@ double sample_cubic(const cv::Mat1f& image, const Eigen::Vector2d& at) {
   return sum;
 }
 
+/// Whether the place lies between the centres of the first and the last pixels.
+bool is_inside(const Eigen::Vector2d& at, const cv::Mat& image) {
+  return at.x() >= 0 && at.y() >= 0 && at.x() <= image.cols - 1 && at.y() <= image.rows - 1;
+}
+
+/// The inverse of distorted_pixel(), for places in an image that check_distortion() accepts. The distorted radius grows
+/// with the ideal one up to `largest_radius`; a place that is seen from farther away gives one outside the image.
+Eigen::Vector2d ideal_pixel(const Eigen::Matrix3d& intrinsics, const RadialDistortion& distortion,
+                            double largest_radius, const Eigen::Vector2d& pixel) {
+  constexpr int kHalvings = 40;
+  Eigen::Vector3d seen = intrinsics.inverse() * pixel.homogeneous();
+  const double radius = seen.head<2>().norm();
+  if (radius == 0) return pixel;
+  double low = 0, high = largest_radius;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = 0.5 * (low + high);
+    (middle * distortion.factor(middle * middle) < radius ? low : high) = middle;
+  }
+  if (low >= largest_radius * (1 - 1e-9)) return {-1, -1};
+  seen.head<2>() *= 0.5 * (low + high) / radius;
+  return (intrinsics * seen).head<2>();
+}
+
+/// The pixel that a place inside an image belongs to.
+template <class Mask>
+auto& nearest(Mask& mask, const Eigen::Vector2d& at) {
+  return mask(int(std::lround(at.y())), int(std::lround(at.x())));
+}
+
 }  // namespace
 
 Eigen::Vector2d distorted_pixel(const Eigen::Matrix3d& intrinsics, const RadialDistortion& distortion,
@@ -75,21 +104,57 @@ void remove_distortion(View& view, const RadialDistortion& distortion) {
   check_distortion(camera.intrinsics, distortion, camera.width_px, camera.height_px, "view '" + view.name + "'");
   cv::Mat1f taken, straight(camera.height_px, camera.width_px, 0.f);
   view.image.pixels.convertTo(taken, CV_32F);
-  cv::Mat1b mask(camera.height_px, camera.width_px, std::uint8_t(0));
-  const cv::Mat1b own_mask = view.mask;
+  const cv::Mat1b own_mask =
+      view.mask.empty() ? cv::Mat1b(camera.height_px, camera.width_px, std::uint8_t(255)) : cv::Mat1b(view.mask);
   tbb::parallel_for(0, camera.height_px, [&](int v) {
     for (int u = 0; u < camera.width_px; ++u) {
       const Eigen::Vector2d seen = distorted_pixel(camera.intrinsics, distortion, {u, v});
-      if (!(seen.x() >= 0 && seen.y() >= 0 && seen.x() <= camera.width_px - 1 && seen.y() <= camera.height_px - 1))
-        continue;
-      straight(v, u) = float(sample_cubic(taken, seen));
-      mask(v, u) = own_mask.empty() ? 255 : own_mask(int(std::lround(seen.y())), int(std::lround(seen.x())));
+      if (is_inside(seen, taken)) straight(v, u) = float(sample_cubic(taken, seen));
     }
   });
   cv::Mat pixels;
   straight.convertTo(pixels, view.image.pixels.type());  // rounds and saturates
   view.image.pixels = pixels;
-  if (!own_mask.empty() || cv::countNonZero(mask) < mask.rows * mask.cols) view.mask = mask;
+  const cv::Mat1b mask = straightened_mask(own_mask, camera.intrinsics, distortion);
+  if (!view.mask.empty() || cv::countNonZero(mask) < mask.rows * mask.cols) view.mask = mask;
+}
+
+cv::Mat1b straightened_mask(const cv::Mat1b& original, const Eigen::Matrix3d& intrinsics,
+                            const RadialDistortion& distortion) {
+  cv::Mat1b straight(original.size(), std::uint8_t(0));
+  tbb::parallel_for(0, original.rows, [&](int v) {
+    for (int u = 0; u < original.cols; ++u) {
+      const Eigen::Vector2d seen = distorted_pixel(intrinsics, distortion, {u, v});
+      if (is_inside(seen, original)) straight(v, u) = nearest(original, seen);
+    }
+  });
+  return straight;
+}
+
+cv::Mat1b original_mask(const cv::Mat1b& straight, const Eigen::Matrix3d& intrinsics,
+                        const RadialDistortion& distortion) {
+  check_distortion(intrinsics, distortion, straight.cols, straight.rows, "the mask");
+  const double radius = std::sqrt(largest_squared_radius(intrinsics.inverse(), straight.cols, straight.rows));
+  cv::Mat1b original(straight.size(), std::uint8_t(255)), is_known(straight.size(), std::uint8_t(0));
+  // Where several pixels become one, it is zero if any of them is.
+  for (int v = 0; v < straight.rows; ++v)
+    for (int u = 0; u < straight.cols; ++u) {
+      const Eigen::Vector2d seen = distorted_pixel(intrinsics, distortion, {u, v});
+      if (!is_inside(seen, original)) continue;
+      nearest(is_known, seen) = 255;
+      if (straight(v, u) == 0) nearest(original, seen) = 0;
+    }
+  // Where one becomes several, they are all alike.
+  tbb::parallel_for(0, straight.rows, [&](int v) {
+    for (int u = 0; u < straight.cols; ++u) {
+      if (is_known(v, u)) continue;
+      const Eigen::Vector2d ideal = ideal_pixel(intrinsics, distortion, radius, {u, v});
+      if (!is_inside(ideal, straight)) continue;
+      const Eigen::Vector2d seen = distorted_pixel(intrinsics, distortion, ideal.array().round());
+      if (is_inside(seen, original)) original(v, u) = nearest(original, seen);
+    }
+  });
+  return original;
 }
 
 void apply_calibration(View& view, const Calibration& calibration) {

@@ -126,6 +126,56 @@ TEST(Calibration, OwnMaskIsMovedAlong) {
   EXPECT_EQ(read.mask.at<std::uint8_t>(77, 104), 255);
 }
 
+/// Boxes, a line one pixel wide and single pixels, zero on 255.
+cv::Mat1b drawn() {
+  cv::Mat1b mask(kHeight, kWidth, std::uint8_t(255));
+  mask(cv::Rect(20, 30, 50, 40)) = 0;
+  mask(cv::Rect(120, 90, 70, 60)) = 0;
+  mask(cv::Rect(100, 5, 1, 150)) = 0;
+  for (int i = 0; i < 40; ++i) mask((i * 37) % kHeight, (i * 53) % kWidth) = 0;
+  return mask;
+}
+
+TEST(Calibration, MaskDrawnOnTheStraightImageComesBack) {
+  for (const RadialDistortion& distortion : {kPincushion, RadialDistortion{{-3.5, 2, 0}}}) {
+    const cv::Mat1b mask = drawn();
+    const cv::Mat1b original = marrow::original_mask(mask, intrinsics(), distortion);
+    const cv::Mat1b again = marrow::straightened_mask(original, intrinsics(), distortion);
+    int moved = 0;
+    for (int v = 0; v < kHeight; ++v)
+      for (int u = 0; u < kWidth; ++u) {
+        const Eigen::Vector2d seen = distorted_pixel(intrinsics(), distortion, {u, v});
+        const bool inside = seen.x() >= 0 && seen.y() >= 0 && seen.x() <= kWidth - 1 && seen.y() <= kHeight - 1;
+        if (!inside || mask(v, u) == 0) {
+          EXPECT_EQ(again(v, u), 0) << "what was drawn is zero: " << u << " " << v;
+        } else if (again(v, u) == 0) {
+          const cv::Rect around = cv::Rect(u - 2, v - 2, 5, 5) & cv::Rect(0, 0, kWidth, kHeight);
+          EXPECT_LT(cv::countNonZero(mask(around)), around.area()) << "far from what was drawn: " << u << " " << v;
+        }
+        moved += seen.x() > 0 && (seen - Eigen::Vector2d(u, v)).norm() > 3;
+      }
+    EXPECT_GT(moved, kWidth * kHeight / 10) << "the distortion is strong";
+    EXPECT_EQ(cv::norm(marrow::original_mask(again, intrinsics(), distortion), original, cv::NORM_INF), 0)
+        << "reading and writing it again changes nothing";
+  }
+}
+
+TEST(Calibration, MaskOfTheOriginalImageHasNoHoles) {
+  const cv::Mat1b box = [] {
+    cv::Mat1b mask(kHeight, kWidth, std::uint8_t(255));
+    mask(cv::Rect(110, 20, 70, 100)) = 0;
+    return mask;
+  }();
+  const cv::Mat1b original = marrow::original_mask(box, intrinsics(), kPincushion);
+  for (int v = 0; v < kHeight; ++v) {  // a row crosses the box once
+    int changes = 0;
+    for (int u = 1; u < kWidth; ++u) changes += original(v, u) != original(v, u - 1);
+    EXPECT_LE(changes, 2) << v;
+  }
+  EXPECT_SAYS(marrow::original_mask(box, intrinsics(), RadialDistortion{{-60, 0, 0}}),
+              "the mask: the radial distortion folds the image");
+}
+
 TEST(Calibration, WithoutDistortionNothingChanges) {
   marrow::View read;
   read.name = "a";

@@ -58,32 +58,28 @@ const XrayMasks = (() => {
     return [...runs, length];
   }
 
-  // A mask is drawn on the image as its file stores it. If that is mirrored when it is read, the mask is mirrored, too;
-  // doing so twice gives the mask back.
-  function asStored(used, width_px, is_mirrored) {
-    if (!is_mirrored) return used;
-    return used.map((value, i) => used[i - i % width_px + width_px - 1 - i % width_px]);
-  }
-
   function make(shared) {
-    const known = new Map();  // by the path of the file
+    const known = new Map();  // by what keyOf() gives
     let working = null;       // {view, mask, what} while a stroke is being made or kept
 
-    async function read(path, view) {
-      const {bytes, about} = await Ask.bytes('api/xray/image', {path}), entry = shared.entryOf(view);
-      await entry.reading;
-      const stored = Uint8Array.from(new Uint16Array(bytes), (n) => (n ? 255 : 0));
-      const mask = blank(about.width_px, about.height_px, asStored(stored, about.width_px, entry.is_mirrored));
-      known.set(path, mask);
+    // What the server needs to know of a view to turn its mask's file into the mask of the image that is shown, and
+    // back. Without a camera that can be used, the image is shown as its file has it.
+    const sourceOf = (view) => ({image: view.image, camera: XrayImages.of(view).fault ? null : view.camera || null});
+    const keyOf = (view) => JSON.stringify([view.mask, view.image, view.camera || null]);
+
+    async function read(view) {
+      await XrayImages.of(view).reading;
+      const {bytes, about} = await Ask.postForBytes('api/xray/shown-mask', {mask: view.mask, ...sourceOf(view)});
+      known.set(keyOf(view), blank(about.width_px, about.height_px, new Uint8Array(bytes)));
       shared.refresh();
     }
     function ofView(view) {
       if (!view.mask) return null;
-      if (!known.has(view.mask)) {
-        known.set(view.mask, null);
-        read(view.mask, view.name).catch((error) => Shell.notice(`${view.mask}: ${error.message}`, 'fault'));
+      if (!known.has(keyOf(view))) {
+        known.set(keyOf(view), null);
+        read(view).catch((error) => Shell.notice(`${view.mask}: ${error.message}`, 'fault'));
       }
-      return known.get(view.mask);
+      return known.get(keyOf(view));
     }
 
     function begin(frame) {
@@ -108,15 +104,15 @@ const XrayMasks = (() => {
     async function keep() {
       const done = working;
       if (!done) return;
-      const {view, mask} = done, is_all_used = mask.used.every((one) => one);
+      const {view, mask} = done, shown = shared.views().find((one) => one.name === view);
       await Shell.guarded(async () => {
-        let path = null;
-        if (!is_all_used) {
-          const stored = asStored(mask.used, mask.width_px, shared.entryOf(view).is_mirrored);
-          const body = {width_px: mask.width_px, height_px: mask.height_px, runs: runsOf(stored)};
-          path = (await Ask.post('api/xray/mask', body)).mask;
-          known.set(path, mask);
-        }
+        const body = {width_px: mask.width_px, height_px: mask.height_px, runs: runsOf(mask.used), ...sourceOf(shown)};
+        const {mask: path} = await Ask.post('api/xray/mask', body);
+        const next = {...shown, mask: path};
+        if (path && XrayImages.of(shown).is_straightened)
+          await read(next);  // pixels that are one in the image's file were painted together
+        else
+          known.set(keyOf(next), mask);
         await shared.draft.change(`paint the mask of ${view}`, (document) => {
           const one = document.views.find((other) => other.name === view);
           if (path)

@@ -4,6 +4,7 @@
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/hash.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
 
 namespace fs = std::filesystem;
 
@@ -41,6 +42,10 @@ fs::path camera_file(const Workbench& workbench, const json& camera) {
   return working_file(workbench, "camera", ".yaml", written.dump(1) + "\n");
 }
 
+DistortedCamera distorted_camera(const Workbench& workbench, const json& camera) {
+  return files::read_camera_file(camera_file(workbench, camera));
+}
+
 std::vector<Override> overrides_of(const Workbench& workbench, const json& views) {
   json names = json::array(), images = json::array(), cameras = json::array();
   for (const json& view : views) {
@@ -49,6 +54,10 @@ std::vector<Override> overrides_of(const Workbench& workbench, const json& views
     cameras.push_back(camera_file(workbench, view.at("camera")).string());
   }
   return {{"views.names", set_text(names)}, {"views.images", set_text(images)}, {"views.cameras", set_text(cameras)}};
+}
+
+PipelineCall image_call(const Workbench& workbench, const std::string& image) {
+  return {workbench_pipeline("image"), {{{"image", workbench.folder.inside(image).string()}}, {}}, {}, {}, false};
 }
 
 Ran run(const PipelineCall& call, const Workbench& workbench) {

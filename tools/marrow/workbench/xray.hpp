@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "marrow/domain/calibration.hpp"
 #include "marrow/domain/camera.hpp"
 #include "workbench/value_json.hpp"
 #include "workbench/workbench.hpp"
@@ -16,6 +17,9 @@ std::string set_text(const nlohmann::json& value);
 /// The camera file of a view: the one that `camera` names by {file}, or one in .marrow/drafts with the keys that are
 /// written in place. Throws Error if there is neither.
 std::filesystem::path camera_file(const Workbench& workbench, const nlohmann::json& camera);
+
+/// The camera that the file holds, with the distortion that is still in its images. Throws Error if it cannot be read.
+DistortedCamera distorted_camera(const Workbench& workbench, const nlohmann::json& camera);
 
 /// Writes it to .marrow/drafts/NAME-DIGEST.ENDING, where the digest is that of the text, and returns this place.
 std::filesystem::path working_file(const Workbench& workbench, const std::string& name, const std::string& ending,
@@ -31,6 +35,9 @@ struct Ran {
 };
 /// Throws Error as outputs_of() does.
 Ran run(const PipelineCall& call, const Workbench& workbench);
+
+/// The run that reads an image alone. `image` is relative to the opened folder.
+PipelineCall image_call(const Workbench& workbench, const std::string& image);
 
 /// Each adds a part of the requests.
 void add_xray_views(Server& server, Workbench& workbench);

@@ -3,7 +3,6 @@
 #include <cstring>
 
 #include "marrow/domain/printable.hpp"
-#include "marrow/toolbox/files/volume_file.hpp"
 #include "workbench/xray.hpp"
 
 namespace marrow::workbench {
@@ -36,10 +35,6 @@ std::string pixels_of(const Image& image, json& about) {
   return bytes;
 }
 
-PipelineCall image_call(const Workbench& workbench, const std::string& image) {
-  return {workbench_pipeline("image"), {{{"image", workbench.folder.inside(image).string()}}, {}}, {}, {}, false};
-}
-
 /// The view if it can be read. If not, the image alone, and why not as `fault`. Throws Error if the image cannot be
 /// read.
 Answer view_answer(const Workbench& workbench, const Request& request) {
@@ -58,7 +53,7 @@ Answer view_answer(const Workbench& workbench, const Request& request) {
     const View& view = ran.outputs.at("view").as<View>();
     about["camera"] = json_of(view.camera);
     about["warnings"] = ran.warnings;
-    about["is_mirrored"] = files::is_mirrored_as_read(workbench.folder.inside(image));
+    about["is_straightened"] = !distorted_camera(workbench, request.body["camera"]).distortion.is_none();
     std::string pixels = pixels_of(view.image, about);
     return bytes_answer(std::move(pixels), about);
   } catch (const Error& error) {
@@ -67,7 +62,6 @@ Answer view_answer(const Workbench& workbench, const Request& request) {
   const PipelineCall call = image_call(workbench, image);
   about = {{"fault", printable_lines(fault)}, {"command", command_of(call)}, {"warnings", json::array()}};
   const Ran ran = run(call, workbench);
-  about["is_mirrored"] = files::is_mirrored_as_read(workbench.folder.inside(image));
   std::string pixels = pixels_of(ran.outputs.at("image").as<Image>(), about);
   return bytes_answer(std::move(pixels), about);
 }

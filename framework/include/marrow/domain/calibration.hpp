@@ -59,6 +59,17 @@ void check_distortion(const Eigen::Matrix3d& intrinsics, const RadialDistortion&
 /// original image are masked out. Throws Error as check_view() and check_distortion() do.
 void remove_distortion(View& view, const RadialDistortion& distortion);
 
+/// The mask of the straightened image: each pixel is as that pixel of `original` which lies nearest to where it was
+/// seen, and zero outside.
+cv::Mat1b straightened_mask(const cv::Mat1b& original, const Eigen::Matrix3d& intrinsics,
+                            const RadialDistortion& distortion);
+
+/// The mask of the original image for one that was drawn on the straightened image. Straightened again, it is zero
+/// wherever `straight` is zero; elsewhere it is as `straight`, except where several pixels were seen as one of which
+/// some are zero. Throws Error as check_distortion() does.
+cv::Mat1b original_mask(const cv::Mat1b& straight, const Eigen::Matrix3d& intrinsics,
+                        const RadialDistortion& distortion);
+
 /// Sets the view's camera matrix to that of the calibration and removes the calibration's distortion from the view.
 /// Throws Error if the image sizes differ, and as remove_distortion() does.
 void apply_calibration(View& view, const Calibration& calibration);
