@@ -2,9 +2,7 @@
 // A camera in marrow's format or in that of another program. What such a program's file leaves open comes from options.
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/exchange/plastimatch_camera.hpp"
-#include "marrow/toolbox/exchange/projections.hpp"
-#include "marrow/toolbox/files/camera_file.hpp"
+#include "marrow/toolbox/exchange/camera_file.hpp"
 
 namespace {
 
@@ -17,50 +15,24 @@ struct Options {
   std::string mirror = "none";
 };
 
-enum class Format { own, plastimatch, rtk, xreg };
-
-Format format_of(const std::filesystem::path& path) {
-  std::string end = path.extension().string();
-  for (char& c : end) c = char(std::tolower(static_cast<unsigned char>(c)));
-  if (end == ".yaml" || end == ".yml") return Format::own;
-  const exchange::Projections projections = exchange::projections_in(path);
-  if (projections == exchange::Projections::rtk) return Format::rtk;
-  if (projections == exchange::Projections::xreg) return Format::xreg;
-  return exchange::is_plastimatch_camera(path) ? Format::plastimatch : Format::own;
-}
-
-/// An option that the file's format does not need would be ignored, so it is refused.
-void check_needed(const Options& options, bool has_image, Format format) {
-  const bool is_rtk = format == Format::rtk, is_xreg = format == Format::xreg;
-  const auto check = [&](bool is_given, bool is_needed, const char* name) {
-    if (is_given && !is_needed)
-      throw Error(options.path.string() + ": " + name + " is not for this format of cameras; leave it out");
-  };
-  check(options.projection != 0, is_rtk || is_xreg, "projection");
-  check(!options.size_px.empty(), is_rtk || format == Format::plastimatch, "size_px");
-  check(has_image, is_rtk || format == Format::plastimatch, "the input image");
-  check(!options.pixel_mm.empty(), is_rtk, "pixel_mm");
-  check(!options.corner_mm.empty(), is_rtk, "corner_mm");
-  check(options.mirror != "none", is_rtk || is_xreg, "mirror");
-}
-
-Camera own_camera(const std::filesystem::path& path, Context& context) {
-  const DistortedCamera file = files::read_camera_file(path);
-  if (!file.distortion.is_none())
-    context.warn(path.string() +
+/// Where the file says how large its images are, a wired one must be so; a size in numbers is refused there.
+Camera camera(const Image* image, const Options& options, Context& context) {
+  const exchange::CameraFormat format = exchange::camera_format(options.path);
+  const bool has_size = format == exchange::CameraFormat::own || format == exchange::CameraFormat::xreg;
+  if (has_size && !options.size_px.empty())
+    throw Error(options.path.string() + ": size_px is not for this format of cameras; leave it out");
+  exchange::CameraReading reading{
+      options.projection, {options.size_px, options.pixel_mm, options.corner_mm}, exchange::mirror_of(options.mirror)};
+  if (reading.projection == 0 &&
+      (format == exchange::CameraFormat::own || format == exchange::CameraFormat::plastimatch))
+    reading.projection = -1;  // the default
+  if (image) reading.size.size_px = {double(image->width()), double(image->height())};
+  const DistortedCamera read = exchange::read_camera(options.path, reading);
+  if (!read.distortion.is_none())
+    context.warn(options.path.string() +
                  ": the images of this camera are distorted, which only read.view, read.views and read.case remove, "
                  "with the camera file as their option; the camera is that of the image without distortion");
-  return file.camera;
-}
-
-Camera camera(const Image* image, const Options& options, Context& context) {
-  const Format format = format_of(options.path);
-  check_needed(options, image != nullptr, format);
-  if (format == Format::own) return own_camera(options.path, context);
-  exchange::ImageSize size{options.size_px, options.pixel_mm, options.corner_mm};
-  if (image) size.size_px = {double(image->width()), double(image->height())};
-  if (format == Format::plastimatch) return exchange::read_plastimatch_camera(options.path, size);
-  return exchange::read_projections(options.path, {options.projection}, size, exchange::mirror_of(options.mirror))[0];
+  return read.camera;
 }
 
 }  // namespace
@@ -68,7 +40,7 @@ Camera camera(const Image* image, const Options& options, Context& context) {
 MARROW_PLUGIN(plugin) {
   plugin.node("read.camera", camera)
       .summary("Reads a camera from marrow's YAML, or from a file of XMALab, plastimatch, RTK or xReg")
-      .in("image", "plastimatch and RTK: the image, whose size is taken")
+      .in("image", "the image: plastimatch and RTK take its size, and others compare theirs with it")
       .out("camera", "the camera")
       .option("path", &Options::path,
               "camera file; .yaml: marrow's own format, .xml: RTK's geometry, .h5: xReg's projection data, any other "

@@ -23,11 +23,7 @@ std::vector<int> numbers_of(const Options& options) {
   std::vector<int> numbers(options.names.size());
   std::iota(numbers.begin(), numbers.end(), 0);
   for (std::size_t i = 0; i < options.projections.size(); ++i) {
-    const double number = options.projections[i];
-    if (!(number >= 0 && number <= 1e6) || number != double(int(number)))
-      throw Error(options.path.string() + ": projections: expected whole numbers from 0, got " +
-                  std::to_string(number));
-    numbers.at(i) = int(number);
+    numbers.at(i) = exchange::projection_number(options.projections[i], options.path.string());
   }
   return numbers;
 }

@@ -4,8 +4,9 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/names.hpp"
-#include "marrow/toolbox/files/camera_file.hpp"
+#include "marrow/toolbox/exchange/camera_file.hpp"
 #include "marrow/toolbox/files/escaped_name.hpp"
+#include "marrow/toolbox/files/image_sides.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
@@ -85,13 +86,46 @@ void read_ct(const fs::path& folder, const YamlMap& map, marrow::Case& result) {
     result.ct = std::move(*volume);
 }
 
-std::optional<marrow::DistortedCamera> read_camera(const fs::path& folder, const YamlMap& map) {
+/// What a map says about a camera file of another program.
+marrow::exchange::CameraReading camera_reading(const YamlMap& map) {
+  marrow::exchange::CameraReading reading;
+  if (map.has("projection")) {
+    reading.projection = map.integer("projection").value_or(0);
+    if (reading.projection < 0) map.fault("projection", "projection: expected a whole number from 0");
+  }
+  const auto two = [&](const std::string& key) { return map.numbers(key, 2).value_or(std::vector<double>()); };
+  if (map.has("pixel_mm")) reading.size.pixel_mm = two("pixel_mm");
+  if (map.has("corner_mm")) reading.size.corner_mm = two("corner_mm");
+  const std::string mirror = map.has("mirror") ? map.text("mirror").value_or("none") : "none";
+  if (mirror != "none" && mirror != "left_right" && mirror != "upside_down")
+    map.fault("mirror", "mirror: expected none, left_right or upside_down, got '" + mirror + "'");
+  reading.mirror = marrow::exchange::mirror_of(mirror);
+  return reading;
+}
+
+/// The camera of a view whose image is this one.
+std::optional<marrow::DistortedCamera> read_camera(const fs::path& folder, const YamlMap& map,
+                                                   const std::optional<marrow::Image>& image) {
   const auto node = map.required("camera");
   if (!node) return std::nullopt;
-  if (node->IsMap()) return marrow::files::camera_from(*node, map.file());
-  const auto file = file_in(folder, map, "camera");
+  const bool is_map = node->IsMap(), names_file = is_map && (*node)["file"];
+  if (is_map && !names_file) return marrow::files::camera_from(*node, map.file());
+  marrow::exchange::CameraReading reading;
+  std::optional<fs::path> file;
+  if (names_file) {
+    const YamlMap camera(map.file(), *node, "camera", {"file", "projection", "pixel_mm", "corner_mm", "mirror"});
+    file = file_in(folder, camera, "file");
+    reading = camera_reading(camera);
+  } else {
+    file = file_in(folder, map, "camera");
+  }
   if (!file) return std::nullopt;
-  return read_or_fault(map, "camera", [&] { return marrow::files::read_camera_file(*file); });
+  const auto format = marrow::exchange::camera_format(*file);
+  if (format == marrow::exchange::CameraFormat::rtk || format == marrow::exchange::CameraFormat::plastimatch) {
+    if (!image) return std::nullopt;  // the file does not say how large it is
+    reading.size.size_px = {double(image->width()), double(image->height())};
+  }
+  return read_or_fault(map, "camera", [&] { return marrow::exchange::read_camera(*file, reading); });
 }
 
 std::optional<marrow::Image> read_image(const fs::path& folder, const YamlMap& map, const std::string& key) {
@@ -115,13 +149,23 @@ std::optional<cv::Mat> read_mask(const fs::path& folder, const YamlMap& map, boo
   return mirrored;
 }
 
-void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result) {
+/// Says what the image's header lets one doubt. A camera of angles shares the patient's axes with that header.
+void warn_of_sides(const fs::path& folder, const YamlMap& map, const marrow::Camera& camera, marrow::Context& context) {
+  const fs::path image = file_in(folder, map, "image").value();
+  const YAML::Node written = map.node("camera");
+  const bool has_patient_axes = written.IsMap() && written["c_arm"];
+  for (const std::string& doubt : has_patient_axes ? marrow::files::doubts_about_sides(image, 0, camera)
+                                                   : marrow::files::doubts_about_sides(image))
+    context.warn(doubt);
+}
+
+void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result, marrow::Context& context) {
   const auto name = map.text("name");
   if (name)
     if (const std::string fault = marrow::fault_of_item_name(*name); !fault.empty())
       return map.fault("name", "name: the name of a view " + fault + "; choose another");
   const auto image = read_image(folder, map, "image");
-  const auto camera = read_camera(folder, map);
+  const auto camera = read_camera(folder, map, image);
   marrow::View view;
   if (map.has("mask")) {
     const auto mask = read_mask(folder, map, image.has_value());
@@ -133,6 +177,7 @@ void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result)
   view.name = *name;
   view.image = *image;
   view.camera = camera->camera;
+  warn_of_sides(folder, map, view.camera, context);
   try {
     check_view(view);
     if (!camera->distortion.is_none()) remove_distortion(view, camera->distortion);
@@ -142,7 +187,7 @@ void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result)
   result.views.add(*name, std::move(view));
 }
 
-void read_views(const fs::path& folder, const YamlMap& map, marrow::Case& result) {
+void read_views(const fs::path& folder, const YamlMap& map, marrow::Case& result, marrow::Context& context) {
   const auto views = map.required("views");
   if (!views) return;
   if (!views->IsSequence() || views->size() == 0)
@@ -151,7 +196,7 @@ void read_views(const fs::path& folder, const YamlMap& map, marrow::Case& result
     return map.fault("views", "views: there are " + std::to_string(views->size()) + "; at most 1000 are read");
   for (const auto& item : *views) {
     const YamlMap view(map.file(), item, "a view", {"name", "image", "camera", "mask"});
-    if (view.valid()) read_view(folder, view, result);
+    if (view.valid()) read_view(folder, view, result, context);
   }
 }
 
@@ -221,7 +266,7 @@ marrow::List<marrow::Pose> read_starts(const fs::path& folder, const marrow::Lis
   return starts;
 }
 
-marrow::Case read_case(const Options& options) {
+marrow::Case read_case(const Options& options, marrow::Context& context) {
   std::error_code failure;
   if (!fs::is_directory(options.path, failure))
     throw marrow::Error(
@@ -233,7 +278,7 @@ marrow::Case read_case(const Options& options) {
   marrow::files::check_version(map, "marrow-case");
   marrow::Case result;
   read_fragments(map, result);
-  read_views(options.path, map, result);
+  read_views(options.path, map, result, context);
   read_ct(options.path, map, result);
   file.finish();
   if (!options.starts.empty()) result.start = read_starts(options.starts, result.seeds);

@@ -3,8 +3,8 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/names.hpp"
+#include "marrow/toolbox/exchange/view_file.hpp"
 #include "marrow/toolbox/files/sequence_files.hpp"
-#include "marrow/toolbox/files/view_file.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/track/sequence.hpp"
 #include "video.hpp"
@@ -61,14 +61,15 @@ List<SequenceFrame> sequence(const List<Camera>* cameras, const Options& options
       throw Error("view '" + name + "' has " + std::to_string(images.size()) + " frames, but view '" +
                   options.names.front() + "' has " + std::to_string(frames.size()) + " (" +
                   options.images.at(i).string() + "); all views must show the same moments");
-    const files::ViewCamera camera = files::read_view_camera({name,
-                                                              {},
-                                                              cameras ? &files::camera_of(name, *cameras) : nullptr,
-                                                              cameras ? fs::path() : options.cameras.at(i),
-                                                              options.calibration});
+    const exchange::ViewSource source{name,
+                                      {},
+                                      cameras ? &exchange::camera_of_view(name, *cameras) : nullptr,
+                                      cameras ? fs::path() : options.cameras.at(i),
+                                      options.calibration};
+    const exchange::ViewCamera camera = exchange::read_view_camera(source, images.front());
     for (std::size_t k = 0; k < images.size(); ++k) {
       context.check_cancelled();
-      frames[k].views.push_back(files::view_of(name, std::move(images[k]), camera));
+      frames[k].views.push_back(exchange::view_of(name, std::move(images[k]), camera));
       context.progress(double(k + 1) / double(images.size()), name);
     }
   }
@@ -100,7 +101,8 @@ MARROW_PLUGIN(plugin) {
           "per view: which files of its folder belong to it, as 'frontal_*.png' or '*/frontal.png'; * stands for any "
           "characters, ? for one. Empty: all images of the folder")
       .relation(as_many_or_none("patterns", "names"))
-      .option("cameras", &Options::cameras, "one camera file (XMALab's text or marrow's YAML) per view")
+      .option("cameras", &Options::cameras,
+              "one camera file (marrow's YAML, or a file of XMALab, plastimatch or xReg) per view")
       .relation(exactly_one({"in.camera", "cameras"}))
       .relation(as_many_or_none("cameras", "names"))
       .option("calibration", &Options::calibration,

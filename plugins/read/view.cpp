@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/files/view_file.hpp"
+#include "marrow/toolbox/exchange/view_file.hpp"
+#include "marrow/toolbox/files/image_sides.hpp"
 
 namespace {
 
@@ -12,13 +13,17 @@ struct Options {
   std::filesystem::path calibration;
   int frame = 0;
   std::string mirror = "none";
+  int projection = -1;
+  std::vector<double> pixel_mm, corner_mm;
 };
 
-marrow::View view(const marrow::Camera* camera, const Options& options) {
+marrow::View view(const marrow::Camera* camera, const Options& options, marrow::Context& context) {
   if (!camera && options.camera.empty())
     throw marrow::Error("view '" + options.name + "': the node that is wired to 'camera' gave none");
-  return marrow::files::read_view_files(
-      {options.name, options.image, camera, options.camera, options.calibration, options.frame, options.mirror});
+  for (const std::string& doubt : marrow::files::doubts_about_sides(options.image, options.frame)) context.warn(doubt);
+  return marrow::exchange::read_view_files({options.name, options.image, camera, options.camera, options.calibration,
+                                            options.frame, options.mirror, options.projection, options.pixel_mm,
+                                            options.corner_mm});
 }
 
 }  // namespace
@@ -30,15 +35,25 @@ MARROW_PLUGIN(plugin) {
       .out("view", "the view")
       .option("name", &Options::name, "name of the view")
       .option("image", &Options::image, "image file (PNG, TIFF, DICOM)", marrow::required())
-      .option("camera", &Options::camera, "camera file (XMALab's text or marrow's YAML)")
+      .option("camera", &Options::camera, "camera file (marrow's YAML, or a file of XMALab, plastimatch, RTK or xReg)")
       .relation(marrow::exactly_one({"in.camera", "camera"}))
       .option("calibration", &Options::calibration,
               "calibration file; its camera matrix replaces that of the camera, and its distortion is removed from the "
               "image")
       .option("frame", &Options::frame, "frame of a multi-frame file, counted from 1; 0: the file has only one frame",
               marrow::at_least(0))
-      .option("mirror", &Options::mirror,
-              "turns the image over, if it is seen from the detector or has its rows from below; the camera must be "
-              "that of the image that was turned over, as read.camera gives it with the same option",
-              marrow::one_of({"none", "left_right", "upside_down"}));
+      .option(
+          "mirror", &Options::mirror,
+          "turns the image over, if it is seen from the detector or has its rows from below, and with it the camera "
+          "in a file of RTK or xReg; any other camera must be that of the image that was turned over, as "
+          "read.camera gives it with the same option",
+          marrow::one_of({"none", "left_right", "upside_down"}))
+      .option("projection", &Options::projection,
+              "RTK and xReg: number of the view's projection in the camera file, counted from 0; -1: the file has "
+              "only one",
+              marrow::at_least(-1))
+      .option("pixel_mm", &Options::pixel_mm,
+              "RTK: width and height of a pixel on the detector; one number for square pixels")
+      .option("corner_mm", &Options::corner_mm,
+              "RTK: the place (u, v) of the first pixel's centre on the detector; if empty, the image is centred");
 }

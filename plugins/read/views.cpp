@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/files/view_file.hpp"
+#include "marrow/toolbox/exchange/projections.hpp"
+#include "marrow/toolbox/exchange/view_file.hpp"
+#include "marrow/toolbox/files/image_sides.hpp"
 
 namespace {
 
@@ -12,17 +14,28 @@ struct Options {
   std::filesystem::path calibration;
   int frame = 0;
   std::string mirror = "none";
+  std::vector<double> projections, pixel_mm, corner_mm;
 };
 
-marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, const Options& options) {
+/// The number of the view's projection; -1 if none are named.
+int projection_of(const Options& options, std::size_t view) {
+  if (options.projections.empty()) return -1;
+  return marrow::exchange::projection_number(options.projections.at(view), "view '" + options.names[view] + "'");
+}
+
+marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, const Options& options,
+                                 marrow::Context& context) {
   if (!cameras && options.cameras.empty()) throw marrow::Error("the node that is wired to 'camera' gave none");
   marrow::List<marrow::View> views;
   for (std::size_t i = 0; i < options.names.size(); ++i) {
     const std::string& name = options.names[i];
-    views.add(name, marrow::files::read_view_files({name, options.images.at(i),
-                                                    cameras ? &marrow::files::camera_of(name, *cameras) : nullptr,
-                                                    cameras ? std::filesystem::path() : options.cameras.at(i),
-                                                    options.calibration, options.frame, options.mirror}));
+    for (const std::string& doubt : marrow::files::doubts_about_sides(options.images.at(i), options.frame))
+      context.warn(doubt);
+    views.add(name,
+              marrow::exchange::read_view_files(
+                  {name, options.images.at(i), cameras ? &marrow::exchange::camera_of_view(name, *cameras) : nullptr,
+                   cameras ? std::filesystem::path() : options.cameras.at(i), options.calibration, options.frame,
+                   options.mirror, projection_of(options, i), options.pixel_mm, options.corner_mm}));
   }
   return views;
 }
@@ -39,7 +52,8 @@ MARROW_PLUGIN(plugin) {
       .relation(marrow::distinct("names"))
       .option("images", &Options::images, "one image file (PNG, TIFF, DICOM) per view", marrow::required())
       .relation(marrow::same_length({"names", "images"}))
-      .option("cameras", &Options::cameras, "one camera file (XMALab's text or marrow's YAML) per view")
+      .option("cameras", &Options::cameras,
+              "one camera file (marrow's YAML, or a file of XMALab, plastimatch, RTK or xReg) per view")
       .relation(marrow::exactly_one({"in.camera", "cameras"}))
       .relation(marrow::as_many_or_none("cameras", "names"))
       .option("calibration", &Options::calibration,
@@ -49,7 +63,16 @@ MARROW_PLUGIN(plugin) {
               marrow::at_least(0))
       .option(
           "mirror", &Options::mirror,
-          "turns all images over, if they are seen from the detector or have their rows from below; the cameras must "
-          "be those of the images that were turned over, as read.cameras gives them with the same option",
-          marrow::one_of({"none", "left_right", "upside_down"}));
+          "turns all images over, if they are seen from the detector or have their rows from below, and with them the "
+          "cameras in files of RTK or xReg; any others must be those of the images that were turned over, as "
+          "read.cameras gives them with the same option",
+          marrow::one_of({"none", "left_right", "upside_down"}))
+      .option("projections", &Options::projections,
+              "RTK and xReg: number of each view's projection in its camera file, counted from 0; if empty, each file "
+              "must have only one")
+      .relation(marrow::as_many_or_none("projections", "names"))
+      .option("pixel_mm", &Options::pixel_mm,
+              "RTK: width and height of a pixel on the detector; one number for square pixels")
+      .option("corner_mm", &Options::corner_mm,
+              "RTK: the place (u, v) of the first pixel's centre on the detector; if empty, the images are centred");
 }

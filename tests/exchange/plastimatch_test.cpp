@@ -195,8 +195,9 @@ TEST(Plastimatch, DiagnosesOptionsThatAFormatDoesNotNeed) {
   expect("c.yaml", {"mirror", "upside_down"}, "mirror");
   marrow::Image image;
   image.pixels = cv::Mat(4, 4, CV_8U, cv::Scalar(0));
-  EXPECT_NE(shipped::refusal("read.camera", {{"image", shipped::item(image)}}, {{"path", (folder / "c.h5").string()}})
-                .find("the input image is not for this format of cameras; leave it out"),
+  EXPECT_NE(shipped::refusal("read.camera", {{"image", shipped::item(image)}},
+                             {{"path", (kData / "xreg-by-h5py.h5").string()}})
+                .find("this camera is of images of 200 x 160 pixels, but the image has 4 x 4"),
             std::string::npos);
 }
 

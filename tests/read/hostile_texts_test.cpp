@@ -8,7 +8,6 @@
 
 #include "marrow/runtime/abi.hpp"
 #include "marrow/toolbox/files/mesh_file.hpp"
-#include "marrow/toolbox/files/view_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 #include "read/files.hpp"
 #include "read/hostile.hpp"
@@ -181,9 +180,7 @@ TEST_F(HostileTexts, NamesThatHarm) {
   expect_seeds(named(std::string(101, 'n')), "a name has 101 bytes; at most 100 are taken");
   put(folder / "a.yaml", named("R\xC3\xB6hrenknochen, distal"));
   EXPECT_EQ(marrow::files::read_seeds_file(folder / "a.yaml").name(0), "R\xC3\xB6hrenknochen, distal");
-  marrow::files::ViewSource source;
-  source.name = "a\n/b";
-  EXPECT_SAYS(marrow::files::read_view_files(source),
+  EXPECT_SAYS(marrow::test::view_from(nullptr, {"a\n/b", folder / "a.png", folder / "a.yaml"}),
               "the name 'a\\x0a/b' of a view holds a character that cannot be printed; choose another");
 }
 

@@ -36,6 +36,16 @@ Projections projections_in(const std::filesystem::path& path) {
   return end == ".xml" ? Projections::rtk : end == ".h5" || end == ".hdf5" ? Projections::xreg : Projections::none;
 }
 
+int projection_number(double number, const std::string& what) {
+  if (!(number >= 0 && number <= 1e6) || number != double(int(number)))
+    throw Error(what + ": projections: expected whole numbers from 0, got " + std::to_string(number));
+  return int(number);
+}
+
+std::size_t count_projections(const std::filesystem::path& path) {
+  return projections_in(path) == Projections::rtk ? read_rtk(path).size() : read_xreg(path).size();
+}
+
 std::vector<Camera> read_projections(const std::filesystem::path& path, const std::vector<int>& numbers,
                                      const ImageSize& size, Mirror mirror) {
   if (projections_in(path) == Projections::none)

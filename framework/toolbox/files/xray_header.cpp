@@ -7,6 +7,7 @@
 #include "dicom_pixels.hpp"
 #include "marrow/domain/c_arm.hpp"
 #include "marrow/domain/error.hpp"
+#include "patient_orientation.hpp"
 
 namespace marrow::files {
 namespace {
@@ -25,7 +26,6 @@ constexpr DicomTag kPrimaryIncrement{0x0018, 0x1520, "PositionerPrimaryAngleIncr
 constexpr DicomTag kSecondaryIncrement{0x0018, 0x1521, "PositionerSecondaryAngleIncrement"};
 constexpr DicomTag kPositionerMotion{0x0018, 0x1500, "PositionerMotion"};
 constexpr DicomTag kPatientPosition{0x0018, 0x5100, "PatientPosition"};
-constexpr DicomTag kPatientOrientation{0x0020, 0x0020, "PatientOrientation"};
 constexpr DicomTag kPhotometric{0x0028, 0x0004, "PhotometricInterpretation"};
 constexpr DicomTag kSlope{0x0028, 0x1053, "RescaleSlope"};
 constexpr DicomTag kIntensity{0x0028, 0x1040, "PixelIntensityRelationship"};
@@ -98,22 +98,6 @@ Eigen::Vector2d detector_pixel_mm(const DicomHeader& header, double magnificatio
   return pixel;
 }
 
-/// The direction in patient coordinates for letters such as "L" or "LA". Each letter has half the weight of the one
-/// before.
-std::optional<Eigen::Vector3d> direction_of(const std::string& letters) {
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
-  double weight = 1;
-  for (const char letter : letters) {
-    const std::string known = "LRPAHF";
-    const std::size_t at = known.find(letter);
-    if (at == std::string::npos) return std::nullopt;
-    direction[Eigen::Index(at / 2)] += at % 2 == 0 ? weight : -weight;
-    weight *= 0.5;
-  }
-  if (direction.isZero()) return std::nullopt;
-  return direction.normalized();
-}
-
 /// The axes to the right and down of the stored image, in the world, from PatientOrientation. There are eight ways to
 /// turn and mirror what the camera sees; the one that fits its letters best is taken. std::nullopt if the header does
 /// not give it.
@@ -122,12 +106,8 @@ struct Stored {
   bool mirrored = false;
 };
 std::optional<Stored> stored_axes(const DicomHeader& header, const Eigen::Matrix3d& world_from_camera) {
-  const auto text = header.text(kPatientOrientation);
-  if (!text) return std::nullopt;
-  const std::size_t between = text->find('\\');
-  if (between == std::string::npos) return std::nullopt;
-  const auto row = direction_of(text->substr(0, between)), column = direction_of(text->substr(between + 1));
-  if (!row || !column) return std::nullopt;
+  const auto oriented = patient_orientation(header);
+  if (!oriented) return std::nullopt;
   const Eigen::Vector3d u = world_from_camera.col(0), v = world_from_camera.col(1);
   Stored best;
   double best_fit = 0;
@@ -136,13 +116,13 @@ std::optional<Stored> stored_axes(const DicomHeader& header, const Eigen::Matrix
       for (const double b : {1.0, -1.0}) {
         Stored stored{a * (swapped ? v : u), b * (swapped ? u : v), false};
         stored.mirrored = stored.right.cross(stored.down).dot(world_from_camera.col(2)) < 0;
-        if (const double fit = row->dot(stored.right) + column->dot(stored.down); fit > best_fit) {
+        if (const double fit = oriented->right.dot(stored.right) + oriented->down.dot(stored.down); fit > best_fit) {
           best_fit = fit;
           best = stored;
         }
       }
   if (best_fit < 1.2)
-    throw Error(header.path().string() + ": " + kPatientOrientation.text() + " says '" + *text +
+    throw Error(header.path().string() + ": " + kPatientOrientation.text() + " says '" + oriented->letters +
                 "', which no view from these angles shows; one of them is wrong");
   return best;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "marrow/toolbox/exchange/camera_matrix.hpp"
@@ -11,6 +12,12 @@ namespace marrow::exchange {
 /// projection data (.h5, .hdf5).
 enum class Projections { none, rtk, xreg };
 Projections projections_in(const std::filesystem::path& path);
+
+/// A projection's number from an option's. Throws Error, with `what` in front, unless it is a whole number from 0.
+int projection_number(double number, const std::string& what);
+
+/// How many projections such a file holds. Throws Error as the readers of the two formats do.
+std::size_t count_projections(const std::filesystem::path& path);
 
 /// The cameras of the projections with these numbers, from 0; of all if `numbers` is empty. `size` is only for RTK.
 /// Throws Error as the readers of the two formats do, and if there is no such projection.

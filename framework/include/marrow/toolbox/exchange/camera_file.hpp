@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The camera of any file that marrow reads: its own YAML, and the files of XMALab, plastimatch, RTK and xReg.
+#include <filesystem>
+
+#include "marrow/domain/calibration.hpp"
+#include "marrow/toolbox/exchange/camera_matrix.hpp"
+
+namespace marrow::exchange {
+
+/// `own` is what files::read_camera_file() reads: marrow's YAML and XMALab's text.
+enum class CameraFormat { own, plastimatch, rtk, xreg };
+
+/// By the end of the name: .yaml and .yml are marrow's, .xml RTK's, .h5 and .hdf5 xReg's. Any other file is a text: of
+/// plastimatch if it begins as its files do, else of XMALab.
+CameraFormat camera_format(const std::filesystem::path& path);
+
+/// What a file of another program leaves open.
+struct CameraReading {
+  int projection = -1;           ///< RTK and xReg: its number, from 0; -1: the file must hold only one
+  ImageSize size;                ///< size_px: plastimatch and RTK; the others: RTK
+  Mirror mirror = Mirror::none;  ///< RTK and xReg: how the image was turned over
+};
+
+/// The camera in a file of any format. Only marrow's own YAML holds a distortion. `size.size_px` may be given for any
+/// format; all else is refused for a format that does not need it. Throws Error so, if it is of images of another size
+/// than `size_px`, if the file holds several projections and none is named, and as the format's reader does.
+DistortedCamera read_camera(const std::filesystem::path& path, const CameraReading& reading);
+
+}  // namespace marrow::exchange
