@@ -43,6 +43,7 @@ class Resolver {
     files_ = outer;
     pipeline_.name = written_.name;
     pipeline_.help = written_.help;
+    pipeline_.only_inside = written_.only_inside;
     pipeline_.file = written_.file;
     pipeline_.notes = written_.notes;
     for (const WrittenNode& node : written_.nodes) {

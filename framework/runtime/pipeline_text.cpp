@@ -45,7 +45,7 @@ class PipelineReader {
 
  private:
   void read_root(const YAML::Node& root) {
-    static const std::vector<std::string> kKeys{"marrow", "name", "help", "inputs", "nodes", "outputs"};
+    static const std::vector<std::string> kKeys{"marrow", "name", "help", "only_inside", "inputs", "nodes", "outputs"};
     const Place start = is_body_ ? yaml_.place(root) : Place{pipeline_.file.string(), 1, 1};
     bool versioned = false, has_name = false, has_nodes = false, has_outputs = false;
     for (const YamlEntry& entry : yaml_.map(root, start, "the pipeline", &kKeys)) {
@@ -62,6 +62,8 @@ class PipelineReader {
         if (entry.value.IsScalar()) check_file_name(diagnostics_, entry.place, pipeline_.name, "a pipeline's name");
       }
       if (entry.key == "help") pipeline_.help = yaml_.text(entry.value, entry.place, "help").value_or("");
+      if (entry.key == "only_inside")
+        pipeline_.only_inside = yaml_.boolean(entry.value, entry.place, "only_inside").value_or(false);
       if (entry.key == "inputs") read_inputs(entry);
       if (entry.key == "nodes") {
         has_nodes = true;

@@ -54,6 +54,7 @@ struct WrittenPipeline {
   std::map<std::string, Place> input_places;  ///< where each is declared
   std::vector<WrittenNode> nodes;
   std::vector<std::pair<std::string, WrittenValue>> outputs;
+  bool only_inside = false;
   std::vector<std::string> notes;
 };
 

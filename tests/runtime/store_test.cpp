@@ -55,6 +55,21 @@ TEST_F(StoreTest, SecondRunCallsNothing) {
   EXPECT_EQ(result_of(second), 10 + 5 + 20 + 5);
 }
 
+TEST_F(StoreTest, WhatIsReadBackCanBeHandedToAnotherProcess) {
+  scratch.write("file.txt", "hello");
+  const auto nodes = [](const std::string& value) {
+    return "  c: {uses: test.constant, with: {value: 5}}\n"
+           "  r: {uses: parse.test_number, in: {added: c}, with: {path: file.txt, value: " +
+           value + "}}\n";
+  };
+  run(nodes("0.25"), "r: r");
+  const RunResult second = run(nodes("0.5"), "r: r");
+  EXPECT_EQ(second.nodes[0].calls, 0) << "the number is read back";
+  ASSERT_EQ(second.nodes[1].status, marrow::NodeRecord::Status::done) << messages;
+  EXPECT_EQ(result_of(second) - std::floor(result_of(second)), 0.5);
+  EXPECT_GE(result_of(second), 5.5);
+}
+
 TEST_F(StoreTest, OnlyWhatChangedRunsAndFunctionsAreMadeForIt) {
   run(kChain, "n: n");
   std::string changed = kChain;

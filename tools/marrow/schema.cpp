@@ -145,6 +145,9 @@ Json pipeline_schema(const Catalogue& catalogue) {
              {{"type", "string"},
               {"description", "of the folder that a run writes, runs/NAME (default: the file's name)"}}},
             {"help", {{"type", "string"}, {"description", "what the pipeline does, and for which data"}}},
+            {"only_inside",
+             {{"type", "boolean"},
+              {"description", "no command runs it, but the program itself, so its outputs may be functions"}}},
             {"inputs", inputs},
             {"nodes", nodes},
             {"outputs", outputs}}}};

@@ -56,6 +56,7 @@ struct Pipeline {
   std::filesystem::path file;
   std::vector<PipelineNode> nodes;  ///< sorted so that sources come before users
   std::vector<PipelineOutput> outputs;
+  bool only_inside = false;        ///< it runs only inside the program, so its outputs may be functions
   std::vector<std::string> notes;  ///< remarks for people that are not faults
 
   /// The axes of a value that a reference names, outermost first.

@@ -45,6 +45,7 @@ class RunFolder {
 };
 
 /// Adds a fault for each output of the pipeline that could not be written: no library has a writer for its type.
+/// Functions are no faults in a pipeline that only runs inside the program.
 void check_writers(const Pipeline& pipeline, const Catalogue& catalogue, Diagnostics& diagnostics);
 
 /// The widest instruction set of this machine that libraries may choose at run time.
