@@ -259,6 +259,29 @@ class SaveTest(BenchTest):
         self.assertEqual((small / "7" / "case.yaml").read_bytes(), before)
         full.unlink()
 
+    def test_comments_stay_where_nothing_changed(self):
+        server = self.enter()
+        self.assertEqual(self.save(server, self.document())["state"], "done")
+        file = self.folder / "cases" / "7" / "case.yaml"
+        lines = file.read_text().splitlines()
+        at = next(i for i, line in enumerate(lines) if "distal" in line)
+        lines[at] += "   # the long one"
+        mine = "# Patient 7\n" + "\n".join(lines) + "\n# the end\n"
+        file.write_text(mine)
+        self.assertEqual(server.json("GET", "/api/case/lost-comments?case=cases/7"), {"lost": []})
+        self.assertEqual(self.save(server)["state"], "done")
+        self.assertEqual(file.read_text(), mine, "nothing changed")
+        document = server.json("GET", "/api/draft?case=cases/7")["document"]
+        document["fragments"]["distal"]["seeds"].append([21, 15, 10])
+        self.assertEqual(self.save(server, document)["state"], "done")
+        text = file.read_text()
+        for comment in ("# Patient 7\n", "   # the long one\n", "\n# the end\n"):
+            self.assertIn(comment, text)
+        self.assertEqual(yaml.safe_load(text)["fragments"]["distal"]["seeds"], [[20, 15, 10], [21, 15, 10]])
+        del document["fragments"]["distal"]
+        self.change(server, document)
+        self.assertEqual(server.json("GET", "/api/case/lost-comments?case=cases/7"), {"lost": ["# the long one"]})
+
 
 if __name__ == "__main__":
     import sys

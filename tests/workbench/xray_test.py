@@ -302,8 +302,7 @@ class ExchangeTest(XrayTest):
         self.assertEqual(status, 400)
         self.assertIn("this program reads version 1, the file is of version 2", json.loads(text)["error"])
         for path, fault in {
-            "a.txt": "'a.txt': the name must end in .yaml",
-            "s.yaml": "'s.yaml' is there already; give another name",
+            "a.txt": "'a.txt': the name must end in one of .yaml, .mrk.json, .fcsv",
             "no/s.yaml": "'no/s.yaml': there is no such folder; make it first",
         }.items():
             content = {"fragments": {"distal": {"seeds": [[1, 2, 3]]}}}

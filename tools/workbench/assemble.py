@@ -17,7 +17,8 @@ FILES = """
     server geometry shell home draft case
     slice_geometry ct_state slice_input slice_picture slice_view ct_panel point_list fragments_panel
     surface_view segmentation_panel ct_landmarks save_panel
-    viewport sight xray_images xray_frame xray_landmarks xray_table xray_masks xray_exchange xrays xray_add xray_views
+    viewport sight xray_images xray_frame xray_landmarks xray_table xray_masks xray_export xray_exchange xrays
+    xray_camera_file xray_add xray_views
     place_motion place_paint place_view place_steps place_between place_frames
     place_sequence place_timeline place_controls place_case place
     pipeline_text pipeline_node pipeline_runs node_output pipeline results

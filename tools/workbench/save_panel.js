@@ -6,12 +6,28 @@
   const {el} = Dom;
   const PIPELINES = [['femur-best', 'A fractured femur:'], ['bone', 'Any other bone:']];
 
+  // Whether comments of the older files that cannot be kept may be lost. Without an answer of the server, for example
+  // because the case is not whole yet, saving says what is wrong.
+  async function mayLose(draft) {
+    const {lost} = await Ask.json('api/case/lost-comments', {case: draft.path}).catch(() => ({lost: []}));
+    if (!lost.length) return true;
+    return Boolean(await Shell.dialog(
+        'Comments will be lost',
+        (close) =>
+            el('div', {}, el('p', {}, 'What they belong to has changed, so these comments of the older files go:'),
+               el('ul', {class: 'faults', 'data-lost': ''}, lost.map((comment) => el('li', {}, comment))),
+               el('div', {class: 'toolbar'},
+                  Dom.button('Save without them', () => close(true), {'data-do': 'save-without'}),
+                  Dom.button('Do not save', () => close(false), {'data-do': 'do-not-save'})))));
+  }
+
   function make(draft) {
     const outcome = el('div', {role: 'status', 'data-saved': ''});
     const button = Dom.button('Save the case', () => save(), {'data-do': 'save'});
 
     async function save() {
       await draft.last;  // changes on their way come first
+      if (!await mayLose(draft)) return;
       button.disabled = true;
       outcome.replaceChildren();
       try {

@@ -72,7 +72,7 @@ const XrayAdd = (() => {
           el('label', {class: 'field'}, el('span', {}, 'Name of the view'), box), fault,
           el('h3', {}, 'How was it taken?'),
           el('p', {}, Dom.button('Choose a camera file', () => finish('file'), {'data-camera': 'file'}), ' ',
-             el('span', {class: 'note'}, 'from a calibration: marrow’s YAML or XMALab’s text')),
+             el('span', {class: 'note'}, 'marrow’s YAML, or a file of XMALab, plastimatch, RTK or xReg')),
           /\.(dcm|dicom)$/i.test(image) &&
               el('p', {}, Dom.button('Read the DICOM header', () => finish('header'), {'data-camera': 'header'}), ' ',
                  el('span', {class: 'note'}, 'exact to about a degree at best')),
@@ -86,7 +86,7 @@ const XrayAdd = (() => {
     if (answer.kind === 'file') {
       const file =
           await Shell.choose(`Camera of ${answer.name}`, {at: folderOf(image), accepts: (name) => !is_image(name)});
-      return file && {file};
+      return file && XrayCameraFile.cameraOf(file);
     }
     if (answer.kind === 'header') {
       const {camera, warnings} = await Ask.json('api/xray/header-camera', {image});

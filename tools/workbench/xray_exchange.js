@@ -32,32 +32,6 @@ const XrayExchange = (() => {
     }
   };
 
-  // What is written, or a sentence that says why there is nothing.
-  const GET = {
-    seeds(document) {
-      const found = Object.entries(document.fragments || {}).filter(([, one]) => (one.seeds || []).length);
-      if (!found.length) return 'There are no seeds yet.';
-      const fragments = found.map(([name, one]) => [name, {seeds: one.seeds, register: one.register !== false}]);
-      return {fragments: Object.fromEntries(fragments)};
-    },
-    landmarks(document, fragment) {
-      const fragments = {};
-      for (const one of document.landmarks || []) {
-        if (!one.model_mm) continue;
-        const name = one.fragment || fragment, to = fragments[name] = fragments[name] || {points: {}, seen: {}};
-        to.points[one.name] = one.model_mm;
-        for (const [view, at] of Object.entries(one.pixels || {})) (to.seen[view] = to.seen[view] || {})[one.name] = at;
-      }
-      return Object.keys(fragments).length ?
-          {fragments} :
-          'No landmark has a place in the CT, and the file needs it; a landmark of X-rays alone stays in the case.';
-    },
-    pose(document, fragment) {
-      const matrix = ((document.fragments || {})[fragment] || {}).start;
-      return matrix ? {matrix} : `The fragment “${fragment}” has no start yet.`;
-    }
-  };
-
   async function importFrom(shared, what) {
     const path = await Shell.choose(`Import: ${TITLES[what].toLowerCase()}`);
     if (path === undefined) return;
@@ -69,31 +43,27 @@ const XrayExchange = (() => {
     });
   }
 
-  async function exportTo(shared, what) {
-    const content = GET[what](shared.draft.document, shared.fragment());
-    if (typeof content === 'string') return void Shell.notice(content, 'fault');
-    const beside = shared.draft.path ? shared.draft.path + '.' : '';
-    const path =
-        await XrayTable.askName(`Export: ${TITLES[what].toLowerCase()}, to the file`, `${beside}${what}.yaml`, []);
-    if (!path) return;
-    await Shell.guarded(async () => {
-      const {path: written} = await Ask.post('api/xray/export', {what, path, content});
-      Shell.notice(`Written: ${written}`);
-    });
-  }
+  const NAMES = {...TITLES, cameras: 'Cameras', result: 'Result’s pose'};
 
   function make(shared) {
-    const rows = Object.keys(TITLES).map(
-        (what) =>
-            el('span', {class: 'field'}, el('span', {}, TITLES[what]),
-               el('span', {class: 'pair'},
-                  Dom.button(
-                      'Import', () => importFrom(shared, what),
-                      {'data-import': what, 'aria-label': `Import ${TITLES[what].toLowerCase()}`}),
-                  Dom.button(
-                      'Export', () => exportTo(shared, what),
-                      {'data-export': what, 'aria-label': `Export ${TITLES[what].toLowerCase()}`}))));
-    return {element: el('div', {class: 'exchange'}, el('h3', {}, 'Files'), el('div', {class: 'toolbar'}, rows))};
+    const command = el('div', {role: 'status', 'data-exported': ''});
+    const told = ({path, command: text}) => command.replaceChildren(...(
+        text ? [el('p', {class: 'note'}, `The same as ${path} in a shell, into the folder runs:`), Dom.command(text)] :
+               []));
+    const button = (text, what, does) => Dom.button(
+        text, does, {[`data-${text.toLowerCase()}`]: what, 'aria-label': `${text} ${NAMES[what].toLowerCase()}`});
+    const row = (what) => el(
+        'span', {class: 'field'}, el('span', {}, NAMES[what]),
+        el('span', {class: 'pair'}, TITLES[what] && button('Import', what, () => importFrom(shared, what)),
+           button(
+               'Export', what,
+               () =>
+                   (what === 'result' ? XrayExport.beginResult(shared, told) : XrayExport.begin(shared, what, told)))));
+    return {
+      element:
+          el('div', {class: 'exchange'}, el('h3', {}, 'Files'),
+             el('div', {class: 'toolbar'}, Object.keys(NAMES).map(row)), command)
+    };
   }
 
   return {make};

@@ -8,7 +8,7 @@ const XrayViews = (() => {
 
   function cameraText(view) {
     const camera = view.camera || {};
-    if (camera.file) return camera.file;
+    if (camera.file) return XrayCameraFile.inWords(camera);
     if (camera.c_arm)
       return `C-arm, ${camera.c_arm.alpha_deg}° cranio-caudal, ${camera.c_arm.beta_deg}° right/left anterior`;
     return camera.intrinsics ? 'matrices in the case' : 'no camera';
@@ -69,6 +69,15 @@ const XrayViews = (() => {
                        }),
                    {'aria-label': `Remove mask: ${view.name}`})),
         faults.map((fault) => el('p', {class: 'fault', 'data-fault-of': view.name}, fault)));
+  }
+
+  // Files that say nothing about the patient's sides: whether one is mirrored shows only in what it shows.
+  function sidesText(views) {
+    const silent = views.filter((view) => !/\.(dcm|dicom)$/i.test(view.image)).map((view) => view.name);
+    return silent.length ?
+        `${silent.join(', ')}: PNG and TIFF do not say what is left. Compare with the anatomy: in a frontal view the ` +
+            'patient’s left is on the left. Landmarks in two views show a mirrored one, too.' :
+        '';
   }
 
   const degrees = (value) => value.toFixed(1) + '°';
@@ -153,11 +162,13 @@ const XrayViews = (() => {
   function make(draft) {
     const list = el('ul', {class: 'view-list'});
     const figures = el('table', {class: 'values', 'data-figures': ''});
+    const sides = el('p', {class: 'note', 'data-sides': ''});
     const check = el('div', {role: 'status', 'data-check': ''});
     const ask = checking(draft, (answer) => check.replaceChildren(...checkText(answer)));
     const update = () => {
       const views = draft.document.views || [], entries = views.map((view) => XrayImages.of(view, update));
       const signature = JSON.stringify([views, entries.map((one) => one.is_ready)]);
+      sides.textContent = sidesText(views);
       if (signature !== list.dataset.shown) {
         list.dataset.shown = signature;
         list.replaceChildren(...views.map((view, i) => item(draft, view, i, views.length, entries[i])));
@@ -179,7 +190,7 @@ const XrayViews = (() => {
           el('div', {class: 'xray-views'},
              el('div', {class: 'toolbar'}, Dom.button('Add X-ray', () => XrayAdd.add(draft), {'data-do': 'add-view'}),
                 again),
-             list, figures, check),
+             list, sides, figures, check),
       update
     };
   }

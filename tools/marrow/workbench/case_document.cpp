@@ -64,7 +64,9 @@ void adapt(json& document, const std::string& base) {
   for (json& view : document.at("views")) {
     move(view.at("image"));
     if (view.contains("mask")) move(view["mask"]);
-    if (view.at("camera").is_string()) view["camera"] = {{"file", base + view["camera"].get<std::string>()}};
+    json& camera = view.at("camera");
+    if (camera.is_string()) camera = {{"file", camera}};
+    if (camera.contains("file")) move(camera["file"]);
   }
   for (auto& [name, fragment] : document.at("fragments").items())
     for (const char* key : {"start", "truth"})

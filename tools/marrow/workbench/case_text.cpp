@@ -63,7 +63,7 @@ void put_view(YAML::Emitter& out, const json& view) {
   if (view.contains("camera")) {
     const json& camera = view["camera"];
     put(out << YAML::Key << "camera" << YAML::Value,
-        camera.is_object() && camera.contains("file") ? camera["file"] : camera);
+        camera.is_object() && camera.size() == 1 && camera.contains("file") ? camera["file"] : camera);
   }
   put_keys(out, view, {"mask"});
   out << YAML::EndMap;

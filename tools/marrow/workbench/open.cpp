@@ -16,6 +16,7 @@
 #include "process.hpp"
 #include "runtime/text_file.hpp"
 #include "workbench/workbench.hpp"
+#include "workbench/working_files.hpp"
 
 namespace fs = std::filesystem;
 
@@ -94,6 +95,7 @@ int open(const OpenRequest& request) {
   const Target target = target_of(request.place);
   workbench::Server server;
   workbench::Workbench bench(target.folder);
+  workbench::remove_unused_working_files(bench.folder);
   using namespace workbench;
   for (const auto add : {
            add_shell, add_case_page, add_ct_page, add_xray_page,  //

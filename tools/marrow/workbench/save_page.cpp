@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The request of the page "Case" that saves the draft as a case.
 #include "marrow/domain/printable.hpp"
+#include "runtime/text_file.hpp"
 #include "workbench/case_text.hpp"
 #include "workbench/ct_requests.hpp"
 #include "workbench/files_of_case.hpp"
+#include "workbench/kept_comments.hpp"
 
 namespace fs = std::filesystem;
 
@@ -46,19 +48,47 @@ json document_after(const PlannedCase& plan, const std::string& case_path) {
   return document;
 }
 
+/// The texts of a case's files, with the comments of those that are there.
+struct CaseTexts {
+  std::string case_yaml, landmarks_yaml;
+  std::vector<std::string> lost;  ///< comments that are not kept
+};
+
+CaseTexts texts_of(const fs::path& place, const PlannedCase& plan, const json& document) {
+  CaseTexts texts{case_yaml(plan), landmarks_yaml(document), {}};
+  const auto keep = [&](const char* name, std::string& text) {
+    if (!fs::exists(place / name)) return;
+    const KeptText kept = with_comments_of(read_text_file(place / name, kMostSourceBytes), text);
+    if (!text.empty()) text = kept.text;
+    texts.lost.insert(texts.lost.end(), kept.lost.begin(), kept.lost.end());
+  };
+  keep("case.yaml", texts.case_yaml);
+  keep("landmarks.yaml", texts.landmarks_yaml);
+  return texts;
+}
+
+json lost_comments(const std::string& case_path, Workbench& workbench) {
+  const json document = workbench.drafts.open(case_path)["document"];
+  const PlannedCase plan = plan_case(workbench.folder, case_path, document);
+  json lost = json::array();
+  for (const std::string& comment : texts_of(workbench.folder.inside(case_path), plan, document).lost)
+    lost.push_back(printable(comment));
+  return {{"lost", lost}};
+}
+
 json save(const std::string& case_path, int revision, Workbench& workbench, CtMemory& memory, Job& job) {
   json draft = workbench.drafts.open(case_path);
   if (draft["revision"] != revision) throw Conflict("this case was changed in another tab; look at it, and save again");
   const json& document = draft["document"];
   const PlannedCase plan = plan_case(workbench.folder, case_path, document);
-  const std::string landmarks = landmarks_yaml(document);
   const fs::path place = workbench.folder.inside(case_path);
+  const CaseTexts texts = texts_of(place, plan, document);
   job.tell({{"event", "message"}, {"text", "writing and reading back"}});
   const json& ct = document["ct"];
   const fs::path old_ct = workbench.folder.inside(ct["file"]), new_ct = place / plan.document["ct"]["file"];
   const std::string content = content_of_ct(old_ct, ct, FilesOfCt(old_ct));
-  write_case_files(place, plan, case_yaml(plan), landmarks,
-                   [&](const fs::path& staged) { check_case(staged, !landmarks.empty(), workbench, job); });
+  write_case_files(place, plan, texts.case_yaml, texts.landmarks_yaml,
+                   [&](const fs::path& staged) { check_case(staged, !texts.landmarks_yaml.empty(), workbench, job); });
   memory.add_copy(content, content_of_ct(new_ct, ct, FilesOfCt(new_ct)));  // so that it need not be read again
   json copied = json::array();
   for (const PlannedCase::File& file : plan.files)
@@ -77,6 +107,9 @@ json save(const std::string& case_path, int revision, Workbench& workbench, CtMe
 }  // namespace
 
 void add_saving(Server& server, Workbench& workbench, const std::shared_ptr<CtMemory>& memory) {
+  server.get("/api/case/lost-comments", [&workbench](const Request& request) {
+    return json_answer(lost_comments(request.parameter("case"), workbench));
+  });
   server.post("/api/case/save", [&workbench, memory](const Request& request) {
     const std::string case_path = request.text("case");
     const int revision = request.body.value("revision", -1);

@@ -8,22 +8,24 @@
 #include "marrow/domain/camera.hpp"
 #include "workbench/value_json.hpp"
 #include "workbench/workbench.hpp"
+#include "workbench/working_files.hpp"
 
 namespace marrow::workbench {
 
 /// Text of a value that is given by `--set`: a JSON string or list, in which '$' stands for itself.
 std::string set_text(const nlohmann::json& value);
 
-/// The camera file of a view: the one that `camera` names by {file}, or one in .marrow/drafts with the keys that are
-/// written in place. Throws Error if there is neither.
-std::filesystem::path camera_file(const Workbench& workbench, const nlohmann::json& camera);
+/// The camera file of a view: the one that `camera` names by {file}; or one in .marrow/drafts with the keys that are
+/// written in place, or with the camera of a file of another program, if `camera` has further keys for that. Throws
+/// Error if there is none, or if that cannot be read.
+std::filesystem::path camera_file(const Workbench& workbench, const nlohmann::json& camera, const std::string& image);
 
-/// The camera that the file holds, with the distortion that is still in its images. Throws Error if it cannot be read.
-DistortedCamera distorted_camera(const Workbench& workbench, const nlohmann::json& camera);
+/// The camera of a view, with the distortion that is still in its image; only marrow's own files hold one, and of
+/// others the result is empty. Throws Error if it cannot be read.
+DistortedCamera distorted_camera(const Workbench& workbench, const nlohmann::json& camera, const std::string& image);
 
-/// Writes it to .marrow/drafts/NAME-DIGEST.ENDING, where the digest is that of the text, and returns this place.
-std::filesystem::path working_file(const Workbench& workbench, const std::string& name, const std::string& ending,
-                                   const std::string& text);
+/// A camera as a draft's document has it.
+nlohmann::json camera_json(const Camera& camera);
 
 /// The overrides that name these views, a list of {name, image, camera}, for the node `views` of a pipeline.
 std::vector<Override> overrides_of(const Workbench& workbench, const nlohmann::json& views);
@@ -44,5 +46,6 @@ void add_xray_views(Server& server, Workbench& workbench);
 void add_xray_checks(Server& server, Workbench& workbench);
 void add_xray_masks(Server& server, Workbench& workbench);
 void add_xray_exchange(Server& server, Workbench& workbench);
+void add_xray_export(Server& server, Workbench& workbench);
 
 }  // namespace marrow::workbench

@@ -39,7 +39,7 @@ json checked(const Workbench& workbench, const Request& request) {
   const json points = points_of(landmarks_of(request));
   if (!points.is_null())
     call.arguments.overrides.push_back(
-        {"check.points", set_text(working_file(workbench, "points", ".yaml", points.dump(1)).string())});
+        {"check.points", set_text(working_file(workbench.folder, "points", ".yaml", points.dump(1)).string())});
   const Ran ran = run(call, workbench);
   json metrics = json::object();
   for (const Metric& metric : ran.outputs.at("metrics").as<Metrics>().items) metrics[metric.name] = metric.value;
@@ -97,8 +97,8 @@ Fit fit(const Workbench& workbench, const json& views, const json& landmarks, co
   const std::string surface = surface_of(file["fragments"][fragment]["points"]);
   Fit fit{{},
           {workbench_pipeline("fit-landmarks"),
-           {{{"landmarks", working_file(workbench, "landmarks", ".yaml", file.dump(1)).string()},
-             {"model", working_file(workbench, "model", ".ply", surface).string()}},
+           {{{"landmarks", working_file(workbench.folder, "landmarks", ".yaml", file.dump(1)).string()},
+             {"model", working_file(workbench.folder, "model", ".ply", surface).string()}},
             overrides_of(workbench, views)}}};
   fit.pose = run(fit.call, workbench).outputs.at("pose").items.at(0).as<Pose>();
   return fit;

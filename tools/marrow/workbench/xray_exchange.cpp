@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Seeds, landmarks and poses from files and to files.
+// Seeds, landmarks and poses from files.
 #include "marrow/domain/pose.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/domain/volume.hpp"
-#include "marrow/toolbox/files/atomic_write.hpp"
 #include "workbench/xray.hpp"
-
-namespace fs = std::filesystem;
 
 namespace marrow::workbench {
 namespace {
@@ -59,45 +56,10 @@ json imported(const Workbench& workbench, const Request& request) {
   return answer;
 }
 
-/// A place for a new file, below a folder that is there.
-fs::path place_for(const Workbench& workbench, const std::string& path) {
-  const fs::path file = workbench.folder.inside(path);
-  if (file.extension() != ".yaml" && file.extension() != ".yml")
-    throw Error("'" + printable(path) + "': the name must end in .yaml");
-  if (fs::exists(file)) throw Error("'" + printable(path) + "' is there already; give another name");
-  if (!fs::is_directory(file.parent_path()))
-    throw Error("'" + printable(path) + "': there is no such folder; make it first");
-  return file;
-}
-
-json with_version(const std::string& key, const json& content) {
-  json file = content;
-  file[key] = 1;
-  return file;
-}
-
-/// The file's text in marrow's format. `content` is {fragments} for seeds and landmarks, and {matrix} for a pose.
-std::string exported(const std::string& what, const json& content) {
-  if (what == "seeds" || what == "landmarks") {
-    const json fragments = content.value("fragments", json());
-    if (!fragments.is_object() || fragments.empty()) throw Error("there are no " + what + " to export");
-    return with_version("marrow-" + what, {{"fragments", fragments}}).dump(1) + "\n";
-  }
-  if (what != "pose") throw Error("seeds, landmarks or a pose can be exported, not '" + printable(what) + "'");
-  return with_version("marrow-pose", {{"target", "world"}, {"source", "ct"}, {"matrix", content.at("matrix")}})
-             .dump(1) +
-         "\n";
-}
-
 }  // namespace
 
 void add_xray_exchange(Server& server, Workbench& workbench) {
   server.get("/api/xray/import", [&](const Request& request) { return json_answer(imported(workbench, request)); });
-  server.post("/api/xray/export", [&](const Request& request) {
-    const fs::path file = place_for(workbench, request.text("path"));
-    files::write_text(file, exported(request.text("what"), request.body.value("content", json::object())));
-    return json_answer({{"path", workbench.folder.relative(file)}});
-  });
 }
 
 }  // namespace marrow::workbench

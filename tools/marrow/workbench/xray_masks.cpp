@@ -29,7 +29,7 @@ Shown shown_in(const Workbench& workbench, const Request& request) {
   Shown shown;
   shown.is_mirrored = files::is_mirrored_as_read(workbench.folder.inside(request.text("image")));
   const json camera = request.body.value("camera", json());
-  if (!camera.is_null()) shown.camera = distorted_camera(workbench, camera);
+  if (!camera.is_null()) shown.camera = distorted_camera(workbench, camera, request.text("image"));
   return shown;
 }
 
@@ -97,7 +97,7 @@ void add_xray_masks(Server& server, Workbench& workbench) {
     if (cv::countNonZero(mask) == width_px * height_px) return json_answer({{"mask", nullptr}});
     const auto* pixels = reinterpret_cast<const char*>(mask.ptr());
     const std::string png = files::png_of(width_px, height_px, 1, files::Sample::u8, pixels);
-    const fs::path file = working_file(workbench, "mask", ".png", png);
+    const fs::path file = working_file(workbench.folder, "mask", ".png", png);
     return json_answer({{"mask", workbench.folder.relative(file)}});
   });
 }

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pixels and cameras of X-ray views, for the page to show.
+#include <algorithm>
 #include <cstring>
 
 #include "marrow/domain/printable.hpp"
+#include "marrow/toolbox/files/image_sides.hpp"
 #include "workbench/xray.hpp"
 
 namespace marrow::workbench {
@@ -35,6 +37,18 @@ std::string pixels_of(const Image& image, json& about) {
   return bytes;
 }
 
+/// The warnings of a run that read a view, and what its header lets one doubt. A camera of angles has the patient's
+/// axes, so the header can be compared with it; then nothing else needs to be said.
+std::vector<std::string> with_sides(std::vector<std::string> warnings, const std::filesystem::path& image,
+                                    const json& written, const Camera& camera) {
+  if (!written.contains("c_arm")) return warnings;
+  const std::vector<std::string> known = files::doubts_about_sides(image);
+  std::erase_if(warnings,
+                [&](const std::string& one) { return std::find(known.begin(), known.end(), one) != known.end(); });
+  for (const std::string& doubt : files::doubts_about_sides(image, 0, camera)) warnings.push_back(doubt);
+  return warnings;
+}
+
 /// The view if it can be read. If not, the image alone, and why not as `fault`. Throws Error if the image cannot be
 /// read.
 Answer view_answer(const Workbench& workbench, const Request& request) {
@@ -42,7 +56,7 @@ Answer view_answer(const Workbench& workbench, const Request& request) {
   json about;
   std::string fault;
   try {
-    const std::filesystem::path camera = camera_file(workbench, request.body.value("camera", json()));
+    const std::filesystem::path camera = camera_file(workbench, request.body.value("camera", json()), image);
     const PipelineCall call{workbench_pipeline("view"),
                             {{{"image", workbench.folder.inside(image).string()}, {"camera", camera.string()}}, {}},
                             {},
@@ -52,8 +66,8 @@ Answer view_answer(const Workbench& workbench, const Request& request) {
     const Ran ran = run(call, workbench);
     const View& view = ran.outputs.at("view").as<View>();
     about["camera"] = json_of(view.camera);
-    about["warnings"] = ran.warnings;
-    about["is_straightened"] = !distorted_camera(workbench, request.body["camera"]).distortion.is_none();
+    about["warnings"] = with_sides(ran.warnings, workbench.folder.inside(image), request.body["camera"], view.camera);
+    about["is_straightened"] = !distorted_camera(workbench, request.body["camera"], image).distortion.is_none();
     std::string pixels = pixels_of(view.image, about);
     return bytes_answer(std::move(pixels), about);
   } catch (const Error& error) {
@@ -83,9 +97,9 @@ void add_xray_views(Server& server, Workbench& workbench) {
                             {},
                             false};
     const Ran ran = run(call, workbench);
-    json camera = json_of(ran.outputs.at("camera").as<Camera>());
-    camera["camera_from_world"] = {{"target", "camera"}, {"source", "world"}, {"matrix", camera["camera_from_world"]}};
-    return json_answer({{"camera", camera}, {"warnings", ran.warnings}, {"command", command_of(call)}});
+    return json_answer({{"camera", camera_json(ran.outputs.at("camera").as<Camera>())},
+                        {"warnings", ran.warnings},
+                        {"command", command_of(call)}});
   });
 }
 

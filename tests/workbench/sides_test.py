@@ -1,0 +1,77 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""What is said at once about an X-ray that may be mirrored."""
+import json
+import struct
+import unittest
+
+from bench import BenchTest
+
+ARM = {"alpha_deg": 0, "beta_deg": 0, "source_to_detector_mm": 1000, "source_to_isocentre_mm": 600, "pixel_mm": 1}
+CAMERA = {"width_px": 6, "height_px": 4, "c_arm": ARM}
+
+
+def element(group, number, kind, value):
+    if isinstance(value, str):
+        value = value.encode()
+    value += (b"\0" if kind == b"UI" else b" ") * (len(value) % 2)
+    length = struct.pack("<HI", 0, len(value)) if kind in (b"OW", b"OB") else struct.pack("<H", len(value))
+    return struct.pack("<HH", group, number) + kind + length + value
+
+
+def us(number, value):
+    return element(0x0028, number, b"US", struct.pack("<H", value))
+
+
+def dicom(orientation=None, flip=None, angles=None):
+    """An X-ray image of 6 x 4 pixels in explicit little endian."""
+    meta = element(2, 1, b"OB", b"\0\1") + element(2, 0x10, b"UI", "1.2.840.10008.1.2.1")
+    data = b"\0" * 128 + b"DICM" + element(2, 0, b"UL", struct.pack("<I", len(meta))) + meta
+    data += element(8, 0x16, b"UI", "1.2.840.10008.5.1.4.1.1.12.1") + element(8, 0x60, b"CS", "XA")
+    if angles:
+        data += element(0x18, 0x1510, b"DS", str(angles[0])) + element(0x18, 0x1511, b"DS", str(angles[1]))
+    if flip:
+        data += element(0x18, 0x7034, b"CS", flip)
+    if orientation:
+        data += element(0x20, 0x20, b"CS", orientation)
+    data += us(2, 1) + element(0x28, 4, b"CS", "MONOCHROME2") + us(0x10, 4) + us(0x11, 6)
+    data += us(0x100, 16) + us(0x101, 16) + us(0x102, 15) + us(0x103, 0)
+    return data + element(0x7FE0, 0x10, b"OW", struct.pack("<24H", *range(1000, 1024)))
+
+
+class SidesTest(BenchTest):
+    def warnings(self, camera=CAMERA, **header):
+        (self.folder / "a.dcm").write_bytes(dicom(**header))
+        status, headers, content = self.server.ask("POST", "/api/xray/view", {"image": "a.dcm", "camera": camera})
+        self.assertEqual(status, 200, content)
+        about = json.loads(headers["X-Marrow-About"])
+        self.assertNotIn("fault", about)
+        return about["warnings"]
+
+    def setUp(self):
+        super().setUp()
+        self.server = self.open()
+        self.server.enter()
+
+    def test_only_what_the_header_says(self):
+        self.assertEqual(self.warnings(), [])
+        self.assertEqual(self.warnings(flip="NO"), [])
+        self.assertEqual(self.warnings(orientation="R\\F"), [])
+        self.assertEqual(self.warnings(orientation="L\\F", angles=(0, 0)), [], "it is mirrored back")
+        (flipped,) = self.warnings(flip="YES")
+        self.assertIn("was flipped left to right after it was taken", flipped)
+        (mirrored,) = self.warnings(orientation="L\\F")
+        self.assertIn(
+            "is mirrored: by its header (PatientOrientation (0020,0020)) the patient's left is on the right", mirrored
+        )
+
+    def test_without_angles_it_is_not_known(self):
+        (self.folder / "c.yaml").write_text(json.dumps({"marrow-camera": 1, **CAMERA}))
+        (unknown,) = self.warnings(camera={"file": "c.yaml"}, orientation="L\\F")
+        self.assertIn("whether it is mirrored is not known", unknown)
+
+
+if __name__ == "__main__":
+    import sys
+
+    unittest.main(argv=sys.argv[:1] + sys.argv[3:], verbosity=2)
