@@ -164,7 +164,7 @@ TEST_F(CaseCamera, FilesOfOtherPrograms) {
 }
 
 TEST_F(CaseCamera, WhatIsWrongIsSaidWithItsLine) {
-  expect_said("x.h5", "case.yaml:6:13: camera: ");
+  expect_said("x.h5", "case.yaml:6:13: a view: camera: ");
   expect_said("x.h5", "x.h5: has 3 projections; say by its number, counted from 0, which one is meant (projection)");
   expect_said("{file: x.h5, projection: 5}", "there is no projection 5");
   expect_said("{file: x.h5, projection: -1}", "projection: expected a whole number from 0");

@@ -6,7 +6,6 @@ import shlex
 import subprocess
 
 import numpy
-from selenium.webdriver.common.keys import Keys
 
 from bench import MARROW, main
 from xray_bench import ANGLES, MODEL, XrayTest, camera_matrices, pixel
@@ -102,7 +101,8 @@ class ExportTest(XrayTest):
             self.click('dialog [data-camera="file"]')
             self.click('[data-choose="%s"]' % file)
             if projection is not None:
-                self.find("dialog [data-camera-file=projection]").send_keys(Keys.BACKSPACE, str(projection))
+                self.find("dialog [data-camera-file=projection]").clear()
+                self.find("dialog [data-camera-file=projection]").send_keys(str(projection))
                 if mirror:
                     self.find("dialog [data-camera-file=pixel]").send_keys("1")
                 self.click("dialog [data-camera-file=ok]")

@@ -133,6 +133,14 @@ class RequestTest(PipelineBench):
         answer = self.post("plan", inputs={"level": ""})
         self.assertIn("input 'level' has no value", self.error(answer))
 
+    def test_functions_are_no_outputs_of_a_run(self):
+        nodes = "nodes: {optimizer: {uses: optimizer.nelder_mead}}\noutputs: {search: optimizer}\n"
+        self.file.write_text("marrow: 1\nonly_inside: true\n" + nodes)
+        state = self.server.finish(json.loads(self.post("run", inputs={})[2])["job"])
+        self.assertEqual(state["state"], "failed")
+        self.assertIn("output 'search' is a function, which no file can hold", state["error"])
+        self.assertFalse((self.folder / "runs").exists())
+
     def test_a_run_writes_what_marrow_run_writes(self):
         started = json.loads(self.post("run", inputs={"level": "0.5"})[2])
         self.assertEqual(started["command"], "cd %s && marrow run small.yaml level=0.5" % self.folder)

@@ -13,6 +13,7 @@
 #include "marrow/domain/names.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/run_folder.hpp"
+#include "outputs_in_files.hpp"
 #include "process.hpp"
 #include "run_event.hpp"
 #include "runtime/place_of_results.hpp"
@@ -227,6 +228,16 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   return outcome;
 }
 
+void expect_files_can_hold(const Pipeline& pipeline) {
+  for (const PipelineOutput& output : pipeline.outputs)
+    if (pipeline.nodes[std::size_t(output.source.node)]
+            .info.outputs[std::size_t(output.source.output)]
+            .type.is_function)
+      throw Error(printable(pipeline.file.string()) + ": output '" + output.name +
+                  "' is a function, which no file can hold; the program itself runs this pipeline (only_inside): name "
+                  "other outputs with --only");
+}
+
 void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& folder, const Store* store) {
   expect_nothing_reads(pipeline, folder.empty() ? "runs" : folder, "the output folder", "choose another with --out");
   if (store && store->fault().empty())
@@ -258,23 +269,12 @@ bool keep_outputs(Pipeline& pipeline, const std::vector<std::string>& names) {
   return true;
 }
 
-/// Of a pipeline that only runs inside the program, a command can make those outputs that files can hold.
-void check_that_files_hold(const Pipeline& pipeline) {
-  for (const PipelineOutput& output : pipeline.outputs)
-    if (pipeline.nodes[std::size_t(output.source.node)]
-            .info.outputs[std::size_t(output.source.output)]
-            .type.is_function)
-      throw Error(printable(pipeline.file.string()) + ": output '" + output.name +
-                  "' is a function, which no file can hold; the program itself runs this pipeline (only_inside): name "
-                  "other outputs with --only");
-}
-
 int run(const RunRequest& request) {
   const std::atomic<bool>& is_stopped = stop_on_signals();
   const Catalogue catalogue;
   Pipeline pipeline;
   if (!load(request.pipeline, catalogue, pipeline, true) || !keep_outputs(pipeline, request.only)) return 2;
-  check_that_files_hold(pipeline);
+  expect_files_can_hold(pipeline);
   if (is_stopped) {
     std::fprintf(stderr, "marrow: %s before anything was made\n", stopped_text().c_str());
     return 130;

@@ -4,6 +4,7 @@
 #include "commands.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/run_folder.hpp"
+#include "outputs_in_files.hpp"
 #include "run_event.hpp"
 #include "runtime/place_of_results.hpp"
 #include "runtime/verdict_json.hpp"
@@ -82,6 +83,7 @@ json plan_of(const Pipeline& pipeline, const Workbench& workbench) {
 
 json run_into_folder(std::shared_ptr<LastRun> run, const PipelineArguments& arguments, const Workbench& workbench,
                      Job& job) {
+  cli::expect_files_can_hold(run->pipeline);
   const std::filesystem::path runs = workbench.folder.inside("runs");
   expect_nothing_reads(run->pipeline, runs, "the folder of the runs", "open a folder above it");
   RunSettings settings;

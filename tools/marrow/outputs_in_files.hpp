@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include "marrow/runtime/pipeline.hpp"
+
+namespace marrow::cli {
+
+/// Throws Error if an output is a function: a pipeline that only runs inside the program may have such outputs, but a
+/// run into a folder cannot write them.
+void expect_files_can_hold(const Pipeline& pipeline);
+
+}  // namespace marrow::cli
