@@ -4,6 +4,7 @@
 #include <chrono>
 #include <fstream>
 #include <iterator>
+#include <mutex>
 #include <regex>
 #include <vector>
 
@@ -17,7 +18,7 @@ namespace marrow::workbench {
 namespace {
 
 constexpr const char* kFolder = ".marrow/drafts";
-constexpr std::chrono::hours kUnused{24};
+constexpr std::chrono::hours kFresh{1}, kUnused{24};
 
 /// Throws Error if the file cannot be read to its end.
 std::string text_of(const fs::path& file) {
@@ -42,9 +43,16 @@ fs::path working_file(const OpenedFolder& folder, const std::string& name, const
   const fs::path drafts = folder.inside(kFolder);
   fs::create_directories(drafts);
   const fs::path file = drafts / (name + "-" + hash_of_bytes(text.data(), text.size()).hex() + ending);
+  // Its time says when it was last in use. It changes at most once an hour: a run that reads the file just now would
+  // take a change of it for a change of the content.
+  static std::mutex one_at_a_time;
+  const std::lock_guard lock(one_at_a_time);
   std::error_code error;
-  fs::last_write_time(file, fs::file_time_type::clock::now(), error);  // it is in use
-  if (error) files::write_text(file, text);
+  const auto now = fs::file_time_type::clock::now(), before = fs::last_write_time(file, error);
+  if (error)
+    files::write_text(file, text);
+  else if (now - before > kFresh)
+    fs::last_write_time(file, now, error);
   return file;
 }
 
