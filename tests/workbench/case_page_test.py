@@ -263,6 +263,36 @@ class CasePageTest(PageTest):
             ["the CT is missing; choose one", "there is no fragment; add one, with its seeds"],
         )
 
+    def test_comments_that_would_go_are_shown_before(self):
+        ct = ct_cases.mha(ct_cases.straight(SIZE), self.values)
+        (self.folder / "scan.mha").write_bytes(ct)
+        self.begin(ct={"file": "scan.mha"}, fragments={"distal": {"seeds": [list(LOWER)], "register": True}})
+        self.click('[data-do="save"]')
+        self.wait("document.querySelector('[data-saved]').textContent.includes('Saved in')")
+        file = self.folder / "mine" / "case.yaml"
+        kept = "# mine\n" + re.sub("(name: .*)", r"\1   # the first", file.read_text())
+        file.write_text(kept)
+        self.click('[data-do="save"]')
+        self.wait("document.querySelector('[data-saved]').textContent.includes('Saved in')")
+        self.assertEqual(file.read_text(), kept, "nothing changed, so nothing is asked")
+        self.click('[data-view-row="frontal"] [data-do="rename"]')
+        self.wait("document.querySelector('dialog[open] input') !== null")
+        self.browser.js(
+            "const box = document.querySelector('dialog input'); box.value = 'oblique'; box.form.requestSubmit();"
+        )
+        self.wait("document.querySelector('[data-view-row=oblique]') !== null")
+        for answer, is_saved in (("do-not-save", False), ("save-without", True)):
+            self.wait("!document.querySelector('[data-do=save]').disabled")
+            self.click('[data-do="save"]')
+            self.wait("document.querySelector('dialog[open] [data-lost]') !== null")
+            self.assertEqual(self.css("[data-lost]").text, "# the first")
+            self.click('#dialog [data-do="%s"]' % answer)
+            self.wait("!document.getElementById('dialog').open")
+            if is_saved:
+                self.wait("document.querySelector('[data-do=save]').textContent === 'Save again'")
+            self.assertEqual("oblique" in file.read_text(), is_saved)
+        self.assertTrue(file.read_text().startswith("# mine\n"))
+
     def test_nothing_is_cut_off_at_any_width(self):
         server = self.with_ct()
         for width_px in (1440, 1024, 400):

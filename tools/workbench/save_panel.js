@@ -27,9 +27,12 @@
 
     async function save() {
       await draft.last;  // changes on their way come first
-      if (!await mayLose(draft)) return;
       button.disabled = true;
       outcome.replaceChildren();
+      if (!await mayLose(draft)) {
+        button.disabled = false;
+        return;
+      }
       try {
         const {job} = await Ask.post('api/case/save', {case: draft.path, revision: draft.revision});
         const result = await Shell.follow('Saving the case', job);
