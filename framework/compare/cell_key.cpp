@@ -69,13 +69,13 @@ void CellRunner::add_pipeline(Hasher& hasher, const Pipeline& pipeline, const fs
     for (const std::string& path : paths_of(*node)) paths.insert(path);
   }
   for (const Digest& id : build_ids) hasher.add(id);
-  hasher.add(machine_digest());
   for (const std::string& path : paths) hasher.add(content_of(path, look));
 }
 
 fs::path CellRunner::place_of_simulated(std::size_t index, Look look) const {
   Hasher hasher;
   add_pipeline(hasher, simulation_of(index), {}, look);
+  hasher.add(machine_digest());
   hasher.add(experiment_.cases[index].seed);
   return (store_ ? store_->cases() : folder_ / "cases") / hasher.digest().hex() / "outputs" /
          experiment_.simulation.output;
@@ -98,8 +98,10 @@ std::string CellRunner::key_of(const CellIndex& cell, const Pipeline& pipeline) 
     hasher.add(metric.better == MetricChoice::Better::nearest_zero);  // the row then has the magnitude
   }
   hasher.add(experiment_.initial_error);
-  return hasher.digest().hex();
+  return hasher.digest().hex() + "-" + machine_digest().hex();
 }
+
+std::string key_without_machine(const std::string& key) { return key.substr(0, key.find('-')); }
 
 std::string CellRunner::key_of(const CellIndex& cell) {
   try {

@@ -50,6 +50,7 @@ struct RerunRequest {
 void add_run(CLI::App& app, int& code);
 void add_compare(CLI::App& app, int& code);
 void add_cell(CLI::App& app, int& code);
+void add_chunk(CLI::App& app, int& code);
 void add_worker(CLI::App& app, int& code);
 void add_rerun(CLI::App& app, int& code);
 void add_diff(CLI::App& app, int& code);

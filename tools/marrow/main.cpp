@@ -22,9 +22,10 @@ int run_program(int argc, char** argv) {
         failed, CLI::Error(error.get_name(), marrow::printable(error.what()), error.get_exit_code()));
   });
   int code = 0;
-  for (const auto add : {add_run,    add_compare, add_cell,        add_worker,       add_rerun,    add_diff,  add_show,
-                         add_check,  add_plan,    add_cache,       add_list,         add_inspect,  add_new,   add_graph,
-                         add_schema, add_doctor,  add_conformance, add_check_worker, add_describe, add_watch, add_open})
+  for (const auto add :
+       {add_run,    add_compare,     add_cell,         add_chunk,    add_worker,  add_rerun, add_diff,  add_show,
+        add_check,  add_plan,        add_cache,        add_list,     add_inspect, add_new,   add_graph, add_schema,
+        add_doctor, add_conformance, add_check_worker, add_describe, add_watch,   add_open})
     add(app, code);
   try {
     app.parse(argc, argv);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_event.hpp"
 
+#include "marrow/runtime/run_log.hpp"
+
 namespace marrow::cli {
 
 nlohmann::json json_of(const RunEvent& event) {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "cluster/on_cluster.hpp"
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "compare/comparison.hpp"
@@ -71,7 +72,7 @@ std::string fault_of_id(const Experiment& experiment, const std::string& id) {
   return "there is " + fault;
 }
 
-int compare_variants(const CompareRequest& asked) {
+int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster) {
   CompareRequest request = asked;
   stop_on_signals();
   const Catalogue catalogue;
@@ -85,8 +86,9 @@ int compare_variants(const CompareRequest& asked) {
   }
   const fs::path folder = folder_of(request, experiment);
   expect_outside_cases(experiment, folder, request.no_cache);
-  const ComparisonFolder kept(folder, experiment, ComparisonFolder::Use::alone);
   request.no_cache = request.no_cache || !can_keep_results(Store().prepare(), request.quiet);
+  if (cluster.is_given()) return compare_on_cluster(request, cluster, catalogue, experiment, folder);
+  const ComparisonFolder kept(folder, experiment, ComparisonFolder::Use::alone);
   return run_comparison(request, catalogue, experiment, folder);
 }
 
@@ -151,7 +153,9 @@ void add_compare(CLI::App& app, int& code) {
                request->shown);
   command->add_flag("--dry-run", request->dry_run, "say what there is to do, and how long that took before");
   command->add_flag("--quiet", request->quiet, "no progress");
-  command->callback([request, &code] { code = compare_variants(*request); });
+  const auto cluster = std::make_shared<ClusterRequest>();
+  add_cluster_options(command, *request, *cluster);
+  command->callback([request, cluster, &code] { code = compare_variants(*request, *cluster); });
 }
 
 void add_cell(CLI::App& app, int& code) {

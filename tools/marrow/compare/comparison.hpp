@@ -2,6 +2,7 @@
 #pragma once
 // The commands that compare variants.
 #include <filesystem>
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
@@ -25,15 +26,19 @@ struct CompareRequest {
   double memory_limit_mb = 4000;
   std::size_t shown = 8;  ///< cases and starts with pictures in the report
   bool dry_run = false, no_cache = false, quiet = false;
+  bool gather = false;  ///< run no cell: those without a row have failed
   FileLimits file_limits;
 };
 
 /// Adds the arguments that all commands with an experiment share.
 void add_experiment_arguments(CLI::App* command, CompareRequest& request);
-/// Runs all cells that are not done yet, then writes times, tables, pictures and the report. The folder belongs to this
-/// experiment.
+/// Why cells have no row, by their number in cells_of().
+using LostCells = std::map<std::size_t, std::string>;
+/// Runs all cells that are not done yet, here or by tasks of a cluster. Then writes times, tables, pictures and the
+/// report. The folder belongs to this experiment. With request.gather, cells that are not done have failed, for the
+/// reason in `lost`.
 int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment,
-                   const std::filesystem::path& folder);
+                   const std::filesystem::path& folder, const LostCells& lost = {});
 
 /// Cells whose pictures go into the report: all variants of at most `most` pairs of case and start. First come those
 /// where a variant was worst, best or nearest to its median in the first metric, then those that failed, then the first
@@ -44,6 +49,14 @@ std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experim
 /// Prints what a comparison would do. Calls no node.
 void print_plan(const compare::Experiment& experiment, const Catalogue& catalogue, const Store* store,
                 const std::filesystem::path& folder);
+
+/// What is left to do, in evaluations of nodes, and the seconds that these took in earlier runs.
+struct WorkEstimate {
+  double to_make = 0, unknown = 0;  ///< `unknown`: of nodes that never ran, which the seconds leave out
+  double seconds = 0;
+};
+WorkEstimate estimate_of(const compare::Experiment& experiment, const Catalogue& catalogue, const Store* store,
+                         const std::filesystem::path& folder);
 
 /// A figure of merit of one variant, over its completed cells.
 struct VariantFigure {

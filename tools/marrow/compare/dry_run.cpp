@@ -67,6 +67,7 @@ class Plan {
   }
 
   void print() const;
+  WorkEstimate estimate() const;
 
  private:
   void count_cell(const CellIndex& cell, const fs::path& place, bool is_there) {
@@ -121,17 +122,22 @@ std::map<std::string, double> seconds_before(const Store& store) {
   return means;
 }
 
-void Plan::print() const {
-  double to_make = 0, unknown = 0, seconds = 0;
+WorkEstimate Plan::estimate() const {
+  WorkEstimate estimate;
   const std::map<std::string, double> before = store_ ? seconds_before(*store_) : std::map<std::string, double>();
   for (const auto& [node, count] : counts_.to_make) {
-    to_make += count;
+    estimate.to_make += count;
     const auto known = before.find(node);
     if (known == before.end())
-      unknown += count;
+      estimate.unknown += count;
     else
-      seconds += known->second * count;
+      estimate.seconds += known->second * count;
   }
+  return estimate;
+}
+
+void Plan::print() const {
+  const auto& [to_make, unknown, seconds] = estimate();
   const auto& [cases, starts] = samples_;
   const bool is_sample = cases.taken < cases.all || starts.taken < starts.all;
   std::printf("%zu cells: %zu variants, %zu cases, %zu starts\n", experiment_.cell_count(), experiment_.variants.size(),
@@ -151,6 +157,11 @@ void Plan::print() const {
 
 void print_plan(const Experiment& experiment, const Catalogue& catalogue, const Store* store, const fs::path& folder) {
   Plan(experiment, catalogue, store, folder).print();
+}
+
+WorkEstimate estimate_of(const Experiment& experiment, const Catalogue& catalogue, const Store* store,
+                         const fs::path& folder) {
+  return Plan(experiment, catalogue, store, folder).estimate();
 }
 
 }  // namespace marrow::cli

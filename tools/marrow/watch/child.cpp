@@ -19,7 +19,7 @@ namespace marrow::cli {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr std::size_t kMostKept = 20'000;
+constexpr std::size_t kMostKept = 200'000;
 constexpr auto kPatience = std::chrono::seconds(10);
 
 /// Starts the program in a process group of its own, so that Ctrl-C reaches only this process.
@@ -47,12 +47,12 @@ pid_t started(const std::vector<std::string>& command, int output) {
   return process;
 }
 
-/// Reads what is there and passes it on. False at the end.
-bool pass_on(int from, std::string& kept) {
+/// Reads what is there. False at the end.
+bool take(int from, Said said, std::string& kept) {
   char text[4096];
   const ssize_t count = read(from, text, sizeof text);
   if (count <= 0) return count < 0 && errno == EINTR;
-  std::fwrite(text, 1, std::size_t(count), stderr);
+  if (said == Said::passed_on) std::fwrite(text, 1, std::size_t(count), stderr);
   kept.append(text, std::size_t(count));
   if (kept.size() > 2 * kMostKept) kept.erase(0, kept.size() - kMostKept);
   return true;
@@ -60,7 +60,7 @@ bool pass_on(int from, std::string& kept) {
 
 }  // namespace
 
-ChildEnd run_child(const std::vector<std::string>& command, const std::function<bool()>& should_stop) {
+ChildEnd run_child(const std::vector<std::string>& command, const std::function<bool()>& should_stop, Said said) {
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0) throw Error("cannot start " + command[0] + ": " + std::strerror(errno));
   pid_t process = -1;
@@ -74,7 +74,7 @@ ChildEnd run_child(const std::vector<std::string>& command, const std::function<
   ChildEnd end;
   Clock::time_point stopped_at;
   for (pollfd readable{ends[0], POLLIN, 0};;) {
-    if (poll(&readable, 1, 200) > 0 && !pass_on(ends[0], end.said)) break;
+    if (poll(&readable, 1, 200) > 0 && !take(ends[0], said, end.said)) break;
     if (!end.stopped && should_stop()) {
       end.stopped = true;
       stopped_at = Clock::now();

@@ -9,11 +9,14 @@ namespace marrow::cli {
 struct ChildEnd {
   int code = 0;          ///< exit code; 128 + N after signal N
   bool stopped = false;  ///< because `should_stop` said so
-  std::string said;      ///< the last 20,000 characters that it printed, on both streams
+  std::string said;      ///< the last 200,000 characters that it printed, on both streams
 };
 
-/// Runs a program to its end and passes on what it prints. Asks `should_stop` some times a second; if it says so, the
+enum class Said { passed_on, kept };  ///< what it prints also goes to the standard error, or not
+
+/// Runs a program to its end. Asks `should_stop` some times a second; if it says so, the
 /// program gets SIGINT, and SIGKILL if it has not ended after 10 s. Throws Error if it cannot be started.
-ChildEnd run_child(const std::vector<std::string>& command, const std::function<bool()>& should_stop);
+ChildEnd run_child(const std::vector<std::string>& command, const std::function<bool()>& should_stop,
+                   Said said = Said::passed_on);
 
 }  // namespace marrow::cli

@@ -14,6 +14,10 @@
 
 namespace marrow::compare {
 
+/// The part of a cell's key that is the same on machines with other processors. Rows that such machines made belong to
+/// the same comparison, although their last digits may differ.
+std::string key_without_machine(const std::string& key);
+
 /// The result of one cell.
 struct CellRow {
   std::string id, variant, case_name, start;

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Chunks of a comparison, run by one process after the other, by GNU parallel and by Snakemake: the same figures as
+without chunks, also after tasks were killed and files damaged."""
+import json
+import pathlib
+import shutil
+import signal
+import subprocess
+
+from cluster_cases import CASES, MARROW, VARIANTS, Cluster, main, wait_until
+
+
+class Chunks(Cluster):
+    def names(self, out):
+        plan = self.plan(out)
+        return [line for line in (plan.parent / (plan.stem + "-chunks.txt")).read_text().split("\n") if line]
+
+    def chunk(self, out, name, code=0):
+        return self.run_program(MARROW, "chunk", self.plan(out), name, "--quiet", code=code)
+
+    def emit(self, out, program="parallel"):
+        said = self.compare(out, "--emit", program).stdout
+        self.assertIn("%d cells are left, in " % (CASES * VARIANTS), said)
+        return said.split("run them by\n\n")[1].strip()
+
+    def setUp(self):
+        super().setUp()
+        self.compare("local", "--quiet", MARROW_CACHE=str(self.scratch / "another"))
+
+    def test_chunk_by_chunk(self):
+        self.emit("out")
+        names = self.names("out")
+        # the nodes never ran, so a chunk is a case
+        self.assertEqual(len(names), CASES)
+        for name in names[:-1]:
+            self.chunk("out", name)
+        self.compare("out", "--gather", "--quiet", "--shown", "0")
+        figures = self.figures("out")
+        lost = [cell for cell, row in figures.items() if row["status"] == "failed"]
+        self.assertEqual(len(lost), VARIANTS)
+        self.assertEqual({figures[cell]["reason"] for cell in lost}, {"no task left its row"})
+        self.chunk("out", names[-1])
+        said = self.compare("out", "--gather", "--quiet", "--shown", "0").stdout
+        self.assertIn("200 were there already", said)
+        self.expect_same("out", "local")
+        self.assertIn("no cell is left", self.compare("out", "--emit", "parallel").stdout)
+        # what a chunk wrote beside its rows is gone, and there are few files
+        files = [path for path in (self.scratch / "out").rglob("*") if path.is_file()]
+        self.assertEqual([path for path in files if "cells/" in str(path)], [])
+        self.assertLess(len(files), 2 * CASES + 20)
+
+    def test_without_gather_the_rest_runs_here(self):
+        self.emit("out")
+        self.chunk("out", self.names("out")[3])
+        said = self.compare("out", "--quiet").stdout
+        self.assertIn("20 were there already", said)
+        self.expect_same("out", "local")
+
+    def test_chunks_of_known_nodes_are_as_long_as_wished(self):
+        self.compare("timed", "--quiet")  # into the same store
+        shutil.rmtree(self.scratch / "cache")
+        self.experiment("0.05")
+        self.compare("timed", "--quiet", "--jobs", "2")
+        self.experiment("0.051")
+        said = self.compare("out", "--emit", "parallel", "--chunk-minutes", "1e6").stdout
+        self.assertIn("200 cells are left, in 1 chunks", said)
+
+    def test_parallel(self):
+        self.run_program("sh", "-c", self.emit("out"))
+        self.expect_same("out", "local")
+
+    def test_snakemake(self):
+        if not shutil.which("snakemake"):
+            self.skipTest("there is no snakemake")
+        home = self.scratch / "home"
+        home.mkdir()
+        self.run_program("sh", "-c", self.emit("out", "snakemake") + " --quiet", HOME=str(home), timeout=600)
+        self.expect_same("out", "local")
+
+    def test_a_killed_task_leaves_its_rows(self):
+        self.experiment("0.3")
+        self.emit("out")
+        name = self.names("out")[0]
+        rows = self.scratch / "out" / "rows"
+        process = subprocess.Popen(
+            [MARROW, "chunk", self.plan("out"), name, "--quiet", "--jobs", "1"],
+            env={**self.environment, "MARROW_CACHE": str(self.scratch / "other")},
+        )
+        wait_until(lambda: any(len(part.read_text().split("\n")) > 2 for part in rows.glob("*.part")), "no row came")
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        (part,) = rows.glob("*.part")
+        done = len(part.read_text().split("\n")) - 1
+        part.write_text(part.read_text() + "0123 {half a li")  # the line that it was writing
+        self.assertGreater(done, 0)
+        self.chunk("out", name)
+        lines = (rows / (name + ".jsonl")).read_text().split("\n")[:-1]
+        self.assertEqual(len({json.loads(line.split(" ", 1)[1])["id"] for line in lines}), VARIANTS)
+        self.assertEqual(len(lines), VARIANTS)
+        kept = [line for line in lines if line in part.read_text().split("\n")]
+        self.assertGreaterEqual(len(kept), done)
+
+    def test_a_damaged_row_is_made_again(self):
+        self.emit("out")
+        for name in self.names("out"):
+            self.chunk("out", name)
+        file = self.scratch / "out" / "rows" / (self.names("out")[2] + ".jsonl")
+        lines = file.read_text().split("\n")
+        lines[5] = lines[5].replace('"values":[', '"values":[1')
+        file.write_text("\n".join(lines))
+        said = self.compare("out", "--quiet").stdout
+        self.assertIn("199 were there already", said)
+        self.expect_same("out", "local")
+
+    def test_a_plugin_that_crashes_fails_its_cell_only(self):
+        self.experiment(more=", crash: {m.how: crash}")
+        self.compare("local", "--quiet", MARROW_CACHE=str(self.scratch / "another"))
+        self.compare("out", "--emit", "parallel")
+        for name in self.names("out"):
+            self.chunk("out", name)
+        self.compare("out", "--gather", "--quiet")
+        figures = self.figures("out")
+        self.assertEqual(len([1 for row in figures.values() if row["status"] == "failed"]), CASES)
+        self.expect_same("out", "local")
+
+    def refused(self, sentence, *command, code=2):
+        result = self.run_program(*command, code=code)
+        self.assertIn(sentence, result.stderr)
+
+    def test_what_changed_since_the_plan(self):
+        self.emit("out")
+        name = self.names("out")[0]
+        plan = self.plan("out")
+        self.refused("the plan has no chunk 'x'; its chunks are " + name, MARROW, "chunk", plan, "x")
+        again = "is not what it was when the plan was made; give the command that made the plan again"
+        self.write("cases/0/data", "other")
+        self.refused("cases/0 " + again, MARROW, "chunk", plan, name)
+        self.write("cases/0/data", "case 0")
+        self.chunk("out", name)
+        self.experiment("0.02")
+        self.refused("p.yaml " + again, MARROW, "chunk", plan, name)
+        plan.write_text(plan.read_text().replace('"threads": 1', '"threads": 2'))
+        self.refused("is no plan of a comparison: it was changed, or renamed", MARROW, "chunk", plan, name)
+        plan.write_text("{")
+        self.refused("is no plan of a comparison", MARROW, "chunk", plan, name)
+        self.refused("is no plan of a comparison", MARROW, "chunk", self.scratch / "none.json", name)
+
+    def test_words(self):
+        missing = self.compare("new", "--status", code=2).stderr
+        self.assertIn("there is no plan in", missing)
+        self.emit("out")
+        self.chunk("out", self.names("out")[0])
+        self.assertIn("20 of 200 cells in 1 of 10 chunks", self.compare("out", "--status").stdout)
+        self.assertIn("nothing was submitted from", self.compare("out", "--cancel", code=2).stderr)
+
+    def test_profile(self):
+        profile = self.write("profile.yaml", "partition: a b\nminutes: 0\npartiton: x\nsetup: y\ntries: 2.5\n")
+        said = self.compare("out", "--emit", "snakemake", "--profile", profile, code=2).stderr
+        for sentence in (
+            "profile.yaml:1:1",
+            "the profile lacks 'marrow-cluster: 1'",
+            "'partition' may hold letters, digits and _ . , : / + @ - only, got 'a b'",
+            "'minutes' must be from 1 to 1000000, got 0",
+            "partiton",
+            "'setup' must be a list of texts",
+            "'tries'",
+        ):
+            self.assertIn(sentence, said)
+
+
+if __name__ == "__main__":
+    main()

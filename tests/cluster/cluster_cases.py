@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A comparison of 200 cheap cells, for tests of chunks and clusters."""
+import csv
+import json
+import os
+import pathlib
+import subprocess
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "cli"))
+from marrow_cli import MARROW, SOURCE, TEST_PLUGINS, Case, main, wait_until  # noqa: E402, F401
+
+CASES, VARIANTS = 10, 20
+PIPELINE = """marrow: 1
+inputs: {case: {type: path}}
+nodes:
+  shared: {uses: test.work, with: {value: %s, path: $case}}
+  m: {uses: test.misbehave, in: {a: shared}}
+outputs: {number: m}
+"""
+
+
+class Cluster(Case):
+    def setUp(self):
+        super().setUp()
+        self.environment = {
+            **os.environ,
+            "MARROW_PLUGIN_PATH": str(TEST_PLUGINS),
+            "MARROW_CACHE": str(self.scratch / "cache"),
+        }
+        self.file = self.experiment()
+
+    def experiment(self, value="0.01", more=""):
+        self.write("p.yaml", PIPELINE % value)
+        for i in range(CASES):
+            (self.scratch / "cases" / str(i)).mkdir(parents=True, exist_ok=True)
+            self.write("cases/%d/data" % i, "case %d" % i)
+        variants = ", ".join("v%d: {m.value: %d}" % (i, i) for i in range(VARIANTS))
+        return self.write(
+            "e.yaml",
+            "experiment: 1\npipeline: p.yaml\ncases: {folders: [cases/*]}\nmetrics: [number.value]\ntimed_cells: 0\n"
+            "success: {number.value: 15}\nvariants: {%s%s}\n" % (variants, more),
+        )
+
+    def run_program(self, *command, code=0, timeout=300, **environment):
+        result = subprocess.run(
+            [*map(str, command)],
+            env={**self.environment, **environment},
+            cwd=self.scratch,
+            capture_output=True,
+            text=True,
+            timeout=timeout,
+        )
+        self.assertEqual(result.returncode, code, result.stdout + result.stderr)
+        return result
+
+    def compare(self, out, *arguments, code=0, **environment):
+        return self.run_program(
+            MARROW, "compare", self.file, "--out", self.scratch / out, *arguments, code=code, **environment
+        )
+
+    def figures(self, out):
+        """Everything that the tables say of each cell, but for times and tries."""
+        with open(self.scratch / out / "cells.csv", newline="") as stream:
+            rows = list(csv.DictReader(stream))
+        cells = [row["cell"] for row in rows]
+        self.assertEqual(len(cells), len(set(cells)), "a cell is counted twice")
+        return {row.pop("cell"): {k: v for k, v in row.items() if k not in ("seconds", "tries")} for row in rows}
+
+    def answers(self, out):
+        """The statistics in comparison.json without times."""
+        answer = json.loads((self.scratch / out / "comparison.json").read_text())
+        for variant in answer["variants"]:
+            variant.pop("seconds", None)
+        return answer["variants"], answer["comparisons"]
+
+    def expect_same(self, out, as_out):
+        self.assertEqual(self.figures(out), self.figures(as_out))
+        self.assertEqual(self.answers(out), self.answers(as_out))
+
+    def plan(self, out):
+        folder = self.scratch / out / "plans"
+        return folder / ((folder / "latest.txt").read_text().strip() + ".json")

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A comparison on a Slurm cluster of one host, which tools/cluster_test starts: the same figures as on one machine, also
+after tasks and the controller were killed."""
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+from cluster_cases import CASES, MARROW, SOURCE, VARIANTS, Cluster, main, wait_until
+
+PROFILE = "marrow-cluster: 1\nprocessors: 1\ntries: 3\n"
+ALL = bool(os.environ.get("MARROW_TEST_ALL"))
+
+
+def tasks():
+    """Processes of tasks that run a chunk."""
+    found = []
+    for process in pathlib.Path("/proc").glob("[0-9]*"):
+        try:
+            words = (process / "cmdline").read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if len(words) > 2 and words[0] == bytes(MARROW) and words[1] == b"chunk":
+            found.append(int(process.name))
+    return found
+
+
+class OnSlurm(Cluster):
+    def setUp(self):
+        super().setUp()
+        self.profile = self.write("profile.yaml", PROFILE)
+        self.out = self.scratch / "out"
+
+    def submit(self, *arguments, code=0):
+        return self.compare("out", "--on", "slurm", "--profile", self.profile, *arguments, code=code)
+
+    def local(self):
+        self.compare("local", "--quiet", MARROW_CACHE=str(self.scratch / "another"))
+
+    def start(self):
+        process = subprocess.Popen(
+            [MARROW, "compare", self.file, "--out", self.out, "--on", "slurm", "--profile", self.profile, "--wait"],
+            env=self.environment,
+            cwd=self.scratch,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        return process
+
+    def rows(self):
+        return list((self.out / "rows").glob("*.jsonl"))
+
+    def daemon(self, *words):
+        subprocess.run([os.environ["CLUSTER_FOLDER"] + "/daemon", *words], check=True)
+
+    def test_same_figures(self):
+        said = self.submit("--wait").stdout
+        self.assertIn("200 cells are left, in %d chunks" % CASES, said)
+        self.local()
+        self.expect_same("out", "local")
+        said = self.compare("out", "--status").stdout
+        self.assertIn("200 of 200 cells in 10 of 10 chunks", said)
+        self.assertIn("tables and report are made; submitted 1 times", said)
+        self.assertTrue((self.out / "report.html").exists())
+
+    def test_killed_tasks_and_controller(self):
+        self.experiment("0.1")
+        process = self.start()
+        wait_until(tasks, "no task came")
+        for _ in range(2):
+            wait_until(lambda: tasks() or process.poll() is not None, "no task came")
+            for task in tasks():
+                os.kill(task, signal.SIGKILL)
+            time.sleep(1)
+        self.daemon("kill", "slurmctld")
+        time.sleep(2)
+        self.daemon("start", "slurmctld")
+        said, _ = process.communicate(timeout=400)
+        self.assertEqual(process.returncode, 0, said)
+        self.local()
+        self.expect_same("out", "local")
+
+    def test_ctrl_c_and_again(self):
+        self.experiment("0.2")
+        process = self.start()
+        wait_until(tasks, "no task came")
+        time.sleep(3)
+        process.send_signal(signal.SIGINT)
+        said, _ = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 130, said)
+        self.assertIn("its tasks were cancelled; the same command goes on from here", said)
+        wait_until(lambda: not tasks(), "tasks go on")
+        self.assertEqual(subprocess.run(["squeue", "-h"], capture_output=True, text=True).stdout, "")
+        said = self.submit("--wait").stdout
+        self.local()
+        self.expect_same("out", "local")
+
+    def test_a_full_disk(self):
+        self.out.mkdir()
+        subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "none", self.out], check=True)
+        try:
+            process = self.start()
+            said, _ = process.communicate(timeout=300)
+            self.assertNotEqual(process.returncode, 0, said)
+            subprocess.run(["mount", "-o", "remount,size=100m", self.out], check=True)
+            self.submit("--wait")
+            self.local()
+            self.expect_same("out", "local")
+        finally:
+            subprocess.run(["umount", "-l", self.out], check=True)
+
+    def test_a_plugin_that_crashes(self):
+        self.experiment(more=", crash: {m.how: crash}")
+        self.submit("--wait")
+        self.local()
+        self.expect_same("out", "local")
+        self.assertEqual(sum(row["status"] == "failed" for row in self.figures("out").values()), CASES)
+
+    def test_refused(self):
+        self.profile = self.write("profile.yaml", PROFILE + "partition: none\n")
+        said = self.submit(code=2).stderr
+        self.assertIn("sbatch failed", said)
+        self.assertIn("partition", said)
+        self.assertFalse((self.out / "slurm.json").exists())
+        self.assertEqual(subprocess.run(["squeue", "-h"], capture_output=True, text=True).stdout, "")
+
+    def test_time_limit_of_the_cluster(self):
+        if not ALL:
+            self.skipTest("takes two minutes; MARROW_TEST_ALL=1 tries it")
+        self.experiment(more=", hang: {m.how: hang}")
+        self.profile = self.write("profile.yaml", PROFILE.replace("tries: 3", "tries: 1") + "minutes: 1\n")
+        self.submit("--wait")
+        reasons = {row["reason"] for row in self.figures("out").values() if row["status"] == "failed"}
+        self.assertTrue(
+            all("the cluster's time limit was reached (TIMEOUT); see log/" in one for one in reasons), reasons
+        )
+        done = [cell for cell, row in self.figures("out").items() if row["status"] == "done"]
+        self.assertEqual(len(done), CASES * VARIANTS)  # the rows that the tasks had made count
+
+
+def inside_a_cluster():
+    if "CLUSTER_FOLDER" in os.environ:
+        return True
+    folder = tempfile.mkdtemp(prefix="marrow-cluster-")
+    try:
+        if os.geteuid() != 0 or not shutil.which("sbatch"):
+            print("skipped: a Slurm cluster needs root, and the packages slurmctld, slurmd, slurm-client, munge")
+            sys.exit(77)
+        ended = subprocess.run([SOURCE / "tools" / "cluster_test", folder, sys.executable, *sys.argv])
+        sys.exit(ended.returncode)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+if __name__ == "__main__" and inside_a_cluster():
+    main()

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cluster/chunk_rows.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "marrow/domain/error.hpp"
+#include "marrow/runtime/hash.hpp"
+#include "runtime/text_file.hpp"
+
+namespace marrow::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using compare::CellRow;
+
+fs::path rows_folder(const fs::path& folder) { return folder / "rows"; }
+
+/// This process among those of all hosts that see the folder. A process number alone is used by several hosts.
+std::string this_process() {
+  char host[256] = "host";
+  gethostname(host, sizeof host - 1);
+  std::string name;
+  for (const char* c = host; *c; ++c) name += std::isalnum(static_cast<unsigned char>(*c)) || *c == '.' ? *c : '_';
+  std::string boot = "0";
+  try {
+    boot = read_text_file("/proc/sys/kernel/random/boot_id", 100).substr(0, 8);
+  } catch (const Error&) {  // no such file in some containers: host and process tell enough
+  }
+  return name + "-" + boot + "-" + std::to_string(getpid());
+}
+
+std::string digest_of(const std::string& text) { return hash_of_bytes(text.data(), text.size()).hex(); }
+
+}  // namespace
+
+ChunkFile::ChunkFile(const fs::path& folder, const std::string& chunk)
+    : final_(rows_folder(folder) / (chunk + ".jsonl")),
+      part_(rows_folder(folder) / (chunk + "." + this_process() + ".part")) {
+  std::error_code error;
+  fs::create_directories(rows_folder(folder), error);
+  descriptor_ = open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0666);
+  expect_good(descriptor_ >= 0);
+}
+
+ChunkFile::~ChunkFile() {
+  if (descriptor_ >= 0) close(descriptor_);
+}
+
+void ChunkFile::expect_good(bool is_good) const {
+  if (!is_good) throw Error("cannot write " + part_.string() + ": " + std::strerror(errno));
+}
+
+void ChunkFile::add(const CellRow& row) {
+  const std::string text = compare::to_json(row), line = digest_of(text) + " " + text + "\n";
+  for (std::size_t at = 0; at < line.size();) {
+    const ssize_t count = ::write(descriptor_, line.data() + at, line.size() - at);
+    if (count < 0 && errno == EINTR) continue;
+    expect_good(count > 0);
+    at += std::size_t(count);
+  }
+}
+
+void ChunkFile::finish() {
+  expect_good(fsync(descriptor_) == 0);
+  const int descriptor = std::exchange(descriptor_, -1);
+  expect_good(close(descriptor) == 0);  // a full disk may be noticed only here
+  expect_good(rename(part_.c_str(), final_.c_str()) == 0);
+}
+
+std::map<std::string, bool> chunk_files(const fs::path& folder) {
+  std::map<std::string, bool> chunks;
+  std::error_code error;
+  for (fs::directory_iterator at(rows_folder(folder), error), end; !error && at != end; at.increment(error)) {
+    const fs::path name = at->path().filename();
+    if (name.extension() == ".jsonl") chunks[name.stem().string()] = true;
+    if (name.extension() == ".part") chunks.emplace(name.native().substr(0, name.native().find('.')), false);
+  }
+  return chunks;
+}
+
+RowsOfChunks::RowsOfChunks(const fs::path& folder, const compare::Experiment& experiment, const std::string& plan)
+    : experiment_(experiment) {
+  std::error_code error;
+  for (fs::directory_iterator at(rows_folder(folder), error), end; !error && at != end; at.increment(error))
+    if (const fs::path extension = at->path().extension(); extension == ".jsonl" || extension == ".part")
+      add_file(at->path(), !plan.empty() && at->path().filename().native().starts_with(plan + "-"));
+}
+
+void RowsOfChunks::add_file(const fs::path& file, bool is_of_plan) {
+  std::ifstream in(file);
+  for (std::string line; std::getline(in, line);) try {
+      add_line(line, is_of_plan);
+    } catch (const std::exception&) {  // the last line of a killed task, or another experiment's
+    }
+}
+
+/// A line is "DIGEST {...}".
+void RowsOfChunks::add_line(const std::string& line, bool is_of_plan) {
+  const std::size_t space = line.find(' ');
+  const std::string text = space == std::string::npos ? "" : line.substr(space + 1);
+  if (text.empty() || digest_of(text) != line.substr(0, space)) throw Error("a damaged line");
+  CellRow row = compare::row_from_json(text, experiment_);
+  const std::string id = nlohmann::json::parse(text).at("id");
+  if (row.failed.empty())
+    done_[id].push_back(std::move(row));
+  else if (is_of_plan)
+    failed_.insert_or_assign(id, std::move(row));
+}
+
+std::optional<CellRow> RowsOfChunks::done(const compare::CellIndex& cell, const std::string& key) const {
+  const auto found = done_.find(compare::cell_id(experiment_, cell));
+  if (found == done_.end() || key.empty()) return std::nullopt;
+  for (CellRow row : found->second)
+    if (compare::key_without_machine(row.key) == compare::key_without_machine(key)) {
+      compare::name_row(row, experiment_, cell);
+      return row;
+    }
+  return std::nullopt;
+}
+
+std::optional<CellRow> RowsOfChunks::failed(const compare::CellIndex& cell) const {
+  const auto found = failed_.find(compare::cell_id(experiment_, cell));
+  if (found == failed_.end()) return std::nullopt;
+  CellRow row = found->second;
+  compare::name_row(row, experiment_, cell);
+  return row;
+}
+
+}  // namespace marrow::cli

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The files in which the tasks of a cluster leave the rows of their cells: FOLDER/rows/CHUNK.jsonl. While a task runs,
+// its file is CHUNK.HOST-BOOT-PROCESS.part; it is renamed when all rows are there. Each line has a digest of itself, so
+// the rows of a task that was killed count too.
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "marrow/compare/cell.hpp"
+
+namespace marrow::cli {
+
+/// Writes the rows of one chunk.
+class ChunkFile {
+ public:
+  /// Throws Error if the file cannot be made.
+  ChunkFile(const std::filesystem::path& folder, const std::string& chunk);
+  ~ChunkFile();
+  ChunkFile(const ChunkFile&) = delete;
+  ChunkFile& operator=(const ChunkFile&) = delete;
+
+  /// Throws Error if the row cannot be written.
+  void add(const compare::CellRow& row);
+  /// All rows are there: the file gets its final name. Throws Error if that fails.
+  void finish();
+
+ private:
+  void expect_good(bool is_good) const;
+
+  std::filesystem::path final_, part_;
+  int descriptor_ = -1;
+};
+
+/// The chunks that have a file: true if it has its final name. The folder is listed, because on a shared folder a file
+/// that was absent before may seem to be absent still.
+std::map<std::string, bool> chunk_files(const std::filesystem::path& folder);
+
+/// What tasks left in a folder.
+class RowsOfChunks {
+ public:
+  /// Lines that are damaged, or of another experiment, are left out. Rows of failed cells count only if they are of
+  /// this plan; `plan` may be empty.
+  RowsOfChunks(const std::filesystem::path& folder, const compare::Experiment& experiment, const std::string& plan);
+
+  /// A row of the cell that is done and has this key, except for the machine. The result has the names of the cell.
+  std::optional<compare::CellRow> done(const compare::CellIndex& cell, const std::string& key) const;
+  /// A row of the cell that says why it failed.
+  std::optional<compare::CellRow> failed(const compare::CellIndex& cell) const;
+
+ private:
+  void add_file(const std::filesystem::path& file, bool is_of_plan);
+  void add_line(const std::string& line, bool is_of_plan);
+
+  const compare::Experiment& experiment_;
+  std::map<std::string, std::vector<compare::CellRow>> done_;  ///< by the name of the cell
+  std::map<std::string, compare::CellRow> failed_;
+};
+
+}  // namespace marrow::cli

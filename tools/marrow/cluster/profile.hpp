@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "marrow/runtime/diagnostics.hpp"
+
+namespace marrow::cli {
+
+/// What a cluster wants to be told with each task.
+struct ClusterProfile {
+  std::string partition, account;    ///< empty = the cluster's default
+  std::int64_t processors = 0;       ///< of one task; 0 = the cluster's default
+  std::int64_t memory_mb = 0;        ///< of one task; 0 = the cluster's default
+  std::int64_t minutes = 0;          ///< time limit of one task; 0 = the cluster's default
+  std::vector<std::string> modules;  ///< loaded with `module load` before the task
+  std::vector<std::string> setup;    ///< lines of shell before the task, for example `export MARROW_SHARED_CACHE=...`
+  std::vector<std::string> options;  ///< further options of sbatch, as they are written there
+  std::int64_t most_tasks = 1000;    ///< tasks of one array
+  std::int64_t most_at_once = 0;     ///< tasks that may run at once; 0 = no limit
+  std::int64_t tries = 2;            ///< how often a task is given to the cluster
+};
+
+/// Reads a profile; all of its keys may be left out. Faults go to `diagnostics`, at their lines.
+ClusterProfile read_profile(const std::filesystem::path& file, Diagnostics& diagnostics);
+
+}  // namespace marrow::cli

@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cluster/slurm.hpp"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "cluster/chunk_rows.hpp"
+#include "cluster/scripts.hpp"
+#include "marrow/domain/error.hpp"
+#include "report/report.hpp"
+#include "runtime/json_text.hpp"
+#include "runtime/text_file.hpp"
+#include "watch/child.hpp"
+
+namespace marrow::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+/// What a program of Slurm prints. Throws Error if it fails.
+std::string said_by(const std::vector<std::string>& command) {
+  const ChildEnd end = run_child(
+      command, [] { return false; }, Said::kept);
+  if (end.code != 0)
+    throw Error(command[0] + " failed (exit code " + std::to_string(end.code) +
+                "): " + end.said.substr(0, end.said.find_last_not_of("\n") + 1));
+  return end.said;
+}
+
+std::string first_word(const std::string& text) {
+  const std::size_t begin = text.find_first_not_of(" \n");
+  return begin == std::string::npos ? "" : text.substr(begin, text.find_first_of(" ;\n", begin) - begin);
+}
+
+std::vector<std::string> sbatch(const ClusterPlan& plan, const ClusterProfile& profile, bool is_array) {
+  std::vector<std::string> command{"sbatch", "--parsable", "--export=ALL"};
+  const auto add = [&](const std::string& option, const std::string& value) {
+    if (!value.empty() && value != "0") command.push_back(option + "=" + value);
+  };
+  add("--partition", profile.partition);
+  add("--account", profile.account);
+  add("--cpus-per-task", std::to_string(profile.processors));
+  add("--mem", std::to_string(profile.memory_mb));
+  add("--time", std::to_string(profile.minutes));
+  add("--output", (plan.folder / "log" / (is_array ? "%A_%a.txt" : "%j.txt")).string());
+  command.insert(command.end(), profile.options.begin(), profile.options.end());
+  return command;
+}
+
+/// The script of an array: task N does the chunk on line N + 1 of a list.
+fs::path write_array_script(const ClusterPlan& plan, const ClusterProfile& profile) {
+  const fs::path file = plan.folder / "plans" / (plan.id + "-array.sh");
+  write_text_file(file,
+                  "#!/bin/sh\n# A task of a Slurm array. The first argument is a list of chunks.\n"
+                  "chunk=$(sed -n \"$((SLURM_ARRAY_TASK_ID + 1))p\" \"$1\")\n"
+                  "exec " +
+                      shell_word(write_chunk_script(plan, profile).string()) +
+                      " \"$chunk\" --quiet --jobs \"${SLURM_CPUS_PER_TASK:-${SLURM_CPUS_ON_NODE:-1}}\"\n");
+  return file;
+}
+
+class Submitter {
+ public:
+  Submitter(const ClusterPlan& plan, const ClusterProfile& profile) : plan_(plan), profile_(profile) {
+    std::error_code error;
+    fs::create_directories(plan.folder / "log", error);
+    script_ = write_array_script(plan, profile);
+  }
+
+  /// An array of the chunks, which begins when `after` has ended. Arrays have at most most_tasks tasks.
+  void add_arrays(const std::vector<Chunk>& chunks, const std::string& what, const std::vector<std::string>& after) {
+    for (std::size_t begin = 0; begin < chunks.size(); begin += std::size_t(profile_.most_tasks)) {
+      const std::vector<Chunk> part(
+          chunks.begin() + std::ptrdiff_t(begin),
+          chunks.begin() + std::ptrdiff_t(std::min(chunks.size(), begin + std::size_t(profile_.most_tasks))));
+      const fs::path list =
+          plan_.folder / "plans" / (plan_.id + "-" + what + "-" + std::to_string(done_.arrays.size()) + ".txt");
+      write_list(list, part);
+      std::vector<std::string> command = sbatch(plan_, profile_, true);
+      command.push_back("--job-name=marrow-" + what);
+      std::string range = "--array=0-" + std::to_string(part.size() - 1);
+      if (profile_.most_at_once) range += "%" + std::to_string(profile_.most_at_once);
+      command.push_back(range);
+      add_dependency(command, after);
+      command.insert(command.end(), {script_.string(), list.string()});
+      Submission::Array array{first_word(said_by(command)), {}};
+      for (const Chunk& chunk : part) array.chunks.push_back(chunk.name);
+      done_.arrays.push_back(std::move(array));
+    }
+  }
+
+  void add_gather(const fs::path& profile_file) {
+    std::string text = "#!/bin/sh\n# Makes tables and report, or submits again what left no rows.\nexec " +
+                       gather_command(plan_) + " --on slurm";
+    if (!profile_file.empty()) text += " --profile " + shell_word(fs::absolute(profile_file).string());
+    const fs::path file = plan_.folder / "plans" / (plan_.id + "-gather.sh");
+    write_text_file(file, text + "\n");
+    std::vector<std::string> command = sbatch(plan_, profile_, false);
+    command.push_back("--job-name=marrow-gather");
+    add_dependency(command, jobs());
+    command.push_back(file.string());
+    done_.gather = first_word(said_by(command));
+  }
+
+  std::vector<std::string> jobs() const {
+    std::vector<std::string> ids;
+    for (const Submission::Array& array : done_.arrays) ids.push_back(array.job);
+    return ids;
+  }
+  Submission& done() { return done_; }
+
+ private:
+  static void add_dependency(std::vector<std::string>& command, const std::vector<std::string>& after) {
+    if (after.empty()) return;
+    std::string text = "--dependency=afterany";
+    for (const std::string& job : after) text += ":" + job;
+    command.push_back(text);
+  }
+
+  const ClusterPlan& plan_;
+  const ClusterProfile& profile_;
+  fs::path script_;
+  Submission done_;
+};
+
+std::vector<Chunk> without_rows(const std::vector<Chunk>& chunks, const std::map<std::string, bool>& files) {
+  std::vector<Chunk> left;
+  for (const Chunk& chunk : chunks)
+    if (const auto file = files.find(chunk.name); file == files.end() || !file->second) left.push_back(chunk);
+  return left;
+}
+
+/// Lines "JOB_TASK STATE" of a program of Slurm. Nothing if it fails.
+void add_states(const std::vector<std::string>& command, std::map<std::string, std::string>& states) {
+  const ChildEnd end = run_child(
+      command, [] { return false; }, Said::kept);
+  if (end.code != 0) return;
+  std::istringstream lines(end.said);
+  for (std::string task, state; lines >> task >> state; lines.ignore(10'000, '\n')) states.emplace(task, state);
+}
+
+std::string in_words(const std::string& state) {
+  if (state == "TIMEOUT") return "the cluster's time limit was reached";
+  if (state == "OUT_OF_MEMORY") return "it took more memory than the cluster allows";
+  if (state == "PREEMPTED") return "the cluster gave its place to another job";
+  if (state == "NODE_FAIL" || state == "BOOT_FAIL") return "its host failed";
+  if (state.starts_with("CANCELLED")) return "it was cancelled";
+  if (state == "FAILED") return "it ended with an error";
+  return "its end is not known";
+}
+
+}  // namespace
+
+std::optional<Submission> read_submission(const fs::path& folder) {
+  const fs::path file = folder / "slurm.json";
+  if (!fs::exists(file)) return std::nullopt;
+  try {
+    const json j = parse_json(read_text_file(file, kMostRecordBytes), file.string());
+    Submission submission{j.at("plan"), j.at("tries"), {}, j.at("gather"), j.at("gathered")};
+    for (const json& array : j.at("arrays")) submission.arrays.push_back({array.at("job"), array.at("chunks")});
+    return submission;
+  } catch (const std::exception& error) {
+    throw Error(file.string() + " does not say what was submitted: " + error.what());
+  }
+}
+
+void write_submission(const fs::path& folder, const Submission& submission) {
+  json j = {{"plan", submission.plan},
+            {"tries", submission.tries},
+            {"gather", submission.gather},
+            {"gathered", submission.is_gathered},
+            {"arrays", json::array()}};
+  for (const Submission::Array& array : submission.arrays)
+    j["arrays"].push_back({{"job", array.job}, {"chunks", array.chunks}});
+  write_text_file(folder / "slurm.json", j.dump(1) + "\n");
+}
+
+Submission submit(const ClusterPlan& plan, const ClusterProfile& profile, const fs::path& profile_file,
+                  std::int64_t tries_before) {
+  const std::map<std::string, bool> files = chunk_files(plan.folder);
+  Submitter submitter(plan, profile);
+  submitter.done().plan = plan.id;
+  submitter.done().tries = tries_before + 1;
+  try {
+    submitter.add_arrays(without_rows(plan.cases, files), "cases", {});
+    submitter.add_arrays(without_rows(plan.cells, files), "cells", submitter.jobs());
+    submitter.add_gather(profile_file);
+    write_submission(plan.folder, submitter.done());
+  } catch (const Error&) {
+    cancel(submitter.done());
+    throw;
+  }
+  return submitter.done();
+}
+
+std::map<std::string, std::string> states_of(const Submission& submission) {
+  std::string jobs;
+  for (const Submission::Array& array : submission.arrays) jobs += (jobs.empty() ? "" : ",") + array.job;
+  std::map<std::string, std::string> states;
+  if (jobs.empty()) return states;
+  add_states({"squeue", "--noheader", "--array", "--states=all", "--jobs=" + jobs, "--format=%F_%K %T"}, states);
+  add_states({"sacct", "--noheader", "--allocations", "--array", "--jobs=" + jobs, "--format=JobID%40,State%20"},
+             states);
+  return states;
+}
+
+std::map<std::string, std::string> reasons_of(const Submission& submission) {
+  const std::map<std::string, std::string> states = states_of(submission);
+  std::map<std::string, std::string> reasons;
+  for (const Submission::Array& array : submission.arrays)
+    for (std::size_t i = 0; i < array.chunks.size(); ++i) {
+      const std::string task = array.job + "_" + std::to_string(i);
+      const auto state = states.find(task);
+      const std::string name = state == states.end() ? "UNKNOWN" : state->second;
+      reasons[array.chunks[i]] = "task " + task + " of the cluster left no row: " + in_words(name) + " (" + name +
+                                 "); see log/" + task + ".txt";
+    }
+  return reasons;
+}
+
+std::optional<bool> is_alive(const std::string& job) {
+  const ChildEnd end = run_child(
+      {"squeue", "--noheader", "--jobs=" + job, "--format=%T"}, [] { return false; }, Said::kept);
+  if (end.code != 0) return end.said.find("Invalid job id") != std::string::npos ? std::optional(false) : std::nullopt;
+  return !first_word(end.said).empty();
+}
+
+void cancel(const Submission& submission) {
+  std::vector<std::string> command{"scancel"};
+  if (!submission.gather.empty()) command.push_back(submission.gather);  // first, because it would submit again
+  for (const Submission::Array& array : submission.arrays) command.push_back(array.job);
+  if (command.size() > 1)
+    run_child(
+        command, [] { return false; }, Said::kept);
+}
+
+}  // namespace marrow::cli

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "compare/progress.hpp"
+
+#include <unistd.h>
+
+#include <cstdio>
+
+#include "marrow/domain/printable.hpp"
+
+namespace marrow::cli {
+
+Progress::Progress(std::size_t all, bool quiet) : all_(all), quiet_(quiet), is_terminal_(isatty(STDERR_FILENO)) {}
+
+void Progress::done(std::size_t number, const std::string& what) {
+  const auto now = std::chrono::steady_clock::now();
+  if (quiet_ || (number < all_ &&
+                 now - last_ < (is_terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(5000))))
+    return;
+  last_ = now;
+  const double seconds = std::chrono::duration<double>(now - start_).count();
+  std::fprintf(stderr, "%s  %zu of %zu, %.0f s, about %.0f s to go: %s%s", is_terminal_ ? "\r\033[K" : "", number, all_,
+               seconds, number ? seconds * double(all_ - number) / double(number) : 0.0, printable(what).c_str(),
+               is_terminal_ && number < all_ ? "" : "\n");
+}
+
+}  // namespace marrow::cli

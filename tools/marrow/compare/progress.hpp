@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <chrono>
+#include <cstddef>
+#include <string>
+
+namespace marrow::cli {
+
+/// How far something is that has many parts, on the standard error: one line that changes on a terminal, otherwise a
+/// line every five seconds and one at the end.
+class Progress {
+ public:
+  Progress(std::size_t all, bool quiet);
+  /// `number` parts are done; `what` is the last of them.
+  void done(std::size_t number, const std::string& what);
+
+ private:
+  std::size_t all_;
+  bool quiet_, is_terminal_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_ = start_;
+};
+
+}  // namespace marrow::cli
