@@ -84,6 +84,11 @@ int follow(const ClusterPlan& plan, bool quiet) {
         throw Error("the job that gathers, " + submission->gather + ", ended without a report; see " +
                     (plan.folder / "log" / (submission->gather + ".txt")).string());
     }
+    if (const std::string reason = held_back(*submission); !reason.empty()) {
+      cancel(*submission);
+      throw Error("the cluster holds tasks back (" + reason + "), so they were cancelled; can " + plan.folder.string() +
+                  " be written to, or is its disk full? What is done counts: the same command goes on from here");
+    }
     std::this_thread::sleep_for(kBetweenLooks);
   }
   if (!stop) return 0;

@@ -39,6 +39,8 @@ std::map<std::string, std::string> states_of(const Submission& submission);
 std::map<std::string, std::string> reasons_of(const Submission& submission);
 /// Whether a job is waiting or running. Nothing if Slurm does not answer.
 std::optional<bool> is_alive(const std::string& job);
+/// Why the cluster holds a task back until somebody releases it, in its words. Empty if it holds none.
+std::string held_back(const Submission& submission);
 /// Ends what is waiting or running.
 void cancel(const Submission& submission);
 
