@@ -189,9 +189,11 @@ void add_cluster_options(CLI::App* command, CompareRequest& request, ClusterRequ
   command->add_flag("--gather", request.gather, "run no cell: make tables and report from the rows that are there");
 }
 
-int compare_on_cluster(const CompareRequest& request, const ClusterRequest& cluster, const Catalogue& catalogue,
+int compare_on_cluster(const CompareRequest& asked, const ClusterRequest& cluster, const Catalogue& catalogue,
                        const Experiment& experiment, const fs::path& folder) {
   if (cluster.status) return print_status(folder);
+  CompareRequest request = asked;
+  request.no_cache = asked.no_cache || !can_keep_results(Store().prepare(), asked.quiet);
   if (cluster.cancel) {
     const auto submission = read_submission(folder);
     if (!submission) throw Error("nothing was submitted from " + folder.string());

@@ -18,7 +18,7 @@ struct ClusterRequest {
 void add_cluster_options(CLI::App* command, CompareRequest& request, ClusterRequest& cluster);
 
 /// Does what the options ask for, and returns the exit code.
-int compare_on_cluster(const CompareRequest& request, const ClusterRequest& cluster, const Catalogue& catalogue,
+int compare_on_cluster(const CompareRequest& asked, const ClusterRequest& cluster, const Catalogue& catalogue,
                        const compare::Experiment& experiment, const std::filesystem::path& folder);
 
 }  // namespace marrow::cli

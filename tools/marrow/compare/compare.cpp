@@ -86,9 +86,9 @@ int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster)
   }
   const fs::path folder = folder_of(request, experiment);
   expect_outside_cases(experiment, folder, request.no_cache);
-  request.no_cache = request.no_cache || !can_keep_results(Store().prepare(), request.quiet);
   if (cluster.is_given()) return compare_on_cluster(request, cluster, catalogue, experiment, folder);
   const ComparisonFolder kept(folder, experiment, ComparisonFolder::Use::alone);
+  request.no_cache = request.no_cache || !can_keep_results(Store().prepare(), request.quiet);
   return run_comparison(request, catalogue, experiment, folder);
 }
 
