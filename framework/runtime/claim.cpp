@@ -11,33 +11,10 @@
 #include <thread>
 
 #include "marrow/runtime/store.hpp"
-#include "stopwatch.hpp"
+#include "waiting.hpp"
 
 namespace marrow {
 namespace {
-
-constexpr auto kAtOnce = std::chrono::milliseconds(100);  // shorter waits are not reported
-constexpr auto kLong = std::chrono::seconds(5);           // longer waits are shown to people
-
-/// Reports that a wait has begun, that it is long, and that it has ended.
-class Waiting {
- public:
-  explicit Waiting(const std::function<void(bool)>& on_wait) : on_wait_(on_wait) {}
-  ~Waiting() {
-    if (said_) on_wait_(false);
-  }
-  void goes_on() {
-    const auto waited = Clock::now() - start_;
-    if (!on_wait_ || waited < (said_ == 0 ? Clock::duration(kAtOnce) : Clock::duration(kLong)) || said_ == 2) return;
-    ++said_;
-    on_wait_(true);
-  }
-
- private:
-  const std::function<void(bool)>& on_wait_;
-  Clock::time_point start_ = Clock::now();
-  int said_ = 0;
-};
 
 struct flock one_byte(short type, off_t place) {
   struct flock lock {};

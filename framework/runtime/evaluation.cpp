@@ -7,6 +7,7 @@
 
 #include "keys.hpp"
 #include "mapping.hpp"
+#include "shared_store.hpp"
 
 namespace marrow {
 
@@ -110,8 +111,22 @@ void Evaluation::evaluate(std::size_t node, Call& call) {
   finished_(node, call);
 }
 
+SharedStore* Evaluation::shared_for(std::size_t node) const {
+  SharedStore* shared = settings_.store ? settings_.store->shared() : nullptr;
+  const auto& wanted = settings_.wanted_by_others;
+  const bool is_of_use = settings_.within.empty() && (!wanted || wanted->contains(pipeline_.nodes[node].id));
+  return shared && is_of_use ? shared : nullptr;
+}
+
+void Evaluation::complain_of(SharedStore& shared, std::size_t node) {
+  if (const std::string text = shared.complaint(); !text.empty()) report(RunEvent::Kind::warning, node, "", text);
+}
+
 void Evaluation::read_or_make(std::size_t node, Call& call, const Recipe& recipe) {
-  if (read_back(node, call, recipe)) return;
+  SharedStore* shared = shared_for(node);
+  const bool is_found = read_back(node, call, recipe, shared ? Where::anywhere : Where::here);
+  if (shared) complain_of(*shared, node);
+  if (is_found) return;
   int said = 0;
   const auto on_wait = [&](bool waits) {
     const bool is_long = waits ? said++ > 0 : said > 1;
@@ -122,7 +137,15 @@ void Evaluation::read_or_make(std::size_t node, Call& call, const Recipe& recipe
   const Store::Claim claim =
       settings_.store ? settings_.store->claim(recipe.key, settings_.cancelled, on_wait) : Store::Claim();
   // Another process may have made the result in the meantime.
-  if (!read_back(node, call, recipe)) call.result = perform(node, call.inputs, call.item, recipe);
+  if (read_back(node, call, recipe, Where::here)) return;
+  if (!shared || settings_.made_anew.contains(pipeline_.nodes[node].id) || !shared->accepts()) {
+    call.result = perform(node, call.inputs, call.item, recipe);
+    return;
+  }
+  said = 0;
+  const SharedClaim among_hosts = shared->claim(recipe.key, settings_.cancelled, on_wait);
+  if (!read_back(node, call, recipe, Where::anew)) call.result = perform(node, call.inputs, call.item, recipe);
+  complain_of(*shared, node);
 }
 
 /// Ends a call with the result of another call of the same recipe. That call may belong to a node that may fail, which
@@ -139,7 +162,7 @@ bool Evaluation::find(std::size_t node, Call& call) {
     defer(node, call, key);
     return true;
   }
-  return read_back(node, call, key);
+  return read_back(node, call, key, shared_for(node) ? Where::anywhere : Where::here);
 }
 
 void Evaluation::share(const Digest& key, const CallResult& result) {

@@ -78,7 +78,11 @@ class Evaluation {
   void read_or_make(std::size_t node, Call& call, const Recipe& recipe);
   void take(std::size_t node, Call& call, const CallResult& result);
   void defer(std::size_t node, Call& call, const Recipe& recipe);
-  bool read_back(std::size_t node, Call& call, const Recipe& recipe);
+  using Where = Store::Where;
+  bool read_back(std::size_t node, Call& call, const Recipe& recipe, Where where);
+  /// The shared store, if the node's results are of use to others.
+  SharedStore* shared_for(std::size_t node) const;
+  void complain_of(SharedStore& shared, std::size_t node);
   void share(const Digest& key, const CallResult& result);
   CallResult perform(std::size_t node, std::vector<Value> inputs, const std::string& item, const Recipe& recipe);
   std::vector<Value> call_node(std::size_t node, std::vector<Value>& inputs, const std::string& item,

@@ -13,6 +13,7 @@
 #include "no_process.hpp"
 #include "python_file.hpp"
 #include "resident_memory.hpp"
+#include "shared_store.hpp"
 #include "stopwatch.hpp"
 
 namespace marrow {
@@ -143,6 +144,7 @@ void Evaluation::save(std::size_t node, const std::vector<Value>& inputs, const 
   made_from.seconds = seconds;
   made_from.warnings = std::move(warnings);
   const std::string fault = settings_.store->save(recipe.key, result.outputs, made_from);
+  if (SharedStore* shared = shared_for(node)) shared->offer(recipe.key, result.outputs, made_from);
   if (fault.empty()) return;
   {
     const std::scoped_lock lock(mutex_);

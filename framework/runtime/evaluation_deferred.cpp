@@ -96,9 +96,9 @@ void Evaluation::defer(std::size_t node, Call& call, const Recipe& recipe) {
   }
 }
 
-bool Evaluation::read_back(std::size_t node, Call& call, const Recipe& recipe) {
+bool Evaluation::read_back(std::size_t node, Call& call, const Recipe& recipe, Where where) {
   if (!settings_.store || settings_.made_anew.contains(pipeline_.nodes[node].id)) return false;
-  std::optional<StoredResult> stored = settings_.store->find(recipe.key);
+  std::optional<StoredResult> stored = settings_.store->find(recipe.key, where);
   if (!stored) return false;
   const std::vector<PortInfo>& outputs = pipeline_.nodes[node].info.outputs;
   if (!std::equal(stored->outputs.begin(), stored->outputs.end(), outputs.begin(), outputs.end(), is_of)) {

@@ -9,6 +9,7 @@
 #include <new>
 
 #include "plain_path.hpp"
+#include "shared_store.hpp"
 #include "store_entry.hpp"
 #include "store_folder.hpp"
 #include "user_folder.hpp"
@@ -30,7 +31,10 @@ constexpr std::uint64_t kMostRemembered = 16 << 20;  // bytes
 
 }  // namespace
 
-Store::Store(const fs::path& folder) : folder_(folder.empty() ? folder : plain_path(fs::absolute(folder))) {}
+Store::Store() : Store(default_folder(), SharedStore::of_environment()) {}
+Store::Store(const fs::path& folder) : Store(folder, nullptr) {}
+Store::Store(const fs::path& folder, std::shared_ptr<SharedStore> shared)
+    : folder_(folder.empty() ? folder : plain_path(fs::absolute(folder))), shared_(std::move(shared)) {}
 
 fs::path Store::default_folder() {
   const char* folder = std::getenv("MARROW_CACHE");
@@ -58,7 +62,17 @@ std::string Store::prepare() const {
   return fault;
 }
 
-std::optional<StoredResult> Store::find(const Digest& key) const {
+std::optional<StoredResult> Store::find(const Digest& key) const { return find(key, Where::anywhere); }
+
+std::optional<StoredResult> Store::find(const Digest& key, Where where) const {
+  std::optional<StoredResult> found = find_here(key);
+  if (found || where == Where::here || !shared_ || !prepare().empty()) return found;
+  std::optional<StoredResult> in_place;
+  if (!shared_->fetch(key, file_of(key), where == Where::anew ? Look::listed : Look::quick, in_place)) return found;
+  return in_place ? std::move(in_place) : find_here(key);
+}
+
+std::optional<StoredResult> Store::find_here(const Digest& key) const {
   if (!is_there()) return std::nullopt;
   const fs::path path = file_of(key);
   const StoreFile file(path);

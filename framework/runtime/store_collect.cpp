@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lists what the store holds, and keeps it within its size.
-#include <signal.h>
+#include "store_collect.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cstdlib>
 
 #include "folder_use.hpp"
 #include "remove_tree.hpp"
+#include "shared_claim.hpp"
 #include "store_entry.hpp"
 #include "store_folder.hpp"
 
@@ -36,14 +35,6 @@ std::uint64_t bytes_of(const fs::path& path) {
     if (!gone) sum += size;
   }
   return sum;
-}
-
-/// Whether the process that writes a temporary file has ended. Its number may belong to another process by now, so a
-/// file that was not changed for a day counts as abandoned too.
-bool is_abandoned(const StoreItem& item) {
-  std::error_code error;
-  const auto changed = fs::last_write_time(item.path, error);
-  return (kill(item.process, 0) != 0 && errno == ESRCH) || (!error && FileClock::now() - changed > kDay);
 }
 
 /// Whether something is mounted on the folder that holds the item, on the item, or below it. What is there belongs to
@@ -82,15 +73,14 @@ void list_keys(const std::vector<Leaf>& leaves, std::vector<Digest>& keys) {
 
 }  // namespace
 
-std::vector<Store::Entry> Store::entries() const {
-  std::vector<Entry> entries;
-  if (!is_there()) return entries;
+std::vector<Store::Entry> entries_in(const fs::path& folder) {
+  std::vector<Store::Entry> entries;
   std::string fault;
-  for (const StoreItem& item : items_of_store(folder_, fault)) {
+  for (const StoreItem& item : items_of_store(folder, fault)) {
     if (item.kind != Kind::entry) continue;
     const StoreFile file(item.path);
     if (!file.is_open()) continue;
-    Entry entry{item.key, file.size(), {}, {}, {}};
+    Store::Entry entry{item.key, file.size(), {}, {}, {}};
     std::error_code ignored;
     entry.used = fs::last_write_time(item.path, ignored);
     try {
@@ -102,21 +92,17 @@ std::vector<Store::Entry> Store::entries() const {
     entries.push_back(std::move(entry));
   }
   if (!fault.empty()) throw Error(fault);
-  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.used < b.used; });
+  std::sort(entries.begin(), entries.end(), [](const Store::Entry& a, const Store::Entry& b) { return a.used < b.used; });
   return entries;
 }
 
-Store::Freed Store::collect(std::uint64_t keep_bytes) const {
+Store::Freed collect_in(const fs::path& folder, std::uint64_t keep_bytes, const std::optional<timespec>& now) {
   struct Kept {
     StoreItem item;
     std::uint64_t bytes = 0;
     fs::file_time_type used;
   };
-  Freed freed;
-  if (const FolderState state = examine_store(folder_); !state.is_store) {
-    freed.fault = state.fault;
-    return freed;
-  }
+  Store::Freed freed;
   std::vector<Kept> all;
   std::error_code error;
   const auto remove = [&](const StoreItem& item) {
@@ -127,13 +113,14 @@ Store::Freed Store::collect(std::uint64_t keep_bytes) const {
   };
   std::uint64_t total = 0;
   std::vector<StoreItem> remembered;
-  for (StoreItem& item : items_of_store(folder_, freed.fault)) {
+  for (StoreItem& item : items_of_store(folder, freed.fault)) {
     if (is_mounted(item)) {
       freed.fault = item.path.string() + " is left, because something is mounted there; unmount that first";
       continue;
     }
-    if (item.kind == Kind::temporary) {
-      if (is_abandoned(item)) remove(item);
+    if (item.kind == Kind::claim) item.writer = owner_of_claim(item.path);
+    if (item.kind == Kind::temporary || item.kind == Kind::claim) {
+      if (is_abandoned(item, now)) remove(item);
       continue;
     }
     if (item.kind == Kind::remembered) {
@@ -160,6 +147,16 @@ Store::Freed Store::collect(std::uint64_t keep_bytes) const {
   }
   if (keep_bytes == 0) oldest_kept = fs::file_time_type::max();
   if (oldest_kept) remove_older(remembered, *oldest_kept - kDay);
+  return freed;
+}
+
+std::vector<Store::Entry> Store::entries() const { return is_there() ? entries_in(folder_) : std::vector<Entry>(); }
+
+Store::Freed Store::collect(std::uint64_t keep_bytes) const {
+  const FolderState state = examine_store(folder_);
+  if (state.is_store) return collect_in(folder_, keep_bytes, time_in(folder_));
+  Freed freed;
+  freed.fault = state.fault;
   return freed;
 }
 

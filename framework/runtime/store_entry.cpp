@@ -23,6 +23,7 @@ static_assert(sizeof(Preamble) == 32);
 
 constexpr std::uint64_t kMostDescription = 64 << 20;  // bytes
 constexpr int kMostAxes = 16;
+constexpr int kMostReadings = 3;  // to read a value
 
 const char* const kDamaged = "the entry is not whole";
 
@@ -41,6 +42,20 @@ class CountingArchive : public Archive {
     count += size;
   }
   std::uint64_t count = 0;
+
+ private:
+  Archive& out_;
+};
+
+/// Passes the bytes on and hashes them.
+class HashingArchive : public Archive {
+ public:
+  explicit HashingArchive(Archive& out) : out_(out) {}
+  void bytes(const void* data, std::size_t size) override {
+    hasher.bytes(data, size);
+    out_.bytes(data, size);
+  }
+  Hasher hasher;
 
  private:
   Archive& out_;
@@ -91,6 +106,17 @@ class StoredSource : public Source {
       throw Error("values of type '" + type.id + "' cannot be read back without the plugin that knows them");
     const std::string name = "the stored result " + file_.string();
     if (type != type_) throw DamagedEntry(name + " is of another type or version than '" + type.id + "'");
+    // In a shared folder, the file may be replaced by the same result while it is read.
+    for (int tries = 1; tries < kMostReadings; ++tries) try {
+        return read_once(type, name);
+      } catch (const DamagedEntry&) {
+        std::error_code error;
+        if (!fs::exists(file_, error)) throw;
+      }
+    return read_once(type, name);
+  }
+
+  std::shared_ptr<const void> read_once(const TypeInfo& type, const std::string& name) const {
     const StoreFile file(file_);
     if (!file.is_open() || offset_ > file.size() || size_ > file.size() - offset_)
       throw DamagedEntry(name + " is gone");
@@ -117,8 +143,7 @@ class StoredSource : public Source {
 Value value_at(const ReadEntry& entry, const fs::path& file, std::size_t& next, int depth) {
   if (next >= entry.description.leaves.size() || depth > kMostAxes) throw Error(kDamaged);
   const Leaf& leaf = entry.description.leaves[next++];
-  const std::uint64_t payload = entry.description.payload;
-  if (leaf.offset > payload || leaf.size > payload - leaf.offset) throw Error(kDamaged);
+  if (!is_within(leaf, entry)) throw Error(kDamaged);
   Value value;
   value.type = {leaf.type, leaf.version, std::size_t(leaf.type_size), false, nullptr};
   value.key = leaf.key;
@@ -138,7 +163,7 @@ EntryDescription describe_entry(const Digest& key, const std::vector<Value>& out
   return description;
 }
 
-void write_entry(Archive& out, const EntryDescription& description, const std::vector<Value>& outputs) {
+void write_description(Archive& out, const EntryDescription& description) {
   Packer packed;
   packed.add(description);
   if (packed.packed.size() > kMostDescription) throw Error("a list of that many items is not kept");
@@ -147,6 +172,10 @@ void write_entry(Archive& out, const EntryDescription& description, const std::v
   preamble.digest = hash_of_bytes(packed.packed.data(), packed.packed.size());
   out.bytes(&preamble, sizeof preamble);
   out.bytes(packed.packed.data(), packed.packed.size());
+}
+
+void write_entry(Archive& out, const EntryDescription& description, const std::vector<Value>& outputs) {
+  write_description(out, description);
   CountingArchive payload(out);
   for (const Value& output : outputs) write_values(payload, output);
   if (payload.count != description.payload) throw Error("the result was changed while it was kept");
@@ -174,6 +203,40 @@ ReadEntry read_entry(const StoreFile& file, const Digest& key) {
   if (unpacker.remaining() || entry.description.key != key || entry.description.payload != file.size() - entry.begin)
     throw Error(kDamaged);
   return entry;
+}
+
+bool copy_bytes(const StoreFile& file, std::uint64_t offset, std::uint64_t size, Archive& to) {
+  constexpr std::uint64_t kPiece = 1 << 20;
+  std::vector<char> piece(std::size_t(std::min(size, kPiece)));
+  for (std::uint64_t done = 0; done < size;) {
+    const std::size_t count = std::size_t(std::min(size - done, kPiece));
+    if (!file.read(piece.data(), count, offset + done)) return false;
+    to.bytes(piece.data(), count);
+    done += count;
+  }
+  return true;
+}
+
+bool is_within(const Leaf& leaf, const ReadEntry& entry) {
+  const std::uint64_t payload = entry.description.payload;
+  return leaf.offset <= payload && leaf.size <= payload - leaf.offset;
+}
+
+bool copy_leaf(const StoreFile& file, const ReadEntry& entry, const Leaf& leaf, Archive& to) {
+  HashingArchive hashed(to);
+  return is_within(leaf, entry) && copy_bytes(file, entry.begin + leaf.offset, leaf.size, hashed) &&
+         hashed.hasher.digest() == leaf.key;
+}
+
+bool copy_entry(const StoreFile& file, const ReadEntry& entry, Archive& to) {
+  write_description(to, entry.description);
+  std::uint64_t next = 0;
+  for (const Leaf& leaf : entry.description.leaves) {
+    if (!leaf.present) continue;
+    if (leaf.offset != next || !copy_leaf(file, entry, leaf, to)) return false;
+    next += leaf.size;
+  }
+  return next == entry.description.payload;
 }
 
 std::vector<Value> outputs_of(const ReadEntry& entry, const fs::path& file) {

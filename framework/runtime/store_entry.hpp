@@ -37,6 +37,8 @@ struct EntryDescription {
 /// Throws Error if an output cannot be stored.
 EntryDescription describe_entry(const Digest& key, const std::vector<Value>& outputs, const Provenance& provenance);
 void write_entry(Archive& out, const EntryDescription& description, const std::vector<Value>& outputs);
+/// The part of an entry that comes before the packed values. Throws Error if it is too long.
+void write_description(Archive& out, const EntryDescription& description);
 
 struct ReadEntry {
   EntryDescription description;
@@ -44,6 +46,14 @@ struct ReadEntry {
 };
 /// Throws Error if the file is not the whole entry of that key.
 ReadEntry read_entry(const StoreFile& file, const Digest& key);
+/// Copies a part of a file. Returns false if it cannot be read, or has become shorter.
+bool copy_bytes(const StoreFile& file, std::uint64_t offset, std::uint64_t size, Archive& to);
+/// Whether the leaf lies within the payload of the entry.
+bool is_within(const Leaf& leaf, const ReadEntry& entry);
+/// Copies the packed value of a leaf. Returns false if it cannot be read, or is not what the leaf says.
+bool copy_leaf(const StoreFile& file, const ReadEntry& entry, const Leaf& leaf, Archive& to);
+/// Copies an entry with all packed values. Returns false if it is not whole.
+bool copy_entry(const StoreFile& file, const ReadEntry& entry, Archive& to);
 /// The outputs. Their data are read from the file when they are first needed. Throws Error if the description is not
 /// one of outputs.
 std::vector<Value> outputs_of(const ReadEntry& entry, const std::filesystem::path& file);

@@ -3,10 +3,12 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <new>
 
@@ -56,29 +58,48 @@ class FileWriter : public Archive {
 };
 
 /// Makes a new file next to `file` and puts its name into `temporary`. Returns -1 with errno if it cannot be made.
-int open_temporary(const fs::path& file, fs::path& temporary) {
+int open_temporary(const fs::path& file, const Permissions& permissions, fs::path& temporary) {
   constexpr int kMode = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW;
+  const auto make_folder = [&] {
+    const fs::path folder = file.parent_path();
+    return (permissions.group ? make_shared_folder(folder, permissions) : make_private_folder(folder)).empty();
+  };
   int descriptor = -1;
   do {
     temporary = temporary_beside(file);
     descriptor = open(temporary.c_str(), kMode, 0600);
-    if (descriptor < 0 && errno == ENOENT && make_private_folder(file.parent_path()).empty())
-      descriptor = open(temporary.c_str(), kMode, 0600);
+    if (descriptor < 0 && errno == ENOENT && make_folder()) descriptor = open(temporary.c_str(), kMode, 0600);
   } while (descriptor < 0 && (errno == EEXIST || errno == EINTR));
-  if (descriptor >= 0) fchmod(descriptor, 0600);  // with any umask
+  if (descriptor >= 0) permit(descriptor, permissions.file, permissions);
   return descriptor;
 }
 
+constexpr int kMostOpenings = 5;  // to open a file whose handle has become stale
+
 }  // namespace
 
-StoreFile::StoreFile(const fs::path& path)
-    : descriptor_(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY)) {
+bool permit(int descriptor, mode_t mode, const Permissions& permissions) {
+  constexpr mode_t kOfGroup = S_IRWXG | S_ISGID;
+  struct stat status {};
+  if (fstat(descriptor, &status) != 0) return false;
+  if (permissions.group && status.st_gid != *permissions.group &&
+      fchown(descriptor, uid_t(-1), *permissions.group) != 0)
+    mode &= ~kOfGroup;  // it has another group, which must not read it
+  return fchmod(descriptor, mode) == 0;
+}
+
+StoreFile::StoreFile(const fs::path& path) {
+  // On a shared folder a name may lead to a file that another host has just replaced. The next try finds the new one.
+  for (int tries = 0; descriptor_ < 0 && tries < kMostOpenings && (tries == 0 || errno == ESTALE); ++tries)
+    descriptor_ = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY);
+  if (descriptor_ < 0) fault_ = errno;
   struct stat status {};
   if (descriptor_ >= 0 && fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode)) {
     size_ = std::uint64_t(status.st_size);
   } else if (descriptor_ >= 0) {
     close(descriptor_);
     descriptor_ = -1;
+    fault_ = ENOENT;
   }
 }
 
@@ -96,6 +117,12 @@ bool StoreFile::read(void* data, std::size_t size, std::uint64_t offset) const {
 }
 
 void StoreFile::mark_as_used() const { futimens(descriptor_, nullptr); }
+
+void StoreFile::mark_as_used_today() const {
+  constexpr time_t kDay_s = 24 * 3600;
+  struct stat status {};
+  if (fstat(descriptor_, &status) == 0 && std::abs(time(nullptr) - status.st_mtime) >= kDay_s) mark_as_used();
+}
 
 FileUnpacker::FileUnpacker(const StoreFile& file, std::uint64_t offset, std::uint64_t size)
     : Unpacker(std::size_t(size)),
@@ -133,10 +160,11 @@ void FileUnpacker::take(void* data, std::size_t size) {
   }
 }
 
-std::string write_whole(const fs::path& file, const std::function<void(Archive&)>& fill, bool is_durable) {
+std::string write_whole(const fs::path& file, const std::function<void(Archive&)>& fill, bool is_durable,
+                        const Permissions& permissions) {
   fs::path temporary;
   const auto fault_of = [&](int number) { return "cannot write " + file.string() + ": " + std::strerror(number); };
-  const int descriptor = open_temporary(file, temporary);
+  const int descriptor = open_temporary(file, permissions, temporary);
   if (descriptor < 0) return fault_of(errno);
   std::string fault;
   try {

@@ -1,15 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Files of the store. They are written whole or not at all. Readers never trust their size.
+#include <sys/types.h>
+
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "marrow/runtime/hash.hpp"
 
 namespace marrow {
+
+/// What new files and folders of a store allow, with any umask. If a group is named, what is made allows it to no other
+/// group.
+struct Permissions {
+  mode_t file = 0600, folder = 0700;
+  std::optional<gid_t> group = {};
+};
+/// Gives an open file or folder the permissions. Returns false, with errno, if that is not possible.
+bool permit(int descriptor, mode_t mode, const Permissions& permissions);
 
 /// A regular file that is open for reading. A link is not opened.
 class StoreFile {
@@ -21,11 +33,15 @@ class StoreFile {
 
   bool is_open() const { return descriptor_ >= 0; }
   std::uint64_t size() const { return size_; }  ///< the size when it was opened
+  int fault() const { return fault_; }          ///< errno, if it is not open
   /// Returns false if the file has become shorter or cannot be read.
   bool read(void* data, std::size_t size, std::uint64_t offset) const;
   void mark_as_used() const;
+  /// The same, but only if this was not done for a day.
+  void mark_as_used_today() const;
 
  private:
+  int fault_ = 0;
   int descriptor_ = -1;
   std::uint64_t size_ = 0;
 };
@@ -51,10 +67,10 @@ class FileUnpacker : public Unpacker {
   Hasher hasher_;
 };
 
-/// Writes what `fill` adds to a temporary file that only its owner can read, and renames it. Makes the folder if it is
+/// Writes what `fill` adds to a temporary file with these permissions, and renames it. Makes the folder if it is
 /// missing. Returns why this failed, or an empty text; after a failure, nothing is left behind. With `is_durable`,
 /// waits until the file is on the disk.
 std::string write_whole(const std::filesystem::path& file, const std::function<void(Archive&)>& fill,
-                        bool is_durable = false);
+                        bool is_durable = false, const Permissions& permissions = {});
 
 }  // namespace marrow

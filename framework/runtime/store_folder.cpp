@@ -7,12 +7,13 @@
 
 #include <atomic>
 #include <cerrno>
-#include <charconv>
+#include <cstdio>
 #include <cstring>
 #include <optional>
 
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/store.hpp"
+#include "process_identity.hpp"
 #include "store_file.hpp"
 #include "user_folder.hpp"
 
@@ -23,8 +24,6 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kWhat = "marrow store of results, layout ";
 constexpr std::string_view kLayout = "1";
-constexpr std::string_view kForPeople =
-    "Made and tidied up by marrow: see 'marrow cache'. It may be removed as a whole.";
 
 bool is_digits(std::string_view text, const char* digits) {
   return !text.empty() && text.find_first_not_of(digits) == std::string_view::npos;
@@ -35,24 +34,28 @@ std::optional<Digest> key_of_name(const std::string& name) {
   return is_digits(name, "0123456789abcdef") ? digest_of_hex(name) : std::nullopt;
 }
 
+/// What the files of a folder of a store are, if it is none of entries.
+std::optional<StoreItem::Kind> kind_in(const std::string& folder) {
+  if (folder == "last" || folder == "digests") return StoreItem::Kind::remembered;
+  if (folder == "claims") return StoreItem::Kind::claim;
+  return std::nullopt;
+}
+
 struct TemporaryName {
-  std::string final;
-  int process = 0;
+  std::string final, writer;
 };
 
 std::optional<TemporaryName> temporary_of_name(const std::string& name) {
   constexpr std::string_view kMiddle = ".tmp-";
   const std::size_t middle = name.find(kMiddle);
   if (middle == std::string::npos) return std::nullopt;
-  const std::string_view numbers = std::string_view(name).substr(middle + kMiddle.size());
-  const std::size_t dash = numbers.find('-');
-  if (dash == std::string_view::npos || !is_digits(numbers.substr(0, dash), "0123456789") ||
-      !is_digits(numbers.substr(dash + 1), "0123456789"))
-    return std::nullopt;
-  TemporaryName found{name.substr(0, middle), 0};
-  const auto parsed = std::from_chars(numbers.data(), numbers.data() + dash, found.process);
-  if (parsed.ec != std::errc() || found.process <= 0) return std::nullopt;
-  return found;
+  const std::string_view rest = std::string_view(name).substr(middle + kMiddle.size());
+  const std::size_t dash = rest.find('-');
+  if (dash == std::string_view::npos || !is_digits(rest.substr(dash + 1), "0123456789")) return std::nullopt;
+  const std::string_view writer = rest.substr(0, dash);
+  const bool is_number = is_digits(writer, "0123456789") && writer[0] != '0';  // an older marrow wrote only that
+  if (!is_number && !is_identity(writer)) return std::nullopt;
+  return TemporaryName{name.substr(0, middle), std::string(writer)};
 }
 
 /// Calls visit(name, path, is_folder) for each regular file and folder in a folder. Links and everything else are left
@@ -68,16 +71,6 @@ void for_each_in(const fs::path& folder, std::string& fault, const Visit& visit)
   }
   if (error && error != std::errc::no_such_file_or_directory && fault.empty())
     fault = "cannot look into the folder " + folder.string() + ": " + error.message();
-}
-
-/// Whether a folder is empty, apart from markers that are being written. False if it cannot be read.
-bool holds_nothing(const fs::path& folder) {
-  std::error_code error;
-  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
-    const auto temporary = temporary_of_name(at->path().filename().string());
-    if (!temporary || temporary->final != kStoreMarker) return false;
-  }
-  return !error;
 }
 
 enum class Mark { none, ours, other_layout, unknown };
@@ -143,11 +136,20 @@ std::string make_store(const fs::path& folder) {
   const std::string fault = write_whole(
       folder / kStoreMarker,
       [](Archive& out) {
-        for (std::string_view part : {kWhat, kLayout, std::string_view("\n"), kForPeople, std::string_view("\n")})
+        for (std::string_view part : {kWhat, kLayout, std::string_view("\n"), kStoreForPeople})
           out.bytes(part.data(), part.size());
       },
       true);
   return fault.empty() ? examine_store(folder).fault : fault;
+}
+
+bool holds_nothing(const fs::path& folder) {
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    const auto temporary = temporary_of_name(at->path().filename().string());
+    if (!temporary || temporary->final != kStoreMarker) return false;
+  }
+  return !error;
 }
 
 std::string make_private_folder(const fs::path& folder) {
@@ -165,9 +167,23 @@ std::string make_private_folder(const fs::path& folder) {
   }
 }
 
+std::string make_shared_folder(const fs::path& folder, const Permissions& permissions) {
+  const auto fault = [&] { return "cannot make the folder " + folder.string() + ": " + std::strerror(errno); };
+  const fs::path temporary = temporary_beside(folder);
+  if (mkdir(temporary.c_str(), 0700) != 0) return fault();
+  const int descriptor = open(temporary.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+  bool is_done = descriptor >= 0 && permit(descriptor, permissions.folder, permissions);
+  if (descriptor >= 0) close(descriptor);
+  // Another process may have been quicker.
+  is_done = is_done && (std::rename(temporary.c_str(), folder.c_str()) == 0 || errno == EEXIST || errno == ENOTEMPTY);
+  const std::string text = is_done ? "" : fault();
+  rmdir(temporary.c_str());
+  return text;
+}
+
 fs::path temporary_beside(const fs::path& final) {
   static std::atomic<std::uint64_t> number{0};
-  return final.string() + ".tmp-" + std::to_string(getpid()) + "-" + std::to_string(number++);
+  return final.string() + ".tmp-" + this_process() + "-" + std::to_string(number++);
 }
 
 fs::path new_folder_beside(const fs::path& final) {
@@ -188,9 +204,12 @@ std::vector<StoreItem> items_of_store(const fs::path& folder, std::string& fault
   std::vector<StoreItem> items;
   const auto add_temporary = [&](const std::string& name, const fs::path& path, const auto& is_ours) {
     const auto temporary = temporary_of_name(name);
-    if (temporary && is_ours(temporary->final)) items.push_back({Kind::temporary, path, {}, temporary->process});
+    if (temporary && is_ours(temporary->final)) items.push_back({Kind::temporary, path, {}, temporary->writer});
   };
   const auto is_key = [](const std::string& name) { return key_of_name(name).has_value(); };
+  const auto is_folder_of_keys = [](const std::string& name) {
+    return kind_in(name).has_value() || (name.size() == 2 && is_digits(name, "0123456789abcdef"));
+  };
   for_each_in(folder, fault, [&](const std::string& name, const fs::path& path, bool is_folder) {
     if (!is_folder) {
       add_temporary(name, path, [](const std::string& final) { return final == kStoreMarker || final == "tidied"; });
@@ -198,21 +217,43 @@ std::vector<StoreItem> items_of_store(const fs::path& folder, std::string& fault
       for_each_in(path, fault, [&](const std::string& inner, const fs::path& at, bool is_case) {
         std::error_code error;
         if (const auto key = key_of_name(inner); key && is_case && fs::is_regular_file(at / "content.txt", error))
-          items.push_back({Kind::simulated_case, at, *key, 0});
+          items.push_back({Kind::simulated_case, at, *key, ""});
         else if (is_case)
           add_temporary(inner, at, is_key);
       });
-    } else if (name == "last" || (name.size() == 2 && is_digits(name, "0123456789abcdef"))) {
+    } else if (is_folder_of_keys(name)) {
+      const Kind kind = kind_in(name).value_or(Kind::entry);
       for_each_in(path, fault, [&](const std::string& inner, const fs::path& at, bool is_other) {
-        if (is_other || (name != "last" && !inner.starts_with(name))) return;
+        if (is_other || (kind == Kind::entry && !inner.starts_with(name))) return;
         if (const auto key = key_of_name(inner))
-          items.push_back({name == "last" ? Kind::remembered : Kind::entry, at, *key, 0});
+          items.push_back({kind, at, *key, ""});
         else
           add_temporary(inner, at, is_key);
       });
+    } else {
+      add_temporary(name, path, is_folder_of_keys);
     }
   });
   return items;
+}
+
+std::optional<timespec> time_in(const fs::path& folder, const Permissions& permissions) {
+  const fs::path file = temporary_beside(folder / kStoreMarker);
+  const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
+  if (descriptor < 0) return std::nullopt;
+  permit(descriptor, permissions.file, permissions);
+  struct stat status {};
+  const bool is_known = write(descriptor, "\n", 1) == 1 && fsync(descriptor) == 0 && fstat(descriptor, &status) == 0;
+  close(descriptor);
+  unlink(file.c_str());
+  return is_known ? std::optional(status.st_mtim) : std::nullopt;
+}
+
+bool is_abandoned(const StoreItem& temporary, const std::optional<timespec>& now) {
+  constexpr time_t kDay_s = 24 * 3600;
+  if (life_of(temporary.writer) == Life::ended) return true;
+  struct stat status {};
+  return now && lstat(temporary.path.c_str(), &status) == 0 && now->tv_sec - status.st_mtime > kDay_s;
 }
 
 }  // namespace marrow

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -46,6 +47,9 @@ struct RunSettings {
   const Store* store = nullptr;
   /// Nodes that are called even if the store has their results; for measuring time.
   std::set<std::string> made_anew = {};
+  /// Nodes whose results others may want: these are looked up in the shared store, and kept there if it is worth it.
+  /// Nothing: all nodes.
+  std::optional<std::set<std::string>> wanted_by_others = {};
   bool remember = true;  ///< store what each node's result was made from, so that the next plan can say what changed
   FileLimits file_limits = {};
   std::string within = {};  ///< the node and the pass whose body is run, as "track/0007"; empty for a whole pipeline

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -43,6 +44,8 @@ class DamagedEntry : public Error {
   using Error::Error;
 };
 
+class SharedStore;
+
 /// Results of nodes on disk, one file per result, found by their keys. Several processes of one user may use one folder
 /// at once. A file is written under a temporary name and then renamed, so an entry is whole or absent, even if the
 /// process is killed or the disk is full. Reading checks that the entry belongs to the key, and checks the content hash
@@ -52,13 +55,20 @@ class DamagedEntry : public Error {
 /// A store is a folder of this user that marrow made, or found empty, and marked with a file `marrow-store`. marrow
 /// never writes to any other folder and removes nothing from it. Only the owner can look into a store, because results
 /// are patients' data.
+///
+/// Behind it there may be a shared store: a folder that several hosts and users see. What is not in the store is looked
+/// up there and copied from there.
 class Store {
  public:
-  explicit Store(const std::filesystem::path& folder = default_folder());
+  /// The store in default_folder(). If MARROW_SHARED_CACHE is set, the shared store in that folder is behind it.
+  Store();
+  explicit Store(const std::filesystem::path& folder);
+  Store(const std::filesystem::path& folder, std::shared_ptr<SharedStore> shared);
   /// MARROW_CACHE if it is set. Else marrow/store in XDG_CACHE_HOME, in ~/.cache, or in .cache of the home folder that
   /// the system knows for the user. Empty if there is none of these: then nothing is kept.
   static std::filesystem::path default_folder();
   const std::filesystem::path& folder() const { return folder_; }
+  SharedStore* shared() const { return shared_.get(); }  ///< nullptr if there is none
 
   /// Why the folder cannot be used: it holds other things, belongs to another user or cannot be written to. Empty if it
   /// is a store or can become one. If there is a fault, the functions below find nothing and keep nothing.
@@ -68,8 +78,13 @@ class Store {
   std::string prepare() const;
 
   /// Reads the result of a key. Returns nothing if there is no entry. An entry that is not whole, or was written for
-  /// another key, is removed and counts as absent.
+  /// another key, is removed and counts as absent. If the shared store has the result, it is copied into this store, or
+  /// read there if it is large.
   std::optional<StoredResult> find(const Digest& key) const;
+  /// `here`: only in this store. `anywhere`: as find(key). `anew`: the same, but what the file system remembers about
+  /// the shared folder is not relied on. That takes longer, and is for a result that another host may just have made.
+  enum class Where { here, anywhere, anew };
+  std::optional<StoredResult> find(const Digest& key, Where where) const;
   /// Keeps a result that consists of data, absent items and lists of them. Returns why it was not kept, or an empty
   /// text. It does not throw, because a full disk must not end a run.
   std::string save(const Digest& key, const std::vector<Value>& outputs, const Provenance& provenance) const;
@@ -132,8 +147,10 @@ class Store {
  private:
   bool is_there() const;
   std::filesystem::path file_of(const Digest& key) const;
+  std::optional<StoredResult> find_here(const Digest& key) const;
 
   std::filesystem::path folder_;
+  std::shared_ptr<SharedStore> shared_;
   mutable std::atomic<bool> is_checked_{false};
 };
 
