@@ -6,21 +6,25 @@
 #include <set>
 #include <sstream>
 
+#include "cell_fault.hpp"
 #include "cell_key.hpp"
 #include "marrow/domain/pose.hpp"
 #include "marrow/runtime/run_folder.hpp"
 #include "marrow/runtime/types.hpp"
 #include "marrow/runtime/verdicts.hpp"
-#include "runtime/folder_use.hpp"
-#include "runtime/keys.hpp"
+#include "runtime/digest_memory.hpp"
 #include "runtime/remove_tree.hpp"
-#include "runtime/store_folder.hpp"
+#include "runtime/shared_store.hpp"
 #include "runtime/text_file.hpp"
 
 namespace marrow::compare {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Results of nodes that a cell may add to the shared store. With one file for each case, these are at most two files
+/// a cell in all.
+constexpr long kSharedFilesOfCell = 1;
 
 const std::string kChanged = "a file that the cell needs was changed while it ran; run it again";
 
@@ -36,15 +40,6 @@ Pipeline checked(const fs::path& file, const PipelineArguments& arguments, const
   Pipeline pipeline = read_pipeline(file, arguments, catalogue, diagnostics);
   if (!diagnostics.empty()) throw Error("the pipeline has faults:\n" + diagnostics.text());
   return pipeline;
-}
-
-/// The reason of the first node that failed, in the pipeline's order.
-std::string reason_of(const Pipeline& pipeline, const RunResult& result) {
-  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
-    if (result.nodes[i].status == NodeRecord::Status::failed || result.nodes[i].status == NodeRecord::Status::cancelled)
-      return "node '" + pipeline.nodes[i].id + "' (" + pipeline.nodes[i].info.name +
-             ") failed: " + result.nodes[i].reason;
-  return "";
 }
 
 /// The figure that a path names. Nothing if a node failed that may fail; `absent` then gets a sentence about it. Throws
@@ -94,21 +89,6 @@ int evaluations_in(const Value& value) {
   return sum;
 }
 
-/// The folder of a simulated case, from the path of its outputs.
-fs::path case_folder_of(const fs::path& outputs) { return outputs.parent_path().parent_path(); }
-
-/// The hash of a case's content. A simulated case has it in the file content.txt, which is written last. A case that
-/// does not match its hash is not whole and is made again.
-std::string content_of_case(const fs::path& outputs) { return path_digest(outputs).hex(); }
-
-bool is_whole_case(const fs::path& folder, const fs::path& outputs) {
-  try {
-    return read_text_file(folder / "content.txt", kMostSourceBytes) == content_of_case(outputs) + "\n";
-  } catch (const std::exception&) {  // it cannot be read
-    return false;
-  }
-}
-
 /// Whether a file has exactly this text. False also if the file is missing or cannot be read.
 bool has_text(const fs::path& file, const std::string& text) {
   try {
@@ -117,18 +97,6 @@ bool has_text(const fs::path& file, const std::string& text) {
     return false;
   }
 }
-
-/// A temporary folder. It is removed at the end, unless it was renamed before.
-struct TemporaryFolder {
-  explicit TemporaryFolder(const fs::path& final) : path(new_folder_beside(final)) {}
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  fs::path path;
-};
 
 /// The time that a cell took, if the store has it.
 std::optional<double> kept_seconds(const Store& store, const Digest& key) {
@@ -145,6 +113,14 @@ std::optional<double> kept_seconds(const Store& store, const Digest& key) {
 
 }  // namespace
 
+std::string reason_of(const Pipeline& pipeline, const RunResult& result) {
+  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
+    if (result.nodes[i].status == NodeRecord::Status::failed || result.nodes[i].status == NodeRecord::Status::cancelled)
+      return "node '" + pipeline.nodes[i].id + "' (" + pipeline.nodes[i].info.name +
+             ") failed: " + result.nodes[i].reason;
+  return "";
+}
+
 CellRunner::CellRunner(const Experiment& experiment, const Catalogue& catalogue, const Store* store, fs::path folder,
                        int threads, const FileLimits& file_limits)
     : experiment_(experiment),
@@ -152,7 +128,11 @@ CellRunner::CellRunner(const Experiment& experiment, const Catalogue& catalogue,
       store_(store),
       folder_(std::move(folder)),
       threads_(threads),
-      file_limits_(file_limits) {}
+      file_limits_(file_limits) {
+  if (!store_) return;
+  keep_digests_in(store_->folder());
+  if (SharedStore* shared = store_->shared()) shared->allow_files(0);  // none before the first cell
+}
 
 fs::path CellRunner::folder_of(const CellIndex& cell) const { return folder_ / "cells" / cell_id(experiment_, cell); }
 
@@ -166,60 +146,6 @@ Pipeline CellRunner::simulation_of(std::size_t index) const {
 std::uint64_t CellRunner::seed_of(std::size_t index) const {
   const ExperimentCase& one = experiment_.cases[index];
   return one.is_simulated || !one.folder.empty() ? 1 : one.seed;
-}
-
-fs::path CellRunner::case_folder(std::size_t index) {
-  const ExperimentCase& one = experiment_.cases[index];
-  if (!one.is_simulated) return one.folder;
-  FoundCase& found = simulated_[index];
-  fs::path outputs = found.use ? found.outputs : case_place(index), folder = case_folder_of(outputs);
-  // Until this process uses the folder, another one may remove it when it tidies the store up.
-  for (int tries = 0; !found.use; ++tries) {
-    std::shared_ptr<const void> use = use_folder(folder);
-    if (use && is_whole_case(folder, outputs))
-      found = {outputs, use};
-    else if (tries < 10)
-      simulate(index, folder);
-    else
-      throw Error("case '" + one.name + "' is removed again and again; let nothing tidy up " +
-                  folder.parent_path().string() + " meanwhile");
-  }
-  std::error_code ignored;
-  // Mark the folder as just used, so that it is removed last.
-  fs::last_write_time(folder, fs::file_time_type::clock::now(), ignored);
-  return outputs;
-}
-
-void CellRunner::simulate(std::size_t index, const fs::path& folder) const {
-  const ExperimentCase& one = experiment_.cases[index];
-  const Pipeline pipeline = simulation_of(index);
-  const Digest states = states_of_files(pipeline);
-  RunSettings settings;
-  settings.seed = one.seed;
-  settings.threads = threads_;
-  settings.file_limits = file_limits_;
-  if (const std::string fault = store_ ? store_->prepare() : ""; !fault.empty())
-    throw Error("case '" + one.name + "' cannot be written: " + fault);
-  const RunResult result = run_pipeline(pipeline, catalogue_, settings);
-  if (result.failed()) throw Error("case '" + one.name + "' cannot be simulated: " + reason_of(pipeline, result));
-  if (states_of_files(pipeline) != states || case_folder_of(place_of_simulated(index, Look::anew)) != folder)
-    throw Error("case '" + one.name +
-                "' cannot be simulated: what it is made from was changed meanwhile; run it again");
-  const TemporaryFolder temporary(folder);
-  RunFolder written(temporary.path, pipeline);
-  for (const RunFolder::Written& output : written.write_outputs(pipeline, result, catalogue_))
-    if (const std::string fault = output.fault + output.absent; !fault.empty())
-      throw Error("case '" + one.name + "' cannot be written: " + fault);
-  const fs::path outputs = fs::path("outputs") / experiment_.simulation.output;
-  write_text_file(temporary.path / "content.txt", content_of_case(temporary.path / outputs) + "\n");
-  std::error_code error;
-  fs::rename(temporary.path, folder, error);
-  if (!error || is_whole_case(folder, folder / outputs)) return;  // another process may have been quicker
-  const TemporaryFolder damaged(folder);
-  fs::rename(folder, damaged.path, error);
-  fs::rename(temporary.path, folder, error);
-  if (!is_whole_case(folder, folder / outputs))
-    throw Error("case '" + one.name + "' cannot be written to " + folder.string() + ": " + error.message());
 }
 
 Pipeline CellRunner::pipeline_of(const CellIndex& cell, const fs::path& case_folder, Depth depth) const {
@@ -261,6 +187,7 @@ CellRunner::Done CellRunner::run_into(const fs::path& folder, const Pipeline& pi
   settings.seed = seed_of(cell.case_index);
   settings.store = store_;
   settings.remember = false;
+  settings.wanted_by_others = wanted_by_others(cell, pipeline);
   settings.observer = observer;
   Done done{run_pipeline(pipeline, catalogue_, settings), ""};
   const auto outputs = written.write_outputs(pipeline, done.result, catalogue_);
@@ -279,6 +206,7 @@ CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const Ru
     const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::figures);
     const Watched before = watched(cell, pipeline);
     row.key = before.key;
+    if (SharedStore* shared = store_ ? store_->shared() : nullptr) shared->allow_files(kSharedFilesOfCell);
     const Done done = run_into(folder_of(cell), pipeline, cell, observer);
     fill(row, pipeline, done);
     if (row.failed.empty() && watched(cell, pipeline) != before) row.failed = kChanged;
@@ -341,7 +269,7 @@ bool CellRunner::draw(const CellIndex& cell, const std::function<void(const RunE
   return true;
 }
 
-std::set<std::string> CellRunner::own_nodes(const CellIndex& cell, const Pipeline& pipeline) {
+std::vector<std::size_t> CellRunner::variants_with_nodes(const CellIndex& cell, const Pipeline& pipeline) {
   const std::string& case_name = experiment_.cases[cell.case_index].name;
   std::map<Digest, std::size_t> variants_with;
   for (std::size_t v = 0; v < experiment_.variants.size(); ++v) {
@@ -349,12 +277,31 @@ std::set<std::string> CellRunner::own_nodes(const CellIndex& cell, const Pipelin
         pipeline_of({v, cell.case_index, cell.start}, case_folder(cell.case_index), Depth::figures), case_name);
     for (const Digest& one : std::set<Digest>(others.begin(), others.end())) ++variants_with[one];
   }
-  const std::vector<Digest> own = histories(pipeline, case_name);
+  std::vector<std::size_t> counts;
+  for (const Digest& one : histories(pipeline, case_name)) counts.push_back(variants_with[one]);
+  return counts;
+}
+
+std::set<std::string> CellRunner::own_nodes(const CellIndex& cell, const Pipeline& pipeline) {
+  const std::vector<std::size_t> variants_with = variants_with_nodes(cell, pipeline);
   std::set<std::string> ids;
-  for (std::size_t i = 0; i < own.size(); ++i)
-    if (experiment_.variants.size() == 1 || variants_with[own[i]] < experiment_.variants.size())
+  for (std::size_t i = 0; i < variants_with.size(); ++i)
+    if (experiment_.variants.size() == 1 || variants_with[i] < experiment_.variants.size())
       ids.insert(pipeline.nodes[i].id);
   return ids;
+}
+
+const std::set<std::string>& CellRunner::wanted_by_others(const CellIndex& cell, const Pipeline& pipeline) {
+  const auto [known, is_new] = wanted_.try_emplace(cell.variant);
+  std::set<std::string>& wanted = known->second;
+  if (!is_new || !store_ || !store_->shared()) return wanted;
+  const std::vector<std::size_t> variants_with = variants_with_nodes(cell, pipeline);
+  const std::vector<Dependence> depends = dependences(pipeline, experiment_);
+  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
+    if (variants_with[i] > 1 || (experiment_.starts.size() > 1 && !depends[i].on_start) ||
+        (experiment_.cases.size() > 1 && !depends[i].on_case))
+      wanted.insert(pipeline.nodes[i].id);
+  return wanted;
 }
 
 double CellRunner::time(const CellIndex& cell) {
@@ -366,6 +313,7 @@ double CellRunner::time(const CellIndex& cell) {
   settings.store = store_;
   settings.remember = false;
   settings.made_anew = own_nodes(cell, pipeline);
+  settings.wanted_by_others = wanted_by_others(cell, pipeline);
   Hasher hasher;
   const Watched before = watched(cell, pipeline);
   hasher.add(std::string("seconds"));

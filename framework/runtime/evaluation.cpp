@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "digest_memory.hpp"
 #include "keys.hpp"
 #include "mapping.hpp"
 #include "shared_store.hpp"
@@ -28,7 +29,9 @@ Evaluation::Evaluation(const Pipeline& pipeline, const Catalogue& catalogue, con
       settings_(settings),
       records_(records),
       mutex_(mutex),
-      finished_(std::move(finished)) {}
+      finished_(std::move(finished)) {
+  if (settings_.store) keep_digests_in(settings_.store->folder());
+}
 Evaluation::~Evaluation() = default;
 
 void Evaluation::report(RunEvent::Kind kind, std::size_t node, const std::string& item, std::string text,

@@ -2,10 +2,7 @@
 #include "keys.hpp"
 
 #include <fcntl.h>
-#include <linux/magic.h>
 #include <sys/stat.h>
-#include <sys/vfs.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -14,6 +11,8 @@
 #include <optional>
 #include <sstream>
 
+#include "digest_memory.hpp"
+#include "file_state.hpp"
 #include "machine.hpp"
 #include "mapping.hpp"
 #include "named_files.hpp"
@@ -23,28 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What distinguishes two states of a file. A write changes the time of the file's last change, which no program can
-/// set. If the file is mapped into memory, only the first write after write_back() changes it.
-struct FileState {
-  dev_t device = 0;
-  ino_t number = 0;
-  off_t size = 0;
-  timespec written{}, changed{};
-  bool operator==(const FileState& other) const {
-    const auto same = [](const timespec& a, const timespec& b) {
-      return a.tv_sec == b.tv_sec && a.tv_nsec == b.tv_nsec;
-    };
-    return device == other.device && number == other.number && size == other.size && same(written, other.written) &&
-           same(changed, other.changed);
-  }
-};
-
-std::optional<FileState> state_of(const fs::path& file) {
-  struct stat status {};
-  if (stat(file.c_str(), &status) != 0) return std::nullopt;
-  return FileState{status.st_dev, status.st_ino, status.st_size, status.st_mtim, status.st_ctim};
-}
-
 /// Flushes what was written through memory maps to the file, so that the next such write changes the file's time.
 void write_back(const fs::path& file) {
   struct stat status {};
@@ -53,16 +30,6 @@ void write_back(const fs::path& file) {
   if (descriptor < 0) return;  // whoever reads the file says why
   sync_file_range(descriptor, 0, 0, SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER);
   close(descriptor);
-}
-
-/// Whether each later change of the file will show in its state. A file that was changed just now may change again
-/// within the resolution of its time. A file that is in memory only may change without a new time.
-bool is_settled(const fs::path& file, const FileState& state) {
-  struct statfs system {};
-  if (statfs(file.c_str(), &system) != 0 || system.f_type == TMPFS_MAGIC || system.f_type == RAMFS_MAGIC) return false;
-  timespec now{};
-  clock_gettime(CLOCK_REALTIME, &now);
-  return now.tv_sec - state.changed.tv_sec > 2;
 }
 
 Digest digest_once(const fs::path& file) {
@@ -79,8 +46,10 @@ Digest digest_once(const fs::path& file) {
     if (found != known.end() && found->second.state == *state) return found->second.digest;
   }
   write_back(file);
-  const Digest digest = file_digest(file);
-  if (state && is_settled(file, *state) && state_of(file) == state) {
+  const bool settled = state && is_settled(file, *state);
+  const auto read = [&] { return file_digest(file); };
+  const Digest digest = settled ? digest_in_state(file, *state, read) : read();
+  if (settled && state_of(file) == state) {
     const std::scoped_lock lock(mutex);
     known[file] = {*state, digest};
   }
@@ -145,19 +114,10 @@ void write_back_files(const PipelineNode& node) {
 
 Digest states_of_files(const PipelineNode& node) {
   Hasher hasher;
-  const auto add_time = [&](const timespec& time) {
-    hasher.add(std::int64_t(time.tv_sec));
-    hasher.add(std::int64_t(time.tv_nsec));
-  };
   for (const std::string& path : paths_of(node))
     for (const NamedFile& file : files_named_by(path)) {
-      const FileState state = state_of(file.file).value_or(FileState{});
       hasher.add(file.name);
-      hasher.add(std::uint64_t(state.device));
-      hasher.add(std::uint64_t(state.number));
-      hasher.add(std::int64_t(state.size));
-      add_time(state.written);
-      add_time(state.changed);
+      state_of(file.file).value_or(FileState{}).add_to(hasher);
     }
   return hasher.digest();
 }

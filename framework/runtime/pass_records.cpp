@@ -19,7 +19,7 @@ Value without_data(Value value) {
   return value;
 }
 
-int rank(Status status) {
+int rank_of(Status status) {
   static constexpr Status kOrder[] = {Status::failed,       Status::cancelled, Status::not_run,
                                       Status::failed_alone, Status::skipped,   Status::done};
   return int(std::find(std::begin(kOrder), std::end(kOrder), status) - std::begin(kOrder));
@@ -35,7 +35,7 @@ void append(const Value& value, const std::string& pass, const std::string& axis
 /// Adds what a node did in one pass. `pass` is empty for what was done once.
 void add_node(const NodeRecord& from, const std::string& pass, const std::string& axis, NodeRecord& to) {
   if (from.status == Status::not_needed && from.outputs.empty()) return;
-  if (to.status == Status::not_needed || rank(from.status) < rank(to.status)) {
+  if (to.status == Status::not_needed || rank_of(from.status) < rank_of(to.status)) {
     to.status = from.status;
     to.reason = from.reason.empty() || pass.empty() ? from.reason : pass + ": " + from.reason;
   }

@@ -51,13 +51,18 @@ ClaimText parsed(const std::string& text) {
   return {};  // it was made just now, or its owner was killed before it wrote
 }
 
-/// The text of a claim; nothing if it is not there. Opening a file anew shows what other hosts wrote to it.
-std::optional<std::string> text_of(const fs::path& file) {
+/// The text of a claim; nothing if it is not there or cannot be read. Opening a file anew shows what other hosts wrote
+/// to it.
+std::optional<std::string> claim_text(const fs::path& file) {
   constexpr std::size_t kMost = 256;
-  const StoreFile open_file(file);
-  if (!open_file.is_open()) return std::nullopt;
-  std::string text(std::size_t(std::min<std::uint64_t>(open_file.size(), kMost)), '\0');
-  return open_file.read(text.data(), text.size(), 0) ? text : std::string();
+  constexpr int kMostTries = 5;
+  for (int tries = 0; tries < kMostTries; ++tries) {
+    const StoreFile open_file(file);
+    if (!open_file.is_open()) return std::nullopt;
+    std::string text(std::size_t(std::min<std::uint64_t>(open_file.size(), kMost)), '\0');
+    if (open_file.read(text.data(), text.size(), 0)) return text;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -72,19 +77,21 @@ class HeldClaim {
   ~HeldClaim() {
     // Not in a child that was forked in the meantime. Not if it was taken over, and the file is another's.
     if (process_ == getpid())
-      if (const ClaimText now = parsed(text_of(file_).value_or("")); now.owner == this_process() && now.number == number_)
+      if (const ClaimText now = parsed(claim_text(file_).value_or(""));
+          now.owner == this_process() && now.number == number_)
         unlink(file_.c_str());
     close(descriptor_);
   }
   HeldClaim(const HeldClaim&) = delete;
   HeldClaim& operator=(const HeldClaim&) = delete;
 
-  /// Writes a sign of life. A fault is no harm: at worst others take the claim over.
+  /// Writes a sign of life. Closing any descriptor of a file sends to the server what was written, so that other hosts
+  /// see it; fsync() would also wait for its disk. A fault is no harm: at worst others take the claim over.
   void beat() {
     std::array<char, 200> text{};
     const int size = std::snprintf(text.data(), text.size(), "%s %llu %.3f %012llu\n", this_process().c_str(), number_,
                                    claim_seconds(), ++beats_);
-    if (pwrite(descriptor_, text.data(), std::size_t(size), 0) == size) fdatasync(descriptor_);
+    if (pwrite(descriptor_, text.data(), std::size_t(size), 0) == size) close(dup(descriptor_));
   }
 
  private:
@@ -165,7 +172,7 @@ Heart& heart() {
 void take_away(const fs::path& file, const std::string& text) {
   const fs::path aside = temporary_beside(file);
   if (std::rename(file.c_str(), aside.c_str()) != 0) return;
-  if (text_of(aside) != text) link(aside.c_str(), file.c_str());
+  if (claim_text(aside).value_or(text) != text) link(aside.c_str(), file.c_str());
   unlink(aside.c_str());
 }
 
@@ -183,26 +190,29 @@ int open_new(const fs::path& file, const Permissions& permissions) {
 /// or waited for the file system itself, does not take its own absence for the owner's.
 class Watch {
  public:
-  /// Whether the owner of the claim has ended, as far as this can be known.
-  bool is_left(const std::string& text) {
+  /// Whether the owner of the claim has ended, as far as this can be known. A claim that could not be read (no text)
+  /// counts as unchanged.
+  bool is_left(const std::optional<std::string>& text) {
     const Clock::time_point now = Clock::now();
-    const ClaimText claim = parsed(text);
-    if (text != text_) {
+    if (text && text != text_) {
       text_ = text;
       unchanged_ = Seconds(0);
     } else {
       unchanged_ += std::min<Seconds>(now - looked_, 2 * pause_);
     }
     looked_ = now;
+    const ClaimText claim = parsed(text_.value_or(""));
     pause_ = std::clamp<Seconds>(1.5 * pause_, Seconds(kFirst_s), Seconds(std::min(1.0, claim.seconds / kBeats)));
     return life_of(claim.owner) == Life::ended || unchanged_.count() > claim.seconds;
   }
+  /// What the claim said when it was last read.
+  std::string text() const { return text_.value_or(""); }
   void pause() const { std::this_thread::sleep_for(pause_); }
 
  private:
   static constexpr double kFirst_s = 0.01;
   std::optional<std::string> text_;
-  Clock::time_point looked_;
+  Clock::time_point looked_ = Clock::now();
   Seconds unchanged_{0}, pause_{kFirst_s};
 };
 
@@ -212,14 +222,11 @@ SharedClaim::SharedClaim(std::shared_ptr<HeldClaim> held) : held_(std::move(held
 SharedClaim::~SharedClaim() = default;
 
 double claim_seconds() {
-  static const double seconds = [] {
-    const char* text = std::getenv("MARROW_CLAIM_SECONDS");
-    double given = 0;
-    if (!text || std::from_chars(text, text + std::strlen(text), given).ec != std::errc() || !(given > 0))
-      return kDefault_s;
-    return std::clamp(given, kLeast_s, kMost_s);
-  }();
-  return seconds;
+  const char* text = std::getenv("MARROW_CLAIM_SECONDS");
+  double given = 0;
+  if (!text || std::from_chars(text, text + std::strlen(text), given).ec != std::errc() || !(given > 0))
+    return kDefault_s;
+  return std::clamp(given, kLeast_s, kMost_s);
 }
 
 SharedClaim claim_file(const fs::path& file, const Permissions& permissions, const std::atomic<bool>* cancelled,
@@ -239,9 +246,9 @@ SharedClaim claim_file(const fs::path& file, const Permissions& permissions, con
       fault = "cannot make the claim " + file.string() + ": " + std::strerror(errno);
       return {};
     }
-    const std::optional<std::string> text = text_of(file);
-    if (text && watch.is_left(*text)) {
-      take_away(file, *text);
+    if (watch.is_left(claim_text(file))) {
+      take_away(file, watch.text());
+      watch = Watch();
       continue;
     }
     waiting.goes_on();
@@ -249,6 +256,6 @@ SharedClaim claim_file(const fs::path& file, const Permissions& permissions, con
   }
 }
 
-std::string owner_of_claim(const fs::path& file) { return parsed(text_of(file).value_or("")).owner; }
+std::string owner_of_claim(const fs::path& file) { return parsed(claim_text(file).value_or("")).owner; }
 
 }  // namespace marrow

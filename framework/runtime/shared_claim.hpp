@@ -32,9 +32,9 @@ class SharedClaim {
 /// Seconds without a sign of life after which others take a claim of this process over: MARROW_CLAIM_SECONDS, or 30.
 double claim_seconds();
 
-/// Waits for the claim of a file, as Store::claim() does. Takes it over if its owner has ended, or if nothing changed for
-/// the seconds that the owner promised, by the clock of this process alone. Returns an empty claim if `cancelled` becomes
-/// true, or if the file cannot be made: `fault` then says why.
+/// Waits for the claim of a file, as Store::claim() does. Takes it over if its owner has ended, or if nothing changed
+/// for the seconds that the owner promised, by the clock of this process alone. Returns an empty claim if `cancelled`
+/// becomes true, or if the file cannot be made: `fault` then says why.
 SharedClaim claim_file(const std::filesystem::path& file, const Permissions& permissions,
                        const std::atomic<bool>* cancelled, const std::function<void(bool waits)>& on_wait,
                        std::string& fault);

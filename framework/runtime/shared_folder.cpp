@@ -23,7 +23,7 @@ constexpr int kMostLooks = 6;
 constexpr auto kFirstPause = std::chrono::milliseconds(20);  // each one is twice as long as the one before
 const std::string kWhereTo = "; set MARROW_SHARED_CACHE to a folder for it, or unset it";
 
-bool is_marked(const fs::path& folder, Look look) {
+bool is_marked(const fs::path& folder, SharedLook look) {
   std::string ignored;
   return read_shared(
       folder / kStoreMarker, look,
@@ -38,10 +38,16 @@ Permissions permissions_of(const struct stat& status) {
   return {status.st_mode & 0660, status.st_mode & (S_ISGID | 0770), status.st_gid};
 }
 
-/// Whether the file's name is in its folder. Listing asks the server again.
+/// Whether the file's name is in its folder. Listing asks the server again. The folder itself may be new to this host.
 bool is_listed(const fs::path& file) {
+  const fs::path folder = file.parent_path();
   std::error_code error;
-  for (fs::directory_iterator at(file.parent_path(), error), end; !error && at != end; at.increment(error))
+  fs::directory_iterator at(folder, error);
+  if (error) {
+    const fs::directory_iterator above(folder.parent_path(), error);
+    at = fs::directory_iterator(folder, error);
+  }
+  for (const fs::directory_iterator end; !error && at != end; at.increment(error))
     if (at->path().filename() == file.filename()) return true;
   return false;
 }
@@ -69,9 +75,9 @@ SharedFolderState examine_shared(const fs::path& folder) {
     state.fault = "everybody may write to " + folder.string() + "; take that from them (chmod o-w)";
   else if (faccessat(AT_FDCWD, folder.c_str(), R_OK | X_OK, AT_EACCESS) != 0)
     state.fault = "cannot look into the folder " + folder.string() + ": " + std::strerror(errno);
-  else if (is_marked(folder, Look::quick))
+  else if (is_marked(folder, SharedLook::quick))
     state.is_store = true;
-  else if (!holds_nothing(folder) && is_marked(folder, Look::listed))  // another host has just made it a store
+  else if (!holds_nothing(folder) && is_marked(folder, SharedLook::listed))  // another host has just made it a store
     state.is_store = true;
   else if (!holds_nothing(folder))
     state.fault = name + " holds other things and is no shared store of marrow" + kWhereTo;
@@ -94,10 +100,10 @@ SharedFolderState make_shared(const fs::path& folder) {
   return made;
 }
 
-bool read_shared(const fs::path& file, Look look, const std::function<bool(const StoreFile&)>& use,
+bool read_shared(const fs::path& file, SharedLook look, const std::function<bool(const StoreFile&)>& use,
                  std::string& fault) {
   auto pause = kFirstPause;
-  bool is_there = look == Look::listed && is_listed(file);
+  bool is_there = look == SharedLook::listed && is_listed(file);
   for (int tries = 1;; ++tries) {
     const StoreFile open_file(file);
     if (open_file.is_open()) {

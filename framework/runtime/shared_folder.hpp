@@ -26,12 +26,12 @@ SharedFolderState make_shared(const std::filesystem::path& folder);
 
 /// How far what this host remembers about a folder is relied on. `listed`: it lists the folder first, so that it learns
 /// of new files.
-enum class Look { quick, listed };
+enum class SharedLook { quick, listed };
 
 /// Opens a file and calls use(file). If it returns false, because the file cannot be read or is not whole, or if a file
-/// that is listed cannot be opened, tries again with pauses, about a second in all. Returns whether use() returned true.
-/// `fault` is set if the folder cannot be read at all.
-bool read_shared(const std::filesystem::path& file, Look look, const std::function<bool(const StoreFile&)>& use,
+/// that is listed cannot be opened, tries again with pauses, about a second in all. Returns whether use() returned
+/// true. `fault` is set if the folder cannot be read at all.
+bool read_shared(const std::filesystem::path& file, SharedLook look, const std::function<bool(const StoreFile&)>& use,
                  std::string& fault);
 
 }  // namespace marrow

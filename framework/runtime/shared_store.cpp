@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // A result is shared if it took at least a second, and ten times as long as reading it at 100 MB/s.
-constexpr double kLeast_s = 1, kLeast_s_per_MB = 0.1;
+constexpr double kShortest_s = 1, kShortest_s_per_MB = 0.1;
 constexpr double kShareOfLocal = 0.1;  // a larger part of the local store's size is not copied there for one result
 
 double megabytes(std::uint64_t bytes) { return double(bytes) / 1e6; }
@@ -59,7 +59,8 @@ void SharedStore::complain(const std::string& fault, bool only_writing) {
   const std::scoped_lock lock(mutex_);
   (only_writing ? is_read_only_ : is_off_) = true;
   if (fault_.empty())
-    fault_ = fault + (only_writing ? "; nothing more is written to the shared store" : "; the shared store is not used");
+    fault_ =
+        fault + (only_writing ? "; nothing more is written to the shared store" : "; the shared store is not used");
 }
 
 std::string SharedStore::complaint() {
@@ -67,7 +68,7 @@ std::string SharedStore::complaint() {
   return fault_.empty() || std::exchange(has_complained_, true) ? "" : fault_;
 }
 
-bool SharedStore::fetch(const Digest& key, const fs::path& to, Look look, std::optional<StoredResult>& in_place) {
+bool SharedStore::fetch(const Digest& key, const fs::path& to, SharedLook look, std::optional<StoredResult>& in_place) {
   if (!state()) return false;
   const fs::path path = file_of(key);
   std::string fault;
@@ -79,9 +80,9 @@ bool SharedStore::fetch(const Digest& key, const fs::path& to, Look look, std::o
           file.mark_as_used_today();
           bool is_whole = true;
           const bool is_copied = file.size() <= most_copied() && write_whole(to, [&](Archive& out) {
-                                   is_whole = copy_entry(file, entry, out);
-                                   if (!is_whole) throw Error("it is not whole");
-                                 }).empty();
+                                                                   is_whole = copy_entry(file, entry, out);
+                                                                   if (!is_whole) throw Error("it is not whole");
+                                                                 }).empty();
           if (!is_copied && is_whole) {
             in_place = StoredResult{{}, outputs_of(entry, path)};
             in_place->provenance = std::move(entry.description.provenance);
@@ -118,19 +119,22 @@ void SharedStore::write(const Digest& key, const Write& write) {
 }
 
 void SharedStore::offer(const Digest& key, const std::vector<Value>& outputs, const Provenance& provenance) {
-  if (provenance.seconds < kLeast_s || !accepts()) return;
+  if (provenance.seconds < kShortest_s || !accepts()) return;
   EntryDescription description;
   try {
     description = describe_entry(key, outputs, provenance);
   } catch (const std::exception&) {  // it cannot be kept in any store
     return;
   }
-  if (provenance.seconds < kLeast_s_per_MB * megabytes(description.payload)) return;
-  if (is_limited_ && files_left_-- <= 0) return;
+  if (provenance.seconds < kShortest_s_per_MB * megabytes(description.payload)) return;
+  if (is_limited_ && files_left_-- <= 0) {
+    ++files_left_;
+    return;
+  }
   write(key, [&](Archive& out) { write_entry(out, description, outputs); });
 }
 
-bool SharedStore::fetch_case(const Digest& key, const fs::path& folder, Look look) {
+bool SharedStore::fetch_case(const Digest& key, const fs::path& folder, SharedLook look) {
   if (!state()) return false;
   std::string fault;
   const bool is_found = read_shared(

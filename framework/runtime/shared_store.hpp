@@ -19,9 +19,9 @@ namespace marrow {
 /// Results in a folder that several hosts and users see (NFS, Lustre, BeeGFS). It stands behind the store of each host
 /// and never takes its place: a fault here is said once (complaint()), and runs go on without it.
 ///
-/// Each file is written under a temporary name and then renamed. Whatever is read is checked by its hash, so a file that
-/// another host sees too early, in part or damaged counts as absent. Nothing relies on locks, on equal clocks, or on
-/// numbers of processes of other hosts. Safe to use from several threads.
+/// Each file is written under a temporary name and then renamed. Whatever is read is checked by its hash, so a file
+/// that another host sees too early, in part or damaged counts as absent. Nothing relies on locks, on equal clocks, or
+/// on numbers of processes of other hosts. Safe to use from several threads.
 class SharedStore {
  public:
   explicit SharedStore(const std::filesystem::path& folder);
@@ -35,7 +35,8 @@ class SharedStore {
 
   /// Copies the result of a key to a file of another store. Returns false if the result is not there, or is not whole.
   /// If it is too large to be copied, or cannot be, `in_place` receives the result; it is read when it is needed.
-  bool fetch(const Digest& key, const std::filesystem::path& to, Look look, std::optional<StoredResult>& in_place);
+  bool fetch(const Digest& key, const std::filesystem::path& to, SharedLook look,
+             std::optional<StoredResult>& in_place);
   /// Keeps a result if that is worth it: if it took so long that reading it is much quicker, and if a file is left to
   /// be written (allow_files()).
   void offer(const Digest& key, const std::vector<Value>& outputs, const Provenance& provenance);
@@ -45,7 +46,7 @@ class SharedStore {
   bool accepts();
 
   /// The same for a simulated case, a folder with files. It is one file here. fetch_case() writes to a new folder.
-  bool fetch_case(const Digest& key, const std::filesystem::path& folder, Look look);
+  bool fetch_case(const Digest& key, const std::filesystem::path& folder, SharedLook look);
   void offer_case(const Digest& key, const std::filesystem::path& folder);
 
   /// The right to make a result, among all hosts. It is empty if others cannot be asked.

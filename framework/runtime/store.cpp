@@ -68,7 +68,8 @@ std::optional<StoredResult> Store::find(const Digest& key, Where where) const {
   std::optional<StoredResult> found = find_here(key);
   if (found || where == Where::here || !shared_ || !prepare().empty()) return found;
   std::optional<StoredResult> in_place;
-  if (!shared_->fetch(key, file_of(key), where == Where::anew ? Look::listed : Look::quick, in_place)) return found;
+  if (!shared_->fetch(key, file_of(key), where == Where::anew ? SharedLook::listed : SharedLook::quick, in_place))
+    return found;
   return in_place ? std::move(in_place) : find_here(key);
 }
 
@@ -111,23 +112,15 @@ void Store::remember(const std::string& place, const Last& last) const {
   if (!prepare().empty()) return;
   Packer packed;
   packed.add(Remembered{place, last});
-  const Digest check = hash_of_bytes(packed.packed.data(), packed.packed.size());
-  write_whole(folder_ / "last" / hash_of(place).hex(), [&](Archive& out) {
-    out.bytes(&check, sizeof check);
-    out.bytes(packed.packed.data(), packed.packed.size());
-  });
+  write_checked(folder_ / "last" / hash_of(place).hex(), packed.packed);
 }
 
 std::optional<Store::Last> Store::last(const std::string& place) const {
   if (!is_there()) return std::nullopt;
-  const StoreFile file(folder_ / "last" / hash_of(place).hex());
-  Digest check;
-  if (!file.is_open() || file.size() <= sizeof check || file.size() > kMostRemembered) return std::nullopt;
-  std::string text(std::size_t(file.size()) - sizeof check, '\0');
-  if (!file.read(&check, sizeof check, 0) || !file.read(text.data(), text.size(), sizeof check)) return std::nullopt;
-  if (hash_of_bytes(text.data(), text.size()) != check) return std::nullopt;
+  const auto text = read_checked(folder_ / "last" / hash_of(place).hex(), kMostRemembered);
+  if (!text) return std::nullopt;
   try {
-    Remembered remembered = Unpacker(text).get<Remembered>();
+    Remembered remembered = Unpacker(*text).get<Remembered>();
     if (remembered.place == place) return std::move(remembered.last);
   } catch (const Error&) {  // of another layout
   }

@@ -92,7 +92,8 @@ std::vector<Store::Entry> entries_in(const fs::path& folder) {
     entries.push_back(std::move(entry));
   }
   if (!fault.empty()) throw Error(fault);
-  std::sort(entries.begin(), entries.end(), [](const Store::Entry& a, const Store::Entry& b) { return a.used < b.used; });
+  std::sort(entries.begin(), entries.end(),
+            [](const Store::Entry& a, const Store::Entry& b) { return a.used < b.used; });
   return entries;
 }
 

@@ -15,8 +15,8 @@ namespace marrow {
 /// As Store::entries().
 std::vector<Store::Entry> entries_in(const std::filesystem::path& folder);
 
-/// As Store::collect(). Also removes claims whose owners have ended. `now` is the time by the clock of the folder's file
-/// system (time_in()). Without it, nothing counts as left behind because of its age.
+/// As Store::collect(). Also removes claims whose owners have ended. `now` is the time by the clock of the folder's
+/// file system (time_in()). Without it, nothing counts as left behind because of its age.
 Store::Freed collect_in(const std::filesystem::path& folder, std::uint64_t keep_bytes,
                         const std::optional<timespec>& now);
 

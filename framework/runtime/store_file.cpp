@@ -184,4 +184,21 @@ std::string write_whole(const fs::path& file, const std::function<void(Archive&)
   return fault;
 }
 
+std::string write_checked(const fs::path& file, std::string_view text) {
+  const Digest check = hash_of_bytes(text.data(), text.size());
+  return write_whole(file, [&](Archive& out) {
+    out.bytes(&check, sizeof check);
+    out.bytes(text.data(), text.size());
+  });
+}
+
+std::optional<std::string> read_checked(const fs::path& path, std::uint64_t most_bytes) {
+  const StoreFile file(path);
+  Digest check;
+  if (!file.is_open() || file.size() <= sizeof check || file.size() > most_bytes) return std::nullopt;
+  std::string text(std::size_t(file.size()) - sizeof check, '\0');
+  if (!file.read(&check, sizeof check, 0) || !file.read(text.data(), text.size(), sizeof check)) return std::nullopt;
+  return hash_of_bytes(text.data(), text.size()) == check ? std::optional(std::move(text)) : std::nullopt;
+}
+
 }  // namespace marrow

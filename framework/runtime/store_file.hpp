@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "marrow/runtime/hash.hpp"
@@ -72,5 +73,10 @@ class FileUnpacker : public Unpacker {
 /// waits until the file is on the disk.
 std::string write_whole(const std::filesystem::path& file, const std::function<void(Archive&)>& fill,
                         bool is_durable = false, const Permissions& permissions = {});
+
+/// Writes a small file with its digest in front, and reads it. A file that does not fit its digest, or has more than
+/// `most_bytes`, counts as absent.
+std::string write_checked(const std::filesystem::path& file, std::string_view text);
+std::optional<std::string> read_checked(const std::filesystem::path& file, std::uint64_t most_bytes);
 
 }  // namespace marrow

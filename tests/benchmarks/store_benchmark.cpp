@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the store of results costs: looking a small value up, and reading a large one.
+// What the store of results costs: looking a small value up, and reading a large one; and the same through a shared
+// store that is on the same disk.
 #include <benchmark/benchmark.h>
 
 #include <filesystem>
 
+#include "framework/runtime/shared_store.hpp"
 #include "marrow/runtime/store.hpp"
 #include "marrow/runtime/types.hpp"
 
@@ -43,6 +45,58 @@ BENCHMARK_F(Fixture, LookUpASmallValue)(benchmark::State& state) {
 BENCHMARK_F(Fixture, LookUpWhatIsNotThere)(benchmark::State& state) {
   int name = 2000;
   for (auto _ : state) benchmark::DoNotOptimize(store.find(hash_of(name++)).has_value());
+}
+
+/// A host that has a shared store behind its own, which is empty at first.
+class SharedFixture : public benchmark::Fixture {
+ public:
+  void SetUp(benchmark::State&) override {
+    fs::create_directories(folder / "shared");
+    fs::permissions(folder / "shared", fs::perms::owner_all);
+    for (int i = 0; i < kResults; ++i) {
+      const Metrics item{{{"mtre_mm", double(i), "mm"}}};
+      Value value = Value::of<Metrics>(std::make_shared<const Metrics>(item));
+      value.key = value.type.content->hash(value.data.get());
+      shared->offer(hash_of(i), {value}, Provenance{.node = "evaluate.pose_error", .seconds = 2});
+    }
+  }
+  void TearDown(benchmark::State&) override { fs::remove_all(folder); }
+
+  static constexpr int kResults = 500;
+  fs::path folder = fs::temp_directory_path() / "marrow-shared-store-benchmark";
+  std::shared_ptr<SharedStore> shared = std::make_shared<SharedStore>(folder / "shared");
+  Store store{folder / "host", shared};
+};
+
+BENCHMARK_F(SharedFixture, TakeASmallValueFromTheSharedStore)(benchmark::State& state) {
+  int name = 0;
+  for (auto _ : state) {
+    const Digest key = hash_of(name++ % kResults);
+    benchmark::DoNotOptimize(store.find(key)->outputs[0].as<Metrics>().items[0].value);
+    state.PauseTiming();
+    store.drop(key);
+    state.ResumeTiming();
+  }
+}
+
+BENCHMARK_F(SharedFixture, LookUpASmallValueThatWasTaken)(benchmark::State& state) {
+  int name = 0;
+  for (auto _ : state)
+    benchmark::DoNotOptimize(store.find(hash_of(name++ % kResults))->outputs[0].as<Metrics>().items[0].value);
+}
+
+BENCHMARK_F(SharedFixture, LookUpWhatIsInNeither)(benchmark::State& state) {
+  int name = kResults;
+  for (auto _ : state) benchmark::DoNotOptimize(store.find(hash_of(name++)).has_value());
+}
+
+BENCHMARK_F(SharedFixture, ClaimWhatIsInNeither)(benchmark::State& state) {
+  int name = kResults;
+  for (auto _ : state) {
+    const Digest key = hash_of(name++);
+    const SharedClaim claim = shared->claim(key, nullptr);
+    benchmark::DoNotOptimize(store.find(key, Store::Where::anew).has_value());
+  }
 }
 
 Volume large_volume() {

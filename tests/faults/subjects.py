@@ -312,7 +312,8 @@ class Collect:
             run = Run(self.program)
             assert self.program.run(run.arguments(template / "out"), template).returncode == 0
             for path in list((template / "store").glob("??/*"))[:1]:
-                shutil.copy(path, str(path) + ".tmp-999999999-0")
+                left = shutil.copy(path, str(path) + ".tmp-999999999-0")
+                os.utime(left, (0, 0))  # nobody writes it any more
         shutil.copytree(template / "store", folder / "store")
 
     def command(self, folder):

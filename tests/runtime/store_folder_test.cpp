@@ -11,7 +11,9 @@
 
 #include "framework/runtime/folder_use.hpp"
 #include "marrow/runtime/store.hpp"
+#include "runtime/environment.hpp"
 #include "runtime/fixture.hpp"
+#include "runtime/identities.hpp"
 
 namespace store_folder_test {
 
@@ -20,6 +22,7 @@ using marrow::Digest;
 using marrow::Metrics;
 using marrow::Store;
 using marrow::Value;
+using runtime_fixture::Environment;
 using runtime_fixture::Scratch;
 
 Value number(double value) {
@@ -46,22 +49,6 @@ mode_t mode_of(const fs::path& path) {
   EXPECT_EQ(stat(path.c_str(), &status), 0) << path;
   return status.st_mode & 07777;
 }
-
-/// Environment variables of a test, as they were before at its end.
-class Environment {
- public:
-  ~Environment() {
-    for (const auto& [name, value] : before_) value ? setenv(name.c_str(), value->c_str(), 1) : unsetenv(name.c_str());
-  }
-  void set(const std::string& name, const std::optional<std::string>& value) {
-    const char* old = std::getenv(name.c_str());
-    before_.try_emplace(name, old ? std::optional<std::string>(old) : std::nullopt);
-    value ? setenv(name.c_str(), value->c_str(), 1) : unsetenv(name.c_str());
-  }
-
- private:
-  std::map<std::string, std::optional<std::string>> before_;
-};
 
 class StoreFolderTest : public testing::Test {
  protected:
@@ -141,11 +128,11 @@ TEST_F(StoreFolderTest, OnlyItsOwnLayoutIsCollected) {
   ASSERT_EQ(save(store), "");
   store.remember("place", {});
   const std::string key = marrow::hash_of(1).hex(), two = key.substr(0, 2);
-  const std::string dead = ".tmp-4194304-0";  // no process has that number
+  const std::string dead = ".tmp-" + runtime_fixture::ended_process() + "-0";
   put(scratch.path / "elsewhere" / "ab0123456789abcdef0123456789abcd");
-  for (const char* own :
-       {"cases/0123456789abcdef0123456789abcdef/outputs/case/a", "cases/0123456789abcdef0123456789abcdef/content.txt",
-        "cases/0123456789abcdef0123456789abcdef.tmp-4194304-7/x"})
+  for (const std::string& own : {std::string("cases/0123456789abcdef0123456789abcdef/outputs/case/a"),
+                                 std::string("cases/0123456789abcdef0123456789abcdef/content.txt"),
+                                 "cases/0123456789abcdef0123456789abcdef" + dead + "/x"})
     put(folder / own);
   put(folder / two / (key + dead));
   put(folder / "last" / (key + dead));
@@ -156,7 +143,7 @@ TEST_F(StoreFolderTest, OnlyItsOwnLayoutIsCollected) {
         two + "/" + two + std::string(30, '0') + "/x", two + "/notes.txt", two + "/" + key + ".tmp-1x-0",
         two + "/" + key + ".tmp--0", two + "/" + key + ".tmp-0-0", "cases/" + std::string(31, '1') + "/x",
         "cases/" + std::string(32, '4') + "/mine.txt", "cases/2222222222222222" + std::string(16, '2'),
-        std::string("last/mine.tmp-4194304-0")})
+        "last/mine" + dead})
     put(folder / foreign);
   fs::create_directory_symlink(scratch.path / "elsewhere", folder / "ab");
   fs::create_directory_symlink(scratch.path / "elsewhere", folder / "cases" / std::string(32, '3'));
@@ -174,17 +161,23 @@ TEST_F(StoreFolderTest, OnlyItsOwnLayoutIsCollected) {
   EXPECT_EQ(tree(scratch.path / "elsewhere").size(), 1u);
 }
 
-TEST_F(StoreFolderTest, WhatDeadProcessesLeftIsRemovedAlsoWhenTheirNumbersLive) {
+TEST_F(StoreFolderTest, WhatProcessesElsewhereLeftIsRemovedAfterADay) {
   ASSERT_EQ(save(store), "");
-  const std::string key = marrow::hash_of(1).hex();
-  const auto temporary = [&](pid_t process) {
-    return folder / key.substr(0, 2) / (key + ".tmp-" + std::to_string(process) + "-99");
+  const std::string key = marrow::hash_of(1).hex(), elsewhere = runtime_fixture::process_elsewhere();
+  const auto temporary = [&](const std::string& writer, const std::string& number) {
+    return folder / key.substr(0, 2) / (key + ".tmp-" + writer + "-" + number);
   };
-  for (pid_t process : {getpid(), getppid()}) put(temporary(process));
-  fs::last_write_time(temporary(getppid()), fs::file_time_type::clock::now() - std::chrono::hours(25));
+  for (const std::string& writer : {marrow::this_process(), elsewhere, std::string("4711")})
+    for (const char* age : {"23", "25"}) {
+      put(temporary(writer, age));
+      fs::last_write_time(temporary(writer, age),
+                          fs::file_time_type::clock::now() - std::chrono::hours(std::atoi(age)));
+    }
   store.collect(1000000);
-  EXPECT_TRUE(fs::exists(temporary(getpid())));
-  EXPECT_FALSE(fs::exists(temporary(getppid()))) << "no result takes a day to write";
+  for (const std::string& writer : {marrow::this_process(), elsewhere, std::string("4711")}) {
+    EXPECT_TRUE(fs::exists(temporary(writer, "23"))) << writer;
+    EXPECT_FALSE(fs::exists(temporary(writer, "25"))) << "no result takes a day to write: " << writer;
+  }
 }
 
 TEST_F(StoreFolderTest, AnEmptyFolderBecomesAPrivateStore) {
@@ -205,6 +198,7 @@ TEST_F(StoreFolderTest, AnEmptyFolderBecomesAPrivateStore) {
 }
 
 TEST_F(StoreFolderTest, AMarkerThatWasBeingWrittenIsNoForeignThing) {
+  put(folder / ("marrow-store.tmp-" + runtime_fixture::process_elsewhere() + "-0"));
   put(folder / "marrow-store.tmp-4194304-0");
   EXPECT_EQ(save(store), "");
   EXPECT_TRUE(Store(folder).find(marrow::hash_of(1)));

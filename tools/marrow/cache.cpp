@@ -6,6 +6,7 @@
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "marrow/domain/printable.hpp"
+#include "runtime/shared_store.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -57,25 +58,49 @@ bool can_keep_results(const std::string& fault_of_store, bool quiet) {
 
 namespace {
 
-int cache_info() {
-  const Store store;
-  if (const int code = code_after(store.fault())) return code;
+void note_not_shared(const std::string& text) {
+  if (!text.empty()) std::fprintf(stderr, "marrow: note: %s\n", printable_lines(text).c_str());
+}
+
+}  // namespace
+
+void say_if_not_shared(const Store& store, bool quiet) {
+  const std::string fault = store.shared() && !quiet ? store.shared()->fault() : "";
+  if (!fault.empty()) note_not_shared("the shared store is not used: " + fault);
+}
+
+void say_complaint(const Store& store) {
+  if (store.shared()) note_not_shared(store.shared()->complaint());
+}
+
+namespace {
+
+void print_shares(const std::string& folder, const std::vector<Store::Entry>& entries) {
   std::map<std::string, Share> shares;
   Share all;
-  for (const Store::Entry& entry : store.entries())
+  for (const Store::Entry& entry : entries)
     for (Share* share : {&shares[entry.provenance.node], &all}) {
       ++share->entries;
       share->bytes += entry.bytes;
       share->seconds += entry.provenance.seconds;
     }
-  std::printf("%s\n\n%-34s %8s %12s %12s\n", printable(store.folder().string()).c_str(), "node", "results", "MB",
-              "seconds");
+  std::printf("%s\n\n%-34s %8s %12s %12s\n", printable(folder).c_str(), "node", "results", "MB", "seconds");
   const auto print = [](const std::string& name, const Share& share) {
     std::printf("%-34s %8zu %12.2f %12.2f\n", printable(name).c_str(), share.entries, megabytes(share.bytes),
                 share.seconds);
   };
   for (const auto& [name, share] : shares) print(name.empty() ? "(damaged or of another version)" : name, share);
   print("all", all);
+}
+
+int cache_info() {
+  const Store store;
+  if (const int code = code_after(store.fault())) return code;
+  print_shares(store.folder().string(), store.entries());
+  if (!store.shared()) return 0;
+  if (const int code = code_after(store.shared()->fault())) return code;
+  std::printf("\n");
+  print_shares(store.shared()->folder().string() + " (shared)", store.shared()->entries());
   return 0;
 }
 
@@ -86,7 +111,12 @@ int cache_why(const std::string& key) {
   if (const int code = code_after(store.fault())) return code;
   std::vector<Store::Entry> meant;
   std::set<std::string> keys;  // several results may have the same output
-  for (Store::Entry& entry : store.entries()) {
+  std::vector<Store::Entry> entries = store.entries();
+  if (store.shared())
+    for (Store::Entry& entry : store.shared()->entries())
+      if (std::none_of(entries.begin(), entries.end(), [&](const auto& one) { return one.key == entry.key; }))
+        entries.push_back(std::move(entry));
+  for (Store::Entry& entry : entries) {
     std::vector<Digest> all = entry.outputs;
     all.push_back(entry.key);
     std::erase_if(all, [&](const Digest& digest) { return !digest.hex().starts_with(key); });
@@ -94,8 +124,9 @@ int cache_why(const std::string& key) {
     if (!all.empty()) meant.push_back(std::move(entry));
   }
   if (keys.empty())
-    return code_after("the store " + store.folder().string() + " holds no result with a key that begins with '" + key +
-                      "'");
+    return code_after("the store " + store.folder().string() +
+                      (store.shared() ? ", or the shared one " + store.shared()->folder().string() + "," : "") +
+                      " holds no result with a key that begins with '" + key + "'");
   if (keys.size() > 1) return code_after(several(key, keys));
   int code = 0;
   for (const Store::Entry& entry : meant) {
@@ -108,9 +139,12 @@ int cache_why(const std::string& key) {
   return code;
 }
 
-int cache_collect(double keep_gb) {
+int cache_collect(double keep_gb, bool is_shared) {
   const Store store;
-  const Store::Freed freed = store.collect(std::uint64_t(keep_gb * 1e9));
+  if (is_shared && !store.shared())
+    return code_after("there is no shared store: MARROW_SHARED_CACHE is not set; nothing is removed");
+  const std::uint64_t keep_bytes = std::uint64_t(keep_gb * 1e9);
+  const Store::Freed freed = is_shared ? store.shared()->collect(keep_bytes) : store.collect(keep_bytes);
   if (freed.fault.empty() || freed.entries)
     std::printf("%zu results removed, %.2f MB freed\n", freed.entries, megabytes(freed.bytes));
   return code_after(freed.fault);
@@ -122,7 +156,9 @@ void add_cache(CLI::App& app, int& code) {
   const auto key = std::make_shared<std::string>();
   const auto keep_gb = std::make_shared<double>(10);
   CLI::App* command = app.add_subcommand(
-      "cache", "look at the store of results (MARROW_CACHE, else ~/.cache/marrow/store), and tidy it up");
+      "cache",
+      "look at the store of results (MARROW_CACHE, else ~/.cache/marrow/store) and at the shared one\n"
+      "(MARROW_SHARED_CACHE), and tidy them up");
   command->require_subcommand(1);
   command->add_subcommand("info", "how much is kept, and of which nodes")->callback([&code] { code = cache_info(); });
   CLI::App* why = command->add_subcommand("why", "what a kept result was made from");
@@ -136,7 +172,9 @@ void add_cache(CLI::App& app, int& code) {
   show_default(gc->add_option_function<std::string>("--keep-gb", take_keep_gb, "size to keep, in gigabytes")
                    ->type_name("NUMBER"),
                *keep_gb);
-  gc->callback([keep_gb, &code] { code = cache_collect(*keep_gb); });
+  const auto is_shared = std::make_shared<bool>(false);
+  gc->add_flag("--shared", *is_shared, "of the shared store, instead of this host's");
+  gc->callback([keep_gb, is_shared, &code] { code = cache_collect(*keep_gb, *is_shared); });
 }
 
 }  // namespace marrow::cli

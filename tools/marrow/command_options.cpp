@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "command_options.hpp"
 
+#include <cstdlib>
+
 namespace marrow::cli {
 
 void add_pipeline_arguments(CLI::App* command, PipelineRequest& request) {
@@ -18,6 +20,14 @@ void add_file_limits(CLI::App* command, FileLimits& limits, const std::string& o
   const std::string end = " that reading a file may use (default: " + otherwise + ")";
   add_amount(command, "--file-memory", limits.memory_mb, "megabytes", "megabytes" + end);
   add_amount(command, "--file-seconds", limits.seconds, "seconds", "seconds of processor time" + end);
+}
+
+void add_shared_cache(CLI::App* command) {
+  command
+      ->add_option_function<std::string>(
+          "--shared-cache", [](const std::string& folder) { setenv("MARROW_SHARED_CACHE", folder.c_str(), 1); },
+          "folder in which hosts share results (default: MARROW_SHARED_CACHE)")
+      ->type_name("FOLDER");
 }
 
 void add_log_level(CLI::App* command, LogLevel& level) {

@@ -72,6 +72,10 @@ void add_describe(CLI::App& app, int& code);
 
 /// Whether results can be kept in the store. If not, prints why, unless `quiet`.
 bool can_keep_results(const std::string& fault_of_store, bool quiet);
+/// Prints why the shared store behind a store cannot be used, if it has one, unless `quiet`.
+void say_if_not_shared(const Store& store, bool quiet);
+/// Prints the first fault of the shared store, once.
+void say_complaint(const Store& store);
 /// Splits texts of the form name=value. Throws Error for one without '=' or without a name; `form` says what is
 /// expected.
 std::vector<std::pair<std::string, std::string>> pairs_of(const std::vector<std::string>& texts, const char* form);

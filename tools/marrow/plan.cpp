@@ -38,6 +38,7 @@ int plan(const PipelineRequest& request, std::uint64_t seed) {
   if (!load(request, catalogue, pipeline, true)) return 2;
   const Store store;
   can_keep_results(store.fault(), false);
+  say_if_not_shared(store, false);
   RunSettings settings;
   settings.seed = seed;
   settings.store = &store;
@@ -66,6 +67,7 @@ void add_plan(CLI::App& app, int& code) {
   CLI::App* command = app.add_subcommand("plan", "show what a run would compute, what it would read back, and why");
   add_pipeline_arguments(command, *request);
   show_default(add_whole_number(command, "--seed", *seed, "seed of all randomness"), *seed);
+  add_shared_cache(command);
   command->callback([request, seed, &code] { code = plan(*request, *seed); });
   say_that_libraries_are_described(command);
 }

@@ -17,6 +17,7 @@
 #include "process.hpp"
 #include "run_event.hpp"
 #include "runtime/place_of_results.hpp"
+#include "runtime/shared_store.hpp"
 #include "runtime/verdict_json.hpp"
 
 namespace marrow::cli {
@@ -243,6 +244,9 @@ void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& fo
   if (store && store->fault().empty())
     expect_nothing_reads(pipeline, store->folder(), "the store of results",
                          "set MARROW_CACHE to another folder, or give --no-cache");
+  if (store && store->shared())
+    expect_nothing_reads(pipeline, store->shared()->folder(), "the shared store of results",
+                         "set MARROW_SHARED_CACHE to another folder, or give --no-cache");
 }
 
 namespace {
@@ -310,6 +314,7 @@ void add_run(CLI::App& app, int& code) {
   show_default(add_whole_number(command, "--seed", request->seed, "seed of all randomness"), request->seed);
   add_whole_number(command, "--threads", request->threads, "threads to use (default: all)", 1, 1024);
   command->add_flag("--no-cache", request->no_cache, "neither read nor keep results of nodes");
+  add_shared_cache(command);
   add_log_level(command, request->log_level);
   command->add_flag("--quiet", request->quiet, "print only errors");
   command->add_flag("--json", request->json, "print events as JSON, one a line");

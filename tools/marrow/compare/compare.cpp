@@ -12,6 +12,7 @@
 #include "process.hpp"
 #include "runtime/no_process.hpp"
 #include "runtime/place_of_results.hpp"
+#include "runtime/shared_store.hpp"
 #include "runtime/text_file.hpp"
 
 namespace marrow::cli {
@@ -51,6 +52,9 @@ void expect_outside_cases(const Experiment& experiment, const fs::path& folder, 
   const Store store;
   if (!no_cache && store.fault().empty())
     expect("the store of results", store.folder(), "set MARROW_CACHE to another folder, or give --no-cache");
+  if (!no_cache && store.shared())
+    expect("the shared store of results", store.shared()->folder(),
+           "set MARROW_SHARED_CACHE to another folder, or give --no-cache");
 }
 
 /// A message if a part of a cell's name is unknown to the experiment, with the nearest known name. Otherwise empty.
@@ -81,6 +85,7 @@ int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster)
   if (request.dry_run) {
     const Store store;
     can_keep_results(store.fault(), request.no_cache);
+    say_if_not_shared(store, request.no_cache);
     print_plan(experiment, catalogue, request.no_cache ? nullptr : &store, folder_of(request, experiment));
     return 0;
   }
@@ -88,7 +93,9 @@ int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster)
   expect_outside_cases(experiment, folder, request.no_cache);
   if (cluster.is_given()) return compare_on_cluster(request, cluster, catalogue, experiment, folder);
   const ComparisonFolder kept(folder, experiment, ComparisonFolder::Use::alone);
-  request.no_cache = request.no_cache || !can_keep_results(Store().prepare(), request.quiet);
+  const Store store;
+  request.no_cache = request.no_cache || !can_keep_results(store.prepare(), request.quiet);
+  say_if_not_shared(store, request.no_cache || request.quiet);
   return run_comparison(request, catalogue, experiment, folder);
 }
 
@@ -108,12 +115,14 @@ int run_cell(const CompareRequest& request, const std::string& id) {
   kept.take_cell(id);
   const Store store;
   const bool is_kept = !request.no_cache && can_keep_results(store.prepare(), false);
+  say_if_not_shared(store, !is_kept);
   CellRunner runner(experiment, catalogue, is_kept ? &store : nullptr, folder, request.threads, request.file_limits);
   const long without_process = calls_without_process();
   CellRow row = runner.run(*cell);
   if (!row.failed.empty() && calls_without_process() != without_process)
     throw Error(row.failed);  // the cell itself did not fail
   runner.write(*cell, row);
+  say_complaint(store);
   std::printf("%s\n", compare::to_json(row).c_str());
   if (!row.failed.empty()) return 1;
   try {
@@ -134,6 +143,7 @@ void add_experiment_arguments(CLI::App* command, CompareRequest& request) {
   show_default(add_whole_number(command, "--threads", request.threads, "threads of each cell", 1, 1024),
                request.threads);
   command->add_flag("--no-cache", request.no_cache, "neither read nor keep results of nodes");
+  add_shared_cache(command);
   add_file_limits(command, request.file_limits);
 }
 

@@ -66,9 +66,10 @@ json with_processes(const std::function<json()>& task) {
   }
 }
 
-json run_cell(CellRunner& runner, const json& asked, WorkerReports& reports) {
+json run_cell(CellRunner& runner, const Store& store, const json& asked, WorkerReports& reports) {
   const long before = calls_without_process();
   const compare::CellRow row = runner.run(cell_in(runner, asked), observer_of(reports));
+  say_complaint(store);
   if (!row.failed.empty() && calls_without_process() != before) throw Error(row.failed);
   return json::parse(compare::to_json(row));
 }
@@ -91,7 +92,7 @@ int worker(const CompareRequest& request) {
        }},
       {"cell",
        [&](const json& asked, WorkerReports& reports) {
-         return with_processes([&] { return run_cell(runner, asked, reports); });
+         return with_processes([&] { return run_cell(runner, store, asked, reports); });
        }},
       {"time",
        [&](const json& asked, WorkerReports&) {

@@ -137,9 +137,17 @@ class CellRunner {
                 const std::function<void(const RunEvent&)>& observer);
   void fill(CellRow& row, const Pipeline& pipeline, const Done& done) const;
   Pipeline simulation_of(std::size_t case_index) const;
+  /// For each node of the cell, how many variants have it with the same result.
+  std::vector<std::size_t> variants_with_nodes(const CellIndex& cell, const Pipeline& pipeline);
   /// The nodes of the cell that are not common to all variants. If there is only one variant, all nodes.
   std::set<std::string> own_nodes(const CellIndex& cell, const Pipeline& pipeline);
+  /// The nodes of the cell that others have too: other variants, starts or cases of the experiment.
+  const std::set<std::string>& wanted_by_others(const CellIndex& cell, const Pipeline& pipeline);
+  /// Copies a simulated case from the shared store, or makes it, once among all hosts.
+  void make_case(std::size_t case_index, const std::filesystem::path& folder) const;
   void simulate(std::size_t case_index, const std::filesystem::path& folder) const;
+  /// Gives a case that was made elsewhere its name in the store.
+  void put_case(std::size_t case_index, const std::filesystem::path& made, const std::filesystem::path& folder) const;
 
   const Experiment& experiment_;
   const Catalogue& catalogue_;
@@ -156,6 +164,7 @@ class CellRunner {
     std::shared_ptr<const void> use;  ///< as long as it lives, the store does not remove the folder
   };
   std::map<std::size_t, FoundCase> simulated_;
+  std::map<std::size_t, std::set<std::string>> wanted_;  ///< by variant
 };
 
 }  // namespace marrow::compare

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <string>
+
+#include "marrow/runtime/executor.hpp"
+
+namespace marrow::compare {
+
+/// The reason of the first node that failed, in the pipeline's order.
+std::string reason_of(const Pipeline& pipeline, const RunResult& result);
+
+}  // namespace marrow::compare
