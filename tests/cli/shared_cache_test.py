@@ -36,7 +36,7 @@ class SharedCache(Case):
         out = self.scratch / ("out-%d" % self.runs)
         result = self.marrow("run", self.pipeline, "--out", out, *more, host=host, **environment)
         self.assertEqual(result.returncode, 0, result.stderr)
-        nodes = {node["name"]: node for node in json.loads((out / "run.json").read_text())["nodes"]}
+        nodes = {node["id"]: node for node in json.loads((out / "run.json").read_text())["nodes"]}
         self.stderr, self.number = result.stderr, (out / "outputs" / "number.json").read_bytes()
         return {name: (node["calls"], node["cached"]) for name, node in nodes.items()}
 
@@ -88,9 +88,9 @@ class SharedCache(Case):
 
     def test_only_people_tidy_it_up(self):
         self.run_on("one")
-        self.run_on("one", MARROW_CACHE_GB="0")
-        self.assertEqual(self.results(), [0, 1], "a run tidies up its own host's store only")
-        self.assertIn("0 results removed", self.marrow("cache", "gc", "--keep-gb", 0).stdout)
+        self.run_on("two", MARROW_CACHE_GB="0")
+        self.assertEqual(self.results(host="two"), [0, 1], "a run tidies up its own host's store only")
+        self.assertIn("3 results removed", self.marrow("cache", "gc", "--keep-gb", 0).stdout)
         self.assertEqual(self.results(), [0, 1])
         self.assertIn("1 results removed", self.marrow("cache", "gc", "--shared", "--keep-gb", 0).stdout)
         self.assertEqual(self.results(), [0, 0])
