@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "process_identity.hpp"
+#include "shared_folder.hpp"
 #include "store_folder.hpp"
 #include "waiting.hpp"
 
@@ -58,7 +59,10 @@ std::optional<std::string> claim_text(const fs::path& file) {
   constexpr int kMostTries = 5;
   for (int tries = 0; tries < kMostTries; ++tries) {
     const StoreFile open_file(file);
-    if (!open_file.is_open()) return std::nullopt;
+    if (!open_file.is_open()) {
+      if (open_file.fault() != ENOENT || !is_listed(file)) return std::nullopt;
+      continue;  // this host did not know of it yet
+    }
     std::string text(std::size_t(std::min<std::uint64_t>(open_file.size(), kMost)), '\0');
     if (open_file.read(text.data(), text.size(), 0)) return text;
   }
@@ -172,7 +176,7 @@ Heart& heart() {
 void take_away(const fs::path& file, const std::string& text) {
   const fs::path aside = temporary_beside(file);
   if (std::rename(file.c_str(), aside.c_str()) != 0) return;
-  if (claim_text(aside).value_or(text) != text) link(aside.c_str(), file.c_str());
+  if (claim_text(aside) != text) link(aside.c_str(), file.c_str());
   unlink(aside.c_str());
 }
 
@@ -205,8 +209,8 @@ class Watch {
     pause_ = std::clamp<Seconds>(1.5 * pause_, Seconds(kFirst_s), Seconds(std::min(1.0, claim.seconds / kBeats)));
     return life_of(claim.owner) == Life::ended || unchanged_.count() > claim.seconds;
   }
-  /// What the claim said when it was last read.
-  std::string text() const { return text_.value_or(""); }
+  /// What the claim said when it was last read; nothing if it never could be.
+  const std::optional<std::string>& text() const { return text_; }
   void pause() const { std::this_thread::sleep_for(pause_); }
 
  private:
@@ -247,7 +251,8 @@ SharedClaim claim_file(const fs::path& file, const Permissions& permissions, con
       return {};
     }
     if (watch.is_left(claim_text(file))) {
-      take_away(file, watch.text());
+      if (!watch.text()) return {};  // nobody can tell whose it is: rather make the result twice than wait for ever
+      take_away(file, *watch.text());
       watch = Watch();
       continue;
     }

@@ -38,20 +38,6 @@ Permissions permissions_of(const struct stat& status) {
   return {status.st_mode & 0660, status.st_mode & (S_ISGID | 0770), status.st_gid};
 }
 
-/// Whether the file's name is in its folder. Listing asks the server again. The folder itself may be new to this host.
-bool is_listed(const fs::path& file) {
-  const fs::path folder = file.parent_path();
-  std::error_code error;
-  fs::directory_iterator at(folder, error);
-  if (error) {
-    const fs::directory_iterator above(folder.parent_path(), error);
-    at = fs::directory_iterator(folder, error);
-  }
-  for (const fs::directory_iterator end; !error && at != end; at.increment(error))
-    if (at->path().filename() == file.filename()) return true;
-  return false;
-}
-
 /// Whether an error of opening means only that the file is not there, or is not there any more.
 bool is_absence(int number) { return number == ENOENT || number == ESTALE || number == ELOOP; }
 
@@ -98,6 +84,19 @@ SharedFolderState make_shared(const fs::path& folder) {
   SharedFolderState made = examine_shared(folder);
   if (made.fault.empty()) made.fault = fault;
   return made;
+}
+
+bool is_listed(const fs::path& file) {
+  const fs::path folder = file.parent_path();
+  std::error_code error;
+  fs::directory_iterator at(folder, error);
+  if (error) {
+    const fs::directory_iterator above(folder.parent_path(), error);
+    at = fs::directory_iterator(folder, error);
+  }
+  for (const fs::directory_iterator end; !error && at != end; at.increment(error))
+    if (at->path().filename() == file.filename()) return true;
+  return false;
 }
 
 bool read_shared(const fs::path& file, SharedLook look, const std::function<bool(const StoreFile&)>& use,

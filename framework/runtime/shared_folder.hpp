@@ -24,6 +24,9 @@ SharedFolderState examine_shared(const std::filesystem::path& folder);
 /// Makes a store of an empty folder. Returns what examine_shared() then says.
 SharedFolderState make_shared(const std::filesystem::path& folder);
 
+/// Whether the file's name is in its folder. Listing asks the server again. The folder itself may be new to this host.
+bool is_listed(const std::filesystem::path& file);
+
 /// How far what this host remembers about a folder is relied on. `listed`: it lists the folder first, so that it learns
 /// of new files.
 enum class SharedLook { quick, listed };
