@@ -23,7 +23,9 @@ void pack_case(Archive& out, const Digest& key, const fs::path& folder) {
   for (const auto& entry : fs::recursive_directory_iterator(folder))
     if (entry.is_regular_file() && !entry.is_symlink()) names.push_back(entry.path().lexically_relative(folder));
   std::sort(names.begin(), names.end());
-  EntryDescription description{key, {.node = "simulated case"}, {}, 0};
+  EntryDescription description;
+  description.key = key;
+  description.provenance.node = "simulated case";
   for (const fs::path& name : names) {
     const StoreFile file(folder / name);
     Hasher hasher;

@@ -37,6 +37,14 @@ void set_age(const fs::path& path, std::chrono::hours age) {
   fs::last_write_time(path, fs::file_time_type::clock::now() - age);
 }
 
+/// Of a result that took so long.
+marrow::Provenance took(double seconds) {
+  marrow::Provenance provenance;
+  provenance.node = "test.work";
+  provenance.seconds = seconds;
+  return provenance;
+}
+
 /// A shared folder and the stores of two hosts in front of it.
 class SharedStoreTest : public StoreTest {
  protected:
@@ -52,7 +60,7 @@ class SharedStoreTest : public StoreTest {
     return count;
   }
   void offer(SharedStore& to, const Digest& key, double value, double seconds = 2) {
-    to.offer(key, {number(value)}, {.node = "test.work", .seconds = seconds});
+    to.offer(key, {number(value)}, took(seconds));
   }
   static std::optional<double> value_of(const std::optional<StoredResult>& found) {
     if (!found) return std::nullopt;
@@ -80,7 +88,7 @@ TEST_F(SharedStoreTest, AResultIsCopiedToAHostThatLacksIt) {
 
 TEST_F(SharedStoreTest, ALargeResultIsReadWhereItIs) {
   const auto shared = open();
-  shared->offer(key, {many(300000)}, {.node = "test.work", .seconds = 2});
+  shared->offer(key, {many(300000)}, took(2));
   environment.set("MARROW_CACHE_GB", "0.01");  // a tenth of it is 1 MB, and the result has 1.2 MB
   const Store host(scratch.path / "host", shared);
   const auto found = host.find(key);
@@ -93,8 +101,8 @@ TEST_F(SharedStoreTest, OnlyWhatTakesLongerThanReadingItIsKept) {
   const auto shared = open();
   offer(*shared, hash_of(1), 1, 0.9);
   offer(*shared, hash_of(2), 1, 1.1);
-  shared->offer(hash_of(3), {many(5000000)}, {.node = "test.work", .seconds = 1.9});  // 20 MB
-  shared->offer(hash_of(4), {many(5000000)}, {.node = "test.work", .seconds = 2.1});
+  shared->offer(hash_of(3), {many(5000000)}, took(1.9));  // 20 MB
+  shared->offer(hash_of(4), {many(5000000)}, took(2.1));
   EXPECT_FALSE(fs::exists(file_of(hash_of(1))));
   EXPECT_TRUE(fs::exists(file_of(hash_of(2))));
   EXPECT_FALSE(fs::exists(file_of(hash_of(3))));
@@ -293,7 +301,9 @@ TEST_F(SharedStoreTest, ACaseNeverWritesOutsideItsFolder) {
   const auto shared = open();
   ASSERT_TRUE(shared->accepts());
   for (const char* name : {"../outside", "/tmp/marrow-outside", "a/../../outside", "", "a/", "."}) {
-    marrow::EntryDescription description{key, {.node = "simulated case"}, {}, 4};
+    marrow::EntryDescription description;
+    description.key = key;
+    description.payload = 4;
     description.leaves.push_back({name, 0, 0, true, marrow::hash_of_bytes("text", 4), 0, 4, "", {}});
     ASSERT_EQ(marrow::write_whole(file_of(key),
                                   [&](marrow::Archive& out) {
