@@ -12,7 +12,7 @@
 
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/hash.hpp"
-#include "runtime/text_file.hpp"
+#include "runtime/process_identity.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -21,20 +21,6 @@ namespace fs = std::filesystem;
 using compare::CellRow;
 
 fs::path rows_folder(const fs::path& folder) { return folder / "rows"; }
-
-/// This process among those of all hosts that see the folder. A process number alone is used by several hosts.
-std::string this_process() {
-  char host[256] = "host";
-  gethostname(host, sizeof host - 1);
-  std::string name;
-  for (const char* c = host; *c; ++c) name += std::isalnum(static_cast<unsigned char>(*c)) || *c == '.' ? *c : '_';
-  std::string boot = "0";
-  try {
-    boot = read_text_file("/proc/sys/kernel/random/boot_id", 100).substr(0, 8);
-  } catch (const Error&) {  // no such file in some containers: host and process tell enough
-  }
-  return name + "-" + boot + "-" + std::to_string(getpid());
-}
 
 std::string digest_of(const std::string& text) { return hash_of_bytes(text.data(), text.size()).hex(); }
 

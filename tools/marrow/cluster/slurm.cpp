@@ -223,9 +223,8 @@ std::map<std::string, std::string> reasons_of(const Submission& submission) {
 std::string held_back(const Submission& submission) {
   std::string jobs = submission.gather;
   for (const Submission::Array& array : submission.arrays) jobs += "," + array.job;
-  const ChildEnd end =
-      run_child({"squeue", "--noheader", "--states=PENDING", "--jobs=" + jobs, "--format=%r"}, [] { return false; },
-                Said::kept);
+  const ChildEnd end = run_child(
+      {"squeue", "--noheader", "--states=PENDING", "--jobs=" + jobs, "--format=%r"}, [] { return false; }, Said::kept);
   std::istringstream lines(end.code == 0 ? end.said : "");
   for (std::string reason; std::getline(lines, reason);)
     if (reason.find("held") != std::string::npos || reason.find("Held") != std::string::npos) return reason;
