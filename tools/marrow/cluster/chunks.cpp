@@ -2,6 +2,7 @@
 // How the cells of a comparison are cut into chunks.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "cluster/plan.hpp"
 
