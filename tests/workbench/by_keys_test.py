@@ -106,6 +106,7 @@ class ByKeysTest(WholeWay):
         self.click('[data-do="save"]')
         self.browser.wait("return document.querySelector('[data-saved]').textContent.includes('Saved in')", 120)
         self.click('#pages a[data-page="place"]')
+        self.wait_for_page("place")
         self.click('a[href="#place=mine"]')
         self.browser.wait("return !!document.querySelector('[data-do=register]:not(:disabled)')", 120)
         self.moved_by_keys()
