@@ -7,6 +7,7 @@ import shutil
 import time
 
 import yaml
+from selenium.webdriver import ActionChains
 from selenium.webdriver.common.keys import Keys
 
 import bench
@@ -20,7 +21,7 @@ CHECKED = "return arguments[0].matches('input[type=checkbox], input[type=radio]'
 class ByKeysTest(WholeWay):
     def keys(self, *keys):
         """To whatever has the focus."""
-        self.browser.driver.switch_to.active_element.send_keys(*keys)
+        ActionChains(self.browser.driver, duration=0).send_keys(*keys).perform()
 
     def reach(self, selector):
         """Tab, until the focus is there."""

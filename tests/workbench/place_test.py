@@ -178,12 +178,7 @@ class PageOfCaseTest(PageOfCase, Placing, PageTest):
         self.assertAlmostEqual(new[0] - old[0], 50, delta=0.5)
         self.assertAlmostEqual(new[1] - old[1], -30, delta=0.5)
         before = self.pose()
-        self.touch(
-            "frontal",
-            [(200, 250), (300, 250)],
-            [(215, 215), (285, 285)],
-            [(250, 200), (250, 300)],
-        )
+        self.touch("frontal", [(200, 250), (300, 250)], [(215, 215), (285, 285)], [(250, 200), (250, 300)])
         after = self.kept()
         self.assertAlmostEqual(angle_deg(before, after), 90, delta=1)
 

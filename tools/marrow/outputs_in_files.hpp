@@ -5,8 +5,8 @@
 
 namespace marrow::cli {
 
-/// Throws Error if no file can hold an output: a pipeline that only runs inside the program may have such outputs, but a
-/// run into a folder cannot write them.
+/// Throws Error if no file can hold an output: a pipeline that only runs inside the program may have such outputs, but
+/// a run into a folder cannot write them.
 void expect_files_can_hold(const Pipeline& pipeline, const Catalogue& catalogue);
 
 }  // namespace marrow::cli
