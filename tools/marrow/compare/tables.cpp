@@ -61,7 +61,8 @@ std::map<std::string, std::vector<std::string>> options_by_variant(const Experim
   for (const compare::Variant& variant : experiment.variants) {
     std::map<std::string, std::string> own;
     for (const Override& change : variant.overrides) own[change.key] = change.value;
-    for (const std::string& option : options) values[variant.name].push_back(own[option]);
+    std::vector<std::string>& of_variant = values[variant.name];
+    for (const std::string& option : options) of_variant.push_back(own[option]);
   }
   return values;
 }
