@@ -25,6 +25,7 @@ struct CompareRequest {
   double time_limit_s = 600;
   double memory_limit_mb = 4000;
   std::size_t shown = 8;  ///< cases and starts with pictures in the report
+  double page_mb = 20;    ///< bytes of report.html; pictures that do not fit lie beside it
   bool dry_run = false, no_cache = false, quiet = false;
   bool gather = false;  ///< run no cell: those without a row have failed
   FileLimits file_limits;

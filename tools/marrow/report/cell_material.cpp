@@ -79,10 +79,6 @@ Place next_place(const compare::CellRunner& runner, const std::vector<CellIndex>
   return place;
 }
 
-bool is_part_name(const std::string& name) {
-  return name.size() == 19 && name.ends_with(".js") && name.find_first_not_of("0123456789abcdef") == 16;
-}
-
 }  // namespace
 
 void add_cell_materials(json& data, const compare::CellRunner& runner, const std::vector<CellIndex>& shown,
@@ -101,6 +97,10 @@ void add_cell_materials(json& data, const compare::CellRunner& runner, const std
       bytes += text_of(data["parts"].back()).size() + 1;
     }
   }
+}
+
+bool is_part_name(const std::string& name) {
+  return name.size() == 19 && name.ends_with(".js") && name.find_first_not_of("0123456789abcdef") == 16;
 }
 
 void remove_other_parts(const json& data, const fs::path& folder) {

@@ -11,9 +11,6 @@
 
 namespace marrow::cli {
 
-/// A page of more bytes takes too long to send and to open.
-inline constexpr std::size_t kMostPageBytes = 20'000'000;
-
 /// All cells, as data.js describes a cell_table.
 nlohmann::json cell_table(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
 
@@ -23,10 +20,13 @@ nlohmann::json cell_table(const compare::Experiment& experiment, const std::vect
 /// start at a time is in memory besides the page. Throws Error if a file cannot be written.
 void add_cell_materials(nlohmann::json& data, const compare::CellRunner& runner,
                         const std::vector<compare::CellIndex>& shown, const std::filesystem::path& folder,
-                        std::size_t most_bytes = kMostPageBytes);
+                        std::size_t most_bytes);
 
 /// Removes the files of FOLDER/report that `data` does not list: those of an earlier page. Other files stay.
 void remove_other_parts(const nlohmann::json& data, const std::filesystem::path& folder);
+
+/// Whether a file of FOLDER/report is a part of a page, by its name.
+bool is_part_name(const std::string& name);
 
 /// Bytes of the page with these data.
 std::size_t page_bytes(const nlohmann::json& data);

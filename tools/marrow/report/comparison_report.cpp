@@ -136,7 +136,7 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
   for (const json& plugin : record.value("plugins", json::array()))
     data["experiment"]["plugins"].push_back(
         {{"file", plugin.value("file", "")}, {"build_id", plugin.value("build_id", "")}});
-  add_cell_materials(data, runner, shown, folder);
+  add_cell_materials(data, runner, shown, folder, std::size_t(1e6 * request.page_mb));
   write_page(data, folder / "report.html");
   remove_other_parts(data, folder);
 }

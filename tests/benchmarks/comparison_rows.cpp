@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Fills the folder of a comparison with made-up rows, as if all of its cells had run, so that report_cost.py can
+// measure what tables and page cost.
+//
+//     comparison_rows EXPERIMENT.yaml FOLDER
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <random>
+
+#include "marrow/compare/cell.hpp"
+#include "marrow/compare/experiment.hpp"
+#include "marrow/runtime/catalogue.hpp"
+#include "marrow/runtime/diagnostics.hpp"
+
+namespace {
+
+using namespace marrow;
+
+/// A row as a registration gives it: most are near the truth, some far off, one in a hundred has failed.
+compare::CellRow made_up_row(const compare::Experiment& experiment, const compare::CellIndex& cell,
+                             std::mt19937& draw) {
+  std::uniform_real_distribution<double> share(0, 1);
+  if (share(draw) < 0.01)
+    return compare::failed_row(experiment, cell, "node 'shaft' failed: 0 pairs of borders in view 'lateral'", 2);
+  compare::CellRow row;
+  compare::name_row(row, experiment, cell);
+  row.initial_error = 20 * share(draw);
+  const double error_mm = share(draw) < 0.9 ? 0.5 * std::exp(0.4 * share(draw)) : *row.initial_error + 2;
+  for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
+    row.values.emplace_back(error_mm * (0.5 + share(draw)));
+    row.units.push_back("mm");
+  }
+  row.evaluations = int(1000 + 1000 * share(draw));
+  for (const char* node : {"case", "bone", "model", "edges", "shaft", "start", "outline", "cost", "optimizer", "pose",
+                           "errors", "verdict"})
+    row.nodes[node] = {1, 1, share(draw)};
+  return row;
+}
+
+}  // namespace
+
+int main(int count, char** arguments) {
+  if (count != 3) {
+    std::fprintf(stderr, "usage: comparison_rows EXPERIMENT.yaml FOLDER\n");
+    return 2;
+  }
+  const Catalogue catalogue;
+  Diagnostics diagnostics;
+  const compare::Experiment experiment = compare::read_experiment(arguments[1], catalogue, diagnostics);
+  if (!diagnostics.empty()) {
+    std::fprintf(stderr, "%s has faults: marrow compare %s --dry-run says which\n", arguments[1], arguments[1]);
+    return 2;
+  }
+  const std::filesystem::path folder = arguments[2];
+  compare::CellRunner runner(experiment, catalogue, nullptr, folder, 1);
+  runner.keep_dependencies();
+  std::mt19937 draw(7);
+  for (const compare::CellIndex& cell : compare::cells_of(experiment)) {
+    compare::CellRow row = made_up_row(experiment, cell, draw);
+    row.key = runner.key_of(cell);
+    runner.write(cell, row);
+  }
+}
