@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Fills the folder of a comparison with made-up rows, as if all of its cells had run, so that report_cost.py can
-// measure what tables and page cost.
+// measure what tables and page cost. The keys of rows depend on the libraries of the program that makes them. So this
+// is loaded into marrow itself, where it does its work before main():
 //
-//     comparison_rows EXPERIMENT.yaml FOLDER
+//     MADE_UP_ROWS_OF=EXPERIMENT.yaml MADE_UP_ROWS_IN=FOLDER LD_PRELOAD=.../comparison_rows.so marrow
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <random>
 
@@ -38,21 +40,14 @@ compare::CellRow made_up_row(const compare::Experiment& experiment, const compar
   return row;
 }
 
-}  // namespace
-
-int main(int count, char** arguments) {
-  if (count != 3) {
-    std::fprintf(stderr, "usage: comparison_rows EXPERIMENT.yaml FOLDER\n");
-    return 2;
-  }
+void write_rows(const std::filesystem::path& file, const std::filesystem::path& folder) {
   const Catalogue catalogue;
   Diagnostics diagnostics;
-  const compare::Experiment experiment = compare::read_experiment(arguments[1], catalogue, diagnostics);
+  const compare::Experiment experiment = compare::read_experiment(file, catalogue, diagnostics);
   if (!diagnostics.empty()) {
-    std::fprintf(stderr, "%s has faults: marrow compare %s --dry-run says which\n", arguments[1], arguments[1]);
-    return 2;
+    std::fprintf(stderr, "%s has faults: marrow compare %s --dry-run says which\n", file.c_str(), file.c_str());
+    std::_Exit(2);
   }
-  const std::filesystem::path folder = arguments[2];
   compare::CellRunner runner(experiment, catalogue, nullptr, folder, 1);
   runner.keep_dependencies();
   std::mt19937 draw(7);
@@ -62,3 +57,15 @@ int main(int count, char** arguments) {
     runner.write(cell, row);
   }
 }
+
+__attribute__((constructor)) void before_main() {
+  const char *file = std::getenv("MADE_UP_ROWS_OF"), *folder = std::getenv("MADE_UP_ROWS_IN");
+  if (!file || !folder) return;
+  unsetenv("LD_PRELOAD");  // keys depend on it, too
+  const std::filesystem::path experiment = file, out = folder;
+  unsetenv("MADE_UP_ROWS_OF");
+  write_rows(experiment, out);
+  std::_Exit(0);
+}
+
+}  // namespace

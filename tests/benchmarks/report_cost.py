@@ -62,8 +62,9 @@ def measure(build, cells, folder, window):
     environment = dict(
         os.environ, MARROW_PLUGIN_PATH=str(build / "tests" / "plugins"), MARROW_CACHE=str(folder / "cache")
     )
-    rows = build / "bin" / "comparison_rows"
-    subprocess.run([rows, experiment, out], env=environment, check=True)
+    rows = {"LD_PRELOAD": str(build / "lib" / "comparison_rows.so")}
+    rows |= {"MADE_UP_ROWS_OF": str(experiment), "MADE_UP_ROWS_IN": str(out)}
+    subprocess.run([build / "bin" / "marrow"], env=dict(environment, **rows), check=True)
     command = [build / "bin" / "marrow", "compare", experiment, "--out", out, "--shown", "0", "--quiet"]
     seconds, memory_mb = measured(command, environment)
     page = out / "report.html"

@@ -163,7 +163,8 @@ class ManyCellsTest(BrowserTest):
 
     def test_find_is_the_filter(self):
         self.browser.open(self.page)
-        find = """const event = new KeyboardEvent('keydown', {key: 'f', ctrlKey: true, bubbles: true, cancelable: true});
+        find = """const how = {key: 'f', ctrlKey: true, bubbles: true, cancelable: true};
+            const event = new KeyboardEvent('keydown', how);
             document.activeElement.dispatchEvent(event);
             return [event.defaultPrevented, document.activeElement.type === 'search']"""
         self.assertEqual(self.browser.js(find), [False, False], "the table is not in sight")

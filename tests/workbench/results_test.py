@@ -134,7 +134,7 @@ class RequestTest(ResultsBench):
     def test_only_parts_of_a_report_are_given(self):
         name = "0123456789abcdef.js"
         folder = self.folder / "compared" / "report"
-        folder.mkdir(exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text('Parts.take("%s",\n{}\n);\n' % name)
         status, headers, content = self.server.ask(
             "GET", self.address("/results/part.txt", folder="compared", file=name)
