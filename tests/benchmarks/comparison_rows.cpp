@@ -19,12 +19,11 @@ namespace {
 
 using namespace marrow;
 
-/// A row as a registration gives it: most are near the truth, some far off, one in a hundred has failed.
+/// A row as a registration gives it: most are near the truth, some far off. None has failed, because marrow would run
+/// the cell again.
 compare::CellRow made_up_row(const compare::Experiment& experiment, const compare::CellIndex& cell,
                              std::mt19937& draw) {
   std::uniform_real_distribution<double> share(0, 1);
-  if (share(draw) < 0.01)
-    return compare::failed_row(experiment, cell, "node 'shaft' failed: 0 pairs of borders in view 'lateral'", 2);
   compare::CellRow row;
   compare::name_row(row, experiment, cell);
   row.initial_error = 20 * share(draw);
