@@ -38,21 +38,18 @@ variants: %s
 
 
 class Page(Case):
-    def compare(self, *arguments):
-        result = marrow(
-            "compare",
-            "e.yaml",
-            "--out",
-            "out",
-            "--quiet",
-            *arguments,
-            plugins=[TEST_PLUGINS],
-            extra_environment={"MARROW_CACHE": str(self.scratch / "cache")},
-            cwd=self.scratch
-        )
+    def marrow(self, *arguments):
+        cache = {"MARROW_CACHE": str(self.scratch / "cache")}
+        result = marrow(*arguments, plugins=[TEST_PLUGINS], extra_environment=cache, cwd=self.scratch)
         self.assertEqual(result.returncode, 0, result.stderr)
+
+    def data_of(self, page):
+        return json.loads(re.search(r'id="data">(.*?)</script>', page.read_text(), re.S).group(1))
+
+    def compare(self, *arguments):
+        self.marrow("compare", "e.yaml", "--out", "out", "--quiet", *arguments)
         self.page = self.scratch / "out" / "report.html"
-        return json.loads(re.search(r'id="data">(.*?)</script>', self.page.read_text(), re.S).group(1))
+        return self.data_of(self.page)
 
     def with_pictures(self):
         noise = random.Random(7)
@@ -103,6 +100,16 @@ class Page(Case):
         self.assertEqual(others, sorted(part["file"] for part in data["parts"]), "those of an earlier page go")
         self.compare()
         self.assertEqual([path.name for path in self.parts()], ["notes.txt"])
+
+    def test_pictures_of_a_cell_that_has_none(self):
+        self.with_pictures()
+        data = self.compare("--shown", "0")
+        self.assertEqual((data["materials"], data["parts"], data["pictures"]), ([], [], {}))
+        # The commands that the page gives for such a cell.
+        self.marrow("cell", data["experiment"]["file"], "--out", data["experiment"]["out"], "y/b/0")
+        self.marrow("show", data["experiment"]["folder"] + "/pictures/y/b/0")
+        shown = self.data_of(self.scratch / "out" / "pictures" / "y" / "b" / "0" / "report.html")
+        self.assertEqual(len(shown["pictures"]), 1)
 
     def test_worst_median_failed_and_best_are_shown(self):
         self.write("p.yaml", NUMBERS)
