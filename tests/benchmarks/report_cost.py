@@ -5,9 +5,10 @@ number of cells, with made-up rows, as if all cells had run.
 
     tests/benchmarks/report_cost.py BUILD [CELLS ...]
 
-Prints a row for each number of cells: the seconds and the peak memory of `marrow compare`, which finds all cells there
-and writes tables and page; the size of the page; and how long headless Chromium takes until the page is ready (the best
-of three), with the load of the machine. Times include the reading of all rows and the check that they still hold.
+Prints a row for each number of cells: the seconds, the seconds of processor time and the peak memory of `marrow
+compare`, which finds all cells there and writes tables and page; the size of the page; and how many seconds headless
+Chromium takes until the page is ready (the best of three). The load of the machine is printed beside it. Times include
+the reading of all rows and the check that they still hold.
 """
 import os
 import pathlib
@@ -42,12 +43,12 @@ variants:
 
 
 def measured(command, environment):
-    """Seconds and peak memory (MB) of a command, without its workers."""
+    """Seconds, seconds of processor time and peak memory (MB) of a command."""
     begin = time.monotonic()
     process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)
     assert status == 0, command
-    return time.monotonic() - begin, usage.ru_maxrss / 1024
+    return time.monotonic() - begin, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
 
 
 def measure(build, cells, folder, window):
@@ -66,11 +67,12 @@ def measure(build, cells, folder, window):
     rows |= {"MADE_UP_ROWS_OF": str(experiment), "MADE_UP_ROWS_IN": str(out)}
     subprocess.run([build / "bin" / "marrow"], env=dict(environment, **rows), check=True)
     command = [build / "bin" / "marrow", "compare", experiment, "--out", out, "--shown", "0", "--quiet"]
-    seconds, memory_mb = measured(command, environment)
+    seconds, processor_s, memory_mb = measured(command, environment)
     page = out / "report.html"
     ready = min(window.open(page) for _ in range(3)) if window else float("nan")
     size_mb = page.stat().st_size / 1e6
-    print("| %6d | %6.1f | %5.0f | %5.1f | %5.2f |" % (cells, seconds, memory_mb, size_mb, ready), flush=True)
+    row = (cells, seconds, processor_s, memory_mb, size_mb, ready)
+    print("| %6d | %6.1f | %6.1f | %5.0f | %5.1f | %5.2f |" % row, flush=True)
     print("load %.1f" % os.getloadavg()[0], file=sys.stderr)
 
 
