@@ -239,7 +239,7 @@ void check_writers(const Pipeline& pipeline, const Catalogue& catalogue, Diagnos
     if (output.source.node < 0) continue;  // it names nothing that is there; this was already reported
     const PipelineNode& node = pipeline.nodes[std::size_t(output.source.node)];
     const TypeInfo& type = node.info.outputs[std::size_t(output.source.output)].type;
-    if (catalogue.find_writer(type) || (type.is_function && pipeline.only_inside)) continue;
+    if (catalogue.find_writer(type) || pipeline.only_inside) continue;
     if (type.is_function)
       diagnostics.add(output.source.place,
                       "output '" + output.name + "' is a function (" + type.id + "), which no file can hold",

@@ -61,7 +61,7 @@ class OnlyInsideTest(unittest.TestCase):
         self.assertEqual(
             ran.stdout,
             "p.yaml: good; 2 nodes, 2 outputs\n"
-            "  note: no command runs it, but the program itself (only_inside): outputs may be functions\n",
+            "  note: no command runs it, but the program itself (only_inside): no file need hold its outputs\n",
         )
         ran = self.marrow("run", "p.yaml")
         self.assertNotEqual(ran.returncode, 0)

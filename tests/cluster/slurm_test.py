@@ -29,11 +29,22 @@ def tasks():
     return found
 
 
+def is_idle():
+    """Whether no job waits, runs or ends."""
+    listed = subprocess.run(["squeue", "-h"], capture_output=True, text=True)
+    return listed.returncode == 0 and not listed.stdout
+
+
 class OnSlurm(Cluster):
     def setUp(self):
         super().setUp()
         self.profile = self.write("profile.yaml", PROFILE)
         self.out = self.scratch / "out"
+
+    def tearDown(self):
+        subprocess.run(["scancel", "--user=root"], check=True)
+        wait_until(is_idle, "the cluster goes on")
+        super().tearDown()
 
     def submit(self, *arguments, code=0):
         return self.compare("out", "--on", "slurm", "--profile", self.profile, *arguments, code=code)
@@ -71,7 +82,7 @@ class OnSlurm(Cluster):
         self.assertTrue((self.out / "report.html").exists())
 
     def test_killed_tasks_and_controller(self):
-        self.experiment("0.1")
+        self.experiment("0.2")
         process = self.start()
         wait_until(tasks, "no task came")
         for _ in range(2):
@@ -79,6 +90,7 @@ class OnSlurm(Cluster):
             for task in tasks():
                 os.kill(task, signal.SIGKILL)
             time.sleep(1)
+        time.sleep(8)  # until the controller has saved that the jobs are there
         self.daemon("kill", "slurmctld")
         time.sleep(2)
         self.daemon("start", "slurmctld")
@@ -100,8 +112,8 @@ class OnSlurm(Cluster):
         self.assertEqual(process.returncode, 130, said)
         self.assertIn("its tasks were cancelled; the same command goes on from here", said)
         wait_until(lambda: not tasks(), "tasks go on")
-        self.assertEqual(subprocess.run(["squeue", "-h"], capture_output=True, text=True).stdout, "")
-        said = self.submit("--wait").stdout
+        wait_until(is_idle, "the cluster goes on")
+        self.submit("--wait")
         self.local()
         self.expect_same("out", "local")
 
@@ -133,7 +145,7 @@ class OnSlurm(Cluster):
         self.assertIn("sbatch failed", said)
         self.assertIn("partition", said)
         self.assertFalse((self.out / "slurm.json").exists())
-        self.assertEqual(subprocess.run(["squeue", "-h"], capture_output=True, text=True).stdout, "")
+        self.assertTrue(is_idle())
 
     def test_time_limit_of_the_cluster(self):
         if not ALL:

@@ -9,6 +9,7 @@
 #include "landmarks_node.hpp"
 #include "marrow/toolbox/calibration/board.hpp"
 #include "marrow/toolbox/files/calibration_file.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
 #include "marrow/toolbox/files/points_file.hpp"
 #include "target.hpp"
 
@@ -32,7 +33,8 @@ void put_case_files() {
 }
 
 void read(char format, std::string_view text) {
-  if (format == 'c') put("case/case.yaml", text), read_case({marrow::fuzz::folder() / "case"});
+  marrow::Context context;
+  if (format == 'c') put("case/case.yaml", text), read_case({marrow::fuzz::folder() / "case"}, context);
   if (format == 'm') marrow::files::read_camera_file(put("a.yaml", text));
   if (format == 'x') marrow::files::read_camera_file(put("a.txt", text));
   if (format == 'k') marrow::files::read_calibration_file(put("a.yaml", text));

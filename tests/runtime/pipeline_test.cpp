@@ -89,7 +89,7 @@ TEST_F(PipelineTest, AnEmptyPathStaysEmpty) {
   const std::string text =
       "marrow: 1\ninputs: {x: {type: path, default: \"\"}}\nnodes:\n  c: {uses: test.constant, with: {path: $x}}\n"
       "outputs: {c: c}\n";
-  for (const PipelineArguments& arguments : {PipelineArguments{}, PipelineArguments{{{"x", ""}}, {}}}) {
+  for (const auto& arguments : {marrow::PipelineArguments{}, marrow::PipelineArguments{{{"x", ""}}, {}}}) {
     const Pipeline p = read(text, arguments);
     ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
     EXPECT_EQ(std::get<std::string>(p.nodes[0].options[6]), "") << "not the folder of the pipeline";

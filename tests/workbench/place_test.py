@@ -169,6 +169,24 @@ class PageOfCaseTest(PageOfCase, Placing, PageTest):
         self.assertLess(math.dist(*turned), 1e-9)
         self.assertGreater(angle_deg(before, after), 5)
 
+    def test_one_finger_moves_and_two_turn(self):
+        self.place()
+        camera, before = self.camera("frontal"), self.pose()
+        self.touch("frontal", [(250, 250)], [(270, 240)], [(300, 220)])
+        after = self.kept()
+        old, new = (seen(camera, self.middle(pose)) for pose in (before, after))
+        self.assertAlmostEqual(new[0] - old[0], 50, delta=0.5)
+        self.assertAlmostEqual(new[1] - old[1], -30, delta=0.5)
+        before = self.pose()
+        self.touch(
+            "frontal",
+            [(200, 250), (300, 250)],
+            [(215, 215), (285, 285)],
+            [(250, 200), (250, 300)],
+        )
+        after = self.kept()
+        self.assertAlmostEqual(angle_deg(before, after), 90, delta=1)
+
     def test_keys_move_by_the_chosen_step(self):
         self.place()
         camera = self.camera("frontal")

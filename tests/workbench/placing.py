@@ -92,8 +92,9 @@ class PageOfCase:
         self.browser.wait("return !PlacePage.current().keyMoves && !PlacePage.current().isKeeping")
         return self.js("return PlacePage.current().draft.document.fragments[arguments[0]].start", self.bone)
 
-    def pointer(self, kind, view, pixel, button="left", modifiers=0):
-        place = self.js(
+    def place_of(self, view, pixel):
+        """Where a pixel of the X-ray is in the window."""
+        return self.js(
             "const view = PlacePage.current().views.find((one) => one.name === arguments[0]);"
             "const r = view.canvas.getBoundingClientRect(), camera = view.camera;"
             "return [r.left + (arguments[1][0] + 0.5) / camera.width_px * r.width,"
@@ -101,6 +102,26 @@ class PageOfCase:
             view,
             pixel,
         )
+
+    def touch(self, view, *steps):
+        """Fingers that come down at the first step, move from step to step and leave. A step is a pixel a finger."""
+        send = lambda kind, pixels: self.browser.driver.execute_cdp_cmd(
+            "Input.dispatchTouchEvent",
+            {
+                "type": kind,
+                "touchPoints": [
+                    dict(zip("xy", self.place_of(view, pixel)), id=finger) for finger, pixel in enumerate(pixels)
+                ],
+            },
+        )
+        for fingers in range(1, len(steps[0]) + 1):
+            send("touchStart", steps[0][:fingers])
+        for pixels in steps[1:]:
+            send("touchMove", pixels)
+        send("touchEnd", [])
+
+    def pointer(self, kind, view, pixel, button="left", modifiers=0):
+        place = self.place_of(view, pixel)
         self.browser.driver.execute_cdp_cmd(
             "Input.dispatchMouseEvent",
             {

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include "marrow/runtime/catalogue.hpp"
 #include "marrow/runtime/pipeline.hpp"
 
 namespace marrow::cli {
 
-/// Throws Error if an output is a function: a pipeline that only runs inside the program may have such outputs, but a
+/// Throws Error if no file can hold an output: a pipeline that only runs inside the program may have such outputs, but a
 /// run into a folder cannot write them.
-void expect_files_can_hold(const Pipeline& pipeline);
+void expect_files_can_hold(const Pipeline& pipeline, const Catalogue& catalogue);
 
 }  // namespace marrow::cli

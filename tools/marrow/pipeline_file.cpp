@@ -101,7 +101,7 @@ int check(const PipelineRequest& request, bool json) {
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
     if (!needed[i]) std::printf("  note: %s feeds no output and is not run\n", pipeline.nodes[i].id.c_str());
   if (pipeline.only_inside)
-    std::printf("  note: no command runs it, but the program itself (only_inside): outputs may be functions\n");
+    std::printf("  note: no command runs it, but the program itself (only_inside): no file need hold its outputs\n");
   for (const std::string& note : pipeline.notes) std::printf("  note: %s\n", printable(note).c_str());
   return 0;
 }

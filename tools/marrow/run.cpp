@@ -229,14 +229,16 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   return outcome;
 }
 
-void expect_files_can_hold(const Pipeline& pipeline) {
-  for (const PipelineOutput& output : pipeline.outputs)
-    if (pipeline.nodes[std::size_t(output.source.node)]
-            .info.outputs[std::size_t(output.source.output)]
-            .type.is_function)
-      throw Error(printable(pipeline.file.string()) + ": output '" + output.name +
-                  "' is a function, which no file can hold; the program itself runs this pipeline (only_inside): name "
-                  "other outputs with --only");
+void expect_files_can_hold(const Pipeline& pipeline, const Catalogue& catalogue) {
+  for (const PipelineOutput& output : pipeline.outputs) {
+    const TypeInfo& type =
+        pipeline.nodes[std::size_t(output.source.node)].info.outputs[std::size_t(output.source.output)].type;
+    if (!catalogue.find_writer(type))
+      throw Error(printable(pipeline.file.string()) + ": output '" + output.name + "' is " +
+                  (type.is_function ? "a function" : "of the type " + std::string(type.id)) +
+                  ", which no file can hold; the program itself runs this pipeline (only_inside): name other outputs "
+                  "with --only");
+  }
 }
 
 void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& folder, const Store* store) {
@@ -278,7 +280,7 @@ int run(const RunRequest& request) {
   const Catalogue catalogue;
   Pipeline pipeline;
   if (!load(request.pipeline, catalogue, pipeline, true) || !keep_outputs(pipeline, request.only)) return 2;
-  expect_files_can_hold(pipeline);
+  expect_files_can_hold(pipeline, catalogue);
   if (is_stopped) {
     std::fprintf(stderr, "marrow: %s before anything was made\n", stopped_text().c_str());
     return 130;

@@ -147,7 +147,7 @@ Json pipeline_schema(const Catalogue& catalogue) {
             {"help", {{"type", "string"}, {"description", "what the pipeline does, and for which data"}}},
             {"only_inside",
              {{"type", "boolean"},
-              {"description", "no command runs it, but the program itself, so its outputs may be functions"}}},
+              {"description", "no command runs it, but the program itself, so no file need hold its outputs"}}},
             {"inputs", inputs},
             {"nodes", nodes},
             {"outputs", outputs}}}};

@@ -168,6 +168,8 @@ const Shell = (() => {
     }
     if (event.target.matches && event.target.matches('input[type="range"]') && /^(Arrow|Page|Home|End)/.test(event.key))
       return;  // they move the slider
+    const button = event.target.closest && event.target.closest('a, button, summary, [role="button"]');
+    if (button && /^( |Enter)$/.test(event.key)) return;  // it is pressed
     if (types && !event.ctrlKey && !event.metaKey) return;
     if (types && !event.target.matches('select') && /^Ctrl\+[zyZ]$/.test(name)) return;  // the field's own undo
     if (name === '?') return void showKeys();

@@ -44,20 +44,20 @@ DistortedCamera read_camera(const std::filesystem::path& path, const CameraReadi
   const CameraFormat format = camera_format(path);
   check_needed(path, reading, format);
   if (format == CameraFormat::plastimatch) return {read_plastimatch_camera(path, reading.size), {}};
-  DistortedCamera read;
+  DistortedCamera found;
   if (format == CameraFormat::own) {
-    read = files::read_camera_file(path);
+    found = files::read_camera_file(path);
   } else {
     const int number = reading.projection >= 0 ? reading.projection : only_projection(path);
-    read.camera = read_projections(path, {number}, reading.size, reading.mirror)[0];
+    found.camera = read_projections(path, {number}, reading.size, reading.mirror)[0];
   }
-  if (reading.size.size_px.empty()) return read;
+  if (reading.size.size_px.empty()) return found;
   const Eigen::Vector2i size = size_px(reading.size, path.string());
-  if (size.x() != read.camera.width_px || size.y() != read.camera.height_px)
-    throw Error(path.string() + ": this camera is of images of " + std::to_string(read.camera.width_px) + " x " +
-                std::to_string(read.camera.height_px) + " pixels, but the image has " + std::to_string(size.x()) +
+  if (size.x() != found.camera.width_px || size.y() != found.camera.height_px)
+    throw Error(path.string() + ": this camera is of images of " + std::to_string(found.camera.width_px) + " x " +
+                std::to_string(found.camera.height_px) + " pixels, but the image has " + std::to_string(size.x()) +
                 " x " + std::to_string(size.y()));
-  return read;
+  return found;
 }
 
 }  // namespace marrow::exchange

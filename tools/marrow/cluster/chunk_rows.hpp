@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The files in which the tasks of a cluster leave the rows of their cells: FOLDER/rows/CHUNK.jsonl. While a task runs,
-// its file is CHUNK.PROCESS.part, by which it is known among the processes of all hosts. It is renamed when all rows are
-// there. Each line has a digest of itself, so the rows of a task that was killed count too.
+// its file is CHUNK.PROCESS.part, by which it is known among the processes of all hosts. It is renamed when all rows
+// are there. Each line has a digest of itself, so the rows of a task that was killed count too.
 #include <filesystem>
 #include <map>
 #include <optional>

@@ -227,7 +227,8 @@ std::string held_back(const Submission& submission) {
       {"squeue", "--noheader", "--states=PENDING", "--jobs=" + jobs, "--format=%r"}, [] { return false; }, Said::kept);
   std::istringstream lines(end.code == 0 ? end.said : "");
   for (std::string reason; std::getline(lines, reason);)
-    if (reason.find("held") != std::string::npos || reason.find("Held") != std::string::npos) return reason;
+    if (reason.find("requeued held") != std::string::npos || reason.find("JobHeldAdmin") != std::string::npos)
+      return reason;
   return "";
 }
 

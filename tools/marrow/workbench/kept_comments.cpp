@@ -44,7 +44,7 @@ std::optional<std::vector<double>> transform_of(const YAML::Node& map) {
   return numbers;
 }
 
-bool is_same(const YAML::Node& a, const YAML::Node& b) {
+bool says_same(const YAML::Node& a, const YAML::Node& b) {
   if (a.Type() != b.Type()) return false;
   if (a.IsScalar()) return is_same_scalar(a, b);
   if (a.IsMap())
@@ -52,12 +52,12 @@ bool is_same(const YAML::Node& a, const YAML::Node& b) {
   if (a.size() != b.size()) return false;
   if (a.IsSequence()) {
     for (std::size_t i = 0; i < a.size(); ++i)
-      if (!is_same(a[i], b[i])) return false;
+      if (!says_same(a[i], b[i])) return false;
     return true;
   }
   for (const auto& entry : a) {
     const YAML::Node other = b[entry.first.Scalar()];
-    if (!other.IsDefined() || !is_same(entry.second, other)) return false;
+    if (!other.IsDefined() || !says_same(entry.second, other)) return false;
   }
   return true;
 }
@@ -155,13 +155,13 @@ class Merge {
 
   void merge_values(const YamlEntryText& before, const YamlEntryText& after) {
     const YAML::Node &old = before.value, &now = after.value;
-    if (is_same(old, now)) return;
+    if (says_same(old, now)) return;
     const bool in_block = old.IsMap() && now.IsMap() && old.size() > 0 && !older_.is_flow(old) && now.size() > 0;
     const bool is_transform = in_block && transform_of(old);
     if (in_block && !is_transform) return merge_maps(old, now);
     if (!has_same_beginning(old, now)) return replace(before, after);
     for (std::size_t i = 0; i < old.size(); ++i)
-      if (!is_same(old[i], now[i])) merge_maps(old[i], now[i]);
+      if (!says_same(old[i], now[i])) merge_maps(old[i], now[i]);
     if (now.size() > old.size()) append_items(before, after);
   }
 
@@ -171,7 +171,7 @@ class Merge {
     for (std::size_t i = 0; i < old.size(); ++i) {
       if (!old[i].IsMap() || !now[i].IsMap() || older_.is_flow(old[i]) || !old[i]["name"] || !now[i]["name"])
         return false;
-      if (!is_same(old[i]["name"], now[i]["name"])) return false;
+      if (!says_same(old[i]["name"], now[i]["name"])) return false;
     }
     return true;
   }
@@ -214,7 +214,7 @@ KeptText with_comments_of(const std::string& older, const std::string& newer) {
   try {
     Merge merge(older, newer);
     kept.text = merge.text();
-    if (!is_same(parse_yaml(kept.text, {.aliases = false}), parse_yaml(newer, {.aliases = false}))) kept.text.clear();
+    if (!says_same(parse_yaml(kept.text, {.aliases = false}), parse_yaml(newer, {.aliases = false}))) kept.text.clear();
   } catch (const std::exception&) {
     kept.text.clear();
   }

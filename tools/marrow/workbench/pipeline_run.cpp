@@ -83,7 +83,7 @@ json plan_of(const Pipeline& pipeline, const Workbench& workbench) {
 
 json run_into_folder(std::shared_ptr<LastRun> run, const PipelineArguments& arguments, const Workbench& workbench,
                      Job& job) {
-  cli::expect_files_can_hold(run->pipeline);
+  cli::expect_files_can_hold(run->pipeline, workbench.catalogue);
   const std::filesystem::path runs = workbench.folder.inside("runs");
   expect_nothing_reads(run->pipeline, runs, "the folder of the runs", "open a folder above it");
   RunSettings settings;

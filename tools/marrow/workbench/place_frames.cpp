@@ -69,7 +69,7 @@ std::vector<ViewFrames> frames_in(const json& views, const PlacedCase& placed) {
 fs::path camera_file_of(const Workbench& workbench, const PlacedCase& placed, const std::string& view) {
   const json document = document_of_case(workbench.folder, placed.path);
   for (const json& one : document.at("views"))
-    if (one.at("name") == view) return camera_file(workbench, one.value("camera", json()), one.value("image", ""));
+    if (one.at("name") == view) return camera_file(workbench, one.value("camera", json()), one.at("image"));
   throw Error("case.yaml has no view " + in_quotes(printable(view)) + " any more; open the case again");
 }
 

@@ -1,0 +1,143 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""The whole way without a mouse: from a DICOM CT, two X-rays and the C-arm's angles to a pose that was moved by hand and
+registered, and to another node in a pipeline. Everything is reached by Tab and used by keys, as a person would do it."""
+import json
+import shutil
+import time
+
+import yaml
+from selenium.webdriver.common.keys import Keys
+
+import bench
+from bench import SOURCE
+from whole_way_test import WholeWayTest as WholeWay
+
+MOST_TABS = 400
+CHECKED = "return arguments[0].matches('input[type=checkbox], input[type=radio]')"
+
+
+class ByKeysTest(WholeWay):
+    def keys(self, *keys):
+        """To whatever has the focus."""
+        self.browser.driver.switch_to.active_element.send_keys(*keys)
+
+    def reach(self, selector):
+        """Tab, until the focus is there."""
+        self.css(selector)
+        for _ in range(MOST_TABS):
+            if self.browser.js("return !!document.activeElement.matches(%s)" % json.dumps(selector)):
+                return self.browser.driver.switch_to.active_element
+            self.keys(Keys.TAB)
+        self.fail("Tab never reaches " + selector)
+
+    def click(self, selector):
+        """What a click does is done by Enter, or by the space bar."""
+        element = self.reach(selector)
+        if self.browser.js(
+            "return arguments[0].matches('input:not([type=checkbox]):not([type=radio]), canvas')", element
+        ):
+            return
+        element.send_keys(Keys.SPACE if self.browser.js(CHECKED, element) else Keys.ENTER)
+
+    def add_fragment(self, name, seed_mm):
+        box = 'section[aria-label="Fragments"] input[type="text"]'
+        self.reach(box).send_keys(name + Keys.ENTER)
+        self.until(lambda document: name in document["fragments"])
+        self.click('[data-tool="seed %s"]' % name)
+        index = [
+            round((mm - origin) / spacing)
+            for mm, origin, spacing in zip(seed_mm, self.grid["origin_mm"], self.grid["spacing_mm"])
+        ]
+        self.reach('[data-slice="axial"]')
+        self.go("axial", index[2], Keys.PAGE_UP)
+        self.go("sagittal", index[0], Keys.ARROW_RIGHT)
+        self.go("coronal", index[1], Keys.ARROW_DOWN)
+        self.keys(Keys.ENTER)
+        self.until(lambda document: document["fragments"][name]["seeds"])
+
+    def go(self, slices, wanted, more):
+        """Moves the crosshair until the other slices show what is wanted. `more` leads to a higher number, or a lower."""
+        less = {Keys.PAGE_UP: Keys.PAGE_DOWN, Keys.ARROW_RIGHT: Keys.ARROW_LEFT, Keys.ARROW_DOWN: Keys.ARROW_UP}[more]
+        shown = lambda: int(self.browser.js("return document.querySelector('[data-slice=%s]').dataset.shown" % slices))
+        begin = shown()
+        if begin == wanted:
+            return
+        self.keys(more)
+        self.browser.wait("return document.querySelector('[data-slice=%s]').dataset.shown !== '%d'" % (slices, begin))
+        if shown() < begin:
+            more, less = less, more
+        way = wanted - shown()
+        for _ in range(abs(way)):
+            self.keys(more if way > 0 else less)
+        self.browser.wait("return document.querySelector('[data-slice=%s]').dataset.shown === '%d'" % (slices, wanted))
+
+    def add_view(self, view, beta_deg):
+        self.click('[data-do="add-view"]')
+        self.click('#dialog [data-choose="%s"]' % view["image"])
+        self.click("#dialog details summary")
+        for key, value in (("beta_deg", beta_deg), ("pixel_mm", 0.586)):
+            box = self.reach('#dialog [data-arm="%s"]' % key)
+            box.send_keys(Keys.CONTROL + "a")
+            box.send_keys(str(value))
+        self.keys(Keys.ENTER)
+        self.until(lambda document: any(one["name"] == view["name"] for one in document["views"]))
+
+    def moved_by_keys(self):
+        """The bone, a step to the left in the first view and back, and turned about its axis: the draft has it."""
+        self.reach(".place-canvas")
+        before = self.browser.js("return PlacePage.current().placed.distal")
+        self.keys(Keys.ARROW_LEFT, "a", "q", "w", "r")
+        self.until(lambda document: document["fragments"]["distal"].get("start") not in (None, before))
+        self.keys("f", "s", "e", "d", Keys.ARROW_RIGHT)
+        self.browser.wait("return !PlacePage.current().keyMoves && !PlacePage.current().isKeeping")
+
+    def test_from_dicom_to_a_pose(self):
+        server = self.open()
+        self.show(server, "case=mine")
+        self.choose_ct()
+        for name, fragment in self.given["fragments"].items():
+            self.add_fragment(name, fragment["seeds"][0])
+        for name, fragment in self.given["fragments"].items():
+            if not fragment.get("register", True):
+                self.click('[data-fragment="%s"] input[type="checkbox"]' % name)
+        for view, beta_deg in zip(self.given["views"], (0, 90)):
+            self.add_view(view, beta_deg)
+        self.click('[data-do="save"]')
+        self.browser.wait("return document.querySelector('[data-saved]').textContent.includes('Saved in')", 120)
+        self.click('#pages a[data-page="place"]')
+        self.wait_for_page("place")
+        self.click('a[href="#place=mine"]')
+        self.browser.wait("return !!document.querySelector('[data-do=register]:not(:disabled)')", 120)
+        self.moved_by_keys()
+        self.reach(".place-canvas")
+        self.keys(Keys.ENTER)
+        self.browser.wait("return !!document.querySelector('[data-judgement]')", 240)
+        self.assertIn("start", self.document()["fragments"]["distal"])
+
+    def wait_for_file(self, file, condition):
+        for _ in range(200):
+            if condition(yaml.safe_load(file.read_text())):
+                return
+            time.sleep(0.1)
+        self.fail(file.read_text())
+
+    def test_another_node_in_a_pipeline(self):
+        file = self.folder / "femur.yaml"
+        shutil.copy(SOURCE / "pipelines" / "femur.yaml", file)
+        shutil.copytree(SOURCE / "pipelines" / "verdict", self.folder / "verdict")
+        server = self.open()
+        self.show(server, "pipeline=femur.yaml")
+        self.click("[data-node=edges]")
+        self.click("[data-do=fits]")
+        self.click('[data-use="edges.canny"]')
+        used = lambda document: document["nodes"]["edges"]["uses"]
+        self.wait_for_file(file, lambda document: used(document) == "edges.canny")
+        self.keys(Keys.CONTROL + "z")
+        self.wait_for_file(file, lambda document: used(document) != "edges.canny")
+
+
+del WholeWay  # its own tests are elsewhere
+
+if __name__ == "__main__":
+    bench.main()
