@@ -180,12 +180,12 @@ void apply(YAML::Node root, const PipelineEdit& edit) {
   }
 }
 
-bool has_same_text(const YAML::Node& a, const YAML::Node& b) {
+bool is_same(const YAML::Node& a, const YAML::Node& b) {
   if (a.Type() != b.Type() || a.size() != b.size()) return false;
   if (a.IsScalar()) return a.Scalar() == b.Scalar() && (a.Tag() == "!") == (b.Tag() == "!");
   for (auto one = a.begin(), other = b.begin(); one != a.end(); ++one, ++other) {
-    if (a.IsSequence() ? !has_same_text(*one, *other)
-                       : !has_same_text(one->first, other->first) || !has_same_text(one->second, other->second))
+    if (a.IsSequence() ? !is_same(*one, *other)
+                       : !is_same(one->first, other->first) || !is_same(one->second, other->second))
       return false;
   }
   return true;
@@ -222,7 +222,7 @@ std::string edited_text(const std::string& text, const PipelineEdit& edit) {
     }
     YAML::Node wanted = parse_yaml(text, {.aliases = false});
     apply(wanted, edit);
-    if (has_same_text(parse_yaml(result, {.aliases = false}), wanted)) return result;
+    if (is_same(parse_yaml(result, {.aliases = false}), wanted)) return result;
   } catch (const YAML::Exception&) {  // the text below
   } catch (const Error&) {
     if (edit.value) value_of(edit);  // says what is wrong with it
