@@ -5,7 +5,7 @@
 
 const Rows = (() => {
   const {el} = Dom;
-  const MORE = 8;  // rows that are drawn above and below those that are seen, so that scrolling shows no gap
+  const MORE = 4;  // rows that are drawn above and below those that are seen, so that scrolling shows no gap
 
   // Places of the items in ascending order of key(item), a text or a number. Equal ones keep their order; those without
   // a key come last, also if `down`.
