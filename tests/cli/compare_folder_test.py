@@ -120,7 +120,7 @@ class Folder(Comparison):
     def test_nothing_is_changed_behind_a_link(self):
         (self.scratch / "mine" / "0" / "0").mkdir(parents=True)
         self.write("mine/0/0/notes", "mine")
-        for place in ("cells", "pictures", "cases", "cells/b", "cells/b/0", "pictures/a/1", "cells/b/1/0"):
+        for place in ("cells", "pictures", "cases", "report", "cells/b", "cells/b/0", "pictures/a/1", "cells/b/1/0"):
             with self.subTest(place):
                 self.marrow(0, "compare", self.file, "--out", "out")
                 shutil.rmtree(self.scratch / "out" / place, ignore_errors=True)

@@ -49,8 +49,8 @@ class Browser:
                     raise
         self.driver.set_script_timeout(120)
 
-    def open(self, path, width_px=1200, height_px=900, theme="light"):
-        """Opens a page from disk; the seconds until it says that it is ready."""
+    def open(self, path, width_px=1200, height_px=900, theme="light", hash=""):
+        """Opens a page from disk, or at an address; the seconds until it says that it is ready."""
         self.driver.get("about:blank")
         self.logs()
         self.driver.execute_cdp_cmd(
@@ -60,8 +60,9 @@ class Browser:
         self.driver.execute_cdp_cmd(
             "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]}
         )
+        address = str(path) if str(path).startswith("http:") else pathlib.Path(path).resolve().as_uri()
         begin = time.monotonic()
-        self.driver.get(pathlib.Path(path).resolve().as_uri())
+        self.driver.get(address + hash)
         self.wait(
             "return document.documentElement.dataset.ready === 'true' && (!document.querySelector('#distributions') ||"
             " !!document.querySelector('#distributions svg.plot .box'))"

@@ -30,15 +30,13 @@ SECTIONS = [
 ]
 
 
-class PageTest(unittest.TestCase):
+class BrowserTest(unittest.TestCase):
+    """A browser, a folder for pages, and what is done with a page."""
+
     @classmethod
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="marrow_report_"))
         cls.browser = browser.Browser()
-        cls.comparison_data = synthetic.comparison()
-        cls.run_data = synthetic.run()
-        cls.comparison = cls.write("comparison", cls.comparison_data)
-        cls.run_page = cls.write("run", cls.run_data)
 
     @classmethod
     def tearDownClass(cls):
@@ -95,6 +93,18 @@ class PageTest(unittest.TestCase):
         while give() != wanted and time.monotonic() < end:
             time.sleep(0.05)
         self.assertEqual(give(), wanted)
+
+
+class PageTest(BrowserTest):
+    """The same with the page of a comparison and that of a run."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.comparison_data = synthetic.comparison()
+        cls.run_data = synthetic.run()
+        cls.comparison = cls.write("comparison", cls.comparison_data)
+        cls.run_page = cls.write("run", cls.run_data)
 
 
 def run_tests(arguments=()):

@@ -6,6 +6,7 @@
     tests/report/synthetic.py run data.json
 """
 import argparse
+import hashlib
 import json
 import math
 import pathlib
@@ -26,6 +27,18 @@ VARIANTS = [
     ("canny", {"edges.uses": "edges.canny"}, 9.5, 0.55, 4.4, 1380),
     ("gradient", {"edges.uses": "edges.gradient", "edges.high": 80}, 11.0, 0.47, 4.9, 1410),
     ("bobyqa", {"optimizer.uses": "optimizer.bobyqa"}, 11.5, 0.40, 3.2, 610),
+]
+# Further ones, for large comparisons.
+VARIANTS += [
+    (
+        "high %d" % (60 + 5 * i),
+        {"edges.high": 60 + 5 * i},
+        10.0 + 0.4 * i,
+        0.41 + 0.02 * i,
+        4.0 + 0.2 * i,
+        1400 - 20 * i,
+    )
+    for i in range(6)
 ]
 AXES = [
     ("rotation about the frontal axis", "deg"),
@@ -78,7 +91,7 @@ def wilson(count, of):
 
 def make_cell(chance, variant, case, start, far_mm, hardness):
     _, _, reach_mm, median_mm, seconds, evaluations = VARIANTS[variant]
-    number = "%s-%d-%d" % ("abcdefgh"[variant], case + 1, start)
+    number = "%s-%d-%d" % ("abcdefghij"[variant], case + 1, start)
     cell = {
         "id": number,
         "variant": variant,
@@ -362,6 +375,52 @@ def run(with_cube=True):
         "views": views,
         "poses": [{"mesh": 0, "name": "result", "world_from_model": shapes.flat(matrix)}],
     }
+    return data
+
+
+FIELDS = ["variant", "case", "start", "status", "success", "tries", "initial_mtre_mm", "seconds", "evaluations"]
+FIELDS += ["cached_nodes", "reason", "absent", "verdict", "failure_probability"]
+MATERIAL = ["pictures", "convergence", "landscape", "scene", "verdicts", "poses"]
+
+
+def as_table(data):
+    """The same comparison with its cells as a table, as the program writes it. The cells' ids become
+    VARIANT/CASE/START."""
+    texts, cells = {None: None}, data.pop("cells")
+    place = lambda text: texts.setdefault(text, len(texts) - 1)
+    value = lambda cell, name: (
+        place(cell.get(name)) if name in ("status", "reason", "absent", "verdict") else cell.get(name)
+    )
+    data["cell_table"] = {
+        "fields": FIELDS,
+        "rows": [[value(cell, name) for name in FIELDS] + cell["values"] for cell in cells],
+        "texts": list(texts)[1:],
+    }
+    material = lambda cell: {key: cell[key] for key in MATERIAL if cell.get(key)}
+    data["materials"] = [
+        {"variant": cell["variant"], "case": cell["case"], "start": cell["start"], **material(cell)}
+        for cell in cells
+        if material(cell)
+    ]
+    return data
+
+
+def put_beside(data, folder, places):
+    """Moves what is known of these cases and starts into files of a folder; the page without them."""
+    folder.mkdir()
+    data["parts"] = []
+    for case, start in places:
+        materials = [one for one in data["materials"] if (one["case"], one["start"]) == (case, start)]
+        data["materials"] = [one for one in data["materials"] if one not in materials]
+        scenes = {one["scene"]: data["scenes"].pop(one["scene"]) for one in materials if "scene" in one}
+        names = [entry["picture"] for one in materials for entry in one["pictures"]]
+        names += {view["image"] for scene in scenes.values() for view in scene["views"]}
+        pictures = {name: data["pictures"].pop(name) for name in names}
+        text = json.dumps({"materials": materials, "pictures": pictures, "geometries": {}, "scenes": scenes})
+        name = hashlib.sha256(text.encode()).hexdigest()[:16] + ".js"
+        (folder / name).write_text('Parts.take("%s",\n%s\n);\n' % (name, text))
+        kinds = ["pictures", "scene", "convergence", "landscape"]
+        data["parts"].append({"case": case, "start": start, "file": name, "bytes": len(text), "kinds": kinds})
     return data
 
 

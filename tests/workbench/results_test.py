@@ -131,6 +131,23 @@ class RequestTest(ResultsBench):
             answer = self.server.ask("GET", self.address(path, folder="..", first="..", second=".."))
             self.assertIn("leads out of the folder that is open", self.error(answer))
 
+    def test_only_parts_of_a_report_are_given(self):
+        name = "0123456789abcdef.js"
+        folder = self.folder / "compared" / "report"
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text('Parts.take("%s",\n{}\n);\n' % name)
+        status, headers, content = self.server.ask(
+            "GET", self.address("/results/part.txt", folder="compared", file=name)
+        )
+        self.assertEqual((status, headers["Content-Type"]), (200, "text/plain; charset=utf-8"))
+        self.assertEqual(content, (folder / name).read_bytes())
+        (folder / "notes.js").write_text("mine")
+        (self.scratch / "secret.js").write_text("secret")
+        (folder / "fedcba9876543210.js").symlink_to(self.scratch / "secret.js")
+        for other in ("notes.js", "../comparison.json", "fedcba9876543210.js", "0123456789abcdee.js"):
+            answer = self.server.ask("GET", self.address("/results/part.txt", folder="compared", file=other))
+            self.assertEqual(self.error(answer), "the report has no part '%s'" % other)
+
     def test_a_report_that_leads_elsewhere_is_not_given(self):
         (self.scratch / "secret.html").write_text("secret")
         (self.folder / "runs" / "first" / "report.html").symlink_to(self.scratch / "secret.html")

@@ -1,45 +1,51 @@
 // SPDX-License-Identifier: Apache-2.0
-// The table of all cells: filters, sorting, pages; and the list of those that failed.
+// The table of all cells: filters and sorting; and the list of those that failed.
 'use strict';
 
 const Cells = (() => {
   const {el, number} = Dom;
-  const PAGE = 50;
   const OUTCOMES = {success: 'success', missed: 'missed', failed: 'failed', done: 'done'};
 
   const badge = (cell) => el('span', {class: 'outcome ' + Data.outcome(cell)}, OUTCOMES[Data.outcome(cell)]);
-  const contents =
-      (cell) => [cell.pictures.length && 'pictures', cell.scene && '3D', (cell.convergence || []).length && 'curve']
-                    .filter(Boolean)
-                    .join(', ');
+  const NAMES = {pictures: 'pictures', scene: '3D', convergence: 'curve'};
 
-  function columns(data) {
-    const one = (title, key, cell, isNumber, unit) => ({title, key, cell, number: isNumber, unit});
-    return [
-      one('Cell', (c) => String(c.id), (c) => Dom.button(String(c.id), () => Detail.open(data, c), {class: 'link'})),
-      one('Variant', (c) => data.variants[c.variant].name, (c) => data.variants[c.variant].name),
-      one('Case', (c) => data.cases[c.case], (c) => data.cases[c.case]),
-      one('Start', (c) => data.starts[c.start], (c) => data.starts[c.start]),
-      one('Outcome', (c) => Data.outcome(c), badge),
-      ...(data.cells.some((c) => c.verdict) ?
-              [
-                one('Verdict', (c) => c.verdict || '', (c) => Verdict.badge(c.verdict)),
-                one('Failure', (c) => c.failure_probability, (c) => Dom.percent(c.failure_probability), true)
-              ] :
-              []),
-      one('Start’s mTRE', (c) => c.initial_mtre_mm, (c) => number(c.initial_mtre_mm), true, 'mm'),
-      ...data.metrics.map(
-          (metric, i) => one(metric.label, (c) => c.values[i], (c) => number(c.values[i]), true, metric.unit)),
-      one('Time', (c) => c.seconds, (c) => number(c.seconds), true, 's'),
-      one('Evaluations', (c) => c.evaluations, (c) => number(c.evaluations), true),
-      one('Kept', contents, (c) => el('small', {}, contents(c))),
-    ];
+  const longest = (texts, least, most) =>
+      Math.min(most, texts.reduce((length, text) => Math.max(length, String(text).length), least));
+
+  // The place of each text in the order of all.
+  function ranks(texts) {
+    const places = [];
+    Rows.order(texts, (text) => text).forEach((place, rank) => (places[place] = rank));
+    return places;
   }
 
-  function compare(a, b) {
-    if (typeof a === 'string' || typeof b === 'string')
-      return String(a ?? '').localeCompare(String(b ?? ''), undefined, {numeric: true});
-    return (Number.isFinite(a) ? a : Infinity) - (Number.isFinite(b) ? b : Infinity) || 0;
+  function columns(data) {
+    const variants = data.variants.map((variant) => variant.name), {cases, starts} = data;
+    const [byVariant, byCase, byStart] = [variants, cases, starts].map(ranks);
+    const named = (title, texts, rank, place) =>
+        ({title, key: (c) => rank[place(c)], cell: (c) => texts[place(c)], width: longest(texts, title.length, 26)});
+    const figure = (title, key, unit) =>
+        ({title, key, cell: (c) => number(key(c)), number: true, unit, width: longest([title + (unit || '')], 8, 16)});
+    const id = (c) => (byVariant[c.variant] * cases.length + byCase[c.case]) * starts.length + byStart[c.start];
+    const button = (c) => Dom.button(String(c.id), () => Detail.open(data, c), {class: 'link', title: c.id});
+    const outcome = {title: 'Outcome', key: (c) => Data.outcome(c), cell: badge, width: 9};
+    const probability = (c) => c.failure_probability;
+    const contents = (c) => Data.kinds(data, c).map((kind) => NAMES[kind]).filter(Boolean).join(', ');
+    return [
+      {title: 'Cell', key: id, cell: button, width: longest(data.cells.map((c) => c.id), 6, 30)},
+      named('Variant', variants, byVariant, (c) => c.variant), named('Case', cases, byCase, (c) => c.case),
+      named('Start', starts, byStart, (c) => c.start), outcome,
+      ...(data.cells.some((c) => c.verdict) ?
+              [
+                {title: 'Verdict', key: (c) => c.verdict || '', cell: (c) => Verdict.badge(c.verdict), width: 9},
+                {...figure('Failure', probability), cell: (c) => Dom.percent(probability(c))}
+              ] :
+              []),
+      figure('Start’s mTRE', (c) => c.initial_mtre_mm, 'mm'),
+      ...data.metrics.map((metric, i) => figure(metric.label, (c) => c.values[i], metric.unit)),
+      figure('Time', (c) => c.seconds, 's'), figure('Evaluations', (c) => c.evaluations),
+      {title: 'Kept', key: contents, cell: (c) => el('small', {}, contents(c)), width: 18}
+    ];
   }
 
   function csv(data, cells) {
@@ -79,107 +85,99 @@ const Cells = (() => {
         filter: {variant: '', case: '', outcome: '', text: ''},
         column: null,
         down: false,
-        page: 0
+        orders: new Map(),  // the cells sorted by a column, made when it is first asked for
+        words: new Map()
       });
-      const words = (c) => [c.id, data.variants[c.variant].name, data.cases[c.case], data.starts[c.start], c.reason,
-                            Data.outcome(c), c.verdict]
-                               .join(' ')
-                               .toLowerCase();
-      this.words = new Map(data.cells.map((cell) => [cell, words(cell)]));
-      this.body = el('tbody', {onclick: (event) => this.click(event)});
-      this.heads = this.columns.map(
-          (column, i) =>
-              el('th', {scope: 'col', class: column.number ? 'number' : null},
-                 Dom.button(
-                     [column.title, column.unit && el('small', {}, ' ' + column.unit)].filter(Boolean),
-                     () => this.sort(i), {class: 'sort'})));
+      this.table = new Rows.Table('All runs; the arrow keys go from row to row', this.columns, {
+        attributes: (cell) => ({'data-id': cell.id}),
+        sort: (column) => this.sort(column),
+        open: (cell) => Detail.open(data, cell)
+      });
       this.count = el('span', {class: 'count', role: 'status'});
-      this.previous = Dom.button('Previous', () => this.turn(-1));
-      this.next = Dom.button('Next', () => this.turn(1));
       this.element =
-          el('div', {}, this.filters(),
-             el('div', {class: 'scroll', tabindex: 0, role: 'region', 'aria-label': 'All cells'},
-                el('table', {class: 'sortable cells'}, el('thead', {}, el('tr', {}, this.heads)), this.body)),
-             el('div', {class: 'toolbar pager'}, this.count, this.previous, this.next,
+          el('div', {}, this.filters(), this.table.element,
+             el('div', {class: 'toolbar pager'}, this.count,
                 Dom.button('Save these rows as CSV', () => save(csv(data, this.rows()), 'cells.csv'))));
+      document.addEventListener('keydown', (event) => this.find(event));
       this.show();
     }
 
     filters() {
       const {data, filter} = this, set = (name) => (value) => {
         filter[name] = value;
-        this.page = 0;
         this.show();
       };
-      const text = el('input', {
+      this.text = el('input', {
         type: 'search',
         placeholder: 'id, name or reason',
+        'aria-keyshortcuts': 'Control+F',
         oninput: (event) => set('text')(event.target.value.toLowerCase())
       });
       const used = ['success', 'missed', 'failed', 'done'].filter(
           (name) => data.cells.some((cell) => Data.outcome(cell) === name));
       const outcome =
           Dom.select('Outcome', [['', 'all'], ...used.map((name) => [name, OUTCOMES[name]])], '', set('outcome'));
-      this.showOutcome = (name) => {
-        outcome.box.value = name;
-        set('outcome')(name);
-      };
       return el(
           'div', {class: 'toolbar filters'},
           Dom.select(
               'Variant', [['', 'all'], ...data.variants.map((variant, i) => [i, variant.name])], '', set('variant')),
           Dom.select('Case', [['', 'all'], ...data.cases.map((name, i) => [i, name])], '', set('case')), outcome,
-          el('label', {class: 'field'}, el('span', {}, 'Text'), text));
+          el('label', {class: 'field'}, el('span', {}, 'Text'), this.text));
+    }
+
+    // What a cell is found by.
+    wordsOf(cell) {
+      if (!this.words.has(cell)) {
+        const {data} = this, words = [
+          cell.id, data.variants[cell.variant].name, data.cases[cell.case], data.starts[cell.start], cell.reason,
+          Data.outcome(cell), cell.verdict
+        ];
+        this.words.set(cell, words.join(' ').toLowerCase());
+      }
+      return this.words.get(cell);
+    }
+
+    sorted() {
+      const {cells} = this.data, name = this.column + ' ' + this.down;
+      if (this.column === null) return cells;
+      if (!this.orders.has(name)) {
+        const places = Rows.order(cells, this.columns[this.column].key, this.down);
+        this.orders.set(name, Array.from(places, (i) => cells[i]));
+      }
+      return this.orders.get(name);
     }
 
     rows() {
       const {variant, case: place, outcome, text} = this.filter;
-      const rows = this.data.cells.filter(
+      return this.sorted().filter(
           (cell) => (variant === '' || cell.variant === Number(variant)) &&
               (place === '' || cell.case === Number(place)) && (outcome === '' || Data.outcome(cell) === outcome) &&
-              (text === '' || this.words.get(cell).includes(text)));
-      if (this.column === null) return rows;
-      const {key} = this.columns[this.column];
-      return rows.sort((a, b) => (this.down ? -1 : 1) * compare(key(a), key(b)));
+              (text === '' || this.wordsOf(cell).includes(text)));
     }
 
     sort(column) {
       this.down = this.column === column ? !this.down : false;
       this.column = column;
-      this.page = 0;
       this.show();
     }
 
-    turn(pages) {
-      this.page += pages;
-      this.show();
-    }
-
-    click(event) {
-      const row = event.target.closest('tr');
-      if (row && !event.target.closest('button') && !String(getSelection()))
-        Detail.open(this.data, this.data.byId.get(row.dataset.id));
+    // The browser's own find sees only the rows that are drawn. A second Ctrl+F gives it.
+    find(event) {
+      if (event.key !== 'f' || !(event.ctrlKey || event.metaKey) || event.altKey || event.shiftKey) return;
+      const box = this.element.getBoundingClientRect(), {activeElement} = document;
+      const is_here = box.top < 0.7 * innerHeight && box.bottom > 0.3 * innerHeight;
+      if (!is_here || activeElement === this.text || document.getElementById('cell').open) return;
+      event.preventDefault();
+      this.text.focus();
+      this.text.select();
     }
 
     show() {
-      const rows = this.rows(), last = Math.max(0, Math.ceil(rows.length / PAGE) - 1);
-      this.page = Math.max(0, Math.min(last, this.page));
-      const shown = rows.slice(this.page * PAGE, (this.page + 1) * PAGE);
-      this.heads.forEach(
-          (head, i) => head.setAttribute(
-              'aria-sort',
-              this.column !== i ? 'none' :
-                  this.down     ? 'descending' :
-                                  'ascending'));
-      this.body.replaceChildren(...shown.map(
-          (cell) =>
-              el('tr', {'data-id': cell.id},
-                 this.columns.map((column) => el('td', {class: column.number ? 'number' : null}, column.cell(cell))))));
-      this.count.textContent = rows.length ?
-          this.page * PAGE + 1 + '–' + (this.page * PAGE + shown.length) + ' of ' + rows.length :
-          'No cell fits the filter';
-      this.previous.disabled = this.page === 0;
-      this.next.disabled = this.page === last;
+      const rows = this.rows(), all = this.data.cells.length, many = (count) => count.toLocaleString('en');
+      this.table.show(rows, this.column, this.down);
+      this.count.textContent = rows.length === all ? many(all) + (all === 1 ? ' run' : ' runs') :
+          rows.length                              ? many(rows.length) + ' of ' + many(all) + ' runs' :
+                                                     'No cell fits the filter';
     }
   }
 
@@ -188,13 +186,15 @@ const Cells = (() => {
     const reasons = new Map();
     for (const cell of data.cells.filter((item) => item.status === 'failed')) {
       const reason = cell.reason || 'no reason given';
-      reasons.set(reason, [...(reasons.get(reason) || []), cell]);
+      if (!reasons.has(reason)) reasons.set(reason, []);
+      reasons.get(reason).push(cell);
     }
     if (!reasons.size) return el('p', {}, 'No cell failed.');
     const sorted = [...reasons].sort((a, b) => b[1].length - a[1].length), most = 40;
+    const more = sorted.length - most;
     return el(
         'ul', {class: 'failures'},
-        sorted.map(
+        sorted.slice(0, most).map(
             ([reason, cells]) =>
                 el('li', {}, el('pre', {class: 'reason'}, reason),
                    el('p', {}, cells.length + (cells.length === 1 ? ' cell: ' : ' cells: '),
@@ -202,7 +202,9 @@ const Cells = (() => {
                           (cell, i) => [i ? ', ' : '', Dom.button(String(cell.id), () => Detail.open(data, cell), {
                             class: 'link'
                           })]),
-                      cells.length > most ? ' and ' + (cells.length - most) + ' more' : ''))));
+                      cells.length > most ? ' and ' + (cells.length - most) + ' more' : ''))),
+        more > 0 &&
+            el('li', {}, 'And ' + more + ' more reasons, each of fewer cells: choose the outcome “failed” above.'));
   }
 
   return {Table, failures, badge};

@@ -27,6 +27,13 @@
 //     motion: [[6: degrees, mm]] from the first frame along the bone's own axes, deviation: the same}],
 //     pictures: [{name: "overlay/distal/frontal", picture: id}], convergence: [[evaluations, cost], ...] | null,
 //     landscape: [{axis, unit, offsets: [...], costs: [...]}] | null, scene: id | null, folder}]
+//   cell_table: {fields: [name of a field of a cell], rows: [[value per field, then one per metric]], texts: [text]}
+//     instead of cells, a tenth as long: id and folder follow from the names of variant, case and start; the fields
+//     status, reason, absent and verdict are places in texts, or null
+//   materials: [{variant, case, start, and of a cell: pictures, convergence, landscape, scene, poses, verdicts,
+//     trajectories}]     what is known of some cells of the table besides their row
+//   parts: [{case, start, file, bytes, kinds: ["pictures" | "scene" | "convergence" | "landscape"]}]
+//     materials of all cells of a case and start that are beside the page; parts.js loads them
 //   pictures: {id: "data:image/webp;base64,..."}
 //   geometries: {id: {vertices: base64 float32 xyz, triangles: base64 uint32}}     for meshes that several scenes share
 //   scenes: {id: {meshes: [{name, vertices, triangles} or {name, geometry: id}],
@@ -41,28 +48,62 @@
 const Data = (() => {
   const FORMAT = 1;
 
+  const LISTS = [
+    'figures', 'passes', 'variants', 'metrics', 'cases', 'starts', 'summary', 'comparisons', 'cells', 'materials',
+    'parts'
+  ];
+  const IN_TEXTS = ['status', 'reason', 'absent', 'verdict'];
+
+  // The cells of a table, each as an object.
+  function cellsOf(data, {fields, rows, texts}) {
+    const is_text = fields.map((name) => IN_TEXTS.includes(name));
+    return rows.map((row) => {
+      const cell = {};
+      fields.forEach((name, i) => (cell[name] = is_text[i] && row[i] !== null ? texts[row[i]] : row[i]));
+      cell.values = row.slice(fields.length);
+      cell.id = [data.variants[cell.variant].name, data.cases[cell.case], data.starts[cell.start]].join('/');
+      cell.folder = 'cells/' + cell.id;
+      return cell;
+    });
+  }
+
+  function completeCell(data, cell) {
+    for (const name of ['values', 'verdicts', 'poses']) cell[name] = cell[name] || [];
+    cell.pictures = (cell.pictures || []).filter((entry) => data.pictures[entry.picture]);
+    cell.scene = data.scenes[cell.scene] ? cell.scene : null;
+  }
+
   function complete(data) {
-    for (const name
-             of ['figures', 'passes', 'variants', 'metrics', 'cases', 'starts', 'summary', 'comparisons', 'cells'])
-      data[name] = data[name] || [];
+    for (const name of LISTS) data[name] = data[name] || [];
     for (const name of ['experiment', 'pictures', 'scenes', 'geometries']) data[name] = data[name] || {};
     for (const variant of data.variants) variant.options = variant.options || {};
-    for (const cell of data.cells) {
-      for (const name of ['values', 'verdicts', 'poses']) cell[name] = cell[name] || [];
-      cell.pictures = (cell.pictures || []).filter((entry) => data.pictures[entry.picture]);
-      cell.scene = data.scenes[cell.scene] ? cell.scene : null;
-    }
+    if (data.cell_table) data.cells = cellsOf(data, data.cell_table);
+    delete data.cell_table;
+    for (const cell of data.cells) completeCell(data, cell);
     return data;
+  }
+
+  // Enters what a part, or the page itself, knows of some cells besides their rows.
+  function enter(data, {materials, pictures, geometries, scenes}) {
+    Object.assign(data.pictures, pictures);
+    Object.assign(data.geometries, geometries);
+    Object.assign(data.scenes, scenes);
+    for (const material of materials) {
+      const pair = data.pairAt(material.case, material.start), cell = pair && pair.cells[material.variant];
+      if (cell) completeCell(data, Object.assign(cell, material));
+    }
   }
 
   // Cells by variant, case and start, and the (case, start) pairs of which anything can be looked at.
   function index(data) {
-    const key = (caseIndex, start) => caseIndex + '/' + start;
+    const key = (caseIndex, start) => caseIndex * data.starts.length + start;
     data.is_run = data.kind === 'run';
     data.baseline = data.variants.findIndex((variant) => variant.is_baseline);
     data.pairs = [];
+    data.cellsOf = data.variants.map(() => []);
     const byKey = new Map();
     for (const cell of data.cells) {
+      (data.cellsOf[cell.variant] = data.cellsOf[cell.variant] || []).push(cell);
       const name = key(cell.case, cell.start);
       if (!byKey.has(name)) {
         byKey.set(name, {case: cell.case, start: cell.start, cells: []});
@@ -70,8 +111,14 @@ const Data = (() => {
       }
       byKey.get(name).cells[cell.variant] = cell;
     }
-    data.pairOf = (cell) => byKey.get(key(cell.case, cell.start));
-    data.lookedAt = data.pairs.filter((pair) => pair.cells.some(hasMaterial));
+    data.pairAt = (caseIndex, start) => byKey.get(key(caseIndex, start));
+    data.pairOf = (cell) => data.pairAt(cell.case, cell.start);
+    enter(data, {materials: data.materials});
+    for (const part of data.parts) {
+      const pair = data.pairAt(part.case, part.start);
+      if (pair) pair.part = part;
+    }
+    data.lookedAt = data.pairs.filter((pair) => pair.part || pair.cells.some(hasMaterial));
     data.byId = new Map(data.cells.map((cell) => [String(cell.id), cell]));
     data.variantIndex = (variant) =>
         (typeof variant === 'number' ? variant : data.variants.findIndex((item) => item.name === variant));
@@ -80,6 +127,13 @@ const Data = (() => {
 
   const hasMaterial = (cell) => Boolean(
       cell && (cell.pictures.length || cell.scene || (cell.convergence || []).length || (cell.landscape || []).length));
+
+  // What can be looked at of a cell, here or in a part beside the page.
+  function kinds(data, cell) {
+    const {part} = data.pairOf(cell), beside = part && cell.status !== 'failed' ? part.kinds : [];
+    return ['pictures', 'scene', 'convergence', 'landscape'].filter(
+        (kind) => beside.includes(kind) || (kind === 'scene' ? cell.scene : (cell[kind] || []).length));
+  }
 
   function load() {
     const data = JSON.parse(document.getElementById('data').textContent);
@@ -123,8 +177,8 @@ const Data = (() => {
 
   // The finite values of a metric, one variant's, with their cells.
   function valuesOf(data, variant, metric) {
-    return data.cells
-        .filter((cell) => cell.variant === variant && cell.status !== 'failed' && Number.isFinite(cell.values[metric]))
+    return data.cellsOf[variant]
+        .filter((cell) => cell.status !== 'failed' && Number.isFinite(cell.values[metric]))
         .map((cell) => ({value: cell.values[metric], cell}));
   }
 
@@ -144,6 +198,7 @@ const Data = (() => {
 
   return {
     load,
+    enter,
     outcome,
     limit,
     limitText,
@@ -152,6 +207,7 @@ const Data = (() => {
     quantile,
     valuesOf,
     pairedValues,
+    kinds,
     hasMaterial,
     pairName,
     cellName

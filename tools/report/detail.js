@@ -74,13 +74,28 @@ const Detail = (() => {
         el('p', {class: 'note'}, 'The pipeline as it is, no option changed.');
   }
 
-  function command(data, cell) {
-    if (data.is_run) return null;
-    const file = data.experiment.file || (data.experiment.name || 'experiment') + '.yaml';
-    const id = String(cell.id), rest = id.startsWith('-') ? ' -- ' : ' ';  // no option either
-    return el(
-        'div', {}, el('h3', {}, 'Run just this cell'),
-        Dom.command('marrow cell ' + Dom.shellPath(file) + rest + Dom.shellWord(id)));
+  // The command that runs a cell, in the comparison's own folder.
+  function commandOf(data, cell) {
+    const {file, name, out} = data.experiment, id = String(cell.id);
+    const place = out ? ' --out ' + Dom.shellPath(out) : '', rest = id.startsWith('-') ? ' -- ' : ' ';  // no option
+    return 'marrow cell ' + Dom.shellPath(file || (name || 'experiment') + '.yaml') + place + rest + Dom.shellWord(id);
+  }
+
+  const command = (data, cell) =>
+      (data.is_run ? null : el('div', {}, el('h3', {}, 'Run just this cell'), Dom.command(commandOf(data, cell))));
+
+  // Why there is no picture, and how to get some.
+  function noPictures(data, cell) {
+    if (data.is_run || cell.pictures.length) return null;
+    const {part} = data.pairOf(cell), note = (...parts) => el('p', {class: 'note'}, ...parts);
+    const beside = part && cell.status !== 'failed';
+    if (beside && part.loading) return note('The pictures are being loaded (' + Parts.size(part.bytes) + ').');
+    const text = cell.status === 'failed' ?
+        'There are no pictures of this cell, because it failed. When its cause is gone, this makes them:' :
+        beside ? Parts.missing(data, data.pairOf(cell)) + ' Or make them again:' :
+                 'No pictures of this cell are in this report. This makes them, and a page that shows them:';
+    const folder = 'marrow show ' + Dom.shellPath((data.experiment.folder || '.') + '/pictures/' + cell.id);
+    return el('div', {}, el('h3', {}, 'Pictures'), note(text), Dom.command(commandOf(data, cell) + ' && ' + folder));
   }
 
   const reason = (cell) =>
@@ -124,18 +139,10 @@ const Detail = (() => {
         el('p', {class: 'note'}, 'Cell ', el('code', {}, String(cell.id))),
         ...[reason(cell), Verdict.all(data, cell), absent(cell), values(data, cell),
             el('h3', {}, 'Options of ' + data.variants[cell.variant].name), options(data.variants[cell.variant]),
-            command(data, cell), cell.pictures.length > 0 && el('h3', {}, 'Pictures'),
+            command(data, cell), noPictures(data, cell), cell.pictures.length > 0 && el('h3', {}, 'Pictures'),
             cell.pictures.length > 0 && Pictures.gallery(data, cell), closer, ...plots(data, cell),
             ...scene(data, cell)]
             .filter(Boolean));
-  }
-
-  // So that a cell can be linked to. Some browsers refuse it to pages from disk, which does no harm.
-  function nameInAddress(address) {
-    try {
-      history.replaceState(null, '', address);
-    } catch (error) { /* no link then */
-    }
   }
 
   function disposeScene() {
@@ -143,23 +150,55 @@ const Detail = (() => {
     opened = null;
   }
 
-  function open(data, cell) {
+  function show() {
     const dialog = document.getElementById('cell');
     disposeScene();
     if (!dialog.open) {
       dialog.showModal();
       dialog.onclose = () => {
         disposeScene();
-        nameInAddress(location.pathname + location.search);
+        Links.unname();
       };
       dialog.onclick = (event) => event.target === dialog && dialog.close();
     }
-    fillDialog(data, cell, dialog);
     dialog.scrollTop = 0;
+    return dialog;
+  }
+
+  // Opens a cell. What lies beside the page is loaded, and shown as soon as it is there.
+  function open(data, cell) {
+    const dialog = show(), pair = data.pairOf(cell), shown = {};
+    if (pair.part) {
+      const again = () => dialog.open && dialog.shown === shown && fillDialog(data, cell, dialog);
+      Parts.load(data, pair).then(again, again);
+    }
+    dialog.shown = shown;
+    fillDialog(data, cell, dialog);
     dialog.querySelector('h2').focus();
-    nameInAddress('#cell=' + encodeURIComponent(cell.id));
+    Links.name(Links.to(cell));
+  }
+
+  // Says that a link leads to no cell.
+  function openUnknown(data, name) {
+    const dialog = show();
+    dialog.shown = null;
+    const example = data.cells.length ? ', for example ' + data.cells[0].id : '';
+    dialog.replaceChildren(
+        el('div', {class: 'dialog-head'}, el('h2', {tabindex: -1}, 'No such cell'),
+           el('div', {class: 'toolbar'}, Dom.button('Close', () => dialog.close()))),
+        el('p', {},
+           'The link asks for the cell “' + name + '”, which this report does not have. A cell is named ' +
+               'VARIANT/CASE/START' + example + '. The table “All runs” has all of them.'));
+    dialog.querySelector('h2').focus();
+  }
+
+  // Opens what an address asks for, if it asks for a cell.
+  function openAddress(data) {
+    const asked = Links.asked(data, location.hash);
+    if (asked && asked.cell) open(data, asked.cell);
+    if (asked && !asked.cell) openUnknown(data, asked.unknown);
   }
 
   // lookAt(cell) is set by the page: it shows the cell's case and start in the comparison of pictures.
-  return {open, values, figures, options, reason, absent, lookAt: () => {}};
+  return {open, openAddress, values, figures, options, reason, absent, lookAt: () => {}};
 })();

@@ -46,7 +46,8 @@ const Figures = (() => {
         data.variants.map((_, variant) => Data.valuesOf(data, variant, metricIndex).sort((a, b) => a.value - b.value));
     const all = rows.flatMap((row) => row.map((item) => item.value));
     // A limit far from all values would press them into a corner of a linear scale.
-    const limit = Data.limit(metric), drawn = limit !== null && (kind === 'log' || limit <= 3 * Math.max(...all));
+    const limit = Data.limit(metric),
+          drawn = limit !== null && (kind === 'log' || limit <= 3 * all.reduce((a, b) => Math.max(a, b), 0));
     const {root, box: area, x} = Plots.frame({
       width,
       height: ROW_HEIGHT * rows.length + 62,
@@ -65,7 +66,7 @@ const Figures = (() => {
     }
     rows.forEach((row, variant) => {
       const top = area.top + variant * ROW_HEIGHT, middle = top + 40,
-            failed = data.cells.filter((cell) => cell.variant === variant && cell.status === 'failed').length;
+            failed = data.cellsOf[variant].filter((cell) => cell.status === 'failed').length;
       rowTitle(root, data, variant, top, failed ? failed + ' failed, not drawn' : '');
       thinned(row).forEach(
           (item, i) => root.append(Plots.marker(
@@ -164,7 +165,8 @@ const Figures = (() => {
             },
             y: {kind, domain, title: axisTitle(metric)}
           });
-          for (const item of all[i]) {
+          const sorted = all[i].sort((a, b) => (a.value - a.base) - (b.value - b.base));
+          for (const item of thinned(sorted)) {
             const better = Data.isBetter(metric, item.value, item.base);
             root.append(svg('line', {
               class: better ? 'better' : 'worse',

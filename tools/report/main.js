@@ -107,37 +107,54 @@ const Page = (() => {
     const pickers = [];
     const picker = () => {
       const box = Dom.select(
-          'Case and start', data.lookedAt.map((pair, i) => [i, Data.pairName(data, pair)]), 0, (i) => show(Number(i)));
+          'Case and start', data.lookedAt.map((pair, i) => [i, Data.pairName(data, pair)]), 0,
+          (i) => choose(Number(i)));
       pickers.push(box.box);
       return data.lookedAt.length < 2 ?
           null :
-          el('div', {class: 'toolbar picker'}, box, Dom.button('Previous', () => show(state.at - 1)),
-             Dom.button('Next', () => show(state.at + 1)));
+          el('div', {class: 'toolbar picker'}, box, Dom.button('Previous', () => choose(state.at - 1)),
+             Dom.button('Next', () => choose(state.at + 1)));
     };
     const each = () => (data.variants.length > 1 ? Dom.checkbox('each scaled to 0–1', false, (on) => {
       state.each = on;
       curves();
     }) : null);
+    const missing = (what) => {
+      const pair = data.lookedAt[state.at];
+      return pair.part ? Parts.note(data, pair, () => fetch(pair)) : nothing(what);
+    };
     const curves = () => {
-      const cells = data.lookedAt[state.at].cells;
-      places.convergence.replaceChildren(Curves.convergence(data, cells, state.each) || nothing('curve'));
-      places.landscape.replaceChildren(Curves.landscapes(data, cells, state.each) || nothing('landscape'));
+      const {cells} = data.lookedAt[state.at];
+      places.convergence.replaceChildren(Curves.convergence(data, cells, state.each) || missing('curve'));
+      places.landscape.replaceChildren(Curves.landscapes(data, cells, state.each) || missing('landscape'));
     };
     let comparer = null, scene = null;
     const show = (at) => {
       state.at = (at + data.lookedAt.length) % data.lookedAt.length;
       pickers.forEach((box) => (box.value = state.at));
-      const pair = data.lookedAt[state.at];
+      draw(data.lookedAt[state.at]);
+    };
+    const choose = (at) => {
+      show(at);
+      if (data.lookedAt[state.at].part) fetch(data.lookedAt[state.at]);
+    };
+    // Loads what lies beside the page.
+    const fetch = (pair) => {
+      const again = () => data.lookedAt[state.at] === pair && draw(pair);
+      Parts.load(data, pair).then(again, again);
+      again();
+    };
+    const draw = (pair) => {
       if (comparer) comparer.dispose();
       comparer = pair.cells.some((cell) => cell && cell.pictures.length) ? new Pictures.Comparer(data, pair) : null;
-      places.pictures.replaceChildren(comparer ? comparer.element : nothing('picture'));
+      places.pictures.replaceChildren(comparer ? comparer.element : missing('picture'));
       Page.comparer = comparer;
       curves();
       const entries = pair.cells.filter((cell) => cell && cell.scene)
                           .map((cell) => ({label: data.variants[cell.variant].name, scene: cell.scene}));
       if (scene) scene.dispose();
       scene = null;
-      places.scene.replaceChildren(nothing('3D scene'));
+      places.scene.replaceChildren(missing('3D scene'));
       const open = () => {
         Page.scene = scene = new SceneView(data, entries);
         places.scene.replaceChildren(scene.element);
@@ -146,13 +163,13 @@ const Page = (() => {
       if (entries.length) whenNear(places.scene, () => data.lookedAt[state.at] === pair && !scene && open());
     };
     Detail.lookAt = (cell) => {
-      show(data.lookedAt.indexOf(data.pairOf(cell)));
+      choose(data.lookedAt.indexOf(data.pairOf(cell)));
       document.getElementById('pictures').scrollIntoView();
     };
     const many = data.variants.length > 1;
-    const has = (test) => data.cells.some(test);
+    const kinds = new Set(data.lookedAt.flatMap((pair) => pair.cells.flatMap((cell) => Data.kinds(data, cell))));
     const sections = [
-      has((cell) => cell.pictures.length) &&
+      kinds.has('pictures') &&
           section(
               'pictures', 'Pictures',
               many ? 'Two variants on the same X-ray. Arrow keys move the wipe; in a blink the space bar switches.' :
@@ -161,24 +178,24 @@ const Page = (() => {
               data.is_run && data.cells[0] &&
                   el('details', {open: true}, el('summary', {}, 'All pictures'),
                      Pictures.gallery(data, {pictures: Sequence.stills(data.cells[0])}))),
-      has((cell) => cell.scene) &&
+      kinds.has('scene') &&
           section(
               'scene', '3D view',
               'The model in the pose that was found, in the true one and at the start, ' +
                   'among the X-rays or through the eye of one.',
               picker(), places.scene),
-      has((cell) => (cell.convergence || []).length) &&
+      kinds.has('convergence') &&
           section(
               'convergence', 'Convergence', 'The cost that the optimizer had reached, against the evaluations it took.',
               picker(), el('div', {class: 'toolbar'}, each()), many && Plots.legend(data.variants), places.convergence),
-      has((cell) => (cell.landscape || []).length) &&
+      kinds.has('landscape') &&
           section(
               'landscape', 'Cost landscapes',
               'The cost about the result along each axis; the mark is the lowest. ' +
                   'A mark off zero, a second valley or a flat floor says where the cost misleads.',
               picker(), el('div', {class: 'toolbar'}, each()), many && Plots.legend(data.variants), places.landscape),
     ].filter(Boolean);
-    show(0);
+    show(Math.max(0, data.lookedAt.findIndex((pair) => !pair.part)));
     return sections;
   }
 
@@ -266,7 +283,9 @@ const Page = (() => {
     }
     if (many) {
       Page.table = new Cells.Table(data);
-      add(section('cells', 'All runs', 'Click a row for all of one run.', Page.table.element),
+      const intro = 'Click a row for all of one run; its address in the browser’s bar is a link to it. Only the rows ' +
+          'that are seen are drawn, so Ctrl+F goes to the filter here.';
+      add(section('cells', 'All runs', intro, Page.table.element),
           section('failures', 'Failures', null, Cells.failures(data)));
     }
     add(repeat(data));
@@ -274,8 +293,8 @@ const Page = (() => {
       const mark = event.target.closest && event.target.closest('[data-cell]');
       if (mark) Detail.open(data, data.byId.get(mark.dataset.cell));
     });
-    const asked = /^#cell=(.+)$/.exec(location.hash), wanted = asked && data.byId.get(decodeURIComponent(asked[1]));
-    if (wanted) Detail.open(data, wanted);
+    Detail.openAddress(data);
+    addEventListener('hashchange', () => Detail.openAddress(data));
   }
 
   function startTheme() {

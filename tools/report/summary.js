@@ -156,9 +156,8 @@ const Summary = (() => {
 
   // Which cases are hard: each case's median and successes, a column a variant.
   function caseTable(data, metric) {
-    const cells = data.variants.map(
-        (_, variant) =>
-            data.cases.map((_, place) => data.cells.filter((cell) => cell.variant === variant && cell.case === place)));
+    const cells = data.variants.map(() => data.cases.map(() => []));
+    for (const cell of data.cells) cells[cell.variant][cell.case].push(cell);
     const median = (list) => Data.quantile(
         list.filter((cell) => cell.status !== 'failed')
             .map((cell) => cell.values[metric])

@@ -76,6 +76,26 @@
             el('p', {class: 'note'}, 'There is no run in ' + folder + ' yet. The page "Pipeline" makes some.'));
   }
 
+  // A report in its frame reaches nothing. What lies beside its page is read for it when it asks by a message.
+  function reportFrame(folder) {
+    const frame = el('iframe', {
+      class: 'report',
+      title: 'Report of ' + folder,
+      sandbox: 'allow-scripts',
+      src: reportAddress(folder),
+      onload: () => frame.contentWindow.postMessage({marrow: 'gives parts'}, '*')
+    });
+    const give = async ({source, data}) => {
+      if (!frame.isConnected) return removeEventListener('message', give);
+      if (source !== frame.contentWindow || !data || data.marrow !== 'part') return;
+      const file = String(data.file), answer = await fetch('results/part.txt?' + new URLSearchParams({folder, file}));
+      const text = answer.ok ? await answer.text() : '';
+      frame.contentWindow.postMessage({marrow: 'part', file, text}, '*');
+    };
+    addEventListener('message', give);
+    return frame;
+  }
+
   async function one(place, folder) {
     const {command} = await Ask.post('api/results/report', {folder});
     place.append(
@@ -86,9 +106,8 @@
               el('a', {href: reportAddress(folder, {download: 1}), download: '', 'data-do': 'download'},
                  'Download as one file'),
               el('a', {href: '#results='}, 'All results'))),
-        el('iframe',
-           {class: 'report', title: 'Report of ' + folder, sandbox: 'allow-scripts', src: reportAddress(folder)}),
-        command ? el('h2', {}, 'The same on the command line') : '', command ? Dom.command(command) : '');
+        reportFrame(folder), command ? el('h2', {}, 'The same on the command line') : '',
+        command ? Dom.command(command) : '');
   }
 
   // A few lines; the others are folded away.

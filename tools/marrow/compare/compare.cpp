@@ -161,6 +161,9 @@ void add_compare(CLI::App& app, int& code) {
   show_default(add_whole_number(command, "--shown", request->shown,
                                 "cases and starts whose pictures go into the report", 0, 10000),
                request->shown);
+  show_default(add_amount(command, "--page-mb", request->page_mb, "megabytes",
+                          "megabytes that report.html may have; pictures that do not fit go to the folder report/"),
+               request->page_mb);
   command->add_flag("--dry-run", request->dry_run, "say what there is to do, and how long that took before");
   command->add_flag("--quiet", request->quiet, "no progress");
   const auto cluster = std::make_shared<ClusterRequest>();

@@ -25,6 +25,7 @@ struct CompareRequest {
   double time_limit_s = 600;
   double memory_limit_mb = 4000;
   std::size_t shown = 8;  ///< cases and starts with pictures in the report
+  double page_mb = 20;    ///< bytes of report.html; pictures that do not fit lie beside it
   bool dry_run = false, no_cache = false, quiet = false;
   bool gather = false;  ///< run no cell: those without a row have failed
   FileLimits file_limits;
@@ -40,9 +41,10 @@ using LostCells = std::map<std::size_t, std::string>;
 int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment,
                    const std::filesystem::path& folder, const LostCells& lost = {});
 
-/// Cells whose pictures go into the report: all variants of at most `most` pairs of case and start. First come those
-/// where a variant was worst, best or nearest to its median in the first metric, then those that failed, then the first
-/// ones.
+/// Cells whose pictures go into the report: all variants of at most `most` pairs of case and start, the most important
+/// pair first. In turn come one where a variant was worst in the first metric, one where it was nearest to its median,
+/// one where it failed, and one where it was best; of the failed ones first one for each reason. Then come the others,
+/// in their order.
 std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experiment,
                                               const std::vector<compare::CellRow>& rows, std::size_t most);
 

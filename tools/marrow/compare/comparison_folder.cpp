@@ -51,7 +51,7 @@ void refuse_links(const fs::path& folder, const compare::Experiment& experiment)
       throw Error(place.string() +
                   " is a link, behind which nothing is changed; remove it, or choose another folder with --out");
   };
-  for (const char* part : {"cells", "pictures", "cases"}) check(folder / part);
+  for (const char* part : {"cells", "pictures", "cases", "report"}) check(folder / part);
   for (const char* part : {"cells", "pictures"}) {
     if (!fs::is_directory(folder / part, ignored)) continue;
     for (const auto& variant : experiment.variants) {

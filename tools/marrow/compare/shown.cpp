@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "compare/comparison.hpp"
 
@@ -10,22 +11,38 @@ namespace {
 /// A case and a start.
 using Place = std::pair<std::size_t, std::size_t>;
 
+/// Chooses places, each once, until there are enough.
 class Chooser {
  public:
   explicit Chooser(std::size_t most) : most_(most) {}
   void add(const Place& place) {
-    if (places_.size() < most_ && std::find(places_.begin(), places_.end(), place) == places_.end())
-      places_.push_back(place);
+    if (places_.size() < most_ && taken_.insert(place).second) places_.push_back(place);
   }
-  std::vector<Place> sorted() {
-    std::sort(places_.begin(), places_.end());
-    return places_;
+  /// The first place of each list, then the second ones, and so on.
+  void add_in_turn(const std::vector<std::vector<Place>>& lists) {
+    std::size_t longest = 0;
+    for (const auto& list : lists) longest = std::max(longest, list.size());
+    for (std::size_t i = 0; i < longest; ++i)
+      for (const auto& list : lists)
+        if (i < list.size()) add(list[i]);
   }
+  const std::vector<Place>& places() const { return places_; }
 
  private:
   std::size_t most_;
   std::vector<Place> places_;
+  std::set<Place> taken_;
 };
+
+/// The failed rows, the first one with each reason before all others.
+std::vector<std::size_t> failed_rows(const std::vector<compare::CellRow>& rows) {
+  std::vector<std::size_t> first, others;
+  std::set<std::string> reasons;
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    if (!rows[i].failed.empty()) (reasons.insert(rows[i].failed).second ? first : others).push_back(i);
+  first.insert(first.end(), others.begin(), others.end());
+  return first;
+}
 
 }  // namespace
 
@@ -42,16 +59,20 @@ std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experim
                                                       : *rows[a].values[0] < *rows[b].values[0];
     });
 
-  Chooser chooser(most);
-  for (const double rank : {1.0, 0.5, 0.0})  // worst, median, best
+  const auto at_rank = [&](double rank) {
+    std::vector<Place> places;
     for (const auto& order : by_value)
-      if (!order.empty()) chooser.add(place_of(order[std::size_t(std::lround(rank * double(order.size() - 1)))]));
-  for (std::size_t i = 0; i < rows.size(); ++i)
-    if (!rows[i].failed.empty()) chooser.add(place_of(i));
-  for (std::size_t i = 0; i < rows.size(); ++i) chooser.add(place_of(i));
+      if (!order.empty()) places.push_back(place_of(order[std::size_t(std::lround(rank * double(order.size() - 1)))]));
+    return places;
+  };
+  std::vector<Place> failed;
+  for (const std::size_t row : failed_rows(rows)) failed.push_back(place_of(row));
+  Chooser chooser(most);
+  chooser.add_in_turn({at_rank(1), at_rank(0.5), failed, at_rank(0)});  // worst, median, failed, best
+  for (std::size_t i = 0; i < rows.size(); i += variants) chooser.add(place_of(i));
 
   std::vector<compare::CellIndex> cells;
-  for (const auto& [case_index, start] : chooser.sorted())
+  for (const auto& [case_index, start] : chooser.places())
     for (std::size_t v = 0; v < variants; ++v)
       if (rows[(case_index * starts + start) * variants + v].failed.empty()) cells.push_back({v, case_index, start});
   return cells;

@@ -54,17 +54,22 @@ std::vector<std::string> changed_options(const Experiment& experiment) {
   return {keys.begin(), keys.end()};
 }
 
-std::string option_of(const Experiment& experiment, const std::string& variant, const std::string& key) {
-  std::string value;
-  for (const compare::Variant& one : experiment.variants)
-    if (one.name == variant)
-      for (const Override& change : one.overrides)
-        if (change.key == key) value = change.value;
-  return value;
+/// Of each variant, by its name, the values of these options; empty for one that the variant does not change.
+std::map<std::string, std::vector<std::string>> options_by_variant(const Experiment& experiment,
+                                                                   const std::vector<std::string>& options) {
+  std::map<std::string, std::vector<std::string>> values;
+  for (const compare::Variant& variant : experiment.variants) {
+    std::map<std::string, std::string> own;
+    for (const Override& change : variant.overrides) own[change.key] = change.value;
+    std::vector<std::string>& of_variant = values[variant.name];
+    for (const std::string& option : options) of_variant.push_back(own[option]);
+  }
+  return values;
 }
 
 std::string csv(const Experiment& experiment, const std::vector<CellRow>& rows) {
   const std::vector<std::string> options = changed_options(experiment);
+  const auto values_of = options_by_variant(experiment, options);
   std::string text = "cell,variant,case,start,status,reason,success,tries,verdict,failure_probability";
   for (const std::string& option : options) text += "," + field(option);
   for (const compare::MetricChoice& metric : experiment.metrics) text += "," + field(metric.path);
@@ -74,7 +79,7 @@ std::string csv(const Experiment& experiment, const std::vector<CellRow>& rows) 
             (row.failed.empty() ? "done" : "failed") + "," + field(row.failed + row.absent) + "," +
             (row.is_success(experiment) ? "1" : "0") + "," + std::to_string(row.tries) + "," +
             (row.verdict ? name_of(*row.verdict) : "") + "," + number_text(row.failure_probability);
-    for (const std::string& option : options) text += "," + field(option_of(experiment, row.variant, option));
+    for (const std::string& value : values_of.at(row.variant)) text += "," + field(value);
     for (const auto& value : row.values) text += "," + number_text(value);
     text += "," + number_text(row.initial_error) + "," + number_text(row.seconds) + "," +
             std::to_string(row.evaluations) + "\n";
@@ -83,13 +88,14 @@ std::string csv(const Experiment& experiment, const std::vector<CellRow>& rows) 
 }
 
 std::string jsonl(const Experiment& experiment, const std::vector<CellRow>& rows) {
+  const std::vector<std::string> options = changed_options(experiment);
+  const auto values_of = options_by_variant(experiment, options);
   std::string text;
   for (const CellRow& row : rows) {
     json j = json::parse(compare::to_json(row));
     j["success"] = row.is_success(experiment);
     j["options"] = json::object();
-    for (const std::string& option : changed_options(experiment))
-      j["options"][option] = option_of(experiment, row.variant, option);
+    for (std::size_t i = 0; i < options.size(); ++i) j["options"][options[i]] = values_of.at(row.variant)[i];
     for (std::size_t i = 0; i < experiment.metrics.size(); ++i)
       j[experiment.metrics[i].path] = row.values[i] ? json(*row.values[i]) : json();
     text += j.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";

@@ -2,6 +2,7 @@
 #include <thread>
 
 #include "marrow/domain/error.hpp"
+#include "report/cell_material.hpp"
 #include "report/report.hpp"
 #include "run_files.hpp"
 #include "runtime/text_file.hpp"
@@ -21,8 +22,6 @@ std::string text_of_file(const fs::path& file) {
     return "";  // the page is written without it
   }
 }
-
-json of(const std::optional<double>& value) { return value ? json(*value) : json(); }
 
 std::string starts_sentence(const Experiment& experiment) {
   if (!experiment.protocol) return "Each run starts where its pipeline starts.";
@@ -62,43 +61,16 @@ std::string time_sentence(const Experiment& experiment) {
          " threads with nothing else running; what all variants share is read back and does not count.";
 }
 
-json cell_of_row(const Experiment& experiment, const compare::CellIndex& index, const CellRow& row) {
-  json cell = {{"id", row.id},
-               {"variant", index.variant},
-               {"case", index.case_index},
-               {"start", index.start},
-               {"status", row.failed.empty() ? "done" : "failed"},
-               {"tries", row.tries},
-               {"success", row.is_success(experiment)},
-               {"initial_mtre_mm", of(row.initial_error)},
-               {"seconds", of(row.seconds)},
-               {"values", json::array()},
-               {"folder", "cells/" + row.id}};
-  if (row.failed.empty())
-    cell["evaluations"] = row.evaluations;
-  else
-    cell["reason"] = row.failed;
-  if (!row.absent.empty()) cell["absent"] = row.absent;
-  if (row.verdict) {
-    cell["verdict"] = name_of(*row.verdict);
-    cell["failure_probability"] = of(row.failure_probability);
-  }
-  for (const auto& value : row.values) cell["values"].push_back(row.failed.empty() ? of(value) : json());
-  int cached = 0;
-  for (const auto& [name, calls] : row.nodes) cached += calls.made == 0 && calls.cached > 0;
-  cell["cached_nodes"] = cached;
-  return cell;
-}
-
 json metrics_of(const Experiment& experiment, const std::vector<std::string>& units) {
   json metrics = json::array();
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
     const compare::MetricChoice& metric = experiment.metrics[m];
-    metrics.push_back({{"name", metric.path},
-                       {"label", metric.label},
-                       {"unit", units[m]},
-                       {metric.higher_is_better() ? "success_above" : "success_below", of(metric.limit)},
-                       {"higher_is_better", metric.higher_is_better()}});
+    metrics.push_back(
+        {{"name", metric.path},
+         {"label", metric.label},
+         {"unit", units[m]},
+         {metric.higher_is_better() ? "success_above" : "success_below", metric.limit ? json(*metric.limit) : json()},
+         {"higher_is_better", metric.higher_is_better()}});
   }
   return metrics;
 }
@@ -137,6 +109,7 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
                         {"starts_protocol", starts_sentence(experiment)},
                         {"success_rule", success_sentence(experiment, answer.units)},
                         {"time_rule", time_sentence(experiment)}};
+  if (!request.folder.empty()) data["experiment"]["out"] = request.folder.string();
   for (std::size_t v = 0; v < experiment.variants.size(); ++v) {
     json options = json::object();
     for (const Override& one : experiment.variants[v].overrides) options[one.key] = one.value;
@@ -149,21 +122,8 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
   data["summary"] = answers["variants"];
   data["comparisons"] = answers["comparisons"];
 
-  ReportMaterial material;
-  const std::size_t starts = experiment.starts.size(), variants = experiment.variants.size();
-  for (std::size_t i = 0; i < rows.size(); ++i)  // in the order of the cells: by case, by start, by variant
-    data["cells"].push_back(
-        cell_of_row(experiment, {i % variants, i / variants / starts, i / variants % starts}, rows[i]));
-  for (const compare::CellIndex& cell : shown)
-    material.add_prepared(runner.pictures_of(cell),
-                          data["cells"][(cell.case_index * starts + cell.start) * variants + cell.variant]);
-  data["pictures"] = std::move(material.pictures);
-  data["geometries"] = std::move(material.geometries);
-  data["scenes"] = std::move(material.scenes);
+  data["cell_table"] = cell_table(experiment, rows);
   data["graph"] = pipeline_graph(experiment, runner);
-
-  material.print_left_out();
-
   json record = json::object();
   try {
     if (!shown.empty()) record = read_record(runner.pictures_of(shown.front()));
@@ -176,7 +136,9 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
   for (const json& plugin : record.value("plugins", json::array()))
     data["experiment"]["plugins"].push_back(
         {{"file", plugin.value("file", "")}, {"build_id", plugin.value("build_id", "")}});
+  add_cell_materials(data, runner, shown, folder, std::size_t(1e6 * request.page_mb));
   write_page(data, folder / "report.html");
+  remove_other_parts(data, folder);
 }
 
 }  // namespace marrow::cli

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "report/cell_material.hpp"
 #include "report/report.hpp"
 #include "runtime/text_file.hpp"
 
@@ -15,20 +16,36 @@ asm(".section .rodata\n"
 extern "C" const char marrow_report_page[], marrow_report_page_end[];
 
 namespace marrow::cli {
+namespace {
 
-void write_page(const nlohmann::json& data, const std::filesystem::path& file, Kinds kinds) {
-  static constexpr std::string_view kMarker = "<!-- marrow:data -->";
-  const std::string_view page(marrow_report_page, std::size_t(marrow_report_page_end - marrow_report_page));
-  const std::size_t at = page.find(kMarker);
-  std::string text = data.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  // No text in the data may end the script, so "<" is written as a JSON escape.
+constexpr std::string_view kMarker = "<!-- marrow:data -->", kBefore = "<script type=\"application/json\" id=\"data\">",
+                           kAfter = "</script>";
+
+std::string_view page_without_data() {
+  return {marrow_report_page, std::size_t(marrow_report_page_end - marrow_report_page)};
+}
+
+/// No text in the data may end the script, so "<" is written as a JSON escape.
+std::string safe_text(const nlohmann::json& data) {
+  const std::string text = data.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   std::string safe;
   safe.reserve(text.size() + text.size() / 16);
   for (const char c : text) c == '<' ? safe += "\\u003c" : safe += c;
-  write_text_file(file,
-                  std::string(page.substr(0, at)) + "<script type=\"application/json\" id=\"data\">" + safe +
-                      "</script>" + std::string(page.substr(at + kMarker.size())),
-                  kinds);
+  return safe;
+}
+
+}  // namespace
+
+std::size_t page_bytes(const nlohmann::json& data) {
+  return page_without_data().size() - kMarker.size() + kBefore.size() + safe_text(data).size() + kAfter.size();
+}
+
+void write_page(const nlohmann::json& data, const std::filesystem::path& file, Kinds kinds) {
+  const std::string_view page = page_without_data();
+  const std::size_t at = page.find(kMarker);
+  std::string text(page.substr(0, at));
+  text.append(kBefore).append(safe_text(data)).append(kAfter).append(page.substr(at + kMarker.size()));
+  write_text_file(file, text, kinds);
 }
 
 }  // namespace marrow::cli

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Writes one HTML file that shows a run or a comparison and needs no other file. The page is in tools/report; data.js
-// there describes the data.
+// Writes one HTML file that shows a run or a comparison and needs no other file; of a large comparison, further
+// pictures lie beside it. The page is in tools/report; data.js there describes the data.
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -60,7 +60,8 @@ std::string shell_word(const std::string& text);
 /// The same for a path. It is never taken for an option.
 std::string shell_path(const std::filesystem::path& path);
 
-/// Writes FOLDER/report.html of a comparison. `shown`: the cells whose pictures were made.
+/// Writes FOLDER/report.html of a comparison. `shown`: the cells whose pictures were made, those of a case and start
+/// together, the most important ones first. What does not fit into the page goes to FOLDER/report.
 void write_report(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows,
                   const Answer& answer, const compare::CellRunner& runner, const std::vector<compare::CellIndex>& shown,
                   const CompareRequest& request, const std::filesystem::path& folder);

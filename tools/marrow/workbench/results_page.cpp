@@ -2,6 +2,7 @@
 // The requests of the page "Results".
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
+#include "report/cell_material.hpp"
 #include "report/report.hpp"
 #include "run_files.hpp"
 #include "workbench/results.hpp"
@@ -48,6 +49,15 @@ Answer picture_answer(const Workbench& workbench, const Request& request) {
   return {read_text_file(*file, kMostRecordBytes), "image/png"};
 }
 
+/// A file beside a comparison's page. The page in its frame may load nothing; the workbench's own page reads it for it.
+Answer part_answer(const Workbench& workbench, const Request& request) {
+  const fs::path folder = workbench.folder.inside(request.parameter("folder"));
+  const std::string& name = request.parameter("file");
+  const auto file = cli::is_part_name(name) ? cli::file_of_run(folder, "report/" + name) : std::nullopt;
+  if (!file) throw Error("the report has no part " + in_quotes(printable(name)));
+  return {read_text_file(*file, kMostRecordBytes), "text/plain; charset=utf-8"};
+}
+
 }  // namespace
 
 void add_results_page(Server& server, Workbench& workbench) {
@@ -67,6 +77,7 @@ void add_results_page(Server& server, Workbench& workbench) {
     return json_answer({{"command", is_run ? in_folder(workbench, "show " + cli::shell_path(result)) : ""}});
   });
   server.get("/results/report.html", [&](const Request& request) { return report_answer(workbench, request); });
+  server.get("/results/part.txt", [&](const Request& request) { return part_answer(workbench, request); });
   server.get("/results/picture.png", [&](const Request& request) { return picture_answer(workbench, request); });
 }
 

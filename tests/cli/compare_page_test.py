@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of a comparison: which pictures are in it, and that what does not fit lies beside it."""
+import base64
+import csv
+import json
+import pathlib
+import random
+import re
+import sys
+
+from marrow_cli import TEST_PLUGINS, Case, main, marrow
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "report"))
+import shapes  # noqa: E402
+
+PICTURES = """marrow: 1
+inputs: {case: {type: path}}
+nodes:
+  picture: {uses: read.image, with: {path: $case/picture.png}}
+  m: {uses: test.constant}
+outputs: {number: m, picture: picture}
+"""
+NUMBERS = """marrow: 1
+nodes:
+  drawn: {uses: test.draw}
+  m: {uses: test.fail_above, in: {a: drawn}}
+outputs: {number: m}
+"""
+EXPERIMENT = """experiment: 1
+name: e
+pipeline: p.yaml
+cases: %s
+metrics: [number.value]
+pictures: [%s]
+timed_cells: 0
+variants: %s
+"""
+
+
+class Page(Case):
+    def marrow(self, *arguments):
+        cache = {"MARROW_CACHE": str(self.scratch / "cache")}
+        result = marrow(*arguments, plugins=[TEST_PLUGINS], extra_environment=cache, cwd=self.scratch)
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+    def data_of(self, page):
+        return json.loads(re.search(r'id="data">(.*?)</script>', page.read_text(), re.S).group(1))
+
+    def compare(self, *arguments):
+        self.marrow("compare", "e.yaml", "--out", "out", "--quiet", *arguments)
+        self.page = self.scratch / "out" / "report.html"
+        return self.data_of(self.page)
+
+    def with_pictures(self):
+        noise = random.Random(7)
+        for case in "abcd":
+            (self.scratch / "cases" / case).mkdir(parents=True)
+            url = shapes.png(200, 200, bytes(noise.randrange(256) for _ in range(40000)), 1)
+            (self.scratch / "cases" / case / "picture.png").write_bytes(base64.b64decode(url.split(",")[1]))
+        self.write("p.yaml", PICTURES)
+        self.write("e.yaml", EXPERIMENT % ("{folders: [cases/*], input: case}", "picture", "{x: {}, y: {m.value: 2}}"))
+
+    def parts(self):
+        return sorted((self.scratch / "out" / "report").glob("*"))
+
+    def test_all_fits(self):
+        self.with_pictures()
+        data = self.compare()
+        self.assertEqual((data["parts"], len(data["materials"]), len(data["pictures"])), ([], 8, 4))
+        self.assertFalse((self.scratch / "out" / "report").exists())
+        self.assertEqual(data["experiment"]["out"], "out")
+
+    def test_nothing_fits(self):
+        self.with_pictures()
+        data = self.compare("--page-mb", "0.001")
+        self.assertEqual((data["materials"], data["pictures"]), ([], {}))
+        self.assertEqual(sorted((part["case"], part["start"]) for part in data["parts"]), [(i, 0) for i in range(4)])
+        self.assertEqual([path.name for path in self.parts()], sorted(part["file"] for part in data["parts"]))
+        for part in data["parts"]:
+            self.assertEqual(part["kinds"], ["pictures"])
+            first, content, last = (self.scratch / "out" / "report" / part["file"]).read_text().splitlines()
+            self.assertEqual((first, last), ('Parts.take("%s",' % part["file"], ");"))
+            self.assertEqual(len(content), part["bytes"])
+            content = json.loads(content)
+            cells = [(cell["variant"], cell["case"], cell["start"]) for cell in content["materials"]]
+            self.assertEqual(cells, [(0, part["case"], 0), (1, part["case"], 0)])
+            named = {entry["picture"] for cell in content["materials"] for entry in cell["pictures"]}
+            self.assertEqual(named, set(content["pictures"]))
+
+    def test_as_many_as_fit(self):
+        self.with_pictures()
+        data = self.compare("--page-mb", "0.001")
+        limit = self.page.stat().st_size + 2.5 * data["parts"][0]["bytes"]
+        (self.scratch / "out" / "report" / "notes.txt").write_text("mine")
+        data = self.compare("--page-mb", str(limit / 1e6))
+        self.assertLessEqual(self.page.stat().st_size, limit)
+        inside = {cell["case"] for cell in data["materials"]}
+        self.assertEqual((len(inside), {part["case"] for part in data["parts"]}), (2, set(range(4)) - inside))
+        others = [path.name for path in self.parts() if path.name != "notes.txt"]
+        self.assertEqual(others, sorted(part["file"] for part in data["parts"]), "those of an earlier page go")
+        self.compare()
+        self.assertEqual([path.name for path in self.parts()], ["notes.txt"])
+
+    def test_pictures_of_a_cell_that_has_none(self):
+        self.with_pictures()
+        data = self.compare("--shown", "0")
+        self.assertEqual((data["materials"], data["parts"], data["pictures"]), ([], [], {}))
+        # The commands that the page gives for such a cell.
+        self.marrow("cell", data["experiment"]["file"], "--out", data["experiment"]["out"], "y/b/0")
+        self.marrow("show", data["experiment"]["folder"] + "/pictures/y/b/0")
+        shown = self.data_of(self.scratch / "out" / "pictures" / "y" / "b" / "0" / "report.html")
+        self.assertEqual(len(shown["pictures"]), 1)
+
+    def test_worst_median_failed_and_best_are_shown(self):
+        self.write("p.yaml", NUMBERS)
+        self.write("e.yaml", EXPERIMENT % ("{seeds: 1..9}", "", "{x: {m.value: 1000003}}"))
+        self.compare()
+        rows = csv.DictReader((self.scratch / "out" / "cells.csv").read_text().splitlines())
+        values = sorted((float(row["number.value"]), number) for number, row in enumerate(rows))
+        limit = (values[6][0] + values[7][0]) / 2
+        self.write(
+            "e.yaml",
+            EXPERIMENT % ("{seeds: 1..9}", "", "{x: {m.value: %r}, y: {m.value: %r}}" % (limit, values[-1][0] + 1)),
+        )
+        failed = min((7, 8), key=lambda rank: values[rank][1])  # the first one in x
+        for most, wanted in (("1", [6]), ("2", [6, 3]), ("3", [6, 3, failed]), ("4", [6, 3, failed, 0])):
+            data = self.compare("--shown", most)
+            shown = list(dict.fromkeys(cell["case"] for cell in data["materials"]))
+            ranks = [next(rank for rank, value in enumerate(values) if value[1] == case) for case in shown]
+            self.assertEqual(ranks, wanted)
+
+
+if __name__ == "__main__":
+    main()

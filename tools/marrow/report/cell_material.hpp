@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What a comparison's page has of single cells: a row of each, and pictures, curves and 3D views of some. As many of
+// these go into the page as its size allows; the others lie beside it, in the folder report/.
+#include <cstddef>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "report/report.hpp"
+
+namespace marrow::cli {
+
+/// All cells, as data.js describes a cell_table.
+nlohmann::json cell_table(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
+
+/// Enters the materials of the cells in `shown` into `data`, those of a case and start together, in this order, as long
+/// as the page has at most `most_bytes`. The others become files of FOLDER/report, which `data` lists as parts. A file
+/// is named after its content and holds a script, because a page from disk may load nothing else. Only one case and
+/// start at a time is in memory besides the page. Throws Error if a file cannot be written.
+void add_cell_materials(nlohmann::json& data, const compare::CellRunner& runner,
+                        const std::vector<compare::CellIndex>& shown, const std::filesystem::path& folder,
+                        std::size_t most_bytes);
+
+/// Removes the files of FOLDER/report that `data` does not list: those of an earlier page. Other files stay.
+void remove_other_parts(const nlohmann::json& data, const std::filesystem::path& folder);
+
+/// Whether a file of FOLDER/report is a part of a page, by its name.
+bool is_part_name(const std::string& name);
+
+/// Bytes of the page with these data.
+std::size_t page_bytes(const nlohmann::json& data);
+
+}  // namespace marrow::cli
