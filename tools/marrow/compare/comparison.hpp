@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "marrow/compare/case_rate.hpp"
 #include "marrow/compare/cell.hpp"
 #include "marrow/compare/experiment.hpp"
 #include "marrow/compare/statistics.hpp"
@@ -62,6 +63,8 @@ WorkEstimate estimate_of(const compare::Experiment& experiment, const Catalogue&
 struct VariantFigure {
   std::size_t count = 0;
   compare::Summary summary;
+  bool has_interval = false;       ///< of metrics only, from two cases on
+  compare::Interval median{0, 0};  ///< median_of_runs_interval
 };
 /// What the verdicts of a variant are worth, over its completed cells that have one.
 struct VerdictCounts {
@@ -69,14 +72,15 @@ struct VerdictCounts {
   std::size_t misses = 0;        ///< cells that are no success
   std::size_t silent = 0;        ///< silent failures: misses whose verdict is trusted. The other misses are caught.
   std::size_t false_alarms = 0;  ///< successes whose verdict is doubtful or wrong
-  /// wilson_interval of the rates silent / misses and false_alarms / successes; 0 to 1 if there are none.
+  /// CaseRate::interval of the rates silent / misses and false_alarms / successes; 0 to 1 if there are none.
   compare::Interval silent_rate{0, 1}, false_alarm_rate{0, 1};
   std::size_t caught() const { return misses - silent; }
   std::size_t successes() const { return cells - misses; }
 };
 struct VariantSummary {
   std::size_t runs = 0, failed = 0, successes = 0;
-  compare::Interval success;
+  compare::Interval success;           ///< CaseRate::interval
+  double effective_runs = 0;           ///< CaseRate::effective_runs
   std::vector<VariantFigure> figures;  ///< in the order of the experiment's metrics
   compare::CaptureRange capture;       ///< without bins if the experiment names no initial_error
   std::size_t unknown_starts =

@@ -99,13 +99,15 @@ std::string jsonl(const Experiment& experiment, const std::vector<CellRow>& rows
 
 json of(const VariantFigure& figure) {
   if (!figure.count) return {{"count", 0}};
-  return {{"count", figure.count},
-          {"median", figure.summary.median},
-          {"q1", figure.summary.lower_quartile},
-          {"q3", figure.summary.upper_quartile},
-          {"p95", figure.summary.percentile_95},
-          {"worst", figure.summary.worst},
-          {"mean", figure.summary.mean}};
+  json result{{"count", figure.count},
+              {"median", figure.summary.median},
+              {"q1", figure.summary.lower_quartile},
+              {"q3", figure.summary.upper_quartile},
+              {"p95", figure.summary.percentile_95},
+              {"worst", figure.summary.worst},
+              {"mean", figure.summary.mean}};
+  if (figure.has_interval) result.update({{"median_low", figure.median.lower}, {"median_high", figure.median.upper}});
+  return result;
 }
 
 json of(std::size_t count, std::size_t total, const compare::Interval& rate) {
@@ -149,7 +151,8 @@ json answer_json(const Experiment& experiment, const Answer& answer) {
                           {"of", summary.runs},
                           {"rate", summary.runs ? double(summary.successes) / double(summary.runs) : 0.0},
                           {"low", summary.success.lower},
-                          {"high", summary.success.upper}}},
+                          {"high", summary.success.upper},
+                          {"effective_runs", summary.effective_runs}}},
                         {"metrics", figures},
                         {"seconds", of(summary.seconds)},
                         {"evaluations", of(summary.evaluations)}});
