@@ -69,5 +69,104 @@ class Statistics(ComparisonCase):
         self.assertNotIn("median_low", variant["seconds"])
 
 
+SEEDS = "starts: {node: start, count: 2, translation_mm: 0.1}\nvariants: {a: {shift.value: 0}, b: {shift.value: 5}}\n"
+SHIFTED = PIPELINE.replace("{a: start, b: drawn}", "{a: start, b: more}").replace(
+    "outputs", "  shift: {uses: test.constant}\n  more: {uses: test.add, in: {a: drawn, b: shift}}\noutputs"
+)
+
+
+class MoreCases(ComparisonCase):
+    def compare(self, rule, *arguments, variants=SEEDS):
+        self.write("p.yaml", SHIFTED)
+        text = HEAD + variants + ("stop: {%s, most_cases: 40, look_every: 8}\n" % rule if rule else "")
+        return self.marrow("compare", self.write("e.yaml", text), "--out", "out", *arguments)
+
+    def stop(self):
+        return json.loads((self.scratch / "out" / "comparison.json").read_text())["stop"]
+
+    def test_a_difference_is_shown_early(self):
+        first = self.compare("difference: number.value")
+        self.assertEqual(first.returncode, 0, first.stderr)
+        self.assertIn(
+            "look 1 of 5, 8 cases: b is not shown to differ from a in number.value: p = 0.00781", first.stdout
+        )
+        self.assertIn("; --more-cases goes on, with 8 cases a look", first.stdout)
+        rows = sorted((self.scratch / "out" / "cells").rglob("cell.json"))
+        times = [row.stat().st_mtime_ns for row in rows]
+        self.assertEqual(len(rows), 32)
+        more = self.compare("difference: number.value", "--more-cases", "32")
+        self.assertEqual(more.returncode, 0, more.stderr)
+        self.assertIn("64 cells: 2 variants, 16 cases, 2 starts; 32 were there already", more.stdout)
+        self.assertEqual([row.stat().st_mtime_ns for row in rows], times, "no row is made again")
+        self.assertIn("marrow: look 1 of 5, 8 cases: b is not shown", more.stderr)
+        self.assertIn(
+            "look 2 of 5, 16 cases: b differs from a in number.value: p = 3.05e-05, below 0.000788", more.stdout
+        )
+        self.assertIn("The median difference is 5, within 5 to 5, which holds with 95 % confidence", more.stdout)
+        self.assertIn("The other intervals and p do not count the looks.", more.stdout)
+        stop = self.stop()
+        self.assertEqual((stop["look"], stop["looks"], stop["cases"], stop["most_cases"]), (2, 5, 16, 40))
+        self.assertEqual((stop["is_met"], stop["variant"], stop["figure"]), (True, "b", "number.value"))
+        self.assertEqual((stop["low"], stop["high"], stop["difference"], stop["alpha"]), (5, 5, 5, 0.05))
+        again = self.compare("difference: number.value", "--more-cases", "32")
+        self.assertIn("64 cells: 2 variants, 16 cases, 2 starts; 64 were there already", again.stdout)
+
+    def test_without_a_difference_it_goes_to_the_end(self):
+        result = self.compare("difference: number.value", "--more-cases", "100", variants=SEEDS.replace("5}", "0}"))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("look 5 of 5, 40 cases: b is not shown to differ from a in number.value: p = 1", result.stdout)
+        self.assertIn("; this was the last look", result.stdout)
+        self.assertFalse(self.stop()["is_met"])
+
+    def test_it_adds_no_more_than_it_was_asked_for(self):
+        result = self.compare("figure: number.value, width: 1", "--more-cases", "17")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        stop = self.stop()
+        self.assertEqual((stop["look"], stop["cases"], stop["is_met"], stop["width"]), (3, 24, False, 1))
+        self.assertIn("look 3 of 5, 24 cases: the widest interval of number.value is ", result.stdout)
+
+    def test_a_success_rate_is_narrow_enough(self):
+        variants = SEEDS + "success: {number.value: 1e9}\n"
+        result = self.compare("figure: success, width: 0.4", "--more-cases", "32", variants=variants)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        stop = self.stop()
+        self.assertEqual((stop["figure"], stop["is_met"], stop["high"]), ("success", True, 1))
+        self.assertLessEqual(stop["high"] - stop["low"], 0.4)
+        self.assertIn("the widest interval of the success rate is ", result.stdout)
+
+    def test_a_further_cell_by_itself(self):
+        self.compare("difference: number.value")
+        file = self.scratch / "e.yaml"
+        unknown = self.marrow("cell", file, "a/seed-16/0", "--out", "out")
+        self.assertEqual(unknown.returncode, 2)
+        self.assertIn("no case 'seed-16'", unknown.stderr)
+        known = self.marrow("cell", file, "a/seed-16/0", "--more-cases", "8", "--out", "out")
+        self.assertEqual(known.returncode, 0, known.stderr)
+        self.assertEqual(json.loads(known.stdout)["case"], "seed-16")
+
+    def test_how_much_there_is_to_do(self):
+        result = self.compare("difference: number.value", "--more-cases", "32", "--dry-run")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("160 cells: 2 variants, 40 cases, 2 starts", result.stdout)
+
+    def test_faults(self):
+        for rule, arguments, message in (
+            ("", ["8"], "e.yaml does not say when to stop adding cases; add for example  stop: {figure: number.value"),
+            (
+                "difference: number.value",
+                ["7"],
+                "--more-cases 7 is less than the 8 cases from one look to the next; give at least as many",
+            ),
+            (
+                "difference: number.value",
+                ["8", "--emit", "parallel"],
+                "--more-cases looks at each batch of cases before the next one, so it runs here;",
+            ),
+        ):
+            result = self.compare(rule, "--more-cases", *arguments)
+            self.assertEqual(result.returncode, 2, result.stdout)
+            self.assertIn(message, result.stderr)
+
+
 if __name__ == "__main__":
     main()

@@ -39,17 +39,7 @@ VariantFigure figure_by_case(const std::map<std::string, std::vector<double>>& v
   return figure;
 }
 
-using Rows = std::vector<const CellRow*>;
-
-/// The rows of each variant, in the order of the experiment.
-std::vector<Rows> rows_by_variant(const Experiment& experiment, const std::vector<CellRow>& rows) {
-  std::map<std::string, std::size_t> places;
-  for (std::size_t v = 0; v < experiment.variants.size(); ++v) places[experiment.variants[v].name] = v;
-  std::vector<Rows> result(experiment.variants.size());
-  for (const CellRow& row : rows)
-    if (const auto place = places.find(row.variant); place != places.end()) result[place->second].push_back(&row);
-  return result;
-}
+using Rows = RowsOfVariant;
 
 VariantSummary summary_of(const Experiment& experiment, const Rows& rows) {
   VariantSummary summary;
@@ -102,20 +92,6 @@ void add_capture(const Experiment& experiment, const Rows& rows, const StartErro
       ++summary.unknown_starts;
   }
   summary.capture = compare::capture_range(outcomes);
-}
-
-/// The values of one figure in the cells that both variants completed.
-std::vector<compare::Pair> cell_pairs(const Rows& baseline, const Rows& variant, std::size_t metric) {
-  std::map<std::pair<std::string, std::string>, double> reference;
-  for (const CellRow* row : baseline)
-    if (row->failed.empty() && row->values[metric]) reference[{row->case_name, row->start}] = *row->values[metric];
-  std::vector<compare::Pair> pairs;
-  for (const CellRow* row : variant) {
-    const auto found = reference.find({row->case_name, row->start});
-    if (row->failed.empty() && row->values[metric] && found != reference.end())
-      pairs.push_back({row->case_name, found->second, *row->values[metric]});
-  }
-  return pairs;
 }
 
 std::string unit_of(const std::vector<CellRow>& rows, std::size_t metric) {
@@ -198,6 +174,28 @@ std::string figure_table(const Experiment& experiment, const Answer& answer, std
 
 }  // namespace
 
+std::vector<RowsOfVariant> rows_by_variant(const Experiment& experiment, const std::vector<CellRow>& rows) {
+  std::map<std::string, std::size_t> places;
+  for (std::size_t v = 0; v < experiment.variants.size(); ++v) places[experiment.variants[v].name] = v;
+  std::vector<RowsOfVariant> result(experiment.variants.size());
+  for (const CellRow& row : rows)
+    if (const auto place = places.find(row.variant); place != places.end()) result[place->second].push_back(&row);
+  return result;
+}
+
+std::vector<compare::Pair> cell_pairs(const RowsOfVariant& baseline, const RowsOfVariant& variant, std::size_t metric) {
+  std::map<std::pair<std::string, std::string>, double> reference;
+  for (const CellRow* row : baseline)
+    if (row->failed.empty() && row->values[metric]) reference[{row->case_name, row->start}] = *row->values[metric];
+  std::vector<compare::Pair> pairs;
+  for (const CellRow* row : variant) {
+    const auto found = reference.find({row->case_name, row->start});
+    if (row->failed.empty() && row->values[metric] && found != reference.end())
+      pairs.push_back({row->case_name, found->second, *row->values[metric]});
+  }
+  return pairs;
+}
+
 Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows) {
   Answer answer;
   const StartErrors errors = start_errors(rows);
@@ -207,6 +205,7 @@ Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows)
     if (!experiment.initial_error.empty()) add_capture(experiment, own, errors, answer.variants.back());
   }
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) answer.units.push_back(unit_of(rows, m));
+  add_look(experiment, of_variant, answer);
   std::vector<double> p;
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m)
     for (std::size_t v = 0; v < experiment.variants.size(); ++v) {
@@ -253,6 +252,10 @@ std::string table_text(const Experiment& experiment, const Answer& answer) {
   if (experiment.variants.size() > 1)
     out << "; against it, with Holm's correction over all " << answer.findings.size() << ":\n";
   for (const Finding& finding : answer.findings) out << "  " << printable(finding.sentence) << "\n";
+  if (answer.look) {
+    out << "\n" << printable(answer.look_sentence) << "\n";
+    if (answer.look->number > 1) out << "The other intervals and p do not count the looks.\n";
+  }
   return out.str();
 }
 

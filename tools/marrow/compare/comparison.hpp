@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,7 +28,9 @@ struct CompareRequest {
   double memory_limit_mb = 4000;
   std::size_t shown = 8;  ///< cases and starts with pictures in the report
   bool dry_run = false, no_cache = false, quiet = false;
-  bool gather = false;  ///< run no cell: those without a row have failed
+  bool gather = false;          ///< run no cell: those without a row have failed
+  std::size_t more_cases = 0;   ///< further seeds; for `compare` at most so many, for other commands exactly
+  std::size_t made_before = 0;  ///< rows that the same command made at earlier looks
   FileLimits file_limits;
 };
 
@@ -40,6 +43,22 @@ using LostCells = std::map<std::size_t, std::string>;
 /// reason in `lost`.
 int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment,
                    const std::filesystem::path& folder, const LostCells& lost = {});
+
+struct CellRows {
+  std::vector<compare::CellRow> rows;
+  std::size_t made = 0;  ///< those that were not there already
+};
+/// Runs the cells that are not done yet and returns all rows. Nothing if it was interrupted.
+std::optional<CellRows> run_cells(const CompareRequest& request, const Catalogue& catalogue,
+                                  const compare::Experiment& experiment, const std::filesystem::path& folder);
+/// Adds cases look by look, up to request.more_cases, until the experiment's rule says stop. Then writes everything, as
+/// run_comparison() does. Throws Error if the experiment has no rule, or no look within so many cases.
+int run_more_cases(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment,
+                   const std::filesystem::path& folder);
+
+/// The experiment with the most cases that run_more_cases() may take. Throws Error as that does.
+compare::Experiment largest_experiment(const CompareRequest& request, const Catalogue& catalogue,
+                                       const compare::Experiment& experiment);
 
 /// Cells whose pictures go into the report: all variants of at most `most` pairs of case and start. First come those
 /// where a variant was worst, best or nearest to its median in the first metric, then those that failed, then the first
@@ -98,8 +117,19 @@ struct Finding {
 struct Answer {
   std::vector<VariantSummary> variants;
   std::vector<Finding> findings;
-  std::vector<std::string> units;  ///< units of the metrics; empty if no cell is done
+  std::vector<std::string> units;     ///< units of the metrics; empty if no cell is done
+  std::optional<compare::Look> look;  ///< what the experiment's rule says of its cases
+  std::string look_sentence;
 };
+
+using RowsOfVariant = std::vector<const compare::CellRow*>;
+/// The rows of each variant, in the order of the experiment.
+std::vector<RowsOfVariant> rows_by_variant(const compare::Experiment& experiment,
+                                           const std::vector<compare::CellRow>& rows);
+/// The values of one figure in the cells that both variants completed.
+std::vector<compare::Pair> cell_pairs(const RowsOfVariant& baseline, const RowsOfVariant& variant, std::size_t metric);
+/// Applies the rule 'stop' of the experiment, if it has one, to its cases. The units are known.
+void add_look(const compare::Experiment& experiment, const std::vector<RowsOfVariant>& rows, Answer& answer);
 
 /// `rows` may come from an unfinished comparison. Failed cells have no figures. The pairs of a finding are the cells
 /// that both variants completed.

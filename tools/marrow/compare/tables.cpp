@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes cells.csv and cells.jsonl (one row per cell) and comparison.json (the complete answer).
 #include <charconv>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -133,6 +134,27 @@ json of(const compare::CaptureRange& capture, std::size_t unknown_starts) {
   return {{"range", capture.range}, {"is_open", capture.is_open}, {"unknown_starts", unknown_starts}, {"bins", bins}};
 }
 
+json of(const compare::StopRule& rule, const compare::Look& look, const Experiment& experiment,
+        const std::string& sentence) {
+  const auto bound = [](double value) { return std::isfinite(value) ? json(value) : json(); };
+  json result{{"look", look.number},
+              {"looks", look.looks},
+              {"cases", look.cases},
+              {"most_cases", rule.most_cases},
+              {"is_met", look.is_met},
+              {"figure", rule.metric ? experiment.metrics[*rule.metric].path : "success"},
+              {"variant", experiment.variants[look.variant].name},
+              {"level", look.level},
+              {"low", bound(look.interval.lower)},
+              {"high", bound(look.interval.upper)},
+              {"sentence", sentence}};
+  if (rule.goal == compare::StopRule::Goal::difference)
+    result.update({{"p", look.p}, {"difference", look.difference}, {"alpha", rule.alpha}});
+  else
+    result["width"] = rule.width;
+  return result;
+}
+
 }  // namespace
 
 json answer_json(const Experiment& experiment, const Answer& answer) {
@@ -170,7 +192,9 @@ json answer_json(const Experiment& experiment, const Answer& answer) {
                         {"p", finding.comparison.test.p},
                         {"p_holm", finding.p_holm},
                         {"sentence", finding.sentence}});
-  return {{"experiment", experiment.name}, {"variants", variants}, {"comparisons", findings}};
+  json result{{"experiment", experiment.name}, {"variants", variants}, {"comparisons", findings}};
+  if (answer.look) result["stop"] = of(*experiment.stop, *answer.look, experiment, answer.look_sentence);
+  return result;
 }
 
 void write_tables(const Experiment& experiment, const std::vector<CellRow>& rows, const Answer& answer,
