@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The statistics in a comparison's answer: intervals that know that the starts of a case are not independent."""
 import json
+import re
 
 from marrow_cli import TEST_PLUGINS, Case, main, marrow
 
@@ -117,6 +118,21 @@ class MoreCases(ComparisonCase):
         self.assertIn("look 5 of 5, 40 cases: b is not shown to differ from a in number.value: p = 1", result.stdout)
         self.assertIn("; this was the last look", result.stdout)
         self.assertFalse(self.stop()["is_met"])
+
+    def test_a_failed_cell_is_tried_once_a_command(self):
+        broken = "  broken: {uses: test.fail_above, in: {a: more}, with: {value: 300000}}\noutputs: {number: broken"
+        pipeline = SHIFTED.replace("outputs: {number: sum", broken)
+        self.write("broken.yaml", pipeline)
+        text = (HEAD + SEEDS).replace("p.yaml", "broken.yaml")
+        rule = "stop: {difference: number.value, alpha: 0.001, most_cases: 32, look_every: 8}\n"
+        result = self.marrow("compare", self.write("b.yaml", text + rule), "--out", "b", "--more-cases", "24")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("failed cells", result.stdout)
+        looks = result.stderr.count("marrow: look")
+        self.assertGreaterEqual(looks, 1)
+        jobs = re.findall(r"(\d+) of (\d+), .* to go: [ab]/seed-", result.stderr)
+        self.assertGreaterEqual(len(jobs), looks)
+        self.assertEqual({int(of) for _, of in jobs}, {32}, "at each look only the 8 new cases")
 
     def test_it_adds_no_more_than_it_was_asked_for(self):
         result = self.compare("figure: number.value, width: 1", "--more-cases", "17")

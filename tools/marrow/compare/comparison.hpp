@@ -31,6 +31,7 @@ struct CompareRequest {
   bool gather = false;          ///< run no cell: those without a row have failed
   std::size_t more_cases = 0;   ///< further seeds; for `compare` at most so many, for other commands exactly
   std::size_t made_before = 0;  ///< rows that the same command made at earlier looks
+  std::map<std::string, compare::CellRow> failed_before;  ///< of these the failed ones, by their names; not tried again
   FileLimits file_limits;
 };
 

@@ -56,6 +56,8 @@ int run_more_cases(const CompareRequest& asked, const Catalogue& catalogue, cons
     }
     const Answer answer = answer_of(larger, cells->rows);
     request.made_before += cells->made;
+    for (const compare::CellRow& row : cells->rows)
+      if (!row.failed.empty()) request.failed_before.emplace(row.id, row);
     if (answer.look->is_met) return run_comparison(request, catalogue, larger, folder);
     if (!request.quiet) std::fprintf(stderr, "marrow: %s\n", printable(answer.look_sentence).c_str());
   }

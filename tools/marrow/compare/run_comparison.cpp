@@ -120,6 +120,9 @@ class Comparison {
     const std::string& key = cells_.take_key(number);
     std::optional<CellRow> row = runner_.finished(cell, key);
     if (!row) row = chunks.done(cell, key);
+    if (const auto failed = request_.failed_before.find(compare::cell_id(experiment_, cell));
+        !row && failed != request_.failed_before.end())
+      row = failed->second;
     found_ += row.has_value();
     if (row || !request_.gather) return row;
     if ((row = chunks.failed(cell))) return row;
