@@ -7,6 +7,7 @@
 
 #include "draw.hpp"
 #include "experiment_stop.hpp"
+#include "experiment_sweep.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "runtime/file_names.hpp"
@@ -46,7 +47,7 @@ class Reader {
     static const std::vector<std::string> kKeys{"experiment",  "name",    "help",          "pipeline", "inputs",
                                                 "set",         "cases",   "variants",      "matrix",   "starts",
                                                 "metrics",     "success", "initial_error", "baseline", "pictures",
-                                                "timed_cells", "stop"};
+                                                "timed_cells", "stop",    "sweep"};
     const Place start{experiment_.file.string(), 1, 1};
     const std::vector<YamlEntry> entries = yaml_.map(root, start, "the experiment", &kKeys);
     if (!root.IsMap()) return;
@@ -66,8 +67,10 @@ class Reader {
       yaml_.fault(experiment_.cases_place, "there are no cases",
                   "name folders, as  folders: [data/*]  or a simulation");
     apply_matrix();
+    sweep_.apply(experiment_);
     if (experiment_.variants.empty() && diagnostics_.empty())
-      yaml_.fault(start, "there are no variants", "name at least one under  variants:  or options under  matrix:");
+      yaml_.fault(start, "there are no variants",
+                  "name at least one under  variants:  or options under  matrix:  or  sweep:");
     for (const auto& [path, value, place] : success_) set_success(path, value, place);
     set_baseline();
     if (is_too_large(start)) return;
@@ -149,6 +152,7 @@ class Reader {
         written_.picture_places.push_back(place);
       }
     if (entry.key == "stop") stop_.read(entry);
+    if (entry.key == "sweep") sweep_.read(entry);
     if (entry.key == "timed_cells") experiment_.timed_cells = count_of(yaml_, entry, 0, 1000);
   }
 
@@ -361,6 +365,7 @@ class Reader {
   Experiment& experiment_ = written_.experiment;
   fs::path folder_;
   StopReader stop_{yaml_};
+  SweepReader sweep_{yaml_};
   std::vector<std::vector<Override>> matrix_;
   std::vector<std::tuple<std::string, double, Place>> success_;
   std::string baseline_;

@@ -76,12 +76,14 @@ SHIFTED = PIPELINE.replace("{a: start, b: drawn}", "{a: start, b: more}").replac
 )
 
 
-class MoreCases(ComparisonCase):
+class StoppedCase(ComparisonCase):
     def compare(self, rule, *arguments, variants=SEEDS):
         self.write("p.yaml", SHIFTED)
         text = HEAD + variants + ("stop: {%s, most_cases: 40, look_every: 8}\n" % rule if rule else "")
         return self.marrow("compare", self.write("e.yaml", text), "--out", "out", *arguments)
 
+
+class MoreCases(StoppedCase):
     def stop(self):
         return json.loads((self.scratch / "out" / "comparison.json").read_text())["stop"]
 
@@ -182,6 +184,54 @@ class MoreCases(ComparisonCase):
             result = self.compare(rule, "--more-cases", *arguments)
             self.assertEqual(result.returncode, 2, result.stdout)
             self.assertIn(message, result.stderr)
+
+
+class Sweep(StoppedCase):
+    def curves(self, sweep, more=""):
+        variants = "starts: {node: start, count: 2, translation_mm: 0.1}\nsweep: {options: {%s}, %s}\n%s"
+        result = self.compare("", variants=variants % (*sweep, more))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        answer = json.loads((self.scratch / "out" / "comparison.json").read_text())
+        page = (self.scratch / "out" / "report.html").read_text()
+        self.assertIn('"curves":', page)
+        return answer["curves"]
+
+    def test_a_grid_has_a_point_for_each_value(self):
+        curves = self.curves(
+            ("shift.value: [0, 100], shift.count: {range: [1, 4], whole: true, scale: log}", "grid: 3"),
+            "success: {number.value: 1000000000}\n",
+        )
+        self.assertEqual(
+            [(curve["option"], curve["figure"], curve["scale"]) for curve in curves],
+            [
+                ("shift.value", "number.value", "linear"),
+                ("shift.value", "success", "linear"),
+                ("shift.count", "number.value", "log"),
+                ("shift.count", "success", "log"),
+            ],
+        )
+        points = curves[0]["points"]
+        self.assertEqual([point["value"] for point in points], [0, 50, 100])
+        self.assertEqual([point["runs"] for point in points], [48, 48, 48])  # 3 counts, 8 cases, 2 starts
+        for i, point in enumerate(points):
+            self.assertAlmostEqual(point["middle"] - points[0]["middle"], 50 * i, 6)
+            self.assertLess(point["low"], point["middle"])
+            self.assertLess(point["middle"], point["high"])
+        self.assertEqual([point["value"] for point in curves[2]["points"]], [1, 2, 4])
+        self.assertEqual([(point["middle"], point["high"]) for point in curves[1]["points"]], [(1, 1)] * 3)
+        self.assertAlmostEqual(curves[1]["points"][0]["low"], 0.6756, 4)  # Wilson's of 8 of 8
+
+    def test_sobols_points_are_put_into_bins(self):
+        curves = self.curves(("shift.value: [0, 80], shift.count: {range: [1, 9], whole: true}", "sobol: 16"))
+        self.assertEqual([curve["option"] for curve in curves], ["shift.value", "shift.count"])
+        self.assertEqual([point["value"] for point in curves[0]["points"]], [2.5 + 10 * i for i in range(8)])
+        self.assertEqual([point["runs"] for point in curves[0]["points"]], [32] * 8)
+
+    def test_each_variant_has_its_own(self):
+        curves = self.curves(
+            ("shift.value: [0, 100]", "grid: 2"), "variants: {a: {}, b: {start.uses: test.displaced}}\nbaseline: b+0\n"
+        )
+        self.assertEqual([curve["variant"] for curve in curves], ["a", "b"])
 
 
 if __name__ == "__main__":

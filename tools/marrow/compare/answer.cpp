@@ -206,6 +206,7 @@ Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows)
   }
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) answer.units.push_back(unit_of(rows, m));
   add_look(experiment, of_variant, answer);
+  answer.curves = curves_of(experiment, of_variant);
   std::vector<double> p;
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m)
     for (std::size_t v = 0; v < experiment.variants.size(); ++v) {

@@ -115,7 +115,23 @@ struct Finding {
   double p_holm = 1;
   std::string sentence;
 };
+/// A figure at one value of a swept option, or at those in one bin.
+struct CurvePoint {
+  double value = 0;  ///< mean of the values
+  std::size_t runs = 0;
+  double middle = 0;                          ///< median of the figure, or success rate; 0 without runs
+  std::optional<compare::Interval> interval;  ///< median_of_runs_interval, from two cases on, or CaseRate::interval
+};
+/// A figure over a swept option. All variants with the same value count, whatever their other options.
+struct Curve {
+  std::string variant;  ///< whose option is swept; empty for the pipeline as it is
+  std::size_t option = 0;
+  std::optional<std::size_t> metric;  ///< nothing for the success rate
+  std::vector<CurvePoint> points;     ///< by rising value
+};
+
 struct Answer {
+  std::vector<Curve> curves;  ///< none without a sweep
   std::vector<VariantSummary> variants;
   std::vector<Finding> findings;
   std::vector<std::string> units;     ///< units of the metrics; empty if no cell is done
@@ -135,6 +151,9 @@ void add_look(const compare::Experiment& experiment, const std::vector<RowsOfVar
 /// `rows` may come from an unfinished comparison. Failed cells have no figures. The pairs of a finding are the cells
 /// that both variants completed.
 Answer answer_of(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
+/// The response curves of all swept options: on a grid a point for each value, else in eight bins of the range.
+std::vector<Curve> curves_of(const compare::Experiment& experiment, const std::vector<RowsOfVariant>& rows);
+nlohmann::json curves_json(const compare::Experiment& experiment, const std::vector<Curve>& curves);
 /// Counts silent failures and false alarms.
 VerdictCounts verdict_counts(const compare::Experiment& experiment, const std::vector<const compare::CellRow*>& rows);
 /// The counts of all variants as a table for the terminal; empty if no cell has a verdict.

@@ -193,6 +193,7 @@ json answer_json(const Experiment& experiment, const Answer& answer) {
                         {"p_holm", finding.p_holm},
                         {"sentence", finding.sentence}});
   json result{{"experiment", experiment.name}, {"variants", variants}, {"comparisons", findings}};
+  if (!answer.curves.empty()) result["curves"] = curves_json(experiment, answer.curves);
   if (answer.look) result["stop"] = of(*experiment.stop, *answer.look, experiment, answer.look_sentence);
   return result;
 }

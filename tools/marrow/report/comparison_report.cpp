@@ -148,6 +148,7 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
   const json answers = answer_json(experiment, answer);
   data["summary"] = answers["variants"];
   data["comparisons"] = answers["comparisons"];
+  if (answers.contains("curves")) data["curves"] = answers["curves"];
 
   ReportMaterial material;
   const std::size_t starts = experiment.starts.size(), variants = experiment.variants.size();

@@ -17,6 +17,17 @@ struct Variant {
   std::string name;
   Place place;
   std::vector<Override> overrides;
+  std::vector<double> swept = {};  ///< values of the experiment's swept options, in their order
+  std::string swept_from = {};     ///< the variant whose options are swept; empty if it is the pipeline as it is
+};
+
+/// An option whose numbers are tried over a range.
+struct SweptOption {
+  std::string key;  ///< node.option
+  std::array<double, 2> range{};
+  bool is_log = false;    ///< spread evenly over the logarithm
+  bool is_whole = false;  ///< rounded to whole numbers
+  Place place;
 };
 
 /// Data on which all variants run. It is a folder that exists, or a folder that a simulation makes. Without either, the
@@ -101,6 +112,8 @@ struct Experiment {
   std::vector<ExperimentCase> cases;
   std::size_t more_cases = 0;  ///< the last of the cases, which the file does not name
   std::vector<Variant> variants;
+  std::vector<SweptOption> swept;
+  bool sweep_is_grid = false;  ///< else Sobol's points
   std::size_t baseline = 0;
   std::optional<StartProtocol> protocol;
   std::vector<Start> starts;  ///< one without displacement if there is no protocol
