@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "marrow/compare/case_rate.hpp"
 #include "marrow/compare/statistics.hpp"
 #include "marrow/domain/error.hpp"
 
@@ -17,6 +18,7 @@ CaptureRange capture_range(const std::vector<StartOutcome>& outcomes, double bin
   if (!(least_rate >= 0 && least_rate <= 1))
     throw Error("the success rate is " + std::to_string(least_rate) + "; give a fraction from 0 to 1, such as 0.95");
   CaptureRange capture;
+  std::vector<CaseRate> rates;
   double farthest = 0;
   for (const StartOutcome& outcome : outcomes) {
     if (!(outcome.error >= 0 && std::isfinite(outcome.error)))
@@ -28,14 +30,18 @@ CaptureRange capture_range(const std::vector<StartOutcome>& outcomes, double bin
       const double from = bin_width * double(capture.bins.size());
       capture.bins.push_back({from, from + bin_width, 0, 0, {0, 1, 0.95}});
     }
-    ++capture.bins[bin].runs;
-    capture.bins[bin].successes += outcome.success;
+    rates.resize(capture.bins.size());
+    const std::size_t number = std::size_t(&outcome - outcomes.data());
+    rates[bin].add(outcome.case_name.empty() ? " " + std::to_string(number) : outcome.case_name, outcome.success);
   }
   if (!capture.bins.empty()) capture.bins.back().to = std::max(capture.bins.back().to, farthest);
   capture.is_open = !outcomes.empty();
-  for (CaptureRange::Bin& bin : capture.bins) {
+  for (std::size_t b = 0; b < capture.bins.size(); ++b) {
+    CaptureRange::Bin& bin = capture.bins[b];
+    bin.runs = rates[b].runs();
+    bin.successes = rates[b].successes();
     if (!bin.runs) continue;
-    bin.success = wilson_interval(bin.successes, bin.runs);
+    bin.success = rates[b].interval();
     capture.is_open = capture.is_open && double(bin.successes) >= least_rate * double(bin.runs);
     if (capture.is_open) capture.range = bin.to;
   }

@@ -86,8 +86,9 @@ PipelineArguments simulation_arguments_of(const Experiment& experiment, std::siz
   return arguments;
 }
 
-Experiment read_experiment(const fs::path& file, const Catalogue& catalogue, Diagnostics& diagnostics) {
-  WrittenExperiment written = read_written_experiment(file, diagnostics);
+Experiment read_experiment(const fs::path& file, const Catalogue& catalogue, Diagnostics& diagnostics,
+                           std::size_t more_cases) {
+  WrittenExperiment written = read_written_experiment(file, diagnostics, more_cases);
   if (diagnostics.empty()) check_pipelines(written, catalogue, diagnostics);
   return std::move(written.experiment);
 }

@@ -54,6 +54,9 @@ class CaseReader {
       yaml_.fault(entry.place, "'" + entry.key + "' without 'seeds'",
                   "inputs of a simulation that differ between cases stand in 'simulate'");
     }
+    if (experiment_.more_cases && !has_more_)
+      yaml_.fault(section.place, "further cases need seeds, which these cases do not have",
+                  "use  cases: {simulate: ...}  or  {seeds: 1..20}");
   }
 
  private:
@@ -78,7 +81,11 @@ class CaseReader {
     return false;
   }
 
-  void add_seeds(const std::vector<std::uint64_t>& seeds, bool are_simulated, const Place& place) {
+  void add_seeds(std::vector<std::uint64_t> seeds, bool are_simulated, const Place& place) {
+    for (std::size_t i = 0; !seeds.empty() && i < experiment_.more_cases; ++i) {
+      seeds.push_back(i ? seeds.back() + 1 : *std::max_element(seeds.begin(), seeds.end()) + 1);
+      has_more_ = true;
+    }
     for (const std::uint64_t seed : seeds)
       if (!add({"seed-" + std::to_string(seed), {}, are_simulated, seed}, place)) return;
   }
@@ -192,6 +199,7 @@ class CaseReader {
   Experiment& experiment_;
   std::map<std::string, std::size_t> known_;  ///< cases by their names in small letters
   FolderSearch search_;
+  bool has_more_ = false;
 };
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <set>
 
 #include "draw.hpp"
+#include "experiment_stop.hpp"
+#include "experiment_sweep.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "runtime/file_names.hpp"
@@ -18,9 +20,10 @@ namespace fs = std::filesystem;
 
 class Reader {
  public:
-  Reader(const fs::path& file, Diagnostics& diagnostics)
+  Reader(const fs::path& file, Diagnostics& diagnostics, std::size_t more_cases)
       : diagnostics_(diagnostics), yaml_(file.string(), diagnostics) {
     experiment_.file = file;
+    experiment_.more_cases = more_cases;
     folder_ = fs::absolute(file).parent_path();
   }
 
@@ -41,9 +44,10 @@ class Reader {
 
  private:
   void read_root(const YAML::Node& root) {
-    static const std::vector<std::string> kKeys{
-        "experiment", "name",   "help",    "pipeline", "inputs",        "set",      "cases",    "variants",
-        "matrix",     "starts", "metrics", "success",  "initial_error", "baseline", "pictures", "timed_cells"};
+    static const std::vector<std::string> kKeys{"experiment",  "name",    "help",          "pipeline", "inputs",
+                                                "set",         "cases",   "variants",      "matrix",   "starts",
+                                                "metrics",     "success", "initial_error", "baseline", "pictures",
+                                                "timed_cells", "stop",    "sweep"};
     const Place start{experiment_.file.string(), 1, 1};
     const std::vector<YamlEntry> entries = yaml_.map(root, start, "the experiment", &kKeys);
     if (!root.IsMap()) return;
@@ -63,11 +67,14 @@ class Reader {
       yaml_.fault(experiment_.cases_place, "there are no cases",
                   "name folders, as  folders: [data/*]  or a simulation");
     apply_matrix();
+    sweep_.apply(experiment_);
     if (experiment_.variants.empty() && diagnostics_.empty())
-      yaml_.fault(start, "there are no variants", "name at least one under  variants:  or options under  matrix:");
+      yaml_.fault(start, "there are no variants",
+                  "name at least one under  variants:  or options under  matrix:  or  sweep:");
     for (const auto& [path, value, place] : success_) set_success(path, value, place);
     set_baseline();
     if (is_too_large(start)) return;
+    stop_.apply(experiment_, experiment_.protocol ? experiment_.protocol->count : 1);
     if (experiment_.protocol)
       experiment_.starts = draw_starts(*experiment_.protocol);
     else
@@ -144,6 +151,8 @@ class Reader {
         experiment_.pictures.push_back(name);
         written_.picture_places.push_back(place);
       }
+    if (entry.key == "stop") stop_.read(entry);
+    if (entry.key == "sweep") sweep_.read(entry);
     if (entry.key == "timed_cells") experiment_.timed_cells = count_of(yaml_, entry, 0, 1000);
   }
 
@@ -355,6 +364,8 @@ class Reader {
   WrittenExperiment written_;
   Experiment& experiment_ = written_.experiment;
   fs::path folder_;
+  StopReader stop_{yaml_};
+  SweepReader sweep_{yaml_};
   std::vector<std::vector<Override>> matrix_;
   std::vector<std::tuple<std::string, double, Place>> success_;
   std::string baseline_;
@@ -363,8 +374,8 @@ class Reader {
 
 }  // namespace
 
-WrittenExperiment read_written_experiment(const fs::path& file, Diagnostics& diagnostics) {
-  return Reader(file, diagnostics).read();
+WrittenExperiment read_written_experiment(const fs::path& file, Diagnostics& diagnostics, std::size_t more_cases) {
+  return Reader(file, diagnostics, more_cases).read();
 }
 
 }  // namespace marrow::compare

@@ -15,9 +15,11 @@ struct WrittenExperiment {
   std::vector<Place> metric_places, picture_places;
 };
 
-WrittenExperiment read_written_experiment(const std::filesystem::path& file, Diagnostics& diagnostics);
+WrittenExperiment read_written_experiment(const std::filesystem::path& file, Diagnostics& diagnostics,
+                                          std::size_t more_cases);
 
-/// Reads the section 'cases': folders, seeds, and simulations whose inputs are drawn.
+/// Reads the section 'cases': folders, seeds, and simulations whose inputs are drawn. `experiment.more_cases` seeds
+/// follow those that it names.
 void read_cases(StrictYaml& yaml, const YamlEntry& section, const std::filesystem::path& folder,
                 WrittenExperiment& written);
 

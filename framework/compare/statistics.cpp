@@ -6,52 +6,16 @@
 #include <map>
 #include <numeric>
 
+#include "marrow/compare/bootstrap.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/random.hpp"
+#include "normal.hpp"
+#include "quantile.hpp"
 
 namespace marrow::compare {
 namespace {
 
 constexpr std::size_t most_exact_cases = 50;
-
-void check_finite(const std::vector<double>& values, const std::string& what) {
-  if (values.empty()) throw Error("there are no " + what + "s; give at least one");
-  for (std::size_t i = 0; i < values.size(); ++i)
-    if (!std::isfinite(values[i]))
-      throw Error(what + " " + std::to_string(i + 1) + " of " + std::to_string(values.size()) + " is " +
-                  std::to_string(values[i]) +
-                  ", which is no number to compare; count its run as failed, and give the rest");
-}
-
-void check_confidence(double confidence) {
-  if (!(confidence > 0 && confidence < 1))
-    throw Error("the confidence is " + std::to_string(confidence) + "; give a fraction between 0 and 1, such as 0.95");
-}
-
-/// Probability that a standard normal variable is larger than z.
-double upper_tail(double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); }
-
-/// The z >= 0 with upper_tail(z) = tail, by bisection down to neighbouring doubles.
-double z_of_tail(double tail) {
-  double below = 0, above = 40;
-  for (;;) {
-    const double middle = 0.5 * (below + above);
-    if (middle <= below || middle >= above) return middle;
-    (upper_tail(middle) > tail ? below : above) = middle;
-  }
-}
-
-double quantile(const std::vector<double>& sorted, double fraction) {
-  const double position = fraction * static_cast<double>(sorted.size() - 1);
-  const std::size_t below = std::min(static_cast<std::size_t>(position), sorted.size() - 1);
-  const std::size_t above = std::min(below + 1, sorted.size() - 1);
-  return sorted[below] + (position - static_cast<double>(below)) * (sorted[above] - sorted[below]);
-}
-
-double median_of_sorted(const std::vector<double>& sorted) {
-  const std::size_t half = sorted.size() / 2;
-  return sorted.size() % 2 ? sorted[half] : 0.5 * (sorted[half - 1] + sorted[half]);
-}
 
 /// Ranks of the magnitudes in rising order. They are doubled, so that the mean rank of ties is an integer. Zeros take
 /// the first ranks but are not listed.
@@ -110,14 +74,8 @@ Interval wilson_interval(std::size_t successes, std::size_t trials, double confi
   if (successes > trials)
     throw Error("got " + std::to_string(successes) + " successes of " + std::to_string(trials) +
                 " trials; expected at most as many successes as trials");
-  const double n = static_cast<double>(trials);
-  const double rate = static_cast<double>(successes) / n;
-  const double z = z_of_tail((1 - confidence) / 2);
-  const double centre = (rate + z * z / (2 * n)) / (1 + z * z / n);
-  const double half = z / (1 + z * z / n) * std::sqrt(rate * (1 - rate) / n + z * z / (4 * n * n));
-  // With no successes the lower bound is exactly 0, and with all successes the upper bound is exactly 1. Rounding would
-  // miss this.
-  return {successes == 0 ? 0.0 : centre - half, successes == trials ? 1.0 : centre + half, confidence};
+  return score_interval(static_cast<double>(successes) / static_cast<double>(trials), static_cast<double>(trials),
+                        confidence);
 }
 
 Summary summarise(const std::vector<double>& values, bool higher_is_better) {
@@ -135,7 +93,10 @@ Summary summarise(const std::vector<double>& values, bool higher_is_better) {
   return summary;
 }
 
-std::vector<double> case_differences(const std::vector<Pair>& pairs) {
+namespace {
+
+/// The differences of each case, sorted.
+ValuesOfCases differences_of(const std::vector<Pair>& pairs) {
   if (pairs.empty()) throw Error("there are no pairs to compare; the variants need at least one case in common");
   std::map<std::string, std::vector<double>> by_case;
   for (const Pair& pair : pairs) {
@@ -146,23 +107,31 @@ std::vector<double> case_differences(const std::vector<Pair>& pairs) {
                   " for the variant, expected finite numbers; count such a run as failed, and give the rest");
     by_case[pair.case_name].push_back(difference);
   }
-  std::vector<double> means;
+  ValuesOfCases cases;
   for (auto& [name, differences] : by_case) {
     std::sort(differences.begin(), differences.end());  // a sum of doubles depends on its order
-    means.push_back(std::accumulate(differences.begin(), differences.end(), 0.0) /
-                    static_cast<double>(differences.size()));
+    cases.push_back(std::move(differences));
   }
+  return cases;
+}
+
+std::vector<double> sorted_means(const ValuesOfCases& cases) {
+  std::vector<double> means;
+  for (const std::vector<double>& values : cases)
+    means.push_back(std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size()));
   std::sort(means.begin(), means.end());
   return means;
 }
+
+}  // namespace
+
+std::vector<double> case_differences(const std::vector<Pair>& pairs) { return sorted_means(differences_of(pairs)); }
 
 Interval median_interval(const std::vector<double>& differences, std::uint64_t seed, double confidence,
                          std::size_t resamples) {
   check_finite(differences, "difference");
   check_confidence(confidence);
-  if (resamples < 1000)
-    throw Error("got " + std::to_string(resamples) +
-                " resamples; the bounds need at least 1000 (10000 is the default)");
+  check_resamples(resamples);
   std::vector<double> sorted = differences;
   std::sort(sorted.begin(), sorted.end());
   Random random(seed);
@@ -170,8 +139,7 @@ Interval median_interval(const std::vector<double>& differences, std::uint64_t s
   std::vector<double> medians(resamples);
   for (double& median : medians) {
     for (double& value : drawn) value = sorted[random.index(sorted.size())];
-    std::sort(drawn.begin(), drawn.end());
-    median = median_of_sorted(drawn);
+    median = median_in_place(drawn);
   }
   std::sort(medians.begin(), medians.end());
   return {quantile(medians, (1 - confidence) / 2), quantile(medians, (1 + confidence) / 2), confidence};
@@ -215,12 +183,13 @@ std::vector<double> holm(const std::vector<double>& p_values) {
 }
 
 Comparison compare_pairs(const std::vector<Pair>& pairs, std::uint64_t seed, double confidence) {
-  const std::vector<double> differences = case_differences(pairs);
+  const ValuesOfCases cases = differences_of(pairs);
+  const std::vector<double> differences = sorted_means(cases);
   Comparison comparison;
   comparison.cases = differences.size();
   comparison.pairs = pairs.size();
   comparison.median_difference = median_of_sorted(differences);
-  comparison.interval = median_interval(differences, seed, confidence);
+  comparison.interval = median_of_case_means_interval(cases, {seed, confidence, resamples_for(pairs.size()), 0});
   comparison.test = signed_rank_test(differences);
   return comparison;
 }

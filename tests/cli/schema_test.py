@@ -83,9 +83,11 @@ starts: {node: start, count: 2, seed: 3, rotation_deg: 4, translation_mm: 5, dis
 metrics: [errors.distal.final.mtre_mm, {figure: errors.distal.final.rotation_deg, label: rotation}]
 success: {errors.distal.final.mtre_mm: 2}
 initial_error: errors.distal.start.mtre_mm
-baseline: bobyqa+75
+baseline: bobyqa+75+1
 pictures: [overlay]
 timed_cells: 1
+sweep: {options: {edges.sigma_px: {range: [1, 2], scale: log, whole: false}}, grid: 2}
+stop: {width: 0.1, figure: success, most_cases: 10, look_every: 5}
 """
 # What of it becomes what, and is then refused by the schema and by the program alike.
 WRONG = {
@@ -115,9 +117,16 @@ WRONG = {
     "label: rotation": "lable: rotation",
     "mtre_mm: 2": "mtre_mm: low",
     "initial_error: errors.distal.start.mtre_mm": "initial_error: errors",
-    "baseline: bobyqa+75": "baseline: [bobyqa]",
+    "baseline: bobyqa+75+1": "baseline: [bobyqa]",
     "pictures: [overlay]": "pictures: overlay",
     "timed_cells: 1": "timed_cells: all",
+    "range: [1, 2]": "range: [1]",
+    "scale: log": "scale: loud",
+    "whole: false": "whole: perhaps",
+    ", grid: 2": "",
+    "width: 0.1, ": "",
+    "most_cases: 10": "most_cases: 0",
+    "look_every": "look_evry",
 }
 
 
@@ -148,7 +157,7 @@ class ExperimentSchema(SchemaCase):
         self.assertEqual(self.errors(EXPERIMENT), [])
         result = self.program(EXPERIMENT)
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn("24 cells: 4 variants, 3 cases, 2 starts", result.stdout)
+        self.assertIn("48 cells: 8 variants, 3 cases, 2 starts", result.stdout)
         file, schema = yaml.safe_load(EXPERIMENT), self.schema["properties"]
         simulation = schema["cases"]["properties"]["simulate"]["properties"]
         for keys, known in (
@@ -159,6 +168,11 @@ class ExperimentSchema(SchemaCase):
             ),
             (file["cases"]["simulate"], simulation),
             (file["starts"], schema["starts"]["properties"]),
+            (dict(file["sweep"], sobol="instead of the grid"), schema["sweep"]["properties"]),
+            (
+                dict(file["stop"], difference="instead of the figure", variant="of it", alpha="of it"),
+                schema["stop"]["properties"],
+            ),
         ):
             self.assertEqual(set(keys), set(known), "so the program knows all keys that the schema knows")
 

@@ -63,6 +63,16 @@ TEST(CaptureRange, EndsBeforeTheFirstBinThatFails) {
   EXPECT_NEAR(capture.bins[2].success.upper, 0.943318, 1e-6);
 }
 
+TEST(CaptureRange, CountsACaseOnceWhereItsStartsEndAlike) {
+  std::vector<StartOutcome> outcomes;
+  for (int i = 0; i < 100; ++i) outcomes.push_back({1, i >= 20, "case " + std::to_string(i / 10)});
+  const CaptureRange capture = capture_range(outcomes);
+  EXPECT_EQ(capture.bins[0].successes, 80u);
+  EXPECT_EQ(capture.bins[0].runs, 100u);
+  EXPECT_NEAR(capture.bins[0].success.lower, 0.490162, 1e-6) << "as Wilson's interval of 8 of 10 above";
+  EXPECT_NEAR(capture.bins[0].success.upper, 0.943318, 1e-6);
+}
+
 TEST(CaptureRange, IsOpenWhereNoStartIsTooFar) {
   std::vector<StartOutcome> outcomes;
   add(outcomes, 1.5, 10, 10);

@@ -79,9 +79,20 @@ const Page = (() => {
         'capture', 'Capture range',
         'How far from the truth a start may lie: up to the given mTRE, each bin of starts ' +
             'has a success rate of 95 % or more. ' +
-            'Bars are Wilson’s 95 % intervals, failed runs count as no success.',
+            'Bars are 95 % intervals, which know that the starts of a case are not independent. ' +
+            'Failed runs count as no success.',
         ranges, Plots.legend(data.variants), Plots.responsive((width) => Figures.drawCapture(data, bins, width)),
         el('details', {}, el('summary', {}, 'The counts'), Figures.captureTable(data, bins)));
+  }
+
+  function response(data) {
+    const figure = Response.figure(data);
+    return figure &&
+        section(
+               'response', 'Response to options',
+               'The figure’s median, or the success rate, over an option that was swept, with its 95 % interval. ' +
+                   'All runs with the same value count, whatever their other options.',
+               figure);
   }
 
   function byCase(data) {
@@ -272,7 +283,8 @@ const Page = (() => {
     document.title = (experiment.name || 'marrow report') + ' · marrow';
     const add = (...parts) => main.append(...parts.flat(2).filter(Boolean));  // at once: figures need their width
     add(summary(data));
-    if (many && data.metrics.length) add(distributions(data), paired(data), capture(data), byCase(data));
+    if (many && data.metrics.length)
+      add(response(data), distributions(data), paired(data), capture(data), byCase(data));
     add(sequence(data));
     add(closer(data));
     if (data.passes.length) add(section('passes', 'Passes', null, ...Passes.draw(data)));

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "compare/comparison.hpp"
+#include "marrow/compare/bootstrap.hpp"
 #include "marrow/domain/printable.hpp"
 
 namespace marrow::cli {
@@ -23,38 +24,46 @@ VariantFigure figure_of(const std::vector<double>& values, bool higher_is_better
   return figure;
 }
 
-using Rows = std::vector<const CellRow*>;
-
-/// The rows of each variant, in the order of the experiment.
-std::vector<Rows> rows_by_variant(const Experiment& experiment, const std::vector<CellRow>& rows) {
-  std::map<std::string, std::size_t> places;
-  for (std::size_t v = 0; v < experiment.variants.size(); ++v) places[experiment.variants[v].name] = v;
-  std::vector<Rows> result(experiment.variants.size());
-  for (const CellRow& row : rows)
-    if (const auto place = places.find(row.variant); place != places.end()) result[place->second].push_back(&row);
-  return result;
+VariantFigure figure_by_case(const std::map<std::string, std::vector<double>>& values, bool higher_is_better) {
+  compare::ValuesOfCases cases;
+  std::vector<double> all;
+  for (const auto& [name, own] : values) {
+    cases.push_back(own);
+    all.insert(all.end(), own.begin(), own.end());
+  }
+  VariantFigure figure = figure_of(all, higher_is_better);
+  figure.has_interval = cases.size() > 1;
+  if (figure.has_interval)
+    figure.median =
+        compare::median_of_runs_interval(cases, {kBootstrapSeed, 0.95, compare::resamples_for(all.size()), 0});
+  return figure;
 }
+
+using Rows = RowsOfVariant;
 
 VariantSummary summary_of(const Experiment& experiment, const Rows& rows) {
   VariantSummary summary;
-  std::vector<std::vector<double>> values(experiment.metrics.size());
+  std::vector<std::map<std::string, std::vector<double>>> values(experiment.metrics.size());  // by case
   std::vector<double> seconds, evaluations;
+  compare::CaseRate success;
   for (const CellRow* one : rows) {
     const CellRow& row = *one;
-    ++summary.runs;
-    summary.successes += row.is_success(experiment);
+    success.add(row.case_name, row.is_success(experiment));
     if (!row.failed.empty()) {
       ++summary.failed;
       continue;
     }
     for (std::size_t i = 0; i < values.size(); ++i)
-      if (row.values[i]) values[i].push_back(*row.values[i]);
+      if (row.values[i]) values[i][row.case_name].push_back(*row.values[i]);
     if (row.seconds) seconds.push_back(*row.seconds);
     evaluations.push_back(row.evaluations);
   }
-  if (summary.runs) summary.success = compare::wilson_interval(summary.successes, summary.runs);
+  summary.runs = success.runs();
+  summary.successes = success.successes();
+  if (summary.runs) summary.success = success.interval();
+  if (summary.runs) summary.effective_runs = success.effective_runs();
   for (std::size_t i = 0; i < values.size(); ++i)
-    summary.figures.push_back(figure_of(values[i], experiment.metrics[i].higher_is_better()));
+    summary.figures.push_back(figure_by_case(values[i], experiment.metrics[i].higher_is_better()));
   summary.seconds = figure_of(seconds);
   summary.evaluations = figure_of(evaluations);
   summary.verdicts = verdict_counts(experiment, rows);
@@ -77,26 +86,12 @@ void add_capture(const Experiment& experiment, const Rows& rows, const StartErro
     const CellRow& row = *one;
     const auto known = errors.find({row.case_name, row.start});
     if (row.initial_error || known != errors.end())
-      outcomes.push_back(
-          {std::abs(row.initial_error ? *row.initial_error : known->second), row.is_success(experiment)});
+      outcomes.push_back({std::abs(row.initial_error ? *row.initial_error : known->second), row.is_success(experiment),
+                          row.case_name});
     else
       ++summary.unknown_starts;
   }
   summary.capture = compare::capture_range(outcomes);
-}
-
-/// The values of one figure in the cells that both variants completed.
-std::vector<compare::Pair> cell_pairs(const Rows& baseline, const Rows& variant, std::size_t metric) {
-  std::map<std::pair<std::string, std::string>, double> reference;
-  for (const CellRow* row : baseline)
-    if (row->failed.empty() && row->values[metric]) reference[{row->case_name, row->start}] = *row->values[metric];
-  std::vector<compare::Pair> pairs;
-  for (const CellRow* row : variant) {
-    const auto found = reference.find({row->case_name, row->start});
-    if (row->failed.empty() && row->values[metric] && found != reference.end())
-      pairs.push_back({row->case_name, found->second, *row->values[metric]});
-  }
-  return pairs;
 }
 
 std::string unit_of(const std::vector<CellRow>& rows, std::size_t metric) {
@@ -150,7 +145,56 @@ std::string capture_text(const Experiment& experiment, const Answer& answer) {
   return text;
 }
 
+/// The figures of one metric, a row for each variant.
+std::string figure_table(const Experiment& experiment, const Answer& answer, std::size_t m, int width) {
+  const compare::MetricChoice& metric = experiment.metrics[m];
+  char line[400];
+  std::snprintf(line, sizeof line, "%-*s %9s %9s %9s %9s %9s  %s\n", width, "", "median", "25 %", "75 %", "95 %",
+                "worst", "median, 95 % interval");
+  std::string text = "\n" +
+                     printable(metric.label + (answer.units[m].empty() ? "" : " [" + answer.units[m] + "]") +
+                               (metric.label == metric.path ? "" : ", " + metric.path)) +
+                     "\n" + line;
+  for (std::size_t v = 0; v < answer.variants.size(); ++v) {
+    const VariantFigure& figure = answer.variants[v].figures[m];
+    const compare::Summary& summary = figure.summary;
+    char interval[100] = "-";
+    if (figure.has_interval)
+      std::snprintf(interval, sizeof interval, "%.4f to %.4f", figure.median.lower, figure.median.upper);
+    if (figure.count)
+      std::snprintf(line, sizeof line, "%-*s %9.4f %9.4f %9.4f %9.4f %9.4f  %s\n", width,
+                    experiment.variants[v].name.c_str(), summary.median, summary.lower_quartile, summary.upper_quartile,
+                    summary.percentile_95, summary.worst, interval);
+    else
+      std::snprintf(line, sizeof line, "%-*s no cell is done\n", width, experiment.variants[v].name.c_str());
+    text += line;
+  }
+  return text;
+}
+
 }  // namespace
+
+std::vector<RowsOfVariant> rows_by_variant(const Experiment& experiment, const std::vector<CellRow>& rows) {
+  std::map<std::string, std::size_t> places;
+  for (std::size_t v = 0; v < experiment.variants.size(); ++v) places[experiment.variants[v].name] = v;
+  std::vector<RowsOfVariant> result(experiment.variants.size());
+  for (const CellRow& row : rows)
+    if (const auto place = places.find(row.variant); place != places.end()) result[place->second].push_back(&row);
+  return result;
+}
+
+std::vector<compare::Pair> cell_pairs(const RowsOfVariant& baseline, const RowsOfVariant& variant, std::size_t metric) {
+  std::map<std::pair<std::string, std::string>, double> reference;
+  for (const CellRow* row : baseline)
+    if (row->failed.empty() && row->values[metric]) reference[{row->case_name, row->start}] = *row->values[metric];
+  std::vector<compare::Pair> pairs;
+  for (const CellRow* row : variant) {
+    const auto found = reference.find({row->case_name, row->start});
+    if (row->failed.empty() && row->values[metric] && found != reference.end())
+      pairs.push_back({row->case_name, found->second, *row->values[metric]});
+  }
+  return pairs;
+}
 
 Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows) {
   Answer answer;
@@ -161,6 +205,8 @@ Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows)
     if (!experiment.initial_error.empty()) add_capture(experiment, own, errors, answer.variants.back());
   }
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) answer.units.push_back(unit_of(rows, m));
+  add_look(experiment, of_variant, answer);
+  answer.curves = curves_of(experiment, of_variant);
   std::vector<double> p;
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m)
     for (std::size_t v = 0; v < experiment.variants.size(); ++v) {
@@ -201,29 +247,16 @@ std::string table_text(const Experiment& experiment, const Answer& answer) {
                   summary.failed, success, summary.seconds.summary.median, summary.evaluations.summary.median);
     out << line;
   }
-  for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
-    const compare::MetricChoice& metric = experiment.metrics[m];
-    const std::string title = metric.label + (answer.units[m].empty() ? "" : " [" + answer.units[m] + "]") +
-                              (metric.label == metric.path ? "" : ", " + metric.path);
-    std::snprintf(line, sizeof line, "%-*s %9s %9s %9s %9s %9s\n", int(width), "", "median", "25 %", "75 %", "95 %",
-                  "worst");
-    out << '\n' << printable(title) << '\n' << line;
-    for (std::size_t v = 0; v < answer.variants.size(); ++v) {
-      const VariantFigure& figure = answer.variants[v].figures[m];
-      if (figure.count)
-        std::snprintf(line, sizeof line, "%-*s %9.4f %9.4f %9.4f %9.4f %9.4f\n", int(width),
-                      experiment.variants[v].name.c_str(), figure.summary.median, figure.summary.lower_quartile,
-                      figure.summary.upper_quartile, figure.summary.percentile_95, figure.summary.worst);
-      else
-        std::snprintf(line, sizeof line, "%-*s no cell is done\n", int(width), experiment.variants[v].name.c_str());
-      out << line;
-    }
-  }
+  for (std::size_t m = 0; m < experiment.metrics.size(); ++m) out << figure_table(experiment, answer, m, int(width));
   out << verdict_table(experiment, answer) << capture_text(experiment, answer);
   out << "\n* the baseline";
   if (experiment.variants.size() > 1)
     out << "; against it, with Holm's correction over all " << answer.findings.size() << ":\n";
   for (const Finding& finding : answer.findings) out << "  " << printable(finding.sentence) << "\n";
+  if (answer.look) {
+    out << "\n" << printable(answer.look_sentence) << "\n";
+    if (answer.look->number > 1) out << "The other intervals and p do not count the looks.\n";
+  }
   return out.str();
 }
 

@@ -25,9 +25,10 @@ using compare::CellRunner;
 using compare::Experiment;
 
 /// Reads the experiment. If it has faults, prints all of them and returns false.
-bool load_experiment(const CompareRequest& request, const Catalogue& catalogue, Experiment& experiment) {
+bool load_experiment(const CompareRequest& request, const Catalogue& catalogue, Experiment& experiment,
+                     std::size_t more_cases) {
   Diagnostics diagnostics;
-  experiment = compare::read_experiment(request.file, catalogue, diagnostics);
+  experiment = compare::read_experiment(request.file, catalogue, diagnostics, more_cases);
   if (diagnostics.empty()) return true;
   print_faults(diagnostics);
   return false;
@@ -81,8 +82,13 @@ int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster)
   stop_on_signals();
   const Catalogue catalogue;
   Experiment experiment;
-  if (!load_experiment(request, catalogue, experiment)) return 2;
+  if (!load_experiment(request, catalogue, experiment, 0)) return 2;
+  if (request.more_cases && cluster.is_given())
+    throw Error(
+        "--more-cases looks at each batch of cases before the next one, so it runs here; leave the options for a "
+        "cluster out");
   if (request.dry_run) {
+    if (request.more_cases) experiment = largest_experiment(request, catalogue, experiment);
     const Store store;
     can_keep_results(store.fault(), request.no_cache);
     say_if_not_shared(store, request.no_cache);
@@ -96,13 +102,14 @@ int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster)
   const Store store;
   request.no_cache = request.no_cache || !can_keep_results(store.prepare(), request.quiet);
   say_if_not_shared(store, request.no_cache || request.quiet);
-  return run_comparison(request, catalogue, experiment, folder);
+  return request.more_cases ? run_more_cases(request, catalogue, experiment, folder)
+                            : run_comparison(request, catalogue, experiment, folder);
 }
 
 int run_cell(const CompareRequest& request, const std::string& id) {
   const Catalogue catalogue;
   Experiment experiment;
-  if (!load_experiment(request, catalogue, experiment)) return 2;
+  if (!load_experiment(request, catalogue, experiment, request.more_cases)) return 2;
   const auto cell = compare::cell_of(experiment, id);
   if (!cell) {
     std::fprintf(stderr, "marrow: error: the experiment has no cell '%s': %s\n", printable(id).c_str(),
@@ -143,6 +150,11 @@ void add_experiment_arguments(CLI::App* command, CompareRequest& request) {
   show_default(add_whole_number(command, "--threads", request.threads, "threads of each cell", 1, 1024),
                request.threads);
   command->add_flag("--no-cache", request.no_cache, "neither read nor keep results of nodes");
+  add_whole_number(command, "--more-cases", request.more_cases,
+                   command->get_name() == "compare"
+                       ? "add up to so many cases with further seeds, until the rule under 'stop' ends it"
+                       : "so many further seeds belong to the experiment, as in a comparison that added them",
+                   1, 100000);
   add_shared_cache(command);
   add_file_limits(command, request.file_limits);
 }

@@ -40,12 +40,21 @@ class Comparison {
     runner_.keep_dependencies();
   }
 
+  std::size_t found() const { return found_; }
   const compare::Dependencies& dependencies() const { return runner_.dependencies(); }
 
-  int run() {
-    if (!make_cases() || !make_cells()) return stopped();
+  /// The rows of all cells; nothing if it was interrupted.
+  std::optional<std::vector<CellRow>> make_rows() {
+    if (!make_cases() || !make_cells()) return std::nullopt;
     std::vector<CellRow> rows;
     for (auto& row : rows_) rows.push_back(std::move(*row));
+    return rows;
+  }
+
+  int run() {
+    std::optional<std::vector<CellRow>> made = make_rows();
+    if (!made) return stopped();
+    std::vector<CellRow>& rows = *made;
     if (!measure_times(rows)) return stopped();
     const Answer answer = answer_of(experiment_, rows);
     write_tables(experiment_, rows, answer, folder_);
@@ -111,6 +120,9 @@ class Comparison {
     const std::string& key = cells_.take_key(number);
     std::optional<CellRow> row = runner_.finished(cell, key);
     if (!row) row = chunks.done(cell, key);
+    if (const auto failed = request_.failed_before.find(compare::cell_id(experiment_, cell));
+        !row && failed != request_.failed_before.end())
+      row = failed->second;
     found_ += row.has_value();
     if (row || !request_.gather) return row;
     if ((row = chunks.failed(cell))) return row;
@@ -174,7 +186,8 @@ class Comparison {
         cached += calls.cached;
       }
     std::printf("\n%zu cells: %zu variants, %zu cases, %zu starts; %zu were there already\n", rows.size(),
-                experiment_.variants.size(), experiment_.cases.size(), experiment_.starts.size(), found_);
+                experiment_.variants.size(), experiment_.cases.size(), experiment_.starts.size(),
+                found_ - std::min(found_, request_.made_before));
     std::printf("calls of nodes: %ld made, %ld shared or read back\n", made, cached);
   }
 
@@ -213,6 +226,16 @@ int run_comparison(const CompareRequest& request, const Catalogue& catalogue, co
   const int code = comparison.run();
   unchanged.check(comparison.dependencies());
   return code;
+}
+
+std::optional<CellRows> run_cells(const CompareRequest& request, const Catalogue& catalogue,
+                                  const Experiment& experiment, const fs::path& folder) {
+  const LostCells none;
+  Comparison comparison(request, catalogue, experiment, folder, none);
+  std::optional<std::vector<CellRow>> rows = comparison.make_rows();
+  if (!rows) return std::nullopt;
+  const std::size_t made = rows->size() - comparison.found();
+  return CellRows{std::move(*rows), made};
 }
 
 }  // namespace marrow::cli

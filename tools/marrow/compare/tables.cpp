@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes cells.csv and cells.jsonl (one row per cell) and comparison.json (the complete answer).
 #include <charconv>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -105,13 +106,15 @@ std::string jsonl(const Experiment& experiment, const std::vector<CellRow>& rows
 
 json of(const VariantFigure& figure) {
   if (!figure.count) return {{"count", 0}};
-  return {{"count", figure.count},
-          {"median", figure.summary.median},
-          {"q1", figure.summary.lower_quartile},
-          {"q3", figure.summary.upper_quartile},
-          {"p95", figure.summary.percentile_95},
-          {"worst", figure.summary.worst},
-          {"mean", figure.summary.mean}};
+  json result{{"count", figure.count},
+              {"median", figure.summary.median},
+              {"q1", figure.summary.lower_quartile},
+              {"q3", figure.summary.upper_quartile},
+              {"p95", figure.summary.percentile_95},
+              {"worst", figure.summary.worst},
+              {"mean", figure.summary.mean}};
+  if (figure.has_interval) result.update({{"median_low", figure.median.lower}, {"median_high", figure.median.upper}});
+  return result;
 }
 
 json of(std::size_t count, std::size_t total, const compare::Interval& rate) {
@@ -137,6 +140,27 @@ json of(const compare::CaptureRange& capture, std::size_t unknown_starts) {
   return {{"range", capture.range}, {"is_open", capture.is_open}, {"unknown_starts", unknown_starts}, {"bins", bins}};
 }
 
+json of(const compare::StopRule& rule, const compare::Look& look, const Experiment& experiment,
+        const std::string& sentence) {
+  const auto bound = [](double value) { return std::isfinite(value) ? json(value) : json(); };
+  json result{{"look", look.number},
+              {"looks", look.looks},
+              {"cases", look.cases},
+              {"most_cases", rule.most_cases},
+              {"is_met", look.is_met},
+              {"figure", rule.metric ? experiment.metrics[*rule.metric].path : "success"},
+              {"variant", experiment.variants[look.variant].name},
+              {"level", look.level},
+              {"low", bound(look.interval.lower)},
+              {"high", bound(look.interval.upper)},
+              {"sentence", sentence}};
+  if (rule.goal == compare::StopRule::Goal::difference)
+    result.update({{"p", look.p}, {"difference", look.difference}, {"alpha", rule.alpha}});
+  else
+    result["width"] = rule.width;
+  return result;
+}
+
 }  // namespace
 
 json answer_json(const Experiment& experiment, const Answer& answer) {
@@ -155,7 +179,8 @@ json answer_json(const Experiment& experiment, const Answer& answer) {
                           {"of", summary.runs},
                           {"rate", summary.runs ? double(summary.successes) / double(summary.runs) : 0.0},
                           {"low", summary.success.lower},
-                          {"high", summary.success.upper}}},
+                          {"high", summary.success.upper},
+                          {"effective_runs", summary.effective_runs}}},
                         {"metrics", figures},
                         {"seconds", of(summary.seconds)},
                         {"evaluations", of(summary.evaluations)}});
@@ -173,7 +198,10 @@ json answer_json(const Experiment& experiment, const Answer& answer) {
                         {"p", finding.comparison.test.p},
                         {"p_holm", finding.p_holm},
                         {"sentence", finding.sentence}});
-  return {{"experiment", experiment.name}, {"variants", variants}, {"comparisons", findings}};
+  json result{{"experiment", experiment.name}, {"variants", variants}, {"comparisons", findings}};
+  if (!answer.curves.empty()) result["curves"] = curves_json(experiment, answer.curves);
+  if (answer.look) result["stop"] = of(*experiment.stop, *answer.look, experiment, answer.look_sentence);
+  return result;
 }
 
 void write_tables(const Experiment& experiment, const std::vector<CellRow>& rows, const Answer& answer,

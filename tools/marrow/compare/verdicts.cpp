@@ -10,16 +10,21 @@ namespace marrow::cli {
 
 VerdictCounts verdict_counts(const compare::Experiment& experiment, const std::vector<const compare::CellRow*>& rows) {
   VerdictCounts counts;
+  compare::CaseRate silent, false_alarms;
   for (const compare::CellRow* row : rows) {
     if (!row->verdict) continue;
     const bool is_success = row->is_success(experiment), is_trusted = *row->verdict == Judgement::trusted;
     ++counts.cells;
-    counts.misses += !is_success;
-    counts.silent += !is_success && is_trusted;
-    counts.false_alarms += is_success && !is_trusted;
+    if (is_success)
+      false_alarms.add(row->case_name, !is_trusted);
+    else
+      silent.add(row->case_name, is_trusted);
   }
-  if (counts.misses) counts.silent_rate = compare::wilson_interval(counts.silent, counts.misses);
-  if (counts.successes()) counts.false_alarm_rate = compare::wilson_interval(counts.false_alarms, counts.successes());
+  counts.misses = silent.runs();
+  counts.silent = silent.successes();
+  counts.false_alarms = false_alarms.successes();
+  if (silent.runs()) counts.silent_rate = silent.interval();
+  if (false_alarms.runs()) counts.false_alarm_rate = false_alarms.interval();
   return counts;
 }
 

@@ -77,7 +77,7 @@ json run_cell(CellRunner& runner, const Store& store, const json& asked, WorkerR
 int worker(const CompareRequest& request) {
   const Catalogue catalogue;
   Diagnostics diagnostics;
-  const Experiment experiment = compare::read_experiment(request.file, catalogue, diagnostics);
+  const Experiment experiment = compare::read_experiment(request.file, catalogue, diagnostics, request.more_cases);
   if (!diagnostics.empty()) throw Error("the experiment has faults:\n" + diagnostics.text());
   const Store store;
   CellRunner runner(experiment, catalogue, request.no_cache ? nullptr : &store, request.folder, request.threads,

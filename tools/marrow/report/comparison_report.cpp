@@ -121,6 +121,7 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
   const json answers = answer_json(experiment, answer);
   data["summary"] = answers["variants"];
   data["comparisons"] = answers["comparisons"];
+  if (answers.contains("curves")) data["curves"] = answers["curves"];
 
   data["cell_table"] = cell_table(experiment, rows);
   data["graph"] = pipeline_graph(experiment, runner);

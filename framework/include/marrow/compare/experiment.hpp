@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "marrow/compare/stop_rule.hpp"
 #include "marrow/runtime/pipeline.hpp"
 
 namespace marrow::compare {
@@ -16,6 +17,17 @@ struct Variant {
   std::string name;
   Place place;
   std::vector<Override> overrides;
+  std::vector<double> swept = {};  ///< values of the experiment's swept options, in their order
+  std::string swept_from = {};     ///< the variant whose options are swept; empty if it is the pipeline as it is
+};
+
+/// An option whose numbers are tried over a range.
+struct SweptOption {
+  std::string key;  ///< node.option
+  std::array<double, 2> range{};
+  bool is_log = false;    ///< spread evenly over the logarithm
+  bool is_whole = false;  ///< rounded to whole numbers
+  Place place;
 };
 
 /// Data on which all variants run. It is a folder that exists, or a folder that a simulation makes. Without either, the
@@ -98,13 +110,17 @@ struct Experiment {
   CaseSimulation simulation;
   SeededInputs seeded;  ///< of the pipeline itself, where it makes its data and the cases are seeds
   std::vector<ExperimentCase> cases;
+  std::size_t more_cases = 0;  ///< the last of the cases, which the file does not name
   std::vector<Variant> variants;
+  std::vector<SweptOption> swept;
+  bool sweep_is_grid = false;  ///< else Sobol's points
   std::size_t baseline = 0;
   std::optional<StartProtocol> protocol;
   std::vector<Start> starts;  ///< one without displacement if there is no protocol
   std::vector<MetricChoice> metrics;
   std::string initial_error;          ///< path of the figure over which the capture range is drawn; may be empty
   std::vector<std::string> pictures;  ///< outputs to show side by side
+  std::optional<StopRule> stop;       ///< when a comparison with more and more cases ends
   std::size_t timed_cells = 3;        ///< cells per variant that are run again, one at a time, to measure their time
 
   std::size_t cell_count() const { return variants.size() * cases.size() * starts.size(); }
@@ -129,7 +145,9 @@ PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& ce
 PipelineArguments simulation_arguments_of(const Experiment& experiment, std::size_t case_index);
 
 /// Reads and checks an experiment and the pipelines that it names, with each variant's changes. All faults go to
-/// `diagnostics`, at their lines; the result may be used only if there are none.
-Experiment read_experiment(const std::filesystem::path& file, const Catalogue& catalogue, Diagnostics& diagnostics);
+/// `diagnostics`, at their lines; the result may be used only if there are none. `more_cases` further cases follow
+/// those of the file. Their seeds go on after the file's largest one.
+Experiment read_experiment(const std::filesystem::path& file, const Catalogue& catalogue, Diagnostics& diagnostics,
+                           std::size_t more_cases = 0);
 
 }  // namespace marrow::compare

@@ -41,6 +41,7 @@ Summary summarise(const std::vector<double>& values, bool higher_is_better = fal
 struct StartOutcome {
   double error = 0;  ///< error of the start, an mTRE in mm
   bool success = false;
+  std::string case_name = {};  ///< runs with the same one are not independent; empty: a case of its own
 };
 
 /// Success rate over the error of the start, in bins of equal width from 0 to the farthest start. There are at most 100
@@ -49,7 +50,7 @@ struct CaptureRange {
   struct Bin {
     double from = 0, to = 0;  ///< from <= error < to
     std::size_t successes = 0, runs = 0;
-    Interval success;  ///< wilson_interval; 0 to 1 if there are no runs
+    Interval success;  ///< CaseRate::interval; 0 to 1 if there are no runs
   };
   std::vector<Bin> bins;
   /// Up to this error, each bin with runs has at least the required rate. It is the upper end of the last bin with runs
@@ -140,10 +141,11 @@ struct Comparison {
   std::size_t cases = 0;
   std::size_t pairs = 0;
   double median_difference = 0;  ///< median of case_differences; positive if the variant's value is larger
-  Interval interval;             ///< median_interval
+  Interval interval;             ///< median_of_case_means_interval (bootstrap.hpp) of the differences
   SignedRank test;
 };
 
+/// Throws Error as case_differences() and median_interval() do.
 Comparison compare_pairs(const std::vector<Pair>& pairs, std::uint64_t seed, double confidence = 0.95);
 
 /// Whether a difference counts as shown: there are at least fewest_cases(alpha) cases, p (after Holm) < alpha, and the

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "experiment_yaml.hpp"
+
+namespace marrow::compare {
+
+/// Reads the section 'sweep': numbers of options that are tried over ranges, on a grid or at Sobol's points. Each point
+/// is a variant, or one of each variant.
+class SweepReader {
+ public:
+  explicit SweepReader(StrictYaml& yaml) : yaml_(yaml) {}
+  void read(const YamlEntry& section);
+  /// Puts the swept options into the experiment, and the points into its variants, which are complete otherwise.
+  void apply(Experiment& experiment);
+
+ private:
+  void read_option(const YamlEntry& entry);
+  void read_ends(const YAML::Node& node, const Place& place, SweptOption& option);
+  void check(const YamlEntry& section);
+  std::vector<std::vector<double>> points() const;
+
+  StrictYaml& yaml_;
+  Place place_;
+  bool is_good_ = false;
+  std::size_t grid_ = 0, sobol_ = 0;
+  std::vector<SweptOption> options_;
+};
+
+}  // namespace marrow::compare
