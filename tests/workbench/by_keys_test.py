@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""The whole way without a mouse: from a DICOM CT, two X-rays and the C-arm's angles to a pose that was moved by hand and
-registered, and to another node in a pipeline. Everything is reached by Tab and used by keys, as a person would do it."""
+"""The whole way without a mouse: from a DICOM CT, two X-rays and the C-arm's angles to a pose that was moved by hand
+and registered, and to another node in a pipeline. Everything is reached by Tab and used by keys, as a person would."""
 import json
 import shutil
 import time
@@ -58,7 +58,7 @@ class ByKeysTest(WholeWay):
         self.until(lambda document: document["fragments"][name]["seeds"])
 
     def go(self, slices, wanted, more):
-        """Moves the crosshair until the other slices show what is wanted. `more` leads to a higher number, or a lower."""
+        """Moves the crosshair until these slices show what is wanted. `more` leads to a higher number, or a lower."""
         less = {Keys.PAGE_UP: Keys.PAGE_DOWN, Keys.ARROW_RIGHT: Keys.ARROW_LEFT, Keys.ARROW_DOWN: Keys.ARROW_UP}[more]
         shown = lambda: int(self.browser.js("return document.querySelector('[data-slice=%s]').dataset.shown" % slices))
         begin = shown()
