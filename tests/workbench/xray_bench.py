@@ -7,6 +7,7 @@ import time
 import zlib
 
 import numpy
+from selenium.common.exceptions import StaleElementReferenceException
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -138,9 +139,14 @@ class XrayTest(PageTest):
         return self.driver.find_element(By.CSS_SELECTOR, selector)
 
     def click(self, selector):
-        element = self.find(selector)
-        self.browser.js("arguments[0].scrollIntoView({block: 'center'})", element)
-        element.click()
+        for _ in range(5):
+            try:
+                element = self.find(selector)
+                self.browser.js("arguments[0].scrollIntoView({block: 'center'})", element)
+                return element.click()
+            except StaleElementReferenceException:  # the page was drawn anew between the two
+                pass
+        self.fail("%s is drawn anew again and again" % selector)
 
     def text(self, selector):
         return self.find(selector).text
