@@ -121,7 +121,10 @@ Store::Freed collect_in(const fs::path& folder, std::uint64_t keep_bytes, const 
     }
     if (item.kind == Kind::claim) item.writer = owner_of_claim(item.path);
     if (item.kind == Kind::temporary || item.kind == Kind::claim) {
-      if (is_abandoned(item, now)) remove(item);
+      if (is_abandoned(item, now))
+        remove(item);
+      else if (!now && freed.fault.empty())
+        freed.fault = item.path.string() + " is left, because its age is unknown: no file can be written beside it";
       continue;
     }
     if (item.kind == Kind::remembered) {
