@@ -167,6 +167,9 @@ class OnSlurm(Cluster):
 def inside_a_cluster():
     if "CLUSTER_FOLDER" in os.environ:
         return True
+    if not ALL and len(sys.argv) < 4:
+        print("skipped: takes minutes; MARROW_TEST_ALL=1, or the name of a test, tries it")
+        sys.exit(77)
     folder = tempfile.mkdtemp(prefix="marrow-cluster-")
     try:
         if os.geteuid() != 0 or not shutil.which("sbatch"):
