@@ -94,18 +94,7 @@ class ByKeysTest(WholeWay):
         self.browser.wait("return !PlacePage.current().keyMoves && !PlacePage.current().isKeeping")
 
     def test_from_dicom_to_a_pose(self):
-        server = self.open()
-        self.show(server, "case=mine")
-        self.choose_ct()
-        for name, fragment in self.given["fragments"].items():
-            self.add_fragment(name, fragment["seeds"][0])
-        for name, fragment in self.given["fragments"].items():
-            if not fragment.get("register", True):
-                self.click('[data-fragment="%s"] input[type="checkbox"]' % name)
-        for view, beta_deg in zip(self.given["views"], (0, 90)):
-            self.add_view(view, beta_deg)
-        self.click('[data-do="save"]')
-        self.browser.wait("return document.querySelector('[data-saved]').textContent.includes('Saved in')", 120)
+        self.make_case()
         self.click('#pages a[data-page="place"]')
         self.wait_for_page("place")
         self.click('a[href="#place=mine"]')

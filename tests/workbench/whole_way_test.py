@@ -126,7 +126,8 @@ class WholeWayTest(PageTest):
         box.send_keys(Keys.ENTER)
         self.until(lambda document: any(one["name"] == view["name"] for one in document["views"]))
 
-    def test_from_dicom_to_a_pose(self):
+    def make_case(self):
+        """The case from the CT to the saved folder."""
         server = self.open()
         self.show(server, "case=mine")
         self.choose_ct()
@@ -140,6 +141,8 @@ class WholeWayTest(PageTest):
         self.click('[data-do="save"]')
         self.browser.wait("return document.querySelector('[data-saved]').textContent.includes('Saved in')", 120)
 
+    def test_from_dicom_to_a_pose(self):
+        self.make_case()
         self.click('#pages a[data-page="place"]')
         self.click('a[href="#place=mine"]')
         self.click('[data-do="register"]:not(:disabled)')

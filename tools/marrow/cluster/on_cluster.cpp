@@ -23,18 +23,18 @@ using compare::Experiment;
 
 constexpr auto kBetweenLooks = std::chrono::seconds(2);
 
-std::size_t cells_in(const std::vector<Chunk>& chunks, const std::map<std::string, bool>& files) {
-  std::size_t count = 0;
+/// The chunks whose rows are all there.
+struct Made {
+  std::size_t chunks = 0, cells = 0;
+};
+Made made_of(const std::vector<Chunk>& chunks, const std::map<std::string, bool>& files) {
+  Made made;
   for (const Chunk& chunk : chunks)
-    if (const auto file = files.find(chunk.name); file != files.end() && file->second) count += chunk.numbers.size();
-  return count;
-}
-
-std::size_t chunks_in(const std::vector<Chunk>& chunks, const std::map<std::string, bool>& files) {
-  std::size_t count = 0;
-  for (const Chunk& chunk : chunks)
-    if (const auto file = files.find(chunk.name); file != files.end() && file->second) ++count;
-  return count;
+    if (const auto file = files.find(chunk.name); file != files.end() && file->second) {
+      ++made.chunks;
+      made.cells += chunk.numbers.size();
+    }
+  return made;
 }
 
 std::size_t cells_of_plan(const ClusterPlan& plan) {
@@ -45,16 +45,16 @@ std::size_t cells_of_plan(const ClusterPlan& plan) {
 
 /// "120 of 200 cells in 12 of 20 chunks"
 std::string progress_of(const ClusterPlan& plan) {
-  const std::map<std::string, bool> files = chunk_files(plan.folder);
-  return std::to_string(cells_in(plan.cells, files)) + " of " + std::to_string(cells_of_plan(plan)) + " cells in " +
-         std::to_string(chunks_in(plan.cells, files)) + " of " + std::to_string(plan.cells.size()) + " chunks";
+  const auto [chunks, cells] = made_of(plan.cells, chunk_files(plan.folder));
+  return std::to_string(cells) + " of " + std::to_string(cells_of_plan(plan)) + " cells in " + std::to_string(chunks) +
+         " of " + std::to_string(plan.cells.size()) + " chunks";
 }
 
 int print_status(const fs::path& folder) {
   const ClusterPlan plan = latest_plan(folder);
   std::printf("plan %s: %s\n", plan.id.c_str(), progress_of(plan).c_str());
   if (!plan.cases.empty())
-    std::printf("cases to make first: %zu of %zu chunks\n", chunks_in(plan.cases, chunk_files(plan.folder)),
+    std::printf("cases to make first: %zu of %zu chunks\n", made_of(plan.cases, chunk_files(plan.folder)).chunks,
                 plan.cases.size());
   const auto submission = read_submission(folder);
   if (!submission || submission->plan != plan.id) return 0;
@@ -74,8 +74,8 @@ int follow(const ClusterPlan& plan, bool quiet) {
   while (!stop) {
     submission = read_submission(plan.folder);
     if (!submission || submission->plan != plan.id) throw Error("another comparison was submitted from this folder");
-    const std::map<std::string, bool> files = chunk_files(plan.folder);
-    progress.done(cells_in(plan.cells, files), std::to_string(chunks_in(plan.cells, files)) + " chunks");
+    const auto [chunks, cells] = made_of(plan.cells, chunk_files(plan.folder));
+    progress.done(cells, std::to_string(chunks) + " chunks");
     if (submission->is_gathered) break;
     if (is_alive(submission->gather) == std::optional(false)) {
       // it may have submitted again, or ended in order, since the file was read
@@ -121,7 +121,7 @@ int gather_on_slurm(const CompareRequest& request, const ClusterRequest& cluster
   const ClusterPlan plan = latest_plan(folder);
   auto submission = read_submission(folder);
   if (!submission || submission->plan != plan.id) throw Error("nothing was submitted from " + folder.string());
-  const bool is_whole = chunks_in(plan.cells, chunk_files(folder)) == plan.cells.size();
+  const bool is_whole = made_of(plan.cells, chunk_files(folder)).chunks == plan.cells.size();
   if (!is_whole && submission->tries < profile.tries) {
     const Submission again = submit(plan, profile, cluster.profile, submission->tries);
     std::printf("%s; submitted again, try %lld of %lld\n", progress_of(plan).c_str(),
