@@ -3,6 +3,8 @@
 
 #include <set>
 
+#include "runtime/one_node.hpp"
+
 namespace marrow::compare {
 namespace {
 
@@ -24,6 +26,7 @@ class Checker {
       else
         check_figures_of(experiment_.variants[v], pipeline);
     }
+    if (experiment_.tune) check_tuning(*experiment_.tune);
   }
 
  private:
@@ -36,6 +39,24 @@ class Checker {
       diagnostics_.add_all(faults);
       if (faults.empty()) find_output(pipeline, experiment_.simulation.output, written_.simulation_place);
       return;  // the other cases differ only in numbers
+    }
+  }
+
+  /// The optimizer, and the tuned options at both ends of their ranges.
+  void check_tuning(const TuneRule& rule) {
+    Diagnostics faults;
+    pipeline_of_node(rule.optimizer, {}, rule.optimizer_options, catalogue_, faults);
+    for (const Diagnostic& fault : faults.sorted()) diagnostics_.add(rule.optimizer_place, fault.message, fault.hint);
+    if (const NodeInfo* info = catalogue_.find(rule.optimizer); info && info->kind() != "optimizer")
+      diagnostics_.add(rule.optimizer_place, "'" + rule.optimizer + "' is no optimizer",
+                       "name a node such as optimizer.nelder_mead; marrow list optimizer shows them");
+    for (const double end : {0.0, 1.0}) {
+      Experiment tuned = experiment_;
+      add_tuned(tuned, rule.values_at(std::vector<double>(rule.options.size(), end)));
+      Diagnostics at_end;
+      read_pipeline(tuned.pipeline, arguments_of(tuned, {tuned.variants.size() - 1, 0, 0}, "case"), catalogue_, at_end,
+                    true);
+      diagnostics_.add_all(at_end);
     }
   }
 

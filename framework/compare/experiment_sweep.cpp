@@ -13,13 +13,6 @@ namespace {
 
 constexpr const char* kExample = "write it as  sweep: {options: {edges.high: [60, 90]}, grid: 5}";
 
-/// The value at a fraction of the option's range.
-double value_at(const SweptOption& option, double fraction) {
-  const auto& [low, high] = option.range;
-  const double value = option.is_log ? low * std::pow(high / low, fraction) : low + (high - low) * fraction;
-  return option.is_whole ? std::round(value) : value;
-}
-
 /// The fractions of all combinations of `count` values of each option. The last option changes fastest.
 std::vector<std::vector<double>> grid_of(std::size_t options, std::size_t count) {
   std::vector<std::vector<double>> all{{}};
@@ -35,7 +28,45 @@ std::vector<std::vector<double>> grid_of(std::size_t options, std::size_t count)
   return all;
 }
 
+void read_ends(StrictYaml& yaml, const YAML::Node& node, const Place& place, SweptOption& option) {
+  option.range = {1, 2};
+  if (!node.IsSequence() || node.size() != 2)
+    return yaml.fault(place, "'" + option.key + "' must have a range of two ends",
+                      "write it as  " + option.key + ": [60, 90]");
+  for (std::size_t i = 0; i < 2; ++i)
+    option.range[i] = yaml.number(node[i], yaml.place(node[i]), option.key).value_or(option.range[i]);
+  if (!(option.range[0] < option.range[1]) || !std::isfinite(option.range[1] - option.range[0]))
+    yaml.fault(place, "the range of '" + option.key + "' must end above its beginning, got " +
+                          number_text(option.range[0]) + " to " + number_text(option.range[1]));
+}
+
 }  // namespace
+
+SweptOption swept_option_of(StrictYaml& yaml, const YamlEntry& entry) {
+  static const std::vector<std::string> kKeys{"range", "scale", "whole"};
+  SweptOption option;
+  option.key = entry.key;
+  option.place = entry.place;
+  if (entry.value.IsMap()) {
+    bool has_range = false;
+    for (const YamlEntry& part : yaml.map(entry.value, entry.place, "'" + entry.key + "'", &kKeys)) {
+      has_range |= part.key == "range";
+      if (part.key == "range") read_ends(yaml, part.value, part.place, option);
+      if (part.key == "whole") option.is_whole = yaml.boolean(part.value, part.place, "whole").value_or(false);
+      if (part.key != "scale") continue;
+      const std::string scale = yaml.text(part.value, part.place, "scale").value_or("linear");
+      option.is_log = scale == "log";
+      if (scale != "log" && scale != "linear")
+        yaml.fault(part.place, "'" + scale + "' is no scale", suggestion(scale, {"linear", "log"}));
+    }
+    if (!has_range) yaml.fault(entry.place, "'" + entry.key + "' has no range", "add  range: [60, 90]");
+  } else {
+    read_ends(yaml, entry.value, entry.place, option);
+  }
+  if (option.is_log && !(option.range[0] > 0))
+    yaml.fault(entry.place, "a range with a log scale must begin above 0, got " + number_text(option.range[0]));
+  return option;
+}
 
 void SweepReader::read(const YamlEntry& section) {
   static const std::vector<std::string> kKeys{"options", "grid", "sobol"};
@@ -44,47 +75,10 @@ void SweepReader::read(const YamlEntry& section) {
     if (entry.key == "grid") grid_ = count_of(yaml_, entry, 2, kMostVariants);
     if (entry.key == "sobol") sobol_ = count_of(yaml_, entry, 2, kMostVariants);
     if (entry.key == "options")
-      for (const YamlEntry& option : yaml_.map(entry.value, entry.place, "'options'")) read_option(option);
+      for (const YamlEntry& option : yaml_.map(entry.value, entry.place, "'options'"))
+        options_.push_back(swept_option_of(yaml_, option));
   }
   if (section.value.IsMap()) check(section);
-}
-
-void SweepReader::read_option(const YamlEntry& entry) {
-  static const std::vector<std::string> kKeys{"range", "scale", "whole"};
-  SweptOption option;
-  option.key = entry.key;
-  option.place = entry.place;
-  if (entry.value.IsMap()) {
-    bool has_range = false;
-    for (const YamlEntry& part : yaml_.map(entry.value, entry.place, "'" + entry.key + "'", &kKeys)) {
-      has_range |= part.key == "range";
-      if (part.key == "range") read_ends(part.value, part.place, option);
-      if (part.key == "whole") option.is_whole = yaml_.boolean(part.value, part.place, "whole").value_or(false);
-      if (part.key != "scale") continue;
-      const std::string scale = yaml_.text(part.value, part.place, "scale").value_or("linear");
-      option.is_log = scale == "log";
-      if (scale != "log" && scale != "linear")
-        yaml_.fault(part.place, "'" + scale + "' is no scale", suggestion(scale, {"linear", "log"}));
-    }
-    if (!has_range) yaml_.fault(entry.place, "'" + entry.key + "' has no range", "add  range: [60, 90]");
-  } else {
-    read_ends(entry.value, entry.place, option);
-  }
-  if (option.is_log && !(option.range[0] > 0))
-    yaml_.fault(entry.place, "a range with a log scale must begin above 0, got " + number_text(option.range[0]));
-  options_.push_back(std::move(option));
-}
-
-void SweepReader::read_ends(const YAML::Node& node, const Place& place, SweptOption& option) {
-  option.range = {1, 2};
-  if (!node.IsSequence() || node.size() != 2)
-    return yaml_.fault(place, "'" + option.key + "' must be swept over a range of two ends",
-                       "write it as  " + option.key + ": [60, 90]");
-  for (std::size_t i = 0; i < 2; ++i)
-    option.range[i] = yaml_.number(node[i], yaml_.place(node[i]), option.key).value_or(option.range[i]);
-  if (!(option.range[0] < option.range[1]) || !std::isfinite(option.range[1] - option.range[0]))
-    yaml_.fault(place, "the range of '" + option.key + "' must end above its beginning, got " +
-                           number_text(option.range[0]) + " to " + number_text(option.range[1]));
 }
 
 void SweepReader::check(const YamlEntry& section) {
@@ -115,7 +109,7 @@ std::vector<std::vector<double>> SweepReader::points() const {
   std::set<std::vector<double>> known;
   std::vector<std::vector<double>> values;
   for (std::vector<double>& point : points) {
-    for (std::size_t o = 0; o < options_.size(); ++o) point[o] = value_at(options_[o], point[o]);
+    for (std::size_t o = 0; o < options_.size(); ++o) point[o] = options_[o].value_at(point[o]);
     if (known.insert(point).second) values.push_back(std::move(point));  // whole numbers may be equal
   }
   return values;

@@ -8,6 +8,9 @@
 
 namespace marrow::compare {
 
+/// Reads an option and its range, as  edges.high: [60, 90]  or  {range: [0.7, 2.8], scale: log}. Reports its faults.
+SweptOption swept_option_of(StrictYaml& yaml, const YamlEntry& entry);
+
 /// Reads the section 'sweep': numbers of options that are tried over ranges, on a grid or at Sobol's points. Each point
 /// is a variant, or one of each variant.
 class SweepReader {
@@ -18,8 +21,6 @@ class SweepReader {
   void apply(Experiment& experiment);
 
  private:
-  void read_option(const YamlEntry& entry);
-  void read_ends(const YAML::Node& node, const Place& place, SweptOption& option);
   void check(const YamlEntry& section);
   std::vector<std::vector<double>> points() const;
 

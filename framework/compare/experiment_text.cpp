@@ -8,6 +8,7 @@
 #include "draw.hpp"
 #include "experiment_stop.hpp"
 #include "experiment_sweep.hpp"
+#include "experiment_tune.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "runtime/file_names.hpp"
@@ -47,7 +48,7 @@ class Reader {
     static const std::vector<std::string> kKeys{"experiment",  "name",    "help",          "pipeline", "inputs",
                                                 "set",         "cases",   "variants",      "matrix",   "starts",
                                                 "metrics",     "success", "initial_error", "baseline", "pictures",
-                                                "timed_cells", "stop",    "sweep"};
+                                                "timed_cells", "stop",    "sweep",         "tune"};
     const Place start{experiment_.file.string(), 1, 1};
     const std::vector<YamlEntry> entries = yaml_.map(root, start, "the experiment", &kKeys);
     if (!root.IsMap()) return;
@@ -68,13 +69,16 @@ class Reader {
                   "name folders, as  folders: [data/*]  or a simulation");
     apply_matrix();
     sweep_.apply(experiment_);
+    tune_.add_variant(experiment_);
     if (experiment_.variants.empty() && diagnostics_.empty())
       yaml_.fault(start, "there are no variants",
-                  "name at least one under  variants:  or options under  matrix:  or  sweep:");
+                  "name at least one under  variants:  or options under  matrix:,  sweep:  or  tune:");
     for (const auto& [path, value, place] : success_) set_success(path, value, place);
     set_baseline();
     if (is_too_large(start)) return;
-    stop_.apply(experiment_, experiment_.protocol ? experiment_.protocol->count : 1);
+    const std::size_t starts = experiment_.protocol ? experiment_.protocol->count : 1;
+    stop_.apply(experiment_, starts);
+    tune_.apply(experiment_, starts);
     if (experiment_.protocol)
       experiment_.starts = draw_starts(*experiment_.protocol);
     else
@@ -153,6 +157,7 @@ class Reader {
       }
     if (entry.key == "stop") stop_.read(entry);
     if (entry.key == "sweep") sweep_.read(entry);
+    if (entry.key == "tune") tune_.read(entry);
     if (entry.key == "timed_cells") experiment_.timed_cells = count_of(yaml_, entry, 0, 1000);
   }
 
@@ -366,6 +371,7 @@ class Reader {
   fs::path folder_;
   StopReader stop_{yaml_};
   SweepReader sweep_{yaml_};
+  TuneReader tune_{yaml_};
   std::vector<std::vector<Override>> matrix_;
   std::vector<std::tuple<std::string, double, Place>> success_;
   std::string baseline_;

@@ -89,6 +89,16 @@ timed_cells: 1
 sweep: {options: {edges.sigma_px: {range: [1, 2], scale: log, whole: false}}, grid: 2}
 stop: {width: 0.1, figure: success, most_cases: 10, look_every: 5}
 """
+# What stands in the place of its last two keys.
+TUNE = """tune:
+  options: {edges.sigma_px: {range: [1, 2], scale: log, whole: false}}
+  figure: errors.distal.final.mtre_mm
+  failed_as: 10
+  variant: bobyqa+75
+  optimizer: {uses: optimizer.cma_es, with: {}}
+  points: 5
+  training_cases: 2
+"""
 # What of it becomes what, and is then refused by the schema and by the program alike.
 WRONG = {
     "experiment: 1": "experiment: 2",
@@ -161,13 +171,14 @@ class ExperimentSchema(SchemaCase):
         file, schema = yaml.safe_load(EXPERIMENT), self.schema["properties"]
         simulation = schema["cases"]["properties"]["simulate"]["properties"]
         for keys, known in (
-            (file, schema),
+            (dict(file, tune="in the place of two others"), schema),
             (
                 dict(file["cases"], seeds="by themselves", draw="so too", seed_input="so too"),
                 schema["cases"]["properties"],
             ),
             (file["cases"]["simulate"], simulation),
             (file["starts"], schema["starts"]["properties"]),
+            (yaml.safe_load(TUNE)["tune"], schema["tune"]["properties"]),
             (dict(file["sweep"], sobol="instead of the grid"), schema["sweep"]["properties"]),
             (
                 dict(file["stop"], difference="instead of the figure", variant="of it", alpha="of it"),
@@ -175,6 +186,20 @@ class ExperimentSchema(SchemaCase):
             ),
         ):
             self.assertEqual(set(keys), set(known), "so the program knows all keys that the schema knows")
+
+    def test_a_file_may_tune(self):
+        text = EXPERIMENT[: EXPERIMENT.index("sweep:")].replace("bobyqa+75+1", "bobyqa+75") + TUNE
+        self.assertEqual(self.errors(text), [])
+        result = self.program(text)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("tuning: at most 5 points of 1 options on 2 training cases", result.stdout)
+        for right, wrong in (
+            ("points: 5", "points: 0"),
+            ("uses: optimizer", "is: optimizer"),
+            ("failed_as: 10", "fail: 1"),
+        ):
+            self.assertNotEqual(self.errors(text.replace(right, wrong)), [], wrong)
+            self.assertEqual(self.program(text.replace(right, wrong)).returncode, 2, wrong)
 
     def test_what_is_wrong_is_refused_by_schema_and_program(self):
         for right, wrong in sample(WRONG.items(), 10):

@@ -68,7 +68,7 @@ TEST_F(ExperimentFaults, WhatIsMissing) {
   expect_fault(kStart + kVariants, 1, "the key 'metrics' is missing",
                "name the figures to compare, as  metrics: [errors.distal.final.mtre_mm]");
   expect_fault(kStart + kMetrics, 1, "there are no variants",
-               "name at least one under  variants:  or options under  matrix:  or  sweep:");
+               "name at least one under  variants:  or options under  matrix:,  sweep:  or  tune:");
 }
 
 TEST_F(ExperimentFaults, HeadOfTheFile) {

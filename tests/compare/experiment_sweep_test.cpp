@@ -110,7 +110,7 @@ TEST_F(ExperimentSweep, FaultsOfKeys) {
 TEST_F(ExperimentSweep, FaultsOfRanges) {
   for (const char* wrong : {"5", "[1]", "[1, 2, 3]"})
     expect_sweep_fault("options: {c.value: " + std::string(wrong) + "}, grid: 3",
-                       "'c.value' must be swept over a range of two ends", "write it as  c.value: [60, 90]");
+                       "'c.value' must have a range of two ends", "write it as  c.value: [60, 90]");
   expect_sweep_fault("options: {c.value: [2, 2]}, grid: 3",
                      "the range of 'c.value' must end above its beginning, got 2 to 2");
   expect_sweep_fault("options: {c.value: [1, far]}, grid: 3", "c.value: expected a number, got 'far'");

@@ -91,7 +91,18 @@ const Page = (() => {
         section(
                'response', 'Response to options',
                'The figure’s median, or the success rate, over an option that was swept, with its 95 % interval. ' +
-                   'All runs with the same value count, whatever their other options.',
+                   'All runs with the same value count, whatever their other options.' +
+                   (data.tuning ? ' These are runs of the training cases.' : ''),
+               figure);
+  }
+
+  function tuning(data) {
+    const figure = Tuning.figure(data);
+    return figure &&
+        section(
+               'tuning', 'Tuning',
+               'An optimizer chose the tuned variant’s options on training cases. ' +
+                   'All other sections but the response to options are of the cases that were held out.',
                figure);
   }
 
@@ -284,7 +295,7 @@ const Page = (() => {
     const add = (...parts) => main.append(...parts.flat(2).filter(Boolean));  // at once: figures need their width
     add(summary(data));
     if (many && data.metrics.length)
-      add(response(data), distributions(data), paired(data), capture(data), byCase(data));
+      add(tuning(data), response(data), distributions(data), paired(data), capture(data), byCase(data));
     add(sequence(data));
     add(closer(data));
     if (data.passes.length) add(section('passes', 'Passes', null, ...Passes.draw(data)));

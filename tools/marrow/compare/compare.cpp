@@ -77,6 +77,14 @@ std::string fault_of_id(const Experiment& experiment, const std::string& id) {
   return "there is " + fault;
 }
 
+/// The plan that follows counts each variant of the file on each case.
+void say_what_is_tuned(const Experiment& experiment) {
+  const compare::TuneRule& rule = *experiment.tune;
+  std::printf("tuning: at most %zu points of %zu options on %zu training cases, which are at most %zu further cells\n",
+              rule.points, rule.options.size(), rule.training_cases,
+              rule.points * rule.training_cases * experiment.starts.size());
+}
+
 int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster) {
   CompareRequest request = asked;
   stop_on_signals();
@@ -87,11 +95,18 @@ int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster)
     throw Error(
         "--more-cases looks at each batch of cases before the next one, so it runs here; leave the options for a "
         "cluster out");
+  if (experiment.tune && request.more_cases)
+    throw Error("--more-cases goes with a rule under 'stop', not with 'tune'; name more cases in the file");
+  if (experiment.tune && cluster.is_given())
+    throw Error(
+        "'tune' looks at each point before it chooses the next one, so it runs here; leave the options for a cluster "
+        "out");
   if (request.dry_run) {
     if (request.more_cases) experiment = largest_experiment(request, catalogue, experiment);
     const Store store;
     can_keep_results(store.fault(), request.no_cache);
     say_if_not_shared(store, request.no_cache);
+    if (experiment.tune) say_what_is_tuned(experiment);
     print_plan(experiment, catalogue, request.no_cache ? nullptr : &store, folder_of(request, experiment));
     return 0;
   }
@@ -102,6 +117,7 @@ int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster)
   const Store store;
   request.no_cache = request.no_cache || !can_keep_results(store.prepare(), request.quiet);
   say_if_not_shared(store, request.no_cache || request.quiet);
+  if (experiment.tune) return run_tuning(request, catalogue, experiment, folder);
   return request.more_cases ? run_more_cases(request, catalogue, experiment, folder)
                             : run_comparison(request, catalogue, experiment, folder);
 }
@@ -110,6 +126,7 @@ int run_cell(const CompareRequest& request, const std::string& id) {
   const Catalogue catalogue;
   Experiment experiment;
   if (!load_experiment(request, catalogue, experiment, request.more_cases)) return 2;
+  add_tuned(experiment, id.substr(0, id.find('/')));
   const auto cell = compare::cell_of(experiment, id);
   if (!cell) {
     std::fprintf(stderr, "marrow: error: the experiment has no cell '%s': %s\n", printable(id).c_str(),

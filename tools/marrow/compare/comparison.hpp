@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "compare/tuning.hpp"
 #include "marrow/compare/case_rate.hpp"
 #include "marrow/compare/cell.hpp"
 #include "marrow/compare/experiment.hpp"
@@ -29,9 +30,11 @@ struct CompareRequest {
   std::size_t shown = 8;  ///< cases and starts with pictures in the report
   double page_mb = 20;    ///< bytes of report.html; pictures that do not fit lie beside it
   bool dry_run = false, no_cache = false, quiet = false;
-  bool gather = false;          ///< run no cell: those without a row have failed
-  std::size_t more_cases = 0;   ///< further seeds; for `compare` at most so many, for other commands exactly
-  std::size_t made_before = 0;  ///< rows that the same command made at earlier looks
+  bool gather = false;           ///< run no cell: those without a row have failed
+  std::size_t more_cases = 0;    ///< further seeds; for `compare` at most so many, for other commands exactly
+  std::size_t made_before = 0;   ///< rows that the same command made at earlier looks
+  std::string tuned;             ///< name of the tuned variant that the experiment has; empty without one
+  std::optional<Tuning> tuning;  ///< how it was found
   std::map<std::string, compare::CellRow> failed_before;  ///< of these the failed ones, by their names; not tried again
   FileLimits file_limits;
 };
@@ -57,6 +60,11 @@ std::optional<CellRows> run_cells(const CompareRequest& request, const Catalogue
 /// run_comparison() does. Throws Error if the experiment has no rule, or no look within so many cases.
 int run_more_cases(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment,
                    const std::filesystem::path& folder);
+
+/// Lets an optimizer choose the options under 'tune' on the training cases. Then compares the tuned variant with those
+/// of the file on the cases that are held out, and writes everything, as run_comparison() does.
+int run_tuning(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment,
+               const std::filesystem::path& folder);
 
 /// The experiment with the most cases that run_more_cases() may take. Throws Error as that does.
 compare::Experiment largest_experiment(const CompareRequest& request, const Catalogue& catalogue,
@@ -133,7 +141,8 @@ struct Curve {
 };
 
 struct Answer {
-  std::vector<Curve> curves;  ///< none without a sweep
+  std::vector<Curve> curves;     ///< none without a sweep
+  std::optional<Tuning> tuning;  ///< as in CompareRequest
   std::vector<VariantSummary> variants;
   std::vector<Finding> findings;
   std::vector<std::string> units;     ///< units of the metrics; empty if no cell is done

@@ -56,7 +56,8 @@ class Comparison {
     if (!made) return stopped();
     std::vector<CellRow>& rows = *made;
     if (!measure_times(rows)) return stopped();
-    const Answer answer = answer_of(experiment_, rows);
+    Answer answer = answer_of(experiment_, rows);
+    answer.tuning = request_.tuning;
     write_tables(experiment_, rows, answer, folder_);
     const std::vector<CellIndex> shown = cells_to_show(experiment_, rows, request_.shown);
     if (!draw(shown)) return stopped();

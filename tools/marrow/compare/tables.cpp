@@ -200,6 +200,10 @@ json answer_json(const Experiment& experiment, const Answer& answer) {
                         {"sentence", finding.sentence}});
   json result{{"experiment", experiment.name}, {"variants", variants}, {"comparisons", findings}};
   if (!answer.curves.empty()) result["curves"] = curves_json(experiment, answer.curves);
+  if (answer.tuning) {
+    result["tuning"] = tuning_json(*answer.tuning);
+    result["curves"] = json::parse(answer.tuning->curves);
+  }
   if (answer.look) result["stop"] = of(*experiment.stop, *answer.look, experiment, answer.look_sentence);
   return result;
 }

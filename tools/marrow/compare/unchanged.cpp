@@ -49,9 +49,9 @@ void Unchanged::check(const compare::Dependencies& dependencies) const {
   const std::string change = compare::first_change(dependencies, catalogue);
   if (!change.empty()) refuse(change);
   Diagnostics diagnostics;
-  const compare::Experiment now =
-      compare::read_experiment(experiment_.file, catalogue, diagnostics, experiment_.more_cases);
+  compare::Experiment now = compare::read_experiment(experiment_.file, catalogue, diagnostics, experiment_.more_cases);
   if (!diagnostics.empty()) refuse("what " + experiment_.file.string() + " names (" + diagnostics.text() + ")");
+  if (now.tune) keep_held_out_cases(now);
   if (const std::string other = difference(experiment_, now); !other.empty())
     refuse("the list of cases (" + other + ")");
 }

@@ -77,8 +77,9 @@ json run_cell(CellRunner& runner, const Store& store, const json& asked, WorkerR
 int worker(const CompareRequest& request) {
   const Catalogue catalogue;
   Diagnostics diagnostics;
-  const Experiment experiment = compare::read_experiment(request.file, catalogue, diagnostics, request.more_cases);
+  Experiment experiment = compare::read_experiment(request.file, catalogue, diagnostics, request.more_cases);
   if (!diagnostics.empty()) throw Error("the experiment has faults:\n" + diagnostics.text());
+  if (!request.tuned.empty() && !add_tuned(experiment, request.tuned)) refuse_job("what the experiment tunes");
   const Store store;
   CellRunner runner(experiment, catalogue, request.no_cache ? nullptr : &store, request.folder, request.threads,
                     request.file_limits);
@@ -116,6 +117,7 @@ void add_worker(CLI::App& app, int& code) {
   CLI::App* command = app.add_subcommand("worker", "take cells from the standard input; started by compare");
   command->group("");
   add_experiment_arguments(command, *request);
+  command->add_option("--tuned", request->tuned, "name of the tuned variant that the experiment has");
   command->callback([request, &code] { code = worker(*request); });
 }
 

@@ -121,7 +121,8 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
   const json answers = answer_json(experiment, answer);
   data["summary"] = answers["variants"];
   data["comparisons"] = answers["comparisons"];
-  if (answers.contains("curves")) data["curves"] = answers["curves"];
+  for (const char* part : {"curves", "tuning"})
+    if (answers.contains(part)) data[part] = answers[part];
 
   data["cell_table"] = cell_table(experiment, rows);
   data["graph"] = pipeline_graph(experiment, runner);

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "marrow/compare/stop_rule.hpp"
+#include "marrow/compare/swept_option.hpp"
+#include "marrow/compare/tune_rule.hpp"
 #include "marrow/runtime/pipeline.hpp"
 
 namespace marrow::compare {
@@ -19,15 +21,6 @@ struct Variant {
   std::vector<Override> overrides;
   std::vector<double> swept = {};  ///< values of the experiment's swept options, in their order
   std::string swept_from = {};     ///< the variant whose options are swept; empty if it is the pipeline as it is
-};
-
-/// An option whose numbers are tried over a range.
-struct SweptOption {
-  std::string key;  ///< node.option
-  std::array<double, 2> range{};
-  bool is_log = false;    ///< spread evenly over the logarithm
-  bool is_whole = false;  ///< rounded to whole numbers
-  Place place;
 };
 
 /// Data on which all variants run. It is a folder that exists, or a folder that a simulation makes. Without either, the
@@ -121,6 +114,7 @@ struct Experiment {
   std::string initial_error;          ///< path of the figure over which the capture range is drawn; may be empty
   std::vector<std::string> pictures;  ///< outputs to show side by side
   std::optional<StopRule> stop;       ///< when a comparison with more and more cases ends
+  std::optional<TuneRule> tune;       ///< how a further variant is found
   std::size_t timed_cells = 3;        ///< cells per variant that are run again, one at a time, to measure their time
 
   std::size_t cell_count() const { return variants.size() * cases.size() * starts.size(); }
@@ -143,6 +137,14 @@ PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& ce
 
 /// The arguments with which the simulation's pipeline makes this case.
 PipelineArguments simulation_arguments_of(const Experiment& experiment, std::size_t case_index);
+
+/// Adds the variant that has these values of the options under 'tune', and returns its name: "tuned+72.3+1.5".
+std::string add_tuned(Experiment& experiment, const std::vector<double>& values);
+/// Adds the tuned variant with this name. Returns false if no tuned variant of the experiment can have it.
+bool add_tuned(Experiment& experiment, const std::string& name);
+/// Leaves only the training cases, or only those that are held out.
+void keep_training_cases(Experiment& experiment);
+void keep_held_out_cases(Experiment& experiment);
 
 /// Reads and checks an experiment and the pipelines that it names, with each variant's changes. All faults go to
 /// `diagnostics`, at their lines; the result may be used only if there are none. `more_cases` further cases follow

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// The section 'tune' of an experiment.
+#include "experiment_files.hpp"
+
+namespace experiment_tune_test {
+
+using namespace experiment_files;
+using marrow::compare::Experiment;
+using marrow::compare::TuneRule;
+
+const std::string kGood = std::string(kHead) + kCases + kMetrics;  // lines 1 to 4
+const std::string kRest = "points: 9, training_cases: 1, failed_as: 5";
+
+/// Nodes of the tests, and the optimizers.
+const marrow::Catalogue& catalogue() {
+  const std::filesystem::path build = MARROW_BINARY_DIR;
+  static const marrow::Catalogue catalogue({build / "tests" / "plugins", build / "lib" / "marrow"});
+  return catalogue;
+}
+
+class ExperimentTune : public ExperimentFiles {
+ protected:
+  Experiment read(const std::string& text) {
+    diagnostics = marrow::Diagnostics();
+    return marrow::compare::read_experiment(scratch.write("e.yaml", text), catalogue(), diagnostics);
+  }
+  Experiment good(const std::string& tune, const std::string& more = "") {
+    Experiment experiment = read(kGood + more + "tune: {" + tune + "}\n");
+    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+    return experiment;
+  }
+  /// Exactly this one.
+  void expect_fault(const std::string& tune, const std::string& message, const std::string& hint = "",
+                    const std::string& more = "") {
+    read(kGood + "tune: {" + tune + "}\n" + more);
+    ASSERT_EQ(diagnostics.size(), 1u) << tune << diagnostics.text();
+    const marrow::Diagnostic fault = diagnostics.sorted()[0];
+    EXPECT_EQ(fault.place.line, 5) << diagnostics.text();
+    EXPECT_EQ(fault.message, message);
+    EXPECT_EQ(fault.hint, hint);
+  }
+};
+
+TEST_F(ExperimentTune, ThePipelineAsItIsIsTheVariant) {
+  const Experiment experiment = good("options: {c.value: [10, 20]}, " + kRest);
+  ASSERT_EQ(experiment.variants.size(), 1u);
+  EXPECT_EQ(experiment.variants[0].name, "untuned");
+  EXPECT_EQ(experiment.tune->optimizer, "optimizer.nelder_mead");
+  EXPECT_EQ(experiment.tune->points, 9u);
+  EXPECT_EQ(experiment.tune->failed_as, 5);
+}
+
+TEST_F(ExperimentTune, ATunedVariantIsNamedAfterItsValues) {
+  Experiment experiment =
+      good("options: {c.value: [10, 20], c.count: {range: [1, 3], whole: true}}, variant: two, " + kRest,
+           std::string(kVariants));
+  EXPECT_EQ(add_tuned(experiment, std::vector<double>{12.34, 2}), "tuned+12.34+2");
+  const marrow::compare::Variant tuned = experiment.variants.back();
+  ASSERT_EQ(tuned.overrides.size(), 3u);
+  EXPECT_EQ(tuned.overrides[0].key, "c.value") << "those of the variant come first";
+  EXPECT_EQ(tuned.overrides[0].value, "2");
+  EXPECT_EQ(tuned.overrides[1].value, "12.34");
+  EXPECT_EQ(tuned.overrides[2].value, "2");
+  experiment.variants.pop_back();
+  EXPECT_TRUE(add_tuned(experiment, std::string("tuned+12.34+2")));
+  EXPECT_EQ(experiment.variants.back().overrides[1].value, "12.34");
+  for (const char* other : {"tuned", "tuned+12", "tuned+12+2+3", "tuned+12.0+2", "tuned+9+2", "tuned+12+x", "one+12+2"})
+    EXPECT_FALSE(add_tuned(experiment, std::string(other))) << other;
+  EXPECT_EQ(experiment.variants.size(), 3u);
+}
+
+TEST_F(ExperimentTune, ValuesAreRounded) {
+  TuneRule rule = *good("options: {c.value: [10, 20], c.path: {range: [0.7, 2.8], scale: log}}, " + kRest).tune;
+  EXPECT_EQ(rule.values_at({0, 0}), (std::vector<double>{10, 0.7}));
+  EXPECT_EQ(rule.values_at({1, 1}), (std::vector<double>{20, 2.8}));
+  EXPECT_EQ(rule.values_at({0.123456, 0.5}), (std::vector<double>{11.23, 1.4}));
+  EXPECT_EQ(rule.values_at({-1, 2}), (std::vector<double>{10, 2.8}));
+}
+
+TEST_F(ExperimentTune, CasesAreSplit) {
+  Experiment training = good("options: {c.value: [10, 20]}, " + kRest), held_out = training;
+  keep_training_cases(training);
+  keep_held_out_cases(held_out);
+  ASSERT_EQ(training.cases.size(), 1u);
+  ASSERT_EQ(held_out.cases.size(), 1u);
+  EXPECT_EQ(training.cases[0].name, "a");
+  EXPECT_EQ(held_out.cases[0].name, "b");
+}
+
+TEST_F(ExperimentTune, AFailedRunCountsAsTenTimesTheLimit) {
+  const Experiment experiment =
+      good("options: {c.value: [10, 20]}, points: 9, training_cases: 1", "success: {number.value: 0.3}\n");
+  EXPECT_DOUBLE_EQ(experiment.tune->failed_as, 3);
+}
+
+TEST_F(ExperimentTune, EachFaultIsSaid) {
+  const std::string options = "options: {c.value: [10, 20]}, ";
+  const std::string example = "write it as  tune: {options: {edges.high: [60, 90]}, points: 40, training_cases: 20}";
+  expect_fault("points: 9, training_cases: 1", "'tune' names no option", example);
+  expect_fault(options + "training_cases: 1, failed_as: 5", "'tune' does not say how many points may be tried",
+               "add  points: 40");
+  expect_fault(options + "points: 9, failed_as: 5", "'tune' does not say how many cases are for training",
+               "add  training_cases: 20");
+  expect_fault(options + "points: 9, failed_as: 5, training_cases: 2",
+               "2 training cases of 2 leave none that is held out");
+  expect_fault(options + "points: 9, training_cases: 1", "'tune' does not say what a failed run counts as",
+               "add  failed_as:  with a bad value of number.value; with a limit under 'success' it is ten times that "
+               "limit");
+  expect_fault(options + kRest + ", figure: number.valeu", "'number.valeu' is not among the metrics",
+               "did you mean 'number.value'?");
+  expect_fault(options + kRest + ", variant: untune", "there is no variant 'untune'", "did you mean 'untuned'?");
+  expect_fault(options + kRest + ", optimizer: {with: {}}", "'optimizer' does not name its node",
+               "write it as  optimizer: {uses: optimizer.nelder_mead}");
+  expect_fault(options + kRest, "'tune' beside 'sweep'", "make two experiments of them",
+               "sweep: {options: {c.count: [1, 2]}, grid: 2}\n");
+  expect_fault("options: {c.value: [20, 10]}, " + kRest,
+               "the range of 'c.value' must end above its beginning, got 20 to 10");
+}
+
+TEST_F(ExperimentTune, TheEndsOfRangesAndTheOptimizerAreChecked) {
+  expect_fault("options: {c.valu: [10, 20]}, " + kRest, "'test.constant' has no option 'valu'",
+               "did you mean 'value'?");
+  expect_fault("options: {c.value: [10, 20]}, " + kRest + ", optimizer: {uses: test.constant}",
+               "'test.constant' is no optimizer",
+               "name a node such as optimizer.nelder_mead; marrow list optimizer shows them");
+}
+
+}  // namespace experiment_tune_test

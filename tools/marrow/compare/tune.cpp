@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+// Chooses numbers of options by an optimizer on the training cases. Then compares on the cases that are held out.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+#include "compare/comparison.hpp"
+#include "marrow/domain/error.hpp"
+#include "marrow/domain/functions.hpp"
+#include "marrow/domain/printable.hpp"
+#include "marrow/runtime/executor.hpp"
+#include "marrow/runtime/types.hpp"
+#include "process.hpp"
+#include "runtime/one_node.hpp"
+
+namespace marrow::cli {
+namespace {
+
+using compare::CellRow;
+using compare::Experiment;
+using compare::MetricChoice;
+
+constexpr double kFirstStep = 0.25, kStepTolerance = 0.02;  // fractions of the options' ranges
+
+struct Interrupted : std::exception {};
+
+/// The options' present values as fractions of their ranges; the middle where that is unknown.
+Eigen::VectorXd fractions_now(const Experiment& experiment, const Catalogue& catalogue) {
+  const compare::TuneRule& rule = *experiment.tune;
+  Diagnostics faults;
+  const Pipeline pipeline = read_pipeline(experiment.pipeline, arguments_of(experiment, {rule.variant, 0, 0}, "case"),
+                                          catalogue, faults, true);
+  Eigen::VectorXd fractions = Eigen::VectorXd::Constant(Eigen::Index(rule.options.size()), 0.5);
+  for (std::size_t o = 0; o < rule.options.size(); ++o)
+    for (const PipelineNode& node : pipeline.nodes)
+      for (std::size_t i = 0; i < node.info.options.size(); ++i) {
+        if (node.id + "." + node.info.options[i].name != rule.options[o].key) continue;
+        if (const auto* number = std::get_if<double>(&node.options[i]))
+          fractions[Eigen::Index(o)] = rule.options[o].fraction_of(*number);
+        if (const auto* whole = std::get_if<std::int64_t>(&node.options[i]))
+          fractions[Eigen::Index(o)] = rule.options[o].fraction_of(double(*whole));
+      }
+  return fractions;
+}
+
+class Tuner {
+ public:
+  Tuner(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment,
+        const std::filesystem::path& folder)
+      : request_(request), catalogue_(catalogue), experiment_(experiment), rule_(*experiment.tune), folder_(folder) {
+    request_.quiet = true;  // a line for each point says enough
+    const MetricChoice& metric = experiment.metrics[rule_.metric];
+    made_.rule = rule_;
+    made_.figure = metric.label;
+    made_.higher_is_better = metric.higher_is_better();
+    made_.variant = experiment.variants[rule_.variant].name;
+    tried_ = experiment;
+    tried_.variants.clear();
+    tried_.swept = rule_.options;
+    is_quiet_ = request.quiet;
+  }
+
+  Tuning run() {
+    Experiment untuned = experiment_;
+    untuned.variants = {experiment_.variants[rule_.variant]};
+    made_.untuned = point_of(untuned, {});
+    if (!is_quiet_)
+      std::fprintf(stderr, "marrow: %s as it is: %.4g\n", printable(made_.variant).c_str(), made_.untuned.figure);
+    MinimisationProblem problem;
+    problem.function = [&](const Eigen::VectorXd& x) { return badness_at({x.data(), x.data() + x.size()}); };
+    problem.start = fractions_now(experiment_, catalogue_);
+    problem.initial_step = Eigen::VectorXd::Constant(problem.start.size(), kFirstStep);
+    problem.lower = Eigen::VectorXd::Zero(problem.start.size());
+    problem.upper = Eigen::VectorXd::Ones(problem.start.size());
+    problem.max_evaluations = int(rule_.points);
+    problem.step_tolerance = kStepTolerance / kFirstStep;
+    made_.stopped_because = optimizer().minimise(problem).stopped_because;
+    made_.curves = curves_json(tried_, curves_of(tried_, rows_by_variant(tried_, rows_))).dump();
+    return made_;
+  }
+
+ private:
+  const Optimizer& optimizer() {
+    Diagnostics faults;
+    node_ = pipeline_of_node(rule_.optimizer, {}, rule_.optimizer_options, catalogue_, faults);  // it was checked
+    RunSettings settings;
+    settings.threads = 1;
+    result_ = run_pipeline(node_.pipeline, catalogue_, settings);
+    value_ = value_of(result_, node_.pipeline.outputs.at(0).source);
+    if (value_.is_absent()) throw Error(rule_.optimizer + ": " + value_.missing);
+    return value_.as<Optimizer>();
+  }
+
+  double sign() const { return made_.higher_is_better ? -1 : 1; }
+
+  double badness_at(const std::vector<double>& fractions) {
+    const std::vector<double> values = rule_.values_at(fractions);
+    if (const auto known = known_.find(values); known != known_.end())
+      return sign() * made_.points[known->second].figure;
+    Experiment at_point = experiment_;
+    request_.tuned = add_tuned(at_point, values);
+    at_point.variants = {at_point.variants.back()};
+    if (const std::string fault = fault_of(at_point); fault.empty()) {
+      tried_.variants.push_back(at_point.variants[0]);
+      made_.points.push_back(point_of(at_point, values));
+    } else {
+      made_.points.push_back({values, rule_.failed_as, 0, 0, fault});
+    }
+    const std::size_t number = made_.points.size() - 1;
+    known_[values] = number;
+    if (sign() * made_.points[number].figure < sign() * made_.points[made_.best].figure) made_.best = number;
+    if (!is_quiet_)
+      std::fprintf(stderr, "marrow: point %zu of at most %zu: %.4g at %s%s; best so far %.4g\n", number + 1,
+                   rule_.points, made_.points[number].figure, printable(values_text(rule_, values)).c_str(),
+                   made_.points[number].refused.empty() ? "" : ", which the pipeline does not take",
+                   made_.points[made_.best].figure);
+    return sign() * made_.points[number].figure;
+  }
+
+  /// Why the pipeline does not take the values of the only variant; empty if it does. Each value alone may be good,
+  /// and not go with another, as a lower threshold above the upper one.
+  std::string fault_of(const Experiment& at_point) const {
+    Diagnostics faults;
+    read_pipeline(at_point.pipeline, arguments_of(at_point, {0, 0, 0}, "case"), catalogue_, faults, true);
+    return faults.empty() ? "" : faults.sorted()[0].message;
+  }
+
+  /// Runs the only variant of an experiment on the training cases.
+  TuningPoint point_of(Experiment experiment, const std::vector<double>& values) {
+    experiment.baseline = 0;
+    keep_training_cases(experiment);
+    const auto cells = run_cells(request_, catalogue_, experiment, folder_);
+    if (!cells) throw Interrupted();
+    TuningPoint point{values, 0, cells->rows.size(), 0};
+    for (const CellRow& row : cells->rows) {
+      point.failed += !row.failed.empty();
+      point.figure += figure_of(row);
+      if (made_.unit.empty()) made_.unit = row.units[rule_.metric];
+      if (!values.empty()) rows_.push_back(row);
+    }
+    point.figure /= double(point.runs);
+    return point;
+  }
+
+  /// A figure, no worse than that of a failed run.
+  double figure_of(const CellRow& row) const {
+    if (!row.failed.empty() || !row.values[rule_.metric]) return rule_.failed_as;
+    const double value = *row.values[rule_.metric];
+    switch (experiment_.metrics[rule_.metric].better) {
+      case MetricChoice::Better::higher:
+        return std::max(value, rule_.failed_as);
+      case MetricChoice::Better::nearest_zero:
+        return std::min(std::abs(value), std::abs(rule_.failed_as));
+      default:
+        return std::min(value, rule_.failed_as);
+    }
+  }
+
+  CompareRequest request_;
+  const Catalogue& catalogue_;
+  const Experiment& experiment_;
+  const compare::TuneRule& rule_;
+  std::filesystem::path folder_;
+  bool is_quiet_ = false;
+  OneNode node_;
+  RunResult result_;
+  Value value_;
+  Tuning made_;
+  std::map<std::vector<double>, std::size_t> known_;
+  Experiment tried_;
+  std::vector<CellRow> rows_;  ///< of all points
+};
+
+}  // namespace
+
+int run_tuning(const CompareRequest& asked, const Catalogue& catalogue, const Experiment& experiment,
+               const std::filesystem::path& folder) {
+  CompareRequest request = asked;
+  try {
+    request.tuning = Tuner(asked, catalogue, experiment, folder).run();
+  } catch (const Interrupted&) {
+    std::fprintf(stderr, "marrow: %s; the same command goes on from here\n", stopped_text().c_str());
+    return 130;
+  }
+  if (!request.quiet) std::fprintf(stderr, "marrow: %s\n", printable(sentence(*request.tuning)).c_str());
+  Experiment held_out = experiment;
+  request.tuned = add_tuned(held_out, request.tuning->points[request.tuning->best].values);
+  keep_held_out_cases(held_out);
+  return run_comparison(request, catalogue, held_out, folder);
+}
+
+}  // namespace marrow::cli
