@@ -54,7 +54,7 @@ class TuningTest(PageTest):
         line = self.browser.js("return Number(document.querySelector('#tuning .untuned').getAttribute('y1'))")
         self.assertTrue(best[0] < line < best[1], "the untuned figure lies between the first two points")
         text = self.texts("#tuning p")
-        self.assertIn("tuned on 6 cases.", text)
+        self.assertIn("Tuned on 6 cases.", text)
         self.assertIn("The optimizer ended: steps became small.", text[-1])
 
     def test_higher_may_be_better(self):

@@ -52,7 +52,7 @@ const Tuning = (() => {
     const names =
         [{name: tuning.variant + ', as it is'}, {name: 'the best point so far; the large mark is the chosen one'}];
     return el(
-        'div', {}, el('p', {}, tuning.sentence + '.'), Plots.legend(names),
+        'div', {}, el('p', {}, tuning.sentence.replace(/^t/, 'T') + '.'), Plots.legend(names),
         Plots.responsive((width) => draw(tuning, width)),
         el('p', {class: 'note'},
            'The optimizer ended: ' + tuning.stopped_because + '. A run that failed counts as ' +
