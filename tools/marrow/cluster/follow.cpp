@@ -6,6 +6,7 @@
 #include <charconv>
 #include <chrono>
 #include <cstdio>
+#include <set>
 #include <thread>
 
 #include "cluster/chunk_rows.hpp"
@@ -25,6 +26,7 @@ constexpr auto kBetweenLooks = std::chrono::seconds(2);       // at the folder
 constexpr auto kBetweenQuestions = std::chrono::seconds(10);  // to the cluster, which all its users ask
 constexpr auto kEndOfTask = std::chrono::seconds(30);         // after its rows are there
 constexpr int kQuestionsWithoutGather = 2;  // then it has ended: a shared folder may show its last file late
+const std::set<std::string> kUsualReasons{"None", "Resources", "Priority", "Dependency", "JobArrayTaskLimit"};
 
 class Follower {
  public:
@@ -69,7 +71,14 @@ class Follower {
                   plan_.folder.string() +
                   " be written to, or is its disk full? What is done counts: the same command goes on from here");
     }
+    say_reasons(queue);
     end_forgotten(queue);
+  }
+
+  void say_reasons(const Queue& queue) {
+    for (const std::string& reason : queue.reasons)
+      if (!kUsualReasons.contains(reason) && said_reasons_.insert(reason).second)
+        std::fprintf(stderr, "marrow: tasks wait on the cluster: %s\n", printable(reason).c_str());
   }
 
   void check_answer(const Queue& queue) {
@@ -129,6 +138,7 @@ class Follower {
   std::map<std::string, Clock::time_point> made_but_running_;  ///< since when, by the task
   Clock::time_point answered_at_ = Clock::now();
   bool is_silence_said_ = false;
+  std::set<std::string> said_reasons_;
   int questions_without_gather_ = 0;
 };
 

@@ -265,6 +265,7 @@ Queue queue_of(const Submission& submission) {
     const bool is_held =
         reason.find("requeued held") != std::string::npos || reason.find("JobHeldAdmin") != std::string::npos;
     if (state == "PENDING" && is_held) queue.held = reason;
+    if (state == "PENDING") queue.reasons.insert(reason);
   }
   return queue;
 }

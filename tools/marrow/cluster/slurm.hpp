@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -44,6 +45,7 @@ struct Queue {
   std::string fault;                 ///< what it said if it did not answer
   bool has_gather = false;           ///< the job that gathers waits or runs
   std::string held;                  ///< why a job is held back until somebody releases it; empty if none is
+  std::set<std::string> reasons;     ///< why jobs wait, in its words
   std::vector<std::string> running;  ///< tasks that run, each as "JOB_TASK"
 };
 Queue queue_of(const Submission& submission);
