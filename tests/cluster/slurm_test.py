@@ -169,7 +169,8 @@ class OnSlurm(Cluster):
         self.profile = self.write("profile.yaml", ONE_TRY + "memory_mb: 300\n")
         self.submit("--wait")  # the system kills the largest process, which runs the cell; the task goes on
         self.assertEqual(sum(row["status"] == "done" for row in self.figures("out").values()), 2 * VARIANTS)
-        self.assertEqual(self.reasons(), {"crashed in node 'm': Killed"})
+        reason = "crashed in node 'm': Killed, as by a system whose memory, or that of a cluster's job, runs out"
+        self.assertEqual(self.reasons(), {reason})
         shutil.rmtree(self.out)
         shutil.rmtree(self.scratch / "cache")
         process = self.start()
