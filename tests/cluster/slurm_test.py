@@ -90,6 +90,7 @@ class OnSlurm(Cluster):
     def test_same_figures(self):
         said = self.submit("--wait").stdout
         self.assertIn("200 cells are left, in %d chunks" % CASES, said)
+        self.assertEqual({row["status"] for row in self.figures("out").values()}, {"done"})
         self.expect_same_as_here()
         said = self.compare("out", "--status").stdout
         self.assertIn("200 of 200 cells in 10 of 10 chunks", said)
