@@ -2,6 +2,7 @@
 // The keys of cells and simulated cases. They cover everything that these depend on, so that kept ones can be reused.
 #include "cell_key.hpp"
 
+#include <map>
 #include <set>
 
 #include "marrow/compare/cell.hpp"
@@ -22,6 +23,12 @@ std::string content_now(const std::string& path) {
   } catch (const Error& error) {
     return error.what();
   }
+}
+
+std::string with_all_replaced(std::string text, const std::string& what, const std::string& by) {
+  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += by.size())
+    text.replace(at, what.size(), by);
+  return text;
 }
 
 }  // namespace
@@ -56,20 +63,26 @@ std::string CellRunner::content_of(const std::string& path, Look look) const {
   return kept[path] = content_now(path);
 }
 
-/// The case counts as a whole, even if the nodes name only parts of it.
+/// The case counts as a whole, even if the nodes name only parts of it. Where a simulated case lies does not count: it
+/// is in a store, and hosts that share a comparison may have theirs at different places.
 void CellRunner::add_pipeline(Hasher& hasher, const Pipeline& pipeline, const fs::path& case_folder, Look look) const {
-  hasher.add(resolved_yaml(pipeline));
+  const std::string simulated = fs::absolute(store_ ? store_->cases() : folder_ / "cases").string() + "/";
+  const std::string place = case_folder.empty() ? "" : fs::absolute(case_folder).string();
+  const auto neutral = [&](const std::string& text) {
+    return place.starts_with(simulated) ? with_all_replaced(text, place, "the simulated case") : text;
+  };
+  hasher.add(neutral(resolved_yaml(pipeline)));
   std::set<Digest> build_ids;
-  std::set<std::string> paths;
-  if (!case_folder.empty()) paths.insert(fs::absolute(case_folder).string());
+  std::map<std::string, std::string> paths;  // in an order that does not depend on where the case lies
+  if (!place.empty()) paths.emplace(neutral(place), place);
   for (const PipelineNode* node : called_nodes(pipeline)) {
     const Digest build_id = catalogue_.library_of(node->info.name)->build_id;
     build_ids.insert(build_id);
     if (keeps_dependencies_) dependencies_.builds.emplace(node->info.name, build_id);
-    for (const std::string& path : paths_of(*node)) paths.insert(path);
+    for (const std::string& path : paths_of(*node)) paths.emplace(neutral(path), path);
   }
   for (const Digest& id : build_ids) hasher.add(id);
-  for (const std::string& path : paths) hasher.add(content_of(path, look));
+  for (const auto& [name, path] : paths) hasher.add(content_of(path, look));
 }
 
 fs::path CellRunner::place_of_simulated(std::size_t index, Look look) const {

@@ -242,6 +242,7 @@ WorkerEnd Worker::died() {
   if (WIFSIGNALED(status)) {
     end.signal = WTERMSIG(status);
     end.failed = "crashed" + where + ": " + strsignal(end.signal);
+    if (end.signal == SIGKILL) end.failed += ", as by a system whose memory, or that of a cluster's job, runs out";
   } else {
     end.failed = "ended" + where + " with exit code " + std::to_string(WEXITSTATUS(status));
   }

@@ -6,6 +6,7 @@ import re
 import stat
 import struct
 import subprocess
+import time
 
 from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow, wait_until
 
@@ -119,6 +120,25 @@ class Cache(Case):
         self.assertEqual((self.scratch / "precious" / "data").read_text(), "mine")
         self.assertTrue(inner.is_dir())
         self.assertIn("1 results removed", result.stdout, "all else is")
+
+    def test_what_is_left_because_its_age_is_unknown_is_said(self):
+        self.assertEqual(self.run_pipeline().returncode, 0)
+        left = self.cache / "cases" / ("0" * 32 + ".tmp-alpha.0123456789abcdef.00000001.000000000001-0")
+        left.parent.mkdir(exist_ok=True)
+        left.mkdir()  # a process of another host left it
+        two_days_ago = time.time() - 2 * 86400
+        os.utime(left, (two_days_ago, two_days_ago))
+        # ages are counted from the time of a new file, and no byte can be written, as on a full disk
+        command = ["sh", "-c", 'ulimit -f 0; exec "$1" cache gc --keep-gb 1', "sh", str(MARROW)]
+        environment = {**os.environ, "MARROW_CACHE": str(self.cache)}
+        result = subprocess.run(command, capture_output=True, text=True, env=environment)
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn("%s is left, because its age is unknown: no file can be written beside it" % left, result.stderr)
+        self.assertTrue(left.exists())
+        result = self.marrow("cache", "gc", "--keep-gb", "1")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        self.assertFalse(left.exists())
+        self.assertEqual(self.kept(), 1)
 
     def test_a_wrong_limit_is_said_and_removes_nothing(self):
         for wrong in WRONG_NUMBERS[:-1]:

@@ -9,6 +9,22 @@ import subprocess
 
 from cluster_cases import CASES, MARROW, VARIANTS, Cluster, main, wait_until
 
+SIMULATION = """marrow: 1
+nodes:
+  chance: {uses: test.draw}
+  letters: {uses: test.letters}
+  s: {uses: test.add, in: {a: letters, b: chance}}
+outputs: {case: s}
+"""
+SIMULATED = """experiment: 1
+pipeline: p.yaml
+cases: {simulate: {pipeline: s.yaml, seeds: 1..2}}
+metrics: [number.value]
+success: {number.value: 15}
+timed_cells: 0
+variants: {a: {m.value: 1}, b: {m.value: 2}}
+"""
+
 
 class Chunks(Cluster):
     def names(self, out):
@@ -18,9 +34,9 @@ class Chunks(Cluster):
     def chunk(self, out, name, code=0):
         return self.run_program(MARROW, "chunk", self.plan(out), name, "--quiet", code=code)
 
-    def emit(self, out, program="parallel"):
+    def emit(self, out, program="parallel", cells=CASES * VARIANTS):
         said = self.compare(out, "--emit", program).stdout
-        self.assertIn("%d cells are left, in " % (CASES * VARIANTS), said)
+        self.assertIn("%d cells are left, in " % cells, said)
         return said.split("run them by\n\n")[1].strip()
 
     tables = {}  # those of one machine, made once
@@ -109,6 +125,17 @@ class Chunks(Cluster):
         self.assertEqual(len(lines), VARIANTS)
         kept = [line for line in lines if line in part.read_text().split("\n")]
         self.assertGreaterEqual(len(kept), done)
+
+    def test_simulated_cases_in_a_store_of_the_task(self):
+        """The row of a task counts wherever its store is, because simulated cases are the same in each."""
+        self.write("s.yaml", SIMULATION)
+        self.file = self.write("e.yaml", SIMULATED)
+        self.emit("out", cells=4)
+        # "~" comes behind all other names, and "!" before: the order of paths must not count, either
+        for name, store in zip(self.names("out"), ("~", "!")):
+            self.run_program(MARROW, "chunk", self.plan("out"), name, "--quiet", MARROW_CACHE=str(self.scratch / store))
+        said = self.compare("out", "--gather", "--quiet", "--shown", "0").stdout
+        self.assertIn("4 were there already", said)
 
     def test_a_damaged_row_is_made_again(self):
         self.emit("out")

@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 
@@ -30,9 +31,10 @@ class Cluster(Case):
         }
         self.file = self.experiment()
 
-    def experiment(self, value="0.01", more=""):
+    def experiment(self, value="0.01", more="", cases=CASES):
         self.write("p.yaml", PIPELINE % value)
-        for i in range(CASES):
+        shutil.rmtree(self.scratch / "cases", ignore_errors=True)
+        for i in range(cases):
             (self.scratch / "cases" / str(i)).mkdir(parents=True, exist_ok=True)
             self.write("cases/%d/data" % i, "case %d" % i)
         variants = ", ".join("v%d: {m.value: %d}" % (i, i) for i in range(VARIANTS))

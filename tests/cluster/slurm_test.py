@@ -13,6 +13,7 @@ import time
 from cluster_cases import CASES, MARROW, SOURCE, VARIANTS, Cluster, main, wait_until
 
 PROFILE = "marrow-cluster: 1\nprocessors: 1\ntries: 3\n"
+ONE_TRY = PROFILE.replace("tries: 3", "tries: 1")
 ALL = bool(os.environ.get("MARROW_TEST_ALL"))
 
 
@@ -36,6 +37,8 @@ def is_idle():
 
 
 class OnSlurm(Cluster):
+    tables = {}
+
     def setUp(self):
         super().setUp()
         self.profile = self.write("profile.yaml", PROFILE)
@@ -49,8 +52,14 @@ class OnSlurm(Cluster):
     def submit(self, *arguments, code=0):
         return self.compare("out", "--on", "slurm", "--profile", self.profile, *arguments, code=code)
 
-    def local(self):
-        self.compare("local", "--quiet", MARROW_CACHE=str(self.scratch / "another"))
+    def expect_same_as_here(self):
+        """The figures are those of this machine alone, which are made once for each experiment."""
+        cases = len(list((self.scratch / "cases").iterdir()))
+        experiment = (self.scratch / "p.yaml").read_text() + pathlib.Path(self.file).read_text() + str(cases)
+        if experiment not in self.tables:
+            self.compare("local", "--quiet", "--shown", "0", MARROW_CACHE=str(self.scratch / "another"))
+            self.tables[experiment] = self.figures("local"), self.answers("local")
+        self.assertEqual((self.figures("out"), self.answers("out")), self.tables[experiment])
 
     def start(self):
         process = subprocess.Popen(
@@ -68,44 +77,114 @@ class OnSlurm(Cluster):
     def rows(self):
         return list((self.out / "rows").glob("*.jsonl"))
 
+    def parts_with_rows(self):
+        return [part for part in (self.out / "rows").glob("*.part") if part.stat().st_size > 0]
+
     def daemon(self, *words):
         subprocess.run([os.environ["CLUSTER_FOLDER"] + "/daemon", *words], check=True)
+
+    def only_with_all(self):
+        if not ALL and len(sys.argv) < 4:
+            self.skipTest("takes a minute; MARROW_TEST_ALL=1, or its name, tries it")
 
     def test_same_figures(self):
         said = self.submit("--wait").stdout
         self.assertIn("200 cells are left, in %d chunks" % CASES, said)
-        self.local()
-        self.expect_same("out", "local")
+        self.assertEqual({row["status"] for row in self.figures("out").values()}, {"done"})
+        self.expect_same_as_here()
         said = self.compare("out", "--status").stdout
         self.assertIn("200 of 200 cells in 10 of 10 chunks", said)
         self.assertIn("tables and report are made; submitted 1 times", said)
         self.assertTrue((self.out / "report.html").exists())
 
+    def hold_tasks(self):
+        """Holds tasks until two run, and until the controller has saved that: then it loses nothing when it is killed.
+        Else it would start tasks again that have ended, which the node refuses as duplicates."""
+        held = set()
+        saved = pathlib.Path(os.environ["CLUSTER_FOLDER"]) / "state" / "job_state"
+        wait_until(lambda: held.update(self.send(signal.SIGSTOP)) or len(held) >= 2, "no two tasks run")
+        now = time.time()
+        wait_until(lambda: saved.stat().st_mtime > now, "the controller does not save its state")
+
+    @staticmethod
+    def send(number):
+        """Sends a signal to the tasks."""
+        found = tasks()
+        for task in found:
+            os.kill(task, number)
+        return found
+
     def test_killed_tasks_and_controller(self):
         self.experiment("0.2")
         process = self.start()
-        wait_until(tasks, "no task came")
         for _ in range(2):
-            wait_until(lambda: tasks() or process.poll() is not None, "no task came")
-            for task in tasks():
-                os.kill(task, signal.SIGKILL)
+            wait_until(lambda: self.send(signal.SIGKILL), "no task came")
             time.sleep(1)
-        time.sleep(8)  # until the controller has saved that the jobs are there
+        self.hold_tasks()
         self.daemon("kill", "slurmctld")
         time.sleep(2)
         self.daemon("start", "slurmctld")
-        time.sleep(2)
-        # it read an older state, in which tasks run that have ended: the node tells it
-        subprocess.run(["scontrol", "reconfigure"], check=True)
-        said, _ = process.communicate(timeout=100)
-        if process.returncode != 0:  # what the controller forgot, or holds back: the same command goes on
-            self.assertRegex(said, "the same command goes on|ended without a report")
-            wait_until(is_idle, "the cluster goes on")
-            self.submit("--wait")
-        self.local()
-        self.expect_same("out", "local")
+        self.send(signal.SIGCONT)
+        said, _ = process.communicate(timeout=200)
+        self.assertEqual(process.returncode, 0, said)
+        self.expect_same_as_here()
+        self.assertRegex(self.compare("out", "--status").stdout, "submitted [23] times")  # the killed tasks' chunks
+
+    def reasons(self):
+        """Why cells failed, each reason once."""
+        return {row["reason"] for row in self.figures("out").values() if row["status"] == "failed"}
+
+    def expect_reasons(self, words):
+        reasons = self.reasons()
+        self.assertEqual(len(reasons), 2, reasons)  # of two tasks
+        for reason in reasons:
+            self.assertIn(words + "; see log/", reason)
+
+    def give_place_away(self):
+        process = self.start()
+        wait_until(lambda: len(tasks()) == 2, "no two tasks came")
+        subprocess.run(
+            ["sbatch", "--quiet", "-p", "urgent", "-c", "2", "-o", "/dev/null", "--wrap", "sleep 1"], check=True
+        )
+        said, _ = process.communicate(timeout=200)
+        self.assertEqual(process.returncode, 0, said)
+
+    def test_place_given_to_another_job(self):
+        self.only_with_all()
+        self.experiment("5", cases=2)
+        self.profile = self.write("profile.yaml", PROFILE + "partition: cheap\n")
+        self.give_place_away()
+        self.expect_same_as_here()
+        self.assertIn("submitted 2 times", self.compare("out", "--status").stdout)
+        shutil.rmtree(self.out)
+        shutil.rmtree(self.scratch / "cache")
+        self.profile = self.write("profile.yaml", ONE_TRY + "partition: cheap\n")
+        self.give_place_away()
+        self.expect_reasons("the cluster gave its place to another job (PREEMPTED)")
+
+    def test_memory_of_the_cluster(self):
+        self.only_with_all()
+        if not os.environ.get("CLUSTER_MEMORY"):
+            self.skipTest("needs control groups of version 1")
+        self.experiment("0.2", more=", memory: {m.how: memory}", cases=2)
+        self.profile = self.write("profile.yaml", ONE_TRY + "memory_mb: 300\n")
+        self.submit("--wait")  # the system kills the largest process, which runs the cell; the task goes on
+        self.assertEqual(sum(row["status"] == "done" for row in self.figures("out").values()), 2 * VARIANTS)
+        reason = "crashed in node 'm': Killed, as by a system whose memory, or that of a cluster's job, runs out"
+        self.assertEqual(self.reasons(), {reason})
+        shutil.rmtree(self.out)
+        shutil.rmtree(self.scratch / "cache")
+        process = self.start()
+        wait_until(lambda: len(self.parts_with_rows()) == 2, "no two tasks came")
+        for task in tasks():  # now it kills the task itself, but not its processes that run cells
+            pathlib.Path("/proc/%d/oom_score_adj" % task).write_text("1000")
+        said, _ = process.communicate(timeout=200)
+        self.assertEqual(process.returncode, 0, said)
+        self.expect_reasons("it took more memory than the cluster allows (OUT_OF_MEMORY)")
+        self.assertEqual(sum(row["status"] == "done" for row in self.figures("out").values()), 2 * VARIANTS)
 
     def test_ctrl_c_and_again(self):
+        self.only_with_all()
         self.experiment("0.2")
         process = self.start()
         wait_until(tasks, "no task came")
@@ -117,10 +196,10 @@ class OnSlurm(Cluster):
         wait_until(lambda: not tasks(), "tasks go on")
         wait_until(is_idle, "the cluster goes on")
         self.submit("--wait")
-        self.local()
-        self.expect_same("out", "local")
+        self.expect_same_as_here()
 
     def test_a_full_disk(self):
+        self.only_with_all()
         self.out.mkdir()
         subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "none", self.out], check=True)
         try:
@@ -130,16 +209,15 @@ class OnSlurm(Cluster):
             self.assertRegex(said, "the cluster holds tasks back|ended without a report")
             subprocess.run(["mount", "-o", "remount,size=100m", self.out], check=True)
             self.submit("--wait")
-            self.local()
-            self.expect_same("out", "local")
+            self.expect_same_as_here()
         finally:
             subprocess.run(["umount", "-l", self.out], check=True)
 
     def test_a_plugin_that_crashes(self):
+        self.only_with_all()
         self.experiment(more=", crash: {m.how: crash}")
         self.submit("--wait")
-        self.local()
-        self.expect_same("out", "local")
+        self.expect_same_as_here()
         self.assertEqual(sum(row["status"] == "failed" for row in self.figures("out").values()), CASES)
 
     def test_refused(self):
@@ -151,25 +229,20 @@ class OnSlurm(Cluster):
         self.assertTrue(is_idle())
 
     def test_time_limit_of_the_cluster(self):
-        if not ALL:
-            self.skipTest("takes two minutes; MARROW_TEST_ALL=1 tries it")
-        self.experiment(more=", hang: {m.how: hang}")
-        self.profile = self.write("profile.yaml", PROFILE.replace("tries: 3", "tries: 1") + "minutes: 1\n")
+        self.only_with_all()
+        self.experiment(more=", hang: {m.how: hang}", cases=2)
+        self.profile = self.write("profile.yaml", ONE_TRY + "minutes: 1\n")
         self.submit("--wait")
-        reasons = {row["reason"] for row in self.figures("out").values() if row["status"] == "failed"}
-        self.assertTrue(
-            all("the cluster's time limit was reached (TIMEOUT); see log/" in one for one in reasons), reasons
-        )
+        self.expect_reasons("the cluster's time limit was reached (TIMEOUT)")
         done = [cell for cell, row in self.figures("out").items() if row["status"] == "done"]
-        self.assertEqual(len(done), CASES * VARIANTS)  # the rows that the tasks had made count
+        self.assertEqual(len(done), 2 * VARIANTS)  # the rows that the tasks had made count
 
 
 def inside_a_cluster():
     if "CLUSTER_FOLDER" in os.environ:
         return True
-    if not ALL and len(sys.argv) < 4:
-        print("skipped: takes minutes; MARROW_TEST_ALL=1, or the name of a test, tries it")
-        sys.exit(77)
+    if all(pathlib.Path("/sys/fs/cgroup", one, "tasks").exists() for one in ("memory", "freezer")):
+        os.environ["CLUSTER_MEMORY"] = "1"
     folder = tempfile.mkdtemp(prefix="marrow-cluster-")
     try:
         if os.geteuid() != 0 or not shutil.which("sbatch"):

@@ -103,12 +103,16 @@ bool make_rows(const Task& task, const Chunk& chunk) {
   runner.keep_dependencies();
   CellJobs cells(task.experiment, runner);
   std::set<std::size_t> cases;
-  for (const std::size_t number : chunk.numbers) cases.insert(cells.cell(number).case_index);
+  std::set<std::string> names;
+  for (const std::size_t number : chunk.numbers) {
+    cases.insert(cells.cell(number).case_index);
+    names.insert(compare::cell_id(task.experiment, cells.cell(number)));
+  }
   expect_same_cases(task, cases);
   std::map<std::size_t, std::string> faults;
   if (!make_cases(task, cells, {cases.begin(), cases.end()}, scratch.path(), faults)) return false;
 
-  const RowsOfChunks known(task.plan.folder, task.experiment, task.plan.id);
+  const RowsOfChunks known(task.plan.folder, task.experiment, task.plan.id, std::move(names));
   ChunkFile file(task.plan.folder, chunk.name);
   std::vector<Job> jobs;
   for (const std::size_t number : chunk.numbers) {

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <string_view>
 #include <utility>
 
 #include "marrow/domain/error.hpp"
@@ -71,8 +72,9 @@ std::map<std::string, bool> chunk_files(const fs::path& folder) {
   return chunks;
 }
 
-RowsOfChunks::RowsOfChunks(const fs::path& folder, const compare::Experiment& experiment, const std::string& plan)
-    : experiment_(experiment) {
+RowsOfChunks::RowsOfChunks(const fs::path& folder, const compare::Experiment& experiment, const std::string& plan,
+                           std::set<std::string> cells)
+    : experiment_(experiment), cells_(std::move(cells)) {
   std::error_code error;
   for (fs::directory_iterator at(rows_folder(folder), error), end; !error && at != end; at.increment(error))
     if (const fs::path extension = at->path().extension(); extension == ".jsonl" || extension == ".part")
@@ -82,9 +84,18 @@ RowsOfChunks::RowsOfChunks(const fs::path& folder, const compare::Experiment& ex
 void RowsOfChunks::add_file(const fs::path& file, bool is_of_plan) {
   std::ifstream in(file);
   for (std::string line; std::getline(in, line);) try {
-      add_line(line, is_of_plan);
+      if (is_wanted(line)) add_line(line, is_of_plan);
     } catch (const std::exception&) {  // the last line of a killed task, or another experiment's
     }
+}
+
+/// By the first "id" of the line, without reading the rest. A name with an escaped letter is read in any case.
+bool RowsOfChunks::is_wanted(const std::string& line) const {
+  constexpr std::string_view kId = R"("id":")";
+  const std::size_t at = cells_.empty() ? std::string::npos : line.find(kId);
+  if (at == std::string::npos) return true;
+  const std::string name = line.substr(at + kId.size(), line.find('"', at + kId.size()) - at - kId.size());
+  return name.find('\\') != std::string::npos || cells_.contains(name);
 }
 
 /// A line is "DIGEST {...}".

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -42,8 +43,10 @@ std::map<std::string, bool> chunk_files(const std::filesystem::path& folder);
 class RowsOfChunks {
  public:
   /// Lines that are damaged, or of another experiment, are left out. Rows of failed cells count only if they are of
-  /// this plan; `plan` may be empty.
-  RowsOfChunks(const std::filesystem::path& folder, const compare::Experiment& experiment, const std::string& plan);
+  /// this plan; `plan` may be empty. With `cells`, only rows of the cells of these names are taken: a task reads what
+  /// all others left, so it should do little for a row that it does not need.
+  RowsOfChunks(const std::filesystem::path& folder, const compare::Experiment& experiment, const std::string& plan,
+               std::set<std::string> cells = {});
 
   /// A row of the cell that is done and has this key, except for the machine. The result has the names of the cell.
   std::optional<compare::CellRow> done(const compare::CellIndex& cell, const std::string& key) const;
@@ -54,7 +57,10 @@ class RowsOfChunks {
   void add_file(const std::filesystem::path& file, bool is_of_plan);
   void add_line(const std::string& line, bool is_of_plan);
 
+  bool is_wanted(const std::string& line) const;
+
   const compare::Experiment& experiment_;
+  std::set<std::string> cells_;
   std::map<std::string, std::vector<compare::CellRow>> done_;  ///< by the name of the cell
   std::map<std::string, compare::CellRow> failed_;
 };

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cluster/on_cluster.hpp"
 
-#include <chrono>
 #include <cstdio>
-#include <thread>
 
 #include "cluster/chunk_rows.hpp"
+#include "cluster/follow.hpp"
 #include "cluster/scripts.hpp"
 #include "cluster/slurm.hpp"
 #include "command_options.hpp"
@@ -13,42 +12,12 @@
 #include "compare/progress.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
-#include "process.hpp"
 
 namespace marrow::cli {
 namespace {
 
 namespace fs = std::filesystem;
 using compare::Experiment;
-
-constexpr auto kBetweenLooks = std::chrono::seconds(2);
-
-/// The chunks whose rows are all there.
-struct Made {
-  std::size_t chunks = 0, cells = 0;
-};
-Made made_of(const std::vector<Chunk>& chunks, const std::map<std::string, bool>& files) {
-  Made made;
-  for (const Chunk& chunk : chunks)
-    if (const auto file = files.find(chunk.name); file != files.end() && file->second) {
-      ++made.chunks;
-      made.cells += chunk.numbers.size();
-    }
-  return made;
-}
-
-std::size_t cells_of_plan(const ClusterPlan& plan) {
-  std::size_t count = 0;
-  for (const Chunk& chunk : plan.cells) count += chunk.numbers.size();
-  return count;
-}
-
-/// "120 of 200 cells in 12 of 20 chunks"
-std::string progress_of(const ClusterPlan& plan) {
-  const auto [chunks, cells] = made_of(plan.cells, chunk_files(plan.folder));
-  return std::to_string(cells) + " of " + std::to_string(cells_of_plan(plan)) + " cells in " + std::to_string(chunks) +
-         " of " + std::to_string(plan.cells.size()) + " chunks";
-}
 
 int print_status(const fs::path& folder) {
   const ClusterPlan plan = latest_plan(folder);
@@ -64,38 +33,6 @@ int print_status(const fs::path& folder) {
   std::printf("%s; submitted %lld times\n", submission->is_gathered ? "tables and report are made" : "not gathered yet",
               static_cast<long long>(submission->tries));
   return 0;
-}
-
-/// Follows what was submitted. Ctrl-C ends it on the cluster, too.
-int follow(const ClusterPlan& plan, bool quiet) {
-  const std::atomic<bool>& stop = stop_on_signals();
-  Progress progress(cells_of_plan(plan), quiet);
-  std::optional<Submission> submission;
-  while (!stop) {
-    submission = read_submission(plan.folder);
-    if (!submission || submission->plan != plan.id) throw Error("another comparison was submitted from this folder");
-    const auto [chunks, cells] = made_of(plan.cells, chunk_files(plan.folder));
-    progress.done(cells, std::to_string(chunks) + " chunks");
-    if (submission->is_gathered) break;
-    if (is_alive(submission->gather) == std::optional(false)) {
-      // it may have submitted again, or ended in order, since the file was read
-      const auto again = read_submission(plan.folder);
-      if (again && !again->is_gathered && again->gather == submission->gather)
-        throw Error("the job that gathers, " + submission->gather + ", ended without a report; see " +
-                    (plan.folder / "log" / (submission->gather + ".txt")).string());
-    }
-    if (const std::string reason = held_back(*submission); !reason.empty()) {
-      cancel(*submission);
-      throw Error("the cluster holds tasks back (" + reason + "), so they were cancelled; can " + plan.folder.string() +
-                  " be written to, or is its disk full? What is done counts: the same command goes on from here");
-    }
-    std::this_thread::sleep_for(kBetweenLooks);
-  }
-  if (!stop) return 0;
-  cancel(*submission);
-  std::fprintf(stderr, "marrow: %s; its tasks were cancelled; the same command goes on from here\n",
-               stopped_text().c_str());
-  return 130;
 }
 
 bool load_profile(const ClusterRequest& cluster, ClusterProfile& profile) {
@@ -142,6 +79,15 @@ int gather(const CompareRequest& request, const ClusterRequest& cluster, const C
   return run_comparison(request, catalogue, experiment, folder);
 }
 
+void expect_ended(const Submission& before, const fs::path& folder) {
+  const Queue queue = queue_of(before);
+  if (!queue.is_known)
+    throw Error("the cluster does not say whether what was submitted from " + folder.string() +
+                " has ended: " + queue.fault);
+  if (queue.has_gather)
+    throw Error("what was submitted from " + folder.string() + " has not ended; see --status, or end it with --cancel");
+}
+
 int submit_or_emit(const CompareRequest& request, const ClusterRequest& cluster, const ClusterProfile& profile,
                    const Catalogue& catalogue, const Experiment& experiment, const fs::path& folder) {
   ChunkRule rule = cluster.rule;
@@ -150,9 +96,7 @@ int submit_or_emit(const CompareRequest& request, const ClusterRequest& cluster,
   {
     const ComparisonFolder kept(folder, experiment, ComparisonFolder::Use::alone);
     if (const auto before = cluster.on.empty() ? std::nullopt : read_submission(folder))
-      if (!before->is_gathered && is_alive(before->gather) != std::optional(false))
-        throw Error("what was submitted from " + folder.string() +
-                    " has not ended; see --status, or end it with --cancel");
+      if (!before->is_gathered) expect_ended(*before, folder);
     plan = make_plan(request, catalogue, experiment, folder, rule);
   }
   if (plan.cells.empty()) {
@@ -169,7 +113,7 @@ int submit_or_emit(const CompareRequest& request, const ClusterRequest& cluster,
   const Submission submission = submit(plan, profile, cluster.profile, 0);
   std::printf("submitted as %s, gathered by %s; see --status, end them with --cancel\n",
               submission.arrays.back().job.c_str(), submission.gather.c_str());
-  return cluster.wait ? follow(plan, request.quiet) : 0;
+  return cluster.wait ? follow(plan, profile, request.quiet) : 0;
 }
 
 }  // namespace

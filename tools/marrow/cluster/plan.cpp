@@ -152,6 +152,7 @@ ClusterPlan make_plan(const CompareRequest& request, const Catalogue& catalogue,
         chunks_of(cut_into_chunks(left.cells, experiment.starts.size() * experiment.variants.size(), seconds, rule));
     plan.cases = chunks_of(cut_into_chunks(left.cases, 1, 0, {0, std::min(rule.most_tasks, kMostCaseTasks)}));
   }
+  if (plan.cells.empty()) return plan;
   const json content = content_of(plan);
   name_all(plan, content);
   std::error_code error;

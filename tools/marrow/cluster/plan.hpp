@@ -43,7 +43,8 @@ std::vector<std::vector<std::size_t>> cut_into_chunks(const std::vector<std::siz
                                                       std::size_t cells_of_a_case, double seconds_of_a_cell,
                                                       const ChunkRule& rule);
 
-/// Makes the plan of what is left, and writes it. Nothing is run. Throws Error if it cannot be written.
+/// Makes the plan of what is left, and writes it if something is left. Nothing is run. Throws Error if it cannot be
+/// written.
 ClusterPlan make_plan(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment,
                       const std::filesystem::path& folder, const ChunkRule& rule);
 

@@ -2,12 +2,15 @@
 #include "cluster/slurm.hpp"
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "cluster/chunk_rows.hpp"
 #include "cluster/scripts.hpp"
 #include "marrow/domain/error.hpp"
+#include "process.hpp"
 #include "report/report.hpp"
 #include "runtime/json_text.hpp"
 #include "runtime/text_file.hpp"
@@ -19,15 +22,36 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
+constexpr auto kLongestAnswer = std::chrono::seconds(60);
+
+std::string without_end_of_line(const std::string& text) { return text.substr(0, text.find_last_not_of("\n") + 1); }
+
 /// What a program of Slurm prints. Throws Error if it fails.
 std::string said_by(const std::vector<std::string>& command) {
   const ChildEnd end = run_child(
       command, [] { return false; }, Said::kept);
   if (end.code != 0)
-    throw Error(command[0] + " failed (exit code " + std::to_string(end.code) +
-                "): " + end.said.substr(0, end.said.find_last_not_of("\n") + 1));
+    throw Error(command[0] + " failed (exit code " + std::to_string(end.code) + "): " + without_end_of_line(end.said));
   return end.said;
 }
+
+/// Runs a program of Slurm that only asks. It is ended if it takes too long, and after Ctrl-C.
+ChildEnd ask(const std::vector<std::string>& command) {
+  const auto asked_at = std::chrono::steady_clock::now();
+  const std::atomic<bool>& stop = stop_on_signals();
+  return run_child(
+      command, [&] { return stop || std::chrono::steady_clock::now() - asked_at > kLongestAnswer; }, Said::kept);
+}
+
+std::string jobs_of(const Submission& submission) {
+  std::string jobs = submission.gather;
+  for (const Submission::Array& array : submission.arrays) jobs += (jobs.empty() ? "" : ",") + array.job;
+  return jobs;
+}
+
+// Names of a plan's jobs. They tell them from jobs that got the same numbers, after the cluster forgot them.
+std::string name_of_arrays(const std::string& plan) { return "marrow-" + plan; }
+std::string name_of_gather(const std::string& plan) { return "marrow-gather-" + plan; }
 
 std::string first_word(const std::string& text) {
   const std::size_t begin = text.find_first_not_of(" \n");
@@ -35,7 +59,8 @@ std::string first_word(const std::string& text) {
 }
 
 std::vector<std::string> sbatch(const ClusterPlan& plan, const ClusterProfile& profile, bool is_array) {
-  std::vector<std::string> command{"sbatch", "--parsable", "--export=ALL"};
+  std::vector<std::string> command{"sbatch", "--parsable", "--export=ALL",
+                                   "--job-name=" + (is_array ? name_of_arrays(plan.id) : name_of_gather(plan.id))};
   const auto add = [&](const std::string& option, const std::string& value) {
     if (!value.empty() && value != "0") command.push_back(option + "=" + value);
   };
@@ -79,7 +104,6 @@ class Submitter {
           plan_.folder / "plans" / (plan_.id + "-" + what + "-" + std::to_string(done_.arrays.size()) + ".txt");
       write_list(list, part);
       std::vector<std::string> command = sbatch(plan_, profile_, true);
-      command.push_back("--job-name=marrow-" + what);
       std::string range = "--array=0-" + std::to_string(part.size() - 1);
       if (profile_.most_at_once) range += "%" + std::to_string(profile_.most_at_once);
       command.push_back(range);
@@ -98,10 +122,17 @@ class Submitter {
     const fs::path file = plan_.folder / "plans" / (plan_.id + "-gather.sh");
     write_text_file(file, text + "\n");
     std::vector<std::string> command = sbatch(plan_, profile_, false);
-    command.push_back("--job-name=marrow-gather");
     add_dependency(command, jobs());
     command.push_back(file.string());
     done_.gather = first_word(said_by(command));
+  }
+
+  /// Ends what was submitted.
+  void take_back() const {
+    std::vector<std::string> command{"scancel"};
+    if (!done_.gather.empty()) command.push_back(done_.gather);
+    for (const std::string& job : jobs()) command.push_back(job);
+    if (command.size() > 1) ask(command);
   }
 
   std::vector<std::string> jobs() const {
@@ -134,8 +165,7 @@ std::vector<Chunk> without_rows(const std::vector<Chunk>& chunks, const std::map
 
 /// Lines "JOB_TASK STATE" of a program of Slurm. Nothing if it fails.
 void add_states(const std::vector<std::string>& command, std::map<std::string, std::string>& states) {
-  const ChildEnd end = run_child(
-      command, [] { return false; }, Said::kept);
+  const ChildEnd end = ask(command);
   if (end.code != 0) return;
   std::istringstream lines(end.said);
   for (std::string task, state; lines >> task >> state; lines.ignore(10'000, '\n')) states.emplace(task, state);
@@ -189,7 +219,7 @@ Submission submit(const ClusterPlan& plan, const ClusterProfile& profile, const 
     submitter.add_gather(profile_file);
     write_submission(plan.folder, submitter.done());
   } catch (const Error&) {
-    cancel(submitter.done());
+    submitter.take_back();
     throw;
   }
   return submitter.done();
@@ -220,32 +250,33 @@ std::map<std::string, std::string> reasons_of(const Submission& submission) {
   return reasons;
 }
 
-std::string held_back(const Submission& submission) {
-  std::string jobs = submission.gather;
-  for (const Submission::Array& array : submission.arrays) jobs += "," + array.job;
-  const ChildEnd end = run_child(
-      {"squeue", "--noheader", "--states=PENDING", "--jobs=" + jobs, "--format=%r"}, [] { return false; }, Said::kept);
+Queue queue_of(const Submission& submission) {
+  const ChildEnd end =
+      ask({"squeue", "--noheader", "--jobs=" + jobs_of(submission),
+           "--name=" + name_of_arrays(submission.plan) + "," + name_of_gather(submission.plan), "--format=%i %T %r"});
+  Queue queue;
+  // This is said if only one job is asked for, and it is no longer known.
+  queue.is_known = end.code == 0 || end.said.find("Invalid job id") != std::string::npos;
+  if (end.code != 0) queue.fault = end.stopped ? "squeue did not end" : without_end_of_line(end.said);
   std::istringstream lines(end.code == 0 ? end.said : "");
-  for (std::string reason; std::getline(lines, reason);)
-    if (reason.find("requeued held") != std::string::npos || reason.find("JobHeldAdmin") != std::string::npos)
-      return reason;
-  return "";
+  for (std::string job, state, reason; lines >> job >> state && std::getline(lines >> std::ws, reason);) {
+    queue.has_gather = queue.has_gather || job == submission.gather;
+    if (state == "RUNNING" && job != submission.gather) queue.running.push_back(job);
+    const bool is_held =
+        reason.find("requeued held") != std::string::npos || reason.find("JobHeldAdmin") != std::string::npos;
+    if (state == "PENDING" && is_held) queue.held = reason;
+    if (state == "PENDING") queue.reasons.insert(reason);
+  }
+  return queue;
 }
 
-std::optional<bool> is_alive(const std::string& job) {
-  const ChildEnd end = run_child(
-      {"squeue", "--noheader", "--jobs=" + job, "--format=%T"}, [] { return false; }, Said::kept);
-  if (end.code != 0) return end.said.find("Invalid job id") != std::string::npos ? std::optional(false) : std::nullopt;
-  return !first_word(end.said).empty();
+void end_task(const Submission& submission, const std::string& task) {
+  ask({"scancel", "--name=" + name_of_arrays(submission.plan), task});
 }
 
 void cancel(const Submission& submission) {
-  std::vector<std::string> command{"scancel"};
-  if (!submission.gather.empty()) command.push_back(submission.gather);  // first, because it would submit again
-  for (const Submission::Array& array : submission.arrays) command.push_back(array.job);
-  if (command.size() > 1)
-    run_child(
-        command, [] { return false; }, Said::kept);
+  said_by({"scancel", "--name=" + name_of_gather(submission.plan)});  // first, because it would submit again
+  said_by({"scancel", "--name=" + name_of_arrays(submission.plan)});
 }
 
 }  // namespace marrow::cli

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -37,11 +38,20 @@ Submission submit(const ClusterPlan& plan, const ClusterProfile& profile, const 
 std::map<std::string, std::string> states_of(const Submission& submission);
 /// Why the chunks without rows have none, in words, by the chunk's name.
 std::map<std::string, std::string> reasons_of(const Submission& submission);
-/// Whether a job is waiting or running. Nothing if Slurm does not answer.
-std::optional<bool> is_alive(const std::string& job);
-/// Why the cluster holds a task back until somebody releases it, in its words. Empty if it holds none.
-std::string held_back(const Submission& submission);
-/// Ends what is waiting or running.
+
+/// What Slurm says of the jobs that wait or run.
+struct Queue {
+  bool is_known = false;             ///< Slurm answered
+  std::string fault;                 ///< what it said if it did not answer
+  bool has_gather = false;           ///< the job that gathers waits or runs
+  std::string held;                  ///< why a job is held back until somebody releases it; empty if none is
+  std::set<std::string> reasons;     ///< why jobs wait, in its words
+  std::vector<std::string> running;  ///< tasks that run, each as "JOB_TASK"
+};
+Queue queue_of(const Submission& submission);
+/// Ends one task, "JOB_TASK".
+void end_task(const Submission& submission, const std::string& task);
+/// Ends what is waiting or running. Throws Error with what scancel said if it cannot be told.
 void cancel(const Submission& submission);
 
 }  // namespace marrow::cli

@@ -18,9 +18,9 @@ void Progress::done(std::size_t number, const std::string& what) {
     return;
   last_ = now;
   const double seconds = std::chrono::duration<double>(now - start_).count();
-  std::fprintf(stderr, "%s  %zu of %zu, %.0f s, about %.0f s to go: %s%s", is_terminal_ ? "\r\033[K" : "", number, all_,
-               seconds, number ? seconds * double(all_ - number) / double(number) : 0.0, printable(what).c_str(),
-               is_terminal_ && number < all_ ? "" : "\n");
+  std::fprintf(stderr, "%s  %zu of %zu, %.0f s", is_terminal_ ? "\r\033[K" : "", number, all_, seconds);
+  if (number) std::fprintf(stderr, ", about %.0f s to go", seconds * double(all_ - number) / double(number));
+  std::fprintf(stderr, ": %s%s", printable(what).c_str(), is_terminal_ && number < all_ ? "" : "\n");
 }
 
 }  // namespace marrow::cli

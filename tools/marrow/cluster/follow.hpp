@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// How far a plan is, and following it on Slurm. The rows decide, not what the cluster says of its tasks.
+#include <string>
+
+#include "cluster/plan.hpp"
+#include "cluster/profile.hpp"
+
+namespace marrow::cli {
+
+/// The chunks whose rows are all there.
+struct Made {
+  std::size_t chunks = 0, cells = 0;
+};
+Made made_of(const std::vector<Chunk>& chunks, const std::map<std::string, bool>& files);
+
+std::size_t cells_of_plan(const ClusterPlan& plan);
+
+/// "120 of 200 cells in 12 of 20 chunks"
+std::string progress_of(const ClusterPlan& plan);
+
+/// Follows what was submitted until its report is made. Ctrl-C ends it on the cluster, too. Tasks that the cluster
+/// takes for running, although their rows have long been there, are ended. Throws Error if the report will not be made:
+/// the job that makes it has ended or is forgotten, tasks are held back, or the cluster does not answer for
+/// `silence_s`.
+int follow(const ClusterPlan& plan, const ClusterProfile& profile, bool quiet);
+
+}  // namespace marrow::cli
