@@ -68,7 +68,7 @@ json written_beside(Place place, const fs::path& folder) {
 
 /// The next place among the shown cells, from `at` on, which is moved behind it.
 Place next_place(const compare::CellRunner& runner, const std::vector<CellIndex>& shown, std::size_t& at) {
-  Place place{shown[at].case_index, shown[at].start};
+  Place place{shown[at].case_index, shown[at].start, json::array(), {}};
   for (; at < shown.size() && shown[at].case_index == place.case_index && shown[at].start == place.start; ++at) {
     json cell = json::object();
     place.material.add_prepared(runner.pictures_of(shown[at]), cell);
