@@ -18,14 +18,14 @@ ALL = bool(os.environ.get("MARROW_TEST_ALL"))
 
 
 def tasks():
-    """Processes of tasks that run a chunk."""
+    """Processes of tasks that run a chunk of this test's comparison, not of one that runs beside it."""
     found = []
     for process in pathlib.Path("/proc").glob("[0-9]*"):
         try:
             words = (process / "cmdline").read_bytes().split(b"\0")
         except OSError:
             continue
-        if len(words) > 2 and words[0] == bytes(MARROW) and words[1] == b"chunk":
+        if len(words) > 2 and words[1] == b"chunk" and words[2].startswith(bytes(tasks.folder)):
             found.append(int(process.name))
     return found
 
@@ -42,7 +42,7 @@ class OnSlurm(Cluster):
     def setUp(self):
         super().setUp()
         self.profile = self.write("profile.yaml", PROFILE)
-        self.out = self.scratch / "out"
+        self.out = tasks.folder = self.scratch / "out"
 
     def tearDown(self):
         subprocess.run(["scancel", "--user=root"], check=True)
