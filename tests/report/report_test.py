@@ -13,6 +13,7 @@ import time
 
 import browser
 import synthetic
+import synthetic_verdicts
 from page import SECTIONS, PageTest, assemble, run_tests
 
 
@@ -188,7 +189,7 @@ class ReportTest(PageTest):
 
     def test_a_run_shows_its_verdict_first(self):
         run = synthetic.run(with_cube=False)
-        synthetic.add_verdict(run["cells"][0], "doubtful")
+        synthetic_verdicts.add_verdict(run["cells"][0], "doubtful")
         self.browser.open(self.write("judged_run", run))
         self.assertEqual(self.texts("main > section > h2")[:2], ["Verdict", "Result"])
         self.assertEqual(self.texts("#contents a"), self.texts("main > section > h2"))
@@ -205,7 +206,7 @@ class ReportTest(PageTest):
 
     def test_a_comparison_counts_what_verdicts_are_worth(self):
         data = synthetic.comparison(cases=6, starts=5)
-        synthetic.add_verdicts(data)
+        synthetic_verdicts.add_verdicts(data)
         self.browser.open(self.write("judged", data))
         self.assertIn("A silent failure is a run that is no success", self.texts("#summary .note")[-1])
         shown = self.browser.js(
