@@ -24,7 +24,8 @@ FAILING = PIPELINE.replace("b: drawn", "b: bad").replace(
 )
 LIMITS = PIPELINE.replace("number: noisy", "number: all").replace(
     "outputs",
-    "  limits: {uses: test.limits, with: {low: 1, high: 2}}\n  all: {uses: test.add, in: {a: noisy, b: limits}}\noutputs",
+    "  limits: {uses: test.limits, with: {low: 1, high: 2}}\n"
+    "  all: {uses: test.add, in: {a: noisy, b: limits}}\noutputs",
 )
 SLOW = PIPELINE.replace("b: drawn", "b: slow").replace(
     "outputs", "  slow: {uses: test.work, with: {value: 0.2}, in: {after: sum}}\noutputs"

@@ -123,6 +123,7 @@ class ByKeysTest(WholeWay):
         self.click('[data-use="edges.canny"]')
         used = lambda document: document["nodes"]["edges"]["uses"]
         self.wait_for_file(file, lambda document: used(document) == "edges.canny")
+        self.browser.wait("return !!document.querySelector('[data-do=undo]:not(:disabled)')")  # the page knows it, too
         ActionChains(self.browser.driver).key_down(Keys.CONTROL).send_keys("z").key_up(Keys.CONTROL).perform()
         self.wait_for_file(file, lambda document: used(document) != "edges.canny")
 
