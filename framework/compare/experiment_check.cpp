@@ -49,7 +49,7 @@ class Checker {
     for (const Diagnostic& fault : faults.sorted()) diagnostics_.add(rule.optimizer_place, fault.message, fault.hint);
     if (const NodeInfo* info = catalogue_.find(rule.optimizer); info && info->kind() != "optimizer")
       diagnostics_.add(rule.optimizer_place, "'" + rule.optimizer + "' is no optimizer",
-                       "name a node such as optimizer.nelder_mead; marrow list optimizer shows them");
+                       "marrow list optimizer  shows which there are");
     for (const double end : {0.0, 1.0}) {
       Experiment tuned = experiment_;
       add_tuned(tuned, rule.values_at(std::vector<double>(rule.options.size(), end)));

@@ -12,7 +12,9 @@ namespace marrow::compare {
 namespace {
 
 constexpr std::size_t kMostOptions = 6, kMostPoints = 10000;
-constexpr const char* kExample = "write it as  tune: {options: {edges.high: [60, 90]}, points: 40, training_cases: 20}";
+constexpr const char* kExample =
+    "write it as  tune: {options: {edges.high: [60, 90]}, optimizer: {uses: NAME}, points: 40, training_cases: 20}";
+constexpr const char* kOptimizerHint = "add  optimizer: {uses: NAME};  marrow list optimizer  shows which there are";
 constexpr const char* kTuned = "tuned";
 
 /// Rounded to a power of ten that is at most a thousandth of `range`.
@@ -94,10 +96,11 @@ void TuneReader::read(const YamlEntry& section) {
   if (section.value.IsMap()) check_keys(section);
 }
 
-/// As a node of a pipeline is written: {uses: optimizer.cma_es, with: {population: 8}}.
+/// As a node of a pipeline is written: {uses: KIND.NAME, with: {OPTION: VALUE}}.
 void TuneReader::read_optimizer(const YamlEntry& section) {
   static const std::vector<std::string> kKeys{"uses", "with"};
   rule_.optimizer_place = section.place;
+  has_optimizer_ = true;
   bool has_uses = false;
   for (const YamlEntry& entry : yaml_.map(section.value, section.place, "'optimizer'", &kKeys)) {
     has_uses |= entry.key == "uses";
@@ -107,8 +110,7 @@ void TuneReader::read_optimizer(const YamlEntry& section) {
         rule_.optimizer_options.emplace_back(option.key, patch_value(option.value));
   }
   if (section.value.IsMap() && !has_uses)
-    yaml_.fault(section.place, "'optimizer' does not name its node",
-                "write it as  optimizer: {uses: optimizer.nelder_mead}");
+    yaml_.fault(section.place, "'optimizer' does not name its node", kOptimizerHint);
 }
 
 void TuneReader::check_keys(const YamlEntry& section) {
@@ -117,6 +119,7 @@ void TuneReader::check_keys(const YamlEntry& section) {
   if (rule_.options.size() > kMostOptions)
     return yaml_.fault(section.place, "'tune' has " + std::to_string(rule_.options.size()) + " options, at most " +
                                           std::to_string(kMostOptions) + " are possible");
+  if (!has_optimizer_) return yaml_.fault(section.place, "'tune' does not name its optimizer", kOptimizerHint);
   if (!rule_.points)
     return yaml_.fault(section.place, "'tune' does not say how many points may be tried", "add  points: 40");
   if (!rule_.training_cases)

@@ -31,7 +31,7 @@ class TuneReader {
   void check_cases(const Experiment& experiment, const TuneRule& rule, std::size_t starts);
 
   StrictYaml& yaml_;
-  bool is_given_ = false, is_good_ = false;
+  bool is_given_ = false, is_good_ = false, has_optimizer_ = false;
   TuneRule rule_;
   Place place_, cases_place_;
   std::optional<Named> figure_, variant_;

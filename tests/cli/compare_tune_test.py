@@ -37,7 +37,7 @@ cases: {seeds: 1..10, draw: {noise: [-1, 1]}}
 metrics: [{figure: number.value, label: distance, better: nearest_zero}]
 success: {number.value: 0.7}
 timed_cells: 1
-tune: {options: {x.value: [0, 8]}, points: 30, training_cases: 6%s}
+tune: {options: {x.value: [0, 8]}, optimizer: {uses: optimizer.%s}, points: 30, training_cases: 6}
 """
 
 
@@ -45,7 +45,7 @@ class Tuning(Case):
     def setUp(self):
         super().setUp()
         self.write("p.yaml", PIPELINE)
-        self.file = self.write("e.yaml", EXPERIMENT % "")
+        self.file = self.write("e.yaml", EXPERIMENT % "nelder_mead")
 
     def marrow(self, *arguments):
         return marrow(
@@ -109,7 +109,7 @@ class Tuning(Case):
         self.assertEqual(self.answer()["tuning"], tuning)
 
     def test_another_optimizer(self):
-        self.file = self.write("e.yaml", EXPERIMENT % ", optimizer: {uses: optimizer.direct}")
+        self.file = self.write("e.yaml", EXPERIMENT % "direct")
         self.compare("--quiet")
         tuning = self.answer()["tuning"]
         self.assertEqual(tuning["optimizer"], "optimizer.direct")
@@ -119,7 +119,7 @@ class Tuning(Case):
     def test_a_point_that_the_pipeline_refuses_counts_as_a_bad_one(self):
         self.write("p.yaml", LIMITS)
         self.file = self.write(
-            "e.yaml", EXPERIMENT.replace("x.value: [0, 8]", "limits.low: [0, 8], limits.high: [0, 8]") % ""
+            "e.yaml", EXPERIMENT.replace("x.value: [0, 8]", "limits.low: [0, 8], limits.high: [0, 8]") % "nelder_mead"
         )
         self.compare("--quiet")
         tuning = self.answer()["tuning"]
@@ -140,7 +140,7 @@ class Tuning(Case):
 
     def test_interrupted_it_goes_on(self):
         self.write("p.yaml", SLOW)
-        self.file = self.write("e.yaml", EXPERIMENT % "")
+        self.file = self.write("e.yaml", EXPERIMENT % "nelder_mead")
         environment = dict(os.environ, MARROW_CACHE=str(self.scratch / "cache"), MARROW_PLUGIN_PATH=str(TEST_PLUGINS))
         process = subprocess.Popen(
             [MARROW, "compare", self.file, "--out", "out"],

@@ -9,7 +9,8 @@ using marrow::compare::Experiment;
 using marrow::compare::TuneRule;
 
 const std::string kGood = std::string(kHead) + kCases + kMetrics;  // lines 1 to 4
-const std::string kRest = "points: 9, training_cases: 1, failed_as: 5";
+const std::string kBy = "optimizer: {uses: optimizer.nelder_mead}, ";
+const std::string kRest = kBy + "points: 9, training_cases: 1, failed_as: 5";
 
 /// Nodes of the tests, and the optimizers.
 const marrow::Catalogue& catalogue() {
@@ -89,28 +90,30 @@ TEST_F(ExperimentTune, CasesAreSplit) {
 
 TEST_F(ExperimentTune, AFailedRunCountsAsTenTimesTheLimit) {
   const Experiment experiment =
-      good("options: {c.value: [10, 20]}, points: 9, training_cases: 1", "success: {number.value: 0.3}\n");
+      good("options: {c.value: [10, 20]}, " + kBy + "points: 9, training_cases: 1", "success: {number.value: 0.3}\n");
   EXPECT_DOUBLE_EQ(experiment.tune->failed_as, 3);
 }
 
 TEST_F(ExperimentTune, EachFaultIsSaid) {
-  const std::string options = "options: {c.value: [10, 20]}, ";
-  const std::string example = "write it as  tune: {options: {edges.high: [60, 90]}, points: 40, training_cases: 20}";
+  const std::string options = "options: {c.value: [10, 20]}, ", by = options + kBy;
+  const std::string example =
+      "write it as  tune: {options: {edges.high: [60, 90]}, optimizer: {uses: NAME}, points: 40, training_cases: 20}";
   expect_fault("points: 9, training_cases: 1", "'tune' names no option", example);
-  expect_fault(options + "training_cases: 1, failed_as: 5", "'tune' does not say how many points may be tried",
+  expect_fault(by + "training_cases: 1, failed_as: 5", "'tune' does not say how many points may be tried",
                "add  points: 40");
-  expect_fault(options + "points: 9, failed_as: 5", "'tune' does not say how many cases are for training",
+  expect_fault(by + "points: 9, failed_as: 5", "'tune' does not say how many cases are for training",
                "add  training_cases: 20");
-  expect_fault(options + "points: 9, failed_as: 5, training_cases: 2",
-               "2 training cases of 2 leave none that is held out");
-  expect_fault(options + "points: 9, training_cases: 1", "'tune' does not say what a failed run counts as",
+  expect_fault(by + "points: 9, failed_as: 5, training_cases: 2", "2 training cases of 2 leave none that is held out");
+  expect_fault(by + "points: 9, training_cases: 1", "'tune' does not say what a failed run counts as",
                "add  failed_as:  with a bad value of number.value; with a limit under 'success' it is ten times that "
                "limit");
   expect_fault(options + kRest + ", figure: number.valeu", "'number.valeu' is not among the metrics",
                "did you mean 'number.value'?");
   expect_fault(options + kRest + ", variant: untune", "there is no variant 'untune'", "did you mean 'untuned'?");
-  expect_fault(options + kRest + ", optimizer: {with: {}}", "'optimizer' does not name its node",
-               "write it as  optimizer: {uses: optimizer.nelder_mead}");
+  const std::string which = "add  optimizer: {uses: NAME};  marrow list optimizer  shows which there are",
+                    rest = "points: 9, training_cases: 1, failed_as: 5";
+  expect_fault(options + rest, "'tune' does not name its optimizer", which);
+  expect_fault(options + "optimizer: {with: {}}, " + rest, "'optimizer' does not name its node", which);
   expect_fault(options + kRest, "'tune' beside 'sweep'", "make two experiments of them",
                "sweep: {options: {c.count: [1, 2]}, grid: 2}\n");
   expect_fault("options: {c.value: [20, 10]}, " + kRest,
@@ -120,9 +123,9 @@ TEST_F(ExperimentTune, EachFaultIsSaid) {
 TEST_F(ExperimentTune, TheEndsOfRangesAndTheOptimizerAreChecked) {
   expect_fault("options: {c.valu: [10, 20]}, " + kRest, "'test.constant' has no option 'valu'",
                "did you mean 'value'?");
-  expect_fault("options: {c.value: [10, 20]}, " + kRest + ", optimizer: {uses: test.constant}",
-               "'test.constant' is no optimizer",
-               "name a node such as optimizer.nelder_mead; marrow list optimizer shows them");
+  expect_fault(
+      "options: {c.value: [10, 20]}, optimizer: {uses: test.constant}, points: 9, training_cases: 1, failed_as: 5",
+      "'test.constant' is no optimizer", "marrow list optimizer  shows which there are");
 }
 
 }  // namespace experiment_tune_test

@@ -194,7 +194,7 @@ class ReportTest(PageTest):
         self.assertEqual(self.texts("main > section > h2")[:2], ["Verdict", "Result"])
         self.assertEqual(self.texts("#contents a"), self.texts("main > section > h2"))
         self.assertEqual(self.texts(".verdict-head"), ["distal: doubtful failure 12 %"])
-        _, reasons, remedies = synthetic.VERDICTS["doubtful"]
+        _, reasons, remedies = synthetic_verdicts.VERDICTS["doubtful"]
         self.assertEqual(self.texts(".verdict-list li"), reasons + remedies)
         self.assertEqual(self.texts(".verdict h3"), ["Why", "What would settle it"])
         self.assertEqual(self.texts(".verdict figcaption"), ["overlay/distal/frontal", "overlay/distal/lateral"])

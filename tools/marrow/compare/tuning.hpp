@@ -32,7 +32,7 @@ struct Tuning {
 
 /// "edges.high 72.3, edges.low 40".
 std::string values_text(const compare::TuneRule& rule, const std::vector<double>& values);
-/// "tuned on 20 cases by optimizer.nelder_mead, 31 points: mean mTRE 0.41 mm for canny, 0.23 mm at edges.high 72.3".
+/// "tuned on 20 cases by NODE, 31 points: mean mTRE 0.41 mm for canny, 0.23 mm at edges.high 72.3".
 std::string sentence(const Tuning& tuning);
 nlohmann::json tuning_json(const Tuning& tuning);
 
