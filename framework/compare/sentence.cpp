@@ -9,12 +9,14 @@
 namespace marrow::compare {
 namespace {
 
+bool shows_zero(const std::string& number) { return number.find_first_of("123456789") == std::string::npos; }
+
 /// The number with a decimal point in every locale, and without a minus sign before zero.
 std::string fixed(double value, int decimals) {
   char text[400];  // the largest double has 309 digits before the point
   const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::fixed, decimals).ptr;
   const std::string result(text, end);
-  return result[0] == '-' && result.find_first_of("123456789") == std::string::npos ? result.substr(1) : result;
+  return result[0] == '-' && shows_zero(result) ? result.substr(1) : result;
 }
 
 /// A number with as few digits as it needs: "95", "99.9", "0.05".
@@ -49,7 +51,8 @@ std::string p_text(double p, double alpha) {
 /// must not be rounded to 0, because this would read as no difference. Up to two more decimals are used to avoid it.
 int decimals_of(double difference, const Interval& interval, bool with_interval) {
   const double width = interval.upper - interval.lower;
-  if (!with_interval || width <= 0) return difference == 0 ? 0 : decimals_for(std::abs(difference) / 10);
+  if (!with_interval || width <= 1e-9 * std::abs(difference))  // no wider than numbers are rounded
+    return difference == 0 ? 0 : decimals_for(std::abs(difference) / 10);
   const int decimals = decimals_for(width / 4);
   const bool without_zero = interval.lower > 0 || interval.upper < 0;
   if (!without_zero) return decimals;
@@ -91,11 +94,12 @@ std::string sentence(const std::string& variant, const Metric& metric, const Com
   const std::string percent = plain(100 * interval.confidence) + " %";
   std::string text = metric.label.empty() ? variant : variant + ", " + metric.label;
   text += shown ? ": " : ": no difference shown: ";
-  text += fixed(sign * difference, decimals) + (metric.unit.empty() ? "" : " " + metric.unit);
-  if (difference != 0) text += worse ? " worse" : " better";
+  const std::string amount = fixed(sign * difference, decimals);
+  text += amount + (metric.unit.empty() ? "" : " " + metric.unit);
+  if (!shows_zero(amount)) text += worse ? " worse" : " better";
   if (enough) {
     text += ", " + percent + " interval " + fixed(interval.lower, decimals) + " to " + fixed(interval.upper, decimals);
-    if (difference == 0) text += worse ? " (positive is worse)" : " (positive is better)";
+    if (shows_zero(amount)) text += worse ? " (positive is worse)" : " (positive is better)";
   }
   text += ", " + std::to_string(comparison.cases) + (comparison.cases == 1 ? " case, " : " cases, ");
   text += p_text(p_after_holm, alpha);

@@ -45,6 +45,10 @@ TEST(Sentence, CountsInTheDirectionThatItNames) {
             "canny, overlap: 0.12 better, 95 % interval 0.08 to 0.17, 20 cases, p = 0.0020");
   EXPECT_EQ(sentence("canny", unnamed, comparison_of(0, -0.04, 0.05), 1),
             "canny: no difference shown: 0.00 mm, 95 % interval -0.04 to 0.05 (positive is worse), 20 cases, p = 1");
+  EXPECT_EQ(sentence("canny", unnamed, comparison_of(-0.00001, -0.04, 0.05), 1),
+            "canny: no difference shown: 0.00 mm, 95 % interval -0.05 to 0.04 (positive is better), 20 cases, p = 1");
+  EXPECT_EQ(sentence("canny", unnamed, comparison_of(2.0 / 9, 2.0 / 9 - 1e-16, 2.0 / 9 + 1e-16), 1e-9),
+            "canny: 0.22 mm worse, 95 % interval 0.22 to 0.22, 20 cases, p < 0.001");
   EXPECT_EQ(sentence("canny", unnamed, comparison_of(0, 0, 0), 1),
             "canny: no difference shown: 0 mm, 95 % interval 0 to 0 (positive is worse), 20 cases, p = 1");
 }
