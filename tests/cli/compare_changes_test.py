@@ -64,8 +64,9 @@ class Changes(Case):
             {cell: figure for cell, figure in fresh.items() if figure},
         )
 
-    def changed_meanwhile(self, change, *arguments, code=2):
-        """What a comparison says when something changes once its first cell is there."""
+    def changed_meanwhile(self, change, *arguments, code=2, place="a/1/0/cell.json"):
+        """What a comparison says when something changes once this is there: the row of a cell, or the folder of one
+        that has begun."""
         process = subprocess.Popen(
             [str(MARROW), "compare", str(self.file), "--out", "out", "--jobs", "1", *arguments],
             env=self.environment,
@@ -76,7 +77,7 @@ class Changes(Case):
         )
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)  # where the test ends before
-        wait_until((self.scratch / "out" / "cells" / "a" / "1" / "0" / "cell.json").exists, "no cell came")
+        wait_until((self.scratch / "out" / "cells" / place).exists, "no cell came")
         change()
         said = process.communicate(timeout=240)[1]
         self.assertEqual(process.returncode, code, said)
@@ -171,7 +172,7 @@ class Changes(Case):
             for content in ("two", "one"):
                 self.write("other.txt", content)
 
-        self.changed_meanwhile(change, code=0)
+        self.changed_meanwhile(change, code=0, place="b/1/0")
         self.assertEqual(
             self.figures("out", "reason"),
             {"a/1/0": "", "b/1/0": "a file that the cell needs was changed while it ran; run it again"},
