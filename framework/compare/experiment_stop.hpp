@@ -18,10 +18,6 @@ class StopReader {
   void apply(Experiment& experiment, std::size_t starts);
 
  private:
-  struct Named {
-    std::string name;
-    Place place;
-  };
   void check_keys(const YamlEntry& section);
   void find_figure(const Experiment& experiment, StopRule& rule);
   void find_variant(const Experiment& experiment, StopRule& rule);

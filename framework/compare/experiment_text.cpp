@@ -74,7 +74,7 @@ class Reader {
       yaml_.fault(start, "there are no variants",
                   "name at least one under  variants:  or options under  matrix:,  sweep:  or  tune:");
     for (const auto& [path, value, place] : success_) set_success(path, value, place);
-    set_baseline();
+    if (!baseline_.name.empty()) find_variant(yaml_, experiment_, baseline_, experiment_.baseline);
     if (is_too_large(start)) return;
     const std::size_t starts = experiment_.protocol ? experiment_.protocol->count : 1;
     stop_.apply(experiment_, starts);
@@ -146,10 +146,7 @@ class Reader {
       experiment_.initial_error = text();
       written_.initial_error_place = entry.place;
     }
-    if (entry.key == "baseline") {
-      baseline_ = text();
-      baseline_place_ = entry.place;
-    }
+    if (entry.key == "baseline") baseline_ = {text(), entry.place};
     if (entry.key == "pictures")
       for (const auto& [name, place] : texts_of(yaml_, entry)) {
         experiment_.pictures.push_back(name);
@@ -353,17 +350,6 @@ class Reader {
     yaml_.fault(place, "'" + path + "' is not among the metrics", suggestion(path, paths));
   }
 
-  void set_baseline() {
-    if (baseline_.empty()) return;
-    std::vector<std::string> names;
-    for (std::size_t i = 0; i < experiment_.variants.size(); ++i) {
-      names.push_back(experiment_.variants[i].name);
-      if (names.back() == baseline_) experiment_.baseline = i;
-    }
-    if (std::find(names.begin(), names.end(), baseline_) == names.end())
-      yaml_.fault(baseline_place_, "there is no variant '" + baseline_ + "'", suggestion(baseline_, names));
-  }
-
   Diagnostics& diagnostics_;
   StrictYaml yaml_;
   WrittenExperiment written_;
@@ -374,8 +360,8 @@ class Reader {
   TuneReader tune_{yaml_};
   std::vector<std::vector<Override>> matrix_;
   std::vector<std::tuple<std::string, double, Place>> success_;
-  std::string baseline_;
-  Place baseline_place_, variants_place_, matrix_place_;
+  Named baseline_;
+  Place variants_place_, matrix_place_;
 };
 
 }  // namespace

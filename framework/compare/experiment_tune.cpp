@@ -140,7 +140,8 @@ void TuneReader::apply(Experiment& experiment, std::size_t starts) {
   if (!is_good_ || experiment.metrics.empty() || experiment.cases.empty()) return;
   TuneRule rule = rule_;
   find_figure(experiment, rule);
-  find_variant(experiment, rule);
+  rule.variant = experiment.baseline;
+  if (variant_) find_variant(yaml_, experiment, *variant_, rule.variant);
   check_cases(experiment, rule, starts);
   experiment.tune = rule;
 }
@@ -166,21 +167,6 @@ void TuneReader::find_figure(const Experiment& experiment, TuneRule& rule) {
     yaml_.fault(place_, "'tune' does not say what a failed run counts as",
                 "add  failed_as:  with a bad value of " + metric.path +
                     (metric.higher_is_better() ? "" : "; with a limit under 'success' it is ten times that limit"));
-}
-
-void TuneReader::find_variant(const Experiment& experiment, TuneRule& rule) {
-  rule.variant = experiment.baseline;
-  if (!variant_) return;
-  std::vector<std::string> names;
-  bool is_found = false;
-  for (std::size_t v = 0; v < experiment.variants.size(); ++v) {
-    names.push_back(experiment.variants[v].name);
-    if (names.back() != variant_->name) continue;
-    rule.variant = v;
-    is_found = true;
-  }
-  if (!is_found)
-    yaml_.fault(variant_->place, "there is no variant '" + variant_->name + "'", suggestion(variant_->name, names));
 }
 
 void TuneReader::check_cases(const Experiment& experiment, const TuneRule& rule, std::size_t starts) {

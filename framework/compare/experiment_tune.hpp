@@ -20,14 +20,9 @@ class TuneReader {
   void apply(Experiment& experiment, std::size_t starts);
 
  private:
-  struct Named {
-    std::string name;
-    Place place;
-  };
   void read_optimizer(const YamlEntry& section);
   void check_keys(const YamlEntry& section);
   void find_figure(const Experiment& experiment, TuneRule& rule);
-  void find_variant(const Experiment& experiment, TuneRule& rule);
   void check_cases(const Experiment& experiment, const TuneRule& rule, std::size_t starts);
 
   StrictYaml& yaml_;

@@ -84,6 +84,15 @@ std::string in_small_letters(std::string name) {
   return name;
 }
 
+void find_variant(StrictYaml& yaml, const Experiment& experiment, const Named& asked, std::size_t& number) {
+  std::vector<std::string> names;
+  for (const Variant& variant : experiment.variants) names.push_back(variant.name);
+  const auto found = std::find(names.begin(), names.end(), asked.name);
+  if (found == names.end())
+    return yaml.fault(asked.place, "there is no variant '" + asked.name + "'", suggestion(asked.name, names));
+  number = std::size_t(found - names.begin());
+}
+
 fs::path file_of(StrictYaml& yaml, const YamlEntry& entry, const fs::path& folder) {
   const auto text = yaml.text(entry.value, entry.place, entry.key);
   if (!text) return {};

@@ -12,6 +12,12 @@ namespace marrow::compare {
 
 using PlacedTexts = std::vector<std::pair<std::string, Place>>;
 
+/// A name that a file gives, and where.
+struct Named {
+  std::string name;
+  Place place;
+};
+
 /// Reads a list of texts.
 PlacedTexts texts_of(StrictYaml& yaml, const YamlEntry& entry);
 /// Reads values of inputs, written as name: value.
@@ -34,6 +40,8 @@ inline constexpr std::size_t kMostNameBytes = 100;
 bool check_name(StrictYaml& yaml, const std::string& name, const Place& place, const std::string& what);
 /// The name in small letters. To some file systems, names that differ only in the case of their letters are the same.
 std::string in_small_letters(std::string name);
+/// Sets `number` to that of the variant with this name. Reports a fault if there is none.
+void find_variant(StrictYaml& yaml, const Experiment& experiment, const Named& asked, std::size_t& number);
 /// The file that a key names, relative to `folder`. If there is none, reports a fault and returns an empty path.
 std::filesystem::path file_of(StrictYaml& yaml, const YamlEntry& entry, const std::filesystem::path& folder);
 

@@ -49,6 +49,9 @@ using LostCells = std::map<std::size_t, std::string>;
 int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment,
                    const std::filesystem::path& folder, const LostCells& lost = {});
 
+/// Says why a comparison was stopped, and how it goes on. Returns the exit code, 130.
+int stopped();
+
 struct CellRows {
   std::vector<compare::CellRow> rows;
   std::size_t made = 0;  ///< those that were not there already

@@ -5,7 +5,6 @@
 #include "compare/comparison.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
-#include "process.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -50,10 +49,7 @@ int run_more_cases(const CompareRequest& asked, const Catalogue& catalogue, cons
     const Experiment larger = with_more(experiment, catalogue, request.more_cases);
     if (k + 1 == looks.size()) return run_comparison(request, catalogue, larger, folder);
     const auto cells = run_cells(request, catalogue, larger, folder);
-    if (!cells) {
-      std::fprintf(stderr, "marrow: %s; the same command goes on from here\n", stopped_text().c_str());
-      return 130;
-    }
+    if (!cells) return stopped();
     const Answer answer = answer_of(larger, cells->rows);
     request.made_before += cells->made;
     for (const compare::CellRow& row : cells->rows)

@@ -74,11 +74,6 @@ class Comparison {
   }
 
  private:
-  static int stopped() {
-    std::fprintf(stderr, "marrow: %s; the same command goes on from here\n", stopped_text().c_str());
-    return 130;
-  }
-
   std::string tidy() const { return request_.no_cache ? "" : store_.tidy(); }
 
   bool make_cases() {
@@ -219,6 +214,11 @@ class Comparison {
 };
 
 }  // namespace
+
+int stopped() {
+  std::fprintf(stderr, "marrow: %s; the same command goes on from here\n", stopped_text().c_str());
+  return 130;
+}
 
 int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment,
                    const fs::path& folder, const LostCells& lost) {

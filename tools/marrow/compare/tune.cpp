@@ -11,7 +11,6 @@
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/executor.hpp"
 #include "marrow/runtime/types.hpp"
-#include "process.hpp"
 #include "runtime/one_node.hpp"
 
 namespace marrow::cli {
@@ -180,8 +179,7 @@ int run_tuning(const CompareRequest& asked, const Catalogue& catalogue, const Ex
   try {
     request.tuning = Tuner(asked, catalogue, experiment, folder).run();
   } catch (const Interrupted&) {
-    std::fprintf(stderr, "marrow: %s; the same command goes on from here\n", stopped_text().c_str());
-    return 130;
+    return stopped();
   }
   if (!request.quiet) std::fprintf(stderr, "marrow: %s\n", printable(sentence(*request.tuning)).c_str());
   Experiment held_out = experiment;
