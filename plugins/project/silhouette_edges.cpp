@@ -41,18 +41,23 @@ Geometry geometry_of(const marrow::Camera& camera, const marrow::RigidTransform&
   return g;
 }
 
-/// A point on the contour generator, the border between the parts of the surface that face the source and the parts
-/// that do not. It lies on the edge between two vertices of the surface.
-struct ContourPoint {
-  float u, v;
-  float fraction;  ///< position on the edge: 0 at `from`, 1 at `to`
-  std::uint32_t from, to;
-  bool usable;  ///< in front of the source, and a true outline of the bone
+/// Points on the contour generator, the border between the parts of the surface that face the source and the parts that
+/// do not. Each lies on the edge between two vertices of the surface. One array for each number, so that a loop over
+/// points is computed several at once.
+struct ContourPoints {
+  std::vector<std::uint32_t> from, to;
+  std::vector<float> fraction;  ///< position on the edge: 0 at `from`, 1 at `to`
+  std::vector<float> u, v;      ///< in the image; set by project_points()
+
+  void add(std::uint32_t from_vertex, std::uint32_t to_vertex, float at) {
+    from.push_back(from_vertex), to.push_back(to_vertex), fraction.push_back(at);
+  }
 };
 
-/// A piece of this border. Seen from the source, the facing part lies on its left.
-struct ContourPiece {
-  ContourPoint from, to;
+/// Pieces of this border, each between two points. Seen from the source, the facing part lies on its left.
+struct ContourPieces {
+  ContourPoints begin, end;
+  std::vector<char> is_rim;  ///< the surface ends there, so this is no outline of the bone
 };
 
 /// Marks the patches that may have a normal perpendicular to a line of sight. For such a patch, the angle between the
@@ -85,16 +90,33 @@ MARROW_DISPATCH std::uint32_t face_source(const SurfacePatches& s, std::size_t f
   return positive;
 }
 
+MARROW_DISPATCH void project_points(const SurfacePatches& s, const Geometry& geometry, ContourPoints& points) {
+  const std::size_t count = points.fraction.size();
+  points.u.resize(count), points.v.resize(count);
+  const float *x = s.x.data(), *y = s.y.data(), *z = s.z.data(), *fraction = points.fraction.data();
+  const std::uint32_t *from = points.from.data(), *to = points.to.data();
+  float *u = points.u.data(), *v = points.v.data();
+  const Eigen::Matrix3f m = geometry.pixel_matrix;
+  const Eigen::Vector3f o = geometry.pixel_offset;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::uint32_t i = from[k], j = to[k];
+    const float t = fraction[k];
+    const float px = x[i] + t * (x[j] - x[i]), py = y[i] + t * (y[j] - y[i]), pz = z[i] + t * (z[j] - z[i]);
+    const float inverse = 1 / (m(2, 0) * px + m(2, 1) * py + m(2, 2) * pz + o[2]);
+    u[k] = (m(0, 0) * px + m(0, 1) * py + m(0, 2) * pz + o[0]) * inverse;
+    v[k] = (m(1, 0) * px + m(1, 1) * py + m(1, 2) * pz + o[1]) * inverse;
+  }
+}
+
 /// Finds the contour generator as the zero line of g = n . (source - x), which is linear within each triangle. It uses
 /// interpolated normals of the vertices, so it is a smooth curve. A curve along the edges of the mesh would zigzag.
 class ContourFinder {
  public:
   ContourFinder(const SurfacePatches& surface, const Geometry& geometry) : s_(surface), geometry_(geometry) {}
 
-  std::vector<ContourPiece> find() {
+  ContourPieces find() {
     std::vector<char> may_cross(s_.patches.size());
     mark_patches(s_.bounds, geometry_.source.data(), may_cross.data());
-    pieces_.reserve(4096);
     for (std::size_t i = 0; i < s_.patches.size(); ++i) {
       const auto& patch = s_.patches[i];
       const bool crossed = may_cross[i];
@@ -103,51 +125,56 @@ class ContourFinder {
       const std::uint32_t facing =
           face_source(s_, first_, patch.vertex_count, geometry_.source.data(), facing_.data(), front_.data());
       if (facing == 0) continue;
-      if (crossed && facing < patch.vertex_count)
-        for (std::uint32_t k = 0; k < patch.triangle_count; ++k) add_triangle(s_.triangles[patch.first_triangle + k]);
+      if (crossed && facing < patch.vertex_count) add_triangles(patch);
       for (std::uint32_t k = 0; k < patch.rim_count; ++k) add_rim(s_.rims[patch.first_rim + k]);
     }
+    project_points(s_, geometry_, pieces_.begin);
+    project_points(s_, geometry_, pieces_.end);
     return std::move(pieces_);
   }
 
  private:
-  void add_triangle(const std::array<std::uint8_t, 3>& t) {
-    const int front[3] = {front_[t[0]], front_[t[1]], front_[t[2]]}, count = front[0] + front[1] + front[2];
-    if (count == 0 || count == 3) return;
-    // The corner whose sign differs from the other two.
-    int lone = 0;
-    while (front[lone] != int(count == 1)) ++lone;
-    const ContourPoint p = between(t[lone], t[(lone + 1) % 3]), q = between(t[lone], t[(lone + 2) % 3]);
-    pieces_.push_back(count == 1 ? ContourPiece{p, q} : ContourPiece{q, p});
+  using Triangle = std::array<std::uint8_t, 3>;
+
+  /// First a list of the triangles with corners on both sides, without a branch that cannot be predicted.
+  void add_triangles(const SurfacePatches::Patch& patch) {
+    const Triangle* triangles = s_.triangles.data() + patch.first_triangle;
+    std::array<std::uint32_t, 256> crossed;
+    for (std::uint32_t k = 0; k < patch.triangle_count;) {
+      std::uint32_t count = 0;
+      for (const std::uint32_t end = std::min(patch.triangle_count, k + 256); k < end; ++k) {
+        const Triangle& t = triangles[k];
+        crossed[count] = k;
+        count += std::uint32_t(front_[t[0]] + front_[t[1]] + front_[t[2]] - 1) < 2;
+      }
+      for (std::uint32_t i = 0; i < count; ++i) add_triangle(triangles[crossed[i]]);
+    }
+  }
+
+  void add_triangle(const Triangle& t) {
+    // Bit k of the row: corner k faces the source. The corner that differs from the two others.
+    constexpr std::array<std::uint8_t, 8> kLone{0, 0, 1, 2, 2, 1, 0, 0};
+    const int front = front_[t[0]] | front_[t[1]] << 1 | front_[t[2]] << 2;
+    const std::size_t lone = kLone[std::size_t(front)];
+    const std::uint8_t corner = t[lone], next = t[lone == 2 ? 0 : lone + 1], last = t[lone == 0 ? 2 : lone - 1];
+    const bool lone_faces = front_[corner];
+    add_between(corner, lone_faces ? next : last, pieces_.begin);
+    add_between(corner, lone_faces ? last : next, pieces_.end);
+    pieces_.is_rim.push_back(false);
   }
 
   /// The rim of an open surface also bounds the facing part, but it is not an outline of the bone.
   void add_rim(const std::array<std::uint8_t, 2>& rim) {
     const bool from_front = front_[rim[0]], to_front = front_[rim[1]];
     if (!from_front && !to_front) return;
-    ContourPiece piece{from_front ? point(rim[0], rim[0], 0) : between(rim[0], rim[1]),
-                       to_front ? point(rim[1], rim[1], 0) : between(rim[0], rim[1])};
-    piece.from.usable = piece.to.usable = false;
-    pieces_.push_back(piece);
+    const auto vertex = [&](int k) { return std::uint32_t(first_ + rim[std::size_t(k)]); };
+    from_front ? pieces_.begin.add(vertex(0), vertex(0), 0) : add_between(rim[0], rim[1], pieces_.begin);
+    to_front ? pieces_.end.add(vertex(1), vertex(1), 0) : add_between(rim[0], rim[1], pieces_.end);
+    pieces_.is_rim.push_back(true);
   }
 
-  ContourPoint between(std::uint8_t a, std::uint8_t b) const {
-    return point(a, b, facing_[a] / (facing_[a] - facing_[b]));
-  }
-
-  ContourPoint point(std::uint8_t a, std::uint8_t b, float t) const {
-    const auto i = std::uint32_t(first_ + a), j = std::uint32_t(first_ + b);
-    const float x = s_.x[i] + t * (s_.x[j] - s_.x[i]), y = s_.y[i] + t * (s_.y[j] - s_.y[i]),
-                z = s_.z[i] + t * (s_.z[j] - s_.z[i]);
-    const Eigen::Matrix3f& m = geometry_.pixel_matrix;
-    const Eigen::Vector3f& o = geometry_.pixel_offset;
-    const float depth = m(2, 0) * x + m(2, 1) * y + m(2, 2) * z + o[2], inverse = 1 / depth;
-    return {(m(0, 0) * x + m(0, 1) * y + m(0, 2) * z + o[0]) * inverse,
-            (m(1, 0) * x + m(1, 1) * y + m(1, 2) * z + o[1]) * inverse,
-            t,
-            i,
-            j,
-            depth > 0 && !s_.at_border[i] && !s_.at_border[j]};
+  void add_between(std::uint8_t a, std::uint8_t b, ContourPoints& points) const {
+    points.add(std::uint32_t(first_ + a), std::uint32_t(first_ + b), facing_[a] / (facing_[a] - facing_[b]));
   }
 
   const SurfacePatches& s_;
@@ -155,7 +182,7 @@ class ContourFinder {
   std::size_t first_ = 0;
   std::array<float, 256> facing_;
   std::array<std::uint8_t, 256> front_;
-  std::vector<ContourPiece> pieces_;
+  ContourPieces pieces_;
 };
 
 /// A crossing of a contour piece with a line of a square grid over the image.
@@ -167,13 +194,29 @@ struct Crossing {
   int layers;  ///< change of the number of facing layers at the crossing, in the direction of increasing coordinates
 };
 
+/// The lines across which each piece runs: from first[i] to before last[i]. `a`, `b`: the coordinates of its ends
+/// across the lines. The interval is half open, so that the joint of two pieces is crossed once.
+MARROW_DISPATCH void find_lines(const float* a, const float* b, std::size_t count, float lines_per_px, float lines,
+                                std::int32_t* first, std::int32_t* last) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const float from = a[i] * lines_per_px, to = b[i] * lines_per_px;
+    const float low = std::min(from, to), high = std::max(from, to);
+    const bool inside = (low < lines) & (high > 0);  // NaN is not
+    const float begin = inside ? std::max(low, 0.0f) : 0, end = inside ? std::min(high, lines) : 0;
+    // Rounded up; the numbers are not negative. Without SSE 4.1, std::ceil is a slow function call.
+    const auto whole_begin = std::int32_t(begin), whole_end = std::int32_t(end);
+    first[i] = whole_begin + (float(whole_begin) < begin);
+    last[i] = whole_end + (float(whole_end) < end);
+  }
+}
+
 /// Selects the points on the outer outline from all contour pieces. At these points, the number of facing layers along
 /// a line of the image changes between 0 and more. The lines are the rows and columns of a grid, so that the points
 /// move smoothly with the pose. Rows give the points of nearly vertical outlines, columns those of nearly horizontal
 /// ones.
 class OuterOutline {
  public:
-  OuterOutline(const SurfacePatches& surface, const std::vector<ContourPiece>& pieces, const marrow::Camera& camera,
+  OuterOutline(const SurfacePatches& surface, const ContourPieces& pieces, const marrow::Camera& camera,
                const Geometry& geometry, double spacing_px)
       : surface_(surface),
         pieces_(pieces),
@@ -189,10 +232,6 @@ class OuterOutline {
   }
 
  private:
-  /// The coordinate across the lines (v for rows), and the coordinate along them.
-  float across(const ContourPoint& p, bool rows) const { return rows ? p.v : p.u; }
-  float along(const ContourPoint& p, bool rows) const { return rows ? p.u : p.v; }
-
   void scan(bool rows) {
     const int lines = int((rows ? height_px_ - 1 : width_px_ - 1) / spacing_px_) + 1;
     // Counting sort of the crossings by line.
@@ -209,28 +248,29 @@ class OuterOutline {
   }
 
   void find_crossings(bool rows, int lines) {
-    const float lines_per_px = 1 / spacing_px_, top = float(lines);
-    for (std::size_t i = 0; i < pieces_.size(); ++i) {
-      const ContourPiece& piece = pieces_[i];
-      const float a = across(piece.from, rows) * lines_per_px, b = across(piece.to, rows) * lines_per_px;
-      const float low = std::min(a, b), high = std::max(a, b);
-      if (!(low < top && high > 0)) continue;  // NaN is left out too
-      // The interval is half open, so that the joint of two pieces is crossed once.
-      const int begin = ceil_of(std::max(low, 0.0f)), end = ceil_of(std::min(high, top));
-      for (int line = begin; line < end; ++line) {
-        const float t = (float(line) - a) / (b - a);
-        const float at = along(piece.from, rows) + t * (along(piece.to, rows) - along(piece.from, rows));
+    const ContourPoints &from = pieces_.begin, &to = pieces_.end;
+    const std::vector<float>&across_from = rows ? from.v : from.u, &across_to = rows ? to.v : to.u,
+          &along_from = rows ? from.u : from.v, &along_to = rows ? to.u : to.v;
+    const float lines_per_px = 1 / spacing_px_;
+    const std::size_t count = across_from.size();
+    first_.resize(count), last_.resize(count), crossed_.resize(count);
+    find_lines(across_from.data(), across_to.data(), count, lines_per_px, float(lines), first_.data(), last_.data());
+    // Most pieces cross no line or one, so a branch here could not be predicted.
+    std::size_t crossed = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      crossed_[crossed] = std::uint32_t(i);
+      crossed += first_[i] < last_[i];
+    }
+    for (std::size_t k = 0; k < crossed; ++k) {
+      const std::size_t i = crossed_[k];
+      const float a = across_from[i] * lines_per_px, b = across_to[i] * lines_per_px;
+      for (std::int32_t line = first_[i]; line < last_[i]; ++line) {
+        const float t = (float(line) - a) / (b - a), at = along_from[i] + t * (along_to[i] - along_from[i]);
         // The facing part lies on the left of the piece. So a line towards the right enters it where the piece runs
         // down.
         crossings_.push_back({at, line, std::int32_t(i), t, (b > a) == rows ? 1 : -1});
       }
     }
-  }
-
-  /// Rounds up a number that is not negative. Without SSE 4.1, std::ceil is a slow function call.
-  static int ceil_of(float x) {
-    const int whole = int(x);
-    return whole + (float(whole) < x);
   }
 
   template <class Iterator>
@@ -250,40 +290,53 @@ class OuterOutline {
 
   /// `outside`: the direction along the line, +1 or -1, in which the bone ends.
   void add(bool rows, const Crossing& crossing, int outside) {
-    const ContourPiece& piece = pieces_[std::size_t(crossing.piece)];
-    if (!piece.from.usable || !piece.to.usable) return;
+    const auto piece = std::size_t(crossing.piece);
+    const ContourPoints &from = pieces_.begin, &to = pieces_.end;
+    if (pieces_.is_rim[piece] || !is_usable(from, piece) || !is_usable(to, piece)) return;
     const float t = crossing.fraction;
-    const Eigen::Vector3f normal = (1 - t) * normal_at(piece.from) + t * normal_at(piece.to);
+    const Eigen::Vector3f normal = (1 - t) * normal_at(from, piece) + t * normal_at(to, piece);
     // The tangent plane contains the ray, so it is projected to the tangent of the outline.
     const Eigen::Vector2f image_normal = (geometry_.line_matrix * normal).head<2>().normalized();
     const float cosine = image_normal[rows ? 0 : 1], sine = image_normal[rows ? 1 : 0];
     if (cosine * float(outside) <= 0 || std::abs(cosine) < std::abs(sine)) return;
     if (!rows && std::abs(cosine) == std::abs(sine)) return;
     marrow::OutlinePoint point;
-    point.u_px = piece.from.u + t * (piece.to.u - piece.from.u);
-    point.v_px = piece.from.v + t * (piece.to.v - piece.from.v);
+    point.u_px = from.u[piece] + t * (to.u[piece] - from.u[piece]);
+    point.v_px = from.v[piece] + t * (to.v[piece] - from.v[piece]);
     if (!(point.u_px >= 0 && point.v_px >= 0 && point.u_px <= float(width_px_ - 1) &&
           point.v_px <= float(height_px_ - 1)))
       return;
     point.normal_u = image_normal[0];
     point.normal_v = image_normal[1];
-    point.model_mm = surface_.origin_mm.cast<float>() + (1 - t) * model_at(piece.from) + t * model_at(piece.to);
+    point.model_mm = surface_.origin_mm.cast<float>() + (1 - t) * model_at(from, piece) + t * model_at(to, piece);
     points_.push_back(point);
   }
 
-  Eigen::Vector3f normal_at(const ContourPoint& p) const { return between(surface_.nx, surface_.ny, surface_.nz, p); }
-  Eigen::Vector3f model_at(const ContourPoint& p) const { return between(surface_.x, surface_.y, surface_.z, p); }
+  /// In front of the source, and where the CT does not end.
+  bool is_usable(const ContourPoints& points, std::size_t i) const {
+    const float depth = geometry_.pixel_matrix.row(2).dot(model_at(points, i)) + geometry_.pixel_offset[2];
+    return depth > 0 && !surface_.at_border[points.from[i]] && !surface_.at_border[points.to[i]];
+  }
+  Eigen::Vector3f normal_at(const ContourPoints& points, std::size_t i) const {
+    return between(surface_.nx, surface_.ny, surface_.nz, points, i);
+  }
+  Eigen::Vector3f model_at(const ContourPoints& points, std::size_t i) const {
+    return between(surface_.x, surface_.y, surface_.z, points, i);
+  }
   static Eigen::Vector3f between(const std::vector<float>& x, const std::vector<float>& y, const std::vector<float>& z,
-                                 const ContourPoint& p) {
-    const Eigen::Vector3f from(x[p.from], y[p.from], z[p.from]), to(x[p.to], y[p.to], z[p.to]);
-    return from + p.fraction * (to - from);
+                                 const ContourPoints& points, std::size_t i) {
+    const std::uint32_t a = points.from[i], b = points.to[i];
+    const Eigen::Vector3f from(x[a], y[a], z[a]), to(x[b], y[b], z[b]);
+    return from + points.fraction[i] * (to - from);
   }
 
   const SurfacePatches& surface_;
-  const std::vector<ContourPiece>& pieces_;
+  const ContourPieces& pieces_;
   const Geometry& geometry_;
   const float spacing_px_;
   const int width_px_, height_px_;
+  std::vector<std::int32_t> first_, last_;  ///< lines that each piece crosses
+  std::vector<std::uint32_t> crossed_;      ///< pieces that cross one at least
   std::vector<Crossing> crossings_;
   std::vector<marrow::OutlinePoint> points_;
 };
@@ -299,7 +352,7 @@ class SilhouetteEdges : public marrow::OutlineProjector {
     if (!(spacing_px > 0)) throw marrow::Error("the outline's spacing must be positive");
     const SurfacePatches& surface = spacing_px >= kCoarse_px && !coarse_.patches.empty() ? coarse_ : surface_;
     const Geometry geometry = geometry_of(camera, world_from_model, surface.origin_mm);
-    const std::vector<ContourPiece> pieces = ContourFinder(surface, geometry).find();
+    const ContourPieces pieces = ContourFinder(surface, geometry).find();
     return OuterOutline(surface, pieces, camera, geometry, spacing_px).find();
   }
 

@@ -146,7 +146,8 @@ TEST(PredictedCovariance, IsThatOfTheMinimaWithoutEachBlock) {
   const PredictedCovariance predicted(cost, pose, about);
   ASSERT_TRUE(predicted.covariance());
   EXPECT_LT((*predicted.covariance() - expected).norm(), 1e-6 * expected.norm());
-  EXPECT_EQ(predicted.evaluations(), 3 + 25) << "the value, the derivatives twice, and a line of poses";
+  EXPECT_EQ(predicted.evaluations(), 3 + 13 + 4)
+      << "the value, the derivatives twice, every second of 25 poses on a line, and those between that matter";
   // Derivatives say nothing about a minimum that is wider than degrees, and this cost has no blocks to try.
   EXPECT_FALSE(PredictedCovariance(Squares(50), pose, about).covariance());
 }

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "marrow/domain/decompositions.hpp"
 
@@ -18,6 +19,7 @@ constexpr double kLeastRise = 0.5, kGoodRise = 1, kMostRise = 3;  // in units of
 constexpr double kFlat = 0.1, kFlatLater = 0.5;  // in units of the wanted rise: the least curvature along a step
 constexpr double kWantedRise = 10;               // of the cost by a step, in units of its noise
 constexpr int kMostRounds = 5;
+constexpr double kMattersBelow = 12;  // rise of a cost along the least certain direction, in units of its noise
 
 std::string number(double value) {
   char text[32];
@@ -279,8 +281,7 @@ void PredictedCovariance::widen() {
   const double step = std::min(kReach * std::sqrt(variance), kMostStep) / kSide;
   std::vector<RigidTransform> poses;
   for (int i = -kSide; i <= kSide; ++i) poses.push_back(pose_at(i * step * eigen.vectors.col(5)));
-  const std::vector<double> values = cost_.values(poses);
-  evaluations_ += int(values.size());
+  const std::vector<double> values = values_along(poses);
   find_other_minima(poses, values);
   double sum = 0, squares = 0;
   for (int i = -kSide; i <= kSide; ++i) {
@@ -294,12 +295,34 @@ void PredictedCovariance::widen() {
   *covariance_ += (squares / sum - variance) * unit * unit.transpose();
 }
 
+/// The cost at poses on a line, a standard deviation or less apart. Every second comes first. Those between are
+/// computed only beside a cost that could matter, and are infinite elsewhere.
+std::vector<double> PredictedCovariance::values_along(const std::vector<RigidTransform>& poses) {
+  std::vector<double> values(poses.size(), std::numeric_limits<double>::infinity());
+  const auto compute = [&](const std::vector<std::size_t>& chosen) {
+    std::vector<RigidTransform> at;
+    for (const std::size_t i : chosen) at.push_back(poses[i]);
+    const std::vector<double> computed = cost_.values(at);
+    for (std::size_t k = 0; k < chosen.size(); ++k) values[chosen[k]] = computed[k];
+    evaluations_ += int(chosen.size());
+  };
+  std::vector<std::size_t> chosen;
+  for (std::size_t i = 0; i < poses.size(); i += 2) chosen.push_back(i);
+  compute(chosen);
+  chosen.clear();
+  for (std::size_t i = 1; i + 1 < poses.size(); i += 2)
+    if (std::min(values[i - 1], values[i + 1]) < value_ + kMattersBelow * noise_) chosen.push_back(i);
+  compute(chosen);
+  return values;
+}
+
 /// `poses` lie on a line through the pose, which is in the middle, a standard deviation or less apart.
 void PredictedCovariance::find_other_minima(const std::vector<RigidTransform>& poses,
                                             const std::vector<double>& values) {
   constexpr std::size_t kMost = 2;
   constexpr int kNear = 1;          // poses at both sides that belong to the pose's own minimum
   constexpr double kMostRise = 10;  // in units of the cost's noise
+  static_assert(kMostRise < kMattersBelow);
   const int count = int(values.size()), middle = count / 2;
   std::vector<int> found;
   for (int i = 1; i + 1 < count; ++i) {

@@ -57,6 +57,7 @@ class PredictedCovariance {
   void move_without_each_block(const Eigen::MatrixXd& at_ends, double flat);
   void turn_steps(const Matrix6d& hessian);
   void widen();
+  std::vector<double> values_along(const std::vector<RigidTransform>& poses);
   void find_other_minima(const std::vector<RigidTransform>& poses, const std::vector<double>& values);
 
   const Cost& cost_;
