@@ -17,7 +17,7 @@ class Bowl : public marrow::Cost {
       : bottom_(std::move(bottom)), frame_(std::move(frame)), hessian_(hessian) {
     const marrow::SymmetricEigen<6> eigen = marrow::eigen_of_symmetric(hessian);
     for (int i = 0; i < 6; ++i)
-      slopes_.push_back(std::sqrt(std::max(eigen.values[i], 0.0) / information) * eigen.vectors.col(i));
+      slopes_.push_back(std::sqrt(0.5 * std::max(eigen.values[i], 0.0) / information) * eigen.vectors.col(i));
   }
 
   double value(const marrow::RigidTransform& pose) const override {
@@ -28,12 +28,13 @@ class Bowl : public marrow::Cost {
     levels.push_back(level);
     return std::make_shared<Bowl>(*this);
   }
-  /// Six blocks. Without each of them the bowl is higher, and tilted along one of its eigenvectors, so much that its
-  /// covariance is the inverse of information * hessian.
+  /// Twelve blocks. Without each of them the bowl is higher, and tilted to one side along one of its eigenvectors, so
+  /// much that its covariance is the inverse of information * hessian. All of them together do not tilt it.
   std::vector<double> without_each_block(const marrow::RigidTransform& pose) const override {
     const marrow::Vector6d motion = way(bottom_, pose, frame_);
     std::vector<double> values;
-    for (const marrow::Vector6d& slope : slopes_) values.push_back(value(pose) + 0.1 + slope.dot(motion));
+    for (const marrow::Vector6d& slope : slopes_)
+      for (const double side : {-1, 1}) values.push_back(value(pose) + 0.1 + side * slope.dot(motion));
     return values;
   }
 

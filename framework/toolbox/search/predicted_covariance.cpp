@@ -14,8 +14,8 @@
 namespace marrow::search {
 namespace {
 
-constexpr double kMostStep = 16, kLeastStep = 1.0 / 256;          // degrees or mm
-constexpr double kLeastRise = 0.5, kGoodRise = 1, kMostRise = 3;  // in units of the wanted rise
+constexpr double kMostStep = 16, kLeastStep = 1.0 / 256;                            // degrees or mm
+constexpr double kLeastRise = 0.5, kGoodRise = 1, kAimedRise = 1.7, kMostRise = 3;  // in units of the wanted rise
 constexpr double kFlat = 0.1, kFlatLater = 0.5;  // in units of the wanted rise: the least curvature along a step
 constexpr double kWantedRise = 10;               // of the cost by a step, in units of its noise
 constexpr int kMostRounds = 5;
@@ -25,13 +25,6 @@ std::string number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.3g", value);
   return text;
-}
-
-/// The standard deviation of the cost's value by the jackknife.
-double deviation_of(double value, const std::vector<double>& without_block) {
-  double squares = 0;
-  for (const double without : without_block) squares += (without - value) * (without - value);
-  return std::sqrt(squares);
 }
 
 }  // namespace
@@ -50,23 +43,23 @@ PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform&
     widen();
     return;
   }
-  const std::vector<double> without_block = cost.without_each_block(pose);
-  if (without_block.empty()) return;
+  at_pose_ = blocks_at(pose);
+  if (at_pose_.size() == 0) return;
   ++evaluations_;
-  wanted_rise_ = deviation_of(value_, without_block);
+  wanted_rise_ = std::sqrt((at_pose_.array() - value_).square().sum());  // the standard deviation of the cost's value
   guess_steps();
   for (int round = 1;; ++round) {
     choose_steps();
-    const Matrix6d h = hessian();
-    const Eigen::MatrixXd at_ends = without_each_block_at_ends();
-    const auto gradient = gradients(at_ends);
+    const Eigen::MatrixXd at_diagonals = without_each_block(diagonals());
+    const Matrix6d h = hessian(at_diagonals);
+    const auto gradient = gradients();
     const double flat = round == 1 ? kFlat : kFlatLater;
     noise_ = (inverse(h, flat) * gradient.transpose() * gradient).trace() / 6;
     const double least_curvature = eigen_of_symmetric(h).values[0] / wanted_rise_, wanted_before = wanted_rise_;
     wanted_rise_ = std::min(wanted_rise_, kWantedRise * noise_);
     const bool steps_are_right = wanted_rise_ > 0.5 * wanted_before && (round > 1 || least_curvature > kFlatLater);
     if (steps_are_right || round == kMostRounds) {
-      move_without_each_block(at_ends, flat);
+      move_without_each_block(at_diagonals, flat);
       break;
     }
     turn_steps(h);
@@ -127,28 +120,36 @@ void PredictedCovariance::guess_steps() {
   for (int axis = 0; axis < 6; ++axis) {
     const double unit = axis < 3 ? radians(1) : 1, curvature = about->curvature(axis, axis) * unit * unit;
     if (!(curvature > 0)) continue;
-    const double step = std::sqrt(2 * 1.5 * wanted_rise_ / curvature);
+    const double step = std::sqrt(2 * kAimedRise * wanted_rise_ / curvature);
     steps_(axis, axis) = std::clamp(step, kLeastStep, kMostStep);
   }
 }
 
+/// A step that is too long or too short gets the length that a parabola would have, at most eight times less or more.
 void PredictedCovariance::choose_steps() {
+  constexpr double kMostChange = 8;
   std::array<int, 6> evaluations{};
   tbb::parallel_for(0, 6, [&](int i) {
     if (open_[std::size_t(i)]) return;
     Vector6d step = steps_.col(i);
-    double* ends = ends_.data() + 2 * i;
+    std::array<Eigen::VectorXd, 2> ends;
     const auto rise = [&] {
       evaluations[std::size_t(i)] += 2;
-      ends[0] = cost_.value(pose_at(step));
-      ends[1] = cost_.value(pose_at(-step));
-      return 0.5 * (ends[0] + ends[1]) - value_;
+      for (const std::size_t end : {0u, 1u}) ends[end] = blocks_at(pose_at(end ? -step : step));
+      return 0.5 * (ends[0].mean() + ends[1].mean()) - at_pose_.mean();
+    };
+    const auto change = [&](double height) {
+      return std::clamp(std::sqrt(kAimedRise * wanted_rise_ / std::max(height, 1e-12 * wanted_rise_)), 1 / kMostChange,
+                        kMostChange);
     };
     double height = rise();
-    for (; height > kMostRise * wanted_rise_ && step.cwiseAbs().maxCoeff() > kLeastStep; height = rise()) step *= 0.5;
-    for (; height < kGoodRise * wanted_rise_ && step.cwiseAbs().maxCoeff() < kMostStep; height = rise()) step *= 2;
+    for (; height > kMostRise * wanted_rise_ && step.cwiseAbs().maxCoeff() > kLeastStep; height = rise())
+      step *= std::max(change(height), kLeastStep / step.cwiseAbs().maxCoeff());
+    for (; height < kGoodRise * wanted_rise_ && step.cwiseAbs().maxCoeff() < kMostStep; height = rise())
+      step *= std::min(change(height), kMostStep / step.cwiseAbs().maxCoeff());
     steps_.col(i) = step;
     rises_[i] = height;
+    at_ends_[std::size_t(2 * i)] = ends[0], at_ends_[std::size_t(2 * i + 1)] = ends[1];
     open_[std::size_t(i)] = height <= kLeastRise * wanted_rise_;
   });
   for (const int count : evaluations) evaluations_ += count;
@@ -179,37 +180,33 @@ Matrix6d PredictedCovariance::hessian_of(double value, const Vector6d& rises,
   return h;
 }
 
-Matrix6d PredictedCovariance::hessian() {
-  const std::vector<double> values = cost_.values(diagonals());
-  evaluations_ += int(values.size());
-  return hessian_of(value_, rises_, Eigen::Map<const Eigen::VectorXd>(values.data(), Eigen::Index(values.size())));
+/// Of the mean cost without a block.
+Matrix6d PredictedCovariance::hessian(const Eigen::MatrixXd& at_diagonals) const {
+  return hessian_of(at_pose_.mean(), rises_, at_diagonals.colwise().mean());
+}
+
+Eigen::VectorXd PredictedCovariance::blocks_at(const RigidTransform& pose) const {
+  const std::vector<double> values = cost_.without_each_block(pose);
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), Eigen::Index(values.size()));
 }
 
 /// Values without each block at all poses: in each row those of one block.
 Eigen::MatrixXd PredictedCovariance::without_each_block(const std::vector<RigidTransform>& poses) {
-  std::vector<std::vector<double>> values(poses.size());
+  Eigen::MatrixXd rows(at_pose_.size(), Eigen::Index(poses.size()));
   tbb::parallel_for(std::size_t(0), poses.size(),
-                    [&](std::size_t i) { values[i] = cost_.without_each_block(poses[i]); });
+                    [&](std::size_t i) { rows.col(Eigen::Index(i)) = blocks_at(poses[i]); });
   evaluations_ += int(poses.size());
-  Eigen::MatrixXd rows(Eigen::Index(values[0].size()), Eigen::Index(poses.size()));
-  for (std::size_t i = 0; i < poses.size(); ++i)
-    rows.col(Eigen::Index(i)) = Eigen::Map<const Eigen::VectorXd>(values[i].data(), rows.rows());
   return rows;
 }
 
-/// At both ends of each step.
-Eigen::MatrixXd PredictedCovariance::without_each_block_at_ends() {
-  std::vector<RigidTransform> poses;
-  for (int end = 0; end < 12; ++end) poses.push_back(pose_at((end % 2 ? -1 : 1) * steps_.col(end / 2)));
-  return without_each_block(poses);
-}
-
-/// The gradients, in units of the steps, of the changes that leaving out a block makes. One block in each row.
-Eigen::Matrix<double, Eigen::Dynamic, 6> PredictedCovariance::gradients(const Eigen::MatrixXd& at_ends) const {
-  Eigen::Matrix<double, Eigen::Dynamic, 6> gradients(at_ends.rows(), 6);
-  for (int axis = 0; axis < 6; ++axis)
-    gradients.col(axis) = 0.5 * ((at_ends.col(2 * axis).array() - ends_[std::size_t(2 * axis)]) -
-                                 (at_ends.col(2 * axis + 1).array() - ends_[std::size_t(2 * axis + 1)]));
+/// The gradients, in units of the steps, of the changes that leaving out a block makes. One block in each row. What all
+/// blocks have in common is the slope of the whole cost, which is none at a minimum.
+Eigen::Matrix<double, Eigen::Dynamic, 6> PredictedCovariance::gradients() const {
+  Eigen::Matrix<double, Eigen::Dynamic, 6> gradients(at_pose_.size(), 6);
+  for (int axis = 0; axis < 6; ++axis) {
+    const Eigen::VectorXd slope = 0.5 * (at_ends_[std::size_t(2 * axis)] - at_ends_[std::size_t(2 * axis + 1)]);
+    gradients.col(axis) = slope.array() - slope.mean();
+  }
   return gradients;
 }
 
@@ -219,7 +216,7 @@ void PredictedCovariance::turn_steps(const Matrix6d& hessian) {
   const std::array<bool, 6> were_open = open_;
   Vector6d length;
   for (int i = 0; i < 6; ++i) {
-    length[i] = std::sqrt(2 * wanted_rise_ / std::max(eigen.values[i], kFlat * wanted_rise_));
+    length[i] = std::sqrt(2 * kAimedRise * wanted_rise_ / std::max(eigen.values[i], kFlat * wanted_rise_));
     double share = 0;
     for (int k = 0; k < 6; ++k) share += were_open[std::size_t(k)] ? eigen.vectors(k, i) * eigen.vectors(k, i) : 0;
     open_[std::size_t(i)] = share > 0.5;
@@ -242,16 +239,16 @@ Matrix6d PredictedCovariance::inverse(const Matrix6d& hessian, double flat) cons
   return inverse;
 }
 
-void PredictedCovariance::move_without_each_block(const Eigen::MatrixXd& at_ends, double flat) {
+void PredictedCovariance::move_without_each_block(const Eigen::MatrixXd& at_diagonals, double flat) {
   constexpr double kMostVariance = 100 * 100;  // in squared steps; used for directions that nothing determines
-  const Eigen::MatrixXd at_pose = without_each_block({pose_}), at_diagonals = without_each_block(diagonals());
-  const auto gradient = gradients(at_ends);
+  const auto gradient = gradients();
   Matrix6d sum = Matrix6d::Zero();
-  for (Eigen::Index block = 0; block < at_ends.rows(); ++block) {
+  for (Eigen::Index block = 0; block < at_pose_.size(); ++block) {
     Vector6d rises;
     for (int axis = 0; axis < 6; ++axis)
-      rises[axis] = 0.5 * (at_ends(block, 2 * axis) + at_ends(block, 2 * axis + 1)) - at_pose(block, 0);
-    const Matrix6d h = hessian_of(at_pose(block, 0), rises, at_diagonals.row(block));
+      rises[axis] =
+          0.5 * (at_ends_[std::size_t(2 * axis)][block] + at_ends_[std::size_t(2 * axis + 1)][block]) - at_pose_[block];
+    const Matrix6d h = hessian_of(at_pose_[block], rises, at_diagonals.row(block));
     const Vector6d motion = inverse(h, flat) * gradient.row(block).transpose();
     sum += motion * motion.transpose();
   }

@@ -49,12 +49,12 @@ class PredictedCovariance {
   void choose_steps();
   std::vector<RigidTransform> diagonals() const;
   Matrix6d hessian_of(double value, const Vector6d& rises, const Eigen::VectorXd& at_diagonals) const;
-  Matrix6d hessian();
+  Matrix6d hessian(const Eigen::MatrixXd& at_diagonals) const;
   Matrix6d inverse(const Matrix6d& hessian, double flat) const;
+  Eigen::VectorXd blocks_at(const RigidTransform& pose) const;
   Eigen::MatrixXd without_each_block(const std::vector<RigidTransform>& poses);
-  Eigen::MatrixXd without_each_block_at_ends();
-  Eigen::Matrix<double, Eigen::Dynamic, 6> gradients(const Eigen::MatrixXd& at_ends) const;
-  void move_without_each_block(const Eigen::MatrixXd& at_ends, double flat);
+  Eigen::Matrix<double, Eigen::Dynamic, 6> gradients() const;
+  void move_without_each_block(const Eigen::MatrixXd& at_diagonals, double flat);
   void turn_steps(const Matrix6d& hessian);
   void widen();
   std::vector<double> values_along(const std::vector<RigidTransform>& poses);
@@ -68,8 +68,9 @@ class PredictedCovariance {
   double noise_ = 0;        ///< the rise of the cost that one standard deviation makes, times 2
   int evaluations_ = 0;
   Matrix6d steps_ = 0.5 * Matrix6d::Identity();  ///< a direction in each column, in degrees and mm
-  Vector6d rises_;                               ///< mean rises of the cost at both ends of each step
-  std::array<double, 12> ends_{};                ///< the cost at both ends of each step
+  Vector6d rises_;                               ///< mean rises at both ends of each step, of the mean without a block
+  Eigen::VectorXd at_pose_;                      ///< the cost at the pose without each block
+  std::array<Eigen::VectorXd, 12> at_ends_;      ///< the same at both ends of each step
   std::array<bool, 6> open_{};                   ///< directions in which the cost hardly changes
   Matrix6d in_units_;                            ///< the covariance in degrees and mm, without open directions
   std::optional<Matrix6d> covariance_;
