@@ -6,6 +6,13 @@
 #include <algorithm>
 #include <cmath>
 
+// The hot loop is also compiled for newer processors. The best version is chosen at run time.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define MARROW_DISPATCH __attribute__((target_clones("avx2", "default")))
+#else
+#define MARROW_DISPATCH
+#endif
+
 namespace marrow::field {
 namespace {
 
@@ -75,16 +82,24 @@ bool beside_surface(const float* v) {
   return differs;
 }
 
-/// The distances of a row of voxels from their neighbours'. A voxel with no neighbour within `reach_mm` keeps its own.
-template <int count>
-void redistance_row(const float* v, const Eigen::Vector3f& per_mm, float reach_mm, float band_mm, float* row) {
-  for (int x = 0; x < count; ++x, ++v) {
-    const float sign = *v < 0 ? -1.f : 1.f;
-    const auto nearest = [&](int step) { return std::min(sign * v[step], sign * v[-step]); };
-    const float around = std::min(std::min(nearest(kX), nearest(kY)), nearest(kZ));
-    const float distance = sign * std::min(eikonal(v, sign, per_mm), band_mm);
-    row[x] = around < reach_mm ? distance : *v;
-  }
+/// The distances of a tile's voxels from their neighbours', in rows of eight. A voxel with no neighbour within
+/// `reach_mm` keeps its own. `v`: the tile's first value in its halo. `is_beside`: of each voxel, beside_surface().
+MARROW_DISPATCH void redistance_tile(const float* v, const Eigen::Vector3f& per_mm, float reach_mm, float band_mm,
+                                     float* values, std::uint8_t* is_beside) {
+  constexpr int kSide = 8;
+  for (int z = 0; z < kSide; ++z)
+    for (int y = 0; y < kSide; ++y, values += kSide, is_beside += kSide) {
+      const float* row = v + z * kZ + y * kY;
+      for (int x = 0; x < kSide; ++x) {
+        const float* at = row + x;
+        const float sign = *at < 0 ? -1.f : 1.f;
+        const auto nearest = [&](int step) { return std::min(sign * at[step], sign * at[-step]); };
+        const float around = std::min(std::min(nearest(kX), nearest(kY)), nearest(kZ));
+        const float distance = sign * std::min(eikonal(at, sign, per_mm), band_mm);
+        values[x] = around < reach_mm ? distance : *at;
+      }
+      for (int x = 0; x < kSide; ++x) is_beside[x] = beside_surface(row + x);
+    }
 }
 
 }  // namespace
@@ -301,13 +316,19 @@ void Front::advance(double step_mm) {
 void Front::redistance_once(bool rescale, float reach_mm) {
   tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
     keep_values(position);
-    for_voxels(position, reach_mm, [&](const float* v, int x, int, int, std::size_t place, std::size_t) {
-      if (x % kTile == 0) redistance_row<kTile>(v, voxels_per_mm_, reach_mm, band_mm_, &next_values_[place]);
-      if (!beside_surface(v)) return;
+    Halo halo{};
+    if (!load(active_[position], reach_mm, halo)) return;
+    float* next = next_values_.data() + position * kVoxels;
+    std::array<std::uint8_t, kVoxels> is_beside;
+    const float* first = halo.data() + kZ + kY + kX;
+    redistance_tile(first, voxels_per_mm_, reach_mm, band_mm_, next, is_beside.data());
+    for (std::size_t i = 0; i < kVoxels; ++i) {
+      if (!is_beside[i]) continue;
+      const float* v = first + i / (kTile * kTile) * kZ + i / kTile % kTile * kY + i % kTile;
       const float length = rescale ? gradient(v, voxels_per_mm_).norm() : 0.f;
       const float rescaled = length > 0.3f ? *v / std::clamp(length, 0.7f, 1.4f) : *v;
-      next_values_[place] = std::clamp(rescaled, -near_mm_, near_mm_);  // a neighbour of the surface is no farther
-    });
+      next[i] = std::clamp(rescaled, -near_mm_, near_mm_);  // a neighbour of the surface is no farther
+    }
   });
   write_back();
 }
