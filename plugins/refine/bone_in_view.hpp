@@ -46,7 +46,10 @@ class BoneInView {
     const auto moved_by = [&](const Vector6d& step) { return moved(pose, frame_, from_units(step)); };
     Model model;
     model.value = value(pose);
-    if (!(wanted_rise > 0)) wanted_rise = changes_without_blocks(pose).norm();
+    if (!(wanted_rise > 0)) {
+      const Eigen::VectorXd without = without_blocks(pose);
+      wanted_rise = (without.array() - without.mean()).matrix().norm();
+    }
     std::array<double, 12> ends{};
     Vector6d rises;
     tbb::parallel_for(0, 6, [&](int axis) {
@@ -70,6 +73,19 @@ class BoneInView {
     return model;
   }
 
+  /// Moves a model to another pose: its value and gradient are made anew, by the steps of the last model, and its
+  /// curvature and scatter stay. This takes a third of the time.
+  void move(Model& model, const RigidTransform& pose) const {
+    tbb::parallel_for(0, 7, [&](int axis) {
+      if (axis == 6)
+        model.value = value(pose);
+      else
+        model.gradient[axis] =
+            (value(moved_by(pose, Vector6d::Unit(axis))) - value(moved_by(pose, -Vector6d::Unit(axis)))) /
+            (2 * steps_[axis]);
+    });
+  }
+
  private:
   static constexpr double kMostStep = 4, kLeastStep = 1.0 / 64;  // degrees or mm
 
@@ -89,18 +105,21 @@ class BoneInView {
     const SymmetricEigen<6> eigen = eigen_of_symmetric(h);
     return eigen.vectors * eigen.values.cwiseMax(0).asDiagonal() * eigen.vectors.transpose();
   }
-  /// By how much each block of this view's image changes the cost in this view.
-  Eigen::VectorXd changes_without_blocks(const RigidTransform& pose) const {
+  /// The cost in this view without each block of its image. To all of them the same number is added: the cost in the
+  /// other views.
+  Eigen::VectorXd without_blocks(const RigidTransform& pose) const {
     const std::vector<double> without = cost_.without_each_block(pose);
     if (without.size() != before_ + blocks_ + after_)
       throw Error("the cost gives no values without each block of the images; use a cost of the kind similarity");
-    return (Eigen::VectorXd::Map(without.data() + before_, Eigen::Index(blocks_)).array() - cost_.value(pose)) / share_;
+    return Eigen::VectorXd::Map(without.data() + before_, Eigen::Index(blocks_)) / share_;
   }
+  /// Of the slopes about their mean, which is that of the whole cost in this view, and what the other views add.
   Matrix6d scatter(const RigidTransform& pose) const {
     Eigen::MatrixXd gradients(6, Eigen::Index(blocks_));
     tbb::parallel_for(0, 6, [&](int axis) {
-      gradients.row(axis) = 0.5 * (changes_without_blocks(moved_by(pose, Vector6d::Unit(axis))) -
-                                   changes_without_blocks(moved_by(pose, -Vector6d::Unit(axis))));
+      const Eigen::VectorXd slopes = 0.5 * (without_blocks(moved_by(pose, Vector6d::Unit(axis))) -
+                                            without_blocks(moved_by(pose, -Vector6d::Unit(axis))));
+      gradients.row(axis) = (slopes.array() - slopes.mean()).transpose();
     });
     return gradients * gradients.transpose();
   }

@@ -59,7 +59,8 @@ class Refinement {
     choose_scale(context);
     for (std::size_t i = 1; i < options_.pixel_step.size(); ++i) {
       compare_each(options_.pixel_step[i]);
-      converged_ = descend(true, context);
+      std::vector<Model> first;
+      converged_ = descend(true, context, first);
       expand(true);
     }
     covariance_ = inverse_of(equations().first);
@@ -118,10 +119,11 @@ class Refinement {
   void choose_scale(Context& context) {
     const State given = state_;
     Found best;
+    std::vector<Model> at_given;
     for (const double scale : {1.0, 0.1, 0.01}) {
       scale_ = scale;
-      if (scale < 1) state_ = given;
-      const bool converged = descend(scale == 1, context);
+      if (scale < 1) state_ = given, models_ = at_given;
+      const bool converged = descend(scale == 1, context, at_given);
       expand(scale == 1);
       const Found found{scale, converged, evidence(), state_, models_};
       char text[96];
@@ -151,13 +153,18 @@ class Refinement {
     return sum;
   }
 
+  /// Moves the models to the state. Their curvatures stay.
+  void move_models() {
+    for (std::size_t i = 0; i < models_.size(); ++i)
+      in_views_[i].move(models_[i], seen(state_, i / views_.size(), i % views_.size()));
+  }
+
   /// Makes the models anew, and if wanted the noises. The noise of a cost is by how much it rises, in the mean over six
   /// directions, where the pose moves by what the scatter of its blocks predicts (as for the predicted covariance of a
   /// registration), times 2; and twice this, because blocks do not see an error that is common to several of them
   /// (docs/results.md).
   void expand(bool with_noise) {
-    constexpr double kWantedRise = 2.5;  // in units of the noise
-    constexpr double kUnseen = 2;
+    constexpr double kWantedRise = 2.5, kUnseen = 2;  // the rise in units of the noise
     for (std::size_t f = 0; f < poses_.size(); ++f) {
       Matrix6d curvature = Matrix6d::Zero(), scatter = Matrix6d::Zero();
       for (std::size_t v = 0; v < views_.size(); ++v) {
@@ -199,12 +206,17 @@ class Refinement {
   }
 
   /// Goes on until a step makes the state hardly more probable. The noise is measured in the first two rounds, if
-  /// wanted.
-  bool descend(bool with_noise, Context& context) {
+  /// wanted. Later rounds keep the curvatures. The first models are kept in `first`; if it holds some, these are those
+  /// of the state already.
+  bool descend(bool with_noise, Context& context, std::vector<Model>& first) {
     for (int round = 0; round < options_.max_rounds; ++round) {
       context.check_cancelled();
       context.progress(double(round) / options_.max_rounds, "rounds");
-      expand(with_noise && round < 2);
+      if (round == 0 ? first.empty() : with_noise && round == 1)
+        expand(with_noise);
+      else if (round > 0)
+        move_models();
+      if (round == 0) first = models_;
       if (step() < 0.05) return true;
     }
     return false;
