@@ -3,16 +3,10 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/dispatch.hpp"
 #include "marrow/toolbox/rays/volume_border.hpp"
 #include "marrow/toolbox/surface/coarse_surface.hpp"
 #include "marrow/toolbox/surface/surface_patches.hpp"
-
-// The hot loop is also compiled for newer processors. The best version is chosen at run time.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define MARROW_DISPATCH __attribute__((target_clones("avx2", "default")))
-#else
-#define MARROW_DISPATCH
-#endif
 
 namespace {
 

@@ -6,12 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-// The hot loop is also compiled for newer processors. The best version is chosen at run time.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define MARROW_DISPATCH __attribute__((target_clones("avx2", "default")))
-#else
-#define MARROW_DISPATCH
-#endif
+#include "marrow/domain/dispatch.hpp"
 
 namespace marrow::field {
 namespace {
