@@ -12,7 +12,7 @@ import time
 
 from cluster_cases import CASES, MARROW, SOURCE, VARIANTS, Cluster, main, wait_until
 
-PROFILE = "marrow-cluster: 1\nprocessors: 1\ntries: 3\n"
+PROFILE = "marrow-cluster: 1\nprocessors: 1\ntries: 3\nask_every_s: 2\n"
 ONE_TRY = PROFILE.replace("tries: 3", "tries: 1")
 ALL = bool(os.environ.get("MARROW_TEST_ALL"))
 
