@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 constexpr auto kBetweenLooks = std::chrono::seconds(2);  // at the folder, or shorter, as between questions
-constexpr int kQuestionsOfEndedTask = 3;    // since its rows are there; then it is ended
+constexpr int kQuestionsOfEndedTask = 3;                 // since its rows are there; then it is ended
 constexpr int kQuestionsWithoutGather = 2;  // then it has ended: a shared folder may show its last file late
 const std::set<std::string> kUsualReasons{"None", "Resources", "Priority", "Dependency", "JobArrayTaskLimit"};
 
