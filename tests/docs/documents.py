@@ -14,7 +14,7 @@ sys.path[:0] = [str(SOURCE / "tools" / "site"), str(SOURCE / "tests")]
 import blocks  # noqa: E402
 import compiler_cache  # noqa: E402
 import document_pages  # noqa: E402
-from sample import ALL  # noqa: E402, F401
+from sample import ALL, sample  # noqa: E402, F401
 
 MARROW = BUILD / "bin" / "marrow"
 compiler_cache.use(BUILD)
