@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of `marrow open` share: a server on a folder of its own, and a browser that shows it."""
+import atexit
 import http.client
 import json
 import os
@@ -14,6 +15,8 @@ import unittest
 
 SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
 MARROW = BUILD / "bin" / "marrow"
+os.environ["MARROW_CACHE"] = tempfile.mkdtemp(prefix="marrow-cache-")  # not the store of who runs the tests
+atexit.register(shutil.rmtree, os.environ["MARROW_CACHE"], ignore_errors=True)
 sys.path.insert(0, str(SOURCE / "tests" / "report"))
 sys.path.insert(0, str(SOURCE / "tests"))
 import browser as chromium  # noqa: E402
