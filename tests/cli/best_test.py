@@ -5,7 +5,7 @@ import pathlib
 import shutil
 import tempfile
 
-from cases import metrics
+from cases import metrics, simulate
 from marrow_cli import SOURCE, Case, main, marrow
 
 PIPELINES = SOURCE / "pipelines"
@@ -23,18 +23,13 @@ class Best(Case):
         cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-best-"))
         cls.cases = {}
         for level in ("off", "usual"):
-            made = marrow(
-                "run",
-                PIPELINES / "simulate-clutter.yaml",
+            cls.cases[level] = simulate(
+                cls.shared / level,
                 *["%s=off" % name for name in OFF],
                 "camera_faults=%s" % level,
-                "--out",
-                cls.shared / level,
-                "--quiet",
-                *sets(SMALL)
+                *sets(SMALL),
+                pipeline="simulate-clutter.yaml",
             )
-            assert made.returncode == 0, made.stderr
-            cls.cases[level] = cls.shared / level / "outputs" / "case"
 
     @classmethod
     def tearDownClass(cls):

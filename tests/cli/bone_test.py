@@ -6,7 +6,7 @@ import tempfile
 
 import yaml
 
-from cases import copy_case, metrics
+from cases import copy_case, metrics, simulate
 from marrow_cli import SOURCE, Case, main, marrow
 
 PIPELINES = SOURCE / "pipelines"
@@ -24,11 +24,7 @@ class Bone(Case):
     @classmethod
     def setUpClass(cls):
         cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-bone-"))
-        made = marrow(
-            "run", PIPELINES / "simulate-vertebra.yaml", "--out", cls.shared / "made", "--quiet", *sets(SMALL + VIEWS)
-        )
-        assert made.returncode == 0, made.stderr
-        cls.case = cls.shared / "made" / "outputs" / "case"
+        cls.case = simulate(cls.shared / "made", *sets(SMALL + VIEWS), pipeline="simulate-vertebra.yaml")
         cls.landmarks = cls.shared / "made" / "outputs" / "landmarks" / "bone.yaml"
 
     @classmethod

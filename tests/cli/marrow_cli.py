@@ -11,6 +11,7 @@ import time
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+import compiler_cache  # noqa: E402
 from sample import sample  # noqa: E402, F401
 
 SOURCE = pathlib.Path(sys.argv[1])
@@ -23,6 +24,7 @@ IS_SANITIZED = any(name in MARROW.read_bytes() for name in (b"libasan.so", b"lib
 CACHE = pathlib.Path(tempfile.mkdtemp(prefix="marrow-cache-"))  # no test sees what another run left
 atexit.register(shutil.rmtree, CACHE, ignore_errors=True)
 os.environ["MARROW_CACHE"] = str(CACHE)
+compiler_cache.use(BUILD)
 
 
 def marrow(*arguments, plugins=(), cwd=None, timeout=300, extra_environment=None):

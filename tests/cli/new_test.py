@@ -56,7 +56,7 @@ class New(Case):
             said = self.run_in(self.scratch, program, "new", "node", kind + ".mine")
             self.assertIn("%s_mine/ci builds it, tests it" % kind, said)
         self.run_in(self.scratch, program, "new", "kind", "denoised")
-        kinds = sample(KINDS, 2)
+        kinds = sample(KINDS, 1)
         projects = [kind + "_mine" for kind in kinds] + ["denoised"]
         # One project for all, so that the packages are looked for once.
         lines = ["cmake_minimum_required(VERSION 3.25)", "project(all CXX)", "enable_testing()"]
@@ -89,7 +89,8 @@ class New(Case):
 
     @unittest.skipUnless((BUILD / "python" / "marrow" / "nodes.pyi").exists(), "the Python package is not built")
     def test_nodes_in_python_work_without_a_build(self):
-        compared = sample(KINDS, 2)
+        checked = sample(KINDS, 3)
+        compared = sample(checked, 1)
         for kind in KINDS:
             with self.subTest(kind):
                 result = self.new("node", kind + ".mine", "--python")
@@ -97,7 +98,8 @@ class New(Case):
                 folder = self.scratch / (kind + "_mine")
                 paths = {"PYTHONPATH": str(BUILD / "python"), "MARROW_PLUGIN_PATH": str(folder)}
                 self.assertIn("OK", self.run_in(folder, "/usr/bin/python3", "test.py", **paths))
-                self.assertIn(", 0 failed", self.run_in(folder, MARROW, "conformance", kind + ".mine", **paths))
+                if kind in checked:
+                    self.assertIn(", 0 failed", self.run_in(folder, MARROW, "conformance", kind + ".mine", **paths))
                 self.run_in(folder, MARROW, "check", "pipeline.yaml", **paths)
                 if kind in compared:
                     self.with_one_coarse_case(folder)

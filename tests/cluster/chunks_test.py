@@ -9,6 +9,7 @@ import subprocess
 
 from cluster_cases import CASES, MARROW, VARIANTS, Cluster, main, wait_until
 
+CELLS = CASES * VARIANTS
 SIMULATION = """marrow: 1
 nodes:
   chance: {uses: test.draw}
@@ -34,7 +35,7 @@ class Chunks(Cluster):
     def chunk(self, out, name, code=0):
         return self.run_program(MARROW, "chunk", self.plan(out), name, "--quiet", code=code)
 
-    def emit(self, out, program="parallel", cells=CASES * VARIANTS):
+    def emit(self, out, program="parallel", cells=CELLS):
         said = self.compare(out, "--emit", program).stdout
         self.assertIn("%d cells are left, in " % cells, said)
         return said.split("run them by\n\n")[1].strip()
@@ -67,7 +68,7 @@ class Chunks(Cluster):
         self.assertEqual({figures[cell]["reason"] for cell in lost}, {"no task left its row"})
         self.chunk("out", names[-1])
         said = self.compare("out", "--gather", "--quiet", "--shown", "0").stdout
-        self.assertIn("200 were there already", said)
+        self.assertIn("%d were there already" % CELLS, said)
         self.expect_same("out", "local")
         self.assertIn("no cell is left", self.compare("out", "--emit", "parallel").stdout)
         # what a chunk wrote beside its rows is gone, and there are few files
@@ -77,9 +78,9 @@ class Chunks(Cluster):
 
     def test_without_gather_the_rest_runs_here(self):
         self.emit("out")
-        self.chunk("out", self.names("out")[3])
+        self.chunk("out", self.names("out")[1])
         said = self.compare("out", "--quiet").stdout
-        self.assertIn("20 were there already", said)
+        self.assertIn("%d were there already" % VARIANTS, said)
         self.expect_same("out", "local")
 
     def test_chunks_of_known_nodes_are_as_long_as_wished(self):
@@ -89,7 +90,7 @@ class Chunks(Cluster):
         self.compare("timed", "--quiet", "--jobs", "2")
         self.experiment("0.051")
         said = self.compare("out", "--emit", "parallel", "--chunk-minutes", "1e6").stdout
-        self.assertIn("200 cells are left, in 1 chunks", said)
+        self.assertIn("%d cells are left, in 1 chunks" % CELLS, said)
 
     def test_parallel(self):
         self.run_program("sh", "-c", self.emit("out"))
@@ -146,7 +147,7 @@ class Chunks(Cluster):
         lines[5] = lines[5].replace('"values":[', '"values":[1')
         file.write_text("\n".join(lines))
         said = self.compare("out", "--quiet").stdout
-        self.assertIn("199 were there already", said)
+        self.assertIn("%d were there already" % (CELLS - 1), said)
         self.expect_same("out", "local")
 
     def test_a_plugin_that_crashes_fails_its_cell_only(self):
@@ -187,11 +188,12 @@ class Chunks(Cluster):
         self.assertIn("there is no plan in", missing)
         self.emit("out")
         self.chunk("out", self.names("out")[0])
-        self.assertIn("20 of 200 cells in 1 of 10 chunks", self.compare("out", "--status").stdout)
+        said = self.compare("out", "--status").stdout
+        self.assertIn("%d of %d cells in 1 of %d chunks" % (VARIANTS, CELLS, CASES), said)
         self.assertIn("nothing was submitted from", self.compare("out", "--cancel", code=2).stderr)
 
     def test_profile(self):
-        profile = self.write("profile.yaml", "partition: a b\nminutes: 0\npartiton: x\nsetup: y\ntries: 2.5\n")
+        profile = self.write("profile.yaml", "partition: a b\nminutes: 0\npartiton: x\nsetup: y\ntries: 2.5\nask_every_s: 0\n")
         said = self.compare("out", "--emit", "snakemake", "--profile", profile, code=2).stderr
         for sentence in (
             "profile.yaml:1:1",
@@ -201,6 +203,7 @@ class Chunks(Cluster):
             "partiton",
             "'setup' must be a list of texts",
             "'tries'",
+            "'ask_every_s' must be from 1 to 3600, got 0",
         ):
             self.assertIn(sentence, said)
 

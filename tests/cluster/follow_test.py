@@ -5,8 +5,9 @@ import os
 import signal
 import subprocess
 
-from cluster_cases import MARROW, Cluster, main, wait_until
+from cluster_cases import MARROW, VARIANTS, Cluster, main, wait_until
 
+CELLS = 2 * VARIANTS
 PROGRAM = """#!/usr/bin/python3
 import os, pathlib, subprocess, sys
 
@@ -41,7 +42,7 @@ class Follow(Cluster):
         for name in ("sbatch", "squeue", "scancel", "sacct"):
             self.write("programs/" + name, PROGRAM).chmod(0o755)
         self.environment["PATH"] = str(self.programs) + ":" + os.environ["PATH"]
-        self.profile = self.write("profile.yaml", "marrow-cluster: 1\nsilence_s: 5\n")
+        self.profile = self.write("profile.yaml", "marrow-cluster: 1\nsilence_s: 2\nask_every_s: 1\n")
         self.out = self.scratch / "out"
         self.file = self.experiment(cases=2)
 
@@ -63,7 +64,8 @@ class Follow(Cluster):
         said = self.wait(0)
         self.assertIn("the cluster takes task 1_1 for running, but its rows are there; it is ended", said.stderr)
         self.assertEqual(self.asked("scancel"), ["scancel --name=marrow-%s 1_1" % self.plan_name()])
-        self.assertIn("40 of 40 cells in 2 of 2 chunks", self.compare("out", "--status").stdout)
+        said = self.compare("out", "--status").stdout
+        self.assertIn("{0} of {0} cells in 2 of 2 chunks".format(CELLS), said)
         self.assertTrue((self.out / "report.html").exists())
         self.compare("local", "--quiet", MARROW_CACHE=str(self.scratch / "another"))
         self.expect_same("out", "local")
@@ -84,8 +86,8 @@ class Follow(Cluster):
         fault = "slurm_load_jobs error: Unable to contact slurm controller (connect failure)"
         self.says("squeue", 1, fault + "\n")
         said = self.wait(2).stderr
-        self.assertEqual(said.count("the cluster does not answer (%s); it is asked again for 5 s" % fault), 1)
-        self.assertIn("the cluster has not answered for 5 s (%s)" % fault, said)
+        self.assertEqual(said.count("the cluster does not answer (%s); it is asked again for 2 s" % fault), 1)
+        self.assertIn("the cluster has not answered for 2 s (%s)" % fault, said)
         self.assertIn("--gather makes tables and report of it", said)
         self.assertEqual(self.asked("scancel"), [])  # what goes on without an answer is not ended
         said = self.compare("out", "--on", "slurm", code=2).stderr
@@ -94,7 +96,7 @@ class Follow(Cluster):
         said = self.compare("out", "--cancel", code=2).stderr
         self.assertIn("scancel failed (exit code 1): " + fault, said)
         said = self.compare("out", "--gather", "--quiet").stdout
-        self.assertIn("40 were there already", said)
+        self.assertIn("%d were there already" % CELLS, said)
 
     def test_ctrl_c_while_the_cluster_does_not_answer(self):
         self.write("programs/squeue", "#!/bin/sh\ntouch %s\nexec sleep 1000\n" % (self.scratch / "asks"))

@@ -12,7 +12,7 @@ import time
 
 from cluster_cases import CASES, MARROW, SOURCE, VARIANTS, Cluster, main, wait_until
 
-PROFILE = "marrow-cluster: 1\nprocessors: 1\ntries: 3\n"
+PROFILE = "marrow-cluster: 1\nprocessors: 1\ntries: 3\nask_every_s: 2\n"
 ONE_TRY = PROFILE.replace("tries: 3", "tries: 1")
 ALL = bool(os.environ.get("MARROW_TEST_ALL"))
 
@@ -89,11 +89,11 @@ class OnSlurm(Cluster):
 
     def test_same_figures(self):
         said = self.submit("--wait").stdout
-        self.assertIn("200 cells are left, in %d chunks" % CASES, said)
+        self.assertIn("%d cells are left, in %d chunks" % (CASES * VARIANTS, CASES), said)
         self.assertEqual({row["status"] for row in self.figures("out").values()}, {"done"})
         self.expect_same_as_here()
         said = self.compare("out", "--status").stdout
-        self.assertIn("200 of 200 cells in 10 of 10 chunks", said)
+        self.assertIn("{0} of {0} cells in {1} of {1} chunks".format(CASES * VARIANTS, CASES), said)
         self.assertIn("tables and report are made; submitted 1 times", said)
         self.assertTrue((self.out / "report.html").exists())
 
@@ -115,7 +115,7 @@ class OnSlurm(Cluster):
         return found
 
     def test_killed_tasks_and_controller(self):
-        self.experiment("0.2")
+        self.experiment("0.2", cases=10)
         process = self.start()
         for _ in range(2):
             wait_until(lambda: self.send(signal.SIGKILL), "no task came")
@@ -185,7 +185,7 @@ class OnSlurm(Cluster):
 
     def test_ctrl_c_and_again(self):
         self.only_with_all()
-        self.experiment("0.2")
+        self.experiment("0.2", cases=10)
         process = self.start()
         wait_until(tasks, "no task came")
         time.sleep(3)
@@ -200,6 +200,7 @@ class OnSlurm(Cluster):
 
     def test_a_full_disk(self):
         self.only_with_all()
+        self.experiment(cases=10, variants=20)
         self.out.mkdir()
         subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "none", self.out], check=True)
         try:

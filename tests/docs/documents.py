@@ -12,10 +12,12 @@ import unittest
 SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
 sys.path[:0] = [str(SOURCE / "tools" / "site"), str(SOURCE / "tests")]
 import blocks  # noqa: E402
+import compiler_cache  # noqa: E402
 import document_pages  # noqa: E402
-from sample import ALL  # noqa: E402, F401
+from sample import ALL, sample  # noqa: E402, F401
 
 MARROW = BUILD / "bin" / "marrow"
+compiler_cache.use(BUILD)
 IS_SANITIZED = any(name in MARROW.read_bytes() for name in (b"libasan.so", b"libtsan.so"))
 NOT_RUN = re.compile(r"<!-- not run: (.*) -->")
 

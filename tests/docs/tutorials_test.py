@@ -7,7 +7,7 @@ import re
 import sys
 import unittest
 
-from documents import ALL, BUILD, IS_SANITIZED, SOURCE, Documents, blocks
+from documents import ALL, BUILD, IS_SANITIZED, SOURCE, Documents, blocks, sample
 
 AT_ONCE = 2
 # The comparison of a tutorial goes through fewer of its cases than its reader does, but for MARROW_TEST_ALL=1.
@@ -23,6 +23,8 @@ class Tutorials(Documents):
         pages = [page for page in cls.documents if page.startswith("docs/tutorials/")]
         if IS_SANITIZED:  # a plugin outside the tree is built without the sanitizer, which marrow would refuse
             pages.remove("docs/tutorials/first-node")
+        assert len(pages) > 3, pages
+        pages = sample(pages, 3)
         with concurrent.futures.ThreadPoolExecutor(AT_ONCE) as pool:
             cls.followed = dict(zip(pages, pool.map(cls.follow, pages)))
 
@@ -51,13 +53,15 @@ class Tutorials(Documents):
         return folder, cls.run_here("bash", "-c", cls.script(page), folder=folder, timeout=900)
 
     def told(self, name):
-        """(folder, what was printed) of a tutorial, all of whose commands ended well."""
+        """(folder, what was printed) of a tutorial, all of whose commands ended well. Skips one that is not in the
+        sample."""
+        if "docs/tutorials/" + name not in self.followed:
+            self.skipTest("it is followed on other days")
         folder, result = self.followed["docs/tutorials/" + name]
         self.assertEqual(result.returncode, 0, name + "\n" + result.stdout[-3000:] + result.stderr[-3000:])
         return folder, result.stdout
 
     def test_every_tutorial_can_be_followed(self):
-        self.assertGreater(len(self.followed), 3)
         for page in self.followed:
             self.told(pathlib.Path(page).name)
 

@@ -4,11 +4,13 @@
 names for screen readers, and no page wider than a narrow screen."""
 import itertools
 import os
+import pathlib
 import shutil
 import subprocess
+import tempfile
 
 import bench
-from bench import MARROW, SOURCE, PageTest, sample
+from bench import MARROW, SMALL, SOURCE, PageTest, sample, simulate
 
 # Text whose contrast to what is behind it is too low: [ratio, text, its element]. By WCAG 2.1, 1.4.3: 4.5, and 3 for
 # large text. Controls that are switched off, and text over pictures, do not count.
@@ -56,17 +58,29 @@ PAGES = ("home", "case=case", "place=case", "pipeline=femur.yaml", "results=run"
 
 
 class AccessibleTest(PageTest):
+    """Its folder holds a case, a pipeline and a run, which are made once for both tests."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.made = pathlib.Path(tempfile.mkdtemp(prefix="marrow-accessible-"))
+        cls.addClassCleanup(shutil.rmtree, cls.made, ignore_errors=True)
+        folder = cls.made / "folder"
+        shutil.copytree(simulate(cls.made / "simulated", *SMALL) / "case", folder / "case")
+        shutil.copy(SOURCE / "pipelines/femur.yaml", folder)
+        shutil.copytree(SOURCE / "pipelines/verdict", folder / "verdict")
+        subprocess.run(
+            [MARROW, "run", "femur.yaml", "case=case", "--out", "run", "--quiet"],
+            check=True,
+            stdout=subprocess.DEVNULL,
+            env={**os.environ, "MARROW_CACHE": str(cls.made / "store")},
+            cwd=folder,
+        )
+
     def setUp(self):
         super().setUp()
-        environment = {**os.environ, "MARROW_CACHE": str(self.scratch / "store")}
-        run = lambda *words: subprocess.run(
-            [MARROW, "run", *words, "--quiet"], check=True, stdout=subprocess.DEVNULL, env=environment, cwd=self.folder
-        )
-        run(SOURCE / "pipelines/simulate.yaml", "--out", self.scratch / "simulated")
-        shutil.copytree(self.scratch / "simulated/outputs/case", self.folder / "case")
-        shutil.copy(SOURCE / "pipelines/femur.yaml", self.folder)
-        shutil.copytree(SOURCE / "pipelines/verdict", self.folder / "verdict")
-        run("femur.yaml", "case=case", "--out", "run")
+        for name in ("folder", "store"):  # the store knows what the pages compute of the case
+            shutil.copytree(self.made / name, self.scratch / name, dirs_exist_ok=True)
         self.server = self.open()
         self.is_entered = False
 

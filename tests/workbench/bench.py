@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of `marrow open` share: a server on a folder of its own, and a browser that shows it."""
+import atexit
 import http.client
 import json
 import os
@@ -14,10 +15,22 @@ import unittest
 
 SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
 MARROW = BUILD / "bin" / "marrow"
+os.environ["MARROW_CACHE"] = tempfile.mkdtemp(prefix="marrow-cache-")  # not the store of who runs the tests
+atexit.register(shutil.rmtree, os.environ["MARROW_CACHE"], ignore_errors=True)
 sys.path.insert(0, str(SOURCE / "tests" / "report"))
 sys.path.insert(0, str(SOURCE / "tests"))
 import browser as chromium  # noqa: E402
 from sample import sample  # noqa: E402
+
+SMALL = ["--set", "ct.spacing_mm=[1.2, 1.2, 1.5]", "--set", "ct.range_mm=[0, 300]"]  # 0.8 s instead of 5 s to make
+
+
+def simulate(folder, *arguments, pipeline=SOURCE / "pipelines" / "simulate.yaml"):
+    """The folder of what a simulation makes. The same one is made once for all tests."""
+    environment = {**os.environ, "MARROW_CACHE": str(BUILD / "tests" / "store")}
+    command = [MARROW, "run", pipeline, "--out", folder, "--quiet", *arguments]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment)
+    return folder / "outputs"
 
 
 class Server:

@@ -4,11 +4,10 @@ each frame."""
 import pathlib
 import shutil
 import struct
-import subprocess
 import tempfile
 import unittest
 
-from bench import MARROW
+from bench import simulate
 
 FRAMES = 6
 MADE = {}
@@ -38,8 +37,7 @@ def made():
         scratch = pathlib.Path(tempfile.mkdtemp(prefix="marrow-moving-"))
         unittest.addModuleCleanup(shutil.rmtree, scratch, ignore_errors=True)
         (scratch / "moving.yaml").write_text(PIPELINE % FRAMES)
-        subprocess.run([MARROW, "run", scratch / "moving.yaml", "--out", scratch / "made", "--quiet"], check=True)
-        MADE["outputs"] = scratch / "made" / "outputs"
+        MADE["outputs"] = simulate(scratch / "made", pipeline=scratch / "moving.yaml")
     return MADE["outputs"]
 
 

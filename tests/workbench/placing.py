@@ -4,11 +4,10 @@ does on the page."""
 import math
 import pathlib
 import shutil
-import subprocess
 import tempfile
 import unittest
 
-from bench import MARROW, SOURCE
+from bench import SMALL, simulate
 
 CASE = {}
 
@@ -18,9 +17,7 @@ def case_folder():
     if not CASE:
         scratch = pathlib.Path(tempfile.mkdtemp(prefix="marrow-place-"))
         unittest.addModuleCleanup(shutil.rmtree, scratch, ignore_errors=True)
-        pipeline = SOURCE / "pipelines" / "simulate.yaml"
-        subprocess.run([MARROW, "run", pipeline, "--out", scratch / "sim", "--quiet"], check=True, stdout=-3)
-        CASE["folder"] = scratch / "sim" / "outputs" / "case"
+        CASE["folder"] = simulate(scratch / "sim", *SMALL) / "case"
     return CASE["folder"]
 
 

@@ -15,7 +15,7 @@ from selenium.webdriver.common.keys import Keys
 
 import bench
 import ct_cases
-from bench import MARROW, SOURCE, PageTest
+from bench import MARROW, SMALL, SOURCE, PageTest, simulate
 
 MOST_CLICKS = 25
 
@@ -36,10 +36,7 @@ def read_mha(path):
 class WholeWayTest(PageTest):
     def setUp(self):
         super().setUp()
-        simulated = self.scratch / "simulated"
-        command = [MARROW, "run", SOURCE / "pipelines" / "simulate.yaml", "--out", simulated, "--quiet"]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        case = simulated / "outputs" / "case"
+        case = simulate(self.scratch / "simulated", *SMALL) / "case"
         self.given = yaml.safe_load((case / "case.yaml").read_text())
         size, spacing, origin, values = read_mha(case / self.given["ct"])
         self.grid = {"size": size, "spacing_mm": spacing, "origin_mm": origin}

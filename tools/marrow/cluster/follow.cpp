@@ -22,9 +22,8 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kBetweenLooks = std::chrono::seconds(2);       // at the folder
-constexpr auto kBetweenQuestions = std::chrono::seconds(10);  // to the cluster, which all its users ask
-constexpr auto kEndOfTask = std::chrono::seconds(30);         // after its rows are there
+constexpr auto kBetweenLooks = std::chrono::seconds(2);  // at the folder, or shorter, as between questions
+constexpr int kQuestionsOfEndedTask = 3;                 // since its rows are there; then it is ended
 constexpr int kQuestionsWithoutGather = 2;  // then it has ended: a shared folder may show its last file late
 const std::set<std::string> kUsualReasons{"None", "Resources", "Priority", "Dependency", "JobArrayTaskLimit"};
 
@@ -35,12 +34,14 @@ class Follower {
 
   int run() {
     const std::atomic<bool>& stop = stop_on_signals();
-    for (Clock::time_point next = Clock::now(); !stop; std::this_thread::sleep_for(kBetweenLooks)) {
+    const std::chrono::seconds between_questions(profile_.ask_every_s);
+    const auto between_looks = std::min(kBetweenLooks, between_questions);
+    for (Clock::time_point next = Clock::now(); !stop; std::this_thread::sleep_for(between_looks)) {
       read();
       if (submission_.is_gathered) return 0;
       if (Clock::now() < next) continue;
       check(queue_of(submission_), stop);
-      next = Clock::now() + kBetweenQuestions;
+      next = Clock::now() + between_questions;
     }
     read();  // it may have been submitted again
     cancel(submission_);
@@ -108,11 +109,12 @@ class Follower {
 
   /// A controller that was killed may take tasks for running that ended, and hold back what waits for them.
   void end_forgotten(const Queue& queue) {
+    const std::chrono::seconds end_of_task(kQuestionsOfEndedTask * profile_.ask_every_s);
     for (const std::string& task : queue.running) {
       const auto file = files_.find(chunk_of(task));
       if (file == files_.end() || !file->second) continue;
       const auto [first, is_new] = made_but_running_.emplace(task, Clock::now());
-      if (is_new || Clock::now() - first->second < kEndOfTask) continue;
+      if (is_new || Clock::now() - first->second < end_of_task) continue;
       std::fprintf(stderr, "marrow: the cluster takes task %s for running, but its rows are there; it is ended\n",
                    printable(task).c_str());
       end_task(submission_, task);

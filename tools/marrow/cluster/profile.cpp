@@ -6,9 +6,9 @@
 namespace marrow::cli {
 namespace {
 
-const std::vector<std::string> kKeys{"marrow-cluster", "partition", "account",  "processors", "memory_mb",
-                                     "minutes",        "modules",   "setup",    "options",    "most_tasks",
-                                     "most_at_once",   "tries",     "silence_s"};
+const std::vector<std::string> kKeys{"marrow-cluster", "partition", "account",   "processors", "memory_mb",
+                                     "minutes",        "modules",   "setup",     "options",    "most_tasks",
+                                     "most_at_once",   "tries",     "silence_s", "ask_every_s"};
 
 class ProfileReader {
  public:
@@ -32,6 +32,7 @@ class ProfileReader {
       if (key == "most_at_once") profile.most_at_once = number(entry, 1, 1'000'000);
       if (key == "tries") profile.tries = number(entry, 1, 100);
       if (key == "silence_s") profile.silence_s = number(entry, 1, 1'000'000);
+      if (key == "ask_every_s") profile.ask_every_s = number(entry, 1, 3600);
     }
     if (!has_version) yaml_.fault(whole, "the profile lacks 'marrow-cluster: 1'");
     return profile;

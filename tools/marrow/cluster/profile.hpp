@@ -22,6 +22,7 @@ struct ClusterProfile {
   std::int64_t most_at_once = 0;     ///< tasks that may run at once; 0 = no limit
   std::int64_t tries = 2;            ///< how often a task is given to the cluster
   std::int64_t silence_s = 600;      ///< --wait ends if the cluster does not answer for so long
+  std::int64_t ask_every_s = 10;     ///< how often --wait asks the cluster, which all its users ask
 };
 
 /// Reads a profile; all of its keys may be left out. Faults go to `diagnostics`, at their lines.
