@@ -42,7 +42,7 @@ class Best(Case):
             "case=%s" % self.cases[level],
             "--out",
             self.scratch / level,
-            *arguments
+            *arguments,
         )
         self.assertIn(result.returncode, codes, result.stdout + result.stderr)
         return result, self.scratch / level / "outputs"

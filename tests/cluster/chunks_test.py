@@ -193,7 +193,9 @@ class Chunks(Cluster):
         self.assertIn("nothing was submitted from", self.compare("out", "--cancel", code=2).stderr)
 
     def test_profile(self):
-        profile = self.write("profile.yaml", "partition: a b\nminutes: 0\npartiton: x\nsetup: y\ntries: 2.5\nask_every_s: 0\n")
+        profile = self.write(
+            "profile.yaml", "partition: a b\nminutes: 0\npartiton: x\nsetup: y\ntries: 2.5\nask_every_s: 0\n"
+        )
         said = self.compare("out", "--emit", "snakemake", "--profile", profile, code=2).stderr
         for sentence in (
             "profile.yaml:1:1",
