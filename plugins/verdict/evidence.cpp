@@ -61,7 +61,7 @@ constexpr Words kWords[] = {
     {"outline_spread_mm", "the edges scatter by %.2f mm about the outline", kLook},
     {"predicted_mtre_mm", "the bone's surface is known to %.2f mm", kThirdView},
     {"predicted_axial_deg", "the rotation about the long axis is known to %.2f degrees", kAxial},
-    {"warnings", "the registration gave %.0f warnings", kLook},
+    {"warnings", "warnings of the registration: %.0f", kLook},
 };
 
 std::string filled(const char* text, double value) {

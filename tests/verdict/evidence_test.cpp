@@ -262,7 +262,7 @@ TEST(VerdictEvidence, TheModelGivesTheProbability) {
     EXPECT_NEAR(verdict.failure_probability, 1 / (1 + std::exp(-(bias + log_odds))), 1e-5);
     EXPECT_EQ(verdict.judgement, judgement);
     ASSERT_EQ(verdict.reasons.size(), 1u);
-    EXPECT_EQ(verdict.reasons[0], "the registration gave 3 warnings");
+    EXPECT_EQ(verdict.reasons[0], "warnings of the registration: 3");
     EXPECT_EQ(verdict.remedies.size(), judgement == Judgement::trusted    ? 0u
                                        : judgement == Judgement::doubtful ? 1u
                                                                           : 2u);

@@ -91,7 +91,7 @@ class AccessibleTest(PageTest):
             self.browser.driver.get("about:blank")
         self.show(self.server, page, **how)
         self.is_entered = True
-        self.browser.wait("return !document.querySelector('.notice.job')", 120)
+        self.browser.wait("return !document.querySelector('.notice.job, iframe[aria-busy]')", 120)
         faults = "return [...document.querySelectorAll('.fault')].map((one) => one.textContent).filter(Boolean)"
         self.assertEqual(self.browser.js(faults), [], page)
 

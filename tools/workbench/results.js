@@ -82,8 +82,12 @@
       class: 'report',
       title: 'Report of ' + folder,
       sandbox: 'allow-scripts',
+      'aria-busy': 'true',
       src: reportAddress(folder),
-      onload: () => frame.contentWindow.postMessage({marrow: 'gives parts'}, '*')
+      onload: () => {
+        frame.removeAttribute('aria-busy');
+        frame.contentWindow.postMessage({marrow: 'gives parts'}, '*');
+      }
     });
     const give = async ({source, data}) => {
       if (!frame.isConnected) return removeEventListener('message', give);
