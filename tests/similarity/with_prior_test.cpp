@@ -158,9 +158,9 @@ TEST(WithPrior, ItsSixResidualsStandForItsCovariance) {
   // The same by values: a motion of one deviation about the long axis.
   const auto turned = pose_at(truth(), 0, 0, 5, 0, 0, 0).world_from_model;
   const std::vector<double> values = cost->without_each_block(turned);
-  ASSERT_EQ(values.size(), 6u + 6);
+  ASSERT_EQ(values.size(), 12u + 6);
   double squares = 0;
-  for (std::size_t i = 6; i < values.size(); ++i) squares += std::pow(values[i] - cost->value(turned), 2);
+  for (std::size_t i = 12; i < values.size(); ++i) squares += std::pow(values[i] - cost->value(turned), 2);
   EXPECT_NEAR(squares / (kUnit * kUnit), 10.0 / 11, 1e-6) << "q = 1, and the weight of Student's t is 10 / 11";
 }
 

@@ -21,7 +21,8 @@ RigidTransform moved_by_units(const RigidTransform& pose, const FragmentFrame& f
 /// left there are much smaller than its errors. The derivatives are the cost's own, if it has them. Otherwise they are
 /// central differences along six directions. These are the axes first. If the cost is flat in a direction between them,
 /// they are then the eigenvectors of the Hessian, with a longer step in this direction. A step is four to eight
-/// standard deviations long: enough that the roughness of the cost does not matter.
+/// standard deviations long: enough that the roughness of the cost does not matter. The mean over the blocks stands for
+/// the whole cost there, so each pose is computed once.
 ///
 /// Along the least certain direction the cost may have other minima, or be flatter than its curvature says. So the
 /// variance in this direction becomes that of the density exp(-cost / noise) along it, if this is twice as large.

@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 #include "marrow/domain/decompositions.hpp"
+#include "marrow/domain/dispatch.hpp"
 
 namespace marrow::shaft {
 namespace {
@@ -41,30 +42,40 @@ struct PairFrame {
   Eigen::Vector2d pixel(double s, double t) const { return origin + s * along + t * across; }
 };
 
+/// Where points of the model lie along and across a pair: one array for each, computed several at once. NaN for points
+/// that are not in front of the source.
+MARROW_DISPATCH void flatten(const Eigen::Vector3d* points, std::size_t count, const Eigen::Matrix3d& pair_from_model,
+                             const Eigen::Vector3d& offset, double* along_px, double* across_px) {
+  const Eigen::Matrix3d m = pair_from_model;
+  const Eigen::Vector3d o = offset;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double x = points[i][0], y = points[i][1], z = points[i][2];
+    const double depth = m(2, 0) * x + m(2, 1) * y + m(2, 2) * z + o[2];
+    const double inverse = depth > 0 ? 1 / depth : std::numeric_limits<double>::quiet_NaN();
+    along_px[i] = (m(0, 0) * x + m(0, 1) * y + m(0, 2) * z + o[0]) * inverse;
+    across_px[i] = (m(1, 0) * x + m(1, 1) * y + m(1, 2) * z + o[1]) * inverse;
+  }
+}
+
 /// For each side the extremes at positions 0, 2, 4, ... along the pair, from the triangle edges that cross them.
 std::array<std::vector<Extreme>, 2> extremes_of(const Mesh& model, const RigidTransform& world_from_model,
                                                 const Camera& camera, const PairFrame& pair) {
   const std::size_t count = std::size_t(pair.length / kStep_px) + 1;
   std::array<std::vector<Extreme>, 2> sides{std::vector<Extreme>(count), std::vector<Extreme>(count)};
-  std::vector<Eigen::Vector2d> flat(model.vertices_mm.size());
+  std::vector<double> along_px(model.vertices_mm.size()), across_px(along_px.size());
   const RigidTransform camera_from_model = camera.camera_from_world * world_from_model;
-  const Eigen::Matrix3d pair_from_camera = pair.from_pixel() * camera.intrinsics,
-                        pair_from_model = pair_from_camera * camera_from_model.rotation;
-  const Eigen::Vector3d offset = pair_from_camera * camera_from_model.translation_mm;
-  for (std::size_t i = 0; i < flat.size(); ++i) {
-    const Eigen::Vector3d x = pair_from_model * model.vertices_mm[i] + offset;  // x.z() is the depth
-    flat[i] = x.z() > 0 ? Eigen::Vector2d(x.head<2>() * (1 / x.z()))
-                        : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
-  }
+  const Eigen::Matrix3d pair_from_camera = pair.from_pixel() * camera.intrinsics;
+  flatten(model.vertices_mm.data(), along_px.size(), pair_from_camera * camera_from_model.rotation,
+          pair_from_camera * camera_from_model.translation_mm, along_px.data(), across_px.data());
   const auto cross = [&](std::uint32_t a, std::uint32_t b) {
-    if (flat[a].x() > flat[b].x()) std::swap(a, b);
-    const double from = flat[a].x(), to = flat[b].x();
+    if (along_px[a] > along_px[b]) std::swap(a, b);
+    const double from = along_px[a], to = along_px[b];
     if (!(to > from) || to < 0 || from > pair.length) return;
     const long last = std::min(long(count) - 1, long(to / kStep_px));
     const long before = from > 0 ? long(from / kStep_px) : 0;  // std::ceil is a slow function call
     for (long k = before + (double(before) * kStep_px < from); k <= last; ++k) {
       const double part = (double(k) * kStep_px - from) / (to - from);
-      const double across = flat[a].y() + part * (flat[b].y() - flat[a].y());
+      const double across = across_px[a] + part * (across_px[b] - across_px[a]);
       for (int side = 0; side < 2; ++side) {
         Extreme& extreme = sides[side][std::size_t(k)];
         if (extreme.seen && (side == 0 ? across >= extreme.across : across <= extreme.across)) continue;
@@ -74,7 +85,7 @@ std::array<std::vector<Extreme>, 2> extremes_of(const Mesh& model, const RigidTr
   };
   // Many triangles lie beside the pair, or between two positions.
   const auto is_apart = [&](const std::array<std::uint32_t, 3>& triangle) {
-    const double a = flat[triangle[0]].x(), b = flat[triangle[1]].x(), c = flat[triangle[2]].x(),
+    const double a = along_px[triangle[0]], b = along_px[triangle[1]], c = along_px[triangle[2]],
                  low = std::min(std::min(a, b), c), high = std::max(std::max(a, b), c);
     return high < 0 || low > pair.length || (low > 0 && double(long(high / kStep_px)) < low / kStep_px);
   };

@@ -163,10 +163,12 @@ class NearestEdges {
       envelope.push_back({q, h, start, labels[q]});
     }
     if (envelope.empty()) return;
-    std::size_t k = 0;
-    for (int q = 0; q < columns_; ++q) {
-      while (k + 1 < envelope.size() && envelope[k + 1].from < float(q)) ++k;
-      labels[q] = envelope[k].label;
+    // Each parabola is the lowest from its own `from` to that of the next; a column on the limit belongs to the first.
+    int first = 0;
+    for (std::size_t k = 0; k < envelope.size(); ++k) {
+      int end = columns_;
+      if (k + 1 < envelope.size()) end = std::min(columns_, int(std::floor(envelope[k + 1].from)) + 1);
+      for (; first < end; ++first) labels[first] = envelope[k].label;
     }
   }
 
