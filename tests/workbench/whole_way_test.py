@@ -15,7 +15,7 @@ from selenium.webdriver.common.keys import Keys
 
 import bench
 import ct_cases
-from bench import MARROW, SMALL, SOURCE, PageTest, simulate
+from bench import MARROW, SMALL, PageTest, simulate
 
 MOST_CLICKS = 25
 
