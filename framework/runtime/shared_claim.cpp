@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "shared_claim.hpp"
 
-#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -180,16 +179,6 @@ void take_away(const fs::path& file, const std::string& text) {
   unlink(aside.c_str());
 }
 
-/// Opens a new claim file. Returns -1 with errno: EEXIST if there is one.
-int open_new(const fs::path& file, const Permissions& permissions) {
-  constexpr int kMode = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW;
-  int descriptor = open(file.c_str(), kMode, 0600);
-  if (descriptor < 0 && errno == ENOENT && make_shared_folder(file.parent_path(), permissions).empty())
-    descriptor = open(file.c_str(), kMode, 0600);
-  if (descriptor >= 0) permit(descriptor, permissions.file, permissions);
-  return descriptor;
-}
-
 /// Watches a claim of another process. Only the time counts in which this process looked at it: one that was suspended,
 /// or waited for the file system itself, does not take its own absence for the owner's.
 class Watch {
@@ -240,7 +229,7 @@ SharedClaim claim_file(const fs::path& file, const Permissions& permissions, con
   constexpr int kMostTries = 5;
   for (int stale = 0;;) {
     if (cancelled && cancelled->load()) return {};
-    if (const int descriptor = open_new(file, permissions); descriptor >= 0) {
+    if (const int descriptor = open_new_file(file, permissions); descriptor >= 0) {
       const auto held = std::make_shared<HeldClaim>(file, descriptor);
       heart().add(held);
       return SharedClaim(held);

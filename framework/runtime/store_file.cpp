@@ -59,18 +59,11 @@ class FileWriter : public Archive {
 
 /// Makes a new file next to `file` and puts its name into `temporary`. Returns -1 with errno if it cannot be made.
 int open_temporary(const fs::path& file, const Permissions& permissions, fs::path& temporary) {
-  constexpr int kMode = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW;
-  const auto make_folder = [&] {
-    const fs::path folder = file.parent_path();
-    return (permissions.group ? make_shared_folder(folder, permissions) : make_private_folder(folder)).empty();
-  };
   int descriptor = -1;
   do {
     temporary = temporary_beside(file);
-    descriptor = open(temporary.c_str(), kMode, 0600);
-    if (descriptor < 0 && errno == ENOENT && make_folder()) descriptor = open(temporary.c_str(), kMode, 0600);
+    descriptor = open_new_file(temporary, permissions);
   } while (descriptor < 0 && (errno == EEXIST || errno == EINTR));
-  if (descriptor >= 0) permit(descriptor, permissions.file, permissions);
   return descriptor;
 }
 
@@ -86,6 +79,20 @@ bool permit(int descriptor, mode_t mode, const Permissions& permissions) {
       fchown(descriptor, uid_t(-1), *permissions.group) != 0)
     mode &= ~kOfGroup;  // it has another group, which must not read it
   return fchmod(descriptor, mode) == 0;
+}
+
+int open_new_file(const fs::path& file, const Permissions& permissions) {
+  constexpr int kMode = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW;
+  constexpr int kMostTries = 20;
+  const fs::path folder = file.parent_path();
+  int descriptor = open(file.c_str(), kMode, 0600);
+  // Another process that makes the same folder may put its own, empty one in the place of the one that was just made.
+  for (int tries = 0; descriptor < 0 && errno == ENOENT && tries < kMostTries; ++tries) {
+    if (!(permissions.group ? make_shared_folder(folder, permissions) : make_private_folder(folder)).empty()) break;
+    descriptor = open(file.c_str(), kMode, 0600);
+  }
+  if (descriptor >= 0) permit(descriptor, permissions.file, permissions);
+  return descriptor;
 }
 
 StoreFile::StoreFile(const fs::path& path) {

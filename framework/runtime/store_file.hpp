@@ -24,6 +24,10 @@ struct Permissions {
 /// Gives an open file or folder the permissions. Returns false, with errno, if that is not possible.
 bool permit(int descriptor, mode_t mode, const Permissions& permissions);
 
+/// Opens a file for writing that must not be there yet. Makes its folder if it is missing, also while other processes
+/// do the same. Returns -1 with errno: EEXIST if the file is there.
+int open_new_file(const std::filesystem::path& file, const Permissions& permissions);
+
 /// A regular file that is open for reading. A link is not opened.
 class StoreFile {
  public:

@@ -7,7 +7,9 @@
 
 #include <chrono>
 #include <csignal>
+#include <latch>
 #include <thread>
+#include <vector>
 
 #include "runtime/environment.hpp"
 #include "runtime/fixture.hpp"
@@ -46,6 +48,23 @@ class SharedClaimTest : public testing::Test {
   std::string fault;
   bool is_held = false;
 };
+
+TEST_F(SharedClaimTest, ManyClaimsAtOnceMakeTheirFolder) {
+  constexpr int kRounds = 400, kClaims = 4;
+  for (int round = 0; round < kRounds; ++round) {
+    const fs::path folder = scratch.path / ("claims-" + std::to_string(round));
+    std::vector<std::string> faults(kClaims);
+    std::latch start(kClaims);
+    std::vector<std::thread> threads;
+    for (int i = 0; i < kClaims; ++i)
+      threads.emplace_back([&, i] {
+        start.arrive_and_wait();
+        marrow::claim_file(folder / std::to_string(i), {0600, 0700, getegid()}, nullptr, {}, faults[i]);
+      });
+    for (std::thread& thread : threads) thread.join();
+    for (const std::string& text : faults) EXPECT_EQ(text, "") << "round " << round;
+  }
+}
 
 TEST_F(SharedClaimTest, ItNamesItsOwnerAndIsRemovedAtItsEnd) {
   fs::remove_all(file.parent_path());
