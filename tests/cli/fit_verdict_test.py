@@ -105,7 +105,7 @@ class FitVerdict(unittest.TestCase):
         self.assertEqual([int(word) for word in last.split()[1:]], [bad, silent, good, alarms, 1, 1])
         self.assertTrue((self.folder / "roc.svg").read_text().startswith("<svg"))
 
-    def threshold(self, name, right, failed):
+    def threshold(self, name, right, failed, *arguments):
         """The threshold that is chosen for poses with these log odds."""
         folder = self.folder / name
         folder.mkdir()
@@ -126,21 +126,18 @@ class FitVerdict(unittest.TestCase):
         model_file.write_text(
             yaml.safe_dump({"record": "Before", "bias": -5, "doubtful_above": 0.5, "wrong_above": 0.9, "terms": terms})
         )
-        done = self.run_tool("--threshold", folder, "--model", model_file, "--record", "And after.")
+        done = self.run_tool("--threshold", folder, "--model", model_file, "--record", "And after.", *arguments)
         self.assertEqual(done.returncode, 0, done.stderr)
         model = yaml.safe_load(model_file.read_text())
         self.assertEqual((model["record"], model["terms"]), ("Before. And after.", terms))
         self.assertIn("doubtful_above: %g, before 0.5" % model["doubtful_above"], done.stdout)
         return model["doubtful_above"]
 
-    def test_the_threshold_of_doubt_lies_in_the_middle_of_the_gap(self):
-        self.assertAlmostEqual(self.threshold("gap", [-3, -1], [0.5, 1.5]), 1 / (1 + math.exp(0.25)), places=3)
-
-    def test_a_failure_that_is_trusted_counts_as_ten_doubted_poses(self):
-        one_below_two = self.threshold("two", [-4, -2, -1], [-3, 1])
-        self.assertAlmostEqual(one_below_two, 1 / (1 + math.exp(3.5)), places=3)
-        one_below_eleven = self.threshold("eleven", [-4] + [-2] * 11, [-3, 1])
-        self.assertAlmostEqual(one_below_eleven, 1 / (1 + math.exp(0.5)), places=3)
+    def test_the_threshold_of_doubt_is_what_the_allowed_share_of_right_poses_exceeds(self):
+        right = [-6 + 0.05 * i for i in range(101)]  # log odds
+        chosen = self.threshold("some", right, [-3, 1], "--false-alarms", "0.05")
+        self.assertAlmostEqual(chosen, 1 / (1 + math.exp(6 - 0.05 * 95)), places=3)
+        self.assertEqual(self.threshold("high", [-3] * 10 + [9], [1], "--false-alarms", "0"), 0.9)
 
     def test_says_what_is_missing(self):
         done = self.run_tool(self.folder / "seen", "--verdict", "other")
