@@ -13,6 +13,7 @@
 #include <marrow/plugin.hpp>
 
 #include <marrow/domain/decompositions.hpp>
+#include <marrow/domain/names.hpp>
 #include "bone_in_view.hpp"
 #include "marrow/toolbox/search/search.hpp"
 #include "sight.hpp"
@@ -27,6 +28,7 @@ struct Options : refine::ExpectedErrors {
   double reach_px = 6;
   std::vector<double> pixel_step{2};
   int max_rounds = 15;
+  std::string reference;
 };
 
 struct Result {
@@ -48,7 +50,10 @@ class Refinement {
       : costs_(costs), poses_(poses), views_(views), options_(options) {
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();
     for (const Pose& pose : poses) centre += pose.world_from_model * pose.frame.origin_mm / double(poses.size());
-    for (const View& view : views) sights_.push_back(sight_of(view, centre, options));
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      sights_.push_back(sight_of(views[v], centre, options));
+      if (views.name(v) == options.reference) sights_.back().deviation *= kOfReference;
+    }
     for (const Pose& pose : poses) state_.poses.push_back(pose.world_from_model);
     state_.motions.assign(views.size(), Vector6d::Zero());
   }
@@ -93,6 +98,8 @@ class Refinement {
   }
 
  private:
+  static constexpr double kOfReference = 1e-3;  ///< how far the reference may move, of what is expected of the others
+
   /// The most probable state for a scale.
   struct Found {
     double scale = 1;
@@ -281,10 +288,13 @@ class Refinement {
   Eigen::MatrixXd covariance_;  ///< in degrees and mm
 };
 
-void check_inputs(const List<View>& views, const List<Cost>& costs, const List<Pose>& poses) {
+void check_inputs(const List<View>& views, const List<Cost>& costs, const List<Pose>& poses,
+                  const std::string& reference) {
   if (views.size() < 2)
     throw Error("there is one view only; a camera is corrected by comparing it with others, so give two views or more");
   for (const View& view : views) check_view(view);
+  if (!reference.empty() && !views.find(reference))
+    throw Error("reference: there is no view '" + reference + "'; " + suggestion(reference, views.names()));
   if (poses.empty()) throw Error("there is no bone; wire the pose of at least one");
   if (costs.names() != poses.names())
     throw Error("costs and poses are not of the same bones; wire both from nodes that are called for each fragment");
@@ -325,7 +335,7 @@ void warn_of_large(const std::string& view, const Vector6d& in_deviations, Conte
 Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose>& poses, const Options& options,
                Context& context) {
   search::check_level_list(options.pixel_step, "pixel_step");
-  check_inputs(views, costs, poses);
+  check_inputs(views, costs, poses, options.reference);
   Refinement refinement(costs, poses, views, options);
   refinement.run(context);
   if (!refinement.converged())
@@ -396,5 +406,9 @@ MARROW_PLUGIN(plugin) {
               "per level, for costs of grey values: only every n-th pixel is compared; the first level tells how far "
               "the cameras are off, and the last one decides the poses",
               at_least(1))
-      .option("max_rounds", &Options::max_rounds, "largest number of steps", at_least(1));
+      .option("max_rounds", &Options::max_rounds, "largest number of steps", at_least(1))
+      .option(
+          "reference", &Options::reference,
+          "view whose camera is right and stays, such as the one that was calibrated with the robot; empty: none is "
+          "known to be");
 }

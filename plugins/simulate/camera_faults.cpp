@@ -2,10 +2,12 @@
 // Views with the cameras that a calibration would state: off by errors of known size. The images stay as the true
 // cameras took them.
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/names.hpp"
 #include "marrow/domain/random.hpp"
 
 namespace {
@@ -19,6 +21,7 @@ struct Options {
   double focal_percent = 1;
   double centre_px = 5;
   int camera_seed = 1;
+  std::vector<std::string> only;
 };
 
 double factor_of(const std::string& level) {
@@ -34,12 +37,15 @@ Eigen::Vector3d direction(marrow::Random& random) {
 }
 
 List<View> camera_faults(const List<View>& views, const Options& options) {
+  for (const std::string& name : options.only)
+    if (!views.find(name)) throw Error("only: there is no view '" + name + "'; " + suggestion(name, views.names()));
   const double factor = factor_of(options.level);
   List<View> stated;
   for (std::size_t i = 0; i < views.size(); ++i) {
     View view = views[i];
     Camera& camera = view.camera;
-    if (factor > 0) {
+    const bool is_off = options.only.empty() || std::count(options.only.begin(), options.only.end(), views.name(i)) > 0;
+    if (is_off && factor > 0) {
       marrow::Random random(std::uint64_t(options.camera_seed), i);
       RigidTransform off{"world", "world"};
       const double angle = radians(factor * options.rotation_deg) * length(random);
@@ -75,5 +81,6 @@ MARROW_PLUGIN(plugin) {
               at_least(0), at_most(30))
       .option("focal_percent", &Options::focal_percent, "change of the focal length", at_least(0), at_most(20))
       .option("centre_px", &Options::centre_px, "shift of the principal point", at_least(0))
-      .option("camera_seed", &Options::camera_seed, "seed of the errors", at_least(0));
+      .option("camera_seed", &Options::camera_seed, "seed of the errors", at_least(0))
+      .option("only", &Options::only, "names of the views whose cameras are off; empty: all");
 }

@@ -132,6 +132,23 @@ TEST(RefineCameras, HalfOfAnErrorGoesToEachOfTwoViews) {
   EXPECT_GT((*pose.covariance)(3, 3), 0.01) << "the pose is not known better than the cameras";
 }
 
+TEST(RefineCameras, TheReferenceStaysAndTheOthersGoByIt) {
+  const RigidTransform none = motion({0, 0, 0}, {0, 0, 0}), off = motion({-0.4, 0.3, 0.1}, {0.6, 1, -0.7});
+  std::vector<Bone> bones{Bone({none, off}, 1e6)};
+  const RigidTransform right = bones[0].pose.world_from_model;
+  bones[0].pose = well::pose_at(bones[0].pose, 0.2, 0.1, -0.1, 0.3, 0.5, -0.3);
+  const auto outputs = shipped::call("refine.cameras", inputs(bones), {{"reference", std::string("frontal")}});
+  const auto is_near = [](const RigidTransform& is, const RigidTransform& wanted) {
+    return marrow::degrees(marrow::geodesic_angle_rad(wanted.rotation, is.rotation)) < 0.01 &&
+           (wanted.translation_mm - is.translation_mm).norm() < 0.05;
+  };
+  EXPECT_TRUE(is_near(found(outputs, 0), none));
+  EXPECT_TRUE(is_near(found(outputs, 1), off)) << "the whole error goes to the other camera";
+  const marrow::Pose pose = outputs.at("poses").as_list<marrow::Pose>()[0];
+  EXPECT_LT(well::way(right, pose.world_from_model, pose.frame).norm(), 0.02);
+  EXPECT_LT(std::sqrt(pose.covariance->diagonal().maxCoeff()), 0.05) << "the cameras add nothing";
+}
+
 TEST(RefineCameras, CamerasThatAreRightStay) {
   const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
   std::vector<Bone> bones{Bone({none, none})};
@@ -255,6 +272,8 @@ TEST(RefineCameras, SaysWhatIsWrong) {
       shipped::refusal("refine.cameras", inputs({Bone({})})),
       "the cost of 'distal' cannot be split into views: it compares no views, or it holds more than them, such as "
       "a prior; give the cost of the images alone");
+  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({bone}), {{"reference", std::string("frontl")}}),
+            "reference: there is no view 'frontl'; did you mean 'frontal'?");
   auto other = inputs({bone});
   other["poses"] = inputs({bone, bone})["poses"];
   EXPECT_EQ(shipped::refusal("refine.cameras", other),

@@ -163,6 +163,27 @@ TEST(SimulateCameraFaults, HaveTheirRootMeanSquareAndALimit) {
   }
 }
 
+TEST(SimulateCameraFaults, OnlyTheNamedViewsAreOff) {
+  List<View> views;
+  for (const std::string name : {"frontal", "lateral"}) {
+    View view = even(100, 512);
+    view.name = name;
+    view.camera = test::camera(30, 512);
+    views.add(name, view);
+  }
+  const auto call = [&](const std::string& name) {
+    return shipped::call("simulate.camera_faults", {{"views", shipped::list(views, "view")}},
+                         {{"only", std::vector<std::string>{name}}});
+  };
+  const auto stated = call("lateral").at("views").as_list<View>();
+  EXPECT_EQ(stated[0].camera.camera_from_world.rotation, views[0].camera.camera_from_world.rotation);
+  EXPECT_EQ(stated[0].camera.intrinsics, views[0].camera.intrinsics);
+  EXPECT_NE(stated[1].camera.camera_from_world.rotation, views[1].camera.camera_from_world.rotation);
+  EXPECT_EQ(shipped::refusal("simulate.camera_faults", {{"views", shipped::list(views, "view")}},
+                             {{"only", std::vector<std::string>{"lateal"}}}),
+            "only: there is no view 'lateal'; did you mean 'lateral'?");
+}
+
 TEST(SimulateCameraFaults, OffLeavesTheCamera) {
   const Camera camera = test::camera(30, 512), same = stated(camera, 5, "off");
   EXPECT_EQ(same.intrinsics, camera.intrinsics);
