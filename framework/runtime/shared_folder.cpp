@@ -63,11 +63,10 @@ SharedFolderState examine_shared(const fs::path& folder) {
     state.fault = "cannot look into the folder " + folder.string() + ": " + std::strerror(errno);
   else if (is_marked(folder, SharedLook::quick))
     state.is_store = true;
-  else if (!holds_nothing(folder) && is_marked(folder, SharedLook::listed))  // another host has just made it a store
-    state.is_store = true;
-  else if (!holds_nothing(folder))
-    state.fault = name + " holds other things and is no shared store of marrow" + kWhereTo;
-  else if (!state.may_write)
+  else if (!holds_nothing(folder)) {  // looked at once: another process may be making it a store just now
+    state.is_store = is_marked(folder, SharedLook::listed);
+    if (!state.is_store) state.fault = name + " holds other things and is no shared store of marrow" + kWhereTo;
+  } else if (!state.may_write)
     state.fault = name + " is empty, and this user may not write to it; ask its owner for the right";
   return state;
 }

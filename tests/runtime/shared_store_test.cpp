@@ -6,7 +6,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
+#include <thread>
 
 #include "framework/runtime/store_entry.hpp"
 #include "framework/runtime/store_folder.hpp"
@@ -345,6 +347,23 @@ TEST_F(SharedStoreTest, WhatIsCollected) {
   EXPECT_FALSE(fs::exists(temporary(elsewhere)));
   EXPECT_TRUE(fs::is_empty(folder / "claims"));
   EXPECT_TRUE(shared->entries().empty());
+}
+
+TEST_F(SharedStoreTest, ManyThatMakeItAtTheSameTimeAllUseIt) {
+  for (int round = 0; round < 100 && !HasFailure(); ++round) {
+    const fs::path place = folder / std::to_string(round);
+    fs::create_directory(place);
+    fs::permissions(place, fs::perms::owner_all);
+    std::atomic<int> ready{0};
+    std::vector<std::thread> makers;
+    for (int k = 0; k < 4; ++k)
+      makers.emplace_back([&] {
+        for (++ready; ready < 4;) std::this_thread::yield();
+        const marrow::SharedFolderState state = marrow::make_shared(place);
+        EXPECT_TRUE(state.is_store) << state.fault;
+      });
+    for (std::thread& maker : makers) maker.join();
+  }
 }
 
 TEST_F(SharedStoreTest, TheTimeIsThatOfTheFileSystem) {
