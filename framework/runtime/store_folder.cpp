@@ -92,6 +92,9 @@ FolderState examine_own(const fs::path& folder, mode_t mode) {
   Mark mark = mark_of(folder);
   const bool is_new = mark == Mark::none && holds_nothing(folder);
   if (mark == Mark::none && !is_new) mark = mark_of(folder);  // another process may just have made it a store
+  // Such a process makes the folder private before it marks it. So the mode of before may no longer hold.
+  struct stat status;
+  if (mark == Mark::ours && stat(folder.c_str(), &status) == 0) mode = status.st_mode;
   const std::string name = "the folder " + folder.string();
   if (mark == Mark::other_layout) return {false, name + " is a store of another version of marrow" + kChooseAnother};
   if (mark != Mark::ours && !is_new)
@@ -116,7 +119,9 @@ FolderState examine_store(const fs::path& folder) {
   if (stat(folder.c_str(), &status) != 0) {
     const int number = errno;
     if (number == ENOENT && lstat(folder.c_str(), &status) != 0) return {};
-    return {false, "cannot use the folder " + folder.string() + ": " + std::strerror(number) + kChooseAnother};
+    // If it is no link, another process has made it in the meantime.
+    if (number != ENOENT || S_ISLNK(status.st_mode))
+      return {false, "cannot use the folder " + folder.string() + ": " + std::strerror(number) + kChooseAnother};
   }
   if (!S_ISDIR(status.st_mode)) return {false, folder.string() + " is no folder" + kChooseAnother};
   if (status.st_uid != geteuid())

@@ -5,9 +5,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
+#include <functional>
 #include <set>
+#include <thread>
 
 #include "framework/runtime/folder_use.hpp"
 #include "marrow/runtime/store.hpp"
@@ -324,6 +327,38 @@ TEST_F(StoreFolderTest, ItIsTidiedOnceAMinuteWhateverTheClockOnceSaid) {
   fs::last_write_time(folder / "tidied", fs::file_time_type::clock::now() + std::chrono::hours(24 * 365));
   EXPECT_EQ(store.tidy(), "");
   EXPECT_FALSE(store.find(marrow::hash_of(1)));
+}
+
+/// What `look` says first that is not empty, while `change` goes on in another thread.
+std::string said_during(const std::function<void()>& change, const std::function<std::string()>& look) {
+  std::string said;
+  std::atomic<bool> has_looked{false}, is_over{false};
+  std::thread other([&] {
+    while (!has_looked) std::this_thread::yield();
+    change();
+    is_over = true;
+  });
+  for (; !is_over; has_looked = true)
+    if (said.empty()) said = look();
+  other.join();
+  return said;
+}
+
+TEST_F(StoreFolderTest, AFolderThatAnotherProcessMakesIsNoFault) {
+  for (int round = 0; round < 100 && !HasFailure(); ++round) {
+    EXPECT_EQ(said_during([&] { fs::create_directory(folder); }, [&] { return store.fault(); }), "");
+    fs::remove(folder);
+  }
+}
+
+TEST_F(StoreFolderTest, AFolderThatAnotherProcessMakesPrivateIsNoFault) {
+  for (int round = 0; round < 100 && !HasFailure(); ++round) {
+    fs::create_directory(folder);
+    chmod(folder.c_str(), 0775);
+    const Store other(folder);
+    EXPECT_EQ(said_during([&] { EXPECT_EQ(other.prepare(), ""); }, [&] { return store.fault(); }), "");
+    fs::remove_all(folder);
+  }
 }
 
 }  // namespace store_folder_test
