@@ -45,8 +45,14 @@ std::shared_ptr<const void> use_folder(const fs::path& folder) {
 
 void rename_unused(const fs::path& folder, const fs::path& to, std::error_code& error) {
   const OpenFolder held(folder);
+  const bool is_gone = held.descriptor < 0 && errno == ENOENT;
   if (held.descriptor >= 0 && flock(held.descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
     error = std::make_error_code(std::errc::device_or_resource_busy);
+    return;
+  }
+  // If it was gone, or another process renamed it until it was locked, a new one may be there, which is not locked.
+  if (is_gone || (held.descriptor >= 0 && !is_still(held, folder))) {
+    error = std::make_error_code(std::errc::no_such_file_or_directory);
     return;
   }
   fs::rename(folder, to, error);

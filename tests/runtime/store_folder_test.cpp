@@ -361,4 +361,30 @@ TEST_F(StoreFolderTest, AFolderThatAnotherProcessMakesPrivateIsNoFault) {
   }
 }
 
+TEST_F(StoreFolderTest, ACaseInUseStaysWhileOthersRemoveTheOneBefore) {
+  const fs::path one = scratch.path / "case";
+  std::atomic<bool> is_over{false};
+  std::vector<std::thread> removers;
+  for (int k = 0; k < 4; ++k)
+    removers.emplace_back([&, to = scratch.path / ("removed-" + std::to_string(k))] {
+      while (!is_over) {
+        std::error_code error;
+        marrow::rename_unused(one, to, error);
+        if (!error) fs::remove(to, error);
+      }
+    });
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(2);
+  while (std::chrono::steady_clock::now() < end && !HasFailure()) {
+    std::error_code error;
+    fs::create_directory(one, error);
+    const std::shared_ptr<const void> use = marrow::use_folder(one);
+    for (int i = 0; use && i < 5; ++i) {
+      std::this_thread::yield();
+      EXPECT_TRUE(fs::exists(one));
+    }
+  }
+  is_over = true;
+  for (std::thread& remover : removers) remover.join();
+}
+
 }  // namespace store_folder_test
