@@ -134,6 +134,13 @@ void kill_group(pid_t process) {
   kill(-process, SIGKILL);
 }
 
+/// Waits until the process has ended and returns its status. A signal handler of the program interrupts a wait.
+int status_of_ended(pid_t process) {
+  int status = 0;
+  while (waitpid(process, &status, 0) < 0 && errno == EINTR) continue;
+  return status;
+}
+
 std::string with_number(const char* form, double value) {
   char text[80];
   std::snprintf(text, sizeof text, form, value);
@@ -159,7 +166,7 @@ Worker::~Worker() {
 void Worker::close() {
   if (process_ <= 0) return;
   kill_group(process_);
-  waitpid(process_, nullptr, 0);
+  status_of_ended(process_);
   process_ = -1;
   is_busy_ = false;
 }
@@ -226,14 +233,13 @@ std::optional<WorkerEnd> Worker::understand(const std::string& line, const Said&
 }
 
 WorkerEnd Worker::died() {
-  int status = 0;
   siginfo_t gone{};
   // Its output has ended. If the process itself has not ended after a second, it is of no use and is killed.
   for (int i = 0; i < 100 && waitid(P_PID, id_t(process_), &gone, WEXITED | WNOHANG | WNOWAIT) == 0 && gone.si_pid == 0;
        ++i)
     usleep(10'000);
   kill_group(process_);
-  waitpid(process_, &status, 0);
+  const int status = status_of_ended(process_);
   process_ = -1;
   is_busy_ = false;
   WorkerEnd end;

@@ -7,6 +7,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <chrono>
 #include <fstream>
 #include <thread>
 
@@ -161,6 +163,33 @@ TEST(Worker, WhatItHasStartedEndsWithIt) {
     ASSERT_GT(child, 0);
     EXPECT_TRUE(comes_to(child, std::string("ZX\0", 3))) << then;
   }
+}
+
+TEST(Worker, SignalsOfTheProgramLoseNoEnd) {
+  struct sigaction handled = {}, before = {};
+  handled.sa_handler = [](int) {};
+  sigaction(SIGUSR1, &handled, &before);  // without SA_RESTART, as Python has it
+  const pthread_t here = pthread_self();
+  std::atomic<bool> is_over{false};
+  std::thread signals([&] {
+    while (!is_over) {
+      pthread_kill(here, SIGUSR1);
+      std::this_thread::sleep_for(std::chrono::microseconds(20));
+    }
+  });
+  for (int i = 0; i < 50; ++i) {
+    pid_t process = 0;
+    {
+      Worker worker({{MARROW_TEST_WORKER}, {}, true});
+      process = only_child();
+      worker.ask({{"do", "sleep"}});
+    }
+    EXPECT_EQ(state_of(process), '\0') << "a process that has ended stays where nobody waited for it";
+    EXPECT_EQ(ask({{"do", "crash"}}).signal, SIGSEGV);
+  }
+  is_over = true;
+  signals.join();
+  sigaction(SIGUSR1, &before, nullptr);
 }
 
 TEST(Worker, ProgramThatIsNotThereIsSaid) {
