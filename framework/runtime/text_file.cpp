@@ -21,6 +21,7 @@ namespace fs = std::filesystem;
 /// An open file, closed at the end of its scope.
 class OpenFile {
  public:
+  explicit OpenFile(int number) : number_(number) {}
   OpenFile(const fs::path& file, int flags) : number_(::open(file.c_str(), flags | O_CLOEXEC, 0666)) {}
   ~OpenFile() {
     if (number_ >= 0) ::close(number_);
@@ -37,14 +38,16 @@ class OpenFile {
 
 std::string reason() { return errno == ENOSPC || errno == EDQUOT ? "the disk is full" : std::strerror(errno); }
 
-/// A name next to the file that no other thread or process writes to, unless a process on another machine has the same
-/// number.
-fs::path free_temporary(const fs::path& file) {
+/// Opens a new file next to `file` for writing. Returns -1 with errno if this is not possible.
+int open_part(const fs::path& file, fs::path& temporary) {
   static std::atomic<int> count{0};
-  for (struct stat info{};;) {
-    fs::path name = file.parent_path() / (".part" + std::to_string(::getpid()) + "-" + std::to_string(++count));
-    if (::lstat(name.c_str(), &info) != 0) return name;
-  }
+  int number = -1;
+  // A name may be taken: a killed process left it, or a process in another container or machine has the same number.
+  do {
+    temporary = file.parent_path() / (".part" + std::to_string(::getpid()) + "-" + std::to_string(++count));
+    number = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  } while (number < 0 && errno == EEXIST);
+  return number;
 }
 
 }  // namespace
@@ -87,8 +90,8 @@ void write_text_file(const fs::path& file, const std::string& text, Kinds kinds)
     if (device < 0 || !write_all(device, text) || !device.close()) throw unwritten(reason());
     return;
   }
-  const fs::path temporary = free_temporary(file);
-  OpenFile descriptor(temporary, O_WRONLY | O_CREAT | O_EXCL);
+  fs::path temporary;
+  OpenFile descriptor(open_part(file, temporary));
   if (descriptor < 0) throw unwritten(reason());
   if (write_all(descriptor, text) && descriptor.close() && ::rename(temporary.c_str(), file.c_str()) == 0) return;
   const std::string why = reason();

@@ -2,7 +2,9 @@
 // Whole files: what is not read, and that no half one stands under its name.
 #include "framework/runtime/text_file.hpp"
 
+#include <sched.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <thread>
@@ -120,6 +122,41 @@ TEST_F(TextFileTest, ManyWritersLeaveOneWholeFile) {
   const std::string text = read_text_file(scratch.path / "file", 20000);
   EXPECT_EQ(text, std::string(20000, text[0]));
   EXPECT_EQ(files(), 1u);
+}
+
+/// Runs `work` as process 1 of a container of its own. Returns the process to wait for: its exit code is 0 if `work`
+/// returned true, 77 if the system gives no containers.
+pid_t in_container(const std::function<bool()>& work) {
+  const pid_t child = fork();
+  if (child != 0) return child;
+  if (unshare(CLONE_NEWUSER | CLONE_NEWPID) != 0) _exit(77);
+  const pid_t first = fork();
+  if (first == 0) _exit(work() ? 0 : 1);
+  int status = 0;
+  waitpid(first, &status, 0);
+  _exit(WIFEXITED(status) ? WEXITSTATUS(status) : 1);
+}
+
+TEST_F(TextFileTest, WritersOfTheSameNumberInTwoContainersDoNotMeet) {
+  for (int round = 0; round < 25 && !HasFailure(); ++round) {
+    const fs::path file = scratch.path / "file", begin = scratch.path / "begin";
+    std::vector<pid_t> writers;
+    for (int k = 0; k < 2; ++k)
+      writers.push_back(in_container([&] {
+        while (!fs::exists(begin)) continue;
+        for (int i = 0; i < 50; ++i)
+          if (fault_of([&] { write_text_file(file, "text"); }) != "none") return false;
+        return true;
+      }));
+    scratch.write("begin", "");
+    for (const pid_t writer : writers) {
+      int status = 0;
+      ASSERT_EQ(waitpid(writer, &status, 0), writer);
+      if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "the system gives no containers";
+      EXPECT_EQ(status, 0) << "round " << round;
+    }
+    fs::remove(begin);
+  }
 }
 
 TEST_F(TextFileTest, ReadsWhereStandardInputIsClosed) {
