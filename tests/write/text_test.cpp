@@ -5,7 +5,10 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <thread>
+#include <vector>
 
+#include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 #include "write/full_disk.hpp"
@@ -137,6 +140,19 @@ TEST(WriteText, AFolderOfThatNameIsNotReplaced) {
   std::filesystem::create_directory(folder / "p.yaml");
   EXPECT_SAYS(write(example_pose(), folder / "p.yaml"), "p.yaml: cannot be written");
   EXPECT_TRUE(std::filesystem::is_directory(folder / "p.yaml"));
+}
+
+TEST(WriteText, ThreadsThatWriteTheSameFileLeaveOneOfThemWhole) {
+  const TemporaryFolder folder;
+  std::vector<std::thread> writers;
+  for (int k = 0; k < 4; ++k)
+    writers.emplace_back([&, k] {
+      for (int i = 0; i < 200; ++i)
+        EXPECT_NO_THROW(marrow::files::write_text(folder / "file", std::string(20000, char('a' + k))));
+    });
+  for (std::thread& writer : writers) writer.join();
+  const std::string text = bytes_of(folder / "file");
+  EXPECT_EQ(text, std::string(20000, text.at(0)));
 }
 
 }  // namespace text_test

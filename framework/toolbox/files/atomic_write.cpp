@@ -3,6 +3,7 @@
 
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -21,7 +22,10 @@ void write_atomically(const fs::path& path, const std::function<void(const fs::p
     throw Error(path.string() + ": cannot be written, there is no folder " + folder.string());
   // Hidden, and with the same extension, because some writers choose the format by it.
   // replace_filename() is avoided: if it runs out of memory, GCC 12 leaves a path that cannot be destroyed.
-  const fs::path temporary = folder / (".part" + std::to_string(::getpid()) + "-" + path.filename().string());
+  // With a number, because another thread may write a file of the same name.
+  static std::atomic<unsigned> count{0};
+  const fs::path temporary =
+      folder / (".part" + std::to_string(::getpid()) + "-" + std::to_string(++count) + "-" + path.filename().string());
   try {
     fill(temporary);
     // A folder may only be replaced by a folder. rename() needs the old one to be removed first.
