@@ -193,7 +193,8 @@ const Access& Server::access() const { return parts_->access; }
 void Server::run(const std::atomic<bool>& stop) {
   std::atomic<bool> ended = false;
   std::thread watcher([&] {
-    while (!stop && !ended) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    // stop() does nothing before the server listens, and a signal may have come earlier.
+    while (!ended && !(stop && parts_->http.is_running())) std::this_thread::sleep_for(std::chrono::milliseconds(50));
     parts_->http.stop();
   });
   const bool was_good = parts_->http.listen_after_bind();
