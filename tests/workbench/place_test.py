@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """The page "Place" of `marrow open`: where a dragged bone comes to lie, its steps, and a registration from there."""
+import concurrent.futures
 import json
 import math
 import shlex
@@ -124,6 +125,27 @@ class RequestsTest(Placing, BenchTest):
 
         written = yaml.safe_load((self.scratch / "run" / "outputs" / "pose" / "distal.yaml").read_text())
         self.assertEqual(written["matrix"], found["matrix"])
+
+    def test_poses_of_requests_at_the_same_time_do_not_mix(self):
+        server = self.open()
+        self.opened(server)
+
+        def written(shift_mm):
+            """What the folder holds that is named in the answer."""
+            asked = {"case": "case", "poses": {"distal": [list(row) for row in truth()]}}
+            asked["poses"]["distal"][0][3] = shift_mm
+            begun = server.json("POST", "/api/place/verdict", asked)
+            server.json("POST", "/api/job/stop", {"job": begun["job"]})
+            server.finish(begun["job"])
+            folder = shlex.split(begun["command"])[-1].rpartition("=")[2]
+            import yaml
+
+            return yaml.safe_load((self.folder / folder / "distal.yaml").read_text())["matrix"][0][3]
+
+        with concurrent.futures.ThreadPoolExecutor(6) as pool:
+            for i in range(50):
+                shifts_mm = list(range(6 * i, 6 * i + 6))
+                self.assertEqual(list(pool.map(written, shifts_mm)), shifts_mm)
 
     def test_a_registration_can_be_stopped(self):
         server = self.open()

@@ -118,8 +118,10 @@ std::string write_placement(const OpenedFolder& folder, const std::string& into,
       if (holds_only(place, texts)) return name;
       continue;
     }
-    fs::create_directories(place, error);
+    fs::create_directories(place.parent_path(), error);
+    const bool is_made = !error && fs::create_directory(place, error);
     if (error) throw Error("the poses cannot be written to " + printable(place.string()) + ": " + error.message());
+    if (!is_made) continue;  // another request has just made it, and writes its own poses there
     for (const auto& [file, text] : texts) files::write_text(place / file, text);
     return name;
   }
