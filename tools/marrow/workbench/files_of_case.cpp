@@ -139,6 +139,7 @@ void move_in(const fs::path& staging, const fs::path& place, const PlannedCase& 
   const fs::path old_landmarks = staging / "landmarks.before";
   std::error_code none;
   std::vector<fs::path> moved;
+  bool are_landmarks_changed = false;
   if (fs::exists(place / "landmarks.yaml")) link_file(place / "landmarks.yaml", old_landmarks);
   try {
     for (const PlannedCase::File& file : plan.files)
@@ -151,9 +152,11 @@ void move_in(const fs::path& staging, const fs::path& place, const PlannedCase& 
       fs::rename(staging / "landmarks.yaml", place / "landmarks.yaml");
     else
       fs::remove(place / "landmarks.yaml");  // the last of them was removed
+    are_landmarks_changed = true;
     fs::rename(staging / "case.yaml", place / "case.yaml");
   } catch (...) {
     for (const fs::path& file : moved) fs::remove_all(file, none);
+    if (!are_landmarks_changed) throw;  // what is there now may be of another one that saves the case just now
     if (fs::exists(old_landmarks, none))
       fs::rename(old_landmarks, place / "landmarks.yaml", none);
     else
