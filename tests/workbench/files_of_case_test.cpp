@@ -7,12 +7,38 @@
 #include <thread>
 
 #include "runtime/fixture.hpp"
+#include "runtime/identities.hpp"
 
 namespace {
 
 using marrow::workbench::PlannedCase;
 using marrow::workbench::write_case_files;
 using runtime_fixture::Scratch;
+
+TEST(FilesOfCase, AFolderThatIsBeingSavedNamesItsProcessAmongAllHosts) {
+  const Scratch scratch;
+  std::string name;
+  write_case_files(scratch.path / "case", {}, "case", "",
+                   [&](const fs::path& staged) { name = staged.filename().string(); });
+  EXPECT_TRUE(name.starts_with(".saving-" + marrow::this_process() + "-")) << name;
+}
+
+TEST(FilesOfCase, OnlyWhatAnEndedProcessLeftIsRemoved) {
+  const Scratch scratch;
+  const fs::path place = scratch.path / "case";
+  const std::string ended = ".saving-" + runtime_fixture::ended_process() + "-1",
+                    elsewhere = ".saving-" + runtime_fixture::process_elsewhere() + "-1";
+  for (const std::string& name : {ended, elsewhere, std::string(".saving-4194304-1"), std::string(".saving-")})
+    fs::create_directories(place / name);
+  write_case_files(place, {}, "case", "", [](const fs::path&) {});
+  EXPECT_FALSE(fs::exists(place / ended));
+  EXPECT_FALSE(fs::exists(place / ".saving-4194304-1")) << "of an older version";
+  EXPECT_TRUE(fs::exists(place / elsewhere));
+  EXPECT_TRUE(fs::exists(place / ".saving-"));
+  fs::last_write_time(place / elsewhere, fs::file_time_type::clock::now() - std::chrono::hours(25));
+  write_case_files(place, {}, "case", "", [](const fs::path&) {});
+  EXPECT_FALSE(fs::exists(place / elsewhere)) << "nobody saves that long";
+}
 
 TEST(FilesOfCase, OfTwoThatSaveAtTheSameTimeTheLaterOneTakesNothingBack) {
   const Scratch scratch;

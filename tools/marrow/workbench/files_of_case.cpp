@@ -9,12 +9,14 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <vector>
 
 #include "marrow/domain/error.hpp"
+#include "runtime/process_identity.hpp"
 #include "workbench/case_text.hpp"
 
 namespace fs = std::filesystem;
@@ -116,14 +118,28 @@ void write_text(const fs::path& to, const std::string& text) {
   settle(file);
 }
 
-/// Folders that a crash left behind. Their names say which process made them.
+/// Whether the process that a folder's name says has ended. If that cannot be known, because it runs elsewhere or the
+/// host was started anew, it counts as ended after a day. An older marrow wrote only its number.
+bool is_left_over(const fs::path& folder, const std::string& name) {
+  const std::string writer = name.substr(std::strlen(kStaging), name.rfind('-') - std::strlen(kStaging));
+  if (is_identity(writer)) {
+    std::error_code error;
+    const auto written = fs::last_write_time(folder, error);
+    const bool is_old = !error && fs::file_time_type::clock::now() - written > std::chrono::hours(24);
+    const Life life = life_of(writer);
+    return life == Life::ended || (life == Life::unknown && is_old);
+  }
+  const int process = std::atoi(writer.c_str());
+  return process > 0 && kill(process, 0) != 0 && errno == ESRCH;
+}
+
+/// Folders that a crash left behind. Another host or container may be saving the same case just now.
 void remove_left_over(const fs::path& place) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(place, error)) {
     const std::string name = entry.path().filename().string();
-    if (!name.starts_with(kStaging)) continue;
-    const int process = std::atoi(name.c_str() + std::strlen(kStaging));
-    if (process > 0 && kill(process, 0) != 0 && errno == ESRCH) fs::remove_all(entry.path(), error);
+    if (name.starts_with(kStaging) && name.rfind('-') >= std::strlen(kStaging) && is_left_over(entry.path(), name))
+      fs::remove_all(entry.path(), error);
   }
 }
 
@@ -198,7 +214,7 @@ void write_case_files(const fs::path& place, const PlannedCase& plan, const std:
     fs::create_directories(place);
     remove_left_over(place);
     static std::atomic<int> count = 0;
-    staging = place / (kStaging + std::to_string(getpid()) + "-" + std::to_string(++count));
+    staging = place / (kStaging + this_process() + "-" + std::to_string(++count));
     fs::remove_all(staging);
     fs::create_directory(staging);
     for (const PlannedCase::File& file : plan.files) bring(file, staging);
