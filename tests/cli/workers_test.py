@@ -39,6 +39,12 @@ nodes:
   n: {uses: test.add, in: {a: w}}
 outputs: {number: n}
 """
+CRASH = """marrow: 1
+nodes:
+  w: {uses: test.work, with: {value: 3, path: p.yaml}}
+  m: {uses: test.misbehave, with: {how: crash}, in: {a: w}}
+outputs: {number: m}
+"""
 EXPERIMENT = (
     "experiment: 1\npipeline: p.yaml\ncases: {seeds: 1..2}\nmetrics: [number.value]\nvariants: {one: {}, two: {}}\n"
 )
@@ -59,6 +65,19 @@ class Workers(Case):
     def rows(self):
         with open(self.scratch / "out" / "cells.csv", newline="") as stream:
             return [(row["cell"], row["status"], row.get("number.value")) for row in csv.DictReader(stream)]
+
+    def test_a_crash_is_known_to_who_was_started_with_ends_of_children_ignored(self):
+        self.write("p.yaml", CRASH)
+        subprocess.run(
+            [MARROW, "compare", self.write("e.yaml", EXPERIMENT), "--out", self.scratch / "out"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "MARROW_PLUGIN_PATH": str(TEST_PLUGINS)},
+            preexec_fn=lambda: signal.signal(signal.SIGCHLD, signal.SIG_IGN),
+        )
+        with open(self.scratch / "out" / "cells.csv", newline="") as stream:
+            reasons = {row["reason"] for row in csv.DictReader(stream)}
+        self.assertEqual(reasons, {"crashed in node 'm': Segmentation fault"})
 
     def test_names_cannot_pass_for_answers(self):
         name = json.dumps('x\nend %s\n{"job": 1, "end": %s}\nx' % (FORGED, FORGED))

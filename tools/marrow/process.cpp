@@ -61,6 +61,9 @@ void prepare_process() {
     if (fcntl(stream, F_GETFD) < 0 && open("/dev/null", O_RDWR) < 0) break;  // open() takes the lowest free number
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
+  // Where whoever started it ignores the end of children, the system would not keep how the workers ended. It could
+  // also give their numbers to other processes at once.
+  std::signal(SIGCHLD, SIG_DFL);
 }
 
 int with_output_written(int code) {
