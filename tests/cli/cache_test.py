@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The store of results as a person meets it: where it is, what it refuses to touch, and that waiting is no failure."""
-import fcntl
 import os
 import re
 import stat
-import struct
 import subprocess
 import time
 
-from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow, wait_until
+from marrow_cli import MARROW, TEST_PLUGINS, Case, another_run_makes_all, main, marrow, wait_until
 
 NUMBER = "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: 3}}\noutputs: {number: c}\n"
 WRONG_NUMBERS = ("abc", "inf", "nan", "-5", "0,5", "1e12", "")
@@ -186,10 +184,7 @@ class Cache(Case):
         self.assertEqual(self.run_pipeline().returncode, 0)
         self.assertIn("1 results removed", self.marrow("cache", "gc", "--keep-gb", "0").stdout)
         out, said = self.scratch / "waits", "c: waits for another run that is making the same result"
-        with open(self.cache / "claims", "r+b") as claims:
-            fcntl.fcntl(
-                claims, 37, struct.pack("hhqqi", fcntl.F_WRLCK, os.SEEK_SET, 0, 0, 0)
-            )  # F_OFD_SETLK: another run makes all there is
+        with another_run_makes_all(self.cache):
             environment = dict(os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS), MARROW_CACHE=str(self.cache))
             process = subprocess.Popen(
                 [str(MARROW), "run", str(self.pipeline), "--out", str(out)],

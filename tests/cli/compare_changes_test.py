@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a kept cell, or a kept case, depends on: where any of it changes, nothing old passes for new."""
+import contextlib
 import csv
 import os
 import shutil
 import subprocess
 
-from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow, wait_until
+from marrow_cli import MARROW, TEST_PLUGINS, Case, another_run_makes_all, main, marrow, wait_until
 
 PIPELINE = """marrow: 1
 inputs: {case: {type: path}}
@@ -28,7 +29,7 @@ class Changes(Case):
         self.write("p.yaml", PIPELINE)
         self.write("other.txt", "one")
         self.add_case("1")
-        self.file = self.write("e.yaml", HEAD + "variants: {a: {}, b: {s.value: 0.7}}\n")
+        self.file = self.write("e.yaml", HEAD + "variants: {a: {}, b: {s.value: 0.1}}\n")
         self.environment = dict(
             os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS), MARROW_CACHE=str(self.scratch / "cache")
         )
@@ -64,24 +65,35 @@ class Changes(Case):
             {cell: figure for cell, figure in fresh.items() if figure},
         )
 
-    def changed_meanwhile(self, change, *arguments, code=2, place="a/1/0/cell.json"):
-        """What a comparison says when something changes once this is there: the row of a cell, or the folder of one
-        that has begun."""
-        process = subprocess.Popen(
-            [str(MARROW), "compare", str(self.file), "--out", "out", "--jobs", "1", *arguments],
-            env=self.environment,
-            cwd=self.scratch,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        self.addCleanup(process.wait)
-        self.addCleanup(process.kill)  # where the test ends before
-        wait_until((self.scratch / "out" / "cells" / place).exists, "no cell came")
-        change()
-        said = process.communicate(timeout=240)[1]
-        self.assertEqual(process.returncode, code, said)
-        return said
+    def know_cell_a(self):
+        """Makes all that cell a/1/0 needs, so that its row then comes from the store."""
+        whole, self.file = self.file, self.write("a.yaml", HEAD + "variants: {a: {}}\n")
+        self.compare("known")
+        self.file = whole
+
+    def changed_meanwhile(self, change, *arguments, code=2, waits=True):
+        """What a comparison says when something changes once the row of cell a/1/0 is there. Where it waits, that is
+        while the next cell waits for another run, so that it cannot end before."""
+        if waits:
+            self.know_cell_a()
+        said, row = self.scratch / "said", self.scratch / "out" / "cells" / "a" / "1" / "0" / "cell.json"
+        with another_run_makes_all(self.scratch / "cache") if waits else contextlib.nullcontext():
+            with open(said, "w") as stream:
+                process = subprocess.Popen(
+                    [str(MARROW), "compare", str(self.file), "--out", "out", "--jobs", "1", *arguments],
+                    env=self.environment,
+                    cwd=self.scratch,
+                    stdout=subprocess.DEVNULL,
+                    stderr=stream,
+                )
+            self.addCleanup(process.wait)
+            self.addCleanup(process.kill)  # where the test ends before
+            is_waiting = lambda: "waits for another run" in said.read_text()
+            wait_until(lambda: row.exists() and (not waits or is_waiting()), "no cell came")
+            change()
+        process.wait(timeout=240)
+        self.assertEqual(process.returncode, code, said.read_text())
+        return said.read_text()
 
     def test_a_file_that_an_option_names(self):
         self.compare("out")
@@ -107,13 +119,13 @@ class Changes(Case):
     def test_pictures_of_another_state_do_not_stay(self):
         head = HEAD.replace("timed_cells: 0", "timed_cells: 1")
         self.write("p.yaml", PIPELINE.replace("work: s}", "work: s, picture: r}"))
-        self.write("e.yaml", head + "pictures: [picture]\nvariants: {a: {s.value: 0.7}}\n")
+        self.write("e.yaml", head + "pictures: [picture]\nvariants: {a: {s.value: 4}}\n")
         self.compare("out")
         key = self.scratch / "out" / "pictures" / "a" / "1" / "0" / "key.txt"
         self.assertTrue(key.exists())
         (self.scratch / "out" / "cells" / "a" / "1" / "0" / "cell.json").unlink()
         self.write("other.txt", "two")
-        said = self.changed_meanwhile(lambda: self.write("other.txt", "three"))  # while the time is measured
+        said = self.changed_meanwhile(lambda: self.write("other.txt", "three"), waits=False)  # its time is measured
         self.assertIn("no pictures of a/1/0: what cell a/1/0 depends on changed", said)
         self.assertFalse(key.exists())
 
@@ -172,7 +184,7 @@ class Changes(Case):
             for content in ("two", "one"):
                 self.write("other.txt", content)
 
-        self.changed_meanwhile(change, code=0, place="b/1/0")
+        self.changed_meanwhile(change, code=0)
         self.assertEqual(
             self.figures("out", "reason"),
             {"a/1/0": "", "b/1/0": "a file that the cell needs was changed while it ran; run it again"},
@@ -196,11 +208,11 @@ class Changes(Case):
                 "  m: {uses: test.misbehave, in: {a: s}}\noutputs: {number: r, work: m}",
             ),
         )
-        self.write("e.yaml", HEAD + "variants: {a: {}, b: {s.value: 0.7}, crash: {m.how: crash}}\n")
+        self.write("e.yaml", HEAD + "variants: {a: {}, b: {s.value: 1.5}, crash: {m.how: crash}}\n")
 
     def test_a_case_that_comes_meanwhile(self):
         self.with_a_crash()
-        said = self.changed_meanwhile(lambda: self.add_case("0"), "--no-cache")
+        said = self.changed_meanwhile(lambda: self.add_case("0"), "--no-cache", waits=False)
         self.assertIn("the list of cases ('0' is new) was changed while the comparison ran", said)
         old = self.figures("out")
         self.assertEqual(
