@@ -9,7 +9,7 @@ import subprocess
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "cli"))
-from marrow_cli import MARROW, SOURCE, TEST_PLUGINS, Case, main, wait_until  # noqa: E402, F401
+from marrow_cli import MARROW, SOURCE, TEST_PLUGINS, Case, another_run_makes_all, main, wait_until  # noqa: E402, F401
 
 CASES, VARIANTS = 3, 6
 PIPELINE = """marrow: 1
