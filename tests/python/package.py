@@ -9,7 +9,7 @@ import sys
 import tempfile
 
 sys.path.insert(0, str(pathlib.Path(sys.argv[1]) / "tests" / "cli"))
-from marrow_cli import BUILD, MARROW, SHARED_CACHE, SOURCE, TEST_PLUGINS, Case, main  # noqa: E402, F401
+from marrow_cli import BUILD, MARROW, SHARED_CACHE, SOURCE, TEST_PLUGINS, Case, main, wait_until  # noqa: E402, F401
 
 FEMUR = SOURCE / "pipelines" / "femur.yaml"
 SCRATCH = pathlib.Path(tempfile.mkdtemp(prefix="marrow-python-"))
