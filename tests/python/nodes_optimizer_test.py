@@ -11,7 +11,7 @@ from written_nodes import Written, processes
 
 STEPS = """import time
 
-@marrow.optimizer("optimizer.steps", summary="steps along each axis", traits=["needs_start"], seconds=2)
+@marrow.optimizer("optimizer.steps", summary="steps along each axis", traits=["needs_start"], seconds=%d)
 def steps(problem: marrow.Problem, *, does: Annotated[str, "what it does"] = "steps") -> str:
     if does == "nothing":
         return "it is of no use"
@@ -27,7 +27,9 @@ def steps(problem: marrow.Problem, *, does: Annotated[str, "what it does"] = "st
         problem([1.0])
     if does == "hang":
         problem(problem.start)
-        time.sleep(60)
+        time.sleep(1000)
+    while does == "endless":
+        problem(problem.start)
     if does == "crash":
         problem(problem.start)
         import os
@@ -57,7 +59,7 @@ def bowl(x):
 class Optimizers(Written):
     def setUp(self):
         super().setUp()
-        self.file = self.plugin(STEPS)
+        self.file = self.plugin(STEPS % 600)
 
     def minimise(self, function=bowl, does="steps", **limits):
         return marrow.optimizer.steps(does=does).minimise(function, [0, 0], [0.5, 0.5], **limits)
@@ -126,10 +128,8 @@ def near():
         def broken(x):
             raise ValueError("no value here")
 
-        begun = time.monotonic()
         with self.assertRaisesRegex(ValueError, "no value here"):
             self.minimise(broken, does="swallow")
-        self.assertLess(time.monotonic() - begun, 10)
         self.assertEqual(processes(self.file), [])
 
     def test_what_it_may_not_do(self):
@@ -139,7 +139,6 @@ def near():
             ("raise", "mine.py, line [0-9]+, in steps: ValueError: no way down"),
             ("nan", "the optimizer asked for the value of a point that is not finite"),
             ("other size", r"expected points of 2 numbers, \[N, 2\] or \[2\], got 1"),
-            ("hang", r"took longer than 2 s, and .* give it more in @marrow.optimizer\(..., seconds=...\)"),
             ("crash", r"mine.py crashed its process \(Aborted\)"),
         ):
             with self.subTest(does), self.assertRaisesRegex(marrow.Error, text):
@@ -147,22 +146,33 @@ def near():
         with self.assertRaisesRegex(marrow.Error, "one positive initial step per coordinate"):
             marrow.optimizer.steps().minimise(bowl, [0, 0], [1])
 
+    def test_a_hang(self):
+        self.plugin(STEPS % 2)
+        text = r"took longer than 2 s, and .* give it more in @marrow.optimizer\(..., seconds=...\)"
+        with self.assertRaisesRegex(marrow.Error, text):
+            self.minimise(does="hang")
+
     def test_the_time_of_the_function_does_not_count(self):
+        self.plugin(STEPS % 5)
         asked = []
 
         def slow(x):
             asked.append(x)
-            time.sleep(3 if len(asked) == 1 else 0)  # longer than the optimizer may take
+            time.sleep(6 if len(asked) == 1 else 0)  # longer than the optimizer may take
             return bowl(x)
 
         self.assertEqual(self.minimise(slow).stopped_because, "the steps are short")
 
     def test_ctrl_c(self):
-        threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
-        begun = time.monotonic()
+        begun = threading.Event()
+
+        def interrupt():
+            begun.wait()
+            os.kill(os.getpid(), signal.SIGINT)
+
+        threading.Thread(target=interrupt, daemon=True).start()
         with self.assertRaises(KeyboardInterrupt):
-            self.minimise(lambda x: time.sleep(0.1) or numpy.random.default_rng().random())
-        self.assertLess(time.monotonic() - begun, 10)
+            self.minimise(lambda x: begun.set() or time.sleep(0.1) or bowl(x), does="endless")
 
     def test_threads_have_processes_of_their_own(self):
         optimizer = marrow.optimizer.steps()
