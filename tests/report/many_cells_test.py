@@ -11,7 +11,15 @@ import sys
 import synthetic
 from page import BrowserTest, run_tests
 
+# Both times are for a machine that does the work below in this time. On one that is slower, or busy, they are longer.
 MOST_SECONDS, MOST_BYTES, MOST_TASK_MS = 3, 20e6, 100
+WORK, WORK_MS = (
+    """const begin = performance.now(), list = [];
+    for (let i = 0, x = 1; i < 200000; ++i) list.push({id: 'cell-' + (x = x * 16807 % 2147483647), value: x});
+    list.sort((a, b) => a.value - b.value);
+    return performance.now() - begin""",
+    100,
+)
 ROWS = "return [...document.querySelectorAll('#cells tbody tr')].map((row) => row.dataset.id)"
 
 
@@ -33,6 +41,10 @@ class ManyCellsTest(BrowserTest):
     def choose_text(self, text):
         self.choose("Text", text, "#cells")
 
+    def slowness(self):
+        """How many times as long as the limits say everything may take at the moment."""
+        return max(1, self.browser.js(WORK) / WORK_MS)
+
     def longest_task_ms(self, steps):
         """The longest task of the page while it takes these steps, a list of functions in JavaScript, each in a task of
         its own. Tasks below 50 ms are not reported and count as 0."""
@@ -46,6 +58,7 @@ class ManyCellsTest(BrowserTest):
                 await wait(5);
               }
               await wait(150);
+              tasks.push(...watcher.takeRecords().map((t) => t.duration));
               watcher.disconnect();
               return Math.max(...tasks);
             })()"""
@@ -55,11 +68,12 @@ class ManyCellsTest(BrowserTest):
     def test_it_opens_soon_and_is_small(self):
         for _ in range(3):  # a busy machine may be late
             seconds = self.browser.open(self.page)
-            if seconds < MOST_SECONDS:
+            most = MOST_SECONDS * self.slowness()
+            if seconds < most:
                 break
         size = self.page.stat().st_size
         print("10,000 cells: ready in %.2f s, load %.1f, %.1f MB" % (seconds, os.getloadavg()[0], size / 1e6))
-        self.assertLess(seconds, MOST_SECONDS)
+        self.assertLess(seconds, most)
         self.assertLess(size, MOST_BYTES)
         self.assertEqual(self.texts("#cells .count"), ["10,000 runs"])
         failed = sum(cell["status"] == "failed" for cell in self.cells)
@@ -68,7 +82,7 @@ class ManyCellsTest(BrowserTest):
     def test_sorting_and_filtering_do_not_stall(self):
         self.browser.open(self.page)
         busy = "[() => {}, () => { const end = performance.now() + 120; while (performance.now() < end); }]"
-        self.assertGreater(self.longest_task_ms(busy), MOST_TASK_MS, "a stall is seen")
+        self.eventually(lambda: self.longest_task_ms(busy) > MOST_TASK_MS, True)  # a stall is seen
         sort = """[() => Page.table.orders.clear(),
             ...[...document.querySelectorAll('#cells .sort')].flatMap((b) => [() => b.click(), () => b.click()])]"""
         filters = """[() => Page.table.words.clear(),
@@ -87,11 +101,11 @@ class ManyCellsTest(BrowserTest):
           })"""
         for name, steps in (("sorting", sort), ("filtering", filters), ("scrolling", scroll)):
             for _ in range(8):  # a busy machine makes tasks longer
-                longest = self.longest_task_ms(steps)
-                if longest < MOST_TASK_MS:
+                longest, most = self.longest_task_ms(steps), MOST_TASK_MS * self.slowness()
+                if longest < most:
                     break
             print("10,000 cells, %s: longest task %.0f ms, load %.1f" % (name, longest, os.getloadavg()[0]))
-            self.assertLess(longest, MOST_TASK_MS, name)
+            self.assertLess(longest, most, name)
         self.assertEqual(self.texts("#cells .count"), ["10,000 runs"])
 
     def test_rows_are_in_order(self):
