@@ -56,7 +56,7 @@ class Server:
 
     def ask(self, method, path, body=None, **headers):
         """(status, headers, bytes) of the answer. Headers that are None are left out."""
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=120)
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=600)
         sent = {"Host": "127.0.0.1:%d" % self.port, "Cookie": self.cookie}
         if method != "GET":
             sent.update({"Content-Type": "application/json", "X-Marrow": "1"})
@@ -97,7 +97,7 @@ class Server:
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGTERM)
         try:
-            self.process.wait(60)
+            self.process.wait(200)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()

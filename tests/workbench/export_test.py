@@ -53,7 +53,7 @@ class ExportTest(XrayTest):
         command = shlex.split(self.text("[data-exported] code"))
         self.assertEqual(command[0], "marrow")
         out = self.scratch / "by-command"
-        ran = subprocess.run([MARROW, *command[1:], "--out", out], capture_output=True, text=True, timeout=120)
+        ran = subprocess.run([MARROW, *command[1:], "--out", out], capture_output=True, text=True, timeout=600)
         self.assertEqual(ran.returncode, 0, ran.stderr)
         return (out / "outputs" / output).read_bytes()
 

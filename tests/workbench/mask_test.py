@@ -76,12 +76,12 @@ class DistortedMaskTest(XrayTest):
     def saved_mask(self):
         """The mask of the view that read.case gives, after saving the case."""
         self.click('[data-do="save"]')
-        self.wait_text("[data-saved]", "Saved in", 60)
+        self.wait_text("[data-saved]", "Saved in", 240)
         pipeline = self.scratch / "read.yaml"
         pipeline.write_text(PIPELINE)
         out = self.scratch / "out"
         command = [MARROW, "run", pipeline, "case=" + str(self.folder / "knee"), "--out", out]
-        ran = subprocess.run(command, capture_output=True, text=True, timeout=120)
+        ran = subprocess.run(command, capture_output=True, text=True, timeout=600)
         self.assertEqual(ran.returncode, 0, ran.stderr)
         return read_png(out / "outputs" / "view" / "mask.png")
 

@@ -6,7 +6,6 @@ import json
 import math
 import shlex
 import subprocess
-import time
 
 import bench
 from bench import MARROW, BenchTest, PageTest
@@ -294,15 +293,15 @@ class PageOfCaseTest(PageOfCase, Placing, PageTest):
 
     def test_each_way_to_show_the_bone_changes_the_picture(self):
         self.place()
-        pictures = set()
+        pictures = []
         for mode in ("blend", "wipe", "checkerboard", "edges", "outline"):
             self.js("document.querySelector('[data-value=%s]').click()" % mode)
             self.browser.wait(
                 "return PlacePage.current().views.every((view) => !view.inFlight && view.paint.layers.size === 1)"
             )
-            time.sleep(0.1)
-            pictures.add(self.js("return document.querySelector('[data-view=frontal]').toDataURL()"))
-        self.assertEqual(len(pictures), 5)
+            picture = "document.querySelector('[data-view=frontal]').toDataURL()"
+            self.browser.wait("return !%s.includes(%s)" % (json.dumps(pictures), picture))  # it is drawn in time
+            pictures.append(self.js("return " + picture))
 
     def test_the_bone_stays_under_the_pointer_in_a_larger_image(self):
         self.place()

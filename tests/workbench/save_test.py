@@ -70,7 +70,7 @@ class SaveTest(BenchTest):
         for name in only or ("seeds", "views", "ct"):
             arguments += ["--only", name]
         environment = {**os.environ, "MARROW_CACHE": str(self.scratch / "store")}
-        ended = subprocess.run([MARROW, *arguments], capture_output=True, text=True, env=environment, timeout=200)
+        ended = subprocess.run([MARROW, *arguments], capture_output=True, text=True, env=environment, timeout=600)
         self.assertEqual(ended.returncode, 0, ended.stderr)
 
     def test_a_saved_case_is_read_and_a_second_save_copies_nothing(self):

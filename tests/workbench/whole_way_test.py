@@ -7,6 +7,7 @@ import os
 import shlex
 import shutil
 import subprocess
+import time
 import zlib
 
 import numpy
@@ -63,10 +64,10 @@ class WholeWayTest(PageTest):
 
     def until(self, condition):
         """Waits until what the server keeps fulfils it."""
-        for _ in range(400):
-            if condition(self.document()):
-                return
-        raise AssertionError(self.document())
+        end = time.monotonic() + 240
+        while not condition(self.document()):
+            self.assertLess(time.monotonic(), end, self.document())
+            time.sleep(0.05)
 
     def choose_ct(self):
         self.click('[data-do="choose-ct"]')

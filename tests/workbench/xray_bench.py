@@ -134,7 +134,7 @@ class XrayTest(PageTest):
             at += ("redo" in line) - ("undo" in line)
         return steps[at]
 
-    def find(self, selector, seconds=20):
+    def find(self, selector, seconds=120):
         self.browser.wait("return !!document.querySelector(%s)" % json.dumps(selector), seconds)
         return self.driver.find_element(By.CSS_SELECTOR, selector)
 
@@ -151,12 +151,12 @@ class XrayTest(PageTest):
     def text(self, selector):
         return self.find(selector).text
 
-    def wait_text(self, selector, part, seconds=20):
+    def wait_text(self, selector, part, seconds=120):
         self.find(selector, seconds)
         script = "return [...document.querySelectorAll(%s)].some((one) => one.textContent.includes(%s))"
         self.browser.wait(script % (json.dumps(selector), json.dumps(part)), seconds)
 
-    def until(self, condition, what, seconds=20):
+    def until(self, condition, what, seconds=120):
         end = time.monotonic() + seconds
         while not condition():
             self.assertLess(time.monotonic(), end, what)
