@@ -90,7 +90,7 @@ class Log(Case):
                 if not part:
                     break
                 shown += part
-            process.wait(timeout=60)
+            process.wait(timeout=300)
         os.close(master)
         self.assertRegex(shown, rb"\x1b\[33m[^\n]*mind the gap")
         self.assertNotIn("\x1b", (self.scratch / "coloured" / "log.txt").read_text())

@@ -103,22 +103,22 @@ class Records(Commands):
                     "a/pipeline.yaml is not what 'marrow run' wrote: the pipeline cannot be read: it is no regular"
                     " file; run it again"
                 ),
-                self.expect(2, *command, timeout=60).stderr,
+                self.expect(2, *command).stderr,
             )
-        self.expect(0, "show", "a", timeout=60)
+        self.expect(0, "show", "a")
         self.assertEqual(self.shown()["experiment"]["pipeline_text"], "")
         for name in ("a/pipeline.yaml", "/dev/zero"):
             for command in ("check", "graph", "run", "plan"):
                 self.assertEqual(
-                    self.expect(2, command, name, timeout=60).stderr,
+                    self.expect(2, command, name).stderr,
                     "%s: error: the pipeline file cannot be read: it is no regular file\n  hint: write the text to a"
                     " file and give that\n1 error\n" % name,
                 )
-            self.assertIn("it is no regular file", self.expect(2, "compare", name, "--out", "c", timeout=60).stderr)
+            self.assertIn("it is no regular file", self.expect(2, "compare", name, "--out", "c").stderr)
         self.assertFalse((self.scratch / "c").exists())
         (self.scratch / "out").symlink_to("/dev/stdout")
         page = subprocess.run(
-            [str(MARROW), "show", "b", "--out", "out"], cwd=self.scratch, capture_output=True, text=True, timeout=60
+            [str(MARROW), "show", "b", "--out", "out"], cwd=self.scratch, capture_output=True, text=True, timeout=300
         )
         self.assertIn("</html>", page.stdout, "a pipe that is named as the place of the page")
 
@@ -137,7 +137,7 @@ class Records(Commands):
             one["inputs"] = {port: "%032x" % 2 for port in one["inputs"]}
         nodes[-1]["keys"] = {"number": "%032x" % 3}
         self.write("b/run.json", json.dumps({**self.record, "nodes": nodes}))
-        self.assertIn("First difference: node 'c'", self.expect(1, "diff", "a", "b", timeout=120).stdout)
+        self.assertIn("First difference: node 'c'", self.expect(1, "diff", "a", "b", timeout=300).stdout)
 
     def shown(self):
         """What the page of the run holds."""

@@ -32,7 +32,7 @@ outputs: {sum: sum}
 """
 SLOW = """marrow: 1
 nodes:
-  s: {uses: test.sides, with: {names: [a, b, c, d, e, f, g, h]}}
+  s: {uses: test.sides, with: {names: [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p]}}
   r:
     repeat:
       nodes:
@@ -169,7 +169,7 @@ class Repetition(Runs):
         self.told(0, "run", "p.yaml", "--out", "again")
         work = self.nodes("again")["r/work"]
         self.assertGreaterEqual(work["cached"], 3)
-        self.assertEqual(work["cached"] + work["calls"], 8)
+        self.assertEqual(work["cached"] + work["calls"], 16)
         self.told(0, "run", "p.yaml", "--out", "whole", "--no-cache", "--threads", "1")
         self.assertIn("identical: all 5 nodes", self.told(0, "diff", "again", "whole"))
 

@@ -35,7 +35,7 @@ outputs: {number: total}
 """
 WORK = """marrow: 1
 nodes:
-  w: {uses: test.work, with: {value: 3, path: data}}
+  w: {uses: test.work, with: {value: 15, path: data}}
   n: {uses: test.add, in: {a: w}}
 outputs: {number: n}
 """
@@ -130,11 +130,11 @@ class Workers(Case):
             lambda: comparison.poll() is not None or "waits for another run" in said.read_text(),
             "it does not say that it waits",
         )
-        time.sleep(6)  # longer than a cell may take
+        time.sleep(6)  # longer than a cell may take, and shorter than the other run works
         self.assertIsNone(comparison.poll(), "it did not wait")
         other.send_signal(signal.SIGCONT)
         text = comparison.communicate(timeout=120)[0]
-        other.wait(timeout=60)
+        other.wait(timeout=120)
         errors = said.read_text()
         self.assertEqual(comparison.returncode, 0, errors)
         self.assertEqual([status for _, status, _ in self.rows()], ["done"] * 4, text)
