@@ -65,7 +65,7 @@ class Pairs:
             )
             time.sleep(gap_s if arguments is first else 0)
         with concurrent.futures.ThreadPoolExecutor(2) as pool:
-            texts = list(pool.map(lambda process: process.communicate(timeout=180), processes))
+            texts = list(pool.map(lambda process: process.communicate(timeout=400), processes))
         return [Ended(process.returncode, *text) for process, text in zip(processes, texts)]
 
     def try_pair(self, pair):

@@ -104,10 +104,10 @@ class Signals:
                 for stream in (process.stdout, process.stderr)
             ]
             try:
-                process.wait(180)
+                process.wait(400)
                 complaints = []
             except subprocess.TimeoutExpired:
-                complaints = ["it did not end within 180 s"]
+                complaints = ["it did not end within 400 s"]
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
             errors = texts[1].result().decode(errors="replace") if texts[1] else None
@@ -126,7 +126,7 @@ class Signals:
 
     @staticmethod
     def orphans(mark):
-        for _ in range(300):
+        for _ in range(600):
             left = processes_with(mark)
             if not left:
                 return []
