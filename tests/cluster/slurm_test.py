@@ -115,7 +115,7 @@ class OnSlurm(Cluster):
         return found
 
     def test_killed_tasks_and_controller(self):
-        self.experiment("0.2", cases=10)
+        self.experiment("1.5", cases=10)  # long enough that tasks are left to be held
         process = self.start()
         for _ in range(2):
             wait_until(lambda: self.send(signal.SIGKILL), "no task came")
@@ -125,7 +125,7 @@ class OnSlurm(Cluster):
         time.sleep(2)
         self.daemon("start", "slurmctld")
         self.send(signal.SIGCONT)
-        said, _ = process.communicate(timeout=200)
+        said, _ = process.communicate(timeout=600)
         self.assertEqual(process.returncode, 0, said)
         self.expect_same_as_here()
         self.assertRegex(self.compare("out", "--status").stdout, "submitted [23] times")  # the killed tasks' chunks
@@ -146,7 +146,7 @@ class OnSlurm(Cluster):
         subprocess.run(
             ["sbatch", "--quiet", "-p", "urgent", "-c", "2", "-o", "/dev/null", "--wrap", "sleep 1"], check=True
         )
-        said, _ = process.communicate(timeout=200)
+        said, _ = process.communicate(timeout=600)
         self.assertEqual(process.returncode, 0, said)
 
     def test_place_given_to_another_job(self):
@@ -178,19 +178,19 @@ class OnSlurm(Cluster):
         wait_until(lambda: len(self.parts_with_rows()) == 2, "no two tasks came")
         for task in tasks():  # now it kills the task itself, but not its processes that run cells
             pathlib.Path("/proc/%d/oom_score_adj" % task).write_text("1000")
-        said, _ = process.communicate(timeout=200)
+        said, _ = process.communicate(timeout=600)
         self.assertEqual(process.returncode, 0, said)
         self.expect_reasons("it took more memory than the cluster allows (OUT_OF_MEMORY)")
         self.assertEqual(sum(row["status"] == "done" for row in self.figures("out").values()), 2 * VARIANTS)
 
     def test_ctrl_c_and_again(self):
         self.only_with_all()
-        self.experiment("0.2", cases=10)
+        self.experiment("2", cases=10)
         process = self.start()
         wait_until(tasks, "no task came")
         time.sleep(3)
         process.send_signal(signal.SIGINT)
-        said, _ = process.communicate(timeout=60)
+        said, _ = process.communicate(timeout=300)
         self.assertEqual(process.returncode, 130, said)
         self.assertIn("its tasks were cancelled; the same command goes on from here", said)
         wait_until(lambda: not tasks(), "tasks go on")
@@ -205,7 +205,7 @@ class OnSlurm(Cluster):
         subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "none", self.out], check=True)
         try:
             process = self.start()
-            said, _ = process.communicate(timeout=100)
+            said, _ = process.communicate(timeout=600)
             self.assertEqual(process.returncode, 2, said)
             self.assertRegex(said, "the cluster holds tasks back|ended without a report")
             subprocess.run(["mount", "-o", "remount,size=100m", self.out], check=True)
