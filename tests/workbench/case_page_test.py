@@ -5,6 +5,7 @@ keys. Its X-ray views are in the draft from the beginning."""
 import os
 import re
 import subprocess
+import time
 
 import yaml
 
@@ -57,7 +58,7 @@ class CasePageTest(PageTest):
         return 'section[aria-label="%s"] ' % title
 
     def wait(self, condition):
-        self.browser.wait("return " + condition, 60)
+        self.browser.wait("return " + condition, 240)
 
     def type_name(self, panel, name):
         box = self.css(self.panel(panel) + 'input[type="text"]')
@@ -112,11 +113,11 @@ class CasePageTest(PageTest):
 
     def saved_when(self, condition):
         """Waits until the kept document fulfils it, and returns it."""
-        for _ in range(200):
-            document = self.document()
-            if condition(document):
-                return document
-        raise AssertionError(document)
+        end = time.monotonic() + 120
+        while not condition(document := self.document()):
+            self.assertLess(time.monotonic(), end, document)
+            time.sleep(0.05)
+        return document
 
     def add_seed(self, fragment, index):
         self.click('[data-tool="seed %s"]' % fragment)
@@ -227,7 +228,7 @@ class CasePageTest(PageTest):
         chain.move_by_offset(round(2 * scale), 0).move_by_offset(round(scale), 0).release().perform()
         moved = self.saved_when(lambda document: document["fragments"]["distal"]["seeds"][0][0] > 21)
         self.assertAlmostEqual(moved["fragments"]["distal"]["seeds"][0][0], 23, delta=0.2)
-        self.assertEqual(self.css('[data-do="undo"]').get_attribute("title"), "Undo: move a seed of distal")
+        self.wait("document.querySelector('[data-do=undo]').title === 'Undo: move a seed of distal'")
         self.click('[data-do="undo"]')
         self.saved_when(lambda document: document["fragments"]["distal"]["seeds"] == [[20, 18, 11]])
 

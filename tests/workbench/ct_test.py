@@ -290,7 +290,7 @@ class CtPageTest(PageTest):
             builder.pointer_action.move_to(canvas).pointer_down(2).move_by(dx, dy).pointer_up(2)
             builder.perform()
             boxes = "[...document.querySelectorAll('.ct-panel input.short')].slice(-2).map((one) => one.value)"
-            self.browser.wait("return %s.join() === '%s'" % (boxes, ",".join(changed)), 10)
+            self.browser.wait("return %s.join() === '%s'" % (boxes, ",".join(changed)))
 
     def go_to_slice(self, name, number):
         self.browser.js(
