@@ -45,7 +45,7 @@ def marrow(*arguments, plugins=(), cwd=None, timeout=300, extra_environment=None
     )
 
 
-def wait_until(condition, what, seconds=120):
+def wait_until(condition, what, seconds=300):
     """Returns when the condition holds, which may take long on a machine that has other work."""
     end = time.monotonic() + seconds
     while not condition():

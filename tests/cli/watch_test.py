@@ -67,7 +67,8 @@ class Watch(Case):
                 and fault in state["fault"]
             )
 
-        wait_until(is_there, "%s, %r: %s" % (report, fault, self.state(folder)))
+        # A plugin may have to be built first.
+        wait_until(is_there, "%s, %r: %s" % (report, fault, self.state(folder)), 600)
 
     def test_data(self):
         pose = (SOURCE / "pipelines/wrist/radius-0002.pose.yaml").read_text()
