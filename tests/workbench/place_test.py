@@ -150,9 +150,14 @@ class RequestsTest(Placing, BenchTest):
         server = self.open()
         about = self.opened(server)
         asked = {"case": "case", "pipeline": about["pipelines"][0]["file"], "poses": {"distal": truth()}}
-        job = server.json("POST", "/api/place/register", asked)["job"]
-        server.json("POST", "/api/job/stop", {"job": job})
-        self.assertEqual(server.finish(job)["state"], "stopped")
+        for _ in range(5):  # on a busy machine the stop may come too late
+            asked["poses"]["distal"][0][3] += 0.5
+            job = server.json("POST", "/api/place/register", asked)["job"]
+            server.json("POST", "/api/job/stop", {"job": job})
+            state = server.finish(job)["state"]
+            if state == "stopped":
+                break
+        self.assertEqual(state, "stopped")
 
 
 class PageOfCaseTest(PageOfCase, Placing, PageTest):
