@@ -126,15 +126,15 @@ TEST_F(SharedClaimTest, AnOwnerElsewhereThatGivesNoSignOfLifeLosesIt) {
 
 TEST_F(SharedClaimTest, AnOwnerElsewhereThatGivesSignsOfLifeKeepsIt) {
   std::atomic<bool> cancelled{false};
-  claim_elsewhere("0.5", 0);
+  claim_elsewhere("3", 0);
   std::thread owner([&] {
-    for (int beat = 1; beat <= 20; ++beat) {
+    for (int beat = 1; beat <= 40; ++beat) {
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
-      claim_elsewhere("0.5", beat);
+      claim_elsewhere("3", beat);
     }
     cancelled = true;
   });
-  EXPECT_GE(seconds_to_claim(&cancelled), 2);
+  EXPECT_GE(seconds_to_claim(&cancelled), 3.5);
   owner.join();
   EXPECT_FALSE(is_held);
 }
