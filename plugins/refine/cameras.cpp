@@ -68,7 +68,7 @@ class Refinement {
       converged_ = descend(true, context, first);
       expand(true);
     }
-    covariance_ = inverse_of(equations().first);
+    covariance_ = weight_ * inverse_of(equations().first) + of_other_scales_;
   }
 
   bool converged() const { return converged_; }
@@ -107,6 +107,7 @@ class Refinement {
     double evidence = 0;
     State state;
     std::vector<Model> models;
+    Eigen::MatrixXd covariance;
   };
 
   /// Compares every n-th pixel from now on.
@@ -122,24 +123,48 @@ class Refinement {
   }
 
   /// Finds the most probable state if the cameras are off as expected, a tenth and a hundredth of it, and keeps the one
-  /// with the largest marginal likelihood. So cameras that are right stay as they are.
+  /// with the largest marginal likelihood. So cameras that are right stay as they are. The others count in the
+  /// covariance by their likelihood: where the images hardly tell how far the cameras are off, all of them may be
+  /// right.
   void choose_scale(Context& context) {
     const State given = state_;
-    Found best;
+    std::vector<Found> all;
     std::vector<Model> at_given;
     for (const double scale : {1.0, 0.1, 0.01}) {
       scale_ = scale;
       if (scale < 1) state_ = given, models_ = at_given;
       const bool converged = descend(scale == 1, context, at_given);
       expand(scale == 1);
-      const Found found{scale, converged, evidence(), state_, models_};
+      all.push_back({scale, converged, evidence(), state_, models_, inverse_of(equations().first)});
       char text[96];
       std::snprintf(text, sizeof text, "cameras off by %g times what is expected: log evidence %.4g", scale,
-                    found.evidence);
+                    all.back().evidence);
       context.debug(text);
-      if (scale == 1 || found.evidence > best.evidence) best = found;
     }
+    const auto by_evidence = [](const Found& a, const Found& b) { return a.evidence < b.evidence; };
+    const Found& best = *std::max_element(all.begin(), all.end(), by_evidence);
     scale_ = best.scale, converged_ = best.converged, state_ = best.state, models_ = best.models;
+    double sum = 0;
+    of_other_scales_ = Eigen::MatrixXd::Zero(best.covariance.rows(), best.covariance.cols());
+    for (const Found& found : all) {
+      const double weight = std::exp(found.evidence - best.evidence);
+      sum += weight;
+      const Eigen::VectorXd way = way_to(found.state);
+      if (&found != &best) of_other_scales_ += weight * (found.covariance + way * way.transpose());
+    }
+    weight_ = 1 / sum;
+    of_other_scales_ /= sum;
+  }
+
+  /// From the state to another one, in degrees and mm.
+  Eigen::VectorXd way_to(const State& other) const {
+    Eigen::VectorXd way(at_motion(views_.size()));
+    for (std::size_t f = 0; f < poses_.size(); ++f)
+      way.segment<6>(at_pose(f)) = from_units(Vector6d::Ones())
+                                       .cwiseInverse()
+                                       .cwiseProduct(motion_between(state_.poses[f], other.poses[f], poses_[f].frame));
+    for (std::size_t v = 0; v < views_.size(); ++v) way.segment<6>(at_motion(v)) = other.motions[v] - state_.motions[v];
+    return way;
   }
 
   static Eigen::Index at_pose(std::size_t bone) { return 6 * Eigen::Index(bone); }
@@ -283,7 +308,9 @@ class Refinement {
   std::vector<Model> models_;
   std::vector<double> noise_;  ///< of each bone's cost in one view
   State state_;
-  double scale_ = 1;  ///< of the deviations that the options expect
+  double scale_ = 1;                 ///< of the deviations that the options expect
+  double weight_ = 1;                ///< the probability of this scale
+  Eigen::MatrixXd of_other_scales_;  ///< their part of the covariance
   bool converged_ = false;
   Eigen::MatrixXd covariance_;  ///< in degrees and mm
 };

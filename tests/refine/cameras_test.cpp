@@ -163,6 +163,18 @@ TEST(RefineCameras, CamerasThatAreRightStay) {
   }
 }
 
+TEST(RefineCameras, WhereImagesHardlyTellHowFarTheCamerasAreOffTheDeviationsSaySo) {
+  const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
+  const auto deviation_mm = [&](double information) {
+    const auto outputs = shipped::call("refine.cameras", inputs({Bone({none, none}, information)}));
+    return figure(motions(outputs, 0), "predicted_shift_u_mm");
+  };
+  const double expected_mm = std::sqrt(1 / 3.0 + 25 / 2.0 * std::pow(600 / 1700.0, 2));
+  EXPECT_NEAR(deviation_mm(1e4), expected_mm / 100, 0.05 * expected_mm / 100) << "they are right";
+  EXPECT_GT(deviation_mm(10), expected_mm / 20) << "they are most probably right";
+  EXPECT_LT(deviation_mm(10), expected_mm / 2);
+}
+
 TEST(RefineCameras, TwoBonesShareTheCameras) {
   const RigidTransform frontal = motion({0.4, 0, -0.3}, {1, 1, 0}), lateral = motion({0, 0.5, 0}, {0, -1.5, 1});
   const std::vector<Bone> bones{Bone({frontal, lateral}), Bone({frontal, lateral}, 1e4, -60)};
