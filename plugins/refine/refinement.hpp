@@ -1,0 +1,311 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Cameras by the bones that their images show. A view whose camera is off by a motion sees each bone in a pose that is
+// off by the same motion, for all bones. So no image is projected anew: a cost that can be split into views tells which
+// pose each view alone would like. Sought are the poses of the bones and one motion for each view. They minimise the
+// sum of the costs, in units of their noise, and of the squares of the motions, in units of the deviations expected of
+// a calibration (a Gaussian prior). The minimum is found by Levenberg and Marquardt's steps. The curvature there gives
+// the covariance of all poses and motions together (Laplace's approximation).
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <marrow/domain/decompositions.hpp>
+#include <marrow/plugin.hpp>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bone_in_view.hpp"
+#include "sight.hpp"
+
+namespace marrow::refine {
+
+/// See the help texts in cameras.cpp.
+struct Options : ExpectedErrors {
+  double contour_spacing_px = 2;
+  double reach_px = 6;
+  std::vector<double> pixel_step{2};
+  int max_rounds = 15;
+  std::string reference;
+};
+
+/// What is sought: a pose for each bone, and a motion in degrees and mm for each view.
+struct State {
+  std::vector<RigidTransform> poses;
+  std::vector<Vector6d> motions;
+};
+
+class Refinement {
+ public:
+  Refinement(const List<Cost>& costs, const List<Pose>& poses, const List<View>& views, const Options& options)
+      : costs_(costs), poses_(poses), views_(views), options_(options) {
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    for (const Pose& pose : poses) centre += pose.world_from_model * pose.frame.origin_mm / double(poses.size());
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      sights_.push_back(sight_of(views[v], centre, options));
+      if (views.name(v) == options.reference) sights_.back().deviation *= kOfReference;
+    }
+    for (const Pose& pose : poses) state_.poses.push_back(pose.world_from_model);
+    state_.motions.assign(views.size(), Vector6d::Zero());
+  }
+
+  /// Chooses the scale with the first pixel step, and goes on with the others, as from an approximate state.
+  void run(Context& context) {
+    compare_each(options_.pixel_step.front());
+    choose_scale(context);
+    for (std::size_t i = 1; i < options_.pixel_step.size(); ++i) {
+      compare_each(options_.pixel_step[i]);
+      std::vector<Model> first;
+      converged_ = descend(true, context, first);
+      expand(true);
+    }
+    covariance_ = weight_ * inverse_of(equations().first) + of_other_scales_;
+  }
+
+  bool converged() const { return converged_; }
+  /// How far off the cameras are, in units of what the options expect.
+  double scale() const { return scale_; }
+  const State& state() const { return state_; }
+  const Sight& sight(std::size_t view) const { return sights_[view]; }
+  /// The cost of a bone, as the mean over the views with their cameras corrected.
+  double cost(std::size_t bone) const {
+    double sum = 0;
+    for (std::size_t v = 0; v < views_.size(); ++v) sum += models_[bone * views_.size() + v].value;
+    return sum / double(views_.size());
+  }
+  Matrix6d covariance_of_pose(std::size_t bone) const { return covariance_.block<6, 6>(at_pose(bone), at_pose(bone)); }
+  /// Of the bone's small motion relative to the first bone: what both are off by in common does not count.
+  Matrix6d covariance_beside_first(std::size_t bone) const {
+    const auto frame_of = [&](std::size_t f) -> FragmentFrame {
+      return {state_.poses[f] * poses_[f].frame.origin_mm, state_.poses[f].rotation * poses_[f].frame.axes};
+    };
+    Matrix6d change = change_of_frame(frame_of(0), frame_of(bone));  // the first bone's motion, as one of this bone
+    change.bottomLeftCorner<3, 3>() *= radians(1);                   // rotations are in degrees here
+    const Matrix6d both = covariance_.block<6, 6>(at_pose(bone), at_pose(0)) * change.transpose();
+    return covariance_of_pose(bone) - both - both.transpose() + change * covariance_of_pose(0) * change.transpose();
+  }
+  Vector6d deviation_of_motion(std::size_t view) const {
+    return covariance_.diagonal().segment<6>(at_motion(view)).cwiseMax(0).cwiseSqrt();
+  }
+
+ private:
+  static constexpr double kOfReference = 1e-3;  ///< how far the reference may move, of what is expected of the others
+
+  /// The most probable state for a scale.
+  struct Found {
+    double scale = 1;
+    bool converged = false;
+    double evidence = 0;
+    State state;
+    std::vector<Model> models;
+    Eigen::MatrixXd covariance;
+  };
+
+  /// Compares every n-th pixel from now on.
+  void compare_each(double pixel_step) {
+    in_views_.clear();
+    levels_.clear();
+    for (std::size_t f = 0; f < poses_.size(); ++f) {
+      levels_.push_back(costs_[f].at_level({options_.contour_spacing_px, options_.reach_px, int(pixel_step)}));
+      for (std::size_t v = 0; v < views_.size(); ++v) in_views_.emplace_back(*levels_[f], poses_[f].frame, v, views_);
+    }
+    noise_.assign(poses_.size(), 0.0);
+    models_.assign(in_views_.size(), Model());
+  }
+
+  /// Finds the most probable state if the cameras are off as expected, a tenth and a hundredth of it, and keeps the one
+  /// with the largest marginal likelihood. So cameras that are right stay as they are. The others count in the
+  /// covariance by their likelihood: where the images hardly tell how far the cameras are off, all of them may be
+  /// right.
+  void choose_scale(Context& context) {
+    const State given = state_;
+    std::vector<Found> all;
+    std::vector<Model> at_given;
+    for (const double scale : {1.0, 0.1, 0.01}) {
+      scale_ = scale;
+      if (scale < 1) state_ = given, models_ = at_given;
+      const bool converged = descend(scale == 1, context, at_given);
+      expand(scale == 1);
+      all.push_back({scale, converged, evidence(), state_, models_, inverse_of(equations().first)});
+      char text[96];
+      std::snprintf(text, sizeof text, "cameras off by %g times what is expected: log evidence %.4g", scale,
+                    all.back().evidence);
+      context.debug(text);
+    }
+    const auto by_evidence = [](const Found& a, const Found& b) { return a.evidence < b.evidence; };
+    const Found& best = *std::max_element(all.begin(), all.end(), by_evidence);
+    scale_ = best.scale, converged_ = best.converged, state_ = best.state, models_ = best.models;
+    double sum = 0;
+    of_other_scales_ = Eigen::MatrixXd::Zero(best.covariance.rows(), best.covariance.cols());
+    for (const Found& found : all) {
+      const double weight = std::exp(found.evidence - best.evidence);
+      sum += weight;
+      const Eigen::VectorXd way = way_to(found.state);
+      if (&found != &best) of_other_scales_ += weight * (found.covariance + way * way.transpose());
+    }
+    weight_ = 1 / sum;
+    of_other_scales_ /= sum;
+  }
+
+  /// From the state to another one, in degrees and mm.
+  Eigen::VectorXd way_to(const State& other) const {
+    Eigen::VectorXd way(at_motion(views_.size()));
+    for (std::size_t f = 0; f < poses_.size(); ++f)
+      way.segment<6>(at_pose(f)) = from_units(Vector6d::Ones())
+                                       .cwiseInverse()
+                                       .cwiseProduct(motion_between(state_.poses[f], other.poses[f], poses_[f].frame));
+    for (std::size_t v = 0; v < views_.size(); ++v) way.segment<6>(at_motion(v)) = other.motions[v] - state_.motions[v];
+    return way;
+  }
+
+  static Eigen::Index at_pose(std::size_t bone) { return 6 * Eigen::Index(bone); }
+  Eigen::Index at_motion(std::size_t view) const { return 6 * Eigen::Index(poses_.size() + view); }
+
+  RigidTransform seen(const State& state, std::size_t bone, std::size_t view) const {
+    return sights_[view].motion(state.motions[view]) * state.poses[bone];
+  }
+
+  /// Minus the logarithm of the posterior density.
+  double energy(const State& state) const {
+    double sum = 0;
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+      sum += 0.5 * state.motions[v].cwiseQuotient(scale_ * sights_[v].deviation).squaredNorm();
+      for (std::size_t f = 0; f < poses_.size(); ++f)
+        sum += in_views_[f * views_.size() + v].value(seen(state, f, v)) / noise_[f];
+    }
+    return sum;
+  }
+
+  /// Moves the models to the state. Their curvatures stay.
+  void move_models() {
+    for (std::size_t i = 0; i < models_.size(); ++i)
+      in_views_[i].move(models_[i], seen(state_, i / views_.size(), i % views_.size()));
+  }
+
+  /// Makes the models anew, and if wanted the noises. The noise of a cost is by how much it rises, in the mean over six
+  /// directions, where the pose moves by what the scatter of its blocks predicts (as for the predicted covariance of a
+  /// registration), times 2; and twice this, because blocks do not see an error that is common to several of them
+  /// (docs/results.md).
+  void expand(bool with_noise) {
+    constexpr double kWantedRise = 2.5, kUnseen = 2;  // the rise in units of the noise
+    for (std::size_t f = 0; f < poses_.size(); ++f) {
+      Matrix6d curvature = Matrix6d::Zero(), scatter = Matrix6d::Zero();
+      for (std::size_t v = 0; v < views_.size(); ++v) {
+        Model& model = models_[f * views_.size() + v];
+        model = in_views_[f * views_.size() + v].model_at(seen(state_, f, v), kWantedRise * noise_[f], with_noise);
+        curvature += model.curvature;
+        scatter += model.scatter;
+      }
+      if (!with_noise) continue;
+      const Matrix6d ridge = 1e-6 * curvature.trace() * Matrix6d::Identity();
+      noise_[f] = std::max(1e-12, kUnseen * (inverse_of_symmetric(curvature + ridge) * scatter).trace() / 6);
+    }
+  }
+
+  /// Curvature and gradient of the energy over all poses and motions.
+  std::pair<Eigen::MatrixXd, Eigen::VectorXd> equations() const {
+    const Eigen::Index n = at_motion(views_.size());
+    Eigen::MatrixXd a = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd b = Eigen::VectorXd::Zero(n);
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+      const Eigen::Index m = at_motion(v);
+      const Vector6d weight = (scale_ * sights_[v].deviation).cwiseAbs2().cwiseInverse();
+      a.block<6, 6>(m, m) += weight.asDiagonal();
+      b.segment<6>(m) += weight.cwiseProduct(state_.motions[v]);
+      for (std::size_t f = 0; f < poses_.size(); ++f) {
+        const Model& model = models_[f * views_.size() + v];
+        const Matrix6d change = sights_[v].of_bone(state_.poses[f], poses_[f].frame), h = model.curvature / noise_[f];
+        const Vector6d g = model.gradient / noise_[f];
+        const Eigen::Index p = at_pose(f);
+        a.block<6, 6>(p, p) += h;
+        a.block<6, 6>(p, m) += h * change;
+        a.block<6, 6>(m, p) += change.transpose() * h;
+        a.block<6, 6>(m, m) += change.transpose() * h * change;
+        b.segment<6>(p) += g;
+        b.segment<6>(m) += change.transpose() * g;
+      }
+    }
+    return {a, b};
+  }
+
+  /// Goes on until a step makes the state hardly more probable. The noise is measured in the first two rounds, if
+  /// wanted. Later rounds keep the curvatures. The first models are kept in `first`; if it holds some, these are those
+  /// of the state already.
+  bool descend(bool with_noise, Context& context, std::vector<Model>& first) {
+    for (int round = 0; round < options_.max_rounds; ++round) {
+      context.check_cancelled();
+      context.progress(double(round) / options_.max_rounds, "rounds");
+      if (round == 0 ? first.empty() : with_noise && round == 1)
+        expand(with_noise);
+      else if (round > 0)
+        move_models();
+      if (round == 0) first = models_;
+      if (step() < 0.05) return true;
+    }
+    return false;
+  }
+
+  /// The logarithm of the marginal likelihood of the scale, by Laplace's approximation about the state; without a
+  /// constant.
+  double evidence() const {
+    double sum = -energy(state_) - 6 * double(views_.size()) * std::log(scale_);
+    for (const double value : eigen_of_symmetric<Eigen::Dynamic>(equations().first).values)
+      sum -= 0.5 * std::log(std::max(value, 1e-9));
+    return sum;
+  }
+
+  State after(const Eigen::VectorXd& step) const {
+    State state = state_;
+    for (std::size_t f = 0; f < poses_.size(); ++f)
+      state.poses[f] = moved(state.poses[f], poses_[f].frame, from_units(step.segment<6>(at_pose(f))));
+    for (std::size_t v = 0; v < views_.size(); ++v) state.motions[v] += step.segment<6>(at_motion(v));
+    return state;
+  }
+
+  /// Goes to a state of less energy, and returns by how much less; 0 if there is none.
+  double step() {
+    const auto [a, b] = equations();
+    const double before = energy(state_);
+    for (double damping = 1e-6; damping < 1e4; damping *= 30) {
+      Eigen::MatrixXd damped = a;
+      damped.diagonal() *= 1 + damping;
+      damped.diagonal().array() += 1e-9;
+      const Eigen::VectorXd x = solve_symmetric<Eigen::Dynamic>(damped, -b);
+      if (!(x.cwiseAbs().maxCoeff() < 20)) continue;
+      const State next = after(x);
+      const double gain = before - energy(next);
+      if (!(gain > 0)) continue;
+      state_ = next;
+      return gain;
+    }
+    return 0;
+  }
+
+  static Eigen::MatrixXd inverse_of(Eigen::MatrixXd a) {
+    a.diagonal().array() += 1e-9;
+    Eigen::MatrixXd inverse(a.rows(), a.cols());
+    for (Eigen::Index i = 0; i < a.cols(); ++i)
+      inverse.col(i) = solve_symmetric<Eigen::Dynamic>(a, Eigen::VectorXd::Unit(a.rows(), i));
+    return inverse;
+  }
+
+  const List<Cost>& costs_;
+  const List<Pose>& poses_;
+  const List<View>& views_;
+  const Options& options_;
+  std::vector<Sight> sights_;
+  std::vector<std::shared_ptr<const Cost>> levels_;
+  std::vector<BoneInView> in_views_;  ///< of the first bone in each view, then of the next
+  std::vector<Model> models_;
+  std::vector<double> noise_;  ///< of each bone's cost in one view
+  State state_;
+  double scale_ = 1;                 ///< of the deviations that the options expect
+  double weight_ = 1;                ///< the probability of this scale
+  Eigen::MatrixXd of_other_scales_;  ///< their part of the covariance
+  bool converged_ = false;
+  Eigen::MatrixXd covariance_;  ///< in degrees and mm
+};
+
+}  // namespace marrow::refine
