@@ -2,13 +2,12 @@
 """A limit of processes and threads: what can be done with fewer is done, and no method is blamed for the rest."""
 import csv
 import os
-import pathlib
-import re
 import resource
 import subprocess
 import unittest
 
 from marrow_cli import IS_SANITIZED, MARROW, Case, main, wait_until
+from processes import has_processes
 
 USER = 40000 + os.getpid() % 10000  # of no account and no other process, nor of this test elsewhere
 TETRAHEDRON = """ply
@@ -40,16 +39,6 @@ EXPERIMENT = (
     "experiment: 1\npipeline: p.yaml\ncases: {seeds: 1..2}\nvariants: {one: {}, two: {d.points: 300}}\nmetrics:"
     " [d.mean_mm]\n"
 )
-
-
-def has_processes(user):
-    for status in pathlib.Path("/proc").glob("[0-9]*/status"):
-        try:
-            if re.search(r"^Uid:\t%d\t" % user, status.read_text(), re.MULTILINE):
-                return True
-        except OSError:  # it has ended
-            pass
-    return False
 
 
 @unittest.skipIf(os.getuid() != 0, "only root can become a user without other processes")

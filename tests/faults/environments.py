@@ -13,7 +13,9 @@ import sys
 import time
 import unittest
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "cli"))
 from harness import SKIPPED, arguments_parser, program_of, sample
+from processes import has_processes
 from subjects import Compare, Run, bytes_below
 
 USER = 50000 + 2 * (os.getpid() % 5000)  # of no account and no other process, nor of this program elsewhere
@@ -144,18 +146,8 @@ class Environments(unittest.TestCase):
     @staticmethod
     def wait_for_end_of_all(user):
         """What is left of the last program counts for the next one's limit: the system might not even start it."""
-
-        def has_processes():
-            for status in pathlib.Path("/proc").glob("[0-9]*/status"):
-                try:
-                    if re.search(r"^Uid:\t%d\t" % user, status.read_text(), re.MULTILINE):
-                        return True
-                except OSError:  # it has ended
-                    pass
-            return False
-
         end = time.monotonic() + 120
-        while has_processes() and time.monotonic() < end:
+        while has_processes(user) and time.monotonic() < end:
             time.sleep(0.05)
 
     @needs_root
