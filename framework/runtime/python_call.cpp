@@ -181,7 +181,7 @@ std::unique_ptr<PythonProcess> PythonNodes::take(Context& context) {
       std::unique_ptr<PythonProcess> process = std::move(idle_.back());
       idle_.pop_back();
       process->worker.take(nullptr);  // notices that it has ended meanwhile
-      if (!process->worker.is_dead()) return process;
+      if (!process->worker.is_dead() && !process->worker.is_ending()) return process;
     }
   }
   auto process = std::make_unique<PythonProcess>(trusted_path(described_.file));

@@ -296,12 +296,13 @@ WorkerEnd Worker::wait(const WorkerLimits& limits, const std::atomic<bool>* canc
   }
 }
 
-bool Worker::is_suspended() const {
+/// The state of its main thread, as in `ps`; 0 if there is no such process.
+char Worker::state() const {
   std::ifstream stream("/proc/" + std::to_string(process_) + "/stat");
   std::string text;
   std::getline(stream, text);
   const std::size_t name_end = text.rfind(") ");
-  return name_end != std::string::npos && name_end + 2 < text.size() && text[name_end + 2] == 'T';
+  return name_end != std::string::npos && name_end + 2 < text.size() ? text[name_end + 2] : 0;
 }
 
 double Worker::seconds() {
@@ -309,7 +310,7 @@ double Worker::seconds() {
   const double passed = std::chrono::duration<double>(now - looked_).count();
   looked_ = now;
   const double counted = std::min(passed, kLongestLook_s);
-  const bool suspended = is_suspended();
+  const bool suspended = state() == 'T';
   suspended_seconds_ = suspended ? suspended_seconds_ + counted : 0;
   if (is_busy_ && !is_waiting_ && !suspended) seconds_ += counted;
   return seconds_;
