@@ -39,6 +39,7 @@ struct Options {
 
 constexpr double kStepVoxels = 0.4;  // advection and curvature together stay stable (Courant-Friedrichs-Lewy condition)
 constexpr int kStepsPerCycle = 2;
+constexpr double kNear_mm = 10;  // farther than the fronts of two fragments move towards each other
 
 void keep_all_apart(std::vector<Front>& fronts) {
   for (std::size_t a = 0; a < fronts.size(); ++a)
@@ -72,6 +73,15 @@ void log_fronts(const std::vector<Front>& fronts, const List<Seeds>& seeds, int 
                   fronts[f].band_voxels());
     context.debug(line);
   }
+}
+
+/// A fragment that is not wanted matters only where it meets a wanted one, so elsewhere its front need not move.
+void hold_unwanted(const List<Seeds>& seeds, std::vector<Front>& fronts) {
+  std::vector<const Front*> wanted;
+  for (std::size_t f = 0; f < fronts.size(); ++f)
+    if (seeds[f].wanted) wanted.push_back(&fronts[f]);
+  for (std::size_t f = 0; f < fronts.size(); ++f)
+    if (!seeds[f].wanted) fronts[f].hold_far_from(wanted, kNear_mm);
 }
 
 /// Moves all fronts together until each of them rests on the wall of its bone. The wall is the steepest descent of the
@@ -116,6 +126,7 @@ List<SignedField> level_set_fields(const Volume& volume, const List<Seeds>& seed
                                    Context& context) {
   check(volume);
   std::vector<Front> fronts = begin(volume, seeds, options, context);
+  hold_unwanted(seeds, fronts);
   move(volume, seeds, options, fronts, context);
   List<SignedField> fields;
   for (std::size_t f = 0; f < fronts.size(); ++f) {

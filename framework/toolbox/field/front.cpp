@@ -159,15 +159,33 @@ void Front::write_back() {
   });
 }
 
-/// The active tiles are those that are awake and their six neighbours. All of them get memory.
+void Front::hold_far_from(const std::vector<const Front*>& others, double distance_mm) {
+  may_move_.assign(slots_.size(), 0);
+  for (const Front* other : others)
+    for (std::size_t tile = 0; tile < slots_.size(); ++tile) may_move_[tile] |= other->slots_[tile] >= 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int reach = int(std::ceil(distance_mm / (kTile * grid_.spacing_mm[axis])));
+    const std::vector<std::uint8_t> before = may_move_;
+    for (std::size_t tile = 0; tile < slots_.size(); ++tile) {
+      if (!before[tile]) continue;
+      auto place = place_of(tile);
+      const int from = std::max(0, place[axis] - reach), to = std::min(tiles_[axis] - 1, place[axis] + reach);
+      for (place[axis] = from; place[axis] <= to; ++place[axis]) may_move_[tile_of(place[0], place[1], place[2])] = 1;
+    }
+  }
+  choose_active();
+}
+
+/// The active tiles are those that are awake and their six neighbours, if they may move. All of them get memory.
 void Front::choose_active() {
   std::vector<std::uint32_t> chosen;
   for (std::size_t slot = 0; slot < is_awake_.size(); ++slot) {
     if (!is_awake_[slot]) continue;
     const auto t = place_of(tile_in_slot_[slot]);
     const auto choose = [&](int i, int j, int k) {
-      if (i >= 0 && j >= 0 && k >= 0 && i < tiles_[0] && j < tiles_[1] && k < tiles_[2])
-        chosen.push_back(std::uint32_t(tile_of(i, j, k)));
+      if (i < 0 || j < 0 || k < 0 || i >= tiles_[0] || j >= tiles_[1] || k >= tiles_[2]) return;
+      const std::size_t tile = tile_of(i, j, k);
+      if (may_move_.empty() || may_move_[tile]) chosen.push_back(std::uint32_t(tile));
     };
     choose(t[0], t[1], t[2]);
     for (int side : {-1, 1}) {

@@ -28,6 +28,10 @@ class Front {
   /// Starts at the surface of a mask.
   Front(const marrow::Grid& grid, double band_mm, const Mask& mask);
 
+  /// From now on, parts of this surface stay where they are if they are farther than about `distance_mm` from the
+  /// surfaces of all `others`, as these are now. All fronts are on the same grid.
+  void hold_far_from(const std::vector<const Front*>& others, double distance_mm);
+
   /// Finds by how much a thin cortex shifts the edges near the surface. Later calls of evaluate() use this.
   void find_thin_cortex(const marrow::Volume& volume, const EdgeProfile& profile);
   /// First half of a time step: computes the speed of the surface.
@@ -91,6 +95,7 @@ class Front {
   std::vector<std::uint32_t> tile_in_slot_;
   std::vector<float> values_mm_, values_before_, speed_, shift_mm_;
   std::vector<std::uint8_t> is_awake_;  // of each slot
+  std::vector<std::uint8_t> may_move_;  // of each tile; empty: all
   std::vector<std::uint32_t> active_;   // tiles visited in this step, in order
   std::vector<float> next_values_;      // of the active tiles
   double mean_motion_mm_ = 0;
