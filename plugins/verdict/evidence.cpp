@@ -3,6 +3,8 @@
 // would have, where the outline lies on the images' edges, whether contour and grey values agree, and the predicted
 // deviations. The failure model, which tools/fit_verdict fits to poses whose errors are known, turns these figures into
 // the probability that the pose is off.
+#include <tbb/parallel_invoke.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -108,20 +110,25 @@ Evidence gather(const Judged& judged, const Pose* contour_pose, const Pose& sear
   constexpr double kSpacing_px = 4, kReach_px = 16;
   const auto fine = cost.at_level({kSpacing_px, kReach_px, options.pixel_step});
   const auto coarse = cost.at_level({2 * kSpacing_px, 2 * kReach_px, 2 * options.pixel_step});
-  Evidence evidence;
-  context.progress(0, "the cost of other poses");
-  add(evidence, verdicts::landscape(judged, *fine, ""));
-  context.progress(0.2, "other minima");
-  add(evidence, verdicts::other_minima(judged, *coarse, *fine));
-  context.progress(0.7, "each view alone");
-  add(evidence, verdicts::views_alone(judged, *fine, views, ""));
-  if (contour_cost) {
-    const auto contour = contour_cost->at_level({kSpacing_px, kReach_px, 0});
-    add(evidence, verdicts::landscape(judged, *contour, "contour_"));
-    add(evidence, verdicts::views_alone(judged, *contour, views, "contour_"));
-  }
-  context.progress(0.9, "the outline");
-  if (projector && edges) add(evidence, verdicts::outline_on_edges(judged, *projector, views, *edges));
+  Evidence evidence, of_views, of_contour, of_outline;
+  tbb::parallel_invoke(
+      [&] {
+        context.progress(0, "the cost of other poses");
+        evidence = verdicts::landscape(judged, *fine, "");
+        context.progress(0.3, "other minima");
+        add(evidence, verdicts::other_minima(judged, *coarse, *fine));
+      },
+      [&] { of_views = verdicts::views_alone(judged, *fine, views, ""); },
+      [&] {
+        if (!contour_cost) return;
+        const auto contour = contour_cost->at_level({kSpacing_px, kReach_px, 0});
+        of_contour = verdicts::landscape(judged, *contour, "contour_");
+        add(of_contour, verdicts::views_alone(judged, *contour, views, "contour_"));
+      },
+      [&] {
+        if (projector && edges) of_outline = verdicts::outline_on_edges(judged, *projector, views, *edges);
+      });
+  for (const Evidence* more : {&of_views, &of_contour, &of_outline}) add(evidence, *more);
   if (contour_pose) {
     evidence.push_back({"contour_apart_mm", judged.off_mm(contour_pose->world_from_model), "mm"});
     evidence.push_back({"contour_apart_deg", judged.axial_deg(contour_pose->world_from_model), "deg"});

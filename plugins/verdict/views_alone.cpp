@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What each view alone would have. At the right pose every view agrees with it; the views of a wrong pose, of a wrong
 // camera or of another bone each pull in another direction.
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -41,12 +43,12 @@ double pull_mm(const Judged& judged, const Cost& cost, std::size_t view, const C
 double pull_deg(const Judged& judged, const Cost& cost, std::size_t view) {
   constexpr int kSide = 8;
   constexpr double kStep_deg = 2;
-  std::vector<double> values;
-  for (int i = -kSide; i <= kSide; ++i) {
+  std::vector<double> values(2 * kSide + 1);
+  tbb::parallel_for(0, 2 * kSide + 1, [&](int i) {
     Vector6d motion = Vector6d::Zero();
-    motion[2] = kStep_deg * i;
-    values.push_back(cost.value_in_view(view, judged.moved_by(judged.pose.world_from_model, motion)));
-  }
+    motion[2] = kStep_deg * (i - kSide);
+    values[std::size_t(i)] = cost.value_in_view(view, judged.moved_by(judged.pose.world_from_model, motion));
+  });
   const int best = int(std::min_element(values.begin(), values.end()) - values.begin());
   double between = 0;
   if (best > 0 && best < 2 * kSide) {
@@ -61,12 +63,13 @@ double pull_deg(const Judged& judged, const Cost& cost, std::size_t view) {
 
 Evidence views_alone(const Judged& judged, const Cost& cost, const List<View>& views, const std::string& prefix) {
   if (cost.view_count() != views.size() || views.size() < 2) return {};
-  double most_mm = 0, most_deg = 0;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    most_mm = std::max(most_mm, pull_mm(judged, cost, i, views[i].camera));
-    most_deg = std::max(most_deg, pull_deg(judged, cost, i));
-  }
-  return {{prefix + "view_pull_mm", most_mm, "mm"}, {prefix + "view_pull_deg", most_deg, "deg"}};
+  std::vector<double> pulls_mm(views.size()), pulls_deg(views.size());
+  tbb::parallel_for(std::size_t(0), views.size(), [&](std::size_t i) {
+    pulls_mm[i] = pull_mm(judged, cost, i, views[i].camera);
+    pulls_deg[i] = pull_deg(judged, cost, i);
+  });
+  const auto most = [](const std::vector<double>& of) { return *std::max_element(of.begin(), of.end()); };
+  return {{prefix + "view_pull_mm", most(pulls_mm), "mm"}, {prefix + "view_pull_deg", most(pulls_deg), "deg"}};
 }
 
 }  // namespace marrow::verdicts
