@@ -104,6 +104,23 @@ TEST(LevelSet, TwoFragmentsOneMillimetreApart) {
     ASSERT_FALSE(fields[0].values_mm[at] < 0 && fields[1].values_mm[at] < 0) << "both claim voxel " << at;
 }
 
+TEST(LevelSet, AFragmentIsTheSameWhetherTheOtherIsWantedOrOnlyKeptApart) {
+  HollowBone bone;
+  bone.wall_high_mm = 4;
+  const Volume volume = phantom::scan(
+      phantom::ct_grid({64, 60, 150}), [&](const Vector3d& p) { return bone.hu(p, 0.5 - std::abs(p.z())); }, 0.5, 30,
+      2);
+  const auto distal = [&](bool other_is_wanted) {
+    List<Seeds> seeds;
+    seeds.add("proximal", Seeds{"proximal", {bone.seed(30)}, other_is_wanted});
+    seeds.add("distal", Seeds{"distal", {bone.seed(-30)}});
+    const auto fields = level_set_fields(volume, seeds);
+    EXPECT_EQ(fields.size(), other_is_wanted ? 2u : 1u);
+    return *fields.find("distal");
+  };
+  EXPECT_EQ(distal(true).values_mm, distal(false).values_mm);
+}
+
 TEST(LevelSet, TwoFragmentsInVoxelsAsWideAsTheGap) {
   HollowBone bone;
   bone.wall_high_mm = 4;
