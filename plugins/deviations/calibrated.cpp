@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// Predicted deviations that were compared with real errors. The residuals that a covariance is predicted from do not
+// show every error, such as that of the segmentation, and they count some twice. So the deviations about and along each
+// axis are multiplied by a factor, which was fitted to bones whose true pose is known (tools/deviations --fit).
+#include <array>
+#include <marrow/plugin.hpp>
+
+namespace {
+
+using Factors = std::array<double, 3>;
+
+struct Options {
+  Factors rotation{1, 1, 1}, translation{1, 1, 1};
+  Factors first_rotation{1, 1, 1}, first_translation{1, 1, 1};
+};
+
+struct Result {
+  marrow::Pose pose;
+  marrow::List<marrow::Pose> stages;
+};
+
+marrow::Pose scaled(const marrow::Pose& pose, const marrow::FragmentFrame& axes, const Factors& rotation,
+                    const Factors& translation) {
+  if (!pose.covariance || !pose.covariance->allFinite()) return pose;
+  marrow::Vector6d factors;
+  factors << rotation[0], rotation[1], rotation[2], translation[0], translation[1], translation[2];
+  marrow::Pose along_axes = in_frame(pose, axes);
+  along_axes.covariance = factors.asDiagonal() * *along_axes.covariance * factors.asDiagonal();
+  return in_frame(along_axes, pose.frame);
+}
+
+Result calibrated(const marrow::List<marrow::Pose>& stages, const marrow::Mesh& model, const Options& options) {
+  if (stages.empty()) throw marrow::Error("there is no pose; wire the stages of a registration");
+  marrow::check_mesh(model, "model");
+  const marrow::FragmentFrame axes = marrow::fragment_frame(model);
+  Result result;
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    const bool is_first = stages.name(i) == "first" && i + 1 < stages.size();
+    result.stages.add(stages.name(i),
+                      scaled(stages[i], axes, is_first ? options.first_rotation : options.rotation,
+                             is_first ? options.first_translation : options.translation));
+  }
+  result.pose = result.stages[result.stages.size() - 1];
+  return result;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("deviations.calibrated", calibrated)
+      .summary("Multiplies the predicted deviations of poses by factors that were fitted to known errors")
+      .in("stages", "poses of a search; 'first' is that by its first cost (register.sequence), if it is not the last",
+          marrow::over("stage"))
+      .in("model", "surface of the bone; it gives the axes")
+      .out("pose", &Result::pose, "the last pose; a covariance that is absent or not finite stays as it is")
+      .out("stages", &Result::stages, "all poses", marrow::over("stage"))
+      .option("rotation", &Options::rotation,
+              "factors of the deviations about the frontal, lateral and long axes", marrow::at_least(0.01),
+              marrow::at_most(100))
+      .option("translation", &Options::translation,
+              "factors of the deviations along the frontal, lateral and long axes", marrow::at_least(0.01),
+              marrow::at_most(100))
+      .option("first_rotation", &Options::first_rotation, "the same for 'first', about the axes",
+              marrow::at_least(0.01), marrow::at_most(100))
+      .option("first_translation", &Options::first_translation, "the same for 'first', along the axes",
+              marrow::at_least(0.01), marrow::at_most(100));
+}

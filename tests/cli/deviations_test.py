@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""tools/deviations on errors that are drawn here: how it counts them, and the factors that it fits."""
+import contextlib
+import importlib.machinery
+import importlib.util
+import io
+import pathlib
+import random
+import re
+import sys
+import unittest
+
+ROOT = pathlib.Path(sys.argv[1])
+
+
+def tool():
+    loader = importlib.machinery.SourceFileLoader("deviations", str(ROOT / "tools/deviations"))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("deviations", loader))
+    loader.exec_module(module)
+    return module
+
+
+DEVIATIONS = tool()
+# How many times larger than predicted the deviation of the errors is.
+TRUE_FACTORS = {
+    "first": [2, 1, 0.5, 1, 1.5, 3],
+    "final": [1, 0.7, 1.2, 4, 0.25, 1],
+}
+
+
+def rows(count):
+    chance = random.Random(1)
+    made = []
+    for i in range(count):
+        row = {}
+        for stage, factors in TRUE_FACTORS.items():
+            row["errors.distal.%s.mtre_mm" % stage] = "0.1"
+            for axis, factor in zip(DEVIATIONS.AXES, factors):
+                predicted = chance.uniform(0.01, 0.1)
+                row["errors.distal.%s.predicted_%s" % (stage, axis)] = repr(predicted)
+                row["errors.distal.%s.%s" % (stage, axis)] = repr(chance.gauss(0, predicted * factor))
+        made.append(row)
+    return made
+
+
+def printed(call, *arguments):
+    stream = io.StringIO()
+    with contextlib.redirect_stdout(stream):
+        call(*arguments)
+    return stream.getvalue()
+
+
+class Deviations(unittest.TestCase):
+    def test_the_factors_are_those_of_the_errors(self):
+        text = printed(DEVIATIONS.print_factors, rows(4000))
+        found = {name: list(map(float, re.findall(r"[\d.]+", numbers))) for name, numbers in re.findall(r"(\w+): \[(.*)\]", text)}
+        wanted = {
+            "first_rotation": TRUE_FACTORS["first"][:3],
+            "first_translation": TRUE_FACTORS["first"][3:],
+            "rotation": TRUE_FACTORS["final"][:3],
+            "translation": TRUE_FACTORS["final"][3:],
+        }
+        self.assertEqual(list(found), list(wanted))
+        for name, factors in wanted.items():
+            for got, expected in zip(found[name], factors):
+                self.assertAlmostEqual(got / expected, 1, delta=0.06, msg=name)
+
+    def test_shares_within_one_and_two_deviations(self):
+        text = printed(DEVIATIONS.print_stage, rows(4000), "first")
+        shares = [tuple(map(int, pair)) for pair in re.findall(r"(\d+) %\s+(\d+) %", text)]
+        # Twice, as, half as large as predicted, and so on: of the normal distribution.
+        expected = [(38, 68), (68, 95), (95, 100), (68, 95), (50, 82), (26, 50)]
+        self.assertEqual(len(shares), len(expected))
+        for got, wanted in zip(shares, expected):
+            self.assertLessEqual(max(abs(a - b) for a, b in zip(got, wanted)), 3, text)
+
+    def test_a_pose_that_is_wrong_is_left_out(self):
+        some = rows(20)
+        some[3]["errors.distal.first.mtre_mm"] = "2.5"
+        self.assertIn("contour: 19 poses, 1 left out", printed(DEVIATIONS.print_stage, some, "first"))
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
