@@ -305,12 +305,16 @@ char Worker::state() const {
   return name_end != std::string::npos && name_end + 2 < text.size() ? text[name_end + 2] : 0;
 }
 
+bool Worker::is_suspended() const { return state() == 'T'; }
+
+bool Worker::is_ending() const { return state() == 'Z'; }
+
 double Worker::seconds() {
   const auto now = Clock::now();
   const double passed = std::chrono::duration<double>(now - looked_).count();
   looked_ = now;
   const double counted = std::min(passed, kLongestLook_s);
-  const bool suspended = state() == 'T';
+  const bool suspended = is_suspended();
   suspended_seconds_ = suspended ? suspended_seconds_ + counted : 0;
   if (is_busy_ && !is_waiting_ && !suspended) seconds_ += counted;
   return seconds_;

@@ -36,9 +36,8 @@ Result calibrated(const marrow::List<marrow::Pose>& stages, const marrow::Mesh& 
   Result result;
   for (std::size_t i = 0; i < stages.size(); ++i) {
     const bool is_first = stages.name(i) == "first" && i + 1 < stages.size();
-    result.stages.add(stages.name(i),
-                      scaled(stages[i], axes, is_first ? options.first_rotation : options.rotation,
-                             is_first ? options.first_translation : options.translation));
+    result.stages.add(stages.name(i), scaled(stages[i], axes, is_first ? options.first_rotation : options.rotation,
+                                             is_first ? options.first_translation : options.translation));
   }
   result.pose = result.stages[result.stages.size() - 1];
   return result;
@@ -54,9 +53,8 @@ MARROW_PLUGIN(plugin) {
       .in("model", "surface of the bone; it gives the axes")
       .out("pose", &Result::pose, "the last pose; a covariance that is absent or not finite stays as it is")
       .out("stages", &Result::stages, "all poses", marrow::over("stage"))
-      .option("rotation", &Options::rotation,
-              "factors of the deviations about the frontal, lateral and long axes", marrow::at_least(0.01),
-              marrow::at_most(100))
+      .option("rotation", &Options::rotation, "factors of the deviations about the frontal, lateral and long axes",
+              marrow::at_least(0.01), marrow::at_most(100))
       .option("translation", &Options::translation,
               "factors of the deviations along the frontal, lateral and long axes", marrow::at_least(0.01),
               marrow::at_most(100))

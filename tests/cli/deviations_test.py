@@ -22,10 +22,7 @@ def tool():
 
 DEVIATIONS = tool()
 # How many times larger than predicted the deviation of the errors is.
-TRUE_FACTORS = {
-    "first": [2, 1, 0.5, 1, 1.5, 3],
-    "final": [1, 0.7, 1.2, 4, 0.25, 1],
-}
+TRUE_FACTORS = {"first": [2, 1, 0.5, 1, 1.5, 3], "final": [1, 0.7, 1.2, 4, 0.25, 1]}
 
 
 def rows(count):
@@ -53,7 +50,10 @@ def printed(call, *arguments):
 class Deviations(unittest.TestCase):
     def test_the_factors_are_those_of_the_errors(self):
         text = printed(DEVIATIONS.print_factors, rows(4000))
-        found = {name: list(map(float, re.findall(r"[\d.]+", numbers))) for name, numbers in re.findall(r"(\w+): \[(.*)\]", text)}
+        found = {
+            name: list(map(float, re.findall(r"[\d.]+", numbers)))
+            for name, numbers in re.findall(r"(\w+): \[(.*)\]", text)
+        }
         wanted = {
             "first_rotation": TRUE_FACTORS["first"][:3],
             "first_translation": TRUE_FACTORS["first"][3:],

@@ -113,7 +113,9 @@ class Femur(Runs):
             "Node 'edges' (edges.adaptive_relaxation) differs by itself, too\n  why: option 'high' is 80, was 75\n",
             told,
         )
-        self.assertIn("In consequence differ: shaft, start, pose, verdict, errors, distance, overlay, ", told)
+        self.assertIn(
+            "In consequence differ: shaft, start, pose, verdict, calibrated, errors, distance, overlay, ", told
+        )
         self.assertRegex(
             told,
             r"\n  pose distal\n      %s deg and %s mm apart at the fragment's centroid \(%s deg about and %s mm along"

@@ -77,7 +77,7 @@ class Worker {
   bool is_dead() const { return process_ < 0; }
   /// Whether the process cannot answer any more although take() has not reported its end: its main thread has ended,
   /// and other threads of it, which still end, hold its output open.
-  bool is_ending() const { return state() == 'Z'; }
+  bool is_ending() const;
   pid_t process() const { return process_; }
   /// Time that the job has taken so far. Time in which it waits for another process's result, or in which the worker or
   /// this process is suspended, does not count.
@@ -91,6 +91,7 @@ class Worker {
   WorkerEnd ended(const std::string& why);
   std::optional<WorkerEnd> understand(const std::string& line, const Said& said);
   char state() const;
+  bool is_suspended() const;
 
   pid_t process_ = -1;
   int to_ = -1, from_ = -1;
