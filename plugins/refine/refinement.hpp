@@ -6,6 +6,8 @@
 // sum of the costs, in units of their noise, and of the squares of the motions, in units of the deviations expected of
 // a calibration (a Gaussian prior). The minimum is found by Levenberg and Marquardt's steps. The curvature there gives
 // the covariance of all poses and motions together (Laplace's approximation).
+#include <tbb/parallel_for.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -167,18 +169,30 @@ class Refinement {
     return sights_[view].motion(state.motions[view]) * state.poses[bone];
   }
 
-  /// Minus the logarithm of the posterior density.
-  double energy(const State& state) const {
+  /// Minus the logarithm of the posterior density, for the costs of the bones in the views.
+  double energy(const State& state, const std::vector<double>& costs) const {
     double sum = 0;
     for (std::size_t v = 0; v < views_.size(); ++v) {
       sum += 0.5 * state.motions[v].cwiseQuotient(scale_ * sights_[v].deviation).squaredNorm();
-      for (std::size_t f = 0; f < poses_.size(); ++f)
-        sum += in_views_[f * views_.size() + v].value(seen(state, f, v)) / noise_[f];
+      for (std::size_t f = 0; f < poses_.size(); ++f) sum += costs[f * views_.size() + v] / noise_[f];
     }
     return sum;
   }
+  /// Of the state, whose costs the models have.
+  double energy() const {
+    std::vector<double> costs;
+    for (const Model& model : models_) costs.push_back(model.value);
+    return energy(state_, costs);
+  }
+  std::vector<double> costs_at(const State& state) const {
+    std::vector<double> costs(in_views_.size());
+    tbb::parallel_for(std::size_t(0), costs.size(), [&](std::size_t i) {
+      costs[i] = in_views_[i].value(seen(state, i / views_.size(), i % views_.size()));
+    });
+    return costs;
+  }
 
-  /// Moves the models to the state. Their curvatures stay.
+  /// Moves the models, which have the state's costs, to the state. Their curvatures stay.
   void move_models() {
     for (std::size_t i = 0; i < models_.size(); ++i)
       in_views_[i].move(models_[i], seen(state_, i / views_.size(), i % views_.size()));
@@ -250,7 +264,7 @@ class Refinement {
   /// The logarithm of the marginal likelihood of the scale, by Laplace's approximation about the state; without a
   /// constant.
   double evidence() const {
-    double sum = -energy(state_) - 6 * double(views_.size()) * std::log(scale_);
+    double sum = -energy() - 6 * double(views_.size()) * std::log(scale_);
     for (const double value : eigen_of_symmetric<Eigen::Dynamic>(equations().first).values)
       sum -= 0.5 * std::log(std::max(value, 1e-9));
     return sum;
@@ -267,7 +281,7 @@ class Refinement {
   /// Goes to a state of less energy, and returns by how much less; 0 if there is none.
   double step() {
     const auto [a, b] = equations();
-    const double before = energy(state_);
+    const double before = energy();
     for (double damping = 1e-6; damping < 1e4; damping *= 30) {
       Eigen::MatrixXd damped = a;
       damped.diagonal() *= 1 + damping;
@@ -275,9 +289,11 @@ class Refinement {
       const Eigen::VectorXd x = solve_symmetric<Eigen::Dynamic>(damped, -b);
       if (!(x.cwiseAbs().maxCoeff() < 20)) continue;
       const State next = after(x);
-      const double gain = before - energy(next);
+      const std::vector<double> costs = costs_at(next);
+      const double gain = before - energy(next, costs);
       if (!(gain > 0)) continue;
       state_ = next;
+      for (std::size_t i = 0; i < models_.size(); ++i) models_[i].value = costs[i];
       return gain;
     }
     return 0;

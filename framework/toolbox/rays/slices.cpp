@@ -13,7 +13,7 @@
 namespace marrow::rays {
 namespace {
 
-constexpr int kSpare = 32;       ///< floats after a row that the resampling may read
+constexpr int kSpare = 32;       ///< floats after a row that the resampling may read or rewrite
 constexpr int kRowsAtOnce = 8;   ///< rows of the sheared image that one thread sums at a time: they fit in its cache
 constexpr double kFinest = 0.5;  ///< finest step of the sheared image, in voxels at the volume's middle
 
@@ -24,6 +24,9 @@ struct Sheared {
   int columns = 0, rows = 0;
   std::vector<float> sums;
 
+  std::size_t stride() const { return std::size_t(columns) + kSpare; }
+  float* row(int row) { return sums.data() + std::size_t(row) * stride(); }
+
   /// Cubic convolution (Keys, IEEE Trans Acoust Speech Signal Process 1981). Bilinear values would be smoother half-way
   /// between the grid's points than on them, and a cost that compares them would be rough. 0 near the border: the grid
   /// is two steps larger than needed on each side.
@@ -31,9 +34,9 @@ struct Sheared {
     if (!(column >= 1 && row >= 1 && column < columns - 2 && row < rows - 2)) return 0;
     const int c = int(column), r = int(row);
     const std::array<float, 4> across = cubic(float(column - c)), down = cubic(float(row - r));
-    const float* at = sums.data() + std::size_t(r - 1) * std::size_t(columns) + std::size_t(c - 1);
+    const float* at = sums.data() + std::size_t(r - 1) * stride() + std::size_t(c - 1);
     float sum = 0;
-    for (std::size_t k = 0; k < 4; ++k, at += columns)
+    for (std::size_t k = 0; k < 4; ++k, at += stride())
       sum += down[k] * (across[0] * at[0] + across[1] * at[1] + across[2] * at[2] + across[3] * at[3]);
     return std::max(sum, 0.0f);
   }
@@ -59,56 +62,69 @@ Eigen::Matrix3d slopes_from_pixel(const Rays& rays, const Slices::Stack& stack) 
   return slopes;
 }
 
-/// Adds the slices to a row of the sheared image.
-class RowSum {
+/// The least integer that is not below a value. The library's function is a call on the oldest machines.
+int ceiling(double value) {
+  const int whole = int(value);
+  return whole + (whole < value);
+}
+
+/// Adds slices to rows of the sheared image.
+class RowSums {
  public:
-  RowSum(const Slices::Stack& stack, const Eigen::Vector3d& source, const Sheared& image)
+  RowSums(const Slices::Stack& stack, const Eigen::Vector3d& source, Sheared& image)
       : stack_(stack), source_(source), image_(image), mixed_(std::size_t(stack.length + 3 + 2 * kSpare)) {}
 
-  void add(int slice, int row, float* sums) {
+  void add(int slice, int first_row, int end_row) {
     const double depth = slice - source_[stack_.axes[1]];
-    const double line = source_[stack_.axes[2]] + (image_.q + image_.step_q * row) * depth;
-    const int below = int(std::floor(line));
-    const bool has_below = below >= 0 && below < stack_.rows, has_above = below + 1 >= 0 && below + 1 < stack_.rows;
-    if (!has_below && !has_above) return;
-    const Slices::Extent none, a = has_below ? stack_.extent(slice, below) : none,
-                               b = has_above ? stack_.extent(slice, below + 1) : none;
-    const bool is_a = a.last >= a.first, is_b = b.last >= b.first;
-    if (!is_a && !is_b) return;
-    const int first = std::min(is_a ? a.first : b.first, is_b ? b.first : a.first),
-              last = std::max(is_a ? a.last : b.last, is_b ? b.last : a.last);
-    // Positions of the sheared image's columns on this row. The origin is one voxel before the first that attenuates.
-    const double step = image_.step_p * depth, start = source_[stack_.axes[0]] + image_.p * depth - (first - 1),
-                 length = last - first + 2;
-    double from = -start / step, to = (length - start) / step;
-    if (from > to) std::swap(from, to);
-    const int column = std::max(0, int(std::ceil(from + 1e-4))),
-              end = std::min(image_.columns - 1, int(std::floor(to - 1e-4)));
-    if (column > end) return;
-    float* mixed = mixed_.data() + kSpare;
-    mixed[0] = 0;
-    mix_rows(is_a ? stack_.row(slice, below) + first : nullptr, is_b ? stack_.row(slice, below + 1) + first : nullptr,
-             float(line - below), last - first + 1, mixed + 1);
-    mixed[last - first + 2] = mixed[last - first + 3] = 0;
-    add_resampled(mixed, float(start + step * column), float(step), end - column + 1, sums + column);
+    const Along along{source_[stack_.axes[0]] + image_.p * depth, image_.step_p * depth, 1 / (image_.step_p * depth)};
+    for (int row = first_row; row < end_row; ++row) {
+      const double line = source_[stack_.axes[2]] + (image_.q + image_.step_q * row) * depth;
+      if (line > -1 && line < stack_.rows) add(slice, line, along, image_.row(row));
+    }
   }
 
  private:
+  /// Positions of the sheared image's columns along the rows of a slice, in voxels.
+  struct Along {
+    double start, step, per_step;
+  };
+
+  void add(int slice, double line, const Along& along, float* sums) {
+    const int below = -ceiling(-line);
+    const bool has_below = below >= 0, has_above = below + 1 < stack_.rows;
+    const Slices::Extent none, a = has_below ? stack_.extent(slice, below) : none,
+                               b = has_above ? stack_.extent(slice, below + 1) : none;
+    const int first = std::min(a.first, b.first), last = std::max(a.last, b.last);
+    if (first > last) return;
+    // The origin is one voxel before the first that attenuates.
+    const double start = along.start - (first - 1), length = last - first + 2;
+    double from = -start * along.per_step, to = (length - start) * along.per_step;
+    if (from > to) std::swap(from, to);
+    const int column = std::max(0, ceiling(from + 1e-4)), end = std::min(image_.columns - 1, -ceiling(1e-4 - to));
+    if (column > end) return;
+    const auto position = float(start + along.step * column), step = float(along.step), weight = float(line - below);
+    const std::int16_t* row_a = has_below ? stack_.row(slice, below) + first : nullptr;
+    const std::int16_t* row_b = has_above ? stack_.row(slice, below + 1) + first : nullptr;
+    float* mixed = mixed_.data() + kSpare;
+    mixed[0] = 0;
+    mix_rows(row_a, row_b, weight, last - first + 1, mixed + 1);
+    mixed[last - first + 2] = mixed[last - first + 3] = 0;
+    add_resampled(mixed, position, step, end - column + 1, sums + column);
+  }
+
   const Slices::Stack& stack_;
   const Eigen::Vector3d& source_;
-  const Sheared& image_;
+  Sheared& image_;
   std::vector<float> mixed_;
 };
 
 void sum_slices(const Slices::Stack& stack, const Rays& rays, Sheared& image) {
-  image.sums.assign(std::size_t(image.columns) * std::size_t(image.rows), 0.0f);
+  image.sums.assign(image.stride() * std::size_t(image.rows), 0.0f);
   const int blocks = (image.rows + kRowsAtOnce - 1) / kRowsAtOnce;
   tbb::parallel_for(0, blocks, [&](int block) {
-    RowSum sum(stack, rays.source, image);
+    RowSums sums(stack, rays.source, image);
     const int end = std::min(image.rows, (block + 1) * kRowsAtOnce);
-    for (int slice = stack.first_slice; slice <= stack.last_slice; ++slice)
-      for (int row = block * kRowsAtOnce; row < end; ++row)
-        sum.add(slice, row, image.sums.data() + std::size_t(row) * std::size_t(image.columns));
+    for (int slice = stack.first_slice; slice <= stack.last_slice; ++slice) sums.add(slice, block * kRowsAtOnce, end);
   });
 }
 

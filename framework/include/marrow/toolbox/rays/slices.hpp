@@ -2,6 +2,7 @@
 #pragma once
 // Computes a whole radiograph slice by slice, for all rays from one point. The factorisation of Lacroute and Levoy
 // (SIGGRAPH 1994) turns Joseph's sums (IEEE Transactions on Medical Imaging 1982) into runs along rows of voxels.
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -21,7 +22,7 @@ class Slices {
 
   /// The first and last voxel of a row that attenuate. None does if last < first.
   struct Extent {
-    std::int16_t first = 0, last = -1;
+    std::int16_t first = INT16_MAX, last = -1;
   };
   /// The volume as slices across one axis. A slice has `rows` rows of `length` voxels.
   struct Stack {
