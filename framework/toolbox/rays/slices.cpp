@@ -124,7 +124,8 @@ void sum_slices(const Slices::Stack& stack, const Rays& rays, Sheared& image) {
   tbb::parallel_for(0, blocks, [&](int block) {
     RowSums sums(stack, rays.source, image);
     const int end = std::min(image.rows, (block + 1) * kRowsAtOnce);
-    for (int slice = stack.first_slice; slice <= stack.last_slice; ++slice) sums.add(slice, block * kRowsAtOnce, end);
+    for (int slice = stack.first_slice; slice <= stack.last_slice; slice += stack.slice_step)
+      sums.add(slice, block * kRowsAtOnce, end);
   });
 }
 
@@ -182,6 +183,8 @@ std::vector<float> warped(const Sheared& image, const Slices::Stack& stack, cons
   const Eigen::Vector3d mm(rays.spacing_mm[stack.axes[0]], rays.spacing_mm[stack.axes[2]],
                            rays.spacing_mm[stack.axes[1]]);
   const double per_p = 1 / image.step_p, per_q = 1 / image.step_q;
+  // Times the length of the ray from one slice to the next, in mm.
+  const double thousandth = 1e-3 * stack.slice_step;
   std::vector<float> values(grid.count());
   tbb::parallel_for(0, grid.rows, [&](int row) {
     float* out = values.data() + std::size_t(row) * std::size_t(grid.columns);
@@ -192,8 +195,7 @@ std::vector<float> warped(const Sheared& image, const Slices::Stack& stack, cons
       const Eigen::Vector3d d = first + column * change;
       const double nearer = 1 / d.z(), p = d.x() * nearer, q = d.y() * nearer;
       const float sum = image.at((p - image.p) * per_p, (q - image.q) * per_q);
-      // Times the length of the ray from one slice to the next, in mm; 1e-3 because the sums are thousandths.
-      if (sum != 0) out[column] = sum * float(Eigen::Vector3d(p * mm.x(), q * mm.y(), mm.z()).norm() * 1e-3);
+      if (sum != 0) out[column] = sum * float(Eigen::Vector3d(p * mm.x(), q * mm.y(), mm.z()).norm() * thousandth);
     }
   });
   return values;
@@ -243,6 +245,7 @@ Slices::Slices(const Attenuation& attenuation) : attenuation_(attenuation), turn
   for (std::size_t k = 0; k < 3; ++k) {
     stacks_[k].first_slice = attenuation.first[k];
     stacks_[k].last_slice = attenuation.last[k];
+    stacks_[k].slice_step = attenuation.enough[k];
   }
 }
 

@@ -22,6 +22,8 @@ struct Attenuation {
   Grid grid;
   std::vector<std::int16_t, LargePages<std::int16_t>> thousandths;
   std::array<int, 3> first{0, 0, 0}, last{-1, -1, -1};  ///< box of the voxels that attenuate; last < first if none does
+  /// Along each axis, a sum over every n-th voxel is n times less than that over all; more than 1 in a smooth volume.
+  std::array<int, 3> enough{1, 1, 1};
 
   bool is_empty() const { return last[0] < first[0]; }
 };

@@ -31,7 +31,7 @@ class Slices {
     int length = 0, slices = 0, rows = 0;
     std::size_t slice_stride = 0, row_stride = 0;
     std::vector<Extent> extents;  ///< of each row, slice by slice
-    int first_slice = 0, last_slice = -1;
+    int first_slice = 0, last_slice = -1, slice_step = 1;
 
     const Extent& extent(int slice, int row) const {
       return extents[std::size_t(slice) * std::size_t(rows) + std::size_t(row)];
