@@ -59,22 +59,24 @@ std::vector<float> padded(const Attenuation& attenuation, const std::array<int, 
   return values;
 }
 
-/// Smooths along one axis. Values beyond the ends are 0.
+/// Smooths along one axis. Values beyond the ends are 0. Whole rows of voxels are added at a time; along the rows
+/// themselves single voxels.
 void smooth(std::vector<float>& values, const std::array<int, 3>& size, std::size_t axis,
             const std::vector<float>& weights) {
-  const std::array<std::ptrdiff_t, 3> strides{1, size[0], std::ptrdiff_t(size[0]) * size[1]};
-  const std::size_t a = axis == 0 ? 1 : 0, b = axis == 2 ? 1 : 2;
-  const int reach = int(weights.size()) / 2, length = size[axis];
-  tbb::parallel_for(0, size[b], [&](int j) {
-    std::vector<float> line(std::size_t(length) + 2 * std::size_t(reach), 0.0f);
-    for (int i = 0; i < size[a]; ++i) {
-      float* at = values.data() + i * strides[a] + j * strides[b];
-      for (int k = 0; k < length; ++k) line[std::size_t(k + reach)] = at[k * strides[axis]];
-      for (int k = 0; k < length; ++k) {
-        float sum = 0;
-        for (std::size_t w = 0; w < weights.size(); ++w) sum += weights[w] * line[std::size_t(k) + w];
-        at[k * strides[axis]] = sum;
-      }
+  const std::array<std::size_t, 3> count{std::size_t(size[0]), std::size_t(size[1]), std::size_t(size[2])};
+  const std::array<std::size_t, 3> strides{1, count[0], count[0] * count[1]};
+  const std::size_t width = axis == 0 ? 1 : count[0], border = weights.size() / 2 * width, length = count[axis] * width;
+  const std::size_t outer = axis == 2 ? 1 : 2, lines = axis == 0 ? count[1] : 1;
+  tbb::parallel_for(std::size_t(0), count[outer], [&](std::size_t i) {
+    std::vector<float> line(length + 2 * border, 0.0f), sums(length);
+    for (std::size_t j = 0; j < lines; ++j) {
+      float* at = values.data() + i * strides[outer] + j * strides[1];
+      for (std::size_t k = 0; k < count[axis]; ++k)
+        std::copy_n(at + k * strides[axis], width, line.data() + border + k * width);
+      std::fill(sums.begin(), sums.end(), 0.0f);
+      for (std::size_t w = 0; w < weights.size(); ++w)
+        for (std::size_t k = 0; k < length; ++k) sums[k] += weights[w] * line[k + w * width];
+      for (std::size_t k = 0; k < count[axis]; ++k) std::copy_n(sums.data() + k * width, width, at + k * strides[axis]);
     }
   });
 }
