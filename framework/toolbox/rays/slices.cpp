@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "resample_row.hpp"
 
@@ -17,12 +18,20 @@ constexpr int kSpare = 32;       ///< floats after a row that the resampling may
 constexpr int kRowsAtOnce = 8;   ///< rows of the sheared image that one thread sums at a time: they fit in its cache
 constexpr double kFinest = 0.5;  ///< finest step of the sheared image, in voxels at the volume's middle
 
+/// Columns that may differ from 0.
+struct Columns {
+  int first = std::numeric_limits<int>::max(), last = -1;
+  void add(const Columns& more) { first = std::min(first, more.first), last = std::max(last, more.last); }
+};
+
 /// The image before it is warped, on a grid of slopes. p is the slope along the rows and q that across the rows, both
 /// in voxels per slice.
 struct Sheared {
   double p = 0, q = 0, step_p = 0, step_q = 0;
   int columns = 0, rows = 0;
   std::vector<float> sums;
+  std::vector<Columns> filled;         ///< of each row
+  std::vector<Columns> filled_around;  ///< of each row, the one before and the two after it
 
   std::size_t stride() const { return std::size_t(columns) + kSpare; }
   float* row(int row) { return sums.data() + std::size_t(row) * stride(); }
@@ -33,6 +42,8 @@ struct Sheared {
   float at(double column, double row) const {
     if (!(column >= 1 && row >= 1 && column < columns - 2 && row < rows - 2)) return 0;
     const int c = int(column), r = int(row);
+    const Columns& around = filled_around[std::size_t(r)];
+    if (c + 2 < around.first || c - 1 > around.last) return 0;
     const std::array<float, 4> across = cubic(float(column - c)), down = cubic(float(row - r));
     const float* at = sums.data() + std::size_t(r - 1) * stride() + std::size_t(c - 1);
     float sum = 0;
@@ -79,7 +90,7 @@ class RowSums {
     const Along along{source_[stack_.axes[0]] + image_.p * depth, image_.step_p * depth, 1 / (image_.step_p * depth)};
     for (int row = first_row; row < end_row; ++row) {
       const double line = source_[stack_.axes[2]] + (image_.q + image_.step_q * row) * depth;
-      if (line > -1 && line < stack_.rows) add(slice, line, along, image_.row(row));
+      if (line > -1 && line < stack_.rows) add(slice, line, along, row);
     }
   }
 
@@ -89,7 +100,7 @@ class RowSums {
     double start, step, per_step;
   };
 
-  void add(int slice, double line, const Along& along, float* sums) {
+  void add(int slice, double line, const Along& along, int row) {
     const int below = -ceiling(-line);
     const bool has_below = below >= 0, has_above = below + 1 < stack_.rows;
     const Slices::Extent none, a = has_below ? stack_.extent(slice, below) : none,
@@ -102,6 +113,7 @@ class RowSums {
     if (from > to) std::swap(from, to);
     const int column = std::max(0, ceiling(from + 1e-4)), end = std::min(image_.columns - 1, -ceiling(1e-4 - to));
     if (column > end) return;
+    image_.filled[std::size_t(row)].add({column, end});
     const auto position = float(start + along.step * column), step = float(along.step), weight = float(line - below);
     const std::int16_t* row_a = has_below ? stack_.row(slice, below) + first : nullptr;
     const std::int16_t* row_b = has_above ? stack_.row(slice, below + 1) + first : nullptr;
@@ -109,7 +121,7 @@ class RowSums {
     mixed[0] = 0;
     mix_rows(row_a, row_b, weight, last - first + 1, mixed + 1);
     mixed[last - first + 2] = mixed[last - first + 3] = 0;
-    add_resampled(mixed, position, step, end - column + 1, sums + column);
+    add_resampled(mixed, position, step, end - column + 1, image_.row(row) + column);
   }
 
   const Slices::Stack& stack_;
@@ -120,6 +132,7 @@ class RowSums {
 
 void sum_slices(const Slices::Stack& stack, const Rays& rays, Sheared& image) {
   image.sums.assign(image.stride() * std::size_t(image.rows), 0.0f);
+  image.filled.assign(std::size_t(image.rows), {});
   const int blocks = (image.rows + kRowsAtOnce - 1) / kRowsAtOnce;
   tbb::parallel_for(0, blocks, [&](int block) {
     RowSums sums(stack, rays.source, image);
@@ -127,6 +140,10 @@ void sum_slices(const Slices::Stack& stack, const Rays& rays, Sheared& image) {
     for (int slice = stack.first_slice; slice <= stack.last_slice; slice += stack.slice_step)
       sums.add(slice, block * kRowsAtOnce, end);
   });
+  image.filled_around = image.filled;
+  for (std::size_t row = 0; row < image.filled.size(); ++row)
+    for (std::size_t other = row > 0 ? row - 1 : 0; other < std::min(row + 3, image.filled.size()); ++other)
+      image.filled_around[row].add(image.filled[other]);
 }
 
 /// The grid of slopes that both the pixels and the volume cover. std::nullopt if slopes against this stack cannot
