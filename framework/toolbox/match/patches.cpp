@@ -3,28 +3,44 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core/types.hpp>
 
 namespace marrow::match {
 namespace {
+
+/// Sums over the pixels of a square that count.
+struct Sums {
+  double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+
+  Sums& operator+=(const Sums& more) {
+    n += more.n, a += more.a, b += more.b, aa += more.aa, bb += more.bb, ab += more.ab;
+    return *this;
+  }
+};
+
+Sums sums_in(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b,
+             const std::vector<char>& counts, const cv::Rect& cell) {
+  Sums sums;
+  for (int row = cell.y; row < cell.y + cell.height; ++row)
+    for (std::size_t i = patch.at(cell.x, row); i < patch.at(cell.x, row) + std::size_t(cell.width); ++i) {
+      if (!counts[i]) continue;  // its value may be NaN
+      const double x = a[i], y = b[i];
+      sums += {1, x, y, x * x, y * y, x * y};
+    }
+  return sums;
+}
 
 struct Correlation {
   double weight = 0, value = 0;
 };
 
-Correlation correlation_in(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b,
-                           const std::vector<char>& counts, int left, int top, int side) {
+Correlation correlation_of(const Sums& sums) {
   constexpr double kLeastPixels = 16;
-  double n = 0, sa = 0, sb = 0, aa = 0, bb = 0, ab = 0;
-  for (int row = top; row < top + side; ++row)
-    for (std::size_t i = patch.at(left, row); i < patch.at(left, row) + std::size_t(side); ++i) {
-      if (!counts[i]) continue;  // its value may be NaN
-      const double x = a[i], y = b[i];
-      n += 1, sa += x, sb += y, aa += x * x, bb += y * y, ab += x * y;
-    }
-  if (n < kLeastPixels) return {};
-  const double va = aa - sa * sa / n, vb = bb - sb * sb / n, cov = ab - sa * sb / n;
-  if (!(va > 1e-9 + 1e-12 * aa)) return {};
-  return {va, vb > 1e-14 + 1e-12 * bb ? std::clamp(cov / std::sqrt(va * vb), -1.0, 1.0) : 0};
+  if (sums.n < kLeastPixels) return {};
+  const double va = sums.aa - sums.a * sums.a / sums.n, vb = sums.bb - sums.b * sums.b / sums.n,
+               cov = sums.ab - sums.a * sums.b / sums.n;
+  if (!(va > 1e-9 + 1e-12 * sums.aa)) return {};
+  return {va, vb > 1e-14 + 1e-12 * sums.bb ? std::clamp(cov / std::sqrt(va * vb), -1.0, 1.0) : 0};
 }
 
 }  // namespace
@@ -35,10 +51,28 @@ void add_patch_correlations(const Patch& patch, const std::vector<float>& a, con
   // The squares have fixed positions in the image. If they moved along with the compared region, each pixel of its
   // motion would change all squares, and the cost would be rough.
   const auto first = [step](int origin) { return (step - origin % step) % step; };
-  for (int top = first(patch.top); top + side <= patch.rows; top += step)
-    for (int left = first(patch.left); left + side <= patch.columns; left += step) {
-      const Correlation one = correlation_in(patch, a, b, counts, left, top, side);
-      tally.add(left + 0.5 * side, top + 0.5 * side, one.weight * one.value, one.weight);
+  const int left = first(patch.left), top = first(patch.top);
+  const int columns = std::max(0, (patch.columns - left - side + step) / step),
+            rows = std::max(0, (patch.rows - top - side + step) / step);
+  if (columns == 0 || rows == 0) return;
+  // Squares overlap by about half. So the image is cut at all their borders, and each square is a sum of these cells.
+  const int rest = side % step, per_step = rest > 0 ? 2 : 1, cells = side / step * per_step + (rest > 0 ? 1 : 0);
+  const auto border = [&](int i) { return i / per_step * step + i % per_step * rest; };
+  const int cell_columns = (columns - 1) * per_step + cells, cell_rows = (rows - 1) * per_step + cells;
+  std::vector<Sums> of_cells;
+  for (int y = 0; y < cell_rows; ++y)
+    for (int x = 0; x < cell_columns; ++x)
+      of_cells.push_back(
+          sums_in(patch, a, b, counts,
+                  {left + border(x), top + border(y), border(x + 1) - border(x), border(y + 1) - border(y)}));
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column) {
+      Sums sums;
+      for (int y = row * per_step; y < row * per_step + cells; ++y)
+        for (int x = column * per_step; x < column * per_step + cells; ++x)
+          sums += of_cells[std::size_t(y * cell_columns + x)];
+      const Correlation one = correlation_of(sums);
+      tally.add(left + column * step + 0.5 * side, top + row * step + 0.5 * side, one.weight * one.value, one.weight);
     }
 }
 
