@@ -179,27 +179,41 @@ std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector,
   return std::make_shared<IntensityCost>(projector, own, options, worst, std::move(measure_of));
 }
 
+namespace {
+
+/// Sobel's gradients of a row. Its neighbours lie `down` values before and after it.
+void sobel(const float* row, std::ptrdiff_t down, int count, float* __restrict du, float* __restrict dv) {
+  for (int i = 0; i < count; ++i) {
+    const float* p = row + i;
+    const float a = p[-down - 1], b = p[-down], d = p[-down + 1], e = p[-1], f = p[1], h = p[down - 1], k = p[down],
+                m = p[down + 1];
+    du[i] = 0.125f * (d - a + 2 * (f - e) + m - h);
+    dv[i] = 0.125f * (h - a + 2 * (k - b) + m - d);
+  }
+}
+
+/// Which pixels of a row count together with all their neighbours.
+void all_around(const char* row, std::ptrdiff_t down, int count, char* __restrict all) {
+  for (int i = 0; i < count; ++i) {
+    const char* c = row + i;
+    all[i] = char(c[-down - 1] & c[-down] & c[-down + 1] & c[-1] & c[0] & c[1] & c[down - 1] & c[down] & c[down + 1]);
+  }
+}
+
+}  // namespace
+
 Gradients gradients_of(const Patch& patch) {
   Gradients g;
   const std::size_t count = patch.rendered.size();
   for (auto* values : {&g.rendered_u, &g.rendered_v, &g.seen_u, &g.seen_v}) values->assign(count, 0.0f);
   g.counts.assign(count, 0);
-  const std::ptrdiff_t down = patch.columns;
-  for (int row = 1; row + 1 < patch.rows; ++row)
-    for (int column = 1; column + 1 < patch.columns; ++column) {
-      const std::size_t i = patch.at(column, row);
-      const char* c = patch.counts.data() + i;
-      g.counts[i] =
-          c[-down - 1] && c[-down] && c[-down + 1] && c[-1] && c[0] && c[1] && c[down - 1] && c[down] && c[down + 1];
-      const auto sobel = [&](const float* p, float& du, float& dv) {
-        const float a = p[-down - 1], b = p[-down], d = p[-down + 1], e = p[-1], f = p[1], h = p[down - 1], k = p[down],
-                    m = p[down + 1];
-        du = 0.125f * (d - a + 2 * (f - e) + m - h);
-        dv = 0.125f * (h - a + 2 * (k - b) + m - d);
-      };
-      sobel(patch.rendered.data() + i, g.rendered_u[i], g.rendered_v[i]);
-      sobel(patch.seen.data() + i, g.seen_u[i], g.seen_v[i]);
-    }
+  for (int row = 1; row + 1 < patch.rows; ++row) {
+    const std::size_t i = patch.at(1, row);
+    all_around(patch.counts.data() + i, patch.columns, patch.columns - 2, g.counts.data() + i);
+    sobel(patch.rendered.data() + i, patch.columns, patch.columns - 2, g.rendered_u.data() + i,
+          g.rendered_v.data() + i);
+    sobel(patch.seen.data() + i, patch.columns, patch.columns - 2, g.seen_u.data() + i, g.seen_v.data() + i);
+  }
   return g;
 }
 
