@@ -62,7 +62,7 @@ class BoneInView {
     });
     for (std::size_t axis = 0; axis < 6; ++axis)
       model.gradient[Eigen::Index(axis)] = 0.5 * (ends[2 * axis + 1].value - ends[2 * axis].value);
-    model.curvature = curvature(pose, model.value, rises, ends);
+    model.curvature = curvature(pose, model.value, rises);
     if (with_scatter) model.scatter = scatter(ends);
     const Vector6d per_step = steps_.cwiseInverse();
     model.gradient = model.gradient.cwiseProduct(per_step);
@@ -84,28 +84,28 @@ class BoneInView {
  private:
   static constexpr double kMostStep = 4, kLeastStep = 1.0 / 64;  // degrees or mm
 
+  RigidTransform moved_by(const RigidTransform& pose, const Vector6d& steps) const {
+    return moved(pose, frame_, from_units(steps.cwiseProduct(steps_)));
+  }
+  /// In units of the steps, without its negative eigenvalues.
+  Matrix6d curvature(const RigidTransform& pose, double middle, const Vector6d& rises) const {
+    Matrix6d h = (2 * rises).asDiagonal();
+    tbb::parallel_for(0, 15, [&](int k) {
+      int i = 1, j = k;
+      for (; j >= i; ++i) j -= i;
+      const Vector6d both = Vector6d::Unit(i) + Vector6d::Unit(j);
+      h(i, j) = h(j, i) =
+          0.5 * (value(moved_by(pose, both)) + value(moved_by(pose, -both))) - middle - rises[i] - rises[j];
+    });
+    const SymmetricEigen<6> eigen = eigen_of_symmetric(h);
+    return eigen.vectors * eigen.values.cwiseMax(0).asDiagonal() * eigen.vectors.transpose();
+  }
   /// The cost in this view, and without each block of its image. To the latter the same number may be added: the cost
   /// in the other views.
   struct Sample {
     double value = 0;
     Eigen::VectorXd without;
   };
-  RigidTransform moved_by(const RigidTransform& pose, const Vector6d& steps) const {
-    return moved(pose, frame_, from_units(steps.cwiseProduct(steps_)));
-  }
-  /// In units of the steps, without its negative eigenvalues.
-  Matrix6d curvature(const RigidTransform& pose, double middle, const Vector6d& rises,
-                     const std::array<Sample, 12>& ends) const {
-    Matrix6d h = (2 * rises).asDiagonal();
-    tbb::parallel_for(0, 15, [&](int k) {
-      int i = 1, j = k;
-      for (; j >= i; ++i) j -= i;
-      h(i, j) = h(j, i) = value(moved_by(pose, Vector6d::Unit(i) + Vector6d::Unit(j))) + middle -
-                          ends[std::size_t(2 * i + 1)].value - ends[std::size_t(2 * j + 1)].value;
-    });
-    const SymmetricEigen<6> eigen = eigen_of_symmetric(h);
-    return eigen.vectors * eigen.values.cwiseMax(0).asDiagonal() * eigen.vectors.transpose();
-  }
   Sample sample(const RigidTransform& pose, bool with_blocks) const {
     if (!with_blocks) return {value(pose), {}};
     if (const auto* views = dynamic_cast<const match::ViewsCost*>(&cost_)) {
