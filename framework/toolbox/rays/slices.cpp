@@ -14,7 +14,7 @@
 namespace marrow::rays {
 namespace {
 
-constexpr int kSpare = 32;       ///< floats after a row that the resampling may read or rewrite
+constexpr int kSpare = 32;       ///< floats after a row that the resampling may read
 constexpr int kRowsAtOnce = 8;   ///< rows of the sheared image that one thread sums at a time: they fit in its cache
 constexpr double kFinest = 0.5;  ///< finest step of the sheared image, in voxels at the volume's middle
 
@@ -33,8 +33,7 @@ struct Sheared {
   std::vector<Columns> filled;         ///< of each row
   std::vector<Columns> filled_around;  ///< of each row, the one before and the two after it
 
-  std::size_t stride() const { return std::size_t(columns) + kSpare; }
-  float* row(int row) { return sums.data() + std::size_t(row) * stride(); }
+  float* row(int row) { return sums.data() + std::size_t(row) * std::size_t(columns); }
 
   /// Cubic convolution (Keys, IEEE Trans Acoust Speech Signal Process 1981). Bilinear values would be smoother half-way
   /// between the grid's points than on them, and a cost that compares them would be rough. 0 near the border: the grid
@@ -45,9 +44,9 @@ struct Sheared {
     const Columns& around = filled_around[std::size_t(r)];
     if (c + 2 < around.first || c - 1 > around.last) return 0;
     const std::array<float, 4> across = cubic(float(column - c)), down = cubic(float(row - r));
-    const float* at = sums.data() + std::size_t(r - 1) * stride() + std::size_t(c - 1);
+    const float* at = sums.data() + std::size_t(r - 1) * std::size_t(columns) + std::size_t(c - 1);
     float sum = 0;
-    for (std::size_t k = 0; k < 4; ++k, at += stride())
+    for (std::size_t k = 0; k < 4; ++k, at += columns)
       sum += down[k] * (across[0] * at[0] + across[1] * at[1] + across[2] * at[2] + across[3] * at[3]);
     return std::max(sum, 0.0f);
   }
@@ -131,7 +130,7 @@ class RowSums {
 };
 
 void sum_slices(const Slices::Stack& stack, const Rays& rays, Sheared& image) {
-  image.sums.assign(image.stride() * std::size_t(image.rows), 0.0f);
+  image.sums.assign(std::size_t(image.columns) * std::size_t(image.rows), 0.0f);
   image.filled.assign(std::size_t(image.rows), {});
   const int blocks = (image.rows + kRowsAtOnce - 1) / kRowsAtOnce;
   tbb::parallel_for(0, blocks, [&](int block) {
