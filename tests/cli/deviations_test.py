@@ -76,9 +76,9 @@ class Deviations(unittest.TestCase):
 
     def test_factors_are_judged_on_poses_that_they_were_not_fitted_to(self):
         chance = random.Random(2)
-        ratios = [abs(chance.gauss(0, 3)) for _ in range(4000)]
+        ratios = [abs(chance.gauss(0, 3)) for _ in range(2000)]
         for got, wanted in zip(DEVIATIONS.shares_of_others(ratios), (0.683, 0.954)):
-            self.assertAlmostEqual(got, wanted, delta=0.02)
+            self.assertAlmostEqual(got, wanted, delta=0.03)
         # One half is five times larger than the other half. Judged by the factor of the other half, all of the
         # small errors lie within one deviation and none of the large ones within two.
         halves = [5 * ratio if i % 2 else ratio for i, ratio in enumerate([1, 1.1, 0.9, 1.2] * 10)]
@@ -86,11 +86,11 @@ class Deviations(unittest.TestCase):
 
     def test_the_shares_of_others_are_printed_with_a_fit(self):
         self.assertNotIn("by factors of others", printed(DEVIATIONS.print_stage, rows(200), "first"))
-        text = printed(DEVIATIONS.print_stage, rows(4000), "first", True)
+        text = printed(DEVIATIONS.print_stage, rows(1000), "first", True)
         shares = re.findall(r"(\d+) %, +(\d+) %$", text, re.M)
         self.assertEqual(len(shares), 6)
         for one, two in shares:
-            self.assertLess(abs(int(one) - 68) + abs(int(two) - 95), 5, text)
+            self.assertLess(abs(int(one) - 68) + abs(int(two) - 95), 9, text)
 
     def test_a_pose_that_is_wrong_is_left_out(self):
         some = rows(20)
