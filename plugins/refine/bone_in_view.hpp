@@ -108,14 +108,19 @@ class BoneInView {
   };
   Sample sample(const RigidTransform& pose, bool with_blocks) const {
     if (!with_blocks) return {value(pose), {}};
+    // A cost that is a mean over views tells both at once. Others compare all views a second time.
     if (const auto* views = dynamic_cast<const match::ViewsCost*>(&cost_)) {
       const match::ViewsCost::Split split = views->split(view_, pose);
+      check_count(split.without_block.size(), blocks_);
       return {split.value, Eigen::VectorXd::Map(split.without_block.data(), Eigen::Index(blocks_))};
     }
     const std::vector<double> without = cost_.without_each_block(pose);
-    if (without.size() != before_ + blocks_ + after_)
-      throw Error("the cost gives no values without each block of the images; use a cost of the kind similarity");
+    check_count(without.size(), before_ + blocks_ + after_);
     return {value(pose), Eigen::VectorXd::Map(without.data() + before_, Eigen::Index(blocks_)) / share_};
+  }
+  static void check_count(std::size_t blocks, std::size_t expected) {
+    if (blocks != expected)
+      throw Error("the cost gives no values without each block of the images; use a cost of the kind similarity");
   }
   /// Of the slopes about their mean, which is that of the whole cost in this view, and what the other views add.
   Matrix6d scatter(const std::array<Sample, 12>& ends) const {

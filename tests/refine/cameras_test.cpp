@@ -4,6 +4,7 @@
 #include <marrow/domain/decompositions.hpp>
 #include <marrow/domain/functions.hpp>
 
+#include "marrow/toolbox/match/views_cost.hpp"
 #include "register/well.hpp"
 #include "shipped.hpp"
 
@@ -63,6 +64,30 @@ class Split : public marrow::Cost {
   double information_, stiffness_;
 };
 
+/// The same as a cost that is a mean over views.
+class SplitInViews : public marrow::match::ViewsCost {
+ public:
+  explicit SplitInViews(std::shared_ptr<const marrow::Cost> cost) : ViewsCost(cost->view_count(), {}), cost_(cost) {}
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
+    return std::make_shared<SplitInViews>(*this);
+  }
+  double value_in_view(std::size_t view, const RigidTransform& pose) const override {
+    return cost_->value_in_view(view, pose);
+  }
+  ViewsCost::Split split(std::size_t view, const RigidTransform& pose) const override {
+    const std::vector<double> without = cost_->without_each_block(pose);
+    const std::size_t count = without.size() / view_count();
+    ViewsCost::Split split{value_in_view(view, pose), {}};
+    for (std::size_t block = 0; block < count; ++block)
+      split.without_block.push_back(split.value +
+                                    double(view_count()) * (without[view * count + block] - cost_->value(pose)));
+    return split;
+  }
+
+ private:
+  std::shared_ptr<const marrow::Cost> cost_;
+};
+
 /// A bone 40 mm above the origin of the world, seen by each camera as if it had moved.
 struct Bone {
   explicit Bone(const std::vector<RigidTransform>& motions, double information = 1e4, double at_mm = 40) {
@@ -115,6 +140,16 @@ TEST(RefineCameras, FindsHowTheCamerasAreOffAgainstEachOther) {
   const RigidTransform wanted = inverse(frontal) * lateral, is = inverse(found(outputs, 0)) * found(outputs, 1);
   EXPECT_LT(marrow::degrees(marrow::geodesic_angle_rad(wanted.rotation, is.rotation)), 0.02);
   EXPECT_LT((wanted.translation_mm - is.translation_mm).norm(), 0.1);
+}
+
+TEST(RefineCameras, ACostOfViewsGivesTheSame) {
+  Bone bone({motion({0.3, -0.2, 0.4}, {0.8, 0.5, -3}), motion({-0.4, 0.3, 0.1}, {2, -0.7, 0.6})});
+  const marrow::Pose wanted = shipped::call("refine.cameras", inputs({bone})).at("poses").as_list<marrow::Pose>()[0];
+  bone.cost = std::make_shared<SplitInViews>(bone.cost);
+  const marrow::Pose pose = shipped::call("refine.cameras", inputs({bone})).at("poses").as_list<marrow::Pose>()[0];
+  EXPECT_LT((pose.world_from_model.translation_mm - wanted.world_from_model.translation_mm).norm(), 1e-6);
+  EXPECT_LT(marrow::geodesic_angle_rad(pose.world_from_model.rotation, wanted.world_from_model.rotation), 1e-8);
+  EXPECT_LT((*pose.covariance - *wanted.covariance).norm(), 1e-6 * wanted.covariance->norm());
 }
 
 TEST(RefineCameras, HalfOfAnErrorGoesToEachOfTwoViews) {
@@ -258,6 +293,13 @@ TEST(RefineCameras, WarnsOfCamerasThatAreFarOff) {
   shipped::call("refine.cameras", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 1, 0})})}),
                 {{"max_rounds", std::int64_t(1)}}, marrow::Context(hooks));
   EXPECT_EQ(warnings, std::vector<std::string>{"the cameras still moved after 1 rounds; raise max_rounds"});
+}
+
+TEST(RefineCameras, ACostOfViewsNeedsItsBlocks) {
+  Bone blind({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 0, 0})}, 0);
+  blind.cost = std::make_shared<SplitInViews>(blind.cost);
+  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({blind})),
+            "the cost gives no values without each block of the images; use a cost of the kind similarity");
 }
 
 TEST(RefineCameras, SaysWhatIsWrong) {

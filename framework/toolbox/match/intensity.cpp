@@ -8,6 +8,7 @@
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
+#include "moments.hpp"
 
 namespace marrow::match {
 namespace {
@@ -229,10 +230,6 @@ double scale_of(const Gradients& g) {
 
 namespace {
 
-struct Moments {
-  double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
-};
-
 Moments moments_of(const std::vector<float>& a, const std::vector<float>& b, const std::vector<char>& counts) {
   Moments m;
   // Relative to the first value that counts, so that a large constant causes no rounding errors.
@@ -242,8 +239,7 @@ Moments moments_of(const std::vector<float>& a, const std::vector<float>& b, con
   const double a0 = a[at], b0 = b[at];
   for (std::size_t i = 0; i < a.size(); ++i) {
     if (!counts[i]) continue;
-    const double x = a[i] - a0, y = b[i] - b0;
-    m.n += 1, m.a += x, m.b += y, m.aa += x * x, m.bb += y * y, m.ab += x * y;
+    m.add(a[i] - a0, b[i] - b0);
   }
   return m;
 }
@@ -253,14 +249,14 @@ Moments moments_of(const std::vector<float>& a, const std::vector<float>& b, con
 double correlation(const std::vector<float>& a, const std::vector<float>& b, const std::vector<char>& counts) {
   const Moments m = moments_of(a, b, counts);
   if (m.n < 16) return 0;
-  const double aa = m.aa - m.a * m.a / m.n, bb = m.bb - m.b * m.b / m.n, ab = m.ab - m.a * m.b / m.n;
+  const double aa = m.spread_a(), bb = m.spread_b(), ab = m.spread_ab();
   if (!(aa > 1e-12 * std::max(m.aa, 1e-30)) || !(bb > 1e-12 * std::max(m.bb, 1e-30))) return 0;
   return std::clamp(ab / std::sqrt(aa * bb), -1.0, 1.0);
 }
 
 double deviation(const std::vector<float>& values, const std::vector<char>& counts) {
   const Moments m = moments_of(values, values, counts);
-  return m.n < 16 ? 0 : std::sqrt(std::max(0.0, m.aa - m.a * m.a / m.n) / m.n);
+  return m.n < 16 ? 0 : std::sqrt(std::max(0.0, m.spread_a()) / m.n);
 }
 
 }  // namespace marrow::match

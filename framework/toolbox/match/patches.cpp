@@ -5,42 +5,33 @@
 #include <cmath>
 #include <opencv2/core/types.hpp>
 
+#include "moments.hpp"
+
 namespace marrow::match {
 namespace {
 
-/// Sums over the pixels of a square that count.
-struct Sums {
-  double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
-
-  Sums& operator+=(const Sums& more) {
-    n += more.n, a += more.a, b += more.b, aa += more.aa, bb += more.bb, ab += more.ab;
-    return *this;
-  }
-};
-
-Sums sums_in(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b,
-             const std::vector<char>& counts, const cv::Rect& cell) {
-  Sums sums;
+/// Of the pixels of a square that count.
+Moments moments_in(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b,
+                   const std::vector<char>& counts, const cv::Rect& cell) {
+  Moments moments;
   for (int row = cell.y; row < cell.y + cell.height; ++row)
     for (std::size_t i = patch.at(cell.x, row); i < patch.at(cell.x, row) + std::size_t(cell.width); ++i) {
       if (!counts[i]) continue;  // its value may be NaN
-      const double x = a[i], y = b[i];
-      sums += {1, x, y, x * x, y * y, x * y};
+      moments.add(a[i], b[i]);
     }
-  return sums;
+  return moments;
 }
 
 struct Correlation {
   double weight = 0, value = 0;
 };
 
-Correlation correlation_of(const Sums& sums) {
+Correlation correlation_of(const Moments& m) {
   constexpr double kLeastPixels = 16;
-  if (sums.n < kLeastPixels) return {};
-  const double va = sums.aa - sums.a * sums.a / sums.n, vb = sums.bb - sums.b * sums.b / sums.n,
-               cov = sums.ab - sums.a * sums.b / sums.n;
-  if (!(va > 1e-9 + 1e-12 * sums.aa)) return {};
-  return {va, vb > 1e-14 + 1e-12 * sums.bb ? std::clamp(cov / std::sqrt(va * vb), -1.0, 1.0) : 0};
+  if (m.n < kLeastPixels) return {};
+  const double va = m.spread_a(), vb = m.spread_b();
+  if (!(va > 1e-9 + 1e-12 * m.aa)) return {};
+  return {va, vb > 1e-14 + 1e-12 * m.bb ? std::clamp(m.spread_ab() / std::sqrt(va * vb), -1.0, 1.0) : 0};
 }
 
 }  // namespace
@@ -59,19 +50,19 @@ void add_patch_correlations(const Patch& patch, const std::vector<float>& a, con
   const int rest = side % step, per_step = rest > 0 ? 2 : 1, cells = side / step * per_step + (rest > 0 ? 1 : 0);
   const auto border = [&](int i) { return i / per_step * step + i % per_step * rest; };
   const int cell_columns = (columns - 1) * per_step + cells, cell_rows = (rows - 1) * per_step + cells;
-  std::vector<Sums> of_cells;
+  std::vector<Moments> of_cells;
   for (int y = 0; y < cell_rows; ++y)
     for (int x = 0; x < cell_columns; ++x)
       of_cells.push_back(
-          sums_in(patch, a, b, counts,
-                  {left + border(x), top + border(y), border(x + 1) - border(x), border(y + 1) - border(y)}));
+          moments_in(patch, a, b, counts,
+                     {left + border(x), top + border(y), border(x + 1) - border(x), border(y + 1) - border(y)}));
   for (int row = 0; row < rows; ++row)
     for (int column = 0; column < columns; ++column) {
-      Sums sums;
+      Moments moments;
       for (int y = row * per_step; y < row * per_step + cells; ++y)
         for (int x = column * per_step; x < column * per_step + cells; ++x)
-          sums += of_cells[std::size_t(y * cell_columns + x)];
-      const Correlation one = correlation_of(sums);
+          moments += of_cells[std::size_t(y * cell_columns + x)];
+      const Correlation one = correlation_of(moments);
       tally.add(left + column * step + 0.5 * side, top + row * step + 0.5 * side, one.weight * one.value, one.weight);
     }
 }

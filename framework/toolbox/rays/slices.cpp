@@ -30,8 +30,7 @@ struct Sheared {
   double p = 0, q = 0, step_p = 0, step_q = 0;
   int columns = 0, rows = 0;
   std::vector<float> sums;
-  std::vector<Columns> filled;         ///< of each row
-  std::vector<Columns> filled_around;  ///< of each row, the one before and the two after it
+  std::vector<Columns> filled;  ///< of each row, the one before and the two after it
 
   float* row(int row) { return sums.data() + std::size_t(row) * std::size_t(columns); }
 
@@ -41,7 +40,7 @@ struct Sheared {
   float at(double column, double row) const {
     if (!(column >= 1 && row >= 1 && column < columns - 2 && row < rows - 2)) return 0;
     const int c = int(column), r = int(row);
-    const Columns& around = filled_around[std::size_t(r)];
+    const Columns& around = filled[std::size_t(r)];
     if (c + 2 < around.first || c - 1 > around.last) return 0;
     const std::array<float, 4> across = cubic(float(column - c)), down = cubic(float(row - r));
     const float* at = sums.data() + std::size_t(r - 1) * std::size_t(columns) + std::size_t(c - 1);
@@ -81,8 +80,13 @@ int ceiling(double value) {
 /// Adds slices to rows of the sheared image.
 class RowSums {
  public:
-  RowSums(const Slices::Stack& stack, const Eigen::Vector3d& source, Sheared& image)
-      : stack_(stack), source_(source), image_(image), mixed_(std::size_t(stack.length + 3 + 2 * kSpare)) {}
+  /// Notes in `filled` which columns of each row the slices reach.
+  RowSums(const Slices::Stack& stack, const Eigen::Vector3d& source, Sheared& image, std::vector<Columns>& filled)
+      : stack_(stack),
+        source_(source),
+        image_(image),
+        filled_(filled),
+        mixed_(std::size_t(stack.length + 3 + 2 * kSpare)) {}
 
   void add(int slice, int first_row, int end_row) {
     const double depth = slice - source_[stack_.axes[1]];
@@ -112,7 +116,7 @@ class RowSums {
     if (from > to) std::swap(from, to);
     const int column = std::max(0, ceiling(from + 1e-4)), end = std::min(image_.columns - 1, -ceiling(1e-4 - to));
     if (column > end) return;
-    image_.filled[std::size_t(row)].add({column, end});
+    filled_[std::size_t(row)].add({column, end});
     const auto position = float(start + along.step * column), step = float(along.step), weight = float(line - below);
     const std::int16_t* row_a = has_below ? stack_.row(slice, below) + first : nullptr;
     const std::int16_t* row_b = has_above ? stack_.row(slice, below + 1) + first : nullptr;
@@ -126,23 +130,24 @@ class RowSums {
   const Slices::Stack& stack_;
   const Eigen::Vector3d& source_;
   Sheared& image_;
+  std::vector<Columns>& filled_;
   std::vector<float> mixed_;
 };
 
 void sum_slices(const Slices::Stack& stack, const Rays& rays, Sheared& image) {
   image.sums.assign(std::size_t(image.columns) * std::size_t(image.rows), 0.0f);
-  image.filled.assign(std::size_t(image.rows), {});
+  std::vector<Columns> filled(std::size_t(image.rows));
   const int blocks = (image.rows + kRowsAtOnce - 1) / kRowsAtOnce;
   tbb::parallel_for(0, blocks, [&](int block) {
-    RowSums sums(stack, rays.source, image);
+    RowSums sums(stack, rays.source, image, filled);
     const int end = std::min(image.rows, (block + 1) * kRowsAtOnce);
     for (int slice = stack.first_slice; slice <= stack.last_slice; slice += stack.slice_step)
       sums.add(slice, block * kRowsAtOnce, end);
   });
-  image.filled_around = image.filled;
-  for (std::size_t row = 0; row < image.filled.size(); ++row)
-    for (std::size_t other = row > 0 ? row - 1 : 0; other < std::min(row + 3, image.filled.size()); ++other)
-      image.filled_around[row].add(image.filled[other]);
+  image.filled = filled;
+  for (std::size_t row = 0; row < filled.size(); ++row)
+    for (std::size_t other = row > 0 ? row - 1 : 0; other < std::min(row + 3, filled.size()); ++other)
+      image.filled[row].add(filled[other]);
 }
 
 /// The grid of slopes that both the pixels and the volume cover. std::nullopt if slopes against this stack cannot
