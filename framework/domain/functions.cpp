@@ -28,5 +28,6 @@ std::size_t Cost::view_count() const { return 0; }
 double Cost::value_in_view(std::size_t, const RigidTransform& world_from_model) const {
   return value(world_from_model);
 }
+std::string Cost::nothing_compared(const RigidTransform&) const { return {}; }
 
 }  // namespace marrow

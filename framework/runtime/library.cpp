@@ -48,6 +48,9 @@ std::string stamp_mismatch(const AbiStamp& theirs) {
                    ours.glibcxx_debug ? "on" : "off", "debug mode changes the layout of every container");
   if (theirs.sanitizers != ours.sanitizers)
     return differs("sanitizers", std::to_string(theirs.sanitizers), std::to_string(ours.sanitizers), rebuild);
+  if (theirs.fast_math != ours.fast_math)
+    return differs("-ffast-math", theirs.fast_math ? "on" : "off", ours.fast_math ? "on" : "off",
+                   "leave out -ffast-math and -Ofast: they change the results of other nodes, and NaN is not seen");
   if (theirs.cxx_standard / 100 != ours.cxx_standard / 100)
     return differs("C++ standard", std::to_string(theirs.cxx_standard), std::to_string(ours.cxx_standard),
                    "use -std=c++20");

@@ -106,6 +106,10 @@ class Cost {
   virtual std::size_t view_count() const;
   /// The cost of a pose in one view alone, with view < view_count(). It has the range of value().
   virtual double value_in_view(std::size_t view, const RigidTransform& world_from_model) const;
+  /// Why the images say nothing about this pose, such as "the outline is empty in all views"; empty if something was
+  /// compared. A pose about which the images say nothing is not a result. Empty is the default, so callers also check
+  /// that the cost changes about the pose.
+  virtual std::string nothing_compared(const RigidTransform& world_from_model) const;
 };
 
 /// A function R^n -> R to minimise. It knows nothing about poses.

@@ -24,6 +24,7 @@ struct AbiStamp {
   std::int32_t cxx11_abi;
   std::int32_t glibcxx_debug;  ///< -D_GLIBCXX_DEBUG changes the layout of every container
   std::int32_t sanitizers;     ///< bit 0 address, bit 1 thread
+  std::int32_t fast_math;      ///< -ffast-math: NaN is not seen, and small numbers become 0 in the whole process
   std::int32_t eigen_max_align;
   std::int32_t eigen_version;
   std::int32_t opencv_version;
@@ -49,6 +50,11 @@ struct PluginEntry {
 #else
 #define MARROW_SANITIZE_THREAD 0
 #endif
+#ifdef __FAST_MATH__
+#define MARROW_FAST_MATH 1
+#else
+#define MARROW_FAST_MATH 0
+#endif
 #ifdef _GLIBCXX_DEBUG
 #define MARROW_GLIBCXX_DEBUG 1
 #else
@@ -69,6 +75,7 @@ constexpr AbiStamp abi_stamp() {
           _GLIBCXX_USE_CXX11_ABI,
           MARROW_GLIBCXX_DEBUG,
           MARROW_SANITIZE_ADDRESS | MARROW_SANITIZE_THREAD,
+          MARROW_FAST_MATH,
           EIGEN_MAX_ALIGN_BYTES,
           EIGEN_WORLD_VERSION * 10000 + EIGEN_MAJOR_VERSION * 100 + EIGEN_MINOR_VERSION,
           CV_VERSION_MAJOR * 10000 + CV_VERSION_MINOR * 100,
