@@ -29,5 +29,6 @@ double Cost::value_in_view(std::size_t, const RigidTransform& world_from_model) 
   return value(world_from_model);
 }
 std::string Cost::nothing_compared(const RigidTransform&) const { return {}; }
+std::vector<std::string> Cost::silent_views(const RigidTransform&) const { return {}; }
 
 }  // namespace marrow

@@ -110,6 +110,9 @@ class Cost {
   /// compared. A pose about which the images say nothing is not a result. Empty is the default, so callers also check
   /// that the cost changes about the pose.
   virtual std::string nothing_compared(const RigidTransform& world_from_model) const;
+  /// A sentence for each view that says nothing about this pose, such as "view 'lateral': the mask hides the whole
+  /// outline". None, the default, if each says something or the cost cannot tell.
+  virtual std::vector<std::string> silent_views(const RigidTransform& world_from_model) const;
 };
 
 /// A function R^n -> R to minimise. It knows nothing about poses.
