@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/domain/plain_text.hpp"
 
+#include <algorithm>
+
 namespace marrow {
 namespace {
 
@@ -44,17 +46,19 @@ std::string utf8_of_utf16(const std::string& bytes) {
 }
 
 /// In place, because a text may be a surface of gigabytes. Several \r before a \n, as some converters leave them, are
-/// one line end with it.
+/// one line end with it. Beside \n, a \r elsewhere is no line end: 3D Slicer on Windows writes some inside of its
+/// lines.
 void unify_line_ends(std::string& text) {
   std::size_t to = text.find('\r');
   if (to == std::string::npos) return;
-  for (std::size_t from = to; from < text.size();) {
-    std::size_t end = from;
-    while (end < text.size() && text[end] == '\r') ++end;
-    const bool is_one = end < text.size() && text[end] == '\n';
-    for (; from < end; ++from)
-      if (!is_one) text[to++] = '\n';
-    if (from < text.size()) text[to++] = text[from++];
+  if (text.find('\n') == std::string::npos) {
+    std::replace(text.begin(), text.end(), '\r', '\n');
+    return;
+  }
+  for (std::size_t from = to; from < text.size(); ++from) {
+    if (text[from] == '\n')
+      while (to > 0 && text[to - 1] == '\r') --to;
+    text[to++] = text[from];
   }
   text.resize(to);
 }
