@@ -19,6 +19,15 @@ struct LinkedLibrary {
   std::uint64_t size = 0;
 };
 
+/// A folder in which a plugin's libraries or modules were looked for before they were found elsewhere, or not at all. A
+/// file that appears there may be loaded instead.
+struct SearchedFolder {
+  std::string path;
+  /// Of what was looked for: the whole name of a file, or its name up to the first point. "*.pth" stands for all files
+  /// with this ending.
+  std::vector<std::string> names;
+};
+
 /// What is known about a plugin library without loading it: the content of its manifest, or why it is refused.
 struct LibraryInfo {
   std::filesystem::path file;
@@ -27,6 +36,7 @@ struct LibraryInfo {
   Digest digest;        ///< digest of the file
   Digest build_id;  ///< digest of its own file, the framework's, and the builds of the libraries that these two link
   std::vector<LinkedLibrary> linked;
+  std::vector<SearchedFolder> searched;  ///< in the order of the search
   std::vector<KindInfo> kinds;
   std::vector<NodeInfo> nodes;
   std::vector<WriterInfo> writers;

@@ -82,7 +82,8 @@ class Worker {
   /// Time that the job has taken so far. Time in which it waits for another process's result, or in which the worker or
   /// this process is suspended, does not count.
   double seconds();
-  double memory_mb() const;  ///< resident memory of the process at present
+  /// Resident memory of the process and of all that it started, at present. What they share counts once.
+  double memory_mb() const;
   /// The place that it last reported: "node 'edges' (lateral)". Empty if it reported none.
   const std::string& at() const { return at_; }
 
@@ -117,8 +118,9 @@ class WorkerReports {
 using WorkerTask = std::function<nlohmann::json(const nlohmann::json& request, WorkerReports& reports)>;
 
 /// The worker's side: does the tasks that are requested until its standard input ends. If a task throws, the job fails
-/// with the text of the exception. The standard output is redirected to the standard error first, so that what a
-/// library prints cannot be taken for an answer.
+/// with the text of the exception. Before that, the standard output is redirected to the standard error, and the
+/// standard input to /dev/null, so that what a library prints is not taken for an answer, and no library and no process
+/// that it starts reads a request.
 int serve_worker(const std::map<std::string, WorkerTask>& tasks);
 
 /// The program marrow-worker, in the folder `marrow` next to the framework's library.
