@@ -32,7 +32,12 @@ Evaluation::Evaluation(const Pipeline& pipeline, const Catalogue& catalogue, con
       finished_(std::move(finished)) {
   if (settings_.store) keep_digests_in(settings_.store->folder());
 }
-Evaluation::~Evaluation() = default;
+Evaluation::~Evaluation() {
+  try {
+    if (!remembered_.empty()) settings_.store->remember(place(), remembered_);
+  } catch (const std::exception&) {  // the next plan does not know what changed
+  }
+}
 
 void Evaluation::report(RunEvent::Kind kind, std::size_t node, const std::string& item, std::string text,
                         double fraction, double seconds, LogLevel level) const {
@@ -217,25 +222,38 @@ Provenance Evaluation::provenance(std::size_t index, const std::vector<Value>& i
   return result;
 }
 
-std::string Evaluation::place(std::size_t node, const std::string& item) const {
-  return std::filesystem::absolute(pipeline_.file).lexically_normal().string() + "\n" +
-         (settings_.within.empty() ? "" : settings_.within + "\n") + pipeline_.nodes[node].id + "\n" + item;
+std::string Evaluation::place() const {
+  const std::string file = std::filesystem::absolute(pipeline_.file).lexically_normal().string();
+  return settings_.within.empty() ? file : file + "\n" + settings_.within;
 }
 
+std::string Evaluation::name_of(std::size_t node, const Call& call) const {
+  return pipeline_.nodes[node].id + "\n" + call.item;
+}
+
+/// Functions are not kept, so nobody asks what they were made from.
 void Evaluation::remember(std::size_t node, const Call& call, const Recipe& recipe) {
-  if (settings_.store && settings_.remember)
-    settings_.store->remember(place(node, call.item), {recipe.key, provenance(node, call.inputs)});
+  if (!settings_.store || !settings_.remember || makes_functions(node)) return;
+  Store::Last last{recipe.key, provenance(node, call.inputs)};
+  const std::scoped_lock lock(mutex_);
+  remembered_.insert_or_assign(name_of(node, call), std::move(last));
+}
+
+std::optional<Store::Last> Evaluation::last(std::size_t node, const Call& call) const {
+  if (!last_results_) last_results_ = settings_.store ? settings_.store->last(place()) : Store::LastResults();
+  const auto found = last_results_->find(name_of(node, call));
+  return found == last_results_->end() ? std::nullopt : std::optional(found->second);
 }
 
 double Evaluation::seconds_last_time(std::size_t node, const Call& call) const {
-  const auto last = settings_.store ? settings_.store->last(place(node, call.item)) : std::nullopt;
+  const auto last = this->last(node, call);
   const auto stored = last ? settings_.store->find(last->key) : std::nullopt;
   return stored ? stored->provenance.seconds : 0;
 }
 
 std::string Evaluation::change_since_last(std::size_t node, const Call& call) const {
   if (makes_functions(node)) return "it may fail, and a function is not kept";
-  const auto last = settings_.store ? settings_.store->last(place(node, call.item)) : std::nullopt;
+  const auto last = this->last(node, call);
   if (!last) return "it has not run before";
   const std::string changes = difference(last->provenance, provenance(node, call.inputs));
   return changes.empty()

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -70,7 +71,9 @@ class Evaluation {
   Recipe recipe(std::size_t node, const Call& call, Contents* contents = nullptr) const;
   Recipe noted_recipe(std::size_t node, const Call& call);
   Provenance provenance(std::size_t node, const std::vector<Value>& inputs) const;
-  std::string place(std::size_t node, const std::string& item) const;
+  std::string place() const;
+  std::string name_of(std::size_t node, const Call& call) const;
+  std::optional<Store::Last> last(std::size_t node, const Call& call) const;
   void remember(std::size_t node, const Call& call, const Recipe& recipe);
   std::string failure_text(std::size_t node, const std::string& item, const std::string& reason) const;
   bool makes_functions(std::size_t node) const;
@@ -103,6 +106,8 @@ class Evaluation {
   std::function<void(std::size_t, Call&)> finished_;
   std::map<Digest, std::unique_ptr<Memo>> memos_;
   FilesRead files_read_;
+  Store::LastResults remembered_;                           ///< what this run came to; written when it ends
+  mutable std::optional<Store::LastResults> last_results_;  ///< what the run before came to; for plans
   WorkingFolder working_folder_;
   mutable std::mutex observer_mutex_, warnings_mutex_;
   bool store_complained_ = false;

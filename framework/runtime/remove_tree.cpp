@@ -11,18 +11,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
+[[noreturn]] void fail(const fs::path& path, const std::error_code& error) {
+  throw Error("the folder " + path.string() + " cannot be emptied: " + error.message());
+}
+
+}  // namespace
+
 /// Also true for a bind mount, which has the same device as the folder around it.
 bool is_mount(const fs::path& path) {
   struct statx status {};
   return statx(AT_FDCWD, path.c_str(), AT_SYMLINK_NOFOLLOW | AT_NO_AUTOMOUNT, STATX_TYPE, &status) == 0 &&
          (status.stx_attributes & status.stx_attributes_mask & STATX_ATTR_MOUNT_ROOT);
 }
-
-[[noreturn]] void fail(const fs::path& path, const std::error_code& error) {
-  throw Error("the folder " + path.string() + " cannot be emptied: " + error.message());
-}
-
-}  // namespace
 
 std::optional<fs::path> mount_at_or_below(const fs::path& path) {
   std::error_code error;

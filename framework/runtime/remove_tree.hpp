@@ -5,6 +5,10 @@
 
 namespace marrow {
 
+/// Whether another file system, or a folder from elsewhere, is mounted at a path itself. False if the kernel does not
+/// tell.
+bool is_mount(const std::filesystem::path& path);
+
 /// The place where another file system, or a folder from elsewhere, is mounted on a path or below it. What is there
 /// belongs to somebody else. Returns nothing if nothing is mounted, or if the kernel does not tell.
 std::optional<std::filesystem::path> mount_at_or_below(const std::filesystem::path& path);

@@ -23,8 +23,8 @@ namespace fs = std::filesystem;
 /// noticed.
 struct Remembered {
   std::string place;
-  Store::Last last;
-  using fields = Fields<&Remembered::place, &Remembered::last>;
+  Store::LastResults results;
+  using fields = Fields<&Remembered::place, &Remembered::results>;
 };
 
 constexpr std::uint64_t kMostRemembered = 16 << 20;  // bytes
@@ -108,23 +108,25 @@ std::string Store::save(const Digest& key, const std::vector<Value>& outputs, co
   }
 }
 
-void Store::remember(const std::string& place, const Last& last) const {
-  if (!prepare().empty()) return;
+void Store::remember(const std::string& place, const LastResults& results) const {
+  if (results.empty() || !prepare().empty()) return;
+  LastResults all = results;
+  all.merge(last(place));
   Packer packed;
-  packed.add(Remembered{place, last});
-  write_checked(folder_ / "last" / hash_of(place).hex(), packed.packed);
+  packed.add(Remembered{place, std::move(all)});
+  if (packed.packed.size() <= kMostRemembered) write_checked(folder_ / "last" / hash_of(place).hex(), packed.packed);
 }
 
-std::optional<Store::Last> Store::last(const std::string& place) const {
-  if (!is_there()) return std::nullopt;
+Store::LastResults Store::last(const std::string& place) const {
+  if (!is_there()) return {};
   const auto text = read_checked(folder_ / "last" / hash_of(place).hex(), kMostRemembered);
-  if (!text) return std::nullopt;
+  if (!text) return {};
   try {
     Remembered remembered = Unpacker(*text).get<Remembered>();
-    if (remembered.place == place) return std::move(remembered.last);
+    if (remembered.place == place) return std::move(remembered.results);
   } catch (const Error&) {  // of another layout
   }
-  return std::nullopt;
+  return {};
 }
 
 std::optional<Digest> digest_of_hex(const std::string& text) {

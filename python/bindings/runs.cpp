@@ -137,7 +137,7 @@ void run_into(Run& run, const RunOptions& options, RunSettings& settings, Observ
   run.settings.threads = settings.threads;
   if (folder) write_folder(run, *folder);
   if (settings.store)
-    if (const std::string untidy = settings.store->tidy(); !untidy.empty())
+    if (const std::string untidy = settings.store->tidy(settings.cancelled); !untidy.empty())
       run.warnings.emplace_back("", "the store of results is not tidied up: " + untidy);
   drop_other_values(run);
 }

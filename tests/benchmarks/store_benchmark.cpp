@@ -47,6 +47,17 @@ BENCHMARK_F(Fixture, LookUpWhatIsNotThere)(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(store.find(hash_of(name++)).has_value());
 }
 
+/// What the end of a run takes where earlier runs left that many records, of which none is removed.
+void TidyUpRecords(benchmark::State& state) {
+  const fs::path folder = fs::temp_directory_path() / "marrow-tidying-benchmark";
+  const Store store(folder);
+  const auto run = [](std::int64_t number) { return "run " + std::to_string(number); };
+  for (std::int64_t i = 0; i < state.range(0); ++i) store.remember(run(i), {{"node", {hash_of(i), {}}}});
+  for (auto _ : state) benchmark::DoNotOptimize(store.collect(std::uint64_t(1) << 40).entries);
+  fs::remove_all(folder);
+}
+BENCHMARK(TidyUpRecords)->Arg(4000)->Arg(20000)->Unit(benchmark::kMillisecond);
+
 /// A host that has a shared store behind its own, which is empty at first.
 class SharedFixture : public benchmark::Fixture {
  public:

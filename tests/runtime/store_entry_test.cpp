@@ -81,13 +81,20 @@ TEST_F(StoreEntryTest, WhatWasNotMadeIsNotKept) {
 }
 
 TEST_F(StoreEntryTest, WhatAnotherPlaceCameToIsNotAccepted) {
-  Store::Last last;
-  last.key = key;
-  store.remember("one", last);
-  ASSERT_TRUE(store.last("one"));
+  store.remember("one", {{"node", {key, {}}}});
+  ASSERT_EQ(store.last("one").count("node"), 1u);
   const fs::path folder = store.folder() / "last";
   fs::copy_file(folder / marrow::hash_of(std::string("one")).hex(), folder / marrow::hash_of(std::string("two")).hex());
-  EXPECT_FALSE(store.last("two"));
+  EXPECT_TRUE(store.last("two").empty());
+}
+
+TEST_F(StoreEntryTest, WhatOtherCallsOfAPlaceCameToStays) {
+  store.remember("one", {{"a", {key, {}}}, {"b", {key, {}}}});
+  store.remember("one", {{"b", {marrow::hash_of(7), {}}}});
+  const Store::LastResults last = store.last("one");
+  ASSERT_EQ(last.size(), 2u);
+  EXPECT_EQ(last.at("a").key, key);
+  EXPECT_EQ(last.at("b").key, marrow::hash_of(7));
 }
 
 TEST_F(StoreEntryTest, SizesThatWrapOrLieOutsideAreDamage) {

@@ -96,7 +96,7 @@ TEST_F(StoreFolderTest, AFolderOfOtherThingsIsNeverTouched) {
   EXPECT_EQ(store.fault(), expected);
   EXPECT_EQ(save(store), expected);
   EXPECT_FALSE(store.find(marrow::hash_of(1)));
-  store.remember("place", {});
+  store.remember("place", {{"node", {}}});
   { const Store::Claim claim = store.claim(marrow::hash_of(1), nullptr); }
   const Store::Freed freed = store.collect(0);
   EXPECT_EQ(freed.fault, expected);
@@ -129,7 +129,7 @@ TEST_F(StoreFolderTest, ACaseInUseIsLeft) {
 
 TEST_F(StoreFolderTest, OnlyItsOwnLayoutIsCollected) {
   ASSERT_EQ(save(store), "");
-  store.remember("place", {});
+  store.remember("place", {{"node", {}}});
   const std::string key = marrow::hash_of(1).hex(), two = key.substr(0, 2);
   const std::string dead = ".tmp-" + runtime_fixture::ended_process() + "-0";
   put(scratch.path / "elsewhere" / "ab0123456789abcdef0123456789abcd");
@@ -188,7 +188,7 @@ TEST_F(StoreFolderTest, AnEmptyFolderBecomesAPrivateStore) {
   chmod(folder.c_str(), 0755);
   const mode_t before = umask(0);
   ASSERT_EQ(save(store), "");
-  store.remember("place", {});
+  store.remember("place", {{"node", {}}});
   { const Store::Claim claim = store.claim(marrow::hash_of(1), nullptr); }
   umask(before);
   EXPECT_EQ(mode_of(folder), 0700u);

@@ -211,7 +211,7 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   progress.clear();
   outcome.written = folder.write_outputs(pipeline, outcome.result, catalogue);
   folder.write_record(pipeline, outcome.result, settings, catalogue, arguments, outcome.written);
-  const std::string untidy = settings.store ? settings.store->tidy() : "";
+  const std::string untidy = settings.store ? settings.store->tidy(settings.cancelled) : "";
   if (!untidy.empty()) note("the store of results is not tidied up: " + untidy);
   outcome.is_faulty = outcome.result.failed();
   for (const RunFolder::Written& output : outcome.written) {

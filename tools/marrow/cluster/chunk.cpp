@@ -132,7 +132,7 @@ bool make_rows(const Task& task, const Chunk& chunk) {
                   file.add(row);
                   std::error_code ignored;
                   fs::remove_all(runner.folder_of(cells.cell(job.number)), ignored);
-                  if (!task.request.no_cache) store.tidy();
+                  if (!task.request.no_cache) store.tidy(&stop_on_signals());
                   progress.done(++done, row.id + (row.failed.empty() ? "" : " failed: " + row.failed));
                 }))
     return false;

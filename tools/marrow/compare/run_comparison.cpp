@@ -74,7 +74,7 @@ class Comparison {
   }
 
  private:
-  std::string tidy() const { return request_.no_cache ? "" : store_.tidy(); }
+  std::string tidy() const { return request_.no_cache ? "" : store_.tidy(&stop_on_signals()); }
 
   bool make_cases() {
     std::vector<std::size_t> all(experiment_.cases.size());

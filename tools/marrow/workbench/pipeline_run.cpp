@@ -101,7 +101,7 @@ json run_into_folder(std::shared_ptr<LastRun> run, const PipelineArguments& argu
   run->result = run_pipeline(run->pipeline, workbench.catalogue, settings);
   const auto written = folder.write_outputs(run->pipeline, run->result, workbench.catalogue);
   folder.write_record(run->pipeline, run->result, settings, workbench.catalogue, arguments, written);
-  if (settings.store) settings.store->tidy();
+  if (settings.store) settings.store->tidy(settings.cancelled);
   json verdicts = json::array(), faults = json::array();
   for (const NamedVerdict& one : verdicts_of(run->pipeline, run->result)) verdicts.push_back(json_of(one));
   for (const RunFolder::Written& output : written)

@@ -111,15 +111,17 @@ class Store {
   /// KEY.tmp-PROCESS-NUMBER and then renames it. Cases are collected like entries.
   std::filesystem::path cases() const { return folder_ / "cases"; }
 
-  /// The last result of a node in a pipeline. It is used to say why the node runs again. `place` names the pipeline,
-  /// the node and the item.
+  /// The last result of a call. It is used to say why the node runs again.
   struct Last {
     Digest key;
     Provenance provenance;
     using fields = Fields<&Last::key, &Last::provenance>;
   };
-  void remember(const std::string& place, const Last& last) const;
-  std::optional<Last> last(const std::string& place) const;
+  using LastResults = std::map<std::string, Last>;  ///< by the node and its item
+  /// Notes the last results of a run, or of one pass of a body. `place` names the pipeline and the pass. What is known
+  /// of other calls there stays.
+  void remember(const std::string& place, const LastResults& results) const;
+  LastResults last(const std::string& place) const;
 
   struct Entry {
     Digest key;
@@ -140,9 +142,9 @@ class Store {
   /// names that the store itself gives, and follows no links.
   Freed collect(std::uint64_t keep_bytes) const;
   /// Calls collect() with the limit MARROW_CACHE_GB (20 if it is not set), but at most once a minute. It is called
-  /// after a run and during a comparison, so that the store does not fill the disk. Returns what could not be removed.
-  /// If MARROW_CACHE_GB is wrong, returns why and removes nothing.
-  std::string tidy() const;
+  /// after a run and during a comparison, so that the store does not fill the disk. Stops when `cancelled` becomes
+  /// true. Returns what could not be removed. If MARROW_CACHE_GB is wrong, returns why and removes nothing.
+  std::string tidy(const std::atomic<bool>* cancelled = nullptr) const;
 
  private:
   bool is_there() const;
