@@ -14,6 +14,7 @@
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/types.hpp"
 #include "pipeline_axes.hpp"
+#include "pipeline_circles.hpp"
 #include "pipeline_names.hpp"
 #include "pipeline_options.hpp"
 #include "pipeline_references.hpp"
@@ -54,7 +55,9 @@ class Resolver {
     for (std::size_t i = 0; i < written_.nodes.size(); ++i) resolve_wires(i);
     for (const auto& [name, value] : written_.outputs) resolve_output(name, value);
     point_at_renamed();
+    check_circles(written_, diagnostics_);
     if (diagnostics_.empty()) order_and_find_axes(pipeline_, diagnostics_);
+    note_unused_inputs();
     return std::move(pipeline_);
   }
 
@@ -169,7 +172,12 @@ class Resolver {
       // A port that only other nodes of the kind have is checked like any other, and then left unwired.
       Wire wire =
           resolve_wire(value, own ? KindPort{port->name, port->help, {port->type}, port->axis} : *sibling, index);
-      if (!own) continue;
+      if (!own) {
+        pipeline_.notes.push_back("node " + in_quotes(node.id) + ": the wire to " + in_quotes(name) +
+                                  " is not used: only other nodes of the kind " + node.info.kind() +
+                                  " have this input, " + node.info.name + " has not");
+        continue;
+      }
       wire.port = int(port - node.info.inputs.begin());
       node.wires.push_back(std::move(wire));
     }
@@ -286,6 +294,12 @@ class Resolver {
     for (const WrittenNode& node : written_.nodes) nodes.emplace(node.id, node.place);
     point_at_renamed("node", nodes, ids_.used, ids_.unknown);
     point_at_renamed("input", written_.input_places, input_texts_.used, input_texts_.unknown);
+  }
+
+  /// A value of such an input would change nothing.
+  void note_unused_inputs() {
+    for (const auto& [name, place] : written_.input_places)
+      if (!input_texts_.used.contains(name)) pipeline_.notes.push_back("nothing uses the input " + in_quotes(name));
   }
 
   void point_at_renamed(const std::string& what, const std::map<std::string, Place>& defined,

@@ -13,16 +13,9 @@ namespace marrow {
 namespace {
 
 /// Sorts sources before users, and otherwise keeps the order of the file.
-void sort_nodes(Pipeline& pipeline, Diagnostics& diagnostics) {
+void sort_nodes(Pipeline& pipeline) {
   std::vector<PipelineNode>& nodes = pipeline.nodes;
-  std::vector<std::size_t> stuck;
-  const std::vector<std::size_t> order = pipeline_order(nodes, stuck);
-  if (!stuck.empty()) {
-    std::vector<std::string> names;
-    for (const std::size_t i : stuck) names.push_back(nodes[i].id);
-    diagnostics.add(nodes[stuck[0]].place, "these nodes wait for each other in a circle: " + joined(names, ", "));
-    return;
-  }
+  const std::vector<std::size_t> order = pipeline_order(nodes);
   std::vector<int> place_of(nodes.size());
   std::vector<PipelineNode> sorted;
   for (const std::size_t i : order) {
@@ -75,7 +68,7 @@ void find_axes(Pipeline& pipeline, std::size_t index, Diagnostics& diagnostics) 
 }  // namespace
 
 void order_and_find_axes(Pipeline& pipeline, Diagnostics& diagnostics) {
-  sort_nodes(pipeline, diagnostics);
+  sort_nodes(pipeline);
   for (std::size_t i = 0; i < pipeline.nodes.size() && diagnostics.empty(); ++i) find_axes(pipeline, i, diagnostics);
   if (!diagnostics.empty()) return;
   for (const PipelineOutput& output : pipeline.outputs) check_picks(pipeline, output.source, diagnostics);

@@ -5,7 +5,7 @@
 
 namespace marrow {
 
-std::vector<std::size_t> pipeline_order(const std::vector<PipelineNode>& nodes, std::vector<std::size_t>& stuck) {
+std::vector<std::size_t> pipeline_order(const std::vector<PipelineNode>& nodes) {
   // The order is as if one went through the file in rounds, and in each round took the nodes that have all their
   // sources. So a node is taken in the round of its latest source, or in the next round if that source stands below it.
   std::vector<std::vector<std::size_t>> users(nodes.size());
@@ -23,8 +23,6 @@ std::vector<std::size_t> pipeline_order(const std::vector<PipelineNode>& nodes, 
       round[user] = std::max(round[user], round[order[k]] + (order[k] > user));
       if (--waiting_for[user] == 0) order.push_back(user);
     }
-  for (std::size_t i = 0; i < nodes.size(); ++i)
-    if (waiting_for[i] > 0) stuck.push_back(i);
   std::sort(order.begin(), order.end(),
             [&](std::size_t a, std::size_t b) { return std::pair(round[a], a) < std::pair(round[b], b); });
   return order;

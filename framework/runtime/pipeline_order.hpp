@@ -6,8 +6,8 @@
 
 namespace marrow {
 
-/// The order of the nodes in which sources come before users, and which otherwise keeps the given order. `stuck`
-/// receives the nodes that wait for each other, and the nodes that wait for these.
-std::vector<std::size_t> pipeline_order(const std::vector<PipelineNode>& nodes, std::vector<std::size_t>& stuck);
+/// The order of the nodes in which sources come before users, and which otherwise keeps the given order. No nodes may
+/// wait for each other (pipeline_circles.hpp).
+std::vector<std::size_t> pipeline_order(const std::vector<PipelineNode>& nodes);
 
 }  // namespace marrow
