@@ -110,6 +110,17 @@ class Survey : public YAML::EventHandler {
   int documents_ = 0;
 };
 
+/// Throws if a tab indents the line in which a fault was found. The parser seldom says that this is the reason.
+void refuse_tab(const std::string& text, YAML::Mark mark) {
+  std::istringstream lines(text);
+  std::string line;
+  for (int i = 0; i <= mark.line; ++i) std::getline(lines, line);
+  const std::size_t tab = line.find('\t');
+  if (tab == std::string::npos || tab != line.find_first_not_of(' ')) return;
+  mark.column = int(tab);
+  throw YAML::ParserException(mark, "a tab indents this line; write spaces instead");
+}
+
 /// A quoted scalar has the tag "!".
 bool is_plain(const YAML::Node& node) { return node.IsScalar() && node.Tag() != "!"; }
 
@@ -120,7 +131,12 @@ YAML::Node parse_yaml(const std::string& text, const YamlLimits& limits) {
   YAML::Parser parser(stream);
   Survey survey(limits);
   bool is_empty = true;
-  while (parser.HandleNextDocument(survey)) is_empty = false;
+  try {
+    while (parser.HandleNextDocument(survey)) is_empty = false;
+  } catch (const YAML::ParserException& error) {
+    refuse_tab(text, error.mark);
+    throw;
+  }
   return is_empty ? YAML::Node() : YAML::Load(text);
 }
 

@@ -66,6 +66,17 @@ TEST(Yaml, KeysStandOnceAndAreNames) {
       "of 1; 5: the key 'b\x1b' in it holds a control character; ");
 }
 
+TEST(Yaml, TabsThatIndentAreNamed) {
+  const std::string said = "a tab indents this line; write spaces instead";
+  EXPECT_EQ(refusal("a:\n\tb: 1\n"), "2: " + said);
+  EXPECT_EQ(refusal("a:\n\t- 1\n"), "2: " + said);
+  EXPECT_EQ(refusal("a:\n  b: 1\n  \tc: 1\n"), "3: " + said);
+  EXPECT_EQ(refusal("a: |\n\ttext\n"), "2: " + said);
+  EXPECT_EQ(refusal("\ta: 1\nb: 1\n"), "1: " + said);
+  EXPECT_EQ(refusal("a:\t1\nb: [1,\n\t2]\n"), "") << "tabs elsewhere do no harm";
+  EXPECT_EQ(refusal("a:\t1\nb: [1\n").find("tab"), std::string::npos) << "the fault is another";
+}
+
 TEST(Yaml, Limits) {
   EXPECT_EQ(parse_yaml("").Type(), YAML::NodeType::Null);
   EXPECT_EQ(refusal("a: &x 1\nb: *x\n"), "");
