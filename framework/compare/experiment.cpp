@@ -89,7 +89,7 @@ PipelineArguments simulation_arguments_of(const Experiment& experiment, std::siz
 Experiment read_experiment(const fs::path& file, const Catalogue& catalogue, Diagnostics& diagnostics,
                            std::size_t more_cases) {
   WrittenExperiment written = read_written_experiment(file, diagnostics, more_cases);
-  if (diagnostics.empty()) check_pipelines(written, catalogue, diagnostics);
+  if (diagnostics.empty()) written.experiment.notes = check_pipelines(written, catalogue, diagnostics);
   return std::move(written.experiment);
 }
 

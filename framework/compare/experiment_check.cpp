@@ -4,6 +4,7 @@
 #include <set>
 
 #include "runtime/one_node.hpp"
+#include "runtime/pipeline_names.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -13,7 +14,9 @@ class Checker {
   Checker(const WrittenExperiment& written, const Catalogue& catalogue, Diagnostics& diagnostics)
       : written_(written), experiment_(written.experiment), catalogue_(catalogue), diagnostics_(diagnostics) {}
 
-  void check() {
+  /// Returns the notes that all variants have.
+  std::vector<std::string> check() {
+    std::vector<std::string> notes;
     check_simulation();
     for (std::size_t v = 0; v < experiment_.variants.size(); ++v) {
       Diagnostics faults;
@@ -21,12 +24,15 @@ class Checker {
           read_pipeline(experiment_.pipeline, arguments_of(experiment_, {v, 0, 0}, "case"), catalogue_, faults, true);
       diagnostics_.add_all(faults);  // a fault of every variant is reported once
       if (!faults.empty()) continue;
+      if (v == 0) notes = pipeline.notes;
+      std::erase_if(notes, [&](const std::string& note) { return !contains(pipeline.notes, note); });
       if (v == 0)
         check_names(pipeline);
       else
         check_figures_of(experiment_.variants[v], pipeline);
     }
     if (experiment_.tune) check_tuning(*experiment_.tune);
+    return notes;
   }
 
  private:
@@ -116,8 +122,9 @@ class Checker {
 
 }  // namespace
 
-void check_pipelines(const WrittenExperiment& written, const Catalogue& catalogue, Diagnostics& diagnostics) {
-  Checker(written, catalogue, diagnostics).check();
+std::vector<std::string> check_pipelines(const WrittenExperiment& written, const Catalogue& catalogue,
+                                         Diagnostics& diagnostics) {
+  return Checker(written, catalogue, diagnostics).check();
 }
 
 }  // namespace marrow::compare

@@ -7,6 +7,7 @@
 #include "catalogue_text.hpp"
 #include "command_options.hpp"
 #include "commands.hpp"
+#include "given_path.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/fits.hpp"
 
@@ -102,6 +103,7 @@ int list_fits(const ListRequest& request) {
   const Catalogue catalogue;
   Diagnostics diagnostics;
   const std::string &file = request.fits[0], &id = request.fits[1];
+  expect_given(file, Wanted::pipeline);
   const std::vector<Fit> fits =
       nodes_in_place_of(id, file, arguments_of({file, {}, request.overrides}), catalogue, diagnostics);
   if (!diagnostics.empty()) {

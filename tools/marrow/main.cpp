@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <new>
 
 #include "commands.hpp"
+#include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "process.hpp"
+#include "unknown_words.hpp"
 
 namespace {
 
@@ -14,6 +17,7 @@ int run_program(int argc, char** argv) {
   CLI::App app{
       "marrow finds the 3D pose of bone fragments in X-ray images, by pipelines of plugins described in YAML."};
   app.require_subcommand(1);
+  app.set_version_flag("--version", std::string("marrow ") + MARROW_VERSION, "print the version and end");
   app.footer(
       "Plugins are looked for in the folders of MARROW_PLUGIN_PATH and beside the program's library; see 'marrow "
       "doctor'.");
@@ -30,8 +34,12 @@ int run_program(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    const int status = app.exit(error);
-    return status == 0 ? 0 : 2;
+    const std::string command = unknown_command(app, {argv + std::min(argc, 1), argv + argc});
+    if (!command.empty()) throw marrow::Error(command);
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help or --version
+    if (const std::string option = unknown_option(app); !option.empty()) throw marrow::Error(option);
+    app.exit(error);
+    return 2;
   }
   return code;
 }

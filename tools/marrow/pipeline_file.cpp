@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
 #include <nlohmann/json.hpp>
-#include <regex>
 
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "drawn_graph.hpp"
+#include "given_path.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/run_folder.hpp"
-#include "runtime/text_file.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -23,24 +22,6 @@ void print_json(const Diagnostics& diagnostics) {
                     {"message", item.message},
                     {"hint", item.hint}});
   std::printf("%s\n", list.dump(1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
-}
-
-/// What to do with a file that is no pipeline but another one of marrow's files; empty for other files.
-std::string cure_for_other_file(const std::filesystem::path& file) {
-  static const std::regex kFormat("(?:^|\\n)(experiment|marrow-[a-z-]+):");
-  std::smatch format;
-  std::string text;
-  try {
-    text = read_text_file(file, kMostSourceBytes);
-  } catch (const Error&) {
-    return "";  // read_pipeline says why
-  }
-  if (!std::regex_search(text, format, kFormat)) return "";
-  const std::string name = printable(file.string());
-  if (format[1] == "experiment")
-    return name + ": this is an experiment, not a pipeline; look at it by: marrow compare " + name + " --dry-run";
-  return name + ": this is a file of the format " + format[1].str() +
-         ", not a pipeline; a pipeline names it in an option or an input";
 }
 
 }  // namespace
@@ -70,7 +51,7 @@ void print_faults(const Diagnostics& diagnostics) {
 
 bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required,
           bool json) {
-  if (const std::string cure = cure_for_other_file(request.file); !cure.empty()) throw Error(cure);
+  expect_given(request.file, Wanted::pipeline);
   Diagnostics diagnostics;
   pipeline = read_pipeline(request.file, arguments_of(request), catalogue, diagnostics, inputs_required);
   check_writers(pipeline, catalogue, diagnostics);

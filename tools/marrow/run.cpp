@@ -9,6 +9,7 @@
 
 #include "command_options.hpp"
 #include "commands.hpp"
+#include "fruitless_run.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/names.hpp"
 #include "marrow/domain/printable.hpp"
@@ -144,15 +145,19 @@ void print_nodes(const Pipeline& pipeline, const std::vector<NodeRecord>& record
   }
 }
 
+/// `folder`: empty if it was not kept.
 void print_summary(const Pipeline& pipeline, const RunResult& result, const std::vector<RunFolder::Written>& written,
-                   const RunFolder& folder) {
+                   const std::string& folder) {
   std::printf("\n");
   print_verdicts(verdicts_of(pipeline, result));
   std::printf("%-16s %-34s %9s %6s  %s\n", "node", "uses", "seconds", "calls", "status");
   print_nodes(pipeline, result.nodes, "");
   std::printf("%-16s %-34s %9.3f\n\n", "all", "", result.seconds);
   print_results(pipeline, result);
-  std::printf("results in %s\n", printable(folder.path().string()).c_str());
+  if (folder.empty())
+    std::printf("nothing was made, so no folder of results is kept\n");
+  else
+    std::printf("results in %s\n", printable(folder).c_str());
   for (const RunFolder::Written& output : written) {
     for (const std::string& file : output.files) std::printf("  %s\n", printable(file).c_str());
     if (!output.fault.empty()) std::printf("  %s: %s\n", output.output.c_str(), printable_lines(output.fault).c_str());
@@ -163,7 +168,7 @@ void print_summary(const Pipeline& pipeline, const RunResult& result, const std:
 }
 
 void print_json_summary(const Pipeline& pipeline, const RunResult& result,
-                        const std::vector<RunFolder::Written>& written, const RunFolder& folder) {
+                        const std::vector<RunFolder::Written>& written, const std::string& folder) {
   for (const NamedVerdict& one : verdicts_of(pipeline, result)) {
     json verdict = json_of(one);
     verdict["event"] = "verdict";
@@ -179,7 +184,7 @@ void print_json_summary(const Pipeline& pipeline, const RunResult& result,
                                : result.failed()  ? "failed"
                                                   : "done"},
                     {"seconds", result.seconds},
-                    {"folder", folder.path().string()},
+                    {"folder", folder},
                     {"files", files},
                     {"absent", absent}};
   std::printf("%s\n", end.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
@@ -287,15 +292,18 @@ int run(const RunRequest& request) {
   }
   const Store store;
   expect_good_place(pipeline, request.folder, request.no_cache ? nullptr : &store);
-  RunFolder folder = request.folder.empty()
-                         ? RunFolder::with_free_name(std::filesystem::path("runs") / pipeline.name, pipeline)
-                         : RunFolder(request.folder, pipeline);
+  const std::filesystem::path runs = "runs";
+  FolderOfItsOwn own(runs);
+  RunFolder folder = request.folder.empty() ? RunFolder::with_free_name(runs / pipeline.name, pipeline)
+                                            : RunFolder(request.folder, pipeline);
+  if (request.folder.empty()) own.take(folder.path());
   const RunOutcome outcome = execute(pipeline, catalogue, request, arguments_of(request.pipeline),
                                      request.no_cache ? nullptr : &store, folder);
+  const std::string kept = own.keep_if_fruitful(pipeline, outcome) ? folder.path().string() : "";
   if (request.json)
-    print_json_summary(pipeline, outcome.result, outcome.written, folder);
+    print_json_summary(pipeline, outcome.result, outcome.written, kept);
   else if (!request.quiet)
-    print_summary(pipeline, outcome.result, outcome.written, folder);
+    print_summary(pipeline, outcome.result, outcome.written, kept);
   if (outcome.result.cancelled()) return 130;
   if (outcome.is_faulty) return 1;
   return has_wrong_pose(verdicts_of(pipeline, outcome.result)) ? 3 : 0;

@@ -7,6 +7,7 @@
 #include "commands.hpp"
 #include "compare/comparison.hpp"
 #include "compare/comparison_folder.hpp"
+#include "given_path.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "process.hpp"
@@ -27,6 +28,7 @@ using compare::Experiment;
 /// Reads the experiment. If it has faults, prints all of them and returns false.
 bool load_experiment(const CompareRequest& request, const Catalogue& catalogue, Experiment& experiment,
                      std::size_t more_cases) {
+  expect_given(request.file, Wanted::experiment);
   Diagnostics diagnostics;
   experiment = compare::read_experiment(request.file, catalogue, diagnostics, more_cases);
   if (diagnostics.empty()) return true;
@@ -91,6 +93,9 @@ int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster)
   const Catalogue catalogue;
   Experiment experiment;
   if (!load_experiment(request, catalogue, experiment, 0)) return 2;
+  if (!request.quiet)
+    for (const std::string& note : experiment.notes)
+      std::fprintf(stderr, "marrow: note: %s\n", printable(note).c_str());
   if (request.more_cases && cluster.is_given())
     throw Error(
         "--more-cases looks at each batch of cases before the next one, so it runs here; leave the options for a "

@@ -77,6 +77,11 @@ void remove_parts(const fs::path& folder) {
 
 }  // namespace
 
+bool is_comparison(const fs::path& folder) {
+  std::error_code error;
+  return fs::is_regular_file(folder / kMarker, error);
+}
+
 ComparisonFolder::ComparisonFolder(const fs::path& folder, const compare::Experiment& experiment, Use use)
     : folder_(folder) {
   try {

@@ -7,6 +7,9 @@
 
 namespace marrow::cli {
 
+/// Whether it is the folder of a comparison.
+bool is_comparison(const std::filesystem::path& folder);
+
 /// The folder of a comparison, new or to be continued. A file in it, the marker, says that the folder belongs to marrow
 /// and to which experiment. Nothing is written into a folder with other content. Locks on the marker keep other
 /// processes out. They end with the process, even if it crashes.

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "amount_bounds.hpp"
+#include "given_path.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "run_files.hpp"
@@ -306,6 +307,7 @@ std::vector<std::string> damaged_files(const RunRecord& run) {
 }
 
 RunRecord read_run(const fs::path& folder) {
+  expect_given(folder, Wanted::run);
   std::error_code error;
   const std::string advice =
       "; give a folder that 'marrow run' wrote, or one of the cells of a comparison (FOLDER/cells/VARIANT/CASE/START)";

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "command_options.hpp"
+#include "given_path.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "report/report.hpp"
@@ -165,6 +166,7 @@ json page_of(const fs::path& folder, const json& record, ReportMaterial& materia
 }  // namespace
 
 fs::path write_run_page(const fs::path& folder, fs::path file) {
+  expect_given(folder, Wanted::run);
   std::error_code error;
   if (!fs::exists(folder / "run.json", error))
     throw Error(folder.string() +

@@ -8,6 +8,7 @@
 
 #include "command_options.hpp"
 #include "commands.hpp"
+#include "given_path.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "process.hpp"
@@ -182,7 +183,10 @@ void add_watch(CLI::App& app, int& code) {
   command->add_option("--build", request->builds,
                       "a build folder of CMake: whenever its sources change, it is built, and its plugins are used");
   command->add_option("--out", request->folder, "where page and results are put; default: runs/NAME-watch");
-  command->callback([request, &code] { code = Watch(*request, stop_on_signals()).run(); });
+  command->callback([request, &code] {
+    expect_given(request->pipeline.file, Wanted::pipeline);
+    code = Watch(*request, stop_on_signals()).run();
+  });
   say_that_libraries_are_described(command);
 }
 

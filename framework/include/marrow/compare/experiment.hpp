@@ -116,6 +116,7 @@ struct Experiment {
   std::optional<StopRule> stop;       ///< when a comparison with more and more cases ends
   std::optional<TuneRule> tune;       ///< how a further variant is found
   std::size_t timed_cells = 3;        ///< cells per variant that are run again, one at a time, to measure their time
+  std::vector<std::string> notes;     ///< remarks for people that hold for the pipelines of all variants
 
   std::size_t cell_count() const { return variants.size() * cases.size() * starts.size(); }
 };

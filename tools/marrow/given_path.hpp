@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <filesystem>
+
+namespace marrow::cli {
+
+/// What a command wants to be given.
+enum class Wanted { pipeline, experiment, run };
+
+/// Throws Error if the path names another of marrow's things than the wanted one. The error says what it is and what to
+/// do with it. Of all other paths it says nothing: who reads them says what is wrong.
+void expect_given(const std::filesystem::path& given, Wanted wanted);
+
+}  // namespace marrow::cli

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "unknown_words.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+
+#include "marrow/domain/names.hpp"
+#include "marrow/domain/printable.hpp"
+
+namespace marrow::cli {
+namespace {
+
+std::string name_of(const CLI::App& command) { return command.get_name().empty() ? "marrow" : command.get_name(); }
+
+/// What to do instead of giving `word` ("--case=x") to a command.
+std::string advice_for_option(const CLI::App& command, const std::string& word) {
+  const std::string name = word.substr(0, word.find('='));
+  std::vector<std::string> known;
+  for (const CLI::Option* option : command.get_options())
+    for (const std::string& one : option->get_lnames()) known.push_back("--" + one);
+  const std::string nearest = nearest_name(name, known);
+  const std::string meant = nearest.empty() ? "" : "did you mean " + in_quotes(nearest) + "?";
+  if (command.get_option_no_throw("inputs") != nullptr) {
+    const std::string bare = word.substr(std::min(word.find_first_not_of('-'), word.size()));
+    return (meant.empty() ? "an" : meant + " An") +
+           std::string(" input of the pipeline is given without dashes, as  ") + bare + (name == word ? "=VALUE" : "");
+  }
+  if (!meant.empty()) return meant;
+  if (command.get_parent() == nullptr) return "options of a command stand after its name";
+  return "known: those that --help shows";
+}
+
+}  // namespace
+
+std::string unknown_command(const CLI::App& app, const std::vector<std::string>& arguments) {
+  const CLI::App* at = &app;
+  for (const std::string& word : arguments) {
+    if (word.starts_with('-')) continue;  // no command that has commands has options with values
+    std::vector<std::string> known;
+    const CLI::App* found = nullptr;
+    for (const CLI::App* one : at->get_subcommands(nullptr)) {
+      if (one->get_name() == word) found = one;
+      if (!one->get_group().empty()) known.push_back(one->get_name());
+    }
+    if (found == nullptr && known.empty()) return "";
+    if (found == nullptr)
+      return (at == &app ? "there is no" : in_quotes(name_of(*at)) + " has no") + std::string(" command ") +
+             in_quotes(word) + "; " + suggestion(word, known);
+    at = found;
+  }
+  return "";
+}
+
+std::string unknown_option(const CLI::App& app) {
+  for (const CLI::App* at = &app;; at = at->get_subcommands()[0]) {
+    for (const std::string& word : at->remaining())
+      if (word.starts_with('-') && word != "--")
+        return in_quotes(name_of(*at)) + " has no option " + in_quotes(word.substr(0, word.find('='))) + "; " +
+               advice_for_option(*at, word);
+    if (at->get_subcommands().empty()) return "";
+  }
+}
+
+}  // namespace marrow::cli
