@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
 
 #include "digest_memory.hpp"
 #include "keys.hpp"
 #include "mapping.hpp"
+#include "nearest_result.hpp"
 #include "shared_store.hpp"
 
 namespace marrow {
@@ -251,11 +253,28 @@ double Evaluation::seconds_last_time(std::size_t node, const Call& call) const {
   return stored ? stored->provenance.seconds : 0;
 }
 
-std::string Evaluation::change_since_last(std::size_t node, const Call& call) const {
+/// The least recently used first.
+const std::vector<Store::Last>& Evaluation::kept_results() const {
+  if (kept_results_) return *kept_results_;
+  std::set<std::string> names;
+  for (const PipelineNode& node : pipeline_.nodes) names.insert(node.info.name);
+  kept_results_.emplace();
+  try {
+    for (Store::Entry& entry : settings_.store->entries())
+      if (names.contains(entry.provenance.node)) kept_results_->push_back({entry.key, std::move(entry.provenance)});
+  } catch (const Error&) {  // a folder of the store cannot be read: then the last run is what is compared with
+  }
+  return *kept_results_;
+}
+
+std::string Evaluation::reason_to_run(std::size_t node, const Call& call) const {
   if (makes_functions(node)) return "it may fail, and a function is not kept";
   const auto last = this->last(node, call);
   if (!last) return "it has not run before";
-  const std::string changes = difference(last->provenance, provenance(node, call.inputs));
+  const Provenance now = provenance(node, call.inputs);
+  std::string changes = difference(last->provenance, now);
+  const Provenance* nearest = changes.empty() ? nullptr : nearest_result(kept_results(), *last, now);
+  if (nearest) changes = difference(*nearest, now);
   return changes.empty()
              ? "the store has no result of it: it failed, was stopped or removed, or the processor is another"
              : changes;

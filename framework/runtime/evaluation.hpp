@@ -45,8 +45,8 @@ class Evaluation {
   void evaluate(std::size_t node, Call& call);
   /// Makes the data of a value that is needed at the end of the run. What cannot be made becomes missing.
   static void make(Value& value, const std::function<const TypeInfo&()>& type);
-  /// Why the key of the call is not the one of the node's last run; for plans.
-  std::string change_since_last(std::size_t node, const Call& call) const;
+  /// What differs from the nearest result that the store has; for plans.
+  std::string reason_to_run(std::size_t node, const Call& call) const;
   double seconds_last_time(std::size_t node, const Call& call) const;
   /// Whether the store has the result or the node makes only functions. If so, sets the result of the call as
   /// evaluate() does.
@@ -74,6 +74,7 @@ class Evaluation {
   std::string place() const;
   std::string name_of(std::size_t node, const Call& call) const;
   std::optional<Store::Last> last(std::size_t node, const Call& call) const;
+  const std::vector<Store::Last>& kept_results() const;
   void remember(std::size_t node, const Call& call, const Recipe& recipe);
   std::string failure_text(std::size_t node, const std::string& item, const std::string& reason) const;
   bool makes_functions(std::size_t node) const;
@@ -106,8 +107,9 @@ class Evaluation {
   std::function<void(std::size_t, Call&)> finished_;
   std::map<Digest, std::unique_ptr<Memo>> memos_;
   FilesRead files_read_;
-  Store::LastResults remembered_;                           ///< what this run came to; written when it ends
-  mutable std::optional<Store::LastResults> last_results_;  ///< what the run before came to; for plans
+  Store::LastResults remembered_;                                 ///< what this run came to; written when it ends
+  mutable std::optional<Store::LastResults> last_results_;        ///< what the run before came to; for plans
+  mutable std::optional<std::vector<Store::Last>> kept_results_;  ///< what the store has of these nodes; for plans
   WorkingFolder working_folder_;
   mutable std::mutex observer_mutex_, warnings_mutex_;
   bool store_complained_ = false;

@@ -17,7 +17,7 @@ namespace marrow {
 
 std::vector<PlannedNode> plan_pipeline(const Pipeline& pipeline, const Catalogue& catalogue,
                                        const RunSettings& settings) {
-  return GraphRun(pipeline, catalogue, settings).plan();
+  return GraphRun(pipeline, catalogue, settings).plan(true);
 }
 
 RunResult run_pipeline(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings) {

@@ -74,10 +74,10 @@ RunResult GraphRun::finish() {
   return std::move(result_);
 }
 
-std::vector<PlannedNode> GraphRun::plan() {
+std::vector<PlannedNode> GraphRun::plan(bool with_reasons) {
   std::vector<PlannedNode> planned(pipeline_.nodes.size());
   for (std::size_t i = 0; i < pipeline_.nodes.size(); ++i)
-    if (needed_[i]) planned[i] = plan_node(i, planned);
+    if (needed_[i]) planned[i] = plan_node(i, planned, with_reasons);
   return planned;
 }
 
@@ -102,7 +102,7 @@ void GraphRun::make_outputs() {
   }
 }
 
-PlannedNode GraphRun::plan_node(std::size_t index, const std::vector<PlannedNode>& planned) {
+PlannedNode GraphRun::plan_node(std::size_t index, const std::vector<PlannedNode>& planned, bool with_reasons) {
   const PipelineNode& node = pipeline_.nodes[index];
   PlannedNode result;
   for (const Wire& wire : node.wires)
@@ -119,7 +119,7 @@ PlannedNode GraphRun::plan_node(std::size_t index, const std::vector<PlannedNode
   NodeState& state = states_[index];
   make_calls(pipeline_, result_, index, state);
   result.what = PlannedNode::What::cached;
-  plan_calls(index, result);
+  plan_calls(index, with_reasons, result);
   if (result.calls_to_make)
     result.what = PlannedNode::What::runs;
   else
@@ -127,7 +127,7 @@ PlannedNode GraphRun::plan_node(std::size_t index, const std::vector<PlannedNode
   return result;
 }
 
-void GraphRun::plan_calls(std::size_t index, PlannedNode& result) {
+void GraphRun::plan_calls(std::size_t index, bool with_reasons, PlannedNode& result) {
   const PipelineNode& node = pipeline_.nodes[index];
   for (Call& call : states_[index].calls) {
     if (!obstacle(node, call, call.result.status).empty()) continue;
@@ -141,8 +141,8 @@ void GraphRun::plan_calls(std::size_t index, PlannedNode& result) {
       continue;
     }
     ++result.calls_to_make;
-    if (result.why.empty())
-      result.why = (call.item.empty() ? "" : call.item + ": ") + evaluation_.change_since_last(index, call);
+    if (with_reasons && result.why.empty())
+      result.why = (call.item.empty() ? "" : call.item + ": ") + evaluation_.reason_to_run(index, call);
     result.seconds += evaluation_.seconds_last_time(index, call);
   }
 }

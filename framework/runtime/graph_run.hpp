@@ -34,7 +34,8 @@ class GraphRun {
   /// failure of a node.
   RunResult finish();
   /// What the run would do. Outputs of cached nodes are then in result().
-  std::vector<PlannedNode> plan();
+  /// `with_reasons`: says why nodes run.
+  std::vector<PlannedNode> plan(bool with_reasons);
   /// The result so far. Its outputs may have no data yet. Throws as finish() does.
   const RunResult& result() const;
 
@@ -49,8 +50,8 @@ class GraphRun {
 
   static void complete_key(Value& value);
   void make_outputs();
-  PlannedNode plan_node(std::size_t index, const std::vector<PlannedNode>& planned);
-  void plan_calls(std::size_t index, PlannedNode& result);
+  PlannedNode plan_node(std::size_t index, const std::vector<PlannedNode>& planned, bool with_reasons);
+  void plan_calls(std::size_t index, bool with_reasons, PlannedNode& result);
   int count_sources(std::size_t index) const;
   void enqueue(std::function<void()> work, bool always = false);
   void withdraw(std::atomic<bool>& is_taken);

@@ -180,7 +180,7 @@ std::string text_of(const OptionValue& value, OptionType type, const Contents& c
   return out.str();
 }
 
-std::string difference(const Provenance& before, const Provenance& now) {
+std::vector<std::string> differences(const Provenance& before, const Provenance& now) {
   std::vector<std::string> changes;
   if (before.node != now.node)
     changes.push_back("it uses " + now.node + ", used " + before.node);
@@ -198,8 +198,12 @@ std::string difference(const Provenance& before, const Provenance& now) {
   }
   if (now.random && before.seed != now.seed)
     changes.push_back("the seed is " + std::to_string(now.seed) + ", was " + std::to_string(before.seed));
+  return changes;
+}
+
+std::string difference(const Provenance& before, const Provenance& now) {
   std::string text;
-  for (const std::string& change : changes) text += (text.empty() ? "" : "; ") + change;
+  for (const std::string& change : differences(before, now)) text += (text.empty() ? "" : "; ") + change;
   return text;
 }
 

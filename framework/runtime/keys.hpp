@@ -50,6 +50,9 @@ Digest function_key(const Digest& result, std::size_t output);
 /// that does not have it, from the disk.
 std::string text_of(const OptionValue& value, OptionType type, const Contents& contents = {});
 
+/// What two results were made from differently, one text for each.
+std::vector<std::string> differences(const Provenance& before, const Provenance& now);
+
 /// Why two results differ: "option 'high' is 80, was 75; input 'field' changed". Empty if there is no difference.
 std::string difference(const Provenance& before, const Provenance& now);
 

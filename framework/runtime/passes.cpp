@@ -363,7 +363,7 @@ void Passes::plan(PlannedNode& planned) {
   constant_nodes_.clear();  // a plan makes nothing, so that they are planned in the first pass
   while (has_next()) {
     run_ = next_pass();
-    const std::vector<PlannedNode> nodes = run_->graph->plan();
+    const std::vector<PlannedNode> nodes = run_->graph->plan(planned.why.empty());
     add_runs(run_->pipeline, nodes, name_of_pass());
     ++planned.calls;
     if (planned.calls_to_make) return;

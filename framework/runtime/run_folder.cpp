@@ -267,7 +267,12 @@ RunFolder RunFolder::with_free_name(const fs::path& base, const Pipeline& pipeli
     RunFolder run;
     run.folder_ = i == 1 ? base : fs::path(base.string() + "-" + std::to_string(i));
     if (::mkdir(run.folder_.c_str(), 0777) == 0) {
-      if (run.take(pipeline)) return run;
+      try {
+        if (run.take(pipeline)) return run;
+      } catch (...) {
+        ::rmdir(run.folder_.c_str());
+        throw;
+      }
     } else if (errno != EEXIST) {
       throw Error("cannot make the output folder " + run.folder_.string() + ": " + std::strerror(errno) + kAdvice);
     }

@@ -142,6 +142,16 @@ TEST_F(StoreTest, PlanSaysWhatRunsAndWhy) {
             "the store has no result of it: it failed, was stopped or removed, or the processor is another");
 }
 
+TEST_F(StoreTest, PlanComparesWithTheNearestResultThatIsKept) {
+  const auto constant = [](const std::string& value, const std::string& count) {
+    return "  c: {uses: test.constant, with: {value: " + value + ", count: " + count + "}}\n";
+  };
+  run(constant("1", "1"), "c: c");
+  run(constant("2", "2"), "c: c");
+  EXPECT_EQ(plan(constant("1", "3"), "c: c")[0].why, "option 'count' is 3, was 1") << "the last run had another value";
+  EXPECT_EQ(plan(constant("2", "3"), "c: c")[0].why, "option 'count' is 3, was 2");
+}
+
 TEST_F(StoreTest, WarningsAreRepeated) {
   const std::string nodes = "  w: {uses: test.warn}\n";
   run(nodes, "w: w");
