@@ -60,6 +60,7 @@ void unify_line_ends(std::string& text) {
       while (to > 0 && text[to - 1] == '\r') --to;
     text[to++] = text[from];
   }
+  while (to > 0 && text[to - 1] == '\r') --to;
   text.resize(to);
 }
 

@@ -2,7 +2,6 @@
 // ITK's text format of transforms: "Transform: TYPE", "Parameters: ..." and "FixedParameters: ...".
 #include "marrow/toolbox/exchange/itk_transform.hpp"
 
-#include <charconv>
 #include <cmath>
 #include <optional>
 #include <sstream>
@@ -10,6 +9,7 @@
 
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
@@ -40,11 +40,11 @@ std::optional<std::string> value_of(const std::string& text, const std::string& 
 }
 
 Lines lines_of(const std::filesystem::path& path) {
-  std::istringstream stream(files::read_bytes(path, kMostBytes));
+  std::istringstream stream(files::read_text(path, kMostBytes));
   Lines lines{path, "", "", ""};
   std::string text;
   for (std::size_t number = 1; std::getline(stream, text); ++number) {
-    while (!text.empty() && (text.back() == '\r' || text.back() == ' ' || text.back() == '\t')) text.pop_back();
+    while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.pop_back();
     if (number == 1 && text.rfind("#Insight Transform File V1", 0) != 0)
       lines.refuse(1, "expected '#Insight Transform File V1.0', got " + in_quotes(printable(text.substr(0, 60))) +
                           "; save the transform as .tfm in 3D Slicer or ITK");
@@ -79,12 +79,10 @@ std::vector<double> numbers_of(const Lines& lines, const std::string& text, std:
   std::istringstream words(text);
   std::vector<double> numbers;
   for (std::string word; words >> word;) {
-    const char* first = word.data() + (word[0] == '+' ? 1 : 0);
-    double value = 0;
-    const auto [end, failure] = std::from_chars(first, word.data() + word.size(), value);
-    if (failure != std::errc() || end != word.data() + word.size() || !(std::abs(value) <= kFarthest_mm))
+    const auto value = parsed_number(word);
+    if (!value || !(std::abs(*value) <= kFarthest_mm))
       lines.refuse(line, "expected numbers of at most 1e6, got " + in_quotes(printable(word.substr(0, 40))));
-    numbers.push_back(value);
+    numbers.push_back(*value);
   }
   return numbers;
 }

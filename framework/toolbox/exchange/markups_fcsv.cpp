@@ -2,13 +2,13 @@
 // 3D Slicer's lists of fiducials: comments with the version, the coordinate system and the columns, then a line a
 // point.
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <optional>
 #include <sstream>
 
 #include "markups_file.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
@@ -56,31 +56,33 @@ std::optional<std::string> said(const std::string& text, const std::string& key)
   return value == std::string::npos ? "" : text.substr(value);
 }
 
+std::optional<double> number_in(const std::string& cell) {
+  return parsed_number(std::string_view(cell).substr(std::min(cell.find_first_not_of(' '), cell.size())));
+}
+
 double coordinate(const std::string& text, const Line& line) {
-  const char *first = text.data(), *last = text.data() + text.size();
-  while (first != last && (*first == ' ' || *first == '+')) ++first;
-  double value = 0;
-  const auto [end, failure] = std::from_chars(first, last, value);
-  if (failure != std::errc() || end != last || !(std::abs(value) <= kLargestCoordinate_mm))
+  const auto value = number_in(text);
+  if (!value || !(std::abs(*value) <= kLargestCoordinate_mm))
     line.refuse("expected a coordinate in mm of at most 1 km, got " + in_quotes(text));
-  return value;
+  return *value;
 }
 
 /// What the comments at the beginning say.
 struct Header {
   bool has_version = false;
   std::optional<bool> is_ras;
-  std::size_t x = 1, label = 11, columns = 12;
+  std::size_t x = 1, label = 11, columns = 14;
 
   void read(const std::string& text, const Line& line) {
     if (const auto version = said(text, "Markups fiducial file version")) {
       if (version->rfind("4.", 0) != 0 && version->rfind("5.", 0) != 0)
         line.refuse("expected a version 4 or 5 of 3D Slicer's file, got " + in_quotes(*version));
       has_version = true;
-    } else if (const auto system = said(text, "CoordinateSystem")) {
-      if (*system != "LPS" && *system != "RAS" && *system != "0" && *system != "1")
-        line.refuse("expected the coordinate system LPS or RAS (also 1 or 0), got " + in_quotes(*system));
-      is_ras = *system == "RAS" || *system == "0";
+    } else if (const auto value = said(text, "CoordinateSystem")) {
+      const std::string system = value->substr(0, value->find(','));  // tables fill lines up with commas
+      if (system != "LPS" && system != "RAS" && system != "0" && system != "1")
+        line.refuse("expected the coordinate system LPS or RAS (also 1 or 0), got " + in_quotes(*value));
+      is_ras = system == "RAS" || system == "0";
     } else if (const auto names = said(text, "columns")) {
       const std::vector<std::string> cells = cells_of(*names, line);
       const auto place_of = [&](const char* name) {
@@ -92,10 +94,45 @@ struct Header {
       if (place_of("y") != x + 1 || place_of("z") != x + 2)
         line.refuse("the columns x, y, z do not follow each other; expected " + std::string(kColumns));
       label = place_of("label");
-      columns = std::max(label, x + 2) + 1;
+      columns = cells.size();
     }
   }
 };
+
+/// Whether a number with a decimal comma may have become two cells, so that the coordinates and the label are not where
+/// the columns say. A row may lack cells at its end, where the label shows that nothing has moved.
+bool may_be_shifted(const std::vector<std::string>& cells, const Header& header) {
+  if (cells.size() == header.columns) return false;
+  return cells.size() > header.columns || number_in(cells[header.label]).has_value();
+}
+
+/// 3D Slicer 5 writes two cells more than it names columns: whether the point is placed (0 to 3, 2 if it is), and
+/// whether a program made it (0 or 1). Nothing if the row does not end so.
+std::optional<double> status_of(const std::vector<std::string>& cells, const Header& header) {
+  if (cells.size() != header.columns + 2) return std::nullopt;
+  const auto status = number_in(cells[header.columns]), by_program = number_in(cells[header.columns + 1]);
+  const bool is_known = status && by_program && *status >= 0 && *status <= 3 && (*by_program == 0 || *by_program == 1);
+  return is_known ? status : std::nullopt;
+}
+
+/// The point of a row; nothing if it is listed but not placed.
+std::optional<MarkedPoint> point_of(const std::string& text, const Header& header, const Line& line) {
+  const std::vector<std::string> cells = cells_of(text, line);
+  if (const std::size_t least = std::max(header.label, header.x + 2) + 1; cells.size() < least)
+    line.refuse("expected at least " + std::to_string(least) + " cells, got " + std::to_string(cells.size()));
+  constexpr double kPlaced = 2;
+  if (const auto status = status_of(cells, header)) {
+    if (*status != kPlaced) return std::nullopt;
+  } else if (may_be_shifted(cells, header)) {
+    line.refuse("expected " + std::to_string(header.columns) + " cells, one for each of the columns, got " +
+                std::to_string(cells.size()) +
+                "; a number with a decimal comma makes two cells: write 12.5, not 12,5, and a text with commas in "
+                "quotation marks");
+  }
+  Eigen::Vector3d at_mm;
+  for (int i = 0; i < 3; ++i) at_mm[i] = coordinate(cells[header.x + std::size_t(i)], line);
+  return MarkedPoint{cells[header.label], in_lps(at_mm, *header.is_ras)};
+}
 
 /// In small or capital letters.
 bool ends_with(const std::filesystem::path& path, const std::string& end) {
@@ -116,13 +153,13 @@ std::string quoted(const std::string& text) {
 }  // namespace
 
 std::vector<MarkedPoint> read_markups_fcsv(const std::filesystem::path& path) {
-  std::istringstream lines(files::read_bytes(path, kMostMarkupsBytes));
+  std::istringstream lines(files::read_text(path, kMostMarkupsBytes));
   Header header;
   std::vector<MarkedPoint> points;
   std::string text;
   for (Line line{path}; std::getline(lines, text);) {
     ++line.number;
-    while (!text.empty() && (text.back() == '\r' || text.back() == ' ')) text.pop_back();
+    while (!text.empty() && text.back() == ' ') text.pop_back();
     if (text.empty()) continue;
     if (text[0] == '#') {
       header.read(text, line);
@@ -131,13 +168,7 @@ std::vector<MarkedPoint> read_markups_fcsv(const std::filesystem::path& path) {
     if (!header.has_version) line.refuse("expected 3D Slicer's '# Markups fiducial file version = ' first");
     if (!header.is_ras)
       line.refuse("no line '# CoordinateSystem = ' came before; add it, with LPS or RAS after the sign");
-    const std::vector<std::string> cells = cells_of(text, line);
-    if (cells.size() < header.columns)
-      line.refuse("expected at least " + std::to_string(header.columns) + " cells, got " +
-                  std::to_string(cells.size()));
-    Eigen::Vector3d at_mm;
-    for (int i = 0; i < 3; ++i) at_mm[i] = coordinate(cells[header.x + std::size_t(i)], line);
-    points.push_back({cells[header.label], in_lps(at_mm, *header.is_ras)});
+    if (auto point = point_of(text, header, line)) points.push_back(std::move(*point));
   }
   if (points.empty()) throw Error(path.string() + ": there is no point in it; expected 3D Slicer's list of fiducials");
   return points;

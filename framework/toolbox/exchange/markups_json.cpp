@@ -90,7 +90,7 @@ void read_list(const json& list, const Place& place, std::vector<MarkedPoint>& p
 
 std::vector<MarkedPoint> read_markups_json(const std::filesystem::path& path) {
   const Place file{path.string(), ""};
-  const json root = parsed(files::read_bytes(path, kMostMarkupsBytes), file.file);
+  const json root = parsed(files::read_text(path, kMostMarkupsBytes), file.file);
   if (!root.is_object()) throw Error(file.file + ": expected 3D Slicer's markups, got " + shown(root));
   const std::string schema = text_or(root, "@schema", "markups-schema-v1.", file);
   if (schema.find("markups-schema-v1.") == std::string::npos)

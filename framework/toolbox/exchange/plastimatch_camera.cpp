@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/exchange/plastimatch_camera.hpp"
 
-#include <charconv>
 #include <cmath>
 #include <sstream>
 
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
+#include "marrow/domain/plain_text.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
@@ -22,11 +23,9 @@ std::vector<double> numbers_in(const std::string& line) {
   std::istringstream words(line);
   std::vector<double> numbers;
   for (std::string word; words >> word;) {
-    const char* first = word.data() + (word[0] == '+' ? 1 : 0);
-    double value = 0;
-    const auto [end, failure] = std::from_chars(first, word.data() + word.size(), value);
-    if (failure != std::errc() || end != word.data() + word.size() || !std::isfinite(value)) return {};
-    numbers.push_back(value);
+    const auto value = parsed_number(word);
+    if (!value || !std::isfinite(*value)) return {};
+    numbers.push_back(*value);
   }
   return numbers;
 }
@@ -34,7 +33,7 @@ std::vector<double> numbers_in(const std::string& line) {
 /// Reads the file line by line.
 class Text {
  public:
-  explicit Text(const std::filesystem::path& path) : path_(path), stream_(files::read_bytes(path, kMostBytes)) {}
+  explicit Text(const std::filesystem::path& path) : path_(path), stream_(files::read_text(path, kMostBytes)) {}
 
   template <int Rows, int Columns>
   Eigen::Matrix<double, Rows, Columns> numbers(const std::string& what) {
@@ -63,7 +62,7 @@ class Text {
     std::string line;
     std::getline(stream_, line);
     ++line_;
-    while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
+    while (!line.empty() && line.back() == ' ') line.pop_back();
     return line;
   }
   std::filesystem::path path_;
@@ -77,7 +76,7 @@ bool is_plastimatch_camera(const std::filesystem::path& path) {
   std::error_code failure;
   if (!std::filesystem::is_regular_file(path, failure)) return false;
   const files::InputFile file(path, true);
-  const std::string begin = file.text(0, std::size_t(std::min<std::uint64_t>(file.size(), 256)));
+  const std::string begin = plain_text(file.text(0, std::size_t(std::min<std::uint64_t>(file.size(), 256))));
   return numbers_in(begin.substr(0, begin.find('\n'))).size() == 2;
 }
 

@@ -6,7 +6,6 @@
 #include <expat.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <memory>
@@ -14,6 +13,7 @@
 #include <sstream>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 
@@ -137,11 +137,9 @@ class RtkReader {
     std::istringstream words(text_);
     std::vector<double> values;
     for (std::string word; words >> word;) {
-      const char* first = word.data() + (word[0] == '+' ? 1 : 0);
-      double value = 0;
-      const auto [stop, failure] = std::from_chars(first, word.data() + word.size(), value);
-      if (failure != std::errc() || stop != word.data() + word.size() || !(std::abs(value) <= kLargest)) return {};
-      values.push_back(value);
+      const auto value = parsed_number(word);
+      if (!value || !(std::abs(*value) <= kLargest)) return {};
+      values.push_back(*value);
     }
     return values;
   }

@@ -6,11 +6,26 @@
 #include <cmath>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
+#include "marrow/domain/plain_text.hpp"
 
 namespace marrow::files {
 namespace {
 
 constexpr std::size_t kLongestLine = 1 << 16, kLongestHeader = 1 << 18;
+
+/// The path of a file below `folder`, as a header names it; on Windows some write it with backslashes. Empty if it may
+/// lead out of the folder.
+std::filesystem::path path_inside(const std::filesystem::path& folder, std::string name) {
+  if (name.find('\0') != std::string::npos || name.starts_with('/')) return {};
+  std::error_code failure;
+  if (!std::filesystem::exists(std::filesystem::symlink_status(folder / name, failure)))
+    std::replace(name.begin(), name.end(), '\\', '/');
+  const std::filesystem::path path(name), short_path = path.lexically_normal();
+  const bool is_inside = path.is_relative() && path.has_filename() && short_path != "." &&
+                         std::find(path.begin(), path.end(), "..") == path.end();
+  return is_inside ? short_path : std::filesystem::path();
+}
 
 }  // namespace
 
@@ -42,33 +57,34 @@ std::string shown(const std::string& text) {
 }
 
 std::optional<double> number_of(const std::string& text) {
-  const char* first = text.data() + (!text.empty() && text[0] == '+' ? 1 : 0);
-  double value = 0;
-  const auto [end, failure] = std::from_chars(first, text.data() + text.size(), value);
-  if (failure != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
+  const auto value = parsed_number(text);
+  return value && std::isfinite(*value) ? value : std::nullopt;
+}
+
+HeaderLines::HeaderLines(const InputFile& file) : file_(file) {
+  text_ = file.text(0, std::size_t(std::min<std::uint64_t>(file.size(), kLongestHeader + kLongestLine)));
+  is_utf16_ = begins_as_utf16(text_);
+  if (is_utf16_) text_ = plain_text(std::move(text_));
+  if (text_.starts_with("\xEF\xBB\xBF")) at_ = 3;
+  const std::size_t end = text_.find_first_of("\r\n");
+  if (end != std::string::npos && text_[end] == '\r' && text_.compare(end, 2, "\r\n") != 0) line_end_ = '\r';
 }
 
 std::optional<std::string> HeaderLines::next() {
-  if (at_ >= file_.size()) return std::nullopt;
-  const auto end_in_part = [&] { return part_.find('\n', std::size_t(at_ - part_begin_)); };
-  std::size_t end = end_in_part();
-  if (end == std::string::npos) {
-    part_begin_ = at_;
-    part_ = file_.text(at_, std::size_t(std::min<std::uint64_t>(kLongestLine, file_.size() - at_)));
-    end = end_in_part();
-  }
-  if (end == std::string::npos && part_.size() == kLongestLine)
+  if (at_ >= text_.size()) return std::nullopt;
+  const std::size_t end = std::min(text_.find(line_end_, at_), text_.size());
+  if (end - at_ >= kLongestLine)
     throw Error(file_.path().string() +
                 ": a line of its header is longer than 65536 bytes; it is damaged, or of another kind");
-  end = std::min(end, part_.size());
-  std::string line = part_.substr(std::size_t(at_ - part_begin_), end - std::size_t(at_ - part_begin_));
-  at_ = std::min(part_begin_ + end + 1, file_.size());
+  std::string line = text_.substr(at_, end - at_);
+  at_ = std::min(end + 1, text_.size());
   if (at_ > kLongestHeader)
     throw Error(file_.path().string() + ": its header is longer than 262144 bytes; it is damaged, or of another kind");
   if (!line.empty() && line.back() == '\r') line.pop_back();
   return line;
 }
+
+std::uint64_t HeaderLines::at() const { return is_utf16_ ? file_.size() : at_; }
 
 void HeaderFields::add(std::string key, const std::string& value) {
   key = in_small_letters(trimmed(key));
@@ -127,15 +143,15 @@ std::filesystem::path file_beside(const std::filesystem::path& header, const std
   if (!folder_is_named)
     throw Error(header.string() + ": keeps its samples in another file, '" + shown(name) +
                 "'; name the folder that holds both, or convert to .mha or .nrrd");
-  if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos ||
-      name.find('\0') != std::string::npos)
+  const std::filesystem::path inside = path_inside(header.parent_path(), name);
+  if (inside.empty())
     throw Error(header.string() + ": names '" + shown(name) +
-                "' for its samples; expected one file that lies beside it");
-  std::filesystem::path data = header.parent_path() / name;
+                "' for its samples; expected one file that lies beside it, or in a folder beside it");
+  std::filesystem::path data = header.parent_path();
+  for (const std::filesystem::path& part : inside) check_stays_inside(header.parent_path(), data /= part);
   std::error_code failure;
   if (!std::filesystem::exists(std::filesystem::symlink_status(data, failure)))
     throw Error(header.string() + ": names '" + shown(name) + "' for its samples, which is not there");
-  check_stays_inside(header.parent_path(), data);
   return data;
 }
 

@@ -18,6 +18,7 @@ class HeaderFields {
   const std::filesystem::path& path() const { return path_; }
 
   void add(std::string key, const std::string& value);
+  void replace(const std::string& key, const std::string& value) { values_[key] = value; }
   bool has(const std::string& key) const { return values_.count(key) > 0; }
   /// Getters return the value, or `missing` if there is no such field. Those without a default then throw Error.
   std::string text(const std::string& key) const;
@@ -33,20 +34,23 @@ class HeaderFields {
   std::map<std::string, std::string> values_;
 };
 
-/// The lines at the beginning of a file, one after the other. Throws Error if one line or all lines together are longer
-/// than those of any real header.
+/// The lines at the beginning of a file, one after the other. They end with \n, \r\n or \r, as the first one does, and
+/// a byte order mark before them is passed over. A whole file of UTF-16 is converted. Throws Error if one line or all
+/// lines together are longer than those of any real header.
 class HeaderLines {
  public:
-  explicit HeaderLines(const InputFile& file) : file_(file) {}
+  explicit HeaderLines(const InputFile& file);
   /// The next line without its line end. std::nullopt at the end of the file.
   std::optional<std::string> next();
-  /// Offset of the next line.
-  std::uint64_t at() const { return at_; }
+  /// Offset of the next line in the file. After a header in UTF-16, where no samples can follow, it is the file's end.
+  std::uint64_t at() const;
 
  private:
   const InputFile& file_;
-  std::string part_;
-  std::uint64_t at_ = 0, part_begin_ = 0;
+  std::string text_;  ///< the beginning of the file, or all of it
+  std::size_t at_ = 0;
+  bool is_utf16_ = false;
+  char line_end_ = '\n';
 };
 
 std::string trimmed(const std::string& text);
@@ -57,9 +61,10 @@ std::string shown(const std::string& text);
 /// The whole text as a finite number. std::nullopt if it is none.
 std::optional<double> number_of(const std::string& text);
 
-/// The file with the samples that a header names; it lies in the header's folder. Throws Error if the name is a list, a
-/// pattern or a path, if there is no such file, or if it is a link out of the folder. Also throws if the user named
-/// only the header and not the folder with both files (`folder_is_named`).
+/// The file with the samples that a header names; it lies in the header's folder or below it. Throws Error if the name
+/// is a list, a pattern or a path that leaves the folder, if there is no such file, or if it or a folder on the way is
+/// a link out of the folder. Also throws if the user named only the header and not the folder with both files
+/// (`folder_is_named`): all files in the folder count, and no others.
 std::filesystem::path file_beside(const std::filesystem::path& header, const std::string& name, bool folder_is_named);
 
 }  // namespace marrow::files

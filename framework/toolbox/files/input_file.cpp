@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/plain_text.hpp"
 #include "marrow/runtime/reading.hpp"
 
 namespace marrow::files {
@@ -69,11 +70,15 @@ std::string read_bytes(const std::filesystem::path& path, std::uint64_t most, bo
   return file.text(0, std::size_t(file.size()));
 }
 
+std::string read_text(const std::filesystem::path& path, std::uint64_t most, bool may_be_empty) {
+  return plain_text(read_bytes(path, most, may_be_empty));
+}
+
 const char* FileWindow::bytes(std::uint64_t at, std::size_t count) {
   if (!holds(at, count)) throw std::out_of_range("behind the end");
   if (at < begin_ || at + count > begin_ + part_.size()) {
-    part_.resize(std::size_t(std::min<std::uint64_t>(std::max(count, kWindow), file_.size() - at)));
-    file_.read(at, part_.data(), part_.size());
+    part_.resize(std::size_t(std::min<std::uint64_t>(std::max(count, kWindow), size_ - at)));
+    file_->read(at, part_.data(), part_.size());
     begin_ = at;
   }
   return part_.data() + (at - begin_);

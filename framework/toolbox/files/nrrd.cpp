@@ -6,6 +6,8 @@
 
 #include "header_lines.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
+#include "nrrd_axes.hpp"
 #include "samples.hpp"
 
 namespace marrow::files {
@@ -209,7 +211,7 @@ void read_grid_without_space(const HeaderFields& fields, Samples& samples) {
     if (const double length = spacings[k] * (samples.size[k] - (are_nodes[k] ? 1 : 0));
         std::abs(greatest[k] - least[k] - length) > 1e-3 * std::abs(length))
       fields.refuse("axis maxs", "'axis mins' and as many 'spacings' as there are voxels (" +
-                                     std::to_string(least[k] + length) + ")");
+                                     formatted("%f", least[k] + length) + ")");
 }
 
 /// The format does not allow 'spacings' together with 'space directions'. They are accepted if they agree or are NaN.
@@ -291,7 +293,8 @@ StoredSamples stored_in(const HeaderFields& fields, const InputFile& data, std::
 
 VolumeSamples read_nrrd(const std::filesystem::path& path, bool folder_is_named) {
   const InputFile file(path);
-  const auto [fields, end] = read_nrrd_header(file);
+  const auto [all_fields, end] = read_nrrd_header(file);
+  const HeaderFields fields = without_single_samples(all_fields);
   const long long dimensions = fields.whole_number_or("dimension", 0);
   if (dimensions < 1 || dimensions > 16) fields.refuse("dimension", "3");
   const bool is_detached = fields.has("data file");
@@ -302,7 +305,9 @@ VolumeSamples read_nrrd(const std::filesystem::path& path, bool folder_is_named)
   volume.geometry.dimensions = int(dimensions);
   for (std::size_t k = 0; k < 3; ++k) volume.geometry.size[k] = int(size[k]);
   if (dimensions == 3) read_grid(fields, volume.geometry);
-  volume.values = read_floats(data, stored_in(fields, data, is_detached ? 0 : end, volume.geometry.count()));
+  const StoredSamples stored = stored_in(fields, data, is_detached ? 0 : end, volume.geometry.count());
+  volume.geometry.type = stored.type_of_values();
+  volume.values = read_floats(data, stored);
   return volume;
 }
 

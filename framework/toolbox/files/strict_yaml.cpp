@@ -20,7 +20,7 @@ std::vector<std::string> split_lines(const std::string& text) {
   for (char c : text) {
     if (c == '\n')
       lines.emplace_back();
-    else if (c != '\r')
+    else
       lines.back() += c;
   }
   return lines;
@@ -29,7 +29,7 @@ std::vector<std::string> split_lines(const std::string& text) {
 }  // namespace
 
 YamlFile::YamlFile(std::filesystem::path path) : path_(std::move(path)) {
-  const std::string text = read_bytes(path_, kLargestYaml, true);
+  const std::string text = read_text(path_, kLargestYaml, true);
   lines_ = split_lines(text);
   if (text.find('\0') != std::string::npos) throw Error(path_.string() + ": expected YAML text; this file is binary");
   try {

@@ -3,13 +3,12 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <sstream>
 
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 
 namespace marrow::track {
@@ -33,20 +32,24 @@ std::array<double, 16> numbers_of(const Line& line) {
   while (at < line.text.size()) {
     const std::size_t begin = at, end = std::min(line.text.find_first_of(", \t", at), line.text.size());
     at = end + 1;
-    std::string_view word = line.text.substr(begin, end - begin);
+    const std::string_view word = line.text.substr(begin, end - begin);
     if (word.empty()) continue;
-    if (word.front() == '+') word.remove_prefix(1);
-    double value = 0;
-    const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || stop != word.data() + word.size())
+    const auto value = parsed_number(word);
+    if (!value)
       throw Error(line.place() + ":" + std::to_string(begin + 1) + ": expected a number, got '" +
                   std::string(word.substr(0, 40)) + "'");
-    if (count < numbers.size()) numbers[count] = value;
+    if (count < numbers.size()) numbers[count] = *value;
     ++count;
   }
   if (count != numbers.size())
-    throw Error(line.place() + ": expected the 16 numbers of a 4x4 matrix, got " + std::to_string(count));
+    throw Error(line.place() + ": expected the 16 numbers of a 4x4 matrix, got " + std::to_string(count) +
+                (count > numbers.size() ? "; a number with a decimal comma counts twice: write 12.5, not 12,5" : ""));
   return numbers;
+}
+
+/// Whether there is a comma, and between commas nothing but blanks: programs for tables write NaN so.
+bool has_only_empty_cells(std::string_view text) {
+  return text.find(',') != std::string_view::npos && text.find_first_not_of(", \t") == std::string_view::npos;
 }
 
 std::optional<RigidTransform> pose_of(const std::array<double, 16>& m, const Line& line) {
@@ -71,14 +74,16 @@ std::optional<RigidTransform> pose_of(const std::array<double, 16>& m, const Lin
 }  // namespace
 
 AutoscoperTrack read_tra_file(const std::filesystem::path& path) {
-  std::istringstream lines(files::read_bytes(path, kMostBytes));
+  std::istringstream lines(files::read_text(path, kMostBytes));
   AutoscoperTrack track;
   std::string text;
   for (std::size_t number = 1; std::getline(lines, text); ++number) {
-    if (!text.empty() && text.back() == '\r') text.pop_back();
-    if (text.find_first_not_of(", \t") == std::string::npos) continue;
+    if (text.find_first_not_of(" \t") == std::string::npos) continue;
     const Line line{path, number, text};
-    track.world_from_bone.push_back(pose_of(numbers_of(line), line));
+    if (has_only_empty_cells(text))
+      track.world_from_bone.emplace_back();
+    else
+      track.world_from_bone.push_back(pose_of(numbers_of(line), line));
   }
   return track;
 }
@@ -88,13 +93,11 @@ std::string tra_text(const AutoscoperTrack& track) {
   for (const auto& pose : track.world_from_bone) {
     for (int row = 0; row < 4; ++row)
       for (int column = 0; column < 4; ++column) {
-        char number[40] = "NaN";
         const double value = !pose        ? 0
                              : row == 3   ? double(column == 3)
                              : column < 3 ? pose->rotation(row, column)
                                           : pose->translation_mm[row];
-        if (pose) std::snprintf(number, sizeof number, "%.17g", value);
-        text += (row + column > 0 ? "," : "") + std::string(number);
+        text += (row + column > 0 ? "," : "") + (pose ? formatted("%.17g", value) : "NaN");
       }
     text += "\n";
   }

@@ -35,13 +35,22 @@ class InputFile {
 /// All bytes of a file. Throws Error as InputFile does, or if there are more than `most` bytes.
 std::string read_bytes(const std::filesystem::path& path, std::uint64_t most, bool may_be_empty = false);
 
+/// All of a file that is a text, as UTF-8 in lines that end with \n, however its writer stored it (plain_text() in
+/// domain/plain_text.hpp). Throws Error as read_bytes() does.
+std::string read_text(const std::filesystem::path& path, std::uint64_t most, bool may_be_empty = false);
+
 /// Reads single numbers and texts at any offset of a file. It reads a larger part at once, so that neighbours need no
 /// further access. For use in one thread. The file must outlive it.
 class FileWindow {
  public:
-  explicit FileWindow(const InputFile& file) : file_(file) {}
-  /// Whether the file holds `count` bytes at offset `at`.
-  bool holds(std::uint64_t at, std::uint64_t count) const { return at <= file_.size() && count <= file_.size() - at; }
+  explicit FileWindow(const InputFile& file) : file_(&file), size_(file.size()) {}
+  /// Reads `content` instead, which was unpacked from the file.
+  FileWindow(const InputFile& file, const std::string& content)
+      : file_(&file), size_(content.size()), part_(content.begin(), content.end()) {}
+  /// The number of bytes that can be read.
+  std::uint64_t size() const { return size_; }
+  /// Whether there are `count` bytes at offset `at`.
+  bool holds(std::uint64_t at, std::uint64_t count) const { return at <= size_ && count <= size_ - at; }
   /// The unsigned number of `width` bytes at an offset, and `count` bytes as a string. Both throw std::out_of_range if
   /// the bytes lie beyond the end of the file.
   std::uint64_t number(std::uint64_t at, int width, bool big_endian);
@@ -49,7 +58,8 @@ class FileWindow {
 
  private:
   const char* bytes(std::uint64_t at, std::size_t count);
-  const InputFile& file_;
+  const InputFile* file_;
+  std::uint64_t size_;
   std::vector<char> part_;
   std::uint64_t begin_ = 0;
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Autoscoper's file of a bone's poses (.tra): a line a frame, the 16 numbers of the 4x4 matrix world from bone row by
-// row, in mm. NaN stands for a frame without a pose.
+// row, in mm. A frame without a pose is a line of NaN, or of empty cells: commas alone.
 #include <filesystem>
 
 #include "marrow/toolbox/track/track_state.hpp"
