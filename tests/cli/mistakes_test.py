@@ -54,8 +54,10 @@ class Mistakes(Comparison):
         self.assertEqual(
             self.said("compare", "e.yaml", "--dryrun"), "'compare' has no option '--dryrun'; did you mean '--dry-run'?"
         )
+        self.assertEqual(self.said("cache", "gc", "--keep=3"), "'gc' has no option '--keep'; did you mean '--keep-gb'?")
         self.assertEqual(
-            self.said("cache", "gc", "--keep=3"), "'gc' has no option '--keep'; known: those that --help shows"
+            self.said("cache", "gc", "--everything"),
+            "'gc' has no option '--everything'; known: those that --help shows",
         )
         self.assertEqual(
             self.said("--quiet", "run", "p.yaml"),

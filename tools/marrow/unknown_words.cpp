@@ -18,7 +18,8 @@ std::string advice_for_option(const CLI::App& command, const std::string& word) 
   std::vector<std::string> known;
   for (const CLI::Option* option : command.get_options())
     for (const std::string& one : option->get_lnames()) known.push_back("--" + one);
-  const std::string nearest = nearest_name(name, known);
+  const auto longer = std::find_if(known.begin(), known.end(), [&](const auto& one) { return one.starts_with(name); });
+  const std::string nearest = longer != known.end() ? *longer : nearest_name(name, known);
   const std::string meant = nearest.empty() ? "" : "did you mean " + in_quotes(nearest) + "?";
   if (command.get_option_no_throw("inputs") != nullptr) {
     const std::string bare = word.substr(std::min(word.find_first_not_of('-'), word.size()));

@@ -20,7 +20,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr std::size_t kMostKept = 200'000;
-constexpr auto kPatience = std::chrono::seconds(10);
+constexpr auto kUntilKilled = std::chrono::seconds(10);
 
 /// Starts the program in a process group of its own, so that Ctrl-C reaches only this process.
 pid_t started(const std::vector<std::string>& command, int output) {
@@ -79,7 +79,7 @@ ChildEnd run_child(const std::vector<std::string>& command, const std::function<
       end.stopped = true;
       stopped_at = Clock::now();
       kill(-process, SIGINT);
-    } else if (end.stopped && Clock::now() - stopped_at > kPatience) {
+    } else if (end.stopped && Clock::now() - stopped_at > kUntilKilled) {
       kill(-process, SIGKILL);
     }
   }
