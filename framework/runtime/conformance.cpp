@@ -11,6 +11,8 @@
 #include <thread>
 
 #include "manifest.hpp"
+#include "marrow/domain/number_text.hpp"
+#include "process_state.hpp"
 
 namespace marrow::conformance {
 namespace {
@@ -176,11 +178,7 @@ void expect_reason(const std::string& refusal) {
   expect(refusal.size() > 10, "it refuses without saying why: '" + refusal + "'");
 }
 
-std::string digits(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
+std::string digits(double value) { return formatted("%.3g", value); }
 
 std::filesystem::path files_folder() {
   if (known_files_folder().empty()) throw Error("this check writes files, so only 'marrow conformance' can run it");
@@ -213,8 +211,10 @@ Result Subject::call(const Inputs& inputs, int threads) const {
   Result result;
   arena.execute([&] {
     try {
-      Context context(1);
-      result.outputs = node_.call(values, options.get(), context);
+      ProcessState::of_runs()->keep_during([&] {
+        Context context(1);
+        result.outputs = node_.call(values, options.get(), context);
+      });
     } catch (const Error& error) {
       result.refusal = error.what();
     }

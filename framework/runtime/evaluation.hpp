@@ -11,7 +11,7 @@
 
 #include "files_read.hpp"
 #include "marrow/runtime/executor.hpp"
-#include "working_folder.hpp"
+#include "process_state.hpp"
 
 namespace marrow {
 
@@ -110,7 +110,7 @@ class Evaluation {
   Store::LastResults remembered_;                                 ///< what this run came to; written when it ends
   mutable std::optional<Store::LastResults> last_results_;        ///< what the run before came to; for plans
   mutable std::optional<std::vector<Store::Last>> kept_results_;  ///< what the store has of these nodes; for plans
-  WorkingFolder working_folder_;
+  std::shared_ptr<ProcessState> state_ = ProcessState::of_runs();
   mutable std::mutex observer_mutex_, warnings_mutex_;
   bool store_complained_ = false;
 };

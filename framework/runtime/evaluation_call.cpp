@@ -11,7 +11,9 @@
 #include "keys.hpp"
 #include "named_files.hpp"
 #include "no_process.hpp"
+#include "plugin_code.hpp"
 #include "python_file.hpp"
+#include "reason_of_exception.hpp"
 #include "resident_memory.hpp"
 #include "shared_store.hpp"
 #include "stopwatch.hpp"
@@ -55,8 +57,6 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
     // Isolated: a thread that waits inside this node must not take up work of another node, because that would add to
     // the time of this node.
     result.outputs = tbb::this_task_arena::isolate([&] { return call_node(node, inputs, item, recipe, warnings); });
-    if (const std::string elsewhere = working_folder_.go_back(); !elsewhere.empty())
-      throw Error("the working folder was changed to " + elsewhere + " while it ran; a plugin must leave it as it is");
     check_unchanged(node, inputs, recipe, before);
     seconds = seconds_since(start);
     for (std::size_t i = 0; i < result.outputs.size(); ++i) finish_value(result.outputs[i], recipe.key, i, inputs);
@@ -77,11 +77,10 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
     is_own = false;
     result.status = Status::failed;
     result.reason = error.what();
-  } catch (const std::exception& error) {
+  } catch (...) {
     result.status = Status::failed;
-    result.reason = error.what();
+    result.reason = reason_of_exception();
   }
-  working_folder_.go_back();  // also if the call failed
   if (result.status == Status::failed) result = failure(node, item, result.reason, is_own);
   if (result.status == Status::done) save(node, inputs, recipe, result, seconds, std::move(warnings));
   const std::scoped_lock lock(mutex_);
@@ -125,11 +124,19 @@ std::vector<Value> Evaluation::call_node(std::size_t node, std::vector<Value>& i
   report(RunEvent::Kind::started, node, item, "");
   const Context::Hooks hooks = make_hooks(node, item, seed_of(recipe.recipe, settings_.seed), warnings);
   if (apart) return call_apart(catalogue_, called, inputs, hooks, settings_);
+  const PluginCode code([&](const std::string& reason) {
+    report(RunEvent::Kind::failed, node, item, failure_text(node, item, reason), 0, 0, LogLevel::error);
+  });
   const NodeDefinition& definition = catalogue_.load(called.info.name);
   const std::shared_ptr<void> options = definition.make_options();
   for (std::size_t i = 0; i < called.options.size(); ++i) definition.set_option[i](options.get(), called.options[i]);
-  Context context(hooks);
-  return definition.call(inputs, options.get(), context);
+  std::vector<Value> outputs;
+  state_->keep_during([&] {
+    warnings.clear();
+    Context context(hooks);
+    outputs = definition.call(inputs, options.get(), context);
+  });
+  return outputs;
 }
 
 void Evaluation::save(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe,

@@ -6,11 +6,12 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
-#include <opencv2/core/utility.hpp>
 #include <thread>
 
 #include "graph_run.hpp"
 #include "no_process.hpp"
+#include "process_state.hpp"
+#include "thread_state.hpp"
 #include "thread_supply.hpp"
 
 namespace marrow {
@@ -21,9 +22,11 @@ std::vector<PlannedNode> plan_pipeline(const Pipeline& pipeline, const Catalogue
 }
 
 RunResult run_pipeline(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings) {
+  const UsualArithmetic arithmetic;  // the threads of the pool take it over
   GraphRun run(pipeline, catalogue, settings);
   // The pool is the only source of threads. OpenCV's own loops stay on the thread of the node that calls them.
-  cv::setNumThreads(1);
+  const std::shared_ptr<ProcessState> state = ProcessState::of_runs();
+  state->set_up_opencv();
   const int wanted = settings.threads > 0 ? settings.threads : int(std::max(1u, std::thread::hardware_concurrency()));
   const int threads = threads_to_be_had(wanted);
   if (threads == 0) {

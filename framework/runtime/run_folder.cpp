@@ -19,6 +19,9 @@
 #include "mapping.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
+#include "plugin_code.hpp"
+#include "process_state.hpp"
+#include "reason_of_exception.hpp"
 #include "text_file.hpp"
 #include "verdict_json.hpp"
 #include "written_content.hpp"
@@ -66,10 +69,14 @@ void write_value(const Value& value, const fs::path& stem, const fs::path& root,
   }
   try {
     fs::create_directories(file.parent_path());  // so a list of which no item was made has no folder
-    catalogue.load_writer(value.type).write(value.data.get(), file.string());
+    const WriterDefinition& definition = catalogue.load_writer(value.type);
+    const PluginCode code([&](const std::string& reason) {
+      std::fprintf(stderr, "marrow: error: the writer of %s: %s\n", printable(file.string()).c_str(), reason.c_str());
+    });
+    ProcessState::of_runs()->keep_during([&] { definition.write(value.data.get(), file.string()); });
     written.files.push_back(file.lexically_relative(root).string());
-  } catch (const std::exception& error) {
-    written.fault = error.what();
+  } catch (...) {
+    written.fault = reason_of_exception();
     std::error_code ignored;
     fs::remove_all(file, ignored);  // half a file is worse than none
   }

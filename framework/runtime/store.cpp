@@ -9,6 +9,7 @@
 #include <new>
 
 #include "plain_path.hpp"
+#include "reason_of_exception.hpp"
 #include "shared_store.hpp"
 #include "store_entry.hpp"
 #include "store_folder.hpp"
@@ -103,8 +104,8 @@ std::string Store::save(const Digest& key, const std::vector<Value>& outputs, co
     return write_whole(file_of(key), [&](Archive& out) { write_entry(out, description, outputs); });
   } catch (const std::bad_alloc&) {
     return "out of memory";
-  } catch (const std::exception& error) {
-    return error.what();
+  } catch (...) {  // a value of a plugin's own type
+    return reason_of_exception();
   }
 }
 

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <new>
 
+#include "reason_of_exception.hpp"
 #include "store_folder.hpp"
 
 namespace marrow {
@@ -180,8 +181,8 @@ std::string write_whole(const fs::path& file, const std::function<void(Archive&)
     if (const int number = writer.flush()) fault = fault_of(number);
   } catch (const std::bad_alloc&) {
     fault = fault_of(ENOMEM);
-  } catch (const std::exception& error) {
-    fault = error.what();
+  } catch (...) {  // a value of a plugin's own type
+    fault = reason_of_exception();
   }
   if (fault.empty() && is_durable && fsync(descriptor)) fault = fault_of(errno);
   // Some file systems report only now that there is no space. After EINTR, the file is closed nevertheless.

@@ -4,7 +4,7 @@
 //   marrow-store            says that this is a store, and which layout it has
 //   01/01...HEX             entries, in folders named by the first two digits of their keys
 //   cases/HEX/              simulated cases
-//   last/HEX                the last results of nodes
+//   last/HEX                the last results of a run, or of one pass of a body
 //   digests/HEX             digests of large files
 //   claims, tidied          locks; the time when the store was last tidied up
 //   NAME.tmp-PROCESS-NUMBER any of these while it is being written

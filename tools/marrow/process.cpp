@@ -11,6 +11,8 @@
 #include <exception>
 #include <new>
 
+#include "runtime/plugin_code.hpp"
+
 namespace marrow::cli {
 namespace {
 
@@ -37,13 +39,13 @@ void say(const char* text) {
     say("an exception of an unknown type");
   }
   say("\n");
-  _exit(1);
+  end_process(1);
 }
 
 extern "C" void on_stop(int signal) {
   if (stopped.exchange(true)) {  // the second signal: do not wait for the nodes
     say("\nmarrow: stopped at once; what was being done is lost\n");
-    _exit(130);
+    end_process(130);
   }
   stopped_by = signal;
 }

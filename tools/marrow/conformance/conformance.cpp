@@ -17,6 +17,7 @@
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/worker.hpp"
 #include "process.hpp"
+#include "runtime/reason_of_exception.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -80,8 +81,8 @@ std::string measured(const Catalogue& catalogue, const NodeDefinition& node, con
     return (figure <= check.limit ? "+" : "-") + text;
   } catch (const conformance::NotApplicable& missing) {
     return std::string("~does not apply: ") + missing.what();
-  } catch (const std::exception& error) {
-    return std::string("-") + error.what();
+  } catch (...) {
+    return "-" + reason_of_exception();
   }
 }
 

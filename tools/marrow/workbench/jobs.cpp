@@ -6,6 +6,7 @@
 
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
+#include "runtime/reason_of_exception.hpp"
 
 namespace marrow::workbench {
 namespace {
@@ -66,8 +67,8 @@ std::string Jobs::start(const std::string& title, const std::string& command, st
     try {
       json result = work(*job);
       job->end(job->stopped() ? "stopped" : "done", std::move(result), "");
-    } catch (const std::exception& error) {
-      job->end(job->stopped() ? "stopped" : "failed", nullptr, printable_lines(error.what()));
+    } catch (...) {
+      job->end(job->stopped() ? "stopped" : "failed", nullptr, printable_lines(reason_of_exception()));
     }
     *is_over = true;
   });

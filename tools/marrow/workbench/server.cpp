@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "marrow/domain/printable.hpp"
+#include "runtime/reason_of_exception.hpp"
 
 namespace marrow::workbench {
 namespace {
@@ -150,8 +151,8 @@ struct Server::Parts {
       refuse(response, 409, error.what());
     } catch (const std::bad_alloc&) {
       refuse(response, 500, "out of memory");
-    } catch (const std::exception& error) {
-      refuse(response, 400, error.what());
+    } catch (...) {
+      refuse(response, 400, reason_of_exception());
     }
   }
 };

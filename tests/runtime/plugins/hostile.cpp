@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+// A node that changes what all nodes of a process share or ends it, and one whose result shows it.
+#include <fcntl.h>
+#include <fenv.h>
+#include <locale.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <limits>
+#include <locale>
+#include <marrow/plugin.hpp>
+#include <opencv2/core.hpp>
+#include <sstream>
+#include <thread>
+#ifdef __x86_64__
+#include <xmmintrin.h>
+#endif
+
+namespace {
+using marrow::Metrics;
+
+struct Comma : std::numpunct<char> {
+  char do_decimal_point() const override { return ','; }
+};
+
+struct HostileOptions {
+  std::string how = "nothing";
+};
+
+void change(const std::string& how) {
+  if (how == "rounding") fesetround(FE_UPWARD);
+  if (how == "traps") feenableexcept(FE_DIVBYZERO);
+#ifdef __x86_64__
+  if (how == "tiny") _mm_setcsr(_mm_getcsr() | 0x8040);  // as the start of a program that was linked with -ffast-math
+#endif
+  if (how == "locale") setlocale(LC_ALL, "C.UTF-8");
+  if (how == "locale of streams") std::locale::global(std::locale(std::locale(), new Comma));
+  if (how == "locale of thread") uselocale(newlocale(LC_ALL_MASK, "C.UTF-8", locale_t(nullptr)));
+  if (how == "handler") signal(SIGUSR1, SIG_IGN);
+  if (how == "blocked signals") {
+    sigset_t some;
+    sigemptyset(&some);
+    sigaddset(&some, SIGUSR2);
+    pthread_sigmask(SIG_BLOCK, &some, nullptr);
+  }
+  if (how == "umask") umask(0);
+  if (how == "environment") setenv("MARROW_HOSTILE", "1", 1);
+  if (how == "limit") {
+    rlimit files{};
+    getrlimit(RLIMIT_NOFILE, &files);
+    files.rlim_cur -= 1;
+    setrlimit(RLIMIT_NOFILE, &files);
+  }
+  if (how == "standard input") {
+    const int other = open("/dev/zero", O_RDONLY);
+    dup2(other, STDIN_FILENO);
+    close(other);
+  }
+  if (how == "instructions of OpenCV") cv::setUseOptimized(false);
+  if (how == "threads of OpenCV") cv::setNumThreads(3);
+  if (how == "working folder") std::filesystem::current_path("/");
+}
+
+Metrics hostile(const Metrics& a, const HostileOptions& options) {
+  const std::string& how = options.how;
+  change(how);
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));  // others run meanwhile
+  if (how == "throw number") throw 7;
+  if (how == "throw text") throw "a text";
+  if (how == "exit") std::exit(0);
+  if (how == "quick_exit") std::quick_exit(0);
+  if (how == "_exit") _exit(0);
+  if (how == "_Exit") std::_Exit(0);
+  if (how == "child") {
+    const pid_t child = fork();
+    if (child == 0) _exit(7);
+    int status = 0;
+    waitpid(child, &status, 0);
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != 7) throw marrow::Error("its child did not end as it did");
+  }
+  if (how == "exit of a thread") std::thread([] { std::exit(0); }).join();
+  return a;
+}
+
+double third() {
+  const volatile double one = 1, three = 3;
+  return one / three;
+}
+
+struct SensitiveOptions {
+  double number = 0;
+};
+
+Metrics sensitive(const Metrics& a, const SensitiveOptions& options) {
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  const volatile double smallest = std::numeric_limits<double>::min();
+  std::ostringstream text;
+  text << 0.5;
+  const double here = third();
+  std::atomic<int> different{0};
+  tbb::parallel_for(0, 16, [&](int) { different += third() != here; });
+  return {{{"number", a.items.at(0).value + options.number, ""},
+           {"third", here, ""},
+           {"different", double(different), ""},
+           {"tiny", smallest / 2, ""},
+           {"digits", text.str() == "0.5" ? 1.0 : 0.0, ""},
+           {"parsed", std::strtod("0.5", nullptr), ""},
+           {"optimized", double(cv::useOptimized()), ""},
+           {"threads", double(cv::getNumThreads()), ""},
+           {"random", double(cv::theRNG().next()), ""},
+           {"folder", double(std::filesystem::current_path().string().size()), ""},
+           {"variable", std::getenv("MARROW_HOSTILE") ? 1.0 : 0.0, ""}}};
+}
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("test.hostile", hostile)
+      .summary("Does harm as it is told")
+      .in("a", "number")
+      .out("number", "the same")
+      .option("how", &HostileOptions::how, "what it does");
+  plugin.node("test.sensitive", sensitive)
+      .summary("What it gives shows harm that was done")
+      .in("a", "number")
+      .out("numbers", "what the state of the process leads to")
+      .option("number", &SensitiveOptions::number, "added");
+}
