@@ -88,10 +88,6 @@ const link_map* map_of_framework() {
   return map;
 }
 
-bool is_of_the_system(const std::string& library) {
-  return (library.starts_with("/usr/") && !library.starts_with("/usr/local/")) || library.starts_with("/lib");
-}
-
 Digest identity_of_package(const std::string& path, const struct stat& status) try {
   Hasher hasher;
   const std::string note = build_note(RegularFile(path));
@@ -127,6 +123,16 @@ std::vector<fs::path> libraries_in(const fs::path& folder) {
 }
 
 }  // namespace
+
+std::vector<fs::path> paths_of(const std::vector<LinkedLibrary>& libraries) {
+  std::vector<fs::path> paths;
+  for (const LinkedLibrary& library : libraries) paths.emplace_back(library.path);
+  return paths;
+}
+
+bool is_of_the_system(const std::string& file) {
+  return (file.starts_with("/usr/") && !file.starts_with("/usr/local/")) || file.starts_with("/lib");
+}
 
 const std::vector<LinkedLibrary>& framework_libraries() {
   static const std::vector<LinkedLibrary> libraries = [] {

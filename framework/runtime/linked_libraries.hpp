@@ -13,6 +13,11 @@ std::vector<LinkedLibrary> linked_libraries(void* handle);
 /// The libraries that the framework needs in this process, directly or indirectly.
 const std::vector<LinkedLibrary>& framework_libraries();
 
+std::vector<std::filesystem::path> paths_of(const std::vector<LinkedLibrary>& libraries);
+
+/// Whether a file, given with its full path, is where the system's packages put theirs.
+bool is_of_the_system(const std::string& file);
+
 /// The identity of a library. It includes the name of the file. For a library of the system, it also includes the size
 /// and the GNU build id, which each build gets; if there is no build id, the time of the file. For a library that
 /// people build themselves, it includes the content. Throws Error if the file cannot be read.

@@ -17,6 +17,7 @@
 #include <optional>
 #include <vector>
 
+#include "linked_libraries.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/library.hpp"
 
@@ -80,11 +81,12 @@ bool has_access_list(const fs::path& path) { return getxattr(path.c_str(), "syst
 
 /// What lets others change a file or the entries of a folder; empty if nothing does. In a folder further above, a
 /// sticky bit keeps others from replacing what is not theirs.
-std::string fault_of(const fs::path& path, bool is_above) {
+std::string fault_of(const fs::path& path, bool is_above, uid_t also) {
   struct stat status {};
   if (stat(path.c_str(), &status) != 0) return "cannot be read: " + std::string(std::strerror(errno));
   const std::string quoted = "'" + path.string() + "'";
-  if (status.st_uid != geteuid() && status.st_uid != 0 && status.st_uid != owner_of_framework())
+  if (status.st_uid != geteuid() && status.st_uid != 0 && status.st_uid != owner_of_framework() &&
+      status.st_uid != also)
     return "is not trusted, because " + quoted + " belongs to " + name_of(status.st_uid) + " (mode " +
            mode_text(status.st_mode) + "), who is neither you nor root; copy it into a folder of your own";
   if (is_above && (status.st_mode & S_ISVTX)) return "";
@@ -106,26 +108,35 @@ bool holds_framework(const fs::path& folder) {
 }
 
 /// Checks a path without links: a file or folder, and all folders above it.
-std::string fault_of_chain(const fs::path& real) {
-  std::string fault = fault_of(real, false);
+std::string fault_of_chain(const fs::path& real, uid_t also) {
+  std::string fault = fault_of(real, false, also);
   bool is_above = fs::is_directory(real);
   for (fs::path folder = real; fault.empty() && folder != folder.parent_path(); is_above = true) {
     folder = folder.parent_path();
-    if (!holds_framework(folder)) fault = fault_of(folder, is_above);
+    if (!holds_framework(folder)) fault = fault_of(folder, is_above, also);
   }
   return fault;
 }
 
 /// Checks a path that may contain links. Sets `real` to the path without links.
-std::string fault_of_both_ends(const fs::path& file, fs::path& real) {
+std::string fault_of_both_ends(const fs::path& file, fs::path& real, uid_t also = 0) {
   std::error_code error;
   real = fs::canonical(file, error);
   if (error) return "cannot be read: " + error.message();
   const fs::path folder = fs::canonical(fs::absolute(file).parent_path(), error);
   if (error) return "cannot be read: " + error.message();
-  std::string fault = fault_of_chain(real);
-  if (fault.empty() && real.parent_path() != folder) fault = fault_of_chain(folder);
+  std::string fault = fault_of_chain(real, also);
+  if (fault.empty() && real.parent_path() != folder) fault = fault_of_chain(folder, also);
   return fault;
+}
+
+bool all_are_trusted() {
+  const char* all = std::getenv(kTrustAll);
+  return all && std::strcmp(all, "1") == 0;
+}
+
+std::string with_way_out(const std::string& fault) {
+  return fault + (fault.starts_with("is not") ? std::string(", or set ") + kTrustAll + "=1" : "");
 }
 
 }  // namespace
@@ -136,13 +147,24 @@ std::string changeable_by_others(const fs::path& file) {
 }
 
 fs::path trusted_path(const fs::path& library) {
-  const char* all = std::getenv(kTrustAll);
   fs::path real;
   const std::string fault = fault_of_both_ends(library, real);
-  if (all && std::strcmp(all, "1") == 0) return real.empty() ? library : real;
-  if (!fault.empty())
-    throw Error(fault + (fault.starts_with("is not") ? std::string(", or set ") + kTrustAll + "=1" : ""));
+  if (all_are_trusted()) return real.empty() ? library : real;
+  if (!fault.empty()) throw Error(with_way_out(fault));
   return real;
+}
+
+std::string untrusted_among(const std::vector<fs::path>& files, uid_t also) {
+  if (all_are_trusted()) return "";
+  for (const fs::path& file : files) {
+    std::error_code error;
+    if (is_of_the_system(file.string()) || !fs::exists(file, error)) continue;
+    fs::path real = fs::canonical(file, error);
+    if (holds_framework(real)) continue;  // it is marrow's own library
+    if (const std::string fault = fault_of_both_ends(file, real, also); !fault.empty())
+      return "cannot be loaded, because it needs '" + file.string() + "', which " + with_way_out(fault);
+  }
+  return "";
 }
 
 }  // namespace marrow

@@ -70,6 +70,11 @@ TEST_F(LibraryTest, OtherEigenAlignment) {
   if (!fs::exists(kBad / "other_alignment.so")) GTEST_SKIP() << "only where -mavx changes the alignment";
   expect_refused(kBad / "other_alignment.so", "was built with EIGEN_MAX_ALIGN_BYTES 32, this marrow with 16");
 }
+TEST_F(LibraryTest, FastMath) {
+  expect_refused(kBad / "fast_math.so",
+                 "was built with -ffast-math on, this marrow with off; leave out -ffast-math and -Ofast: they change "
+                 "the results of other nodes, and NaN is not seen");
+}
 TEST_F(LibraryTest, Crash) { expect_refused(kBad / "crashes.so", "crashed while being loaded (Segmentation fault)"); }
 TEST_F(LibraryTest, Throws) { expect_refused(kBad / "throws.so", "crashed while being loaded (Aborted)"); }
 TEST_F(LibraryTest, NoEntry) {
@@ -277,6 +282,20 @@ TEST_F(LinkedLibraryTest, LibrariesThatTheLoaderFindsElsewhereCount) {
       << other.note;
   EXPECT_EQ(build_id(), other.build_id) << "from the cache";
   unsetenv("LD_LIBRARY_PATH");
+  EXPECT_EQ(build_id(), first);
+}
+/// The loader's manual (ld.so) says that the folders of a run path are searched in their order.
+TEST_F(LinkedLibraryTest, LibraryThatAppearsEarlierOnTheRunPathCounts) {
+  marrow::write_manifest(marrow::library_info(file, framework));
+  const marrow::Digest first = build_id();
+  const fs::path earlier = fs::canonical(scratch.path) / "plugins" / "earlier";
+  put(2, "libtest_base.so", earlier), put(1, "libtest_deep.so", earlier);
+  const marrow::LibraryInfo other = marrow::library_info(file, framework);
+  EXPECT_NE(other.build_id, first);
+  EXPECT_EQ(other.note, "its manifest is stale (" + (earlier / "libtest_base.so").string() +
+                            " has appeared, in a folder that is searched earlier), so it was described anew");
+  EXPECT_EQ(build_id(), other.build_id) << "from the cache";
+  fs::remove_all(earlier);
   EXPECT_EQ(build_id(), first);
 }
 TEST_F(LinkedLibraryTest, AnotherLibraryThanTheDescribedOneIsFoundOut) {
