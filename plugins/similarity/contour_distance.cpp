@@ -2,6 +2,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <marrow/domain/number_text.hpp>
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/image/blur.hpp"
@@ -27,7 +28,7 @@ struct Options {
   std::vector<double> weights;
 };
 
-using marrow::match::weight_of;
+using marrow::match::in_view, marrow::match::weight_of;
 
 /// The offset between outline and edges is estimated within this distance of the given one.
 constexpr double kMostOffset_px = 3;
@@ -46,6 +47,7 @@ struct Matches {
   std::vector<Eigen::Vector2f> unmatched_px;  ///< points compared that have no edge
   std::size_t points() const { return residuals.size() + unmatched_px.size(); }
   std::vector<Residual> of_edges;  ///< from the edges near the outline to the outline; only if the cost is symmetric
+  bool is_drawn = false;           ///< some of the outline lies in the image, maybe outside the mask
 };
 
 /// Data that does not depend on the level. It is made once and shared by all levels.
@@ -144,6 +146,23 @@ class ContourDistance : public marrow::match::ViewsCost {
   }
 
  private:
+  std::string silence(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
+    return in_view(scene_->views, view, silence_of(view, world_from_model));
+  }
+  std::string silence_of(std::size_t view, const marrow::RigidTransform& world_from_model) const {
+    const std::vector<Matches> views = match(world_from_model);
+    const Matches& matches = views[view];
+    if (matches.points() == 0)
+      return matches.is_drawn ? "the mask hides the whole outline of the model"
+                              : "it shows nothing of the model's outline, which is empty or outside the image";
+    const double offset = offset_of(views);
+    const auto matters = [&](const Residual& r) { return loss_.weight(distance2(r, offset)) > 0; };
+    if (std::any_of(matches.residuals.begin(), matches.residuals.end(), matters) ||
+        std::any_of(matches.of_edges.begin(), matches.of_edges.end(), matters))
+      return {};
+    return marrow::formatted("no edge lies within %.3g px of the model's outline", level_.reach_px);
+  }
+
   /// If a view has fewer points than this, the missing ones count as unmatched.
   double least_points() const { return 60 / level_.contour_spacing_px; }
 
@@ -261,7 +280,9 @@ class ContourDistance : public marrow::match::ViewsCost {
     matches.residuals.reserve(outline.size());
     std::vector<marrow::OutlinePoint> compared;
     for (const marrow::OutlinePoint& p : outline) {
-      if (p.u_px < kMargin_px || p.v_px < kMargin_px || p.u_px > right || p.v_px > bottom) continue;
+      const bool is_inside = p.u_px >= kMargin_px && p.v_px >= kMargin_px && p.u_px <= right && p.v_px <= bottom;
+      if (!is_inside) continue;  // nor is a point that is not a number
+      matches.is_drawn = true;
       if (!view.mask.empty() && !view.mask.at<std::uint8_t>(int(p.v_px + 0.5f), int(p.u_px + 0.5f))) continue;
       if (scene_->options.symmetric) compared.push_back(p);
       if (const marrow::EdgePixel* edge = nearest_edge(index, p))

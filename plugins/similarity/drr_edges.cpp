@@ -7,6 +7,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/match/edge_loss.hpp"
 #include "marrow/toolbox/match/nearest_edges.hpp"
 #include "marrow/toolbox/match/views_cost.hpp"
@@ -84,6 +85,7 @@ class DrrEdges : public marrow::match::ViewsCost {
       : ViewsCost(scene->views.size(), scene->options.weights),
         scene_(std::move(scene)),
         step_(pixel_step),
+        reach_px_(reach_px),
         loss_(scene_->options.scale_px, reach_px) {}
 
   double value_in_view(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
@@ -95,6 +97,20 @@ class DrrEdges : public marrow::match::ViewsCost {
   }
 
  private:
+  std::string silence(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
+    return marrow::match::in_view(scene_->views, view, silence_of(view, world_from_model));
+  }
+  std::string silence_of(std::size_t view, const marrow::RigidTransform& world_from_model) const {
+    const marrow::match::BlockSums::Sums found = sums(view, world_from_model).all();
+    if (!(found.weights > 0))
+      return scene_->views[view].mask.empty()
+                 ? "it shows no edge of the radiograph, which is empty or outside the image"
+                 : "no edge of the radiograph lies inside image and mask";
+    const double gain = loss_.worst() - found.values / found.weights;
+    if (gain > 1e-9 * loss_.worst()) return {};
+    return marrow::formatted("no edge lies within %.3g px of the radiograph's edges", reach_px_);
+  }
+
   /// A view that shows very few edges of the radiograph is no evidence.
   double value_of(const marrow::match::BlockSums::Sums& sums) const {
     const double least = 60.0 / step_;
@@ -125,9 +141,10 @@ class DrrEdges : public marrow::match::ViewsCost {
     if (const double blur = std::sqrt(std::max(blur2, 0.0)) / step_; blur > 0.2)
       cv::GaussianBlur(radiograph, radiograph, {}, blur);
     for (const DrawnEdge& edge : edges_of(radiograph, grid, scene_->options.threshold_percent)) {
-      if (edge.u < kMargin_px || edge.v < kMargin_px || edge.u > float(camera.width_px - 1) - kMargin_px ||
-          edge.v > float(camera.height_px - 1) - kMargin_px)
-        continue;
+      const bool is_inside = edge.u >= kMargin_px && edge.v >= kMargin_px &&
+                             edge.u <= float(camera.width_px - 1) - kMargin_px &&
+                             edge.v <= float(camera.height_px - 1) - kMargin_px;
+      if (!is_inside) continue;  // nor is an edge whose place is not a number
       if (!view.mask.empty() && !view.mask.at<std::uint8_t>(int(edge.v + 0.5f), int(edge.u + 0.5f))) continue;
       found.add(edge.u, edge.v, double(edge.weight) * loss_(distance2(index, edge)), double(edge.weight));
     }
@@ -149,6 +166,7 @@ class DrrEdges : public marrow::match::ViewsCost {
 
   std::shared_ptr<const Scene> scene_;
   const int step_;
+  const double reach_px_;
   const marrow::match::EdgeLoss loss_;
 };
 

@@ -136,6 +136,15 @@ class GradientProjection : public marrow::match::ViewsCost {
     return weight > 0 ? 1 - inside.values / weight : 1;
   }
 
+  std::string silence(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
+    return marrow::match::in_view(scene_->views, view, silence_of(sums(view, world_from_model)));
+  }
+  static std::string silence_of(const Sums& found) {
+    if (!(found.inside.all().weights > 0)) return "no part of the bone that rays touch lies inside image and mask";
+    if (!(found.inside.all().values > 0)) return "it has no gradient like the CT's where rays touch the bone";
+    return {};
+  }
+
   Split split(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
     const Sums found = sums(view, world_from_model);
     return {value_of(found.inside.all(), found.all),

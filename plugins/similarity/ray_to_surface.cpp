@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/match/views_cost.hpp"
 
 namespace {
@@ -46,6 +47,7 @@ class Distance {
   /// The part of the line that lies inside the box and in front of its start, in units of the direction. Empty if from
   /// >= to.
   std::pair<double, double> span(const Eigen::Vector3d& start, const Eigen::Vector3d& direction) const {
+    if (!start.allFinite() || !direction.allFinite()) return {0, 0};
     double from = 0, to = 1e30;
     for (int k = 0; k < 3; ++k) {
       if (std::abs(direction[k]) < 1e-12) {
@@ -173,6 +175,16 @@ class RayToSurface : public marrow::match::ViewsCost {
   }
 
  private:
+  std::string silence(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
+    return marrow::match::in_view(scene_->views, view, silence_of(view, world_from_model));
+  }
+  std::string silence_of(std::size_t view, const marrow::RigidTransform& world_from_model) const {
+    if (scene_->rays[view].empty()) return "it has no edge that is inside the mask and belongs to this bone";
+    const auto touches = touches_of(view, world_from_model);
+    if (std::any_of(touches.begin(), touches.end(), [](const auto& touch) { return touch.has_value(); })) return {};
+    return marrow::formatted("no ray through an edge passes within %.3g mm of the model's surface", loss_.reach);
+  }
+
   double value_of(const marrow::match::BlockSums::Sums& sums) const {
     return loss_.worst() + (sums.weights > 0 ? sums.values / sums.weights : 0);
   }

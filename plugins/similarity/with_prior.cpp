@@ -135,6 +135,12 @@ class WithPrior : public Cost {
     return about;
   }
 
+  /// Of the images alone: the prior says something about every pose.
+  std::string nothing_compared(const RigidTransform& pose) const override { return images_.nothing_compared(pose); }
+  std::vector<std::string> silent_views(const RigidTransform& pose) const override {
+    return images_.silent_views(pose);
+  }
+
   /// The blocks of the images, and six residuals of the prior, each with its expected size. So a deviation that is
   /// predicted from them is that of images and prior together.
   std::vector<double> without_each_block(const RigidTransform& pose) const override {

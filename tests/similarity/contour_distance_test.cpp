@@ -244,4 +244,24 @@ TEST(NearestOutline, IsThatOfASearchThroughAll) {
   }
 }
 
+TEST(ContourDistance, SaysWhatIsEmpty) {
+  const auto said = [](const marrow::List<marrow::View>& views, const marrow::EdgeMap& map, double x, double z = 0) {
+    return contour_distance(views, edge_maps(map), fixed_offset())->nothing_compared(shifted(x, z));
+  };
+  EXPECT_EQ(said(one_view(), line_at(100, -1), 9), "") << "within the reach of 10 px";
+  EXPECT_EQ(said(one_view(), line_at(100, -1), 30), "view 'lateral': no edge lies within 10 px of the model's outline");
+  EXPECT_EQ(said(one_view(), line_at(100, 1), 0), "view 'lateral': no edge lies within 10 px of the model's outline")
+      << "none of the outline's direction";
+  EXPECT_EQ(said(one_view(), line_at(100, -1), 0, 500),
+            "view 'lateral': it shows nothing of the model's outline, which is empty or outside the image");
+  cv::Mat mask(200, 200, CV_8U, cv::Scalar(0));
+  mask(cv::Rect(0, 0, 20, 200)).setTo(1);
+  EXPECT_EQ(said(one_view(mask), line_at(10, -1), 0), "view 'lateral': the mask hides the whole outline of the model");
+}
+
+TEST(ContourDistance, APoseThatIsNotANumberIsTheWorst) {
+  const auto cost = contour_distance(one_view(), edge_maps(line_at(100, -1)), fixed_offset());
+  EXPECT_EQ(cost->value(shifted(std::nan(""))), cost->value(shifted(500)));
+}
+
 }  // namespace contour_distance_test

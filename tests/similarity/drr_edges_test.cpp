@@ -158,4 +158,20 @@ TEST(DrrEdges, Levels) {
   EXPECT_NEAR(coarse->value(at(12, 0)), loss(12), 0.5);
 }
 
+TEST(DrrEdges, SaysWhatIsEmpty) {
+  const auto said = [](const shipped::Inputs& inputs, double x) {
+    const marrow::Value cost = shipped::call("similarity.drr_edges", inputs, {{"reach_px", 10.0}}).at("cost");
+    return cost.as<marrow::Cost>().nothing_compared(at(x, 0));
+  };
+  EXPECT_EQ(said(inputs(100), 5), "");
+  EXPECT_EQ(said(inputs(130), 0), "view 'frontal': no edge lies within 10 px of the radiograph's edges");
+  EXPECT_EQ(said(inputs(100), 80),
+            "view 'frontal': it shows no edge of the radiograph, which is empty or outside the image");
+  shipped::Inputs masked = inputs(100);
+  marrow::View view = intensity_behaviour::view_of();
+  view.mask = cv::Mat(170, 200, CV_8U, cv::Scalar(0));
+  masked["views"] = shipped::list(intensity_behaviour::views_of(view), "view");
+  EXPECT_EQ(said(masked, 0), "view 'frontal': no edge of the radiograph lies inside image and mask");
+}
+
 }  // namespace drr_edges_test

@@ -228,4 +228,22 @@ TEST(GradientProjection, SaysWhatIsWrong) {
             "the volume has no gradient on the mesh: wire the volume that the mesh was made from");
 }
 
+TEST(GradientProjection, SaysWhatIsEmpty) {
+  const auto said = [](const shipped::Inputs& in, const RigidTransform& pose) {
+    return shipped::call("similarity.gradient_projection", in).at("cost").as<marrow::Cost>().nothing_compared(pose);
+  };
+  EXPECT_EQ(said(inputs(), shifted(1, 0, 0)), "");
+  EXPECT_EQ(said(inputs(), shifted(0, 0, 500)),
+            "view 'frontal': no part of the bone that rays touch lies inside image and mask; "
+            "view 'lateral': no part of the bone that rays touch lies inside image and mask");
+  shipped::Inputs constant = inputs();
+  marrow::List<marrow::View> views;
+  marrow::View view = view_of(0);
+  view.image.pixels.setTo(30000);
+  views.add("frontal", view);
+  constant["views"] = shipped::list(views, "view");
+  EXPECT_EQ(said(constant, shifted(0, 0, 0)),
+            "view 'frontal': it has no gradient like the CT's where rays touch the bone");
+}
+
 }  // namespace gradient_projection_test

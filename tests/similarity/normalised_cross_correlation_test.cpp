@@ -14,4 +14,22 @@ TEST(NormalisedCrossCorrelation, LevelsCompareFewerPixels) { intensity_behaviour
 TEST(NormalisedCrossCorrelation, BlocksAreMasks) { intensity_behaviour::blocks_are_masks(kNode); }
 TEST(NormalisedCrossCorrelation, RefusesNonsense) { intensity_behaviour::refuses_nonsense(kNode); }
 
+// The same for all costs of grey values, which share it.
+TEST(NormalisedCrossCorrelation, SaysWhatIsEmpty) {
+  using namespace intensity_behaviour;
+  const auto projector = std::make_shared<const BlobProjector>();
+  const auto said = [&](const View& view, double u) {
+    return make(kNode, projector, views_of(view))->nothing_compared(at(u, 0));
+  };
+  const View view = view_of();
+  EXPECT_EQ(said(view, 0), "");
+  EXPECT_EQ(said(view, 500), "view 'frontal': it shows nothing of the bone");
+  View constant = view;
+  constant.image.pixels = cv::Mat(170, 200, CV_16U, cv::Scalar(30000));
+  EXPECT_EQ(said(constant, 0), "view 'frontal': its image is constant where the bone would be");
+  View masked = view;
+  masked.mask = cv::Mat(170, 200, CV_8U, cv::Scalar(0));
+  EXPECT_EQ(said(masked, 0), "view 'frontal': no pixel inside the mask shows the bone");
+}
+
 }  // namespace normalised_cross_correlation_test

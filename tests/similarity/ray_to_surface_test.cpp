@@ -206,4 +206,32 @@ TEST(RayToSurface, SaysWhatIsWrong) {
             "the field has no inside, so no ray can touch its surface; check the segmentation");
 }
 
+TEST(RayToSurface, SaysWhatIsEmpty) {
+  const Made cost(inputs());
+  EXPECT_EQ((*cost).nothing_compared(shifted(1, 0, 0)), "");
+  EXPECT_EQ((*cost).nothing_compared(shifted(200, 0, 0)),
+            "view 'frontal': no ray through an edge passes within 4 mm of the model's surface; "
+            "view 'lateral': no ray through an edge passes within 4 mm of the model's surface");
+  shipped::Inputs masked = inputs();
+  marrow::List<marrow::View> views;
+  for (marrow::View view : masked["views"].as_list<marrow::View>()) {
+    view.mask = cv::Mat(view.camera.height_px, view.camera.width_px, CV_8U, cv::Scalar(view.name == "lateral" ? 0 : 1));
+    views.add(view.name, view);
+  }
+  masked["views"] = shipped::list(views, "view");
+  EXPECT_EQ(
+      (*Made(masked)).silent_views(shifted(1, 0, 0)),
+      std::vector<std::string>{"view 'lateral': it has no edge that is inside the mask and belongs to this bone"});
+}
+
+TEST(RayToSurface, APoseThatIsNotANumberIsTheWorst) {
+  const Made cost(inputs());
+  for (const double wrong : {std::nan(""), HUGE_VAL}) {
+    EXPECT_NEAR((*cost).value(shifted(wrong, 0, 0)), 16.0 / 6, 1e-12);
+    RigidTransform turned = shifted(0, 0, 0);
+    turned.rotation.setConstant(wrong);
+    EXPECT_NEAR((*cost).value(turned), 16.0 / 6, 1e-12);
+  }
+}
+
 }  // namespace ray_to_surface_test

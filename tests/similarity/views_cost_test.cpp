@@ -95,4 +95,32 @@ TEST(ViewsCost, IsTheWeightedMean) {
   EXPECT_EQ(Two({3, 1}).without_each_block(pose), (std::vector<double>{1.75, 0.75}));
 }
 
+/// Of its three views, those named here say nothing.
+class Silent : public marrow::match::ViewsCost {
+ public:
+  Silent(const std::vector<double>& weights, std::vector<std::string> silences)
+      : ViewsCost(3, weights), silences_(std::move(silences)) {}
+  double value_in_view(std::size_t, const marrow::RigidTransform&) const override { return 1; }
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override { return nullptr; }
+
+ private:
+  Split split(std::size_t, const marrow::RigidTransform&) const override { return {1, {1.0}}; }
+  std::string silence(std::size_t view, const marrow::RigidTransform&) const override { return silences_[view]; }
+  std::vector<std::string> silences_;
+};
+
+TEST(ViewsCost, SaysNothingWhereNoneOfItsViewsDoes) {
+  const marrow::RigidTransform pose{"world", "ct"};
+  using Texts = std::vector<std::string>;
+  const Silent some({}, {"a is empty", "", "c is empty"}), all({}, {"a is empty", "b is empty", "c is empty"});
+  EXPECT_EQ(some.silent_views(pose), (Texts{"a is empty", "c is empty"}));
+  EXPECT_EQ(some.nothing_compared(pose), "");
+  EXPECT_EQ(all.nothing_compared(pose), "a is empty; b is empty; c is empty");
+  // A view that does not count is not named, and what it shows does not help.
+  const Silent without_second({1, 0, 1}, {"a is empty", "", "c is empty"});
+  EXPECT_EQ(without_second.nothing_compared(pose), "a is empty; c is empty");
+  EXPECT_EQ(Silent({1, 0, 1}, {"", "b is empty", ""}).silent_views(pose), Texts{});
+  EXPECT_EQ(Two({}).nothing_compared(pose), "") << "a cost that does not say";
+}
+
 }  // namespace views_cost_test

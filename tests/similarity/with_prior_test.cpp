@@ -210,4 +210,23 @@ TEST(WithPrior, SaysWhatIsWrong) {
             "of the same model");
 }
 
+/// A bowl of which the images say nothing.
+class Mute : public Differentiable {
+ public:
+  using Differentiable::Differentiable;
+  std::string nothing_compared(const marrow::RigidTransform&) const override { return "view 'a': it is black"; }
+  std::vector<std::string> silent_views(const marrow::RigidTransform&) const override {
+    return {"view 'a': it is black"};
+  }
+};
+
+TEST(WithPrior, APriorIsNoImage) {
+  Trial trial(with_deviations(truth(), six(1, 5, 3)));
+  trial.inputs["cost"] = marrow::Value::of<Cost>(
+      std::make_shared<Mute>(truth().world_from_model, truth().frame, Matrix6d::Identity(), kInformation));
+  const auto cost = trial.cost();
+  EXPECT_EQ(cost->nothing_compared(truth().world_from_model), "view 'a': it is black");
+  EXPECT_EQ(cost->silent_views(truth().world_from_model), std::vector<std::string>{"view 'a': it is black"});
+}
+
 }  // namespace with_prior_test

@@ -69,6 +69,18 @@ class IntensityCost : public ViewsCost {
   }
 
  private:
+  std::string silence(std::size_t view, const RigidTransform& world_from_model) const override {
+    return in_view(views_, view, silence_of(view, patch_of(view, world_from_model)));
+  }
+  std::string silence_of(std::size_t view, const Patch& patch) const {
+    if (patch.rendered.empty()) return "it shows nothing of the bone";
+    if (deviation(patch.rendered, patch.counts) == 0)
+      return views_[view].mask.empty() ? "its radiograph is empty where the bone would be"
+                                       : "no pixel inside the mask shows the bone";
+    if (deviation(patch.seen, patch.counts) == 0) return "its image is constant where the bone would be";
+    return {};
+  }
+
   /// Every step-th pixel of a view's smoothed line integrals.
   Patch image_of(const View& view) const {
     const int step = options_.pixel_step;

@@ -45,6 +45,26 @@ std::vector<double> ViewsCost::without_each_block(const RigidTransform& world_fr
   return values;
 }
 
+std::string ViewsCost::silence(std::size_t, const RigidTransform&) const { return {}; }
+
+std::vector<std::string> ViewsCost::silent_views(const RigidTransform& world_from_model) const {
+  std::vector<std::string> of_view(weights_.size());
+  tbb::parallel_for(std::size_t(0), of_view.size(), [&](std::size_t i) {
+    if (weights_[i] > 0) of_view[i] = silence(i, world_from_model);
+  });
+  std::erase(of_view, "");
+  return of_view;
+}
+
+std::string ViewsCost::nothing_compared(const RigidTransform& world_from_model) const {
+  const std::vector<std::string> silent = silent_views(world_from_model);
+  if (std::ptrdiff_t(silent.size()) < std::count_if(weights_.begin(), weights_.end(), [](double w) { return w > 0; }))
+    return {};
+  std::string text;
+  for (const std::string& one : silent) text += (text.empty() ? "" : "; ") + one;
+  return text;
+}
+
 std::vector<ViewsCost::Split> ViewsCost::splits(const RigidTransform& world_from_model) const {
   std::vector<Split> views(weights_.size());
   tbb::parallel_for(std::size_t(0), views.size(), [&](std::size_t i) { views[i] = split(i, world_from_model); });

@@ -18,6 +18,11 @@ void check_weights(const std::vector<double>& weights, std::size_t views);
 /// and has the camera's size.
 void check_edges(const List<View>& views, const List<EdgeMap>& edges);
 
+/// "view 'lateral': " and then the text; empty if the text is.
+inline std::string in_view(const List<View>& views, std::size_t view, const std::string& text) {
+  return text.empty() ? text : "view '" + views.name(view) + "': " + text;
+}
+
 /// The weight of a view. Without weights all views count equally.
 inline double weight_of(const std::vector<double>& weights, std::size_t view) {
   return weights.empty() ? 1 : weights[view];

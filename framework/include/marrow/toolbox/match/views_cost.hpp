@@ -2,6 +2,7 @@
 #pragma once
 // The common part of costs that are a weighted mean over views.
 #include <algorithm>
+#include <string>
 #include <vector>
 
 #include "marrow/toolbox/match/inputs.hpp"
@@ -62,6 +63,9 @@ class ViewsCost : public Cost {
   double value(const RigidTransform& world_from_model) const override;
   std::vector<double> without_each_block(const RigidTransform& world_from_model) const override;
   std::size_t view_count() const override { return weights_.size(); }
+  /// The sentences of all views whose weight is not 0; empty if one of these views is not silent.
+  std::string nothing_compared(const RigidTransform& world_from_model) const override;
+  std::vector<std::string> silent_views(const RigidTransform& world_from_model) const override;
 
   /// The cost in a view, and the same without each block of the view in turn. For costs that are sums over pixels or
   /// points it takes about as long as value_in_view().
@@ -72,7 +76,10 @@ class ViewsCost : public Cost {
   virtual Split split(std::size_t view, const RigidTransform& world_from_model) const = 0;
 
  protected:
-  /// The same for all views, and the values alone. A cost whose views depend on each other overrides both.
+  /// Why a view says nothing about a pose, such as "view 'lateral': the mask hides the whole outline"; empty, the
+  /// default, if something is compared there.
+  virtual std::string silence(std::size_t view, const RigidTransform& world_from_model) const;
+  /// The same as split() for all views, and the values alone. A cost whose views depend on each other overrides both.
   virtual std::vector<Split> splits(const RigidTransform& world_from_model) const;
   virtual std::vector<double> values_of_views(const RigidTransform& world_from_model) const;
   /// The weighted mean of a value for each view.
