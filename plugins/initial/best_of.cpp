@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
+#include "marrow/toolbox/search/compared.hpp"
 #include "marrow/toolbox/search/search.hpp"
 
 namespace {
@@ -36,9 +37,8 @@ Pose refined(const Pose& start, const marrow::Cost& cost, const marrow::Optimize
 /// "second is the best start, with a cost of 0.21; first 0.4, third 0.9".
 std::string comparison_of(const std::vector<Way>& ways, const Way& best) {
   const auto cost_text = [](const Way& way) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.6g", way.pose.cost);
-    return std::string(text);
+    const std::string text = marrow::formatted("%.6g", way.pose.cost);
+    return text;
   };
   std::string text = best.name + " is the best start, with a cost of " + cost_text(best), separator = "; ";
   for (const Way& way : ways) {
@@ -61,18 +61,30 @@ Pose best_of(const Pose* first, const Pose* second, const Pose* third, const Pos
   for (const auto& [name, start] : starts) marrow::check_rigid(start->world_from_model, name);
   const auto level = cost.at_level({options.contour_spacing_px, options.reach_px, options.pixel_step});
   std::vector<Way> ways;
+  std::string silent;  // the starts about which the images say nothing, and why
+  int evaluations = 0, tried = 0;
   const double share = 1.0 / double(starts.size());
   for (const auto& [name, start] : starts) {
-    const double done = share * double(ways.size());
-    ways.push_back({name, refined(*start, *level, optimizer, options, context, done, share)});
+    const double done = share * double(tried++);
+    const Pose pose = refined(*start, *level, optimizer, options, context, done, share);
+    evaluations += pose.evaluations;
+    const std::string why = marrow::search::nothing_compared(*level, pose.world_from_model, pose.frame);
+    if (why.empty())
+      ways.push_back({name, pose});
+    else
+      silent += (silent.empty() ? "" : "; ") + name + ": " + why;
   }
+  if (ways.empty())
+    throw marrow::Error("the images say nothing about any start: " + silent +
+                        "; give a start nearer to the bone, or see whether the masks, the edges and the model are "
+                        "right");
+  if (!silent.empty()) context.info("the images say nothing about a start: " + silent);
   // Of equal ones, the first.
   const auto best =
       std::min_element(ways.begin(), ways.end(), [](const Way& a, const Way& b) { return a.pose.cost < b.pose.cost; });
   context.info(comparison_of(ways, *best));
   Pose pose = best->pose;
-  pose.evaluations = 0;
-  for (const Way& way : ways) pose.evaluations += way.pose.evaluations;
+  pose.evaluations = evaluations;
   return pose;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/search/compared.hpp"
 #include "marrow/toolbox/search/search.hpp"
 
 namespace {
@@ -64,6 +65,7 @@ marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, 
   const marrow::search::Levels levels = levels_of(cost, settings);
   marrow::search::Search search(optimizer, middle, settings, context);
   search.go_to(search.find(levels).pose);
+  marrow::search::check_compared(*levels.back(), search.pose(), middle.frame);
   return pose_of(search, middle, *levels.back());
 }
 

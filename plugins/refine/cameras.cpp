@@ -6,6 +6,8 @@
 #include <marrow/domain/names.hpp>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
+#include "marrow/toolbox/search/compared.hpp"
 #include "marrow/toolbox/search/search.hpp"
 #include "refinement.hpp"
 
@@ -59,10 +61,19 @@ Metrics metrics_of(const Vector6d& motion, const Vector6d& deviation) {
 void warn_of_large(const std::string& view, const Vector6d& in_deviations, Context& context) {
   const double most = in_deviations.cwiseAbs().maxCoeff();
   if (most <= 3) return;
-  char text[16];
-  std::snprintf(text, sizeof text, "%.1f", most);
+  const std::string text = formatted("%.1f", most);
   context.warn("view '" + view + "': its camera is off by " + text +
                " times what the options expect; is it the camera of this image, and are the poses right?");
+}
+
+/// Throws Error if the images say nothing about one of the bones: its pose and the cameras would be whatever was given.
+void check_compared(const Refinement& refinement, const List<Pose>& poses) {
+  for (std::size_t f = 0; f < poses.size(); ++f) {
+    const std::string why = search::nothing_compared(refinement.level(f), refinement.state().poses[f], poses[f].frame);
+    if (!why.empty())
+      throw Error("the images say nothing about the pose of '" + poses.name(f) + "': " + why +
+                  "; leave this bone out, or see whether its pose, its masks and its edges are right");
+  }
 }
 
 Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose>& poses, const Options& options,
@@ -70,12 +81,13 @@ Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose
   search::check_level_list(options.pixel_step, "pixel_step");
   check_inputs(views, costs, poses, options.reference);
   Refinement refinement(costs, poses, views, options);
+  check_compared(refinement, poses);
   refinement.run(context);
+  check_compared(refinement, poses);
   if (!refinement.converged())
     context.warn("the cameras still moved after " + std::to_string(options.max_rounds) + " rounds; raise max_rounds");
-  char text[96];
-  std::snprintf(text, sizeof text, "the cameras are off by about %.3g times what the options expect",
-                refinement.scale());
+  const std::string text =
+      formatted("the cameras are off by about %.3g times what the options expect", refinement.scale());
   context.info(text);
   Result result;
   for (std::size_t v = 0; v < views.size(); ++v) {
@@ -94,6 +106,7 @@ Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose
     pose.covariance = unit.asDiagonal() * refinement.covariance_of_pose(f) * unit.asDiagonal();
     pose.cost = refinement.cost(f);
     pose.convergence.clear();
+    search::warn_of_silent_views(refinement.level(f), pose, context);
     result.poses.add(poses.name(f), pose);
     pose.covariance = unit.asDiagonal() * refinement.covariance_beside_first(f) * unit.asDiagonal();
     result.relative.add(poses.name(f), pose);

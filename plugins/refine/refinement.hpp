@@ -11,7 +11,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <marrow/domain/decompositions.hpp>
 #include <marrow/plugin.hpp>
 #include <memory>
@@ -21,6 +20,8 @@
 
 #include "bone_in_view.hpp"
 #include "sight.hpp"
+
+#include "marrow/domain/number_text.hpp"
 
 namespace marrow::refine {
 
@@ -51,11 +52,11 @@ class Refinement {
     }
     for (const Pose& pose : poses) state_.poses.push_back(pose.world_from_model);
     state_.motions.assign(views.size(), Vector6d::Zero());
+    compare_each(options_.pixel_step.front());
   }
 
   /// Chooses the scale with the first pixel step, and goes on with the others, as from an approximate state.
   void run(Context& context) {
-    compare_each(options_.pixel_step.front());
     choose_scale(context);
     for (std::size_t i = 1; i < options_.pixel_step.size(); ++i) {
       compare_each(options_.pixel_step[i]);
@@ -70,6 +71,8 @@ class Refinement {
   /// How far off the cameras are, in units of what the options expect.
   double scale() const { return scale_; }
   const State& state() const { return state_; }
+  /// What a bone is compared by: its cost at the level of the last pixel step; before run(), of the first.
+  const Cost& level(std::size_t bone) const { return *levels_[bone]; }
   const Sight& sight(std::size_t view) const { return sights_[view]; }
   /// The cost of a bone, as the mean over the views with their cameras corrected.
   double cost(std::size_t bone) const {
@@ -131,9 +134,8 @@ class Refinement {
       const bool converged = descend(scale == 1, context, at_given);
       expand(scale == 1);
       all.push_back({scale, converged, evidence(), state_, models_, inverse_of(equations().first)});
-      char text[96];
-      std::snprintf(text, sizeof text, "cameras off by %g times what is expected: log evidence %.4g", scale,
-                    all.back().evidence);
+      const std::string text =
+          formatted("cameras off by %g times what is expected: log evidence %.4g", scale, all.back().evidence);
       context.debug(text);
     }
     const auto by_evidence = [](const Found& a, const Found& b) { return a.evidence < b.evidence; };

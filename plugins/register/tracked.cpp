@@ -7,6 +7,7 @@
 #include <marrow/domain/decompositions.hpp>
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/search/compared.hpp"
 #include "marrow/toolbox/search/search.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 
@@ -83,20 +84,23 @@ class Frame {
         context_(context),
         levels_(search::levels_of(cost, search_options_)) {}
 
-  /// The minimum near the prediction.
-  Pose near() {
+  /// The minimum near the prediction; nothing if the images say nothing about it.
+  std::optional<Pose> near() {
     Search search(optimizer_, predicted_, search_options_, context_);
     for (std::size_t i = 0; i < levels_.size(); ++i)
       search.refine(*levels_[i], search::kAllAxes, search.steps_of(i), 0.1 * double(i), 0.1);
     return finished(search);
   }
 
-  /// The best of the minima all around the prediction.
-  Pose wide() {
+  /// The best of the minima all around the prediction; nothing if the images say nothing about it.
+  std::optional<Pose> wide() {
     Search search(optimizer_, predicted_, search_options_, context_);
     search.go_to(search.find(levels_).pose);
     return finished(search);
   }
+
+  /// Why the last search led to nothing.
+  const std::string& why_nothing() const { return why_nothing_; }
 
   bool agrees(const Pose& found) const {
     if (!found.covariance || !found.covariance->allFinite()) return false;
@@ -107,14 +111,17 @@ class Frame {
 
  private:
   /// The search's pose. A new covariance takes most of a frame's time.
-  Pose with_covariance(Search& search, const Cost& cost, const search::Steps& steps) {
+  std::optional<Pose> with_covariance(Search& search, const Cost& cost, const search::Steps& steps) {
+    why_nothing_ = search::nothing_compared(cost, search.pose(), predicted_.frame);
+    if (!why_nothing_.empty()) return std::nullopt;
     if (!covariance_) return final_pose_of(search, predicted_, cost, steps, search_options_, context_);
     Pose pose = pose_of(search, predicted_, cost);
     pose.covariance = covariance_;
+    search::warn_of_silent_views(cost, pose, context_);
     return pose;
   }
 
-  Pose finished(Search& coarse) {
+  std::optional<Pose> finished(Search& coarse) {
     const search::Steps last = coarse.steps_of(levels_.size() - 1);
     if (!finer_cost_) return with_covariance(coarse, *levels_.back(), last);
     Search search(finer_optimizer_, predicted_, search_options_, context_);
@@ -138,6 +145,7 @@ class Frame {
   search::SearchOptions search_options_;
   Context& context_;
   search::Levels levels_;
+  std::string why_nothing_;
 };
 
 /// After some frames without the bone the prediction is so wide that a wrong pose agrees with it, too. Its cost tells.
@@ -156,12 +164,14 @@ Result tracked(const Cost& cost, const Cost* finer_cost, const Optimizer& optimi
   Frame frame(cost, finer_cost, optimizer, finer_optimizer, predicted, covariance, options, context);
   Result result;
   result.stages.add("predicted", initial);
-  result.pose = frame.near();
-  if (!frame.agrees(result.pose) || (state && is_unusual(result.pose, *state))) {
-    result.stages.add("near", result.pose);
-    const Pose wide = frame.wide();
-    if (wide.cost < result.pose.cost) result.pose = wide;
+  std::optional<Pose> found = frame.near();
+  if (!found || !frame.agrees(*found) || (state && is_unusual(*found, *state))) {
+    if (found) result.stages.add("near", *found);
+    const std::optional<Pose> wide = frame.wide();
+    if (!found && !wide) search::refuse_pose(frame.why_nothing());
+    if (!found || (wide && wide->cost < found->cost)) found = wide;
   }
+  result.pose = *found;
   result.stages.add("final", result.pose);
   return result;
 }
@@ -182,7 +192,7 @@ MARROW_PLUGIN(plugin) {
           "known")
       .in("state", "what is known before the frame; then most frames take over the covariance of a frame before")
       .out("pose", &Result::pose, "pose of least cost, with its predicted covariance")
-      .out("stages", &Result::stages, "poses of the search: predicted, near (if it was not enough), final",
+      .out("stages", &Result::stages, "poses of the search: predicted, near (if it was found but not enough), final",
            over("stage"))
       .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline")
       .option("reach_px", &Options::reach_px, "per level: distance beyond which a point counts as unmatched")

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Takes a frame's registered pose into the state, or finds the bone lost in this frame.
 #include <cmath>
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/track/motion_model.hpp"
 
 namespace {
@@ -36,23 +36,26 @@ Measurement measured_by(const Pose& pose, double scale, const Options& options) 
   return measured;
 }
 
+/// Whether there is a pose with deviations. No registration knows a pose exactly: deviations that are all 0 come from
+/// images that say nothing.
+bool is_measured(const Pose* pose) {
+  return pose && pose->covariance && pose->covariance->allFinite() && !pose->covariance->isZero(0);
+}
+
 /// Why the frame's pose is not taken. Empty if it is.
 std::string why_lost(const TrackState& state, const Pose* pose, const Verdict* verdict, double surprise,
                      const Options& options) {
-  char text[160];
   if (!pose) return "no pose was found";
-  if (!pose->covariance || !pose->covariance->allFinite()) return "the images do not determine the pose";
+  if (!is_measured(pose))
+    return pose->covariance && pose->covariance->isZero(0)
+               ? "its predicted deviations are 0, so its registration compared nothing"
+               : "the images do not determine the pose";
   if (verdict && verdict->judgement == Judgement::wrong)
     return "its verdict is wrong" + (verdict->reasons.empty() ? "" : ": " + verdict->reasons[0]);
-  if (pose->cost > options.most_cost_ratio * state.usual_cost) {
-    std::snprintf(text, sizeof text, "its cost is %.3g, where %.3g is usual", pose->cost, state.usual_cost);
-    return text;
-  }
-  if (!(surprise <= options.gate)) {
-    std::snprintf(text, sizeof text, "it is not where the motion leads: squared distance %.3g, at most %.3g", surprise,
-                  options.gate);
-    return text;
-  }
+  if (pose->cost > options.most_cost_ratio * state.usual_cost)
+    return formatted("its cost is %.3g, where %.3g is usual", pose->cost, state.usual_cost);
+  if (!(surprise <= options.gate))
+    return formatted("it is not where the motion leads: squared distance %.3g, at most %.3g", surprise, options.gate);
   return "";
 }
 
@@ -60,10 +63,9 @@ Frame filter(const TrackState& predicted, const Pose* pose, const Verdict* verdi
              Context& context) {
   Frame frame{predicted, {}};
   TrackState& state = frame.state;
-  const bool is_measured = pose && pose->covariance && pose->covariance->allFinite();
   std::optional<Measurement> measured;
   const double scale = predicted.usual_covariance ? predicted.noise_scale : options.first_scale;
-  if (is_measured) measured = measured_by(*pose, scale, options);
+  if (is_measured(pose)) measured = measured_by(*pose, scale, options);
   const double surprise = measured ? track::surprise(predicted, *measured) : state.surprise;
   const std::string lost = why_lost(predicted, pose, verdict, surprise, options);
   if (lost.empty()) {

@@ -107,4 +107,34 @@ TEST(BestOf, NamesTheStartThatIsNoRigidPose) {
   EXPECT_NE(shipped::refusal("initial.best_of", trial.inputs).find("second"), std::string::npos);
 }
 
+/// Says nothing beyond 10 mm.
+class Shortsighted : public well::Well {
+ public:
+  using Well::Well;
+  std::string nothing_compared(const marrow::RigidTransform& pose) const override {
+    return pose.translation_mm.norm() > 10 ? "view 'a': it shows nothing of the bone" : "";
+  }
+  std::shared_ptr<const Cost> at_level(const marrow::CostLevel&) const override {
+    return std::make_shared<Shortsighted>(*this);
+  }
+};
+
+TEST(BestOf, AStartAboutWhichTheImagesSayNothingIsNone) {
+  Trial trial;
+  trial.inputs["cost"] =
+      marrow::Value::of<Cost>(std::make_shared<const Shortsighted>(trial.bottom.world_from_model, trial.bottom.frame));
+  trial.give("first", 20);
+  trial.give("third", 30);
+  EXPECT_EQ(shipped::refusal("initial.best_of", trial.inputs),
+            "the images say nothing about any start: first: view 'a': it shows nothing of the bone; third: view 'a': "
+            "it shows nothing of the bone; give a start nearer to the bone, or see whether the masks, the edges and "
+            "the model are right");
+  trial.give("second", 9);
+  EXPECT_NEAR(trial.run().cost, 81.0 / 6, 1e-9);
+  ASSERT_EQ(trial.log.size(), 2u);
+  EXPECT_EQ(trial.log[0],
+            "the images say nothing about a start: first: view 'a': it shows nothing of the bone; third: view 'a': it "
+            "shows nothing of the bone");
+}
+
 }  // namespace best_of_test

@@ -334,4 +334,37 @@ TEST(RefineCameras, SaysWhatIsWrong) {
             "costs and poses are not of the same bones; wire both from nodes that are called for each fragment");
 }
 
+/// In some views it says nothing.
+class PartlyBlind : public Split {
+ public:
+  PartlyBlind(const Bone& bone, std::size_t silent)
+      : Split({bone.pose.world_from_model, bone.pose.world_from_model}, bone.pose.frame, 1e4), silent_(silent) {}
+  std::vector<std::string> silent_views(const RigidTransform&) const override {
+    const std::vector<std::string> all{"view 'frontal': it is black", "view 'lateral': it is black"};
+    return {all.end() - std::ptrdiff_t(silent_), all.end()};
+  }
+  std::string nothing_compared(const RigidTransform&) const override {
+    return silent_ == 2 ? "view 'frontal': it is black; view 'lateral': it is black" : "";
+  }
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
+    return std::make_shared<PartlyBlind>(*this);
+  }
+
+ private:
+  std::size_t silent_;
+};
+
+TEST(RefineCameras, ABoneOfWhichTheImagesSayNothingIsNoPose) {
+  const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
+  std::vector<Bone> bones{Bone({none, none}), Bone({none, none})};
+  bones[1].cost = std::make_shared<PartlyBlind>(bones[1], 2);
+  EXPECT_EQ(shipped::refusal("refine.cameras", inputs(bones)),
+            "the images say nothing about the pose of 'proximal': view 'frontal': it is black; view 'lateral': it is "
+            "black; leave this bone out, or see whether its pose, its masks and its edges are right");
+  bones[1].cost = std::make_shared<PartlyBlind>(bones[1], 1);
+  const auto poses = shipped::call("refine.cameras", inputs(bones)).at("poses").as_list<marrow::Pose>();
+  EXPECT_EQ(poses[0].warnings, std::vector<std::string>{});
+  EXPECT_EQ(poses[1].warnings, std::vector<std::string>{"view 'lateral': it is black; only the other views count"});
+}
+
 }  // namespace refine_cameras_test

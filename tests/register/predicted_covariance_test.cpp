@@ -280,4 +280,51 @@ TEST(PredictedCovariance, OfADirectionThatOnlyTwoAxesTogetherLeaveOpen) {
   EXPECT_NEAR((*predicted.covariance())(3, 3), 1, 1e-4);
 }
 
+TEST(PredictedCovariance, OfAPerfectFitIsTheLeastStep) {
+  // All residuals are 0, so no block moves the minimum. What is not tried is not known: steps of 1/256 degree or mm.
+  class PerfectValues : public Squares {
+   public:
+    PerfectValues() : Squares(0) {}
+    std::optional<Expansion> expansion(const marrow::RigidTransform&, const marrow::FragmentFrame&) const override {
+      return std::nullopt;
+    }
+    std::vector<double> without_each_block(const marrow::RigidTransform& pose) const override {
+      std::vector<double> values;
+      for (const Expansion& without : Squares::expansion_without_each_block(pose, frame()))
+        values.push_back(without.value);
+      return values;
+    }
+    std::vector<Expansion> expansion_without_each_block(const marrow::RigidTransform&,
+                                                        const marrow::FragmentFrame&) const override {
+      return {};
+    }
+  };
+  const Matrix6d expected = in_radians(Matrix6d::Identity() / (256.0 * 256.0));
+  const marrow::FragmentFrame about = frame();
+  const marrow::RigidTransform pose = bottom();
+  const Squares with_derivatives(0);
+  const PerfectValues with_values;
+  for (const marrow::Cost* cost :
+       {static_cast<const marrow::Cost*>(&with_derivatives), static_cast<const marrow::Cost*>(&with_values)}) {
+    const PredictedCovariance predicted(*cost, pose, about);
+    ASSERT_TRUE(predicted.covariance());
+    EXPECT_LT((*predicted.covariance() - expected).norm(), 1e-6 * expected.norm()) << *predicted.covariance();
+  }
+}
+
+TEST(PredictedCovariance, OneBlockThatAloneTellsAnAxisLeavesItOpen) {
+  // Of nine blocks, one alone holds the residuals along the last axis. Without it nothing tells that axis: no deviation
+  // follows from derivatives, and 0 would be wrong.
+  class Alone : public Squares {
+   public:
+    Alone() : Squares(0.05) {
+      for (int block = 1; block < kBlocks; ++block) slopes[std::size_t(block)].col(5).setZero();
+    }
+  };
+  const Alone cost;
+  const marrow::FragmentFrame about = frame();
+  const marrow::RigidTransform pose = marrow::search::moved_by_units(bottom(), about, cost.minimum());
+  EXPECT_FALSE(PredictedCovariance(cost, pose, about).covariance());
+}
+
 }  // namespace predicted_covariance_test

@@ -9,6 +9,7 @@
 #include "framework/toolbox/search/derivatives.hpp"
 #include "framework/toolbox/search/predicted_covariance.hpp"
 #include "framework/toolbox/search/scan.hpp"
+#include "marrow/toolbox/search/compared.hpp"
 
 namespace search_test {
 
@@ -282,6 +283,57 @@ TEST(Derivatives, AreThoseOfTheCoordinates) {
     EXPECT_TRUE(told.curvature.isApprox(told.gradient * told.gradient.transpose(), 1e-9));
   }
   EXPECT_TRUE(std::isnan(marrow::search::in_coordinates(std::nullopt, motion(0, 0, 0, 0, 0, 0), kAllAxes).value));
+}
+
+/// Without a sentence: a constant, or not a number.
+class Blind : public marrow::Cost {
+ public:
+  explicit Blind(double value, std::string said = "") : value_(value), said_(std::move(said)) {}
+  double value(const marrow::RigidTransform&) const override { return value_; }
+  std::vector<double> without_each_block(const marrow::RigidTransform&) const override { return {value_, value_}; }
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
+    return std::make_shared<Blind>(*this);
+  }
+  std::string nothing_compared(const marrow::RigidTransform&) const override { return said_; }
+
+ private:
+  double value_;
+  std::string said_;
+};
+
+/// What final_pose_of() says at the truth; empty if it gives a pose.
+std::string refused(const marrow::Cost& cost) {
+  const Listener listener;
+  marrow::Context context;
+  const Pose start = truth();
+  const SearchOptions options;
+  Search search(listener, start, options, context);
+  try {
+    final_pose_of(search, start, cost, {1, 1, 1, 0.1}, options, context);
+  } catch (const marrow::Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Search, APoseAboutWhichTheImagesSayNothingIsNoResult) {
+  const std::string before = "the images say nothing about the pose that was found: ",
+                    remedy =
+                        "; give a start nearer to the bone, or see whether the masks, the edges and the model are "
+                        "right";
+  EXPECT_EQ(refused(bowl()), "");
+  EXPECT_EQ(refused(Blind(3)), before + "the cost is the same at all poses within 16 degrees and mm" + remedy);
+  EXPECT_EQ(refused(Blind(0)), before + "the cost is the same at all poses within 16 degrees and mm" + remedy);
+  EXPECT_EQ(refused(Blind(std::nan(""))), before + "the cost is not a number" + remedy);
+  EXPECT_EQ(refused(Blind(3, "view 'a': it is black")), before + "view 'a': it is black" + remedy);
+}
+
+TEST(Search, ACostThatChangesInOneAxisAloneSaysSomething) {
+  Matrix6d one = Matrix6d::Zero();
+  one(5, 5) = 1;
+  const Bowl groove(truth().world_from_model, truth().frame, one);
+  EXPECT_EQ(marrow::search::nothing_compared(groove, truth().world_from_model, truth().frame), "");
+  EXPECT_EQ(refused(groove), "");
 }
 
 }  // namespace search_test

@@ -112,4 +112,22 @@ TEST(Sequence, SaysWhatIsWrong) {
   EXPECT_NE(shipped::refusal("register.sequence", trial.inputs).find("the pose to start from"), std::string::npos);
 }
 
+TEST(Sequence, BothCostsMustSaySomething) {
+  class Constant : public Cost {
+   public:
+    double value(const marrow::RigidTransform&) const override { return 1; }
+    std::shared_ptr<const Cost> at_level(const marrow::CostLevel&) const override {
+      return std::make_shared<Constant>();
+    }
+  };
+  for (const char* port : {"cost", "finer_cost"}) {
+    Trial trial(truth(), truth());
+    trial.inputs[port] = marrow::Value::of<Cost>(std::make_shared<const Constant>());
+    EXPECT_TRUE(shipped::refusal("register.sequence", trial.inputs)
+                    .starts_with("the images say nothing about the pose that was found: the cost is the same at all "
+                                 "poses within 16 degrees and mm"))
+        << port;
+  }
+}
+
 }  // namespace sequence_test

@@ -105,4 +105,44 @@ TEST(Tracked, AStartWithoutACovarianceIsHardlyKnown) {
   EXPECT_LT(apart(shipped::call("register.tracked", inputs(bowl(), without)).at("pose").as<Pose>()), 0.05);
 }
 
+/// A bowl that says nothing within some distance of a pose, as where an edge lies beyond the reach of an outline.
+class MuteNear : public well::Bowl {
+ public:
+  MuteNear(const Pose& middle, double within)
+      : Bowl(truth().world_from_model, truth().frame, Matrix6d::Identity(), 100), middle_(middle), within_(within) {}
+  std::string nothing_compared(const marrow::RigidTransform& pose) const override {
+    const bool is_near = well::way(middle_.world_from_model, pose, middle_.frame).norm() < within_;
+    return is_near ? "view 'a': no edge lies within 6 px of the model's outline" : "";
+  }
+  std::shared_ptr<const Cost> at_level(const marrow::CostLevel&) const override {
+    return std::make_shared<MuteNear>(*this);
+  }
+
+ private:
+  Pose middle_;
+  double within_;
+};
+
+TEST(Tracked, LooksFurtherWhereTheImagesSayNothing) {
+  const Pose near = predicted({6, 0, 0, 0, 0, 0}, 4, 4);
+  shipped::Inputs in = inputs(std::make_shared<const MuteNear>(near, 2), near);
+  in["optimizer"] = marrow::Value::of<marrow::Optimizer>(std::make_shared<const well::Listener>());  // stays
+  const auto out = shipped::call("register.tracked", in);
+  EXPECT_EQ(out.at("stages").as_list<Pose>().names(), (std::vector<std::string>{"predicted", "final"}));
+  EXPECT_GT(well::way(near.world_from_model, out.at("pose").as<Pose>().world_from_model, near.frame).norm(), 2);
+}
+
+TEST(Tracked, AFrameThatSaysNothingGivesNoPose) {
+  marrow::track::TrackState state;
+  state.usual_covariance = Matrix6d(7 * Matrix6d::Identity());  // taken over, it would look like a good pose
+  state.frame = 3;
+  for (const bool has_state : {false, true}) {
+    shipped::Inputs in = inputs(std::make_shared<const MuteNear>(truth(), 1e9), truth());
+    if (has_state) in["state"] = shipped::item(state);
+    EXPECT_EQ(shipped::refusal("register.tracked", in),
+              "the images say nothing about the pose that was found: view 'a': no edge lies within 6 px of the model's "
+              "outline; give a start nearer to the bone, or see whether the masks, the edges and the model are right");
+  }
+}
+
 }  // namespace tracked_test

@@ -110,4 +110,15 @@ TEST(TrackFilter, ALostBoneIsWhereItsMotionLeads) {
   EXPECT_EQ(state_of(filtered(next, &found)).frames_lost, 0);
 }
 
+TEST(TrackFilter, APoseThatIsKnownExactlyIsNone) {
+  // No registration knows a pose exactly: such a covariance comes from a cost that is the same everywhere.
+  const TrackState state = marrow::track::predicted(sequences::begin());
+  Pose exact = pose_at(state.predicted.world_from_model, state);
+  exact.covariance->setZero();
+  const TrackState after = state_of(filtered(state, &exact));
+  EXPECT_FALSE(after.is_found());
+  EXPECT_EQ(after.note, "its predicted deviations are 0, so its registration compared nothing");
+  EXPECT_FALSE(after.usual_covariance);
+}
+
 }  // namespace filter_test

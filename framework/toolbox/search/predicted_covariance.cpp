@@ -6,10 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "marrow/domain/decompositions.hpp"
+
+#include "marrow/domain/number_text.hpp"
 
 namespace marrow::search {
 namespace {
@@ -19,13 +20,10 @@ constexpr double kLeastRise = 0.5, kGoodRise = 1, kAimedRise = 1.7, kMostRise = 
 constexpr double kFlat = 0.1, kFlatLater = 0.5;  // in units of the wanted rise: the least curvature along a step
 constexpr double kWantedRise = 10;               // of the cost by a step, in units of its noise
 constexpr int kMostRounds = 5;
-constexpr double kMattersBelow = 12;  // rise of a cost along the least certain direction, in units of its noise
+constexpr double kMostVariance = 100 * 100;  // in squared steps; used for directions that nothing determines
+constexpr double kMattersBelow = 12;         // rise of a cost along the least certain direction, in units of its noise
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
+std::string number(double value) { return formatted("%.3g", value); }
 
 }  // namespace
 
@@ -47,6 +45,10 @@ PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform&
   if (at_pose_.size() == 0) return;
   ++evaluations_;
   wanted_rise_ = std::sqrt((at_pose_.array() - value_).square().sum());  // the standard deviation of the cost's value
+  if (wanted_rise_ == 0) {
+    set_exact();
+    return;
+  }
   guess_steps();
   for (int round = 1;; ++round) {
     choose_steps();
@@ -55,6 +57,10 @@ PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform&
     const auto gradient = gradients();
     const double flat = round == 1 ? kFlat : kFlatLater;
     noise_ = (inverse(h, flat) * gradient.transpose() * gradient).trace() / 6;
+    if (noise_ == 0) {
+      set_exact();
+      return;
+    }
     const double least_curvature = eigen_of_symmetric(h).values[0] / wanted_rise_, wanted_before = wanted_rise_;
     wanted_rise_ = std::min(wanted_rise_, kWantedRise * noise_);
     const bool steps_are_right = wanted_rise_ > 0.5 * wanted_before && (round > 1 || least_curvature > kFlatLater);
@@ -88,8 +94,15 @@ std::vector<std::string> PredictedCovariance::warnings(double most_deg, double m
   return warnings;
 }
 
+/// Whether a Hessian determines all six axes.
+bool PredictedCovariance::is_regular(const Matrix6d& hessian) {
+  constexpr double kRounding = 1e-12;
+  const Vector6d eigenvalues = eigen_of_symmetric(hessian).values;
+  return eigenvalues[0] > kRounding * eigenvalues[5];
+}
+
 /// By the cost's own derivatives, where it has them. They say little if a direction is nearly flat over degrees or
-/// millimetres. Then nothing is set, and the result is false.
+/// millimetres, or flat without one of the blocks. Then nothing is set, and the result is false.
 bool PredictedCovariance::differentiate() {
   constexpr double kMostDeviation = 1;  // degrees or mm
   const std::vector<Cost::Expansion> without_block = cost_.expansion_without_each_block(pose_, frame_);
@@ -101,6 +114,7 @@ bool PredictedCovariance::differentiate() {
   Matrix6d sum = Matrix6d::Zero(), mean = Matrix6d::Zero();
   for (const Cost::Expansion& without : without_block) {
     const Matrix6d h = unit.asDiagonal() * without.curvature * unit.asDiagonal();
+    if (!is_regular(h)) return false;
     const Vector6d g = unit.cwiseProduct(without.gradient - whole->gradient), motion = solve_symmetric<6>(h, g);
     sum += motion * motion.transpose();
     mean += h / double(without_block.size());
@@ -110,6 +124,20 @@ bool PredictedCovariance::differentiate() {
   in_units_ = sum;
   set_covariance(Matrix6d::Zero());
   return true;
+}
+
+/// No block moves the minimum, so the fit is perfect. But an axis along which even the longest step costs nothing is
+/// not known at all.
+void PredictedCovariance::set_exact() {
+  in_units_.setZero();
+  Matrix6d undetermined = Matrix6d::Zero();
+  for (int axis = 0; axis < 6; ++axis) {
+    const Vector6d step = kMostStep * Vector6d::Unit(axis);
+    const bool rises = cost_.value(pose_at(step)) > value_ || cost_.value(pose_at(-step)) > value_;
+    if (!rises) undetermined(axis, axis) = kMostVariance * kMostStep * kMostStep;
+    evaluations_ += 2;
+  }
+  set_covariance(undetermined);
 }
 
 /// Steps that are nearly right save most of the search for them.
@@ -240,7 +268,6 @@ Matrix6d PredictedCovariance::inverse(const Matrix6d& hessian, double flat) cons
 }
 
 void PredictedCovariance::move_without_each_block(const Eigen::MatrixXd& at_diagonals, double flat) {
-  constexpr double kMostVariance = 100 * 100;  // in squared steps; used for directions that nothing determines
   const auto gradient = gradients();
   Matrix6d sum = Matrix6d::Zero();
   for (Eigen::Index block = 0; block < at_pose_.size(); ++block) {
@@ -260,6 +287,8 @@ void PredictedCovariance::move_without_each_block(const Eigen::MatrixXd& at_diag
 }
 
 void PredictedCovariance::set_covariance(const Matrix6d& undetermined) {
+  constexpr double kNone = 1e-6;  // degrees or mm; no images tell as little
+  if (in_units_.diagonal().maxCoeff() < kNone * kNone) in_units_.diagonal().setConstant(kLeastStep * kLeastStep);
   Vector6d unit = Vector6d::Ones();
   unit.head<3>() *= radians(1);
   covariance_ = unit.asDiagonal() * (in_units_ + undetermined) * unit.asDiagonal();

@@ -26,6 +26,9 @@ RigidTransform moved_by_units(const RigidTransform& pose, const FragmentFrame& f
 ///
 /// Along the least certain direction the cost may have other minima, or be flatter than its curvature says. So the
 /// variance in this direction becomes that of the density exp(-cost / noise) along it, if this is twice as large.
+///
+/// No deviation is 0: if no block moves the minimum, all are the least step. The cost must have compared something at
+/// the pose (compared.hpp).
 class PredictedCovariance {
  public:
   PredictedCovariance(const Cost& cost, const RigidTransform& pose, const FragmentFrame& frame);
@@ -44,7 +47,9 @@ class PredictedCovariance {
 
  private:
   RigidTransform pose_at(const Vector6d& motion) const { return moved_by_units(pose_, frame_, motion); }
+  static bool is_regular(const Matrix6d& hessian);
   bool differentiate();
+  void set_exact();
   void set_covariance(const Matrix6d& undetermined);
   void guess_steps();
   void choose_steps();

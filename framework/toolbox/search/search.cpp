@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "derivatives.hpp"
+#include "marrow/toolbox/search/compared.hpp"
 #include "predicted_covariance.hpp"
 #include "scan.hpp"
 
@@ -187,8 +188,12 @@ PredictedCovariance settle(Search& search, const FragmentFrame& frame, const Cos
 
 Pose final_pose_of(Search& search, const Pose& initial, const Cost& cost, const Steps& steps,
                    const SearchOptions& options, Context& context) {
+  check_compared(cost, search.pose(), initial.frame);
   int evaluations = 0;
   const PredictedCovariance predicted = settle(search, initial.frame, cost, steps, evaluations);
+  check_compared(cost, search.pose(), initial.frame);
+  if (predicted.covariance() && !predicted.covariance()->allFinite())
+    refuse_pose("without some blocks of the images the cost is not a number");
   Pose pose = pose_of(search, initial, cost);
   pose.convergence = search.convergence(cost);
   pose.covariance = predicted.covariance();
@@ -197,6 +202,7 @@ Pose final_pose_of(Search& search, const Pose& initial, const Cost& cost, const 
     context.warn(warning);
     pose.warnings.push_back(warning);
   }
+  warn_of_silent_views(cost, pose, context);
   return pose;
 }
 

@@ -104,7 +104,8 @@ Pose pose_of(const Search& search, const Pose& initial, const Cost& cost);
 /// The same at the end of a search, with the convergence. If the cost can leave out blocks, also with the predicted
 /// covariance and with warnings about axes that the images hardly determine. Along the direction that they determine
 /// least, the cost may have several minima, and the start decides in which the search ends. So the others are refined
-/// with `steps`, and the search goes to the best of them.
+/// with `steps`, and the search goes to the best of them. Throws Error if the images say nothing about the pose
+/// (compared.hpp); a view that says nothing, where others do, is a warning.
 Pose final_pose_of(Search& search, const Pose& initial, const Cost& cost, const Steps& steps,
                    const SearchOptions& options, Context& context);
 

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: Apache-2.0
+// Images that say nothing about a pose: no search may end in a pose there. Every cost is tried in every way in which it
+// can have nothing to compare. That it has nothing is so by construction: the bone, the edges or the pixels are not
+// there.
+#include <gtest/gtest.h>
+
+#include "marrow/toolbox/analytic/body.hpp"
+#include "marrow/toolbox/analytic/x_ray_view.hpp"
+#include "shipped.hpp"
+
+namespace nothing_compared_test {
+
+using namespace marrow;
+
+constexpr int kSize_px = 120;
+constexpr double kPixel_mm = 1.6;
+
+analytic::Body bone() { return {{{0, 0, 8}, {9, 13, 32}}, {{20, -5, -22}, {8, 10, 9}}}; }
+RigidTransform truth() { return analytic::moved_by({0.2, -0.15, 0.3}, {3, -2, 5}); }
+
+/// Draws nothing, as a surface whose triangles face inwards has no outline.
+struct Invisible : OutlineProjector, RadiographProjector {
+  std::vector<OutlinePoint> outline(const Camera&, const RigidTransform&, double) const override { return {}; }
+  std::vector<float> radiograph(const Camera&, const RigidTransform&, const PixelGrid& grid) const override {
+    return std::vector<float>(grid.count());
+  }
+  std::vector<float> radiograph(const Camera&, const RigidTransform&,
+                                const std::vector<Eigen::Vector2f>& pixels) const override {
+    return std::vector<float>(pixels.size());
+  }
+  PixelGrid region(const Camera&, const RigidTransform&) const override { return {20, 20, 1, 80, 80}; }
+};
+
+/// What is given to a cost, and the pose from which it is minimised.
+struct Scene {
+  std::shared_ptr<const OutlineProjector> outline;
+  std::shared_ptr<const RadiographProjector> radiograph;
+  List<View> views;
+  List<EdgeMap> edges;
+  Pose start;
+
+  Scene() {
+    const auto body = std::make_shared<const analytic::BodyProjector>(bone());
+    outline = body, radiograph = body;
+    for (const double angle : {0.0, 80.0}) {
+      const analytic::XRay x_ray{analytic::c_arm(angle, kSize_px, kSize_px, kPixel_mm), 1, 0, 1, 1};
+      const View view = x_ray_view(x_ray, angle > 0 ? "lateral" : "frontal", *body, truth());
+      edges.add(view.name, analytic::edges_of(view));
+      views.add(view.name, view);
+    }
+    start.frame = fragment_frame(analytic::mesh_of(bone()));
+    start.world_from_model = moved(truth(), start.frame, Vector6d::Constant(0.01));
+  }
+  void draw_nothing() {
+    outline = std::make_shared<const Invisible>(), radiograph = std::make_shared<const Invisible>();
+  }
+  void change(const std::function<void(View&, EdgeMap&)>& of_view) {
+    List<View> changed_views;
+    List<EdgeMap> changed_edges;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      View view = views[i];
+      EdgeMap map = edges[i];
+      of_view(view, map);
+      changed_views.add(views.name(i), view);
+      changed_edges.add(views.name(i), map);
+    }
+    views = changed_views, edges = changed_edges;
+  }
+  void shift(const Eigen::Vector3d& by_mm) { start.world_from_model.translation_mm += by_mm; }
+};
+
+bool has(const std::string& node, const std::string& port) {
+  for (const PortInfo& one : shipped::definition_of(node).info.inputs)
+    if (one.name == port) return true;
+  return false;
+}
+
+/// A node's inputs and its cost, which refers to them.
+struct Made {
+  shipped::Inputs inputs;
+  Value cost;
+  Made(const std::string& node, const Scene& scene) {
+    const Grid grid = analytic::grid_of({68, 56, 100}, {1, 1, 1});
+    for (const PortInfo& port : shipped::definition_of(node).info.inputs) {
+      if (port.name == "projector" && port.type.id == TypeInfo::of<OutlineProjector>().id)
+        inputs["projector"] = Value::of<OutlineProjector>(scene.outline);
+      else if (port.name == "projector")
+        inputs["projector"] = Value::of<RadiographProjector>(scene.radiograph);
+      if (port.name == "views") inputs["views"] = shipped::list(scene.views, "view");
+      if (port.name == "edges") inputs["edges"] = shipped::list(scene.edges, "view");
+      if (port.name == "mesh") inputs["mesh"] = shipped::item(analytic::mesh_of(bone()));
+      if (port.name == "volume") inputs["volume"] = shipped::item(analytic::volume_of(bone(), grid, 700, 0));
+      if (port.name == "field") inputs["field"] = shipped::item(analytic::field_of(bone(), grid, 6));
+    }
+    cost = shipped::call(node, inputs).at("cost");
+  }
+};
+
+shipped::Options one_level(const std::string& node) {
+  const auto one = [](double value) { return OptionValue(std::vector<double>{value}); };
+  shipped::Options options{{"contour_spacing_px", one(2)}, {"reach_px", one(6)}};
+  if (node == "initial.best_of") return {{"contour_spacing_px", 2.0}, {"reach_px", 6.0}};
+  if (node == "initial.global_search")
+    return {{"contour_spacing_px", one(2)},
+            {"reach_px", one(6)},
+            {"pixel_step", one(2)},
+            {"poses", std::int64_t(1)},
+            {"candidates", std::int64_t(1)}};
+  options["step_deg"] = options["step_mm"] = one(0.5);
+  options["step_axial_deg"] = one(1);
+  options["max_evaluations"] = std::int64_t(60);
+  if (node == "register.tracked") {
+    options["wide_poses"] = std::int64_t(8);
+    options["most_wide_deg"] = options["most_wide_mm"] = 2.0;
+    return options;
+  }
+  options["step_tolerance"] = one(0.1);
+  options["scan_rotation_deg"] = options["scan_translation_mm"] = 0.0;
+  if (node == "register.sequence")
+    for (const char* name : {"pixel_step", "step_deg", "step_axial_deg", "step_mm", "step_tolerance"})
+      options[std::string("finer_") + name] = one(name == std::string("step_tolerance") ? 0.1 : 2);
+  return options;
+}
+
+shipped::Inputs inputs_of(const std::string& node, const Made& made, const Pose& start) {
+  shipped::Inputs inputs{{"cost", made.cost},
+                         {"optimizer", shipped::call("optimizer.nelder_mead", {}).at("optimizer")}};
+  if (node == "initial.best_of") {
+    inputs["first"] = shipped::item(start);
+  } else if (node == "initial.global_search") {
+    inputs["start"] = shipped::item(start);
+    inputs["model"] = shipped::item(analytic::mesh_of(bone()));
+  } else {
+    inputs["initial"] = shipped::item(start);
+  }
+  if (node == "register.sequence") inputs["finer_cost"] = made.cost;
+  return inputs;
+}
+
+const std::vector<std::string> kSearches{"register.multiresolution", "register.sequence", "register.tracked",
+                                         "initial.global_search", "initial.best_of"};
+const std::vector<std::string> kCosts{"contour_distance",      "drr_edges",
+                                      "entropy_of_difference", "gradient_correlation",
+                                      "gradient_difference",   "gradient_orientation",
+                                      "gradient_projection",   "metal_gradient_correlation",
+                                      "mutual_information",    "normalised_cross_correlation",
+                                      "patch_correlation",     "patch_gradient_correlation",
+                                      "pattern_intensity",     "ray_to_surface"};
+
+/// What a search says of a cost in a scene; empty if it gives a pose.
+std::string refusal(const std::string& search, const std::string& cost, const Scene& scene) {
+  try {
+    const Made made(cost, scene);
+    return shipped::refusal(search, inputs_of(search, made, scene.start), one_level(search));
+  } catch (const Error& error) {
+    return std::string("the images say nothing: ") + error.what();  // the cost itself refuses
+  }
+}
+
+void expect_no_pose(const std::string& what, const Scene& scene, const std::function<bool(const std::string&)>& needs) {
+  int tried = 0;
+  for (const std::string& name : kCosts) {
+    const std::string cost = "similarity." + name;
+    if (!needs(cost)) continue;
+    for (const std::string& search : kSearches) {
+      const std::string said = refusal(search, cost, scene);
+      EXPECT_NE(said.find("the images say nothing"), std::string::npos)
+          << what << ", " << cost << ", " << search << ": " << said;
+      EXPECT_EQ(said.find("nan"), std::string::npos) << said;
+      ++tried;
+    }
+  }
+  EXPECT_GT(tried, 0);
+}
+
+bool any(const std::string&) { return true; }
+bool needs_projector(const std::string& cost) {
+  return has(cost, "projector") && !has(cost, "field") && !has(cost, "mesh");
+}
+bool needs_edges(const std::string& cost) { return has(cost, "edges"); }
+bool needs_grey_values(const std::string& cost) { return !has(cost, "edges"); }
+
+TEST(NothingCompared, AnEmptyOutlineIsNoPose) {
+  Scene scene;
+  scene.draw_nothing();
+  expect_no_pose("an empty outline", scene, needs_projector);
+}
+
+TEST(NothingCompared, NoEdgesAreNoPose) {
+  Scene scene;
+  scene.change([](View&, EdgeMap& map) { map.pixels.clear(); });
+  expect_no_pose("no edges", scene, needs_edges);
+}
+
+TEST(NothingCompared, OneFarEdgeIsNoPose) {
+  Scene scene;
+  scene.change([](View&, EdgeMap& map) { map.pixels = {{5, 5, 1, 0, 100}}; });
+  expect_no_pose("one far edge", scene, needs_edges);
+}
+
+TEST(NothingCompared, AMaskThatHidesEverythingIsNoPose) {
+  Scene scene;
+  scene.change([](View& view, EdgeMap&) { view.mask = cv::Mat(kSize_px, kSize_px, CV_8U, cv::Scalar(0)); });
+  expect_no_pose("a full mask", scene, any);
+}
+
+TEST(NothingCompared, AConstantImageIsNoPose) {
+  Scene scene;
+  scene.change(
+      [](View& view, EdgeMap&) { view.image.pixels = cv::Mat(kSize_px, kSize_px, CV_16U, cv::Scalar(30000)); });
+  expect_no_pose("a constant image", scene, needs_grey_values);
+}
+
+TEST(NothingCompared, ABoneOutOfViewIsNoPose) {
+  Scene scene;
+  scene.shift({0, 0, 400});
+  expect_no_pose("out of view", scene, any);
+}
+
+TEST(NothingCompared, ABoneBehindBothSourcesIsNoPose) {
+  // Each source is 600 mm from the origin; their sum lies 80 degrees between them, 1.17 times as far along either.
+  Scene scene;
+  scene.shift(1.5 * (source_position_mm(scene.views[0].camera) + source_position_mm(scene.views[1].camera)));
+  expect_no_pose("behind the sources", scene, any);
+}
+
+TEST(NothingCompared, SoundImagesAreAPoseWithDeviations) {
+  const Scene scene;
+  for (const std::string& name : kCosts) {
+    const Made made("similarity." + name, scene);
+    for (const std::string& search : kSearches) {
+      const Pose pose =
+          shipped::call(search, inputs_of(search, made, scene.start), one_level(search)).at("pose").as<Pose>();
+      if (search.starts_with("initial")) continue;  // without deviations
+      ASSERT_TRUE(pose.covariance) << name << ", " << search;
+      EXPECT_TRUE(pose.covariance->allFinite() && pose.covariance->diagonal().minCoeff() > 0) << name << ", " << search;
+    }
+  }
+}
+
+TEST(NothingCompared, AViewThatShowsNothingIsNamedWhereAnotherShowsTheBone) {
+  Scene scene;
+  scene.change([](View& view, EdgeMap&) {
+    if (view.name == "lateral") view.mask = cv::Mat(kSize_px, kSize_px, CV_8U, cv::Scalar(0));
+  });
+  const Made made("similarity.normalised_cross_correlation", scene);
+  for (const std::string search : {"register.multiresolution", "register.sequence", "register.tracked"}) {
+    const Pose pose =
+        shipped::call(search, inputs_of(search, made, scene.start), one_level(search)).at("pose").as<Pose>();
+    const std::string expected = "view 'lateral': no pixel inside the mask shows the bone; only the other views count";
+    EXPECT_EQ(std::count(pose.warnings.begin(), pose.warnings.end(), expected), 1) << search;
+    EXPECT_TRUE(pose.covariance->allFinite() && pose.covariance->diagonal().minCoeff() > 0) << search;
+  }
+}
+
+TEST(NothingCompared, ASurfaceTurnedInsideOutIsNoPose) {
+  Scene scene;
+  Mesh mesh = analytic::mesh_of(bone());
+  for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
+  const Value kept = shipped::item(mesh);
+  const Value projector = shipped::call("project.silhouette_edges", {{"mesh", kept}}).at("projector");
+  scene.outline = std::static_pointer_cast<const OutlineProjector>(projector.data);
+  for (const std::string& search : kSearches)
+    EXPECT_NE(refusal(search, "similarity.contour_distance", scene)
+                  .find("view 'frontal': it shows nothing of the model's outline, which is empty or outside the image; "
+                        "view 'lateral': it shows nothing of the model's outline"),
+              std::string::npos)
+        << search;
+}
+
+}  // namespace nothing_compared_test
