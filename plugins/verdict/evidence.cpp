@@ -7,12 +7,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
 #include "failure_model.hpp"
 #include "judged.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/geometry/targets.hpp"
+#include "marrow/toolbox/search/compared.hpp"
 #include "spread.hpp"
 
 namespace {
@@ -32,8 +33,8 @@ struct Words {
   const char* reason;
   const char* remedy;
 };
-constexpr const char* kThirdView = "a third view, from a direction between the others";
-constexpr const char* kAxial = "a third view, or a landmark off the long axis";
+constexpr const char* kView = "another view, from a different direction";
+constexpr const char* kAxial = "another view, or a landmark off the long axis";
 constexpr const char* kLook = "a look at the overlay of each view: is this the bone, the side and the camera?";
 constexpr const char* kStart = "a start nearer to the bone, by hand or by landmarks";
 constexpr const char* kGiven =
@@ -48,9 +49,9 @@ constexpr Words kWords[] = {
     {"contour_best_decoy", "by contour, a random pose nearby explains the images %.2f times as well", kStart},
     {"best_turned", "turned about its long axis, the bone explains the images %.2f times as well", kAxial},
     {"contour_best_turned", "turned about its long axis, the bone's contour fits %.2f times as well", kAxial},
-    {"other_minimum", "a search from elsewhere ends at another pose that is %.2f times as good", kThirdView},
+    {"other_minimum", "a search from elsewhere ends at another pose that is %.2f times as good", kView},
     {"better_minimum", "a search from elsewhere ends at a pose that is better, by %.2f of the cost's rise", kStart},
-    {"restarts_mm", "searches from starts nearby end %.2f mm apart", kThirdView},
+    {"restarts_mm", "searches from starts nearby end %.2f mm apart", kView},
     {"restarts_deg", "searches from starts nearby end %.1f degrees apart about the long axis", kAxial},
     {"contour_apart_mm", "contour and grey values lead to poses %.2f mm apart", kLook},
     {"contour_apart_deg", "contour and grey values lead to poses %.1f degrees apart about the long axis", kAxial},
@@ -61,16 +62,12 @@ constexpr Words kWords[] = {
     {"unexplained", "a share of %.2f of the outline has no edge in the worst view", kLook},
     {"outline_part_mm", "a part of the outline lies %.2f mm off its edges", kLook},
     {"outline_spread_mm", "the edges scatter by %.2f mm about the outline", kLook},
-    {"predicted_mtre_mm", "the bone's surface is known to %.2f mm", kThirdView},
+    {"predicted_mtre_mm", "the bone's surface is known to %.2f mm", kView},
     {"predicted_axial_deg", "the rotation about the long axis is known to %.2f degrees", kAxial},
     {"warnings", "warnings of the registration: %.0f", kLook},
 };
 
-std::string filled(const char* text, double value) {
-  char filled[200];
-  std::snprintf(filled, sizeof filled, text, value);
-  return filled;
-}
+std::string filled(const char* text, double value) { return formatted(text, value); }
 
 void add(Evidence& all, const Evidence& more) { all.insert(all.end(), more.begin(), more.end()); }
 
@@ -79,7 +76,7 @@ void add_predicted(const Pose& pose, const Mesh& mesh, Evidence& evidence) {
   if (!pose.covariance) return;
   verdicts::Spread spread;
   spread.mtre_mm = kUnknown_mm, spread.axial_deg = kUnknown_deg;
-  if (pose.covariance->allFinite()) spread = verdicts::spread_of(pose, mesh);
+  if (verdicts::is_determined(pose)) spread = verdicts::spread_of(pose, mesh);
   evidence.push_back({"predicted_mtre_mm", std::min(spread.mtre_mm, kUnknown_mm), "mm"});
   evidence.push_back({"predicted_axial_deg", std::min(spread.axial_deg, kUnknown_deg), "deg"});
 }
@@ -87,7 +84,7 @@ void add_predicted(const Pose& pose, const Mesh& mesh, Evidence& evidence) {
 /// The share of the errors that the pose's own covariance stands for, and that are off.
 double predicted_failure(const Pose& pose, const verdicts::Spread& spread) {
   if (!pose.covariance) return 0;
-  if (!pose.covariance->allFinite()) return 1;
+  if (!verdicts::is_determined(pose)) return 1;
   return double(spread.off) / verdicts::Spread::kDraws;
 }
 
@@ -104,11 +101,27 @@ void explain_predicted(const verdicts::Spread& spread, double predicted, bool is
   }
 }
 
+constexpr double kSpacing_px = 4, kReach_px = 16;
+
+/// The cost at the level at which poses are judged.
+std::shared_ptr<const Cost> compared(const Cost& cost, const Options& options) {
+  return cost.at_level({kSpacing_px, kReach_px, options.pixel_step});
+}
+
+/// The verdict on a pose about which the images say nothing. It needs no failure model.
+Verdict of_nothing(const std::string& why) {
+  Verdict verdict;
+  verdict.judgement = Judgement::wrong;
+  verdict.failure_probability = 1;
+  verdict.reasons = {"the images say nothing about this pose: " + why};
+  verdict.remedies = {kStart, kGiven};
+  return verdict;
+}
+
 Evidence gather(const Judged& judged, const Pose* contour_pose, const Pose& searched, const Cost& cost,
                 const Cost* contour_cost, const List<View>& views, const List<EdgeMap>* edges,
                 const OutlineProjector* projector, const Mesh& mesh, const Options& options, const Context& context) {
-  constexpr double kSpacing_px = 4, kReach_px = 16;
-  const auto fine = cost.at_level({kSpacing_px, kReach_px, options.pixel_step});
+  const auto fine = compared(cost, options);
   const auto coarse = cost.at_level({2 * kSpacing_px, 2 * kReach_px, 2 * options.pixel_step});
   Evidence evidence, of_views, of_contour, of_outline;
   tbb::parallel_invoke(
@@ -188,6 +201,9 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
   // cannot tell, which is no evidence against the search.
   const Pose& searched = stages && !stages->empty() ? (*stages)[stages->size() - 1] : pose;
   Verdict verdict;
+  const std::string why_nothing =
+      search::nothing_compared(*compared(cost, options), pose.world_from_model, judged.frame);
+  if (!why_nothing.empty()) return of_nothing(why_nothing);
   verdict.figures = gather(judged, other_pose(contour_pose, stages), searched, cost, contour_cost, views, edges,
                            projector, mesh, options, context);
   const double inside_mm = others ? verdicts::intersection_mm(judged, mesh, *others, *other_bones) : 0;
@@ -198,7 +214,7 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
     return verdict;
   }
   const auto contributions = model.contributions(verdict.figures);
-  const bool is_determined = pose.covariance && pose.covariance->allFinite();
+  const bool is_determined = verdicts::is_determined(pose);
   const verdicts::Spread spread = is_determined ? verdicts::spread_of(pose, mesh) : verdicts::Spread();
   const double predicted = predicted_failure(pose, spread);
   verdict.failure_probability = 1 - (1 - model.probability(contributions)) * (1 - predicted);

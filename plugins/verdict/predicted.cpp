@@ -2,11 +2,12 @@
 // Judges a pose by what its registration says about it: the predicted covariance and the warnings. It draws errors from
 // the normal distribution with this covariance, and counts those that are off.
 #include <algorithm>
-#include <cstdio>
 #include <marrow/plugin.hpp>
 #include <optional>
 
 #include "spread.hpp"
+
+#include "marrow/domain/number_text.hpp"
 
 namespace {
 
@@ -21,11 +22,7 @@ struct Options {
 };
 
 /// With one decimal.
-std::string shown(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.1f", value);
-  return text;
-}
+std::string shown(double value) { return marrow::formatted("%.1f", value); }
 
 /// What makes the pose uncertain, the weightier first, each with what would settle it.
 void explain(const Spread& spread, Verdict& verdict) {
@@ -36,10 +33,10 @@ void explain(const Spread& spread, Verdict& verdict) {
     if (is_axial) {
       verdict.reasons.emplace_back("the rotation about the long axis is known to " + shown(spread.axial_deg) +
                                    " degrees only");
-      verdict.remedies.emplace_back("a third view, or a landmark off the long axis");
+      verdict.remedies.emplace_back("another view, or a landmark off the long axis");
     } else {
       verdict.reasons.emplace_back("the bone's surface is known to " + shown(spread.mtre_mm) + " mm only");
-      verdict.remedies.emplace_back("a third view, from a direction between the others");
+      verdict.remedies.emplace_back("another view, from a different direction");
     }
   }
 }
@@ -52,11 +49,15 @@ void judge_by_deviations(const marrow::Pose& pose, const marrow::Mesh& mesh, con
     verdict.remedies.emplace_back("a registration that predicts its deviations");
     return;
   }
-  if (!pose.covariance->allFinite()) {
+  if (!marrow::verdicts::is_determined(pose)) {
+    const bool is_finite = pose.covariance->allFinite();
     verdict.judgement = Judgement::wrong;
     verdict.failure_probability = 1;
-    verdict.reasons.emplace_back("the images do not determine the pose in every direction");
-    verdict.remedies.emplace_back("a third view, or a landmark");
+    verdict.reasons.emplace_back(is_finite ? "the predicted deviations are 0, so the registration compared nothing"
+                                           : "the images do not determine the pose in every direction");
+    verdict.remedies.emplace_back(is_finite ? "a start nearer to the bone, and a look at the masks and edges of each "
+                                              "view"
+                                            : "another view, or a landmark");
     return;
   }
   const Spread spread = marrow::verdicts::spread_of(pose, mesh);

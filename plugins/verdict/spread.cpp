@@ -18,6 +18,10 @@ Matrix6d root_of(const Matrix6d& covariance) {
 
 }  // namespace
 
+bool is_determined(const Pose& pose) {
+  return pose.covariance && pose.covariance->allFinite() && !pose.covariance->isZero(0);
+}
+
 Spread spread_of(const Pose& pose, const Mesh& mesh) {
   constexpr int kTargets = 200;
   const std::vector<Eigen::Vector3d> targets_mm = geometry::targets_mm(pose.world_from_model, &mesh, nullptr, kTargets);

@@ -10,6 +10,9 @@ struct Spread {
   int off = 0, off_mm = 0, off_axial = 0;  ///< draws that are off (kMostError_mm), and in which respect
   double mtre_mm = 0, axial_deg = 0;       ///< root mean squares
 };
+/// Whether a pose has a covariance that comparisons gave. A covariance of 0 comes from images that say nothing: no
+/// registration knows a pose exactly.
+bool is_determined(const Pose& pose);
 /// `pose` has a finite covariance. The targets are 200 points of the mesh.
 Spread spread_of(const Pose& pose, const Mesh& mesh);
 

@@ -355,4 +355,45 @@ TEST(VerdictEvidence, SaysWhatIsWrongWithAModel) {
             std::string::npos);
 }
 
+/// Of which the images say nothing, with or without a sentence.
+struct Blind : marrow::Cost {
+  std::string said;
+  explicit Blind(std::string text) : said(std::move(text)) {}
+  double value(const RigidTransform&) const override { return 0.5; }
+  std::string nothing_compared(const RigidTransform&) const override { return said; }
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
+    return std::make_shared<Blind>(*this);
+  }
+};
+
+TEST(VerdictEvidence, APoseOfWhichTheImagesSayNothingIsWrong) {
+  Trial trial;
+  const ModelFile model(model_of(-9, "  - {figure: warnings, scale: 1, weight: 1, absent: 0}\n"));
+  const auto verdict_on = [&](const std::string& said, const shipped::Options& options) {
+    trial.inputs["cost"] = marrow::Value::of<marrow::Cost>(std::make_shared<const Blind>(said));
+    return shipped::call("verdict.evidence", trial.inputs, options).at("verdict").as<Verdict>();
+  };
+  for (const shipped::Options& options : {shipped::Options(), model.options()}) {
+    const Verdict verdict = verdict_on("view 'frontal': it shows nothing of the bone", options);
+    EXPECT_EQ(verdict.judgement, Judgement::wrong);
+    EXPECT_EQ(verdict.failure_probability, 1);
+    EXPECT_EQ(verdict.reasons,
+              std::vector<std::string>{
+                  "the images say nothing about this pose: view 'frontal': it shows nothing of the bone"});
+  }
+  EXPECT_EQ(verdict_on("", model.options()).reasons,
+            std::vector<std::string>{"the images say nothing about this pose: the cost is the same at all poses within "
+                                     "16 degrees and mm"});
+}
+
+TEST(VerdictEvidence, DeviationsOfZeroAreNoKnowledge) {
+  const ModelFile model(model_of(-9, "  - {figure: warnings, scale: 1, weight: 1, absent: 0}\n"));
+  Trial trial;
+  trial.pose.covariance.emplace(marrow::Matrix6d::Zero());
+  trial.inputs["pose"] = shipped::item(trial.pose);
+  const Verdict verdict = trial.verdict(model.options());
+  EXPECT_EQ(verdict.judgement, Judgement::wrong);
+  EXPECT_EQ(verdict.failure_probability, 1);
+}
+
 }  // namespace evidence_test

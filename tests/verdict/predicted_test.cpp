@@ -75,13 +75,13 @@ TEST(VerdictPredicted, SaysWhichDirectionIsNotKnownAndWhatWouldSettleIt) {
   std::snprintf(axial, sizeof axial, "the rotation about the long axis is known to %.1f degrees only",
                 figure(verdict, "predicted_axial_deg"));
   EXPECT_EQ(verdict.reasons.at(0), axial);
-  EXPECT_EQ(verdict.remedies.at(0), "a third view, or a landmark off the long axis");
+  EXPECT_EQ(verdict.remedies.at(0), "another view, or a landmark off the long axis");
   verdict = verdict_of(pose_with({0, 0, 0, 0, 0, 2}));
   char shift[80];
   std::snprintf(shift, sizeof shift, "the bone's surface is known to %.1f mm only",
                 figure(verdict, "predicted_mtre_mm"));
   EXPECT_EQ(verdict.reasons, Texts{shift});
-  EXPECT_EQ(verdict.remedies, Texts{"a third view, from a direction between the others"});
+  EXPECT_EQ(verdict.remedies, Texts{"another view, from a different direction"});
   verdict = verdict_of(pose_with({0, 0, 40, 0, 0, 0}));
   EXPECT_EQ(verdict.reasons.size(), 2u) << "40 degrees move the surface, too";
   EXPECT_TRUE(verdict.reasons.at(0).starts_with("the rotation about the long axis")) << "the weightier first";
@@ -111,7 +111,7 @@ TEST(VerdictPredicted, AnUndeterminedPoseIsWrong) {
   EXPECT_EQ(verdict.judgement, Judgement::wrong);
   EXPECT_EQ(verdict.failure_probability, 1);
   EXPECT_EQ(verdict.reasons, Texts{"the images do not determine the pose in every direction"});
-  EXPECT_EQ(verdict.remedies, Texts{"a third view, or a landmark"});
+  EXPECT_EQ(verdict.remedies, Texts{"another view, or a landmark"});
 }
 
 TEST(VerdictPredicted, AWarningMakesItDoubtful) {
@@ -199,6 +199,14 @@ TEST(VerdictPredicted, APriorNeedsACovariance) {
                 "verdict.predicted",
                 {{"pose", shipped::item(pose)}, {"mesh", shipped::item(box())}, {"prior", shipped::item(prior)}}),
             "the prior has no covariance; take it from a node that predicts one, such as a fit of markers");
+}
+
+TEST(VerdictPredicted, DeviationsOfZeroAreNoKnowledge) {
+  const Verdict verdict = verdict_of(pose_with(marrow::Vector6d::Zero()));
+  EXPECT_EQ(verdict.judgement, Judgement::wrong);
+  EXPECT_EQ(verdict.failure_probability, 1);
+  EXPECT_EQ(verdict.reasons, Texts{"the predicted deviations are 0, so the registration compared nothing"});
+  EXPECT_EQ(verdict.remedies, Texts{"a start nearer to the bone, and a look at the masks and edges of each view"});
 }
 
 }  // namespace predicted_test
