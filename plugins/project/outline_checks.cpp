@@ -71,6 +71,41 @@ double spacing_off_percent(const OutlineProjector& projector) {
   return 100 * std::abs(4 * coarse / fine - 1);
 }
 
+/// Points drawn where the body is out of view or behind the source: there is nothing to see.
+double points_out_of_view(const OutlineProjector& projector) {
+  std::size_t most = 0;
+  for (const Eigen::Vector3d& shift_mm :
+       {Eigen::Vector3d(0, 0, 300), Eigen::Vector3d(0, -1200, 0), Eigen::Vector3d(0, -700, 0)}) {
+    RigidTransform at = pose();
+    at.translation_mm += shift_mm;
+    most = std::max(most, projector.outline(camera_at(0), at, kSpacing_px).size());
+  }
+  return double(most);
+}
+
+/// A surface whose triangles face inwards may be refused, drawn as it should be, or not be drawn at all. Normals that
+/// point to the bone would fit other borders in the image.
+double points_facing_inwards(const Subject& subject) {
+  const auto& ports = subject.info().inputs;
+  if (std::none_of(ports.begin(), ports.end(), [](const PortInfo& one) { return one.name == "mesh"; }))
+    throw NotApplicable("it draws no surface");
+  Mesh mesh = mesh_of(egg());
+  for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
+  const Inputs inputs = inputs_of(volume_of(egg(), fine_grid(), 500, -1000), field_of(egg(), fine_grid(), 6), mesh);
+  if (subject.call(inputs).refusal) return 0;
+  double inwards = 0;
+  const Made made(subject, inputs);
+  for (const OutlineProjector* projector : made.all<OutlineProjector>())
+    for (const double angle : angles()) {
+      const std::vector<OutlinePoint> silhouette = true_outline(camera_at(angle));
+      for (const OutlinePoint& p : projector->outline(camera_at(angle), pose(), kSpacing_px)) {
+        const OutlinePoint& q = nearest(silhouette, p);
+        inwards += p.normal_u * q.normal_u + p.normal_v * q.normal_v < 0;
+      }
+    }
+  return inwards;
+}
+
 }  // namespace
 
 void check_outline(const std::vector<OutlinePoint>& points, const Camera& camera) {
@@ -91,20 +126,26 @@ std::vector<Check> outline_checks() {
                    return largest(subject, [&](const OutlineProjector& one) { return outline_errors(one).*figure; });
                  }};
   };
-  return {error("outline", "mean distance between the outline and an ellipsoid's silhouette", 0.35, "px",
-                &OutlineErrors::mean_px),
-          error("outline_worst", "largest distance between the outline and an ellipsoid's silhouette", 1.2, "px",
-                &OutlineErrors::worst_px),
-          error("outline_direction", "mean angle between the outline's normals and the silhouette's normals", 6, "deg",
-                &OutlineErrors::angle_deg),
-          error("outline_complete", "part of the silhouette that is more than 2.5 px from the outline", 0, "%",
-                &OutlineErrors::missing_percent),
-          error("outline_model",
-                "mean distance, across the ray, between an outline point and the projection of its surface point", 1,
-                "mm", &OutlineErrors::model_mm),
-          {{"outline_spacing", "four times the spacing should give a quarter of the points: deviation of their number",
-            30, "%"},
-           [](const Subject& subject) { return largest(subject, spacing_off_percent); }}};
+  return {
+      error("outline", "mean distance between the outline and an ellipsoid's silhouette", 0.35, "px",
+            &OutlineErrors::mean_px),
+      error("outline_worst", "largest distance between the outline and an ellipsoid's silhouette", 1.2, "px",
+            &OutlineErrors::worst_px),
+      error("outline_direction", "mean angle between the outline's normals and the silhouette's normals", 6, "deg",
+            &OutlineErrors::angle_deg),
+      error("outline_complete", "part of the silhouette that is more than 2.5 px from the outline", 0, "%",
+            &OutlineErrors::missing_percent),
+      error("outline_model",
+            "mean distance, across the ray, between an outline point and the projection of its surface point", 1, "mm",
+            &OutlineErrors::model_mm),
+      {{"outline_spacing", "four times the spacing should give a quarter of the points: deviation of their number", 30,
+        "%"},
+       [](const Subject& subject) { return largest(subject, spacing_off_percent); }},
+      {{"outline_out_of_view", "points of the outline if the body is out of view or behind the source", 0, "points"},
+       [](const Subject& subject) { return largest(subject, points_out_of_view); }},
+      {{"outline_inside_out", "points whose normal points to the bone if the surface's triangles face inwards", 0,
+        "points"},
+       points_facing_inwards}};
 }
 
 }  // namespace marrow::conformance

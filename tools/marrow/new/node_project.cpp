@@ -43,7 +43,7 @@ void expect_template(const std::string& kind, const Catalogue& catalogue) {
   if (std::find(known.begin(), known.end(), kind) == known.end())
     throw Error("no library brings the kind '" + kind + "'; make it by: marrow new kind " + kind + "; or " +
                 suggestion(kind, known));
-  throw Error("the kind '" + kind + "' has no template, because it has no checks; there are templates of " + list +
+  throw Error("the kind '" + kind + "' has no template; there are templates of " + list +
               ". Copy a node of this kind, or the example-plugin of the documentation");
 }
 
