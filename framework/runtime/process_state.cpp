@@ -24,7 +24,9 @@
 #include "working_folder.hpp"
 
 namespace marrow {
-namespace {
+
+/// They have a name because ProcessState::Parts, which is known outside of this file, holds them.
+namespace process_parts {
 
 /// The locale of C and that of C++, which decide how numbers are written and read.
 class Locale {
@@ -176,6 +178,12 @@ class PermissionsMask {
  private:
   std::optional<mode_t> before_;
 };
+
+}  // namespace process_parts
+
+using namespace process_parts;
+
+namespace {
 
 /// How plugin code ended.
 struct Ended {
