@@ -14,6 +14,7 @@
 
 #include "manifest.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/runtime/abi.hpp"
 #include "marrow/runtime/run_log.hpp"
 #include "marrow/runtime/worker.hpp"
@@ -144,11 +145,7 @@ class Reader {
   std::unique_ptr<Worker> worker_;
 };
 
-std::string short_number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
+std::string short_number(double value) { return formatted("%.3g", value); }
 
 /// How a process ended, without the place, because the sentence already names it.
 std::string without_place(std::string end, const std::string& place) {
@@ -171,7 +168,11 @@ json json_of_option(const OptionValue& value) {
 
 void pass_on(const json& report, const Context& context) {
   const std::string what = report.value("say", ""), text = report.value("text", "");
-  if (what == "progress") context.progress(report.value("fraction", 0.0), text);
+  if (what == "progress") {
+    const json fraction = report.value("fraction", json());  // a number that is not finite is sent as null
+    if (!fraction.is_number()) throw Error("it reports a progress that is not finite; expected a number from 0 to 1");
+    context.progress(fraction.get<double>(), text);
+  }
   for (const LogLevel level : {LogLevel::debug, LogLevel::info, LogLevel::warning})
     if (what == level_name(level)) context.log(level, text);
 }
@@ -198,6 +199,12 @@ void expect_outputs(const std::vector<Value>& values, const std::vector<PortInfo
                   outputs[i].type.id + "'");
 }
 
+std::string killed_from_outside(const std::string& process) {
+  return process +
+         " was killed from outside (SIGKILL), as by a system whose memory, or that of a cluster's job, runs out; run "
+         "it again, with more memory or fewer threads";
+}
+
 std::string failure_of(const std::string& file, const WorkerEnd& end, const CallLimits& limits) {
   if (end.is_out_of_memory)
     return file + ": to read it takes more than " + std::to_string(std::lround(limits.memory_mb)) +
@@ -207,6 +214,9 @@ std::string failure_of(const std::string& file, const WorkerEnd& end, const Call
     return file + ": to read it takes more than " + short_number(limits.processor_s) +
            " s, which is more than a file of its size should; where the file is good, raise the limit with "
            "--file-seconds";
+  if (end.signal == SIGKILL)
+    return file + ": it was not read to its end: " + killed_from_outside("the process that read it") +
+           "; nothing is known against the file";
   if (end.signal)
     return file + ": to read it crashed the process that was started for it (" + strsignal(end.signal) +
            "); the file is damaged, or of a kind that its reader cannot take: copy or export it again";
@@ -250,6 +260,7 @@ std::vector<Value> call_apart(const Catalogue& catalogue, const PipelineNode& no
                               const Context::Hooks& hooks, const RunSettings& settings) {
   const SharedMemory given, made;
   write_values(given.descriptor(), inputs, false);
+  given.seal();
   const CallLimits limits = limits_of(node, bytes_named_by(node) + double(bytes_in(given.descriptor())), settings);
   Reader reader({{worker_program().string()}, {given.descriptor(), made.descriptor()}, true}, hooks.cancelled);
   Worker& worker = reader.worker();

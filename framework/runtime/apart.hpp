@@ -52,6 +52,9 @@ void expect_outputs(const std::vector<Value>& values, const std::vector<PortInfo
 /// A sentence that says why the file could not be read. `end` is how the process ended.
 std::string failure_of(const std::string& file, const WorkerEnd& end, const CallLimits& limits);
 
+/// A sentence for a process that got SIGKILL, which no program sends to itself by a fault: not its work is to blame.
+std::string killed_from_outside(const std::string& process);
+
 /// The worker's side of a call: {"do": "call", "library": ..., "node": ..., "options": ..., ...}. Inputs come through
 /// descriptor 3, outputs go to descriptor 4.
 nlohmann::json answer_call(const nlohmann::json& request, WorkerReports& reports);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "packed_values.hpp"
 
+#include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/uio.h>
@@ -241,11 +242,16 @@ std::string contents_of(int descriptor) {
 
 }  // namespace
 
-SharedMemory::SharedMemory() : descriptor_(memfd_create("marrow", MFD_CLOEXEC)) {
+SharedMemory::SharedMemory() : descriptor_(memfd_create("marrow", MFD_CLOEXEC | MFD_ALLOW_SEALING)) {
   if (descriptor_ < 0) throw Error(std::string("cannot make memory to share: ") + std::strerror(errno));
 }
 
 SharedMemory::~SharedMemory() { close(descriptor_); }
+
+void SharedMemory::seal() const {
+  if (fcntl(descriptor_, F_ADD_SEALS, F_SEAL_WRITE | F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) != 0)
+    throw Error(std::string("cannot protect memory that is shared: ") + std::strerror(errno));
+}
 
 void write_values(int descriptor, const std::vector<Value>& values, bool in_place) {
   FilePacker data(descriptor, in_place);

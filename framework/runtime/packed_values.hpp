@@ -22,6 +22,9 @@ class SharedMemory {
   SharedMemory(const SharedMemory&) = delete;
   SharedMemory& operator=(const SharedMemory&) = delete;
   int descriptor() const { return descriptor_; }
+  /// From now on nobody can write to it, also no other process that opens it through /proc. Throws Error if the system
+  /// does not allow this.
+  void seal() const;
 
  private:
   int descriptor_;

@@ -58,6 +58,7 @@ std::shared_ptr<SharedInput> packed(const Value& item) {
     content_of_own(item.type)->pack(item.data.get(), whole);  // the type may come from a manifest, without content
     packer.bytes(whole.packed.data(), whole.packed.size());
   }
+  made->memory.seal();
   made->bytes = packer.written();
   return made;
 }

@@ -19,8 +19,10 @@
 
 #include "json_text.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/runtime/library.hpp"
 #include "no_process.hpp"
+#include "process_tree.hpp"
 #include "stopwatch.hpp"
 
 namespace marrow {
@@ -127,13 +129,6 @@ pid_t start(const WorkerSettings& settings, int input, int output) {
   return process;
 }
 
-/// Kills the process and everything that it started, which is in its group unless it left it. Must be called before the
-/// process is waited for: until then, no other group has this number.
-void kill_group(pid_t process) {
-  kill(process, SIGKILL);
-  kill(-process, SIGKILL);
-}
-
 /// Waits until the process has ended and returns its status. A signal handler of the program interrupts a wait.
 int status_of_ended(pid_t process) {
   int status = 0;
@@ -141,11 +136,7 @@ int status_of_ended(pid_t process) {
   return status;
 }
 
-std::string with_number(const char* form, double value) {
-  char text[80];
-  std::snprintf(text, sizeof text, form, value);
-  return text;
-}
+std::string with_number(const char* form, double value) { return formatted(form, value); }
 
 }  // namespace
 
@@ -165,7 +156,7 @@ Worker::~Worker() {
 
 void Worker::close() {
   if (process_ <= 0) return;
-  kill_group(process_);
+  kill_tree(process_);
   status_of_ended(process_);
   process_ = -1;
   is_busy_ = false;
@@ -238,7 +229,7 @@ WorkerEnd Worker::died() {
   for (int i = 0; i < 100 && waitid(P_PID, id_t(process_), &gone, WEXITED | WNOHANG | WNOWAIT) == 0 && gone.si_pid == 0;
        ++i)
     usleep(10'000);
-  kill_group(process_);
+  kill_tree(process_);
   const int status = status_of_ended(process_);
   process_ = -1;
   is_busy_ = false;
@@ -275,7 +266,7 @@ std::optional<WorkerEnd> Worker::check(const WorkerLimits& limits) {
     end.is_late = true;
     return end;
   }
-  if (memory_mb() > limits.memory_mb) {
+  if (memory_of_tree_mb(process_, limits.memory_mb) > limits.memory_mb) {
     WorkerEnd end = ended(with_number("used more than %g MB of memory", limits.memory_mb));
     end.is_out_of_memory = true;
     return end;
@@ -320,12 +311,7 @@ double Worker::seconds() {
   return seconds_;
 }
 
-double Worker::memory_mb() const {
-  std::ifstream stream("/proc/" + std::to_string(process_) + "/statm");
-  double total = 0, resident = 0;
-  stream >> total >> resident;
-  return resident * double(sysconf(_SC_PAGESIZE)) / 1e6;
-}
+double Worker::memory_mb() const { return memory_of_tree_mb(process_, 0); }
 
 std::filesystem::path worker_program() { return framework_file().parent_path() / "marrow" / "marrow-worker"; }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The worker's side, which does the work.
+#include <fcntl.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <unistd.h>
@@ -13,19 +14,31 @@
 #include "json_text.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/worker.hpp"
+#include "plugin_code.hpp"
+#include "process_tree.hpp"
+#include "reason_of_exception.hpp"
 
 namespace marrow {
 namespace {
 
 using nlohmann::json;
 
-/// Reads lines from the standard input. It does not use a buffer that a library could share.
+constexpr int kFirstOwnDescriptor = 16;  // above those that the worker is given
+constexpr std::size_t kLongestText_bytes = 1 << 20;
+
+/// Reads lines from the standard input as it was at the start. A library, and a process that it starts, find nothing
+/// there: they would take requests away, or wait for ever.
 class Requests {
  public:
+  Requests() : descriptor_(fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, kFirstOwnDescriptor)) {
+    const int nothing = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    dup2(nothing, STDIN_FILENO);
+    close(nothing);
+  }
   std::optional<std::string> next() {
     for (std::size_t newline; (newline = text_.find('\n')) == std::string::npos;) {
       char buffer[65536];
-      const ssize_t count = read(STDIN_FILENO, buffer, sizeof buffer);
+      const ssize_t count = read(descriptor_, buffer, sizeof buffer);
       if (count < 0 && errno == EINTR) continue;
       if (count <= 0) return std::nullopt;
       text_.append(buffer, std::size_t(count));
@@ -37,24 +50,37 @@ class Requests {
   }
 
  private:
+  int descriptor_;
   std::string text_;
 };
+
+/// A text of a message. A longer one than the reader takes is cut.
+void shorten(json& text) {
+  if (!text.is_string() || text.get_ref<const std::string&>().size() <= kLongestText_bytes) return;
+  const std::size_t all = text.get_ref<const std::string&>().size();
+  text = text.get_ref<const std::string&>().substr(0, kLongestText_bytes) + "... (" +
+         std::to_string(all - kLongestText_bytes) + " more bytes)";
+}
 
 /// Sends answers to the standard output as it was at the start. What a library prints there must not be taken for an
 /// answer.
 class Answers : public WorkerReports {
  public:
-  Answers() : descriptor_(dup(STDOUT_FILENO)) { dup2(STDERR_FILENO, STDOUT_FILENO); }
+  Answers() : descriptor_(fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, kFirstOwnDescriptor)) {
+    dup2(STDERR_FILENO, STDOUT_FILENO);
+  }
 
   void begin(const json& job) { job_ = job; }
   void say(json report) override { send(std::move(report)); }
   void send(json message) {
     message["job"] = job_;
+    for (const char* key : {"text", "failed", "place"})
+      if (message.contains(key)) shorten(message[key]);
     const std::string line = message.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
     const std::scoped_lock lock(mutex_);
     for (std::size_t done = 0; done < line.size();) {
       const ssize_t count = write(descriptor_, line.data() + done, line.size() - done);
-      if (count < 0 && errno != EINTR) _exit(1);  // nobody reads the answers any more
+      if (count < 0 && errno != EINTR) end_process(1);  // nobody reads the answers any more
       if (count > 0) done += std::size_t(count);
     }
   }
@@ -87,10 +113,8 @@ json result_of(const WorkerTask& task, const json& request, Answers& answers) {
     return error.code == cv::Error::StsNoMem ? out_of_memory() : failure(error.what());
   } catch (const json::exception& error) {
     return failure(std::string("the request cannot be understood: ") + error.what());
-  } catch (const std::exception& error) {
-    return failure(error.what());
   } catch (...) {
-    return failure("something was thrown that is no exception");
+    return failure(reason_of_exception());
   }
 }
 
@@ -98,6 +122,10 @@ json result_of(const WorkerTask& task, const json& request, Answers& answers) {
 
 int serve_worker(const std::map<std::string, WorkerTask>& tasks) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
+  leave_ends_to_parent();
+  keep_descendants();
+  for (int descriptor = STDERR_FILENO + 1; descriptor < kFirstOwnDescriptor; ++descriptor)
+    fcntl(descriptor, F_SETFD, FD_CLOEXEC);  // what the worker is given is not for what it starts
   if (is_left_behind()) return 1;
   signal(SIGPIPE, SIG_IGN);
   Answers answers;

@@ -14,6 +14,7 @@ namespace py = pybind11;
 
 void do_interruptibly(std::atomic<bool>& cancelled, const std::function<void()>& work) {
   constexpr std::chrono::milliseconds kBetweenLooks(50);
+  constexpr int kLooksBeforeNotice = 20;
   std::mutex mutex;
   std::condition_variable end;
   bool is_done = false;
@@ -32,7 +33,11 @@ void do_interruptibly(std::atomic<bool>& cancelled, const std::function<void()>&
       end.notify_all();
     });
     std::unique_lock lock(mutex);
-    while (!end.wait_for(lock, kBetweenLooks, [&] { return is_done; })) {
+    for (int looks = 0; !end.wait_for(lock, kBetweenLooks, [&] { return is_done; });) {
+      if (interrupt && ++looks == kLooksBeforeNotice) {
+        const py::gil_scoped_acquire acquire;
+        PySys_WriteStderr("marrow: stopping; it waits until the node that runs has ended\n");
+      }
       if (interrupt) continue;
       lock.unlock();
       {

@@ -84,6 +84,26 @@ TEST_F(ApartTest, CrashIsOneNodesErrorThatNamesTheFile) {
   EXPECT_EQ(failure("names").substr(0, 7), "/inner:");
 }
 
+TEST_F(ApartTest, ProcessThatWasKilledFromOutsideIsNoFaultOfTheFile) {
+  EXPECT_EQ(failure("killed"),
+            ": it was not read to its end: the process that read it was killed from outside (SIGKILL), as by a system "
+            "whose memory, or that of a cluster's job, runs out; run it again, with more memory or fewer threads; "
+            "nothing is known against the file");
+}
+
+TEST_F(ApartTest, ReadersAndWhatTheyStartFindNothingOnTheStandardInput) { EXPECT_EQ(value(run("listen"), 0, 2), 11); }
+
+TEST_F(ApartTest, WhatAReaderSaysIsUnderstood) {
+  const RunResult result = run("nan");
+  EXPECT_TRUE(std::any_of(result.nodes.begin(), result.nodes.end(), [](const NodeRecord& node) {
+    return node.reason == "it reports a progress that is not finite; expected a number from 0 to 1";
+  }));
+  run("flood");
+  EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const RunEvent& event) {
+    return event.kind == RunEvent::Kind::message && event.text.ends_with("xxx... (68951424 more bytes)");
+  }));  // 70,000,000 less 2^20
+}
+
 TEST_F(ApartTest, EndedProcessIsOneNodesError) {
   EXPECT_EQ(failure("exit"), ": could not be read: the process that was started for it ended with exit code 3");
   EXPECT_EQ(failure("inside"), "/inner: could not be read: the process that was started for it ended with exit code 0");

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Readers that do what a hostile file may make a reader do: the first word of the file says what.
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
+#include <iostream>
 #include <numeric>
 #include <opencv2/core.hpp>
 #include <thread>
@@ -27,6 +29,11 @@ Metrics number(const Options& options, const Metrics* added, marrow::Context& co
   if (word == "names") marrow::now_reading(options.path / "inner");
   if (word == "crash" || word == "names") std::raise(SIGSEGV);
   if (word == "abort") std::abort();
+  if (word == "killed") std::raise(SIGKILL);
+  if (word == "listen" && (std::getline(std::cin, word) || std::system("cat") != 0))
+    throw marrow::Error("there is something to read");
+  if (word == "nan") context.progress(std::nan(""));
+  if (word == "flood") context.info(std::string(70'000'000, 'x'));
   if (word == "exit") std::_Exit(3);
   if (word == "refuse") throw marrow::Error(options.path.string() + ": is refused");
   if (word == "memory") return {{{"value", double(std::vector<double>(std::size_t(1) << 33, 1.0).back()), ""}}};
