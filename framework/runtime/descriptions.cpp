@@ -14,6 +14,7 @@
 #include "marrow/domain/error.hpp"
 #include "python_file.hpp"
 #include "regular_file.hpp"
+#include "searched_folders.hpp"
 #include "text_file.hpp"
 #include "trust.hpp"
 
@@ -78,6 +79,9 @@ std::string stale(const LibraryInfo& info, const Digest& digest) {
         std::uint64_t(status.st_size) != library.size)
       return fs::path(library.path).filename().string() + " has changed";
   }
+  for (const SearchedFolder& folder : info.searched)
+    if (const std::vector<fs::path> files = files_with_names(folder); !files.empty())
+      return files[0].string() + " has appeared, in a folder that is searched earlier";
   return "";
 }
 
@@ -163,6 +167,7 @@ LibraryInfo library_info(const fs::path& file, const Digest& framework) {
   std::optional<LibraryInfo> known = from_manifest(file, digest, note);
   if (!known) known = from_cache(digest, framework);
   LibraryInfo info = known ? std::move(*known) : describe_anew(file, digest, framework);
+  if (const std::string fault = untrusted_among(paths_of(info.linked)); !fault.empty()) throw Error(fault);
   info.file = file;
   info.note = note;
   Hasher build_id;

@@ -15,12 +15,16 @@
 #include "apart.hpp"
 #include "descriptions.hpp"
 #include "elf_file.hpp"
+#include "libraries_to_load.hpp"
 #include "linked_libraries.hpp"
 #include "manifest.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/worker.hpp"
+#include "process_state.hpp"
 #include "python_file.hpp"
 #include "regular_file.hpp"
+#include "run_paths.hpp"
+#include "thread_state.hpp"
 #include "trust.hpp"
 
 namespace marrow {
@@ -93,8 +97,13 @@ void* load_without_throwing(const char* path, int mode) noexcept {
   return load(path, mode);
 }
 
+/// What the initialisers of a library change is put back: those of one that was linked with -ffast-math make tiny
+/// numbers 0 from then on.
 void* open_library(const fs::path& file, int mode) {
+  const UsualArithmetic arithmetic;
+  const std::shared_ptr<ProcessState> state = ProcessState::of_runs();
   void* handle = load_without_throwing(fs::absolute(file).c_str(), mode | RTLD_LOCAL);
+  state->put_back();
   if (handle) return handle;
   const char* text = dlerror();
   std::string reason = text ? text : "unknown reason";
@@ -119,10 +128,16 @@ void add_registered(const Plugin& plugin, LibraryInfo& info) {
   for (const WriterDefinition& writer : plugin.writers) info.writers.push_back(writer.info);
 }
 
+/// Throws Error, before anything of it runs, if others could change what a library links.
+void expect_trusted(const std::vector<fs::path>& linked) {
+  if (const std::string fault = untrusted_among(linked); !fault.empty()) throw Error(fault);
+}
+
 /// Runs in a worker. Returns what the library holds, or a refusal.
 LibraryInfo describe_here(const fs::path& file) {
   LibraryInfo info;
   try {
+    expect_trusted(libraries_to_load(file));
     void* handle = nullptr;
     try {
       handle = open_library(file, RTLD_NOW);
@@ -134,6 +149,7 @@ LibraryInfo describe_here(const fs::path& file) {
     }
     const PluginEntry& entry = checked_entry(handle);
     info.linked = linked_libraries(handle);
+    info.searched = run_path_folders(handle);
     Plugin plugin;
     run_registration(plugin, entry);
     add_registered(plugin, info);
@@ -166,6 +182,8 @@ LibraryInfo describe_apart(const fs::path& file) {
     info.refused = "did not say what it holds within " + std::to_string(kDescribeLimit_s) + " s of being loaded";
   else if (end.is_out_of_memory)
     info.refused = "takes more than " + std::to_string(kDescribeLimit_mb) + " MB of memory to be loaded";
+  else if (end.signal == SIGKILL)
+    info.refused = "cannot be described: " + killed_from_outside("the process that loaded it");
   else if (end.signal)
     info.refused = std::string("crashed while being loaded (") + strsignal(end.signal) + ")";
   else if (end.died)
@@ -227,6 +245,7 @@ std::unique_ptr<Plugin> load_library(const LibraryInfo& described) {
     if (is_python_plugin(file)) return load_python_file(described);
     const fs::path real = trusted_path(file);
     check_elf(RegularFile(real));
+    expect_trusted(paths_of(described.linked));
     void* handle = open_library(real, RTLD_NOW);
     auto plugin = std::make_unique<Plugin>();
     run_registration(*plugin, checked_entry(handle));

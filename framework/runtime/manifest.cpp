@@ -11,18 +11,19 @@
 #include "marrow/domain/error.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/store.hpp"
+#include "marrow/runtime/worker.hpp"
 
 namespace marrow {
 namespace {
 
 using nlohmann::json;
-constexpr int kManifestVersion = 3;  // 3: with kinds, traits and relations of options
+constexpr int kManifestVersion = 4;  // 4: with folders in which files were looked for
 constexpr const char* kOptionTypes[] = {"boolean", "integer", "number", "text", "path", "numbers", "texts", "paths"};
 constexpr const char* kRelationTypes[] = {"not_above",   "below",        "same_length", "as_many_or_none",
                                           "exactly_one", "at_least_one", "distinct"};
 constexpr const char* kApart[] = {"no", "parses", "computes"};
 constexpr std::int64_t kMostBytes_of_value = 1 << 30;
-constexpr std::size_t kMostLinked = 1000;
+constexpr std::size_t kMostLinked = 20'000;  // some Python packages load thousands of files
 
 json json_of(const TypeInfo& type) {
   return {{"id", type.id}, {"version", type.version}, {"size", type.size}, {"function", type.is_function}};
@@ -251,12 +252,26 @@ WriterInfo writer_from(const json& j) {
   return writer;
 }
 
+std::string full_path_from(const json& j, const char* of_what) {
+  std::string path;
+  try {
+    path = bytes_of_json(j);
+  } catch (const Error& error) {
+    damaged(std::string("the path of ") + of_what + ": " + error.what());
+  }
+  if (path.empty() || path[0] != '/' || path.find('\0') != std::string::npos)
+    damaged("'" + path + "' is not the full path of " + of_what);
+  return path;
+}
+
 LinkedLibrary linked_from(const json& j) {
   const JsonObject fields(j, "a linked library", 2);
-  const std::string path = fields.text("path");
-  if (path.empty() || path[0] != '/' || path.find('\0') != std::string::npos)
-    damaged("'" + path + "' is not the full path of a library");
-  return {path, std::uint64_t(fields.integer("size", 0, INT64_MAX))};
+  return {full_path_from(fields.at("path"), "a library"), std::uint64_t(fields.integer("size", 0, INT64_MAX))};
+}
+
+SearchedFolder searched_from(const json& j) {
+  const JsonObject fields(j, "a searched folder", 2);
+  return {full_path_from(fields.at("path"), "a folder"), fields.texts("names")};
 }
 
 json parsed(const std::string& text) {
@@ -323,9 +338,11 @@ json json_of(const NodeInfo& node) {
 
 std::string manifest_text(const LibraryInfo& info) {
   json j = {{"marrow_manifest", kManifestVersion}, {"library", info.digest.hex()}, {"refused", info.refused}};
-  j["linked"] = j["kinds"] = j["nodes"] = j["writers"] = json::array();
+  j["linked"] = j["searched"] = j["kinds"] = j["nodes"] = j["writers"] = json::array();
   for (const LinkedLibrary& library : info.linked)
-    j["linked"].push_back({{"path", library.path}, {"size", library.size}});
+    j["linked"].push_back({{"path", json_of_bytes(library.path)}, {"size", library.size}});
+  for (const SearchedFolder& folder : info.searched)
+    j["searched"].push_back({{"path", json_of_bytes(folder.path)}, {"names", folder.names}});
   for (const KindInfo& kind : info.kinds) j["kinds"].push_back(json_of(kind));
   for (const NodeInfo& node : info.nodes) j["nodes"].push_back(json_of(node));
   for (const WriterInfo& writer : info.writers) j["writers"].push_back(json_of(writer));
@@ -336,7 +353,7 @@ std::string manifest_text(const LibraryInfo& info) {
 LibraryInfo manifest_from_text(const std::string& text) {
   JsonDocument document(parsed(text));
   check(document.value());
-  const JsonObject fields(document.value(), "it", 7);
+  const JsonObject fields(document.value(), "it", 8);
   LibraryInfo info;
   const std::optional<Digest> digest = digest_of_hex(fields.text("library"));
   if (!digest) damaged("the library's digest is not 32 hexadecimal digits");
@@ -345,6 +362,7 @@ LibraryInfo manifest_from_text(const std::string& text) {
   if (fields.list("linked").size() > kMostLinked)
     damaged("it names more than " + std::to_string(kMostLinked) + " linked libraries");
   for (const json& library : fields.list("linked")) info.linked.push_back(linked_from(library));
+  for (const json& folder : fields.list("searched")) info.searched.push_back(searched_from(folder));
   std::set<std::string> kinds, names;
   for (const json& kind : fields.list("kinds")) {
     info.kinds.push_back(kind_from(kind));

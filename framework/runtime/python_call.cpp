@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "apart.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/runtime/run_log.hpp"
 #include "marrow/runtime/types.hpp"
 #include "python_file.hpp"
@@ -97,11 +98,7 @@ WorkerEnd wait_for(PythonProcess& process, const WorkerLimits& limits, Context& 
   }
 }
 
-std::string short_text(double number) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", number);
-  return text;
-}
+std::string short_text(double number) { return formatted("%.6g", number); }
 
 /// How the node is declared in its file.
 std::string decorator_of(const NodeInfo& node) {
@@ -121,8 +118,11 @@ std::string failure_of_call(const fs::path& file, const NodeInfo& node, const Wo
     return name + " took longer than " + short_text(limits.seconds) + " s," + ended + "(..., seconds=...)";
   if (end.is_out_of_memory && end.died)
     return name + " used more than " + short_text(limits.memory_mb) + " MB of memory," + ended + "(..., memory_mb=...)";
+  if (end.signal == SIGKILL) return killed_from_outside("the process of " + name);
   if (end.signal) return name + " crashed its process (" + strsignal(end.signal) + "); the next call starts a new one";
-  if (end.died) return name + " ended its process; a node must return or raise an exception";
+  if (end.died && end.failed.starts_with("ended"))
+    return name + " ended its process; a node must return or raise an exception";
+  if (end.died) return name + ": " + end.failed + " and was ended";
   return end.failed;
 }
 
@@ -169,7 +169,7 @@ json PythonNodes::ask(const NodeInfo& node, json request, const PythonArguments&
     throw Error(failure_of_call(described_.file, node, end, limits));
   }
   if (outputs) *outputs = handed_over(process->worker, process->made, content_of_own);
-  learn(end.answer.at("files"));
+  learn(end.answer);
   give_back(std::move(process));
   return end.answer;
 }
@@ -188,10 +188,10 @@ std::unique_ptr<PythonProcess> PythonNodes::take(Context& context) {
   process->worker.ask({{"do", "load"}});
   const WorkerEnd end = wait_for(*process, {kLoadLimit_s}, context, nullptr);
   if (!end.failed.empty()) throw Error(described_.file.string() + " cannot be loaded: " + end.failed);
-  process->limits = end.answer;
-  if (digest_of_python(described_) != described_.digest) throw Error(changed());
+  process->limits = end.answer.at("limits");
   for (const NodeInfo& node : described_.nodes)
     if (!process->limits.contains(node.name)) throw Error(changed());
+  learn(end.answer);
   return process;
 }
 
@@ -204,20 +204,12 @@ std::string PythonNodes::changed() const {
   return described_.file.string() + " or a module that it imports was changed since this program began; start it again";
 }
 
-/// Takes note of files that a process has loaded during a call and that the description does not name.
-void PythonNodes::learn(const std::vector<std::string>& files) {
+/// Takes note of what a process has loaded or looked for and the description does not name.
+void PythonNodes::learn(const json& answer) {
+  if (answer.at("files").empty()) return;  // nothing since its last answer
   const std::scoped_lock lock(mutex_);
-  for (const std::string& file : files) {
-    const bool is_known = std::any_of(described_.linked.begin(), described_.linked.end(),
-                                      [&](const LinkedLibrary& one) { return one.path == file; });
-    if (!is_known) new_files_.insert(file);
-  }
-  if (new_files_.size() == learnt_) {
-    if (!files.empty() && digest_of_python(described_) != described_.digest) throw Error(changed());
-    return;
-  }
-  learnt_ = new_files_.size();
-  add_to_description(described_, {new_files_.begin(), new_files_.end()});
+  if (digest_of_python(described_) != described_.digest) throw Error(changed());
+  if (undescribed_.add_new(answer, described_)) add_to_description(described_, undescribed_);
 }
 
 std::unique_ptr<Plugin> load_python_file(const LibraryInfo& described) {

@@ -4,6 +4,8 @@
 #include <sys/stat.h>
 #include <time.h>
 
+#include <algorithm>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <mutex>
@@ -15,6 +17,7 @@
 #include "packed_values.hpp"
 #include "python_process.hpp"
 #include "regular_file.hpp"
+#include "searched_folders.hpp"
 #include "trust.hpp"
 
 namespace marrow {
@@ -27,10 +30,13 @@ constexpr std::size_t kMostSource_bytes = 4 << 20;
 constexpr int kPythonDescribeLimit_s = 20, kPythonDescribeLimit_mb = 4096;
 constexpr int kTries = 5;
 
-std::vector<LinkedLibrary> with_sizes(const std::vector<std::string>& files) {
-  std::vector<LinkedLibrary> linked;
-  for (const std::string& file : files) linked.push_back({file, fs::file_size(file)});
-  return linked;
+LinkedLibrary with_size(const std::string& file) { return {file, fs::file_size(file)}; }
+
+std::vector<SearchedFolder> searched_in(const json& answer) {
+  std::vector<SearchedFolder> searched;
+  for (const json& one : answer.at("searched"))
+    searched.push_back({bytes_of_json(one.at("path")), one.at("names").get<std::vector<std::string>>()});
+  return searched;
 }
 
 /// Whether a file was changed after the time, or so shortly before it that its time does not tell.
@@ -46,6 +52,7 @@ std::string why_refused(const WorkerEnd& end) {
     return "did not say what it holds within " + std::to_string(kPythonDescribeLimit_s) + " s of being imported";
   if (end.is_out_of_memory)
     return "takes more than " + std::to_string(kPythonDescribeLimit_mb) + " MB of memory to be imported";
+  if (end.signal == SIGKILL) return "cannot be described: " + killed_from_outside("the process that imported it");
   if (end.signal) return std::string("crashed while it was imported (") + strsignal(end.signal) + ")";
   if (end.died) return "ended the process that imported it";
   return "cannot be used: " + end.failed;
@@ -70,8 +77,9 @@ LibraryInfo described_by_process(const fs::path& real, std::vector<std::string>&
     return info;
   }
   try {
-    files = end.answer.at("files").get<std::vector<std::string>>();
+    for (const json& one : end.answer.at("files")) files.push_back(bytes_of_json(one));
     info = info_of_nodes(end.answer.at("nodes"));
+    info.searched = searched_in(end.answer);
   } catch (const std::exception& error) {
     info.refused = std::string("describes itself in a way that cannot be used: ") + error.what();
   }
@@ -84,11 +92,16 @@ Digest name_in_cache(const fs::path& real) {
   name.add(std::string("python"));
   name.add(real.string());
   name.add(digest_of(RegularFile(real)));
-  name.add(python_interpreter().string());
-  name.add(python_package_folder().string());
-  const char* path = std::getenv("PYTHONPATH");
-  name.add(std::string(path ? path : ""));
+  name.add(python_settings());
+  const char* home = std::getenv("HOME");  // it has a folder of modules of the user's own
+  name.add(std::string(home ? home : ""));
   return name.digest();
+}
+
+/// Throws Error if others could change what the file imports, as far as it is known.
+void expect_trusted_modules(const LibraryInfo& info) {
+  const std::string fault = untrusted_among(paths_of(info.linked), owner_of_interpreter());
+  if (!fault.empty()) throw Error(fault);
 }
 
 bool is_current(const LibraryInfo& info) try { return digest_of_python(info) == info.digest; } catch (const Error&) {
@@ -120,11 +133,12 @@ bool is_python_plugin(const fs::path& file) {
 Digest digest_of_python(const LibraryInfo& described) {
   Hasher digest;
   digest.add(digest_of(RegularFile(trusted_path(described.file))));
-  digest.add(python_interpreter().string());  // a virtual environment has the same program under another name
+  digest.add(python_settings());
   for (const LinkedLibrary& one : described.linked) {
     digest.add(one.path);
     digest.add(identity_of(one));
   }
+  add_state_of(described.searched, digest);
   return digest.digest();
 }
 
@@ -141,7 +155,8 @@ LibraryInfo describe_python_file(const fs::path& file) {
     for (const std::string& one : files) changed = changed || is_newer(one, start);
     if (changed && i + 1 < kTries) continue;
     if (changed) throw Error("cannot be described: it or a module that it imports was changed meanwhile; try again");
-    info.linked = with_sizes(files);
+    for (const std::string& one : files) info.linked.push_back(with_size(one));
+    expect_trusted_modules(info);
     info.digest = digest_of_python(info);
     return info;
   }
@@ -158,6 +173,8 @@ LibraryInfo python_file_info(const fs::path& file, const Digest& framework) {
   if (info.file.empty() || !is_current(info)) {
     info = describe_python_file(file);
     keep_description(info, name, framework);
+  } else {
+    expect_trusted_modules(info);
   }
   Hasher build_id;
   build_id.add(info.digest);
@@ -167,13 +184,34 @@ LibraryInfo python_file_info(const fs::path& file, const Digest& framework) {
   return info;
 }
 
-void add_to_description(const LibraryInfo& described, const std::vector<std::string>& files) {
+bool LoadedByPython::add_new(const json& answer, const LibraryInfo& described) {
+  std::set<std::string> known = files;
+  for (const LinkedLibrary& one : described.linked) known.insert(one.path);
+  std::map<std::string, std::set<std::string>> known_names = searched;
+  for (const SearchedFolder& one : described.searched) known_names[one.path].insert(one.names.begin(), one.names.end());
+  bool is_new = false;
+  for (const json& one : answer.at("files"))
+    if (const std::string file = bytes_of_json(one); !known.contains(file))
+      is_new = files.insert(file).second || is_new;
+  for (const SearchedFolder& one : searched_in(answer))
+    for (const std::string& name : one.names)
+      if (!known_names[one.path].contains(name)) is_new = searched[one.path].insert(name).second || is_new;
+  return is_new;
+}
+
+void add_to_description(const LibraryInfo& described, const LoadedByPython& more_loaded) {
   {
     const std::scoped_lock lock(incomplete().mutex);
     incomplete().descriptions.emplace(described.file, described.digest);
   }
   LibraryInfo more = described;
-  for (const LinkedLibrary& one : with_sizes(files)) more.linked.push_back(one);
+  for (const std::string& file : more_loaded.files) more.linked.push_back(with_size(file));
+  for (const auto& [path, names] : more_loaded.searched) {
+    auto folder =
+        std::find_if(more.searched.begin(), more.searched.end(), [&](const auto& one) { return one.path == path; });
+    if (folder == more.searched.end()) folder = more.searched.insert(more.searched.end(), SearchedFolder{path, {}});
+    folder->names.insert(folder->names.end(), names.begin(), names.end());
+  }
   more.digest = digest_of_python(more);
   keep_description(more, name_in_cache(trusted_path(described.file)), file_digest(framework_file()));
 }

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Python files that declare nodes, as if they were plugin libraries.
+#include <map>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <set>
 
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/library.hpp"
@@ -12,9 +15,10 @@ namespace marrow {
 /// Python node, which would otherwise start another one, and so on.
 bool is_python_plugin(const std::filesystem::path& file);
 
-/// Describes a file by a Python process with limits of time and memory. `linked` has the interpreter, the modules that
-/// the file needs from outside of the standard library, and the libraries of its kinds; `digest` is made from the file
-/// and from all of these. The description may be a refusal. Throws Error, with a text that begins with a verb, if there
+/// Describes a file by a Python process with limits of time and memory. `linked` has the interpreter, the modules and
+/// libraries that the process loaded from outside of the standard library, and the libraries of its kinds; `searched`
+/// has the folders in which modules were looked for. `digest` is made from the file, from all of these, and from
+/// python_settings(). The description may be a refusal. Throws Error, with a text that begins with a verb, if there
 /// is no Python or the file is not trusted.
 LibraryInfo describe_python_file(const std::filesystem::path& file);
 
@@ -24,12 +28,22 @@ LibraryInfo python_file_info(const std::filesystem::path& file, const Digest& fr
 /// The nodes of a file. Their calls start Python processes. Throws Error if the file is not as `described`.
 std::unique_ptr<Plugin> load_python_file(const LibraryInfo& described);
 
-/// Digest of a Python file and of all that its description links. Throws Error if one of them is gone.
+/// Digest of a Python file, of all that its description links, and of what is in the searched folders now. Throws Error
+/// if one of the files is gone.
 Digest digest_of_python(const LibraryInfo& described);
 
-/// Adds files that a process loaded only while it was called to the kept description. From now on is_fully_described()
-/// is false for this description: its build id does not cover these files.
-void add_to_description(const LibraryInfo& described, const std::vector<std::string>& files);
+/// What a process has loaded, and where it looked for modules.
+struct LoadedByPython {
+  std::set<std::string> files;
+  std::map<std::string, std::set<std::string>> searched;  ///< the names, by the folder
+
+  /// Takes over what is not in the description; returns whether there was anything.
+  bool add_new(const nlohmann::json& answer, const LibraryInfo& described);
+};
+
+/// Adds what a process did that its description does not say to the kept description. From now on is_fully_described()
+/// is false for this description: its build id does not cover what was added.
+void add_to_description(const LibraryInfo& described, const LoadedByPython& more_loaded);
 bool is_fully_described(const LibraryInfo& described);
 
 }  // namespace marrow

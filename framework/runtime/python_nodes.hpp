@@ -5,12 +5,12 @@
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "marrow/runtime/context.hpp"
 #include "marrow/runtime/library.hpp"
+#include "python_file.hpp"
 #include "shared_inputs.hpp"
 
 namespace marrow {
@@ -44,14 +44,13 @@ class PythonNodes {
  private:
   std::unique_ptr<PythonProcess> take(Context& context);
   void give_back(std::unique_ptr<PythonProcess> process);
-  void learn(const std::vector<std::string>& files);
+  void learn(const nlohmann::json& answer);
   std::string changed() const;
 
   LibraryInfo described_;
   std::mutex mutex_;
   std::vector<std::unique_ptr<PythonProcess>> idle_;
-  std::set<std::string> new_files_;
-  std::size_t learnt_ = 0;
+  LoadedByPython undescribed_;
 };
 
 }  // namespace marrow

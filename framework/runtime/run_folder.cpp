@@ -222,7 +222,9 @@ void for_each_node(const Pipeline& pipeline, const std::vector<NodeRecord>& reco
 
 json json_of(const LibraryInfo& library) {
   json linked = json::array();
-  for (const LinkedLibrary& one : library.linked) linked.push_back(fs::path(one.path).filename().string());
+  for (const LinkedLibrary& one : library.linked)
+    if (one.path.find("-packages/") == std::string::npos)  // of an installed Python package there may be thousands
+      linked.push_back(fs::path(one.path).filename().string());
   json j = {{"file", library.file.filename().string()}, {"build_id", library.build_id.hex()}, {"links", linked}};
   if (library.file.extension() == ".py" && !library.linked.empty()) j["interpreter"] = library.linked[0].path;
   return j;

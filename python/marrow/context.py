@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What marrow gives a node besides its inputs and options."""
+import math
 from typing import Any, Callable, Dict, Optional
 
 from .errors import Error
@@ -29,16 +30,19 @@ class Context:
 
     def progress(self, fraction: float, what: str = "") -> None:
         """Reports how far a long call is, from 0 to 1."""
-        self._say({"say": "progress", "fraction": float(fraction), "text": what})
+        fraction = float(fraction)
+        if not math.isfinite(fraction):
+            raise Error("progress: expected a number from 0 to 1, got %r" % fraction)
+        self._say({"say": "progress", "fraction": fraction, "text": str(what)})
 
     def debug(self, text: str) -> None:
         """Writes a line to the run's log, for people who look for a fault."""
-        self._say({"say": "debug", "text": text})
+        self._say({"say": "debug", "text": str(text)})
 
     def info(self, text: str) -> None:
         """Writes a line to the run's log."""
-        self._say({"say": "info", "text": text})
+        self._say({"say": "info", "text": str(text)})
 
     def warn(self, text: str) -> None:
         """Says what a person should know about the result. It is kept with the result."""
-        self._say({"say": "warning", "text": text})
+        self._say({"say": "warning", "text": str(text)})

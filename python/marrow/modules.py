@@ -1,19 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The files that a node written in Python depends on."""
+"""The files that a node written in Python depends on, and the folders in which its modules are looked for."""
 import ast
 import importlib.machinery
-import importlib.metadata
 import importlib.util
 import os
 import pathlib
 import sys
-import sysconfig
 from types import CodeType, ModuleType
-from typing import Any, Dict, Iterator, List, Optional, Set
+from typing import Any, Dict, Iterable, Iterator, List, Optional, Set, Tuple
 
 from . import _core
+from .installed import is_installed, is_standard, metadata_files, setup_files, setup_folders
 
-_STANDARD = [os.path.realpath(sysconfig.get_paths()[key]) for key in ("stdlib", "platstdlib")]
+_STANDARD_NAMES = getattr(sys, "stdlib_module_names", frozenset())
 
 
 class _FromSource(importlib.machinery.SourceFileLoader):
@@ -33,7 +32,7 @@ def import_from_source(file: str, name: str) -> ModuleType:
     ]
 
     def finder(path: str) -> Any:
-        if (path + os.sep).startswith(folder + os.sep):
+        if os.path.isdir(path) and not is_installed(path + os.sep) and not is_standard(path + os.sep):
             return importlib.machinery.FileFinder(path, *loaders)
         raise ImportError
 
@@ -49,86 +48,103 @@ def import_from_source(file: str, name: str) -> ModuleType:
 
 
 def loaded_files(file: str) -> List[str]:
-    """All files besides `file` that decide what its nodes do: loaded modules, and modules of its own folder that it
-    imports when it is called. Of an installed distribution, the files that tell its version. The standard library is
-    left out, because the interpreter stands for it."""
-    found: Set[str] = {os.path.realpath(str(_core.__file__))}
+    """All files besides `file` that decide what its nodes do: loaded modules and shared libraries, modules of its own
+    folder that it imports when it is called, what tells the version of an installed distribution, and what sets the
+    interpreter up. Of the standard library there is none, because the interpreter stands for it. A link is named as such:
+    it may lead to another file later."""
+    found: Set[str] = {path for path in map(os.fsdecode, _core.loaded_libraries()) if not is_standard(path)}
+    found.update(setup_files())
     for name, module in list(sys.modules.items()):
         path = getattr(module, "__file__", None)
-        if not isinstance(path, str) or not os.path.isfile(path):
+        if not isinstance(path, str) or not os.path.isfile(path) or is_standard(os.path.abspath(path)):
             continue
-        real = os.path.realpath(path)
-        if _is_installed(real):
-            found.update(_version_files(name.partition(".")[0]))
-        elif not _is_standard(real):
-            found.add(real)
-    folder = pathlib.Path(file).parent
-    for path in [file, *sorted(found)]:
-        if path.endswith(".py") and folder in pathlib.Path(path).parents:
-            found.update(_imported_from(pathlib.Path(path), folder, found))
+        found.add(os.path.abspath(path))
+        found.update(metadata_files(name.partition(".")[0], os.path.abspath(path)))
+    found.update(str(path) for path in _own_files(file))
     found.discard(file)
     return sorted(found)
 
 
-def _is_installed(path: str) -> bool:
-    return "/dist-packages/" in path or "/site-packages/" in path
+def searched_folders(places: Dict[str, List[str]], file: str) -> List[Tuple[str, List[str]]]:
+    """The folders in which modules were looked for, or will be in a call, each with the names of the modules: those that
+    are not there, and those that would be another file if one appeared in the folder."""
+    found: Dict[str, Set[str]] = {os.path.abspath(place): set() for place in sys.path}
+    looked_for = {name: list(sys.path) for name in _STANDARD_NAMES}
+    looked_for.update({name.partition(".")[0]: list(sys.path) for name in _names_in_own_files(file)})
+    looked_for.update(places)
+    for name, folders in looked_for.items():
+        here = _place_of(name)
+        for folder in map(os.path.abspath, folders if here is not None else ()):
+            if not is_standard(folder + os.sep):
+                found.setdefault(folder, set()).add(name.rpartition(".")[2])
+            if folder == here or (name in _STANDARD_NAMES and is_standard(folder + os.sep)):
+                break
+    for place, name in _places_in_own_folder(file):
+        found.setdefault(place, set()).add(name)
+    for place, name in setup_folders():
+        found.setdefault(place, set()).add(name)
+    first = [os.path.abspath(place) for place in sys.path]
+    order = list(dict.fromkeys(first)) + sorted(set(found) - set(first))
+    return [(place, sorted(found[place])) for place in order]
 
 
-def _is_standard(path: str) -> bool:
-    return any(path.startswith(folder + os.sep) for folder in _STANDARD)
-
-
-_versions: Dict[str, List[str]] = {}
-
-
-def _version_files(package: str) -> List[str]:
-    """The package's own file and the metadata of its distribution, whose text and name hold the version."""
-    if package not in _versions:
-        files = [getattr(sys.modules.get(package), "__file__", None), _metadata_file(package)]
-        _versions[package] = [os.path.realpath(one) for one in files if one and os.path.isfile(one)]
-    return _versions[package]
-
-
-def _metadata_file(package: str) -> Optional[str]:
-    try:
-        distribution: Any = importlib.metadata.distribution(package)
-    except importlib.metadata.PackageNotFoundError:
+def _place_of(name: str) -> Optional[str]:
+    """The folder in which a module was found; "" if it is not loaded from one folder. None if no folder counts, because
+    the module is a part of the interpreter."""
+    module = sys.modules.get(name)
+    if getattr(getattr(module, "__spec__", None), "origin", None) in ("built-in", "frozen"):
         return None
-    folder = getattr(distribution, "_path", None)
-    if folder is None:
+    if module is None and name in sys.builtin_module_names:
         return None
-    for name in ("METADATA", "PKG-INFO"):
-        if (pathlib.Path(folder) / name).is_file():
-            return str(pathlib.Path(folder) / name)
-    return str(folder)
+    path = getattr(module, "__file__", None)
+    if not isinstance(path, str):
+        return ""
+    folder = os.path.dirname(os.path.abspath(path))
+    return os.path.dirname(folder) if hasattr(module, "__path__") else folder
 
 
-def _imported_from(file: pathlib.Path, folder: pathlib.Path, known: Set[str]) -> Set[str]:
-    """Modules of the folder that the text of a file imports anywhere, and those that these import."""
-    found: Set[str] = set()
-    todo = [file]
+def _own_files(file: str) -> Iterable[pathlib.Path]:
+    """Modules of the file's folder that it imports anywhere in its text, and those that these import."""
+    folder = pathlib.Path(file).parent
+    found: List[pathlib.Path] = []
+    todo = [pathlib.Path(file)]
     while todo:
-        try:
-            tree = ast.parse(todo.pop().read_bytes())
-        except (OSError, SyntaxError, ValueError):
-            continue
-        for name in _imports(tree):
+        for name in _imports(todo.pop()):
             for path in _files_of(folder, name):
-                real = os.path.realpath(path)
-                if real not in known and real not in found:
-                    found.add(real)
+                if path not in found:
+                    found.append(path)
                     todo.append(path)
     return found
 
 
-def _imports(tree: ast.AST) -> Iterator[str]:
+def _names_in_own_files(file: str) -> Set[str]:
+    return {name for path in (pathlib.Path(file), *_own_files(file)) for name in _imports(path) if name}
+
+
+def _places_in_own_folder(file: str) -> Iterator[Tuple[str, str]]:
+    """Where the parts of packages in the file's folder are looked for, and their names."""
+    for name in _names_in_own_files(file):
+        place = pathlib.Path(file).parent
+        for part in name.split("."):
+            if not place.is_dir():
+                break
+            yield str(place), part
+            place = place / part
+
+
+def _imports(file: pathlib.Path) -> List[str]:
+    try:
+        tree = ast.parse(file.read_bytes())
+    except (OSError, SyntaxError, ValueError):
+        return []
+    names = []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            yield from (one.name for one in node.names)
+            names += [one.name for one in node.names]
         elif isinstance(node, ast.ImportFrom):
             base = node.module or ""
-            yield base
-            yield from (base + "." + one.name if base else one.name for one in node.names)
+            names += [base] + [base + "." + one.name if base else one.name for one in node.names]
+    return names
 
 
 def _files_of(folder: pathlib.Path, name: str) -> List[pathlib.Path]:

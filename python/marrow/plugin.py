@@ -1,20 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The process that holds the nodes of one Python file. marrow starts it, and asks it for one thing at a time:
-
-python3 -m marrow.plugin FILE
-
-It reads requests and writes reports and answers as marrow/runtime/worker.hpp says.
+"""The process that holds the nodes of one Python file. marrow starts it (node_process.py), and asks it for one thing at
+a time. It reads requests and writes reports and answers as marrow/runtime/worker.hpp says.
 """
-import importlib
 import json
 import os
 import pathlib
+import re
 import signal
 import sys
 import threading
 import traceback
-from types import FrameType, ModuleType
-from typing import Any, Callable, Dict, List, Optional, Tuple
+from types import FrameType
+from typing import Any, Callable, Dict, Iterator, List, Optional, Tuple
 
 import numpy
 
@@ -23,34 +20,41 @@ from .context import Context
 from .declaration import Declaration, completed, nodes_of
 from .errors import Error
 from .items import Items
-from .modules import import_from_source, loaded_files
+from .kept_state import KeptState
+from .modules import import_from_source, loaded_files, searched_folders
+from .trust import TrustedModules
 
 _MADE = 3  # the descriptor through which values are handed over
 _REPLIES = 4  # the descriptor from which the replies to questions are read
 _MODULE = "marrow_python_nodes"
+_LONGEST_TEXT = 100_000  # characters of a text that is sent
+_LONGEST_LINE = 60_000_000  # marrow reads no longer ones
 
 
 class Process:
-    def __init__(self, file: str, say: Callable[[Dict[str, Any]], None]) -> None:
+    def __init__(self, file: str, places: Dict[str, List[str]], say: Callable[[Dict[str, Any]], None]) -> None:
         self.file = file
+        self.places = places  # of each module that was looked for, the folders
         self.say = say
         self.nodes: Optional[Dict[str, Declaration]] = None
-        self.inputs: Dict[int, Any] = {}  # by the number of their memory
+        self.inputs: Dict[int, Any] = {}  # by the number of their memory, each with a check that it is as it was
         self.functions = functions.Functions()
         self.replies: Any = None
         self.made: Optional[Any] = None
-        self.files: List[str] = []
-        self.modules = 0
+        self.reported: Any = None  # how much was loaded and looked for when it was last reported
         self.context: Optional[Context] = None
+        self.state: Optional[KeptState] = None  # from the first call on
+        self.is_spoilt = False  # a call has changed the state of the process, which ends then
+        self.trusted = TrustedModules()
 
     def load(self) -> Dict[str, Declaration]:
         """Imports the file, once."""
         if self.nodes is None:
             self.say({"say": "at", "place": self.file})  # what ends the process from here on is the file's fault
+            sys.meta_path.insert(0, self.trusted)
             module = import_from_source(self.file, _MODULE)
+            self.trusted.expect_none_refused()
             self.nodes = {one.manifest["name"]: one for one in _checked(nodes_of(module))}
-            self.files = loaded_files(self.file)
-            self.modules = len(sys.modules)
         return self.nodes
 
     def describe(self, request: Dict[str, Any]) -> Any:
@@ -60,10 +64,12 @@ class Process:
             contract = _core.kind_info(name.partition(".")[0])
             libraries.update([contract["library"]] if contract else [])
             nodes.append(completed(one, contract))
-        return {"nodes": nodes, "files": loaded_files(self.file) + sorted(libraries)}
+        loaded = self._loaded()
+        return dict(loaded, nodes=nodes, files=loaded["files"] + sorted(libraries))
 
     def limits(self, request: Dict[str, Any]) -> Any:
-        return {name: one.limits for name, one in self.load().items()}
+        limits = {name: one.limits for name, one in self.load().items()}
+        return dict(self._loaded(), limits=limits)
 
     def call(self, request: Dict[str, Any]) -> Any:
         node = self.load()[request["node"]]
@@ -75,24 +81,26 @@ class Process:
             returned = node.function(**arguments)
         finally:
             self.context = None
+        self._expect_same_inputs(node, request)
         self.made = _core.Made(_outputs(node, returned))
         self.made.hand_over(_MADE, True)
-        return {"files": self._new_files()}
+        return self._loaded()
 
     def make(self, request: Dict[str, Any]) -> Any:
         """Makes a function, so that what is wrong with its inputs is said before it is needed."""
         node, made = self._function(request)
-        return dict(functions.said_of(node, made), files=self._new_files())
+        self._expect_same_inputs(node, request)
+        return dict(functions.said_of(node, made), **self._loaded())
 
     def cost(self, request: Dict[str, Any]) -> Any:
         values = functions.costs(*self._function(request), request)
-        return {"values": values, "files": self._new_files()}
+        return dict(self._loaded(), values=values)
 
     def radiograph(self, request: Dict[str, Any]) -> Any:
         image = functions.radiograph(*self._function(request), request)
         self.made = _core.Made([(image, "radiograph", "image", "")])
         self.made.hand_over(_MADE, True)
-        return {"files": self._new_files()}
+        return self._loaded()
 
     def minimise(self, request: Dict[str, Any]) -> Any:
         node = self.load()[request["node"]]
@@ -101,7 +109,23 @@ class Process:
             reason = functions.minimum(node, self._all_arguments(node, request), request, self._ask_back)
         finally:
             self.context = None
-        return {"stopped_because": reason, "files": self._new_files()}
+        self._expect_same_inputs(node, request)
+        return dict(self._loaded(), stopped_because=shortened(reason))
+
+    def keeping_state(self, task: Callable[[Dict[str, Any]], Any], request: Dict[str, Any]) -> Any:
+        """Does what a request asks for. What it changes for the whole process would change what later calls give."""
+        self.load()
+        self.state = self.state or KeptState()
+        self.state.begin()
+        try:
+            result = task(request)
+        finally:
+            changed = self.state.changed()
+            self.is_spoilt = self.is_spoilt or bool(changed)
+        if changed:
+            raise Error("%s: %s while it ran; a node must leave it as it is" % (self.file, changed))
+        self.trusted.expect_none_refused()
+        return result
 
     def share(self, request: Dict[str, Any]) -> Any:
         assert self.made is not None
@@ -146,18 +170,48 @@ class Process:
         if "axis" in given:
             return Items(given["axis"], given["names"], [self._input(one) for one in given["items"]])
         if given["number"] not in self.inputs:
-            value = _core.mapped_input(given["memory"], given["type"], given["samples_bytes"])
-            self.inputs[given["number"]] = value
-        return self.inputs[given["number"]]
+            self.inputs[given["number"]] = _core.mapped_input(given["memory"], given["type"], given["samples_bytes"])
+        return self.inputs[given["number"]][0]
 
-    def _new_files(self) -> List[str]:
-        """Files that were loaded during a call for the first time."""
-        if len(sys.modules) == self.modules:
-            return []
-        self.modules = len(sys.modules)
-        before = set(self.files)
-        self.files = loaded_files(self.file)
-        return [one for one in self.files if one not in before]
+    def _expect_same_inputs(self, node: Declaration, request: Dict[str, Any]) -> None:
+        """An array cannot be written to, but there are other ways. The next call would get the changed input, too."""
+        for name, given in zip(node.inputs, request["inputs"]):
+            for number in _numbers_in(given):
+                if number in self.inputs and not self.inputs[number][1].holds():
+                    self.inputs.clear()
+                    raise Error(
+                        "%s changed its input '%s'; a node must leave its inputs as they are: change a copy"
+                        % (node.manifest["name"], name)
+                    )
+
+    def _loaded(self) -> Dict[str, Any]:
+        """What was loaded and looked for until now. Nothing where this is as in the last answer."""
+        now = len(sys.modules), len(self.places), _core.count_of_loaded_libraries()
+        if now == self.reported:
+            return {"files": [], "searched": []}
+        self.reported = now
+        searched = searched_folders(self.places, self.file)
+        return {
+            "files": [_bytes_as_json(path) for path in loaded_files(self.file)],
+            "searched": [{"path": _bytes_as_json(path), "names": names} for path, names in searched],
+        }
+
+
+def _numbers_in(given: Any) -> List[int]:
+    """The numbers of the memory that an input of a request has."""
+    if given is None:
+        return []
+    if "axis" in given:
+        return [number for one in given["items"] for number in _numbers_in(one)]
+    return [given["number"]]
+
+
+def _bytes_as_json(name: str) -> Any:
+    """The name of a file. One that is not UTF-8 is given as bytes, as marrow's json_of_bytes() does."""
+    try:
+        return name.encode("utf-8").decode("utf-8")
+    except UnicodeEncodeError:
+        return {"bytes": list(os.fsencode(name))}
 
 
 def _checked(nodes: List[Declaration]) -> List[Declaration]:
@@ -210,6 +264,40 @@ def explained(error: BaseException, file: str) -> str:
     return "%s, line %s, in %s: %s%s%s" % (last.filename, last.lineno, last.name, kind, text, line)
 
 
+def shortened(text: str) -> str:
+    if len(text) <= _LONGEST_TEXT:
+        return text
+    return "%s... (%d more characters)" % (text[:_LONGEST_TEXT], len(text) - _LONGEST_TEXT)
+
+
+def _line_of(message: Dict[str, Any]) -> bytes:
+    """A message as JSON. What is not UTF-8 in a text is shown as \\xff. Raises Error if marrow could not read it."""
+    for key in {"text", "failed", "place"} & set(message):
+        message[key] = shortened(message[key])
+    try:
+        text = json.dumps(message, ensure_ascii=False, allow_nan=False)
+    except ValueError as error:
+        raise Error("it answers with a number that is not finite") from error
+    line = re.sub("[\ud800-\udfff]", lambda one: "\\\\x%02x" % (ord(one[0]) & 0xFF), text).encode() + b"\n"
+    if len(line) > _LONGEST_LINE:
+        raise Error("its answer has %d bytes, more than the %d that it may have" % (len(line), _LONGEST_LINE))
+    return line
+
+
+class Requests:
+    """Reads from the standard input as it was at the start. A node, and a process that it starts, find nothing there."""
+
+    def __init__(self) -> None:
+        self._lines = open(os.dup(0), "rb")
+        nothing = os.open(os.devnull, os.O_RDONLY)
+        os.dup2(nothing, 0)
+        os.close(nothing)
+
+    def __iter__(self) -> Iterator[Any]:
+        for line in self._lines:
+            yield json.loads(line)
+
+
 class Answers:
     """Writes to the standard output as it was at the start. What a node prints goes to the standard error."""
 
@@ -220,7 +308,7 @@ class Answers:
         self.job: Any = None
 
     def send(self, message: Dict[str, Any]) -> None:
-        line = (json.dumps(dict(message, job=self.job)) + "\n").encode()
+        line = _line_of(dict(message, job=self.job))
         with self._lock:
             while line:
                 line = line[os.write(self._to, line) :]
@@ -228,9 +316,11 @@ class Answers:
 
 def answer(process: Process, request: Dict[str, Any], answers: Answers) -> Dict[str, Any]:
     try:
-        tasks = {"describe": process.describe, "load": process.limits, "call": process.call}
-        tasks.update({"share": process.share, "make": process.make, "cost": process.cost})
-        tasks.update({"radiograph": process.radiograph, "minimise": process.minimise})
+        tasks = {"describe": process.describe, "load": process.limits, "share": process.share}
+        calls = {"call": process.call, "make": process.make, "cost": process.cost}
+        calls.update({"radiograph": process.radiograph, "minimise": process.minimise})
+        if request["do"] in calls:
+            return {"end": process.keeping_state(calls[request["do"]], request)}
         return {"end": tasks[request["do"]](request)}
     except MemoryError:
         return {"failed": "out of memory", "out_of_memory": True}
@@ -242,14 +332,15 @@ def answer(process: Process, request: Dict[str, Any], answers: Answers) -> Dict[
         return {"failed": explained(error, process.file)}
 
 
-def main(arguments: List[str]) -> int:
-    if len(arguments) != 1:
-        print(__doc__, file=sys.stderr)
-        return 2
-    answers = Answers()
-    process = Process(arguments[0], answers.send)
-    parent = int(os.environ.get("MARROW_PARENT", os.getppid()))
-    _core.end_with(parent)
+def main(arguments: List[str], places: Dict[str, List[str]]) -> int:
+    """`places` has, for each module that was looked for, the folders. It goes on to grow."""
+    answers, requests = Answers(), Requests()
+    for descriptor in (_MADE, _REPLIES):
+        if _is_open(descriptor):
+            os.set_inheritable(descriptor, False)
+    process = Process(arguments[0], places, answers.send)
+    own = os.getpid()
+    _core.end_with(int(os.environ.get("MARROW_PARENT", os.getppid())))
 
     def stop(number: int, frame: Optional[FrameType]) -> None:
         if process.context is None:
@@ -259,14 +350,23 @@ def main(arguments: List[str]) -> int:
 
     signal.signal(signal.SIGTERM, stop)
     signal.signal(signal.SIGPIPE, signal.SIG_IGN)
-    with open(0, "rb", closefd=False) as requests:
-        for line in requests:
-            request = json.loads(line)
-            answers.job = request["job"]
-            answers.send(answer(process, request, answers))
+    for request in requests:
+        answers.job = request["job"]
+        answered = answer(process, request, answers)
+        if os.getpid() != own:
+            os._exit(1)  # a process that the node forked came out of the node's code: it must not answer
+        try:
+            answers.send(answered)
+        except Error as error:
+            answers.send({"failed": str(error)})
+        if process.is_spoilt:
+            break  # the next call starts a new one
     return 0
 
 
-if __name__ == "__main__":
-    module: ModuleType = importlib.import_module("marrow.plugin")  # so that its classes exist once
-    sys.exit(module.main(sys.argv[1:]))
+def _is_open(descriptor: int) -> bool:
+    try:
+        os.fstat(descriptor)
+    except OSError:
+        return False
+    return True

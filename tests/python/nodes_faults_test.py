@@ -45,7 +45,7 @@ class Faults(Written):
         first = self.does("")
         self.assertEqual(self.does(""), first)
         self.assertIn(
-            "mine.py crashed its process (Killed); the next call starts a new one",
+            "the process of mine.py was killed from outside (SIGKILL)",
             self.failure("os.kill(os.getpid(), signal.SIGKILL)"),
         )
         self.assertIn("crashed its process (Segmentation fault)", self.failure("os.kill(os.getpid(), 11)"))
@@ -90,7 +90,7 @@ class Faults(Written):
         for thread in threads:
             thread.join()
         self.assertEqual(sorted(isinstance(end, int) for end in ends.values()), [False, True], ends)
-        self.assertIn("(Killed)", next(end for end in ends.values() if isinstance(end, str)))
+        self.assertIn("(SIGKILL)", next(end for end in ends.values() if isinstance(end, str)))
 
     def test_a_hang(self):
         file = self.plugin(CALLS.replace("seconds=600", "seconds=3"))

@@ -28,7 +28,8 @@ def processes(file):
             command = (folder / "cmdline").read_bytes().split(b"\0") if folder.name.isdigit() else []
         except OSError:  # it has just ended
             continue
-        if b"marrow.plugin" in command and os.fsencode(str(file)) in command:
+        is_of_nodes = any(part.endswith(b"/node_process.py") for part in command)
+        if is_of_nodes and os.fsencode(str(file)) in command:
             found.append(int(folder.name))
     return found
 

@@ -44,6 +44,7 @@ marrow::LibraryInfo library() {
   marrow::LibraryInfo info;
   info.digest = {1, 2};
   info.linked = {{"/usr/lib/libthis.so.1", 12345}};
+  info.searched = {{"/plugins/caf\xe9", {"libthis.so.1", "*.pth"}}};  // a folder whose name is not UTF-8
   marrow::NodeInfo node;
   node.name = "test.all";
   node.summary = "Has an option of each type";
@@ -184,10 +185,12 @@ TEST(Manifest, NamesAndTextsAreThoseOfADeclaration) {
   expect_refused([](json& j) { j["linked"][0]["path"] = "libthis.so.1"; },
                  "'libthis.so.1' is not the full path of a library");
   marrow::LibraryInfo many = library();
-  many.linked.resize(1000, many.linked[0]);
+  many.linked.resize(20'000, many.linked[0]);
   expect_consistent(many);
-  expect_refused([](json& j) { j["linked"] = std::vector<json>(1001, j["linked"][0]); },
-                 "it names more than 1000 linked libraries");
+  expect_refused([](json& j) { j["linked"] = std::vector<json>(20'001, j["linked"][0]); },
+                 "it names more than 20000 linked libraries");
+  expect_refused([](json& j) { j["searched"][0]["path"] = "plugins"; }, "'plugins' is not the full path of a folder");
+  expect_refused([](json& j) { j["searched"][0]["path"] = 7; }, "the path of a folder: expected a text");
 }
 TEST(Manifest, KindsAreThoseOfADeclaration) {
   const auto kind = [](const char* key, json value) { return [=](json& j) { j["kinds"][0][key] = value; }; };
