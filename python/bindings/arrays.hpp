@@ -40,6 +40,10 @@ py::object array_of(const Eigen::MatrixXd& matrix);
 /// The 4 x 4 matrix of a transform.
 py::object array_of(const RigidTransform& transform);
 
+/// Anything that numpy takes as an array of real numbers, as an array of this type in C order. Throws Error if it is
+/// none, or if numbers would get lost or change: masked ones, complex ones, whole numbers that the type cannot hold.
+/// `what` names it in the message.
+py::object array_of_real(const py::handle& object, const char* type, const std::string& what);
 /// The numbers of anything that numpy takes as an array of this shape; -1 stands for any length. Throws Error if the
 /// shape is another or a number is not one. `what` names it in the message.
 std::vector<double> numbers_of(const py::handle& object, const std::vector<py::ssize_t>& shape,

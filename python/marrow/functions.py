@@ -35,7 +35,7 @@ def _checked(node: Declaration, made: Any) -> Any:
         return made
     if not isinstance(made, tuple) or len(made) != 2 or not callable(made[0]):
         raise Error("%s: expected a function that draws, and the corners of a box about the model" % name)
-    corners = numpy.asarray(made[1], float)
+    corners = _core.array_of_real(made[1], "float64", "%s: corners of the box" % name)
     if corners.ndim != 2 or corners.shape[1] != 3 or not len(corners) or not numpy.isfinite(corners).all():
         raise Error("%s: the corners of the box must be an array [N, 3] of finite numbers, in mm" % name)
     return made[0], corners
@@ -50,7 +50,7 @@ def costs(node: Declaration, cost: Any, request: Dict[str, Any]) -> List[float]:
     """The costs of a batch of poses."""
     name = node.manifest["name"]
     poses = _transforms(request["poses"])
-    values = numpy.asarray(cost(poses), float)
+    values = _core.array_of_real(cost(poses), "float64", "%s: costs" % name)
     if values.shape != (len(poses),):
         raise Error("%s: expected %d costs, got %s" % (name, len(poses), _shape(values)))
     if not numpy.isfinite(values).all():
@@ -69,8 +69,9 @@ def radiograph(node: Declaration, made: Any, request: Dict[str, Any]) -> Any:
         _transforms(camera["camera_from_world"])[0],
     )
     pixels = _pixels(request)
-    values = numpy.asarray(made[0](seen_by, _transforms(request["pose"])[0], pixels), "float32")
     name = node.manifest["name"]
+    drawn = made[0](seen_by, _transforms(request["pose"])[0], pixels)
+    values = _core.array_of_real(drawn, "float32", "%s: values of the pixels" % name)
     if values.shape != (len(pixels),):
         raise Error("%s: expected the values of %d pixels, got %s" % (name, len(pixels), _shape(values)))
     if not numpy.isfinite(values).all() or (values < 0).any():

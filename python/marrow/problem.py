@@ -4,6 +4,7 @@ from typing import Any, Callable
 
 import numpy
 
+from . import _core
 from .errors import Error
 
 __all__ = ["BudgetSpent", "Problem"]
@@ -32,9 +33,9 @@ class Problem:
         step_tolerance: float = 1e-4
     ) -> None:
         self._function = function
-        self.start = numpy.array(start, float)
+        self.start = _numbers(start, "start")
         """Where to begin [n]."""
-        self.initial_step = numpy.array(initial_step, float)
+        self.initial_step = _numbers(initial_step, "initial_step")
         """A positive number for each coordinate [n]: how far the first steps should go."""
         self.lower = _bound(lower, -numpy.inf, len(self.start))
         """The least value of each coordinate [n]; -inf where there is none."""
@@ -57,7 +58,7 @@ class Problem:
 
     def __call__(self, points: Any) -> Any:
         """Raises BudgetSpent if there are more points than values left; as many as are left are asked for first."""
-        asked = numpy.asarray(points, float)
+        asked = _numbers(points, "points")
         size = len(self.start)
         if asked.ndim not in (1, 2) or asked.shape[-1] != size:
             got = " x ".join(map(str, asked.shape)) or "one number"
@@ -75,7 +76,7 @@ class Problem:
         return values if asked.ndim == 2 else float(values[0])
 
     def _values(self, points: Any) -> Any:
-        values = numpy.array(self._function(points), float)
+        values = _numbers(self._function(points), "values of the function")
         if values.shape != (len(points),):
             got = " x ".join(map(str, values.shape)) or "one number"
             raise Error("the function gave %s for %d points" % (got, len(points)))
@@ -97,9 +98,14 @@ class Problem:
             raise Error("the optimizer needs at least one evaluation, got max_evaluations = %d" % self.max_evaluations)
 
 
+def _numbers(given: Any, what: str) -> Any:
+    """A copy as an array of numbers, of which none got lost."""
+    return numpy.array(_core.array_of_real(given, "float64", "the optimizer: " + what))
+
+
 def _bound(given: Any, none: float, size: int) -> Any:
     """The bound of each coordinate. None, nothing and NaN stand for no bound."""
-    bound = numpy.array([] if given is None else given, float)
+    bound = _numbers([numpy.nan if one is None else one for one in ([] if given is None else given)], "bounds")
     if bound.shape not in ((0,), (size,)):
         raise Error("the optimizer got bounds for %d of %d coordinates" % (bound.size, size))
     return numpy.where(numpy.isnan(bound), none, bound) if len(bound) else numpy.full(size, none)

@@ -74,6 +74,68 @@ class Arrays(Case):
             with self.assertRaisesRegex(marrow.Error, text):
                 marrow.Volume(arguments[0], spacing_mm=arguments[1])
 
+    def test_arrays_of_which_something_would_get_lost(self):
+        """What is lost is counted by hand: 2 of 8 values are masked, and 2**24 + 1 = 16777217 is the first whole number
+        that has no 32-bit floating-point number (IEEE 754: 24 bits of significand)."""
+        cube = numpy.zeros((2, 2, 2))
+        masked = numpy.ma.masked_array(cube, mask=numpy.arange(8).reshape(2, 2, 2) < 2)
+        large, exact = numpy.full((2, 2, 2), 2**24 + 1), numpy.full((2, 2, 2), 2**25)
+        self.assertTrue(numpy.array_equal(marrow.Volume(exact, spacing_mm=(1, 1, 1)).array, exact))
+        no_mask = numpy.ma.masked_array(cube, mask=False)
+        self.assertEqual(marrow.Volume(no_mask, spacing_mm=(1, 1, 1)).size, (2, 2, 2))
+        camera = marrow.Camera(2, 2, [[1000, 0, 1], [0, 1000, 1], [0, 0, 1]], numpy.eye(4))
+        flat = numpy.ma.masked_array(numpy.ones((2, 2), "uint8"), mask=[[1, 0], [0, 0]])
+        pose = numpy.ma.masked_array(numpy.eye(4), mask=numpy.eye(4) == 0)
+        corners = numpy.ma.masked_array(numpy.eye(3), mask=numpy.eye(3) == 1)
+        with self.assertRaisesRegex(marrow.Error, "2 of its values are masked"):
+            marrow.SignedField(masked, spacing_mm=(1, 1, 1))
+        for make, text in (
+            (
+                lambda: marrow.Volume(masked, spacing_mm=(1, 1, 1)),
+                "^Volume: 2 of its values are masked, and a mask is not ",
+            ),
+            (
+                lambda: marrow.Volume(cube + 1j, spacing_mm=(1, 1, 1)),
+                "^Volume: expected real numbers, got complex128, ",
+            ),
+            (
+                lambda: marrow.Volume(large, spacing_mm=(1, 1, 1)),
+                "^Volume: 16777217 cannot be held by a 32-bit floating",
+            ),
+            (lambda: marrow.Volume(cube + 1e300, spacing_mm=(1, 1, 1)), "^Volume: a number is beyond what a 32-bit "),
+            (
+                lambda: marrow.Volume(cube.astype(object), spacing_mm=(1, 1, 1)),
+                "got an array of object; convert it with",
+            ),
+            (
+                lambda: marrow.Image(flat),
+                "^Image: 1 of its values is masked, and a mask is not kept; give array.filled",
+            ),
+            (lambda: marrow.Image(flat.filled(1) * 1j), "^Image: expected real numbers, got complex128"),
+            (lambda: marrow.View(flat, camera), "^image of the view: 1 of its values is masked"),
+            (lambda: marrow.View(flat.filled(1), camera, mask=flat), "^mask of the view: 1 of its values is masked"),
+            (lambda: marrow.Pose(pose), "^Pose: 12 of its values are masked"),
+            (lambda: marrow.Mesh(corners, [[0, 1, 2]]), "^vertices_mm: 3 of its values are masked"),
+            (lambda: marrow.Mesh(list(corners), [[0, 1, 2]]), "^vertices_mm: 1 of its values is masked"),
+            (
+                lambda: marrow.Mesh(numpy.eye(3) * 1j, [[0, 1, 2]]),
+                "^vertices_mm: expected real numbers, got complex128",
+            ),
+            (lambda: marrow.Landmarks({"a": corners[0]}), "^landmark a: 1 of its values is masked"),
+            (
+                lambda: marrow.Seeds("a", [[2**53 + 1, 0, 0]]),
+                "^points_mm: 9007199254740993 cannot be held by a 64-bit ",
+            ),
+            (lambda: marrow.Metrics({"a": 1j}), "^figure 'a': expected real numbers, got complex128"),
+            (lambda: marrow.Metrics({"a": numpy.ma.masked}), "^figure 'a': 1 of its values is masked"),
+            (
+                lambda: marrow.Problem(lambda points: points, masked[0, 0], [1, 1]),
+                "^the optimizer: start: 2 of its values",
+            ),
+        ):
+            with self.subTest(text), self.assertRaisesRegex(marrow.Error, text):
+                make()
+
     def test_images_and_views_of_arrays(self):
         for kind in ("uint8", "uint16", "float32"):
             pixels = numpy.arange(12).reshape(3, 4).astype(kind)
