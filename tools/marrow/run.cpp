@@ -12,6 +12,7 @@
 #include "fruitless_run.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/names.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/run_folder.hpp"
 #include "outputs_in_files.hpp"
@@ -20,6 +21,7 @@
 #include "runtime/place_of_results.hpp"
 #include "runtime/shared_store.hpp"
 #include "runtime/verdict_json.hpp"
+#include "stop_notice.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -80,11 +82,7 @@ class RunProgress {
     return event.node.find('/') != std::string::npos && event.seconds < kShort_s;
   }
 
-  static std::string seconds_text(double seconds) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.3f s", seconds);
-    return text;
-  }
+  static std::string seconds_text(double seconds) { return formatted("%.3f s", seconds); }
 
   void line(LogLevel level, const std::string& where, const std::string& text) {
     if (log_.shows(level)) clear();
@@ -116,12 +114,8 @@ class RunProgress {
 
 std::string status_text(const NodeRecord& record) {
   if (record.status != NodeRecord::Status::done || !record.cached) return status_name(record.status);
-  char text[64];
-  if (record.calls)
-    std::snprintf(text, sizeof text, "done, %d cached", record.cached);
-  else
-    std::snprintf(text, sizeof text, "cached (took %.3f s)", record.cached_seconds);
-  return text;
+  return record.calls ? formatted("done, %d cached", record.cached)
+                      : formatted("cached (took %.3f s)", record.cached_seconds);
 }
 
 /// One line for each node, then those of its body. `path`: "", or the node and a slash.
@@ -200,7 +194,11 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   settings.threads = request.threads;
   settings.file_limits = request.file_limits;
   settings.cancelled = &stop_on_signals();
-  settings.observer = [&](const RunEvent& event) { progress(event); };
+  StopNotice stop_notice(*settings.cancelled);
+  settings.observer = [&](const RunEvent& event) {
+    stop_notice(event);
+    progress(event);
+  };
   const auto note = [&](const std::string& text) {
     folder.log().keep(LogLevel::info, "", "note: " + text);
     if (!request.quiet) std::fprintf(stderr, "marrow: note: %s\n", printable(text).c_str());
