@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The compiler has nothing to say of marrow's sources: each is compiled as the build does it, with warnings as errors."""
+import json
+import pathlib
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+import unittest
+
+SOURCE = pathlib.Path(sys.argv[1])
+BUILD = pathlib.Path(sys.argv[2])
+sys.path.insert(0, str(SOURCE / "tests"))
+from sample import sample  # noqa: E402
+
+MUST_NOT_COMPILE = ("forgotten_field.cpp",)
+
+
+def launcher():
+    """ccache, if marrow is built with it."""
+    return re.findall(r"^CMAKE_CXX_COMPILER_LAUNCHER:\w+=(.+ccache)$", (BUILD / "CMakeCache.txt").read_text(), re.M)
+
+
+class Warnings(unittest.TestCase):
+    def test_a_build_prints_no_warning(self):
+        units = json.loads((BUILD / "compile_commands.json").read_text())
+        units = [unit for unit in units if not unit["file"].endswith(MUST_NOT_COMPILE)]
+        with tempfile.TemporaryDirectory(prefix="marrow-warnings-") as scratch:
+            for unit in sample(units, 4):
+                words = shlex.split(unit["command"])
+                words[words.index("-o") + 1] = str(pathlib.Path(scratch, "unit.o"))
+                done = subprocess.run(
+                    [*launcher(), *words, "-Werror"], cwd=unit["directory"], capture_output=True, text=True
+                )
+                with self.subTest(unit["file"]):
+                    self.assertEqual((done.returncode, done.stderr), (0, ""))
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1] + sys.argv[3:], verbosity=2)
