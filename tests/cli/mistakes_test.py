@@ -101,6 +101,7 @@ class Mistakes(Comparison):
                     with self.subTest(command=command, other=other):
                         given = other[: other.index(":")]
                         self.assertEqual(self.said(*command, given, *more), other % wanted)
+        self.assertEqual(self.said("open", "e.yaml"), an_experiment % "a pipeline")
         self.assertEqual(sorted(self.scratch.rglob("*")), before, "nothing is made")
         self.assertEqual(
             self.said("check", SOURCE / "pipelines" / "wrist" / "radius-0002.pose.yaml").split(": ", 1)[1],

@@ -11,6 +11,7 @@
 
 #include "command_options.hpp"
 #include "commands.hpp"
+#include "given_path.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "process.hpp"
@@ -61,6 +62,7 @@ Target target_of(const fs::path& place) {
     return {full, ""};
   }
   if (full.filename() == "case.yaml") return target_of(full.parent_path());
+  if (full.extension() == ".yaml") expect_given(place, Wanted::pipeline);
   if (full.extension() == ".yaml") return {full.parent_path(), "#pipeline=" + encoded(full.filename().string())};
   throw Error(printable(place.string()) + ": open a folder, a case.yaml or a pipeline");
 }
