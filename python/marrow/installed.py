@@ -7,9 +7,8 @@ import sys
 import sysconfig
 from typing import Dict, List, Set, Tuple
 
-_STANDARD = {
-    form(sysconfig.get_paths()[key]) for key in ("stdlib", "platstdlib") for form in (os.path.abspath, os.path.realpath)
-}
+_STANDARD_PATHS = [sysconfig.get_paths()[key] for key in ("stdlib", "platstdlib")]
+_STANDARD = {folder for path in _STANDARD_PATHS for folder in (os.path.abspath(path), os.path.realpath(path))}
 
 
 def is_installed(path: str) -> bool:

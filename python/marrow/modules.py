@@ -7,12 +7,12 @@ import os
 import pathlib
 import sys
 from types import CodeType, ModuleType
-from typing import Any, Dict, Iterable, Iterator, List, Optional, Set, Tuple
+from typing import Any, Dict, FrozenSet, Iterable, Iterator, List, Optional, Set, Tuple
 
 from . import _core
 from .installed import is_installed, is_standard, metadata_files, setup_files, setup_folders
 
-_STANDARD_NAMES = getattr(sys, "stdlib_module_names", frozenset())
+_STANDARD_NAMES: FrozenSet[str] = getattr(sys, "stdlib_module_names", frozenset())
 
 
 class _FromSource(importlib.machinery.SourceFileLoader):
@@ -74,7 +74,7 @@ def searched_folders(places: Dict[str, List[str]], file: str) -> List[Tuple[str,
     looked_for.update(places)
     for name, folders in looked_for.items():
         here = _place_of(name)
-        for folder in map(os.path.abspath, folders if here is not None else ()):
+        for folder in [os.path.abspath(one) for one in folders] if here is not None else []:
             if not is_standard(folder + os.sep):
                 found.setdefault(folder, set()).add(name.rpartition(".")[2])
             if folder == here or (name in _STANDARD_NAMES and is_standard(folder + os.sep)):

@@ -6,16 +6,20 @@ imports nothing that the interpreter has not loaded at its start.
 """
 import sys
 
+TYPE_CHECKING = False  # typing has it too, but is not imported here
+if TYPE_CHECKING:
+    from typing import Iterable
+
 
 class Searches:
     """Notes the folders in which each module was looked for. It finds none itself."""
 
-    def __init__(self):
-        self.places = {}
+    def __init__(self) -> None:
+        self.places: "dict[str, list[str]]" = {}
         for name in ["sitecustomize", "usercustomize", *sys.modules]:
             self.find_spec(name, getattr(sys.modules.get(name.rpartition(".")[0]), "__path__", None))
 
-    def find_spec(self, name, path=None, target=None):
+    def find_spec(self, name: str, path: "Iterable[object] | None" = None, target: object = None) -> None:
         known = self.places.setdefault(name, [])
         known += [one for one in (sys.path if path is None else path) if isinstance(one, str) and one not in known]
 

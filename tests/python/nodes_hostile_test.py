@@ -37,6 +37,14 @@ for name in os.listdir("/proc/%d/fd" % parent):
     except PermissionError:
         made["refused"] += 1
 """
+BUSY = """
+@marrow.node("own.waits", summary="waits")
+def waits(camera: Annotated[Optional[marrow.Camera], "none"] = None, *, mark: Annotated[str, "mark"]) -> Annotated[
+        marrow.Metrics, marrow.named("figures")]:
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+    open(mark, "w")
+    time.sleep(1000)
+"""
 TAKE = "kept = [bytearray(b'x' * 50_000_000) for i in range(10)]"
 
 
@@ -153,17 +161,7 @@ class Hostile(Written):
         )
 
     def test_the_first_ctrl_c_says_what_is_waited_for(self):
-        self.plugin(
-            NODES
-            + """
-@marrow.node("own.waits", summary="waits")
-def waits(camera: Annotated[Optional[marrow.Camera], "none"] = None, *, mark: Annotated[str, "mark"]) -> Annotated[
-        marrow.Metrics, marrow.named("figures")]:
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
-    open(mark, "w")
-    time.sleep(1000)
-"""
-        )
+        self.plugin(NODES + BUSY)
         mark = self.scratch / "begun"
         text = "marrow: 1\nnodes:\n  slow: {uses: own.waits, with: {mark: %s}}\noutputs: {a: slow.figures}\n" % mark
         pipeline = self.write("p.yaml", text)
@@ -185,6 +183,24 @@ def waits(camera: Annotated[Optional[marrow.Camera], "none"] = None, *, mark: An
             notice = "marrow: stopping; it waits for what is running: slow. A second Ctrl-C ends it at once"
             self.assertEqual(notice in said, signals == 1, said)
             self.assertEqual("stopped at once; what was being done is lost" in said, signals == 2, said)
+
+    def test_ctrl_c_in_python_says_that_a_node_is_waited_for(self):
+        self.plugin(NODES + BUSY)
+        mark = self.scratch / "begun"
+        code = "import marrow; marrow.own.waits(mark=%r)" % str(mark)
+        environment = {**os.environ, "PYTHONPATH": os.path.dirname(os.path.dirname(marrow.__file__))}
+        run = subprocess.Popen(
+            ["/usr/bin/python3", "-c", code],
+            env=environment,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.addCleanup(run.kill)  # where the test ends before
+        wait_until(mark.exists, "the node did not begin")
+        run.send_signal(signal.SIGINT)
+        _, said = run.communicate(timeout=200)
+        self.assertIn("marrow: stopping; it waits until the node that runs has ended", said)
+        self.assertIn("KeyboardInterrupt", said)
 
 
 if __name__ == "__main__":

@@ -213,7 +213,7 @@ TEST(Manifest, RelationsAreThoseOfADeclaration) {
   expect_refused([](json& j) { j["nodes"][0]["relations"][0]["type"] = "like"; }, "there is no relation 'like'");
 }
 TEST(Manifest, HasAllFieldsAndNoOthers) {
-  expect_refused([](json& j) { j["more"] = 1; }, "it has 8 fields, expected 7");
+  expect_refused([](json& j) { j["more"] = 1; }, "it has 9 fields, expected 8");
   expect_refused([](json& j) { j["nodes"][0].erase("random"); }, "a node has 7 fields, expected 8");
   expect_refused([](json& j) { j["nodes"] = "none"; }, "'nodes' is not a list");
   expect_refused([](json& j) { j["nodes"] = {1}; }, "a node is not an object");

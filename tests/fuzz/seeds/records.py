@@ -207,10 +207,12 @@ def manifest_seeds():
         "options": options,
     }
     manifest = {
-        "marrow_manifest": 2,
+        "marrow_manifest": 4,
         "library": "0123456789abcdef0123456789abcdef",
         "refused": "",
         "linked": [{"path": "/usr/lib/a.so", "size": 5}],
+        "searched": [{"path": "/usr/lib", "names": ["a"]}],
+        "kinds": [],
         "nodes": [node],
         "writers": [{"type": kind, "extension": "json", "help": "h"}],
         "checksum": "0" * 32,
