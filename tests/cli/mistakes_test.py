@@ -126,8 +126,16 @@ class Mistakes(Comparison):
         self.marrow(0, "run", "mine.yaml", "x=good")
         self.marrow(1, "run", "mine.yaml", "x=bad")
         self.assertEqual([path.name for path in (self.scratch / "runs").iterdir()], ["mine"])
+        self.write("good", "refuse")
+        self.marrow(1, "rerun", "runs/mine")
+        self.assertEqual([path.name for path in (self.scratch / "runs").iterdir()], ["mine"])
         self.marrow(1, "run", "mine.yaml", "x=bad", "--out", "asked")
         self.assertTrue((self.scratch / "asked" / "run.json").exists(), "it was asked for")
+
+    def test_a_long_word_is_no_format(self):
+        for text in ("marrow-" + 3_000_000 * "a" + ": 1\n", "marrow" + 3_000_000 * " " + ": 1\n"):
+            self.write("long.yaml", text)
+            self.assertIn("long.yaml", self.marrow(2, "check", "long.yaml").stderr)
 
     def test_tabs(self):
         for text, line in (

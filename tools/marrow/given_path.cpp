@@ -44,9 +44,10 @@ std::optional<Thing> thing_in_folder(const fs::path& folder) {
   return std::nullopt;
 }
 
-/// By the first of the keys that only one kind of file has at its top level.
+/// By the first of the keys that only one kind of file has at its top level. Everything in the expression is bounded:
+/// it is matched by recursion.
 std::optional<Thing> thing_in_text(const std::string& text, const std::string& name) {
-  static const std::regex kKey("(?:^|[\\n\\r]|\xEF\xBB\xBF)(experiment|variants|marrow|nodes|marrow-[a-z-]+)[ \\t]*:");
+  static const std::regex kKey("(?:^|[\\n\\r]|\xEF\xBB\xBF)(experiment|variants|marrow|nodes|marrow-[a-z-]{1,40}) ?:");
   std::smatch key;
   if (!std::regex_search(text, key, kKey)) return std::nullopt;
   if (key[1] == "experiment" || key[1] == "variants")

@@ -4,6 +4,7 @@
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "difference/findings.hpp"
+#include "fruitless_run.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -14,9 +15,11 @@ int rerun(const RerunRequest& request) {
   Pipeline pipeline;
   if (!load({request.run / "pipeline.yaml", {}, {}}, catalogue, pipeline, true)) return 2;
   expect_good_place(pipeline, request.folder, nullptr);
-  RunFolder folder = request.folder.empty() ? RunFolder::with_free_name(
-                                                  std::filesystem::path("runs") / (pipeline.name + "-rerun"), pipeline)
+  const std::filesystem::path runs = "runs";
+  FolderOfItsOwn own(runs);
+  RunFolder folder = request.folder.empty() ? RunFolder::with_free_name(runs / (pipeline.name + "-rerun"), pipeline)
                                             : RunFolder(request.folder, pipeline);
+  if (request.folder.empty()) own.take(folder.path());
   RunRequest how;
   how.seed = before.seed;
   how.threads = before.threads;
@@ -28,6 +31,7 @@ int rerun(const RerunRequest& request) {
   // The store is not used: a result that is read back proves nothing, and a different result must not replace the
   // first.
   const RunOutcome outcome = execute(pipeline, catalogue, how, before.arguments, nullptr, folder);
+  own.keep_if_fruitful(pipeline, outcome);
   if (outcome.result.cancelled()) return 130;
   KnownValues values;
   for (const NodeRecord& node : outcome.result.nodes)
