@@ -11,6 +11,7 @@
 #include "keys.hpp"
 #include "named_files.hpp"
 #include "no_process.hpp"
+#include "output_faults.hpp"
 #include "plugin_code.hpp"
 #include "python_file.hpp"
 #include "reason_of_exception.hpp"
@@ -22,6 +23,14 @@ namespace marrow {
 namespace {
 
 using Status = NodeRecord::Status;
+
+void expect_sound(const std::vector<Value>& outputs, const std::vector<PortInfo>& ports) {
+  for (std::size_t i = 0; i < outputs.size(); ++i)
+    for_leaves(outputs[i], [&](const Value& leaf) {
+      if (const std::string fault = fault_of_sizes(leaf); !fault.empty())
+        throw Error("it gave an output '" + ports.at(i).name + "' that cannot be: " + fault);
+    });
+}
 
 /// Sets the key of a value: the content hash of data, or the key of a function, which is made from the recipe. A
 /// function also keeps the node's inputs alive.
@@ -57,6 +66,7 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
     // Isolated: a thread that waits inside this node must not take up work of another node, because that would add to
     // the time of this node.
     result.outputs = tbb::this_task_arena::isolate([&] { return call_node(node, inputs, item, recipe, warnings); });
+    expect_sound(result.outputs, pipeline_.nodes[node].info.outputs);
     check_unchanged(node, inputs, recipe, before);
     seconds = seconds_since(start);
     for (std::size_t i = 0; i < result.outputs.size(); ++i) finish_value(result.outputs[i], recipe.key, i, inputs);

@@ -130,6 +130,31 @@ TEST_F(HostileNodes, SettingsOfOpenCvArePutBack) {
   expect_changed("threads of OpenCV", "a setting of OpenCV was changed");
 }
 
+TEST_F(HostileNodes, TheyMayLieAboutSizes) {
+  for (
+      const auto& [about, reason] :
+      {std::pair<std::string, std::string>(
+           "volume",
+           "it gave an output 'volume' that cannot be: its grid has 1000 x 1000 x 1000 voxels, but there are 8 values"),
+       {"mesh",
+        "it gave an output 'mesh' that cannot be: a triangle has the vertex 1000000, but there are 3 vertices, counted "
+        "from 0"}}) {
+    marrow::Diagnostics diagnostics;
+    pipeline = marrow::read_pipeline(scratch.write("lies.yaml",
+                                                   "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: 5}}\n"
+                                                   "  bad: {uses: test.liar, in: {a: c}, with: {about: " +
+                                                       about +
+                                                       "}, may_fail: true}\n"
+                                                       "outputs: {bad: bad." +
+                                                       about + "}\n"),
+                                     {}, catalogue, diagnostics);
+    ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+    const marrow::RunResult result = marrow::run_pipeline(pipeline, catalogue, {});
+    EXPECT_EQ(node(result, "bad").status, Status::failed_alone);
+    EXPECT_EQ(node(result, "bad").reason, reason);
+  }
+}
+
 TEST_F(HostileNodes, NothingWrongIsKept) {
   const marrow::Store kept(scratch.path / "store");
   store = &kept;

@@ -90,6 +90,26 @@ Metrics hostile(const Metrics& a, const HostileOptions& options) {
   return a;
 }
 
+struct LiarOptions {
+  std::string about = "volume";
+};
+
+struct Lies {
+  std::optional<marrow::Volume> volume;
+  std::optional<marrow::Mesh> mesh;
+};
+
+/// A value that holds less than it says.
+Lies lie(const Metrics&, const LiarOptions& options) {
+  Lies lies;
+  if (options.about == "mesh")
+    lies.mesh = marrow::Mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 1, 1000000}}};
+  else
+    lies.volume.emplace().grid.size = {1000, 1000, 1000};
+  if (lies.volume) lies.volume->values.resize(8);
+  return lies;
+}
+
 double third() {
   const volatile double one = 1, three = 3;
   return one / three;
@@ -127,6 +147,12 @@ MARROW_PLUGIN(plugin) {
       .in("a", "number")
       .out("number", "the same")
       .option("how", &HostileOptions::how, "what it does");
+  plugin.node("test.liar", lie)
+      .summary("Gives a value that holds less than it says")
+      .in("a", "anything")
+      .out("volume", &Lies::volume, "a volume")
+      .out("mesh", &Lies::mesh, "a mesh")
+      .option("about", &LiarOptions::about, "volume or mesh");
   plugin.node("test.sensitive", sensitive)
       .summary("What it gives shows harm that was done")
       .in("a", "number")
