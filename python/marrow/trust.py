@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Modules that others could change are not imported by a node written in Python."""
+import os
+import sys
+from importlib.machinery import ModuleSpec
+from typing import Any, List, Optional
+
+from . import _core
+from .errors import Error
+from .installed import is_standard
+
+
+class TrustedModules:
+    """Asked first for each module. It has the other finders look, and refuses what they find in a place into which
+    others may write, before it runs."""
+
+    def __init__(self) -> None:
+        self.fault = ""
+
+    def find_spec(self, name: str, path: Any = None, target: Any = None) -> Optional[ModuleSpec]:
+        for finder in sys.meta_path:
+            find = getattr(finder, "find_spec", None)
+            if finder is self or find is None:
+                continue
+            spec: Optional[ModuleSpec] = find(name, path, target)
+            if spec is not None:
+                self._expect_trusted(spec)
+                return spec
+        return None
+
+    def expect_none_refused(self) -> None:
+        """A file may catch the error of an import and go on without it, but not without a word."""
+        if self.fault:
+            raise Error(self.fault)
+
+    def _expect_trusted(self, spec: ModuleSpec) -> None:
+        if not spec.has_location or not spec.origin or is_standard(spec.origin):
+            return
+        files = [_existing(spec.origin)]
+        if spec.cached and os.path.isfile(spec.cached):
+            files.append(spec.cached)
+        fault = untrusted_among(files)
+        if fault:
+            self.fault = self.fault or "module '%s' %s" % (spec.name, fault)
+            raise ImportError(self.fault, name=spec.name, path=spec.origin)
+
+
+def _existing(path: str) -> str:
+    """The archive of a module that lies in one."""
+    while not os.path.exists(path):
+        path = os.path.dirname(path)
+    return path
+
+
+def untrusted_among(files: List[str]) -> str:
+    return _core.untrusted_among([os.fsencode(os.path.abspath(one)) for one in files], os.stat(sys.executable).st_uid)
