@@ -168,6 +168,8 @@ json PythonNodes::ask(const NodeInfo& node, json request, const PythonArguments&
     if (!end.died) give_back(std::move(process));
     throw Error(failure_of_call(described_.file, node, end, limits));
   }
+  // It has changed what all calls in its process share. So the process is ended.
+  if (end.answer.contains("spoilt")) throw Error(end.answer.at("spoilt").get<std::string>());
   if (outputs) *outputs = handed_over(process->worker, process->made, content_of_own);
   learn(end.answer);
   give_back(std::move(process));

@@ -44,7 +44,7 @@ class Process:
         self.reported: Any = None  # how much was loaded and looked for when it was last reported
         self.context: Optional[Context] = None
         self.state: Optional[KeptState] = None  # from the first call on
-        self.is_spoilt = False  # a call has changed the state of the process, which ends then
+        self.is_spoilt = False  # a call has changed the state of the process
         self.trusted = TrustedModules()
 
     def load(self) -> Dict[str, Declaration]:
@@ -355,12 +355,12 @@ def main(arguments: List[str], places: Dict[str, List[str]]) -> int:
         answered = answer(process, request, answers)
         if os.getpid() != own:
             os._exit(1)  # a process that the node forked came out of the node's code: it must not answer
+        if process.is_spoilt:  # it is of no use for another call
+            answered = {"end": {"spoilt": answered["failed"]}}
         try:
             answers.send(answered)
         except Error as error:
             answers.send({"failed": str(error)})
-        if process.is_spoilt:
-            break  # the next call starts a new one
     return 0
 
 
