@@ -2,6 +2,7 @@
 #include <marrow/plugin.hpp>
 #include <tuple>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
@@ -32,7 +33,7 @@ Hole hole_from(const YamlMap& map, const std::string& name) {
   if (const auto diameter = map.number("diameter_mm")) {
     hole.diameter_mm = *diameter;
     if (!(*diameter > 0))
-      map.fault("diameter_mm", "diameter_mm: expected more than 0, got " + std::to_string(*diameter));
+      map.fault("diameter_mm", "diameter_mm: expected more than 0, got " + formatted("%f", *diameter));
   }
   return hole;
 }
@@ -54,10 +55,10 @@ std::vector<Hole> read_holes(const std::filesystem::path& path) {
   return read;
 }
 
-std::tuple<Implant, Mesh> implant(const Options& options) {
+std::tuple<Implant, Mesh> implant(const Options& options, Context& context) {
   Implant implant;
   implant.holes = read_holes(options.holes);
-  implant.surface = exchange::read_surface_file(options.surface, options.scale);
+  implant.surface = exchange::read_surface_file(options.surface, options.scale, context);
   implant.surface.frame = "implant";
   geometry::check_implant(implant, "read.implant: " + options.surface.string());
   return {implant, implant.surface};

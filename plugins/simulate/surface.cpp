@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/field/mesh_field.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
@@ -30,14 +31,14 @@ struct SurfaceOptions {
   double fat_mm = 12;
 };
 
-Mesh placed(const std::filesystem::path& path, const SurfaceOptions& options) {
-  Mesh mesh = exchange::read_surface_file(path, 1);
+Mesh placed(const std::filesystem::path& path, const SurfaceOptions& options, const Context& context) {
+  Mesh mesh = exchange::read_surface_file(path, options.scale, context);
   const auto about = [&](std::size_t k, const Eigen::Vector3d& axis) {
     return Eigen::AngleAxisd(radians(options.rotation_deg[k]), axis).toRotationMatrix();
   };
   const Eigen::Matrix3d rotation =
       about(2, Eigen::Vector3d::UnitZ()) * about(1, Eigen::Vector3d::UnitY()) * about(0, Eigen::Vector3d::UnitX());
-  for (auto& vertex : mesh.vertices_mm) vertex = options.scale * (rotation * vertex);
+  for (auto& vertex : mesh.vertices_mm) vertex = (rotation * vertex).eval();
   mesh.frame = "bone";
   return mesh;
 }
@@ -64,10 +65,10 @@ Mesh endosteum(const Mesh& outer, const Eigen::Vector3d& low, const Eigen::Vecto
   return inner;
 }
 
-Bone surface(const SurfaceOptions& options) {
+Bone surface(const SurfaceOptions& options, Context& context) {
   Bone bone;
-  bone.outer = placed(options.outer, options);
-  if (!options.inner.empty()) bone.inner = placed(options.inner, options);
+  bone.outer = placed(options.outer, options, context);
+  if (!options.inner.empty()) bone.inner = placed(options.inner, options, context);
   Eigen::Vector3d low = bone.outer.vertices_mm.front(), high = low;
   for (const auto& vertex : bone.outer.vertices_mm) {
     low = low.cwiseMin(vertex);
@@ -76,8 +77,8 @@ Bone surface(const SurfaceOptions& options) {
   const Eigen::Vector3d extent = high - low;
   if (options.long_bone && extent.z() < std::max(extent.x(), extent.y()))
     throw Error("simulate.surface: the bone's long axis must lie along z with the distal end low, but it extends " +
-                std::to_string(extent.x()) + " x " + std::to_string(extent.y()) + " x " + std::to_string(extent.z()) +
-                " mm; turn it with rotation_deg");
+                formatted("%f", extent.x()) + " x " + formatted("%f", extent.y()) + " x " +
+                formatted("%f", extent.z()) + " mm; turn it with rotation_deg");
   if (!options.cortex_mm.empty()) {
     if (!options.inner.empty())
       throw Error("simulate.surface: the inner surface is given by a file and by cortex_mm; give one of them");

@@ -116,14 +116,26 @@ TEST(ReadMesh, DegenerateTrianglesAreLeftOut) {
   EXPECT_EQ(read(folder / "a.stl").triangles.size(), 4u);
 }
 
-TEST(ReadMesh, WarnsOfASurfaceInMetres) {
+// The tetrahedron is as large as `scale`. A femur has 414 mm: 0.414 m, 414000 micrometres.
+TEST(ReadMesh, WarnsOfASizeThatNoBoneHasAndNamesTheUnit) {
   const TemporaryFolder folder;
   put(folder / "a.stl", stl_text());
-  std::string warning;
-  marrow::Context::Hooks hooks;
-  hooks.log = [&](std::string_view message, marrow::LogLevel) { warning = message; };
-  read(folder / "a.stl", 0.4, marrow::Context(hooks));
-  EXPECT_NE(warning.find("is it in metres? Then give scale: 1000"), std::string::npos) << warning;
+  const auto said = [&](double scale) {
+    std::string warning;
+    marrow::Context::Hooks hooks;
+    hooks.log = [&](std::string_view message, marrow::LogLevel) { warning += message; };
+    read(folder / "a.stl", scale, marrow::Context(hooks));
+    return marrow::test::without_folder(warning, folder.path());
+  };
+  const std::string usual = " mm large, where bones and implants have 5 to 1000";
+  EXPECT_EQ(said(0.414), "/a.stl: the surface is 0.414" + usual + "; looks like m: give scale: 414");
+  EXPECT_EQ(said(1), "/a.stl: the surface is 1" + usual + "; looks like cm: give scale: 10");
+  EXPECT_EQ(said(4.9), "/a.stl: the surface is 4.9" + usual + "; looks like cm: give scale: 49");
+  EXPECT_EQ(said(5.1), "");
+  EXPECT_EQ(said(999), "");
+  EXPECT_EQ(said(1001), "/a.stl: the surface is 1001" + usual);
+  EXPECT_EQ(said(414000), "/a.stl: the surface is 4.14e+05" + usual + "; looks like micrometres: give scale: 414");
+  EXPECT_EQ(said(0.001), "/a.stl: the surface is 0.001" + usual);
 }
 
 TEST(ReadMesh, DamagedFilesAreDiagnosed) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Wavefront OBJ: lines "v x y z" and "f 1 2 3". Of a corner "7/2/5" the first number names the vertex. Numbers begin at
-// 1; negative ones count back from the last vertex. Normals, textures, groups and materials are passed over.
+// 1; negative ones count back from the last vertex. Normals, textures, groups and materials are passed over. A line of
+// numbers that ends with \ goes on in the next one.
 #include <algorithm>
 #include <charconv>
 #include <string_view>
@@ -21,10 +22,9 @@ class ObjReader {
 
   FilePolygons read(std::string_view text) {
     while (!text.empty()) {
-      ++line_;
-      const std::size_t end = std::min(text.find('\n'), text.size());
-      read_line(text.substr(0, end));
-      text.remove_prefix(std::min(end + 1, text.size()));
+      line_ += lines_read_;
+      lines_read_ = 0;
+      read_line(next_line(text));
     }
     if (result_.polygons.corner_counts.empty())
       throw Error(what_ + ": there is no face ('f 1 2 3') in it; it is cut off, or no OBJ");
@@ -36,6 +36,26 @@ class ObjReader {
     throw Error(what_ + ":" + std::to_string(line_) + ": " + what);
   }
   static std::string shown(std::string_view word) { return in_quotes(printable(word.substr(0, 40))); }
+
+  /// The next line with those that continue it. A comment or a name may end with \ as well, as a folder's name does.
+  std::string_view next_line(std::string_view& text) {
+    static constexpr std::string_view kNumbers[] = {"v", "f", "l", "p", "vn", "vt", "vp"};
+    std::string_view line = taken_line(text), rest = line;
+    if (std::find(std::begin(kNumbers), std::end(kNumbers), next_word(rest)) == std::end(kNumbers)) return line;
+    if (!line.ends_with('\\')) return line;
+    joined_.clear();
+    for (; line.ends_with('\\') && !text.empty(); line = taken_line(text))
+      joined_ += std::string(line.substr(0, line.size() - 1)) + " ";
+    return joined_ += line;
+  }
+  /// A line without blanks at its end, taken from the text.
+  std::string_view taken_line(std::string_view& text) {
+    ++lines_read_;
+    std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(line.size() + 1, text.size()));
+    while (line.ends_with(' ') || line.ends_with('\t')) line.remove_suffix(1);
+    return line;
+  }
 
   static std::string_view next_word(std::string_view& text) {
     const auto is_space = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
@@ -52,7 +72,7 @@ class ObjReader {
     const std::string_view key = next_word(rest);
     if (key.empty()) return;
     if (key[0] == '#') {
-      if (line.find("SPACE=RAS") != std::string_view::npos) result_.is_ras = true;
+      result_.space.look_into(line);
     } else if (key == "v") {
       read_vertex(rest);
     } else if (key == "f") {
@@ -101,17 +121,19 @@ class ObjReader {
   }
 
   std::string what_;
-  std::size_t line_ = 0;
+  std::size_t line_ = 1, lines_read_ = 0;  ///< the first line of the one that is read, and how many there are
+  std::string joined_;
   FilePolygons result_;
 };
 
 }  // namespace
 
 FilePolygons read_obj(const std::filesystem::path& path) {
-  return ObjReader(path).read(files::read_bytes(path, kMostSurfaceBytes));
+  return ObjReader(path).read(files::read_text(path, kMostSurfaceBytes));
 }
 
 std::string obj_text(const Mesh& mesh) {
+  check_mesh(mesh, "the surface cannot be written as .obj");
   std::string text = "# marrow, mm, SPACE=LPS, frame " + printable(mesh.frame) + "\n";
   for (const Eigen::Vector3d& vertex : mesh.vertices_mm) {
     text += "v";
@@ -124,23 +146,6 @@ std::string obj_text(const Mesh& mesh) {
     text += "\n";
   }
   return text;
-}
-
-Mesh read_surface_file(const std::filesystem::path& path, double scale) {
-  const std::string what = path.string();
-  std::string end = path.extension().string();
-  for (char& c : end) c = char(std::tolower(static_cast<unsigned char>(c)));
-  if (end == ".stl" || end == ".ply") return files::read_mesh_file(path, scale);
-  if (end != ".obj" && end != ".vtp")
-    throw Error(what + ": not a surface that can be read; known are .stl, .ply, .obj and .vtp");
-  const FilePolygons file = end == ".obj" ? read_obj(path) : read_vtp(path);
-  Mesh mesh = files::mesh_of(file.polygons, what);
-  for (Eigen::Vector3d& vertex : mesh.vertices_mm) {
-    if (file.is_ras) vertex.head<2>() *= -1;
-    vertex *= scale;
-  }
-  check_mesh(mesh, what);
-  return mesh;
 }
 
 }  // namespace marrow::exchange

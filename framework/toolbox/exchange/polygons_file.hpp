@@ -7,10 +7,10 @@
 
 namespace marrow::exchange {
 
-/// What an OBJ or VTP file holds. `is_ras`: it says that its coordinates are RAS.
+/// What an OBJ or VTP file holds.
 struct FilePolygons {
   files::Polygons polygons;
-  bool is_ras = false;
+  files::SpaceMark space;
 };
 FilePolygons read_obj(const std::filesystem::path& path);
 FilePolygons read_vtp(const std::filesystem::path& path);

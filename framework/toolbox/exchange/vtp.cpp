@@ -13,7 +13,7 @@
 #include <vtkXMLPolyDataWriter.h>
 
 #include <algorithm>
-#include <cstdlib>
+#include <charconv>
 #include <limits>
 #include <stdexcept>
 
@@ -74,9 +74,11 @@ class Listening {
 double claimed(const std::string& bytes, std::size_t end, const std::string& name) {
   double sum = 0;
   for (std::size_t at = 0; (at = bytes.find(name, at)) < end;) {
-    at = std::min(bytes.find_first_not_of(" \t\r\n='\"", at + name.size()), bytes.size());
-    const double count = std::strtod(bytes.substr(at, 24).c_str(), nullptr);
-    sum += count >= 0 ? count : std::numeric_limits<double>::infinity();
+    at = std::min(bytes.find_first_not_of(" \t\r\n='\"+", at + name.size()), bytes.size());
+    double count = 0;
+    const auto end_of_number = std::from_chars(bytes.data() + at, bytes.data() + bytes.size(), count);
+    const bool is_claim = count >= 0 && end_of_number.ec != std::errc::result_out_of_range;
+    sum += is_claim ? count : std::numeric_limits<double>::infinity();
   }
   return sum;
 }
@@ -94,11 +96,27 @@ void check_claims(const std::string& bytes, const std::string& what) {
   }
 }
 
+/// The value of an attribute in the text of a tag; empty if there is none. XML allows both quotes, and blanks about
+/// '='.
+std::string_view attribute(std::string_view tag, std::string_view name) {
+  constexpr std::string_view kBlanks = " \t\r\n";
+  for (std::size_t at = tag.find(name, 1); at != std::string_view::npos; at = tag.find(name, at + 1)) {
+    if (kBlanks.find(tag[at - 1]) == std::string_view::npos) continue;  // the end of a longer name
+    const std::size_t equals = tag.find_first_not_of(kBlanks, at + name.size());
+    if (equals == std::string_view::npos || tag[equals] != '=') continue;
+    const std::size_t quote = tag.find_first_not_of(kBlanks, equals + 1);
+    if (quote == std::string_view::npos || (tag[quote] != '"' && tag[quote] != '\'')) continue;
+    const std::size_t end = tag.find(tag[quote], quote + 1);
+    if (end != std::string_view::npos) return tag.substr(quote + 1, end - quote - 1);
+  }
+  return {};
+}
+
 void check_is_vtp(const std::string& bytes, const std::string& what) {
-  const std::string begin = bytes.substr(0, 4096);
-  if (begin.find("<VTKFile") == std::string::npos)
+  const std::size_t begin = bytes.find("<VTKFile");
+  if (begin == std::string::npos)
     throw Error(what + ": expected a surface of VTK in XML, with <VTKFile at its beginning; export it again as .vtp");
-  if (begin.find("type=\"PolyData\"") == std::string::npos)
+  if (attribute(std::string_view(bytes).substr(begin, bytes.find('>', begin) - begin), "type") != "PolyData")
     throw Error(what + ": its type is not PolyData, so it is no surface; export the surface as .vtp");
 }
 
@@ -124,7 +142,7 @@ FilePolygons polygons_of(vtkPolyData& data, const std::string& what) {
   }
   if (counts.empty()) throw Error(what + ": there is no polygon in it; export the surface again as .vtp");
   auto* const space = vtkStringArray::SafeDownCast(data.GetFieldData()->GetAbstractArray("SPACE"));
-  result.is_ras = space && space->GetNumberOfValues() > 0 && space->GetValue(0).find("RAS") != std::string::npos;
+  if (space && space->GetNumberOfValues() > 0) result.space.look_into("SPACE=" + space->GetValue(0));
   return result;
 }
 
@@ -150,6 +168,7 @@ FilePolygons read_vtp(const std::filesystem::path& path) {
 }
 
 std::string vtp_bytes(const Mesh& mesh) {
+  check_mesh(mesh, "the surface cannot be written as .vtp");
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
   for (const Eigen::Vector3d& vertex : mesh.vertices_mm) points->InsertNextPoint(vertex.data());

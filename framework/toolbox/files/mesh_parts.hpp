@@ -8,7 +8,7 @@
 #include <string_view>
 #include <unordered_map>
 
-#include "marrow/domain/mesh.hpp"
+#include "marrow/toolbox/files/mesh_file.hpp"
 
 namespace marrow::files {
 
@@ -62,7 +62,12 @@ class Words {
     if (word.empty() || failure != std::errc() || end != word.data() + word.size()) return std::nullopt;
     return value;
   }
-  void skip_line() { at_ = std::min(text_.find('\n', at_), text_.size()); }
+  /// What is left of the line, and goes on after it.
+  std::string_view rest_of_line() {
+    const std::size_t begin = at_;
+    at_ = std::min(text_.find('\n', at_), text_.size());
+    return text_.substr(begin, at_ - begin);
+  }
   bool is_at_end() {
     skip_space();
     return at_ == text_.size();
@@ -80,7 +85,9 @@ class Words {
 /// Adds a face as triangles, as a fan from one of its corners. Throws Error if no fan covers it exactly once.
 void add_polygon(const std::vector<std::uint32_t>& polygon, MeshBuilder& builder, const std::string& what);
 
-/// A surface from the bytes of a PLY file. `what` names it in messages. Throws Error if it is damaged or not supported.
-Mesh read_ply(const std::string& bytes, const std::string& what);
+/// A surface from the bytes of an STL or PLY file. `what` names it in messages. Throw Error if it is damaged or not
+/// supported.
+MarkedMesh read_stl(std::string bytes, const std::string& what);
+MarkedMesh read_ply(std::string bytes, const std::string& what);
 
 }  // namespace marrow::files

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // PLY as text or binary in either byte order. The file's size bounds all work, because each item takes at least one
-// byte.
+// byte. Its comments may hold a mark of the coordinates.
 #include <cmath>
 #include <cstring>
 #include <map>
 #include <vector>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
+#include "marrow/domain/plain_text.hpp"
 #include "mesh_parts.hpp"
 
 namespace marrow::files {
@@ -30,6 +32,7 @@ enum class Format { text, little, big };
 struct PlyHeader {
   Format format = Format::text;
   std::vector<Element> elements;
+  SpaceMark space;
   std::size_t end = 0;  ///< offset of the body
 };
 
@@ -38,8 +41,11 @@ class HeaderReader {
   HeaderReader(const std::string& bytes, const std::string& what) : bytes_(bytes), what_(what) {}
 
   PlyHeader read() {
+    const std::size_t first_end = std::min(bytes_.find_first_of("\r\n"), bytes_.size());
+    const char line_end =
+        bytes_.compare(first_end, 1, "\r") == 0 && bytes_.compare(first_end, 2, "\r\n") != 0 ? '\r' : '\n';
     for (line_number_ = 1;; ++line_number_) {
-      const std::size_t end = bytes_.find('\n', header_.end);
+      const std::size_t end = bytes_.find(line_end, header_.end);
       if (end == std::string::npos || end - header_.end > 4096 || line_number_ > 2000)
         throw Error(what_ + ": its header has no 'end_header'; it is cut off, or no PLY");
       Words line(std::string_view(bytes_).substr(header_.end, end - header_.end));
@@ -47,6 +53,7 @@ class HeaderReader {
       const std::string_view word = line.next();
       if (line_number_ == 1 && word != "ply") throw Error(what_ + ": does not begin with 'ply'; it is no PLY file");
       if (word == "format") read_format(line);
+      if (word == "comment") header_.space.look_into(line.rest_of_line());
       if (word == "element") read_element(line);
       if (word == "property") read_property(line);
       if (word == "end_header") break;
@@ -240,8 +247,7 @@ void read_polygon(const Property& property, Body& body, MeshBuilder& builder, co
   for (std::uint32_t& vertex : polygon) {
     const double corner = body.next(property.type);
     if (!(corner >= 0) || corner >= double(index.size()) || corner != std::floor(corner)) {
-      char text[32];
-      std::snprintf(text, sizeof text, "%.10g", corner);
+      const std::string text = formatted("%.10g", corner);
       throw Error(what + ": a face names vertex " + text + "; there are " + std::to_string(index.size()));
     }
     vertex = index[std::size_t(corner)];
@@ -261,7 +267,8 @@ void read_faces(const Element& element, Body& body, MeshBuilder& builder, const 
 
 }  // namespace
 
-Mesh read_ply(const std::string& bytes, const std::string& what) {
+MarkedMesh read_ply(std::string bytes, const std::string& what) {
+  if (begins_as_utf16(bytes) || bytes.starts_with("\xEF\xBB\xBF")) bytes = plain_text(std::move(bytes));
   const PlyHeader header = HeaderReader(bytes, what).read();
   Body body(header.format, std::string_view(bytes).substr(header.end), what);
   std::size_t faces = 0;
@@ -282,7 +289,7 @@ Mesh read_ply(const std::string& bytes, const std::string& what) {
     }
   }
   body.finish();
-  return std::move(builder.mesh);
+  return {std::move(builder.mesh), header.space};
 }
 
 }  // namespace marrow::files

@@ -3,12 +3,26 @@
 #include <filesystem>
 
 #include "marrow/domain/mesh.hpp"
+#include "marrow/toolbox/files/space_mark.hpp"
 
 namespace marrow::files {
 
+/// A surface with the numbers of its file, and what the file says about its coordinates.
+struct MarkedMesh {
+  Mesh mesh;
+  SpaceMark space;
+};
+
 /// Reads a triangle surface from STL (text or binary) or PLY (text or binary in either byte order). Vertices with equal
-/// coordinates are merged. Triangles with two equal corners are left out. Coordinates are multiplied by `scale`, which
-/// must make them mm. Throws Error for another extension, a damaged file, or a mesh that check_mesh() refuses.
+/// coordinates are merged. Triangles with two equal corners are left out. Throws Error for another extension or a
+/// damaged file.
+MarkedMesh read_marked_mesh(const std::filesystem::path& path);
+
+/// The surface in LPS: coordinates that are marked as RAS are turned by 180 degrees about z. Then they are multiplied
+/// by `scale`, which must make them mm. Throws Error if check_mesh() refuses the result; `what` names the file.
+Mesh in_lps_mm(MarkedMesh marked, double scale, const std::string& what);
+
+/// Both of the above. exchange::read_surface_file() reads more formats, and looks for faults.
 Mesh read_mesh_file(const std::filesystem::path& path, double scale);
 
 /// Points, and faces that name their corners by number: the first face has corner_counts[0] corners, and so on.
