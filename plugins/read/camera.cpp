@@ -13,18 +13,21 @@ struct Options {
   int projection = 0;
   std::vector<double> size_px, pixel_mm, corner_mm;
   std::string mirror = "none";
+  double scale = 1;
 };
 
 /// Where the file says how large its images are, a wired one must be so; a size in numbers is refused there.
 Camera camera(const Image* image, const Options& options, Context& context) {
   const exchange::CameraFormat format = exchange::camera_format(options.path);
-  const bool has_size = format == exchange::CameraFormat::own || format == exchange::CameraFormat::xreg;
+  const bool is_alone = format == exchange::CameraFormat::own || format == exchange::CameraFormat::xmalab,
+             has_size = is_alone || format == exchange::CameraFormat::xreg;
   if (has_size && !options.size_px.empty())
     throw Error(options.path.string() + ": size_px is not for this format of cameras; leave it out");
-  exchange::CameraReading reading{
-      options.projection, {options.size_px, options.pixel_mm, options.corner_mm}, exchange::mirror_of(options.mirror)};
-  if (reading.projection == 0 &&
-      (format == exchange::CameraFormat::own || format == exchange::CameraFormat::plastimatch))
+  exchange::CameraReading reading{options.projection,
+                                  {options.size_px, options.pixel_mm, options.corner_mm},
+                                  exchange::mirror_of(options.mirror),
+                                  options.scale};
+  if (reading.projection == 0 && (is_alone || format == exchange::CameraFormat::plastimatch))
     reading.projection = -1;  // the default
   if (image) reading.size.size_px = {double(image->width()), double(image->height())};
   const DistortedCamera read = exchange::read_camera(options.path, reading);
@@ -32,6 +35,8 @@ Camera camera(const Image* image, const Options& options, Context& context) {
     context.warn(options.path.string() +
                  ": the images of this camera are distorted, which only read.view, read.views and read.case remove, "
                  "with the camera file as their option; the camera is that of the image without distortion");
+  if (const std::string doubt = exchange::doubt_about_unit(options.path, read.camera, options.scale); !doubt.empty())
+    context.warn(doubt);
   return read.camera;
 }
 
@@ -57,5 +62,9 @@ MARROW_PLUGIN(plugin) {
       .option("mirror", &Options::mirror,
               "RTK and xReg: how their images, which are seen from the detector or have rows from below, are turned "
               "over before use, as by the same option of read.view or read.image",
-              one_of({"none", "left_right", "upside_down"}));
+              one_of({"none", "left_right", "upside_down"}))
+      .option(
+          "scale", &Options::scale,
+          "factor that converts the unit of the camera file to mm: 10 for cm, 1000 for metres; not for marrow's YAML",
+          at_least(1e-6));
 }

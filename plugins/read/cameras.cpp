@@ -5,6 +5,7 @@
 #include <marrow/plugin.hpp>
 #include <numeric>
 
+#include "marrow/toolbox/exchange/camera_file.hpp"
 #include "marrow/toolbox/exchange/projections.hpp"
 
 namespace {
@@ -16,6 +17,7 @@ struct Options {
   std::vector<std::string> names;
   std::vector<double> projections, size_px, pixel_mm, corner_mm;
   std::string mirror = "none";
+  double scale = 1;
 };
 
 /// The projections' numbers; without them the first ones, as many as there are names.
@@ -28,7 +30,7 @@ std::vector<int> numbers_of(const Options& options) {
   return numbers;
 }
 
-List<Camera> cameras(const Options& options) {
+List<Camera> cameras(const Options& options, Context& context) {
   if (exchange::projections_in(options.path) == exchange::Projections::xreg &&
       !(options.size_px.empty() && options.pixel_mm.empty() && options.corner_mm.empty()))
     throw Error(options.path.string() +
@@ -36,10 +38,12 @@ List<Camera> cameras(const Options& options) {
                 "corner_mm, which are for RTK's geometry");
   const std::vector<Camera> read = exchange::read_projections(options.path, numbers_of(options),
                                                               {options.size_px, options.pixel_mm, options.corner_mm},
-                                                              exchange::mirror_of(options.mirror));
+                                                              exchange::mirror_of(options.mirror), options.scale);
   List<Camera> cameras;
   for (std::size_t i = 0; i < read.size(); ++i) {
     check_item_name("view", options.names.at(i));
+    if (const std::string doubt = exchange::doubt_about_unit(options.path, read[i], options.scale); !doubt.empty())
+      context.warn("view '" + options.names[i] + "': " + doubt);
     cameras.add(options.names[i], read[i]);
   }
   return cameras;
@@ -68,5 +72,7 @@ MARROW_PLUGIN(plugin) {
       .option("mirror", &Options::mirror,
               "how the program's images, which are seen from the detector or have rows from below, are turned over "
               "before use, as by the same option of read.views",
-              one_of({"none", "left_right", "upside_down"}));
+              one_of({"none", "left_right", "upside_down"}))
+      .option("scale", &Options::scale,
+              "factor that converts the unit of the camera file to mm: 10 for cm, 1000 for metres", at_least(1e-6));
 }

@@ -6,6 +6,7 @@
 #include "marrow/domain/names.hpp"
 #include "marrow/toolbox/exchange/camera_file.hpp"
 #include "marrow/toolbox/files/escaped_name.hpp"
+#include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/image_sides.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
@@ -65,7 +66,7 @@ auto read_or_fault(const YamlMap& map, const std::string& key, Read read) -> std
   }
 }
 
-void read_ct(const fs::path& folder, const YamlMap& map, marrow::Case& result) {
+void read_ct(const fs::path& folder, const YamlMap& map, marrow::Case& result, marrow::Context& context) {
   const auto node = map.required("ct");
   if (!node) return;
   marrow::files::VolumeReading reading;
@@ -82,7 +83,8 @@ void read_ct(const fs::path& folder, const YamlMap& map, marrow::Case& result) {
     file = file_in(folder, map, "ct");
   }
   if (!file) return;
-  if (auto volume = read_or_fault(map, "ct", [&] { return marrow::files::read_volume_file(*file, reading); }))
+  const auto tell = [&](const std::string& line) { context.info(line); };
+  if (auto volume = read_or_fault(map, "ct", [&] { return marrow::files::read_volume_file(*file, reading, tell); }))
     result.ct = std::move(*volume);
 }
 
@@ -94,6 +96,10 @@ marrow::exchange::CameraReading camera_reading(const YamlMap& map) {
     if (reading.projection < 0) map.fault("projection", "projection: expected a whole number from 0");
   }
   const auto two = [&](const std::string& key) { return map.numbers(key, 2).value_or(std::vector<double>()); };
+  if (map.has("scale")) {
+    reading.scale = map.number("scale").value_or(1);
+    if (!(reading.scale >= 1e-6)) map.fault("scale", "scale: expected a factor of at least 1e-6, such as 10 for cm");
+  }
   if (map.has("pixel_mm")) reading.size.pixel_mm = two("pixel_mm");
   if (map.has("corner_mm")) reading.size.corner_mm = two("corner_mm");
   const std::string mirror = map.has("mirror") ? map.text("mirror").value_or("none") : "none";
@@ -105,7 +111,8 @@ marrow::exchange::CameraReading camera_reading(const YamlMap& map) {
 
 /// The camera of a view whose image is this one.
 std::optional<marrow::DistortedCamera> read_camera(const fs::path& folder, const YamlMap& map,
-                                                   const std::optional<marrow::Image>& image) {
+                                                   const std::optional<marrow::Image>& image,
+                                                   marrow::Context& context) {
   const auto node = map.required("camera");
   if (!node) return std::nullopt;
   const bool is_map = node->IsMap(), names_file = is_map && (*node)["file"];
@@ -113,7 +120,8 @@ std::optional<marrow::DistortedCamera> read_camera(const fs::path& folder, const
   marrow::exchange::CameraReading reading;
   std::optional<fs::path> file;
   if (names_file) {
-    const YamlMap camera(map.file(), *node, "camera", {"file", "projection", "pixel_mm", "corner_mm", "mirror"});
+    const YamlMap camera(map.file(), *node, "camera",
+                         {"file", "projection", "pixel_mm", "corner_mm", "mirror", "scale"});
     file = file_in(folder, camera, "file");
     reading = camera_reading(camera);
   } else {
@@ -125,7 +133,11 @@ std::optional<marrow::DistortedCamera> read_camera(const fs::path& folder, const
     if (!image) return std::nullopt;  // the file does not say how large it is
     reading.size.size_px = {double(image->width()), double(image->height())};
   }
-  return read_or_fault(map, "camera", [&] { return marrow::exchange::read_camera(*file, reading); });
+  const auto read = read_or_fault(map, "camera", [&] { return marrow::exchange::read_camera(*file, reading); });
+  if (!read) return std::nullopt;
+  if (const auto doubt = marrow::exchange::doubt_about_unit(*file, read->camera, reading.scale); !doubt.empty())
+    context.warn(doubt);
+  return read;
 }
 
 std::optional<marrow::Image> read_image(const fs::path& folder, const YamlMap& map, const std::string& key) {
@@ -140,6 +152,10 @@ std::optional<cv::Mat> read_mask(const fs::path& folder, const YamlMap& map, boo
   if (!mask) return std::nullopt;
   if (mask->pixels.type() != CV_8U)
     map.fault("mask", "mask: expected an image of 8 bits, zero where the view may not be used");
+  if (marrow::files::is_lossy_image(file_in(folder, map, "mask").value()))
+    map.fault("mask",
+              "mask: was compressed with loss (JPEG or the like), so what was zero may be so no more; save the "
+              "mask as PNG");
   const auto is_mirrored = [&](const std::string& key) {
     return marrow::files::is_mirrored_as_read(file_in(folder, map, key).value());
   };
@@ -149,14 +165,15 @@ std::optional<cv::Mat> read_mask(const fs::path& folder, const YamlMap& map, boo
   return mirrored;
 }
 
-/// Says what the image's header lets one doubt. A camera of angles shares the patient's axes with that header.
-void warn_of_sides(const fs::path& folder, const YamlMap& map, const marrow::Camera& camera, marrow::Context& context) {
+/// Says what the image's file lets one doubt. A camera of angles shares the patient's axes with that header.
+void warn_of_image(const fs::path& folder, const YamlMap& map, const marrow::Camera& camera, marrow::Context& context) {
   const fs::path image = file_in(folder, map, "image").value();
   const YAML::Node written = map.node("camera");
   const bool has_patient_axes = written.IsMap() && written["c_arm"];
   for (const std::string& doubt : has_patient_axes ? marrow::files::doubts_about_sides(image, 0, camera)
                                                    : marrow::files::doubts_about_sides(image))
     context.warn(doubt);
+  for (const std::string& doubt : marrow::files::doubts_about_pixels(image)) context.warn(doubt);
 }
 
 void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result, marrow::Context& context) {
@@ -165,7 +182,7 @@ void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result,
     if (const std::string fault = marrow::fault_of_item_name(*name); !fault.empty())
       return map.fault("name", "name: the name of a view " + fault + "; choose another");
   const auto image = read_image(folder, map, "image");
-  const auto camera = read_camera(folder, map, image);
+  const auto camera = read_camera(folder, map, image, context);
   marrow::View view;
   if (map.has("mask")) {
     const auto mask = read_mask(folder, map, image.has_value());
@@ -177,7 +194,7 @@ void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result,
   view.name = *name;
   view.image = *image;
   view.camera = camera->camera;
-  warn_of_sides(folder, map, view.camera, context);
+  warn_of_image(folder, map, view.camera, context);
   try {
     check_view(view);
     if (!camera->distortion.is_none()) remove_distortion(view, camera->distortion);
@@ -279,7 +296,7 @@ marrow::Case read_case(const Options& options, marrow::Context& context) {
   marrow::Case result;
   read_fragments(map, result);
   read_views(options.path, map, result, context);
-  read_ct(options.path, map, result);
+  read_ct(options.path, map, result, context);
   file.finish();
   if (!options.starts.empty()) result.start = read_starts(options.starts, result.seeds);
   return result;

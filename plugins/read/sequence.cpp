@@ -4,10 +4,12 @@
 
 #include "marrow/domain/names.hpp"
 #include "marrow/toolbox/exchange/view_file.hpp"
+#include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/sequence_files.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/track/sequence.hpp"
 #include "video.hpp"
+#include "video_container.hpp"
 
 namespace {
 
@@ -22,18 +24,26 @@ struct Options : files::FrameRange {
   std::vector<std::string> patterns;
   std::vector<fs::path> cameras;
   fs::path calibration;
+  double scale = 1;
 };
+
+void warn_of_pixels(const fs::path& image, Context& context) {
+  for (const std::string& doubt : files::doubts_about_pixels(image)) context.warn(doubt);
+}
 
 std::vector<Image> read_images(const fs::path& path, const std::string& pattern, const Options& options,
                                Context& context) {
   if (!fs::is_directory(path)) {
     if (!pattern.empty())
       throw Error(path.string() + ": a pattern chooses files of a folder, but this is no folder; leave it out");
-    return read_sequence::is_video(path) ? read_sequence::read_video(path, options)
-                                         : files::read_image_frames(path, options);
+    const char* const container = read_sequence::video_container(path);
+    if (container) return read_sequence::read_video(path, container, options);
+    warn_of_pixels(path, context);
+    return files::read_image_frames(path, options);
   }
   const std::vector<fs::path> all = files::frame_files(path, pattern);
   std::vector<Image> images;
+  warn_of_pixels(all.front(), context);  // the others are alike
   for (const int frame : files::frames_of(options, int(all.size()), path.string())) {
     context.check_cancelled();
     images.push_back(files::read_image_file(all[std::size_t(frame - 1)]));
@@ -61,12 +71,13 @@ List<SequenceFrame> sequence(const List<Camera>* cameras, const Options& options
       throw Error("view '" + name + "' has " + std::to_string(images.size()) + " frames, but view '" +
                   options.names.front() + "' has " + std::to_string(frames.size()) + " (" +
                   options.images.at(i).string() + "); all views must show the same moments");
-    const exchange::ViewSource source{name,
-                                      {},
-                                      cameras ? &exchange::camera_of_view(name, *cameras) : nullptr,
-                                      cameras ? fs::path() : options.cameras.at(i),
-                                      options.calibration};
-    const exchange::ViewCamera camera = exchange::read_view_camera(source, images.front());
+    exchange::ViewSource source{name,
+                                {},
+                                cameras ? &exchange::camera_of_view(name, *cameras) : nullptr,
+                                cameras ? fs::path() : options.cameras.at(i),
+                                options.calibration};
+    source.scale = options.scale;
+    const exchange::ViewCamera camera = exchange::read_view_camera(source, images.front(), context);
     for (std::size_t k = 0; k < images.size(); ++k) {
       context.check_cancelled();
       frames[k].views.push_back(exchange::view_of(name, std::move(images[k]), camera));
@@ -92,8 +103,10 @@ MARROW_PLUGIN(plugin) {
       .relation(distinct("names"))
       .option(
           "images", &Options::images,
-          "per view: a folder of images (PNG, TIFF, DICOM) whose names differ in a number only, a file with several "
-          "pages or frames (TIFF, DICOM), or a video",
+          "per view: a folder of images (PNG, TIFF, DICOM, ...) whose names differ in a number only, a file with "
+          "several "
+          "pages or frames (TIFF, DICOM), or a video (AVI, MP4, MOV, MKV, WebM, WMV, MPEG) of up to 16 bits; colours "
+          "of a video become grey",
           required())
       .relation(same_length({"names", "images"}))
       .option(
@@ -108,6 +121,10 @@ MARROW_PLUGIN(plugin) {
       .option("calibration", &Options::calibration,
               "calibration file of the device that took all views; its camera matrix replaces those of the cameras, "
               "and its distortion is removed from the images")
+      .option(
+          "scale", &Options::scale,
+          "factor that converts the unit of the camera files to mm: 10 for cm, 1000 for metres; not for marrow's YAML",
+          at_least(1e-6))
       .option("first", &Options::first, "first frame that is read, counted from 1", at_least(1))
       .option("last", &Options::last, "last frame that is read; 0: to the end", at_least(0))
       .option("every", &Options::every, "2: every second frame is read", at_least(1));

@@ -2,6 +2,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/exchange/view_file.hpp"
+#include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/image_sides.hpp"
 
 namespace {
@@ -15,15 +16,18 @@ struct Options {
   std::string mirror = "none";
   int projection = -1;
   std::vector<double> pixel_mm, corner_mm;
+  double scale = 1;
 };
 
 marrow::View view(const marrow::Camera* camera, const Options& options, marrow::Context& context) {
   if (!camera && options.camera.empty())
     throw marrow::Error("view '" + options.name + "': the node that is wired to 'camera' gave none");
   for (const std::string& doubt : marrow::files::doubts_about_sides(options.image, options.frame)) context.warn(doubt);
-  return marrow::exchange::read_view_files({options.name, options.image, camera, options.camera, options.calibration,
-                                            options.frame, options.mirror, options.projection, options.pixel_mm,
-                                            options.corner_mm});
+  for (const std::string& doubt : marrow::files::doubts_about_pixels(options.image)) context.warn(doubt);
+  return marrow::exchange::read_view_files(
+      {options.name, options.image, camera, options.camera, options.calibration, options.frame, options.mirror,
+       options.projection, options.pixel_mm, options.corner_mm, options.scale},
+      context);
 }
 
 }  // namespace
@@ -34,7 +38,7 @@ MARROW_PLUGIN(plugin) {
       .in("camera", "the camera, if no camera file is given")
       .out("view", "the view")
       .option("name", &Options::name, "name of the view")
-      .option("image", &Options::image, "image file (PNG, TIFF, DICOM)", marrow::required())
+      .option("image", &Options::image, "image file, as read.image reads it", marrow::required())
       .option("camera", &Options::camera, "camera file (marrow's YAML, or a file of XMALab, plastimatch, RTK or xReg)")
       .relation(marrow::exactly_one({"in.camera", "camera"}))
       .option("calibration", &Options::calibration,
@@ -55,5 +59,9 @@ MARROW_PLUGIN(plugin) {
       .option("pixel_mm", &Options::pixel_mm,
               "RTK: width and height of a pixel on the detector; one number for square pixels")
       .option("corner_mm", &Options::corner_mm,
-              "RTK: the place (u, v) of the first pixel's centre on the detector; if empty, the image is centred");
+              "RTK: the place (u, v) of the first pixel's centre on the detector; if empty, the image is centred")
+      .option(
+          "scale", &Options::scale,
+          "factor that converts the unit of the camera file to mm: 10 for cm, 1000 for metres; not for marrow's YAML",
+          marrow::at_least(1e-6));
 }

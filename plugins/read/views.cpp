@@ -3,6 +3,7 @@
 
 #include "marrow/toolbox/exchange/projections.hpp"
 #include "marrow/toolbox/exchange/view_file.hpp"
+#include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/image_sides.hpp"
 
 namespace {
@@ -15,6 +16,7 @@ struct Options {
   int frame = 0;
   std::string mirror = "none";
   std::vector<double> projections, pixel_mm, corner_mm;
+  double scale = 1;
 };
 
 /// The number of the view's projection; -1 if none are named.
@@ -31,11 +33,13 @@ marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, co
     const std::string& name = options.names[i];
     for (const std::string& doubt : marrow::files::doubts_about_sides(options.images.at(i), options.frame))
       context.warn(doubt);
+    for (const std::string& doubt : marrow::files::doubts_about_pixels(options.images.at(i))) context.warn(doubt);
     views.add(name,
               marrow::exchange::read_view_files(
                   {name, options.images.at(i), cameras ? &marrow::exchange::camera_of_view(name, *cameras) : nullptr,
                    cameras ? std::filesystem::path() : options.cameras.at(i), options.calibration, options.frame,
-                   options.mirror, projection_of(options, i), options.pixel_mm, options.corner_mm}));
+                   options.mirror, projection_of(options, i), options.pixel_mm, options.corner_mm, options.scale},
+                  context));
   }
   return views;
 }
@@ -50,7 +54,7 @@ MARROW_PLUGIN(plugin) {
       .option("names", &Options::names, "one name per view", marrow::required())
       .relation(marrow::at_least_one({"names"}))
       .relation(marrow::distinct("names"))
-      .option("images", &Options::images, "one image file (PNG, TIFF, DICOM) per view", marrow::required())
+      .option("images", &Options::images, "one image file per view, as read.image reads it", marrow::required())
       .relation(marrow::same_length({"names", "images"}))
       .option("cameras", &Options::cameras,
               "one camera file (marrow's YAML, or a file of XMALab, plastimatch, RTK or xReg) per view")
@@ -74,5 +78,9 @@ MARROW_PLUGIN(plugin) {
       .option("pixel_mm", &Options::pixel_mm,
               "RTK: width and height of a pixel on the detector; one number for square pixels")
       .option("corner_mm", &Options::corner_mm,
-              "RTK: the place (u, v) of the first pixel's centre on the detector; if empty, the images are centred");
+              "RTK: the place (u, v) of the first pixel's centre on the detector; if empty, the images are centred")
+      .option(
+          "scale", &Options::scale,
+          "factor that converts the unit of the camera files to mm: 10 for cm, 1000 for metres; not for marrow's YAML",
+          marrow::at_least(1e-6));
 }

@@ -141,12 +141,41 @@ TEST(Plausibility, SizesAndDistancesOfTheObject) {
   for (const auto& [extent, said] : {std::pair(2490.0, false), {2510.0, true}})
     EXPECT_EQ(says("are its coordinates in a smaller unit than mm?", right_camera(), {}, object_at(1600, extent)), said)
         << extent;
-  for (const auto& [distance, said] : {std::pair(151.0, false), {149.0, true}, {4990.0, false}, {5010.0, true}})
+  for (const auto& [distance, said] : {std::pair(201.0, false), {199.0, true}, {4990.0, false}, {5010.0, true}})
     EXPECT_EQ(
         says("mm from the X-ray source, where C-arms have 300 to 1500", right_camera(), {}, object_at(distance, 50)),
         said)
         << distance;
   EXPECT_FALSE(says("", right_camera(), {}, {object_at(600, 0)[0]})) << "one point has no extent";
+}
+
+// The camera's source is 600 mm from the isocentre, which is the origin.
+TEST(Plausibility, WithoutAnObjectItIsTakenToBeNearTheOrigin) {
+  const auto said = [](double factor) {
+    Camera camera = right_camera();
+    camera.camera_from_world.translation_mm *= factor;
+    const auto sentences = calibration::implausible_numbers(camera, {}, {});
+    return sentences.empty() ? std::string() : sentences[0];
+  };
+  EXPECT_EQ(said(1), "");
+  EXPECT_EQ(said(0.1),
+            "the X-ray source is 60 mm from the world's origin, where devices have 200 to 5000; looks like cm: give "
+            "scale: 10");
+  EXPECT_EQ(said(0.001),
+            "the X-ray source is 0.6 mm from the world's origin, where devices have 200 to 5000; looks like m: give "
+            "scale: 1000");
+  EXPECT_EQ(said(0), "") << "the camera is the world";
+}
+
+TEST(Plausibility, NamesTheUnitOfTheDistanceFromTheObject) {
+  Camera camera = right_camera();
+  camera.camera_from_world.translation_mm *= 0.1;
+  const auto sentences = calibration::implausible_numbers(camera, {}, {{-1, -1, -2}, {1, 1, 2}});
+  ASSERT_EQ(sentences.size(), 1u);
+  EXPECT_EQ(
+      sentences[0],
+      "the object is 60 mm from the X-ray source, where C-arms have 300 to 1500; the camera's translation, or the "
+      "object, seems to be in another unit than mm; looks like cm: give scale: 10");
 }
 
 TEST(Plausibility, ObjectsBehindTheSourceOrBesideTheImage) {

@@ -8,20 +8,19 @@
 #include <limits>
 #include <opencv2/calib3d.hpp>
 
+#include "marrow/domain/number_text.hpp"
+#include "marrow/toolbox/files/length_units.hpp"
+
 namespace marrow::calibration {
 namespace {
 
 constexpr double kLeastAngle_deg = 2, kLargestAngle_deg = 60;  ///< opening angle of the image
-constexpr double kNearest_mm = 150, kFarthest_mm = 5000;       ///< distance of the object from the source
+constexpr double kNearest_mm = 200, kFarthest_mm = 5000;       ///< distance of the object from the source
 constexpr double kSmallest_mm = 3, kLargest_mm = 2500;         ///< extent of the object
 constexpr double kBetter = 5;                                  ///< factor by which undoing a mistake reduces the error
 constexpr double kExplained = 0.02;  ///< largest error that may remain then, as a part of the image's width
 
-std::string text(double value) {
-  char characters[32];
-  std::snprintf(characters, sizeof characters, "%.4g", value);
-  return characters;
-}
+std::string text(double value) { return formatted("%.4g", value); }
 
 std::string size_text(double width, double height) { return text(width) + " x " + text(height); }
 
@@ -86,24 +85,26 @@ void check_object(const Camera& camera, const std::vector<Eigen::Vector3d>& obje
     behind += !at.allFinite();
     outside += at.allFinite() && !(at.x() > -1 && at.y() > -1 && at.x() < camera.width_px && at.y() < camera.height_px);
   }
-  const Eigen::Vector3d centre =
-      object_mm.empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(box.center());
-  const double distance = (source_position_mm(camera) - centre).norm();
-  const std::string what = object_mm.empty() ? "the world's origin" : "the object";
+  if (object_mm.empty()) {  // the patient is near the origin
+    if (const std::string doubt = files::doubt_about_distance(camera, 1); !doubt.empty()) found.push_back(doubt);
+    return;
+  }
+  const double distance = (source_position_mm(camera) - box.center()).norm();
   const double extent = object_mm.size() > 1 ? box.diagonal().norm() : 0;
   if (object_mm.size() > 1 && (extent < kSmallest_mm || extent > kLargest_mm))
     found.push_back("the object is " + text(extent) + " mm large; are its coordinates in " +
                     (extent < kSmallest_mm ? "metres or centimetres?" : "a smaller unit than mm?"));
-  if (!object_mm.empty() && (distance < kNearest_mm || distance > kFarthest_mm))
-    found.push_back(what + " is " + text(distance) +
-                    " mm from the X-ray source, where C-arms have 300 to 1500; is the camera's translation, or " +
-                    "the object, in another unit than mm?");
+  if (distance < kNearest_mm || distance > kFarthest_mm)
+    found.push_back("the object is " + text(distance) +
+                    " mm from the X-ray source, where C-arms have 300 to 1500; the camera's translation, or the "
+                    "object, seems to be in another unit than mm" +
+                    files::likely_unit(distance, kNearest_mm, kFarthest_mm, 1));
   if (behind > 0)
     found.push_back(text(double(behind)) + " of " + text(double(object_mm.size())) +
                     " points of the object lie behind the X-ray source; is the camera's pose given the other way round "
                     "(world from camera), or "
                     "does its z axis run away from the detector?");
-  else if (!object_mm.empty() && outside == object_mm.size())
+  else if (outside == object_mm.size())
     found.push_back("the object is projected wholly outside the image; is the camera that of another image?");
 }
 

@@ -5,6 +5,7 @@
 #include "marrow/toolbox/exchange/plastimatch_camera.hpp"
 #include "marrow/toolbox/exchange/projections.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
+#include "marrow/toolbox/files/length_units.hpp"
 
 namespace marrow::exchange {
 namespace {
@@ -19,6 +20,8 @@ void check_needed(const std::filesystem::path& path, const CameraReading& readin
   check(!reading.size.pixel_mm.empty(), is_rtk, "pixel_mm");
   check(!reading.size.corner_mm.empty(), is_rtk, "corner_mm");
   check(reading.mirror != Mirror::none, has_projections, "mirror");
+  if (reading.scale != 1 && format == CameraFormat::own)
+    throw Error(path.string() + ": scale is not for marrow's cameras, whose lengths are in mm; leave it out");
 }
 
 int only_projection(const std::filesystem::path& path) {
@@ -37,19 +40,20 @@ CameraFormat camera_format(const std::filesystem::path& path) {
   const Projections projections = projections_in(path);
   if (projections == Projections::rtk) return CameraFormat::rtk;
   if (projections == Projections::xreg) return CameraFormat::xreg;
-  return is_plastimatch_camera(path) ? CameraFormat::plastimatch : CameraFormat::own;
+  return is_plastimatch_camera(path) ? CameraFormat::plastimatch : CameraFormat::xmalab;
 }
 
 DistortedCamera read_camera(const std::filesystem::path& path, const CameraReading& reading) {
   const CameraFormat format = camera_format(path);
   check_needed(path, reading, format);
-  if (format == CameraFormat::plastimatch) return {read_plastimatch_camera(path, reading.size), {}};
   DistortedCamera found;
-  if (format == CameraFormat::own) {
-    found = files::read_camera_file(path);
-  } else {
+  if (format == CameraFormat::rtk || format == CameraFormat::xreg) {
     const int number = reading.projection >= 0 ? reading.projection : only_projection(path);
-    found.camera = read_projections(path, {number}, reading.size, reading.mirror)[0];
+    found.camera = read_projections(path, {number}, reading.size, reading.mirror, reading.scale)[0];
+  } else {
+    found = format == CameraFormat::plastimatch ? DistortedCamera{read_plastimatch_camera(path, reading.size), {}}
+                                                : files::read_camera_file(path);
+    found.camera.camera_from_world.translation_mm *= reading.scale;
   }
   if (reading.size.size_px.empty()) return found;
   const Eigen::Vector2i size = size_px(reading.size, path.string());
@@ -58,6 +62,12 @@ DistortedCamera read_camera(const std::filesystem::path& path, const CameraReadi
                 std::to_string(found.camera.height_px) + " pixels, but the image has " + std::to_string(size.x()) +
                 " x " + std::to_string(size.y()));
   return found;
+}
+
+std::string doubt_about_unit(const std::filesystem::path& path, const Camera& camera, double scale) {
+  if (camera_format(path) == CameraFormat::own) return {};
+  const std::string doubt = files::doubt_about_distance(camera, scale);
+  return doubt.empty() ? doubt : path.string() + ": " + doubt;
 }
 
 }  // namespace marrow::exchange

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/exchange/rtk_geometry.hpp"
 #include "marrow/toolbox/exchange/xreg_file.hpp"
 
@@ -38,7 +39,7 @@ Projections projections_in(const std::filesystem::path& path) {
 
 int projection_number(double number, const std::string& what) {
   if (!(number >= 0 && number <= 1e6) || number != double(int(number)))
-    throw Error(what + ": projections: expected whole numbers from 0, got " + std::to_string(number));
+    throw Error(what + ": projections: expected whole numbers from 0, got " + formatted("%f", number));
   return int(number);
 }
 
@@ -47,15 +48,23 @@ std::size_t count_projections(const std::filesystem::path& path) {
 }
 
 std::vector<Camera> read_projections(const std::filesystem::path& path, const std::vector<int>& numbers,
-                                     const ImageSize& size, Mirror mirror) {
+                                     const ImageSize& size, Mirror mirror, double scale) {
   if (projections_in(path) == Projections::none)
     throw Error(path.string() + ": expected RTK's geometry (.xml) or xReg's projection data (.h5)");
-  if (projections_in(path) == Projections::rtk)
-    return cameras_of(read_rtk(path), numbers, path.string(), [&](const RtkProjection& one, const std::string& what) {
-      return camera_of(one, size, mirror, what);
-    });
-  return cameras_of(read_xreg(path), numbers, path.string(),
-                    [&](const XregProjection& one, const std::string& what) { return camera_of(one, mirror, what); });
+  ImageSize in_file = size;  // in the file's unit, as RTK's distances are
+  for (double& side : in_file.pixel_mm) side /= scale;
+  for (double& place : in_file.corner_mm) place /= scale;
+  std::vector<Camera> cameras = projections_in(path) == Projections::rtk
+                                    ? cameras_of(read_rtk(path), numbers, path.string(),
+                                                 [&](const RtkProjection& one, const std::string& what) {
+                                                   return camera_of(one, in_file, mirror, what);
+                                                 })
+                                    : cameras_of(read_xreg(path), numbers, path.string(),
+                                                 [&](const XregProjection& one, const std::string& what) {
+                                                   return camera_of(one, mirror, what);
+                                                 });
+  for (Camera& camera : cameras) camera.camera_from_world.translation_mm *= scale;
+  return cameras;
 }
 
 }  // namespace marrow::exchange

@@ -21,7 +21,8 @@ struct SeenPoints {
 };
 
 /// Sentences about numbers that no X-ray device has: a wrong unit, a camera matrix of another image, a detector smaller
-/// than the image. `object_mm`: points of the object that should be seen, in world coordinates; may be empty.
+/// than the image, a source too close to the object or too far. `object_mm`: points of the object that should be seen,
+/// in world coordinates; if it is empty, the object is taken to be near the world's origin.
 std::vector<std::string> implausible_numbers(const Camera& camera, const Device& device,
                                              const std::vector<Eigen::Vector3d>& object_mm);
 

@@ -2,14 +2,15 @@
 #pragma once
 // The camera of any file that marrow reads: its own YAML, and the files of XMALab, plastimatch, RTK and xReg.
 #include <filesystem>
+#include <string>
 
 #include "marrow/domain/calibration.hpp"
 #include "marrow/toolbox/exchange/camera_matrix.hpp"
 
 namespace marrow::exchange {
 
-/// `own` is what files::read_camera_file() reads: marrow's YAML and XMALab's text.
-enum class CameraFormat { own, plastimatch, rtk, xreg };
+/// `own` is marrow's YAML.
+enum class CameraFormat { own, xmalab, plastimatch, rtk, xreg };
 
 /// By the end of the name: .yaml and .yml are marrow's, .xml RTK's, .h5 and .hdf5 xReg's. Any other file is a text: of
 /// plastimatch if it begins as its files do, else of XMALab.
@@ -20,11 +21,16 @@ struct CameraReading {
   int projection = -1;           ///< RTK and xReg: its number, from 0; -1: the file must hold only one
   ImageSize size;                ///< size_px: plastimatch and RTK; the others: RTK
   Mirror mirror = Mirror::none;  ///< RTK and xReg: how the image was turned over
+  double scale = 1;              ///< all but marrow's YAML: converts the file's unit to mm
 };
 
 /// The camera in a file of any format. Only marrow's own YAML holds a distortion. `size.size_px` may be given for any
 /// format; all else is refused for a format that does not need it. Throws Error so, if it is of images of another size
 /// than `size_px`, if the file holds several projections and none is named, and as the format's reader does.
 DistortedCamera read_camera(const std::filesystem::path& path, const CameraReading& reading);
+
+/// files::doubt_about_distance() of a camera from this file, with the file's name; empty for marrow's own format, which
+/// says that it is in mm.
+std::string doubt_about_unit(const std::filesystem::path& path, const Camera& camera, double scale);
 
 }  // namespace marrow::exchange

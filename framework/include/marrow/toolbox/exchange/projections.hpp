@@ -20,8 +20,9 @@ int projection_number(double number, const std::string& what);
 std::size_t count_projections(const std::filesystem::path& path);
 
 /// The cameras of the projections with these numbers, from 0; of all if `numbers` is empty. `size` is only for RTK.
-/// Throws Error as the readers of the two formats do, and if there is no such projection.
+/// `scale` converts the file's unit to mm. Throws Error as the readers of the two formats do, and if there is no such
+/// projection.
 std::vector<Camera> read_projections(const std::filesystem::path& path, const std::vector<int>& numbers,
-                                     const ImageSize& size, Mirror mirror);
+                                     const ImageSize& size, Mirror mirror, double scale);
 
 }  // namespace marrow::exchange
