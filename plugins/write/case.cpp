@@ -129,6 +129,7 @@ void check_case(const marrow::Case& value, const std::string& path) {
   };
   check(value.start.names(), "start");
   check(value.truth.names(), "truth");
+  marrow::check_volume(value.ct, path + ": ct");
 }
 
 void write_case(const marrow::Case& value, const std::string& path) {

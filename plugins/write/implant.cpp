@@ -40,6 +40,7 @@ std::string stl(const marrow::Mesh& mesh) {
 }
 
 void implant(const Implant& implant, const std::string& path) {
+  marrow::geometry::check_implant(implant, path);
   marrow::files::write_atomically(path, [&](const fs::path& folder) {
     fs::create_directory(folder);
     marrow::files::write_plainly(folder / "surface.stl", {stl(implant.surface)});

@@ -24,6 +24,7 @@ std::string in_one_line(std::string name) {
 
 /// Binary PLY with double coordinates, so that reading gives exactly the same numbers.
 void mesh(const marrow::Mesh& mesh, const std::string& path) {
+  marrow::check_mesh(mesh, path);
   std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment marrow, mm, frame " + in_one_line(mesh.frame) +
                       "\nelement vertex " + std::to_string(mesh.vertices_mm.size()) +
                       "\nproperty double x\nproperty double y\nproperty double z\nelement face " +

@@ -15,6 +15,7 @@ void write_png(const std::string& path, const cv::Mat& pixels) {
 /// greatest 65535.
 void image(const marrow::Image& image, const std::string& path) {
   if (image.pixels.depth() != CV_32F) return write_png(path, image.pixels);
+  marrow::files::check_finite_pixels(image.pixels, path);
   double least = 0, greatest = 0;
   cv::minMaxLoc(image.pixels, &least, &greatest);
   const double scale = greatest > least ? 65535 / (greatest - least) : 0;
@@ -28,6 +29,8 @@ void picture(const marrow::Picture& picture, const std::string& path) { write_pn
 void edge_map(const marrow::EdgeMap& edges, const std::string& path) {
   cv::Mat pixels = cv::Mat::zeros(edges.height_px, edges.width_px, CV_8U);
   for (const marrow::EdgePixel& edge : edges.pixels) {
+    if (!std::isfinite(edge.u_px) || !std::isfinite(edge.v_px))
+      throw marrow::Error(path + ": cannot be written, because the place of an edge is not a finite number");
     const int u = int(std::lround(edge.u_px)), v = int(std::lround(edge.v_px));
     if (u >= 0 && v >= 0 && u < edges.width_px && v < edges.height_px) pixels.at<std::uint8_t>(v, u) = 255;
   }

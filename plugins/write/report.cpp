@@ -36,6 +36,7 @@ ordered_json rows(const marrow::RigidTransform& transform) {
 }
 
 ordered_json json_of(const marrow::Scene::Model& model) {
+  check_mesh(model.mesh, "model '" + model.name + "' of a scene");
   std::vector<float> vertices;
   for (const Eigen::Vector3d& vertex : model.mesh.vertices_mm)
     for (int k = 0; k < 3; ++k) vertices.push_back(float(vertex[k]));
@@ -64,11 +65,13 @@ void scene(const marrow::Scene& scene, const std::string& path) {
                        {"poses", ordered_json::array()},
                        {"views", ordered_json::array()}};
   for (const auto& model : scene.models) json["meshes"].push_back(json_of(model));
-  for (const auto& placement : scene.placements)
+  for (const auto& placement : scene.placements) {
+    check_rigid(placement.world_from_model, "pose '" + placement.name + "' of a scene");
     for (std::size_t i = 0; i < scene.models.size(); ++i)
       if (scene.models[i].name == placement.model)
         json["poses"].push_back(
             {{"mesh", i}, {"name", placement.name}, {"world_from_model", rows(placement.world_from_model)}});
+  }
   for (const auto& view : scene.views) json["views"].push_back(json_of(view));
   marrow::files::write_text(path, json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }

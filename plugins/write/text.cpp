@@ -10,11 +10,20 @@ namespace {
 
 using marrow::files::write_text;
 
-void pose(const marrow::Pose& pose, const std::string& path) { write_text(path, marrow::files::pose(pose)); }
+void pose(const marrow::Pose& pose, const std::string& path) {
+  check_rigid(pose.world_from_model, path);
+  write_text(path, marrow::files::pose(pose));
+}
 
-void truth(const marrow::Truth& truth, const std::string& path) { write_text(path, marrow::files::truth(truth)); }
+void truth(const marrow::Truth& truth, const std::string& path) {
+  check_rigid(truth.world_from_model, path);
+  write_text(path, marrow::files::truth(truth));
+}
 
-void camera(const marrow::Camera& camera, const std::string& path) { write_text(path, marrow::files::camera(camera)); }
+void camera(const marrow::Camera& camera, const std::string& path) {
+  check_camera(camera, path);
+  write_text(path, marrow::files::camera(camera));
+}
 
 void shaft_lines(const marrow::ShaftLines& lines, const std::string& path) {
   write_text(path, marrow::files::shaft_lines(lines));

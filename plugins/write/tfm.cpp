@@ -19,6 +19,7 @@ struct Options {
 
 ItkTransformFile tfm(const Pose& pose, const Options& options) {
   const RigidTransform& world_from_ct = pose.world_from_model;
+  check_rigid(world_from_ct, "the pose cannot be written as .tfm");
   return {exchange::itk_transform(options.maps == "world_to_ct" ? inverse(world_from_ct) : world_from_ct)};
 }
 

@@ -7,6 +7,7 @@
 namespace {
 
 void volume(const marrow::Volume& volume, const std::string& path) {
+  marrow::check_volume(volume, path);
   marrow::files::write_atomically(
       path, [&](const auto& temporary) { marrow::files::write_grid(temporary, volume.grid, volume.values); });
 }

@@ -29,6 +29,12 @@ void check_label(const std::filesystem::path& path, std::size_t index, const std
     refuse(path, index, "its label " + in_quotes(printable(name)) + " " + fault + "; " + advice);
 }
 
+MarkedPoint finite(const std::string& label, const Eigen::Vector3d& at_mm) {
+  if (!at_mm.allFinite())
+    throw Error("point " + in_quotes(printable(label)) + " has a coordinate that is not a finite number");
+  return {label, at_mm};
+}
+
 }  // namespace
 
 Landmarks read_marked_landmarks(const std::filesystem::path& path) {
@@ -67,14 +73,14 @@ List<Seeds> read_marked_seeds(const std::filesystem::path& path, const std::stri
 
 std::vector<MarkedPoint> marked_points(const Landmarks& landmarks) {
   std::vector<MarkedPoint> points;
-  for (const Landmarks::Point& point : landmarks.points) points.push_back({point.name, point.model_mm});
+  for (const Landmarks::Point& point : landmarks.points) points.push_back(finite(point.name, point.model_mm));
   return points;
 }
 
 std::vector<MarkedPoint> marked_points(const Seeds& seeds) {
   std::vector<MarkedPoint> points;
   for (const Eigen::Vector3d& point : seeds.points_mm)
-    points.push_back({seeds.fragment + "-" + std::to_string(points.size() + 1), point});
+    points.push_back(finite(seeds.fragment + "-" + std::to_string(points.size() + 1), point));
   return points;
 }
 

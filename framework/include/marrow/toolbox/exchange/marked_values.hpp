@@ -17,7 +17,8 @@ Landmarks read_marked_landmarks(const std::filesystem::path& path);
 /// one. Throws Error as read_markups() does, and for a label that names no fragment.
 List<Seeds> read_marked_seeds(const std::filesystem::path& path, const std::string& fragment);
 
-/// The points of the model, and the seeds with the labels that read_marked_seeds() takes.
+/// The points of the model, and the seeds with the labels that read_marked_seeds() takes. Throw Error for a coordinate
+/// that is not finite.
 std::vector<MarkedPoint> marked_points(const Landmarks& landmarks);
 std::vector<MarkedPoint> marked_points(const Seeds& seeds);
 
