@@ -266,7 +266,8 @@ std::optional<WorkerEnd> Worker::check(const WorkerLimits& limits) {
     end.is_late = true;
     return end;
   }
-  if (memory_of_tree_mb(process_, limits.memory_mb) > limits.memory_mb) {
+  const bool has_limit = limits.memory_mb < WorkerLimits().memory_mb;
+  if (has_limit && memory_of_tree_mb(process_, limits.memory_mb) > limits.memory_mb) {
     WorkerEnd end = ended(with_number("used more than %g MB of memory", limits.memory_mb));
     end.is_out_of_memory = true;
     return end;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -120,6 +121,7 @@ class Checks {
     // An earlier check may have damaged the process. So this check is tried again in a new process.
     if (end.died && !end.is_late && !was_fresh) end = ask(number);
     if (end.is_late) return {'-', "it took longer than " + std::to_string(time_limit_s()) + " s"};
+    if (end.signal == SIGKILL) return {'-', "its process " + end.failed};
     if (end.signal) return {'-', std::string("it crashed: ") + strsignal(end.signal)};
     if (!end.failed.empty()) return {'-', end.failed};
     const std::string text = end.answer.get<std::string>();
