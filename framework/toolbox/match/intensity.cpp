@@ -77,7 +77,8 @@ class IntensityCost : public ViewsCost {
     if (deviation(patch.rendered, patch.counts) == 0)
       return views_[view].mask.empty() ? "its radiograph is empty where the bone would be"
                                        : "no pixel inside the mask shows the bone";
-    if (deviation(patch.seen, patch.counts) == 0) return "its image is constant where the bone would be";
+    constexpr double kRounding = 1e-6;  // of the blur; a grey level of 16 bits is 1.5e-5
+    if (deviation(patch.seen, patch.counts) < kRounding) return "its image is constant where the bone would be";
     return {};
   }
 
