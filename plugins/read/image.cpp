@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 
 namespace {
@@ -11,7 +12,8 @@ struct Options {
   std::string mirror = "none";
 };
 
-marrow::Image image(const Options& options) {
+marrow::Image image(const Options& options, marrow::Context& context) {
+  for (const std::string& doubt : marrow::files::doubts_about_pixels(options.path)) context.warn(doubt);
   return marrow::files::turned_over(marrow::files::read_image_file(options.path, options.frame), options.mirror);
 }
 
@@ -19,9 +21,11 @@ marrow::Image image(const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.image", image)
-      .summary("Reads a grey image from PNG, TIFF (8 or 16 bit, or float) or DICOM")
+      .summary(
+          "Reads a grey image from PNG, TIFF, JPEG, BMP, DICOM, MetaImage, NRRD or NIfTI, whatever its file is named")
       .out("image",
-           "grey values, bright = air; a DICOM image is scaled as its header says; a DICOM X-ray image is also "
+           "grey values, bright = air; 8 and 16 bits are kept, others become float; a DICOM image is scaled as its "
+           "header says; a DICOM X-ray image is also "
            "mirrored and inverted if needed, so that it fits the camera of its header")
       .option("path", &Options::path, "image file", marrow::required())
       .option("frame", &Options::frame, "frame of a multi-frame file, counted from 1; 0: the file has only one frame",

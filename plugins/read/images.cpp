@@ -2,6 +2,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/names.hpp"
+#include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 
 namespace {
@@ -12,12 +13,13 @@ struct Options {
   int frame = 0;
 };
 
-marrow::List<marrow::Image> images(const Options& options) {
+marrow::List<marrow::Image> images(const Options& options, marrow::Context& context) {
   marrow::List<marrow::Image> images;
   for (std::size_t i = 0; i < options.paths.size(); ++i) {
     const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names.at(i);
     marrow::check_item_name("view", name);
     if (images.find(name)) throw marrow::Error("names: two images are named '" + name + "'; name each differently");
+    for (const std::string& doubt : marrow::files::doubts_about_pixels(options.paths[i])) context.warn(doubt);
     images.add(name, marrow::files::read_image_file(options.paths[i], options.frame));
   }
   return images;
@@ -29,7 +31,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("read.images", images)
       .summary("Reads grey images without cameras, as a calibration needs them")
       .out("images", "grey values, as from read.image", marrow::over("view"))
-      .option("paths", &Options::paths, "image files (PNG, TIFF, DICOM)", marrow::required())
+      .option("paths", &Options::paths, "image files, as read.image reads them", marrow::required())
       .relation(marrow::at_least_one({"paths"}))
       .option("names", &Options::names, "one name per image; if empty, the file names without extension")
       .relation(marrow::as_many_or_none("names", "paths"))

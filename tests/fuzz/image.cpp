@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images: PNG, whose checksums are put right in half of the inputs so that what they guard is tried too, and TIFF.
+// Images: PNG, whose checksums are put right in half of the inputs so that what they guard is tried too, TIFF, JPEG and
+// BMP.
 #include <zlib.h>
 
 #include <cstring>
@@ -30,11 +31,15 @@ std::string with_checksums(std::string_view bytes) {
 }
 
 std::filesystem::path file_of(marrow::fuzz::Input& input) {
-  switch (input.choice("cpt")) {
+  switch (input.choice("cptjb")) {
     case 'c':
       return marrow::fuzz::put("a.png", with_checksums(input.rest));
     case 'p':
       return marrow::fuzz::put("a.png", input.rest);
+    case 'j':
+      return marrow::fuzz::put("a.jpg", input.rest);
+    case 'b':
+      return marrow::fuzz::put("a.bmp", input.rest);
     default:
       return marrow::fuzz::put("a.tif", input.rest);
   }

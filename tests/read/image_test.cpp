@@ -69,16 +69,11 @@ TEST(ReadImage, RealFluoroscopy) {
 
 TEST(ReadImage, RefusesOtherThanOneGreyImage) {
   const TemporaryFolder folder;
-  ItkGrid<std::uint8_t> colours{.size = {2, 2}, .samples = std::vector<std::uint8_t>(12), .components = 3};
-  write_itk(folder / "colours.png", colours);
-  EXPECT_SAYS(read(folder / "colours.png"), "has 3 channels; an X-ray image has one");
   ItkGrid<std::uint16_t> pages{.size = {4, 4, 3}, .samples = std::vector<std::uint16_t>(48)};
   write_itk(folder / "pages.tif", pages);
   EXPECT_SAYS(read(folder / "pages.tif"), "has 3 pages; an image has one");
-  marrow::test::put(folder / "a.bmp", "BM");
-  EXPECT_SAYS(read(folder / "a.bmp"), "not an image that can be read; known are .png, .tif and .dcm");
   EXPECT_SAYS(read(folder / "absent.png"), "there is no such file");
-  EXPECT_SAYS(read(folder.path()), "not an image");
+  EXPECT_SAYS(read(folder.path()), "expected a file, this is none");
   std::filesystem::create_directory(folder / "folder.png");
   EXPECT_SAYS(read(folder / "folder.png"), "expected a file, this is none");
 }

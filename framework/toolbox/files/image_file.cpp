@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "dicom_pixels.hpp"
-#include "header_lines.hpp"
+#include "file_format.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/toolbox/files/sequence_files.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
@@ -41,14 +41,14 @@ Image image_of(const Samples& samples, int frame, const fs::path& path) {
                    : samples.type == Samples::Type::u16 ? CV_16U
                    : samples.type == Samples::Type::f32 ? CV_32F
                                                         : -1;
-  if (type < 0) throw Error(path.string() + ": expected 8 or 16 bit grey levels without sign, or float");
   const std::size_t page_bytes = std::size_t(samples.size[0]) * std::size_t(samples.size[1]) * bytes_each(samples.type);
-  if (samples.slope != 1 || samples.intercept != 0) {
+  if (type < 0 || samples.slope != 1 || samples.intercept != 0) {
     const std::vector<float> values = to_float(samples);
     const std::size_t page_pixels = values.size() / std::size_t(samples.size[2]);
     Image image{cv::Mat(samples.size[1], samples.size[0], CV_32F)};
     std::copy_n(values.begin() + std::ptrdiff_t(std::size_t(frame - 1) * page_pixels), page_pixels,
                 image.pixels.ptr<float>());
+    check_finite(image, path);
     return image;
   }
   Image image{cv::Mat(samples.size[1], samples.size[0], type)};
@@ -60,11 +60,12 @@ Image image_of(const Samples& samples, int frame, const fs::path& path) {
 Image read_dicom_image(const fs::path& path, int frame) {
   const DicomPixels pixels = read_dicom_pixels(path, std::max(1, frame));
   check_frame(frame, pixels.frames, path, " frames; name one with frame (from 1)");
-  check_one_channel(pixels.channels, path);
+  if (!pixels.is_plain_rgb) check_one_channel(pixels.channels, path);
   if (pixels.has_table)
     throw Error(path.string() +
                 ": its values go through a table (ModalityLUTSequence), which is not read; export it without one");
-  const Samples samples = read_dicom_frame(pixels, std::max(1, frame));
+  Samples samples = read_dicom_frame(pixels, std::max(1, frame));
+  make_grey(path.string(), samples);
   const bool is_signed = samples.type != Samples::Type::u8 && samples.type != Samples::Type::u16;
   if (!is_signed && pixels.slope == 1 && pixels.intercept == 0) return image_of(samples, 1, path);
   Image image{cv::Mat(pixels.rows, pixels.columns, CV_32F)};
@@ -80,17 +81,66 @@ Image as_its_camera_sees(Image image, const fs::path& path, int frame) {
     cv::flip(image.pixels, mirrored, 1);
     image.pixels = mirrored;
   }
-  if (stored.inverted) {
-    double largest = 0;
-    cv::minMaxLoc(image.pixels, nullptr, &largest);
-    image.pixels = cv::Mat(largest - image.pixels);
-  }
+  if (stored.inverted_from) image.pixels = cv::Mat(*stored.inverted_from - image.pixels);
   return image;
 }
 
-bool is_dicom(const fs::path& path) {
-  const std::string extension = in_small_letters(path.extension().string());
-  return extension == ".dcm" || extension == ".dicom";
+bool is_dicom(const fs::path& path) { return file_format(path) == FileFormat::dicom; }
+
+template <class T>
+void put_values(const std::vector<float>& values, std::byte* to) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const T value = T(values[i]);
+    std::memcpy(to + i * sizeof(T), &value, sizeof(T));
+  }
+}
+
+/// The pages of a format for volumes. Whole numbers of 8 and 16 bits without sign stay so; all others become float.
+Samples pages_of(const VolumeSamples& volume) {
+  Samples pages = volume.geometry;
+  if (pages.type != Samples::Type::u8 && pages.type != Samples::Type::u16) pages.type = Samples::Type::f32;
+  pages.bytes.resize(pages.count() * bytes_each(pages.type));
+  if (pages.type == Samples::Type::u8) put_values<std::uint8_t>(volume.values, pages.bytes.data());
+  if (pages.type == Samples::Type::u16) put_values<std::uint16_t>(volume.values, pages.bytes.data());
+  if (pages.type == Samples::Type::f32) put_values<float>(volume.values, pages.bytes.data());
+  return pages;
+}
+
+[[noreturn]] void refuse_format(const fs::path& path) {
+  const std::string other = name_of_other_format(path);
+  if (!other.empty()) throw Error(path.string() + ": is " + other + ", not an image that can be read; save it as PNG");
+  throw Error(path.string() +
+              ": not an image that can be read; known are PNG, TIFF, JPEG, BMP, DICOM, MetaImage, NRRD and NIfTI");
+}
+
+Samples read_stored_pages(const fs::path& path) {
+  switch (file_format(path)) {
+    case FileFormat::png:
+      return read_png(path);
+    case FileFormat::tiff:
+      return read_tiff(path);
+    case FileFormat::jpeg:
+      return read_jpeg(path);
+    case FileFormat::bmp:
+      return read_bmp(path);
+    case FileFormat::meta_image:
+      return pages_of(read_meta_image(path, false));
+    case FileFormat::nrrd:
+      return pages_of(read_nrrd(path, false));
+    case FileFormat::nifti:
+      return pages_of(read_nifti(path, false));
+    case FileFormat::dicom:
+    case FileFormat::unknown:
+      break;
+  }
+  refuse_format(path);
+}
+
+/// All pages of a file that is not DICOM, as grey levels.
+Samples read_pages(const fs::path& path) {
+  Samples pages = read_stored_pages(path);
+  make_grey(path.string(), pages);
+  return pages;
 }
 
 }  // namespace
@@ -107,29 +157,22 @@ bool is_mirrored_as_read(const fs::path& path, int frame) {
 }
 
 Image read_image_file(const fs::path& path, int frame) {
-  const std::string extension = in_small_letters(path.extension().string());
   if (is_dicom(path)) return as_its_camera_sees(read_dicom_image(path, frame), path, frame);
-  if (extension != ".tif" && extension != ".tiff" && extension != ".png")
-    throw Error(path.string() + ": not an image that can be read; known are .png, .tif and .dcm");
-  const Samples samples = extension == ".png" ? read_png(path) : read_tiff(path);
-  check_frame(frame, samples.size[2], path,
+  const Samples pages = read_pages(path);
+  check_frame(frame, pages.size[2], path,
               " pages; an image has one (a stack is a volume; frame, from 1, picks a page)");
-  check_one_channel(samples.components, path);
-  return image_of(samples, std::max(1, frame), path);
+  return image_of(pages, std::max(1, frame), path);
 }
 
 std::vector<Image> read_image_frames(const fs::path& path, const FrameRange& range) {
   std::vector<Image> images;
-  const std::string extension = in_small_letters(path.extension().string());
-  if (extension != ".tif" && extension != ".tiff") {
-    const int count = is_dicom(path) ? read_dicom_pixels(path, 1).frames : 1;
+  if (is_dicom(path)) {
+    const int count = read_dicom_pixels(path, 1).frames;
     for (const int frame : frames_of(range, count, path.string())) images.push_back(read_image_file(path, frame));
     return images;
   }
-  const Samples samples = read_tiff(path);
-  check_one_channel(samples.components, path);
-  for (const int frame : frames_of(range, samples.size[2], path.string()))
-    images.push_back(image_of(samples, frame, path));
+  const Samples pages = read_pages(path);
+  for (const int frame : frames_of(range, pages.size[2], path.string())) images.push_back(image_of(pages, frame, path));
   return images;
 }
 

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 
 #include "dicom_file.hpp"
+#include "file_format.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/files/xray_header.hpp"
 #include "patient_orientation.hpp"
@@ -15,11 +16,7 @@ constexpr DicomTag kHorizontalFlip{0x0018, 0x7034, "FieldOfViewHorizontalFlip"};
 constexpr DicomTag kAngleOfPrimary{0x0018, 0x1510, "PositionerPrimaryAngle"};
 constexpr DicomTag kAngleOfSecondary{0x0018, 0x1511, "PositionerSecondaryAngle"};
 
-bool has_dicom_header(const std::filesystem::path& path) {
-  std::string end = path.extension().string();
-  for (char& c : end) c = char(std::tolower(static_cast<unsigned char>(c)));
-  return end == ".dcm" || end == ".dicom";
-}
+bool has_dicom_header(const std::filesystem::path& path) { return file_format(path) == FileFormat::dicom; }
 
 /// The patient's side that a direction points to most.
 std::string side_of(const Eigen::Vector3d& direction) {

@@ -1,33 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Baseline JPEG by libjpeg. Its warnings, for example about data that end too early, are treated as errors.
-#include <csetjmp>
-#include <cstdio>
-#include <memory>
-
+// Baseline JPEG in DICOM files, by libjpeg.
 #include "jpeg_stream.hpp"
-// jpeglib.h needs stdio.h before it.
-#include <jpeglib.h>
+#include "libjpeg.hpp"
 
 namespace marrow::files {
 namespace {
 
-struct Failure {
-  jpeg_error_mgr manager;
-  std::jmp_buf back;
-  char text[JMSG_LENGTH_MAX];
-};
-
-void on_error(j_common_ptr state) {
-  Failure& failure = *reinterpret_cast<Failure*>(state->err);
-  state->err->format_message(state, failure.text);
-  std::longjmp(failure.back, 1);
-}
-void on_message(j_common_ptr state, int level) {
-  if (level < 0) on_error(state);
-}
-
 /// No object with a destructor may live between setjmp and the calls that can jump back to it.
-bool decode(jpeg_decompress_struct& state, Failure& failure, const CodedImage& image, std::byte* to) {
+bool decode(jpeg_decompress_struct& state, JpegFailure& failure, const CodedImage& image, std::byte* to) {
   if (setjmp(failure.back)) return false;
   jpeg_mem_src(&state, reinterpret_cast<const unsigned char*>(image.bytes.data()), image.bytes.size());
   jpeg_read_header(&state, TRUE);
@@ -54,15 +34,12 @@ std::vector<std::byte> decode_jpeg_baseline(const CodedImage& image) {
     if (marker == 0xDA) throw CodecError("the compressed pixels have no frame header");
     marker = segments.next();
   }
-  if (marker != 0xC0) throw CodecError("the pixels are compressed by another kind of JPEG than the header says");
+  if (marker != 0xC0) throw CodecNotRead("its pixels are compressed by another kind of JPEG than the header says");
   if (frame_precision(segments, image) != 8 || image.bits_allocated != 8) throw CodecError("baseline JPEG has 8 bits");
   std::vector<std::byte> bytes(std::size_t(image.columns) * std::size_t(image.rows));
-  Failure failure;
+  JpegFailure failure;
   jpeg_decompress_struct state{};
-  state.err = jpeg_std_error(&failure.manager);
-  failure.manager.error_exit = on_error;
-  failure.manager.emit_message = on_message;
-  jpeg_create_decompress(&state);
+  prepare(state, failure);
   const bool good = decode(state, failure, image, bytes.data());
   jpeg_destroy_decompress(&state);
   if (!good) throw CodecError(failure.text);

@@ -137,6 +137,7 @@ VolumeSamples read_samples(const MetaHeader& header, const InputFile& data, std:
   if (const long long packed = fields.whole_number_or("compresseddatasize", 0);
       packed < 0 || std::uint64_t(packed) > data.size() - std::min(stored.begin, data.size()))
     fields.refuse("compresseddatasize", "no more bytes than the file holds");
+  volume.geometry.type = stored.type_of_values();
   volume.values = read_floats(data, stored);
   return volume;
 }

@@ -95,6 +95,11 @@ NiftiHeader read_nifti_header(const InputFile& file) {
     take_first_version(bytes, header);
   else if (bytes.is(kSecondBytes, 4, "n+2\0\r\n\x1A\n"sv))
     take_second_version(bytes, header);
+  else if (bytes.is(kFirstBytes, 344, "ni1\0"sv) || bytes.is(kSecondBytes, 4, "ni2\0"sv))
+    throw Error(
+        header.what +
+        ": is not a NIfTI file with its samples in it: they are in an .img file beside this header; save both as "
+        "one file (.nii)");
   else
     throw Error(header.what + ": is not a NIfTI file with its samples in it, or is damaged at its start");
   return header;

@@ -7,6 +7,7 @@
 #include <new>
 #include <string_view>
 
+#include "exif.hpp"
 #include "marrow/domain/error.hpp"
 #include "samples.hpp"
 
@@ -75,37 +76,17 @@ bool read_rows(Reader& reader, png_bytepp rows) {
   return true;
 }
 
-/// The unsigned number of `width` bytes; 0 beyond the end.
-std::uint32_t number_at(std::string_view bytes, std::size_t at, std::size_t width, bool big_endian) {
-  std::uint32_t number = 0;
-  for (std::size_t i = 0; at <= bytes.size() && width <= bytes.size() - at && i < width; ++i)
-    number = number << 8 | static_cast<unsigned char>(bytes[at + (big_endian ? i : width - 1 - i)]);
+std::size_t length_at(std::string_view bytes, std::size_t at) {
+  std::size_t number = 0;
+  for (std::size_t i = 0; i < 4; ++i) number = number << 8 | static_cast<unsigned char>(bytes[at + i]);
   return number;
 }
 
-/// The Exif orientation (1 to 8) from the first directory of Exif data; 1 (not turned) if there is none.
-std::uint32_t orientation_of(std::string_view exif) {
-  const bool big_endian = exif.substr(0, 2) == "MM";
-  if (!big_endian && exif.substr(0, 2) != "II") return 1;
-  const std::size_t directory = number_at(exif, 4, 4, big_endian), entries = number_at(exif, directory, 2, big_endian);
-  for (std::size_t i = 0; i < entries && directory + 14 + 12 * i <= exif.size(); ++i) {
-    const std::size_t entry = directory + 2 + 12 * i;
-    if (number_at(exif, entry, 2, big_endian) != 274) continue;
-    const bool is_long = number_at(exif, entry + 2, 2, big_endian) == 4;
-    return number_at(exif, entry + 8, is_long ? 4 : 2, big_endian);
-  }
-  return 1;
-}
-
-/// Image viewers would turn such an image, but this reader does not. So it is refused.
 void check_orientation(const std::string& what, std::string_view bytes) {
   for (std::size_t at = 8; at + 12 <= bytes.size();) {
-    const std::size_t length = number_at(bytes, at, 4, true);
+    const std::size_t length = length_at(bytes, at);
     if (length > bytes.size() - at - 12) return;  // cut off; libpng reports this if it needs the chunk
-    if (bytes.substr(at + 4, 4) == "eXIf")
-      if (const auto orientation = orientation_of(bytes.substr(at + 8, length)); orientation >= 2 && orientation <= 8)
-        throw Error(what + ": is to be shown turned or mirrored (Exif Orientation " + std::to_string(orientation) +
-                    "), but its pixels are not; save it turned, without Orientation");
+    if (bytes.substr(at + 4, 4) == "eXIf") check_not_turned(what, bytes.substr(at + 8, length));
     at += 12 + length;
   }
 }

@@ -36,23 +36,29 @@ std::size_t bytes_each(Samples::Type type);
 
 /// A volume: its grid, and its samples as float.
 struct VolumeSamples {
-  Samples geometry;  ///< without bytes
+  Samples geometry;  ///< without bytes; its type is that of the stored samples, or f32 if they are scaled
   std::vector<float> values;
+  std::string note{};  ///< for the log: the files of a folder that were passed over; else empty
 };
 
 VolumeSamples read_meta_image(const std::filesystem::path& path, bool folder_is_named);
 VolumeSamples read_nrrd(const std::filesystem::path& path, bool folder_is_named);
-VolumeSamples read_nifti(const std::filesystem::path& path);
+/// `is_placed`: the header must say where the volume lies. Else it may be one image, and the grid is not read.
+VolumeSamples read_nifti(const std::filesystem::path& path, bool is_placed = true);
 /// A CT series in HU: all slices of one series in a folder, sorted by position and checked for gaps. `series_uid`
-/// selects the series; empty: the folder must hold only one. Throws Error if slices are missing, damaged or do not fit
+/// selects the series; empty: the folder must hold only one CT. Other files of the folder are passed over. Throws Error if slices are missing, damaged or do not fit
 /// together.
 VolumeSamples read_dicom_series(const std::filesystem::path& folder, const std::string& series_uid);
-/// Whether a file has DICOM's mark at its start.
+/// Whether a file has DICOM's mark at byte 128 or, as some programs write it, begins with DICOM elements at once.
 bool looks_like_dicom(const std::filesystem::path& path);
 
-/// All pages of a TIFF. If it has colours, `components` is not 1 and there are no bytes.
+/// All pages of a TIFF. Colours of a kind that is not read leave `components` above 1 and give no bytes.
 Samples read_tiff(const std::filesystem::path& path);
 Samples read_png(const std::filesystem::path& path);
+Samples read_jpeg(const std::filesystem::path& path);
+Samples read_bmp(const std::filesystem::path& path);
+/// Makes one component of equal colours and full opacity. Throws Error, beginning with `what`, for others.
+void make_grey(const std::string& what, Samples& samples);
 
 /// Throws Error if a size from the header is not possible for a volume or image, or if a file of `stored_bytes` cannot
 /// hold so many samples. To be called before memory is reserved for them. No CT or image is compressed to more than 500
@@ -69,6 +75,8 @@ struct StoredSamples {
   bool big_endian = false;
   std::size_t count = 0;
   double slope = 1, intercept = 0;
+
+  Samples::Type type_of_values() const { return slope == 1 && intercept == 0 ? type : Samples::Type::f32; }
 };
 /// All samples as float, scaled by slope and intercept. Throws Error if samples are missing or data follow them.
 std::vector<float> read_floats(const InputFile& file, const StoredSamples& stored);

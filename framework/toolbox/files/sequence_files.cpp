@@ -4,8 +4,10 @@
 #include <fnmatch.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 
+#include "file_format.hpp"
 #include "header_lines.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
@@ -15,10 +17,31 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_image(const fs::path& path) {
-  const std::string extension = in_small_letters(path.extension().string());
-  return extension == ".png" || extension == ".tif" || extension == ".tiff" || extension == ".dcm" ||
-         extension == ".dicom";
+/// Files of a higher rank are no images beside those of a lower one: JPEG and BMP are pictures of them, and a file for
+/// volumes is a CT.
+std::size_t rank_of(FileFormat format) {
+  if (format == FileFormat::png || format == FileFormat::tiff || format == FileFormat::dicom) return 0;
+  return format == FileFormat::jpeg || format == FileFormat::bmp ? 1 : 2;
+}
+
+/// The images among the files of a folder.
+std::vector<std::string> images_in(const fs::path& folder, const std::vector<std::string>& names) {
+  std::array<std::vector<std::string>, 3> by_rank;
+  for (const std::string& name : names) {
+    const FileFormat format = file_format(folder / name);
+    if (format == FileFormat::unknown || in_small_letters(fs::path(name).filename().string()) == "dicomdir") continue;
+    by_rank[rank_of(format)].push_back(name);
+  }
+  const auto first = std::find_if(by_rank.begin(), by_rank.end(),
+                                  [](const std::vector<std::string>& found) { return !found.empty(); });
+  return first == by_rank.end() ? std::vector<std::string>() : *first;
+}
+
+std::vector<std::string> names_that_fit(const std::string& pattern, const std::vector<std::string>& names) {
+  std::vector<std::string> fitting;
+  for (const std::string& name : names)
+    if (fnmatch(pattern.c_str(), name.c_str(), FNM_PATHNAME | FNM_PERIOD) == 0) fitting.push_back(name);
+  return fitting;
 }
 
 /// Paths from the folder of all its files, sorted. Folders inside are searched as deep as the pattern reaches.
@@ -43,7 +66,7 @@ std::vector<std::string> files_in(const fs::path& folder, long depth) {
   for (std::size_t i = 0; i < std::min(kMost, names.size()); ++i) there += (i ? ", '" : "'") + names[i] + "'";
   if (names.size() > kMost) there += " and " + std::to_string(names.size() - kMost) + " more";
   throw Error(folder.string() + ": no " +
-              (pattern.empty() ? std::string("image (PNG, TIFF, DICOM) is in it")
+              (pattern.empty() ? std::string("image (PNG, TIFF, DICOM, ...) is in it")
                                : "file in it fits the pattern '" + pattern + "'") +
               (there.empty() ? "; the folder is empty" : "; there are " + there));
 }
@@ -127,10 +150,7 @@ std::vector<int> frames_of(const FrameRange& range, int count, const std::string
 
 std::vector<fs::path> frame_files(const fs::path& folder, const std::string& pattern) {
   const std::vector<std::string> all = files_in(folder, std::count(pattern.begin(), pattern.end(), '/'));
-  std::vector<std::string> names;
-  for (const std::string& name : all)
-    if (pattern.empty() ? is_image(name) : fnmatch(pattern.c_str(), name.c_str(), FNM_PATHNAME | FNM_PERIOD) == 0)
-      names.push_back(name);
+  const std::vector<std::string> names = pattern.empty() ? images_in(folder, all) : names_that_fit(pattern, all);
   if (names.empty()) refuse_no_file(folder, pattern, all);
   std::vector<fs::path> paths;
   if (names.size() == 1) {

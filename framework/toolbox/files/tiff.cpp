@@ -37,16 +37,48 @@ Samples::Type type_of(const std::string& what, const TiffPage& page) {
 }
 
 void read_page(const InputFile& file, const TiffPages& tiff, const TiffPage& page, std::byte* to) {
-  const std::size_t row_bytes = std::size_t(page.width) * std::size_t(page.bits / 8);
-  std::uint64_t row = 0;
+  const std::size_t row_bytes = std::size_t(page.width * page.samples_together()) * std::size_t(page.bits / 8);
+  std::uint64_t row = 0;  // the rows of a second plane follow those of the first
   for (const TiffStrip& strip : page.strips) {
-    const std::uint64_t rows = std::min(page.rows_per_strip, page.height - row);
+    const std::uint64_t rows = std::min(page.rows_per_strip, page.height - row % page.height);
     read_tiff_strip(file, tiff, page, strip, to + row * row_bytes, std::size_t(rows) * row_bytes);
     row += rows;
   }
   if (page.orientation == 4)  // the first row is the bottom one
-    for (std::uint64_t v = 0; v < page.height / 2; ++v)
-      std::swap_ranges(to + v * row_bytes, to + (v + 1) * row_bytes, to + (page.height - 1 - v) * row_bytes);
+    for (std::uint64_t plane = 0; plane < row; plane += page.height)
+      for (std::uint64_t v = 0; v < page.height / 2; ++v)
+        std::swap_ranges(to + (plane + v) * row_bytes, to + (plane + v + 1) * row_bytes,
+                         to + (plane + page.height - 1 - v) * row_bytes);
+}
+
+/// Puts the samples of a pixel side by side.
+void join_planes(const TiffPage& page, std::size_t width, std::byte* pixels) {
+  const std::size_t count = std::size_t(page.width * page.height), each = std::size_t(page.samples);
+  const std::vector<std::byte> planes(pixels, pixels + count * each * width);
+  for (std::size_t k = 0; k < each; ++k)
+    for (std::size_t i = 0; i < count; ++i)
+      std::memcpy(pixels + (i * each + k) * width, planes.data() + (k * count + i) * width, width);
+}
+
+/// The colours of indices of 8 bits. The palette has 16 bits a value, of which screens show the upper 8.
+void look_up_colours(const std::string& what, const TiffPage& page, Samples& samples) {
+  if (page.palette.size() != 3 * 256)
+    throw Error(what + ": is damaged: its palette has " + std::to_string(page.palette.size()) +
+                " values, 768 expected; copy or export it again");
+  std::vector<std::byte> colours(3 * samples.bytes.size());
+  for (std::size_t i = 0; i < colours.size(); ++i)
+    colours[i] = std::byte(page.palette[i % 3 * 256 + std::size_t(samples.bytes[i / 3])] >> 8);
+  samples.bytes = std::move(colours);
+  samples.components = 3;
+}
+
+/// Whether its colours, or grey levels with an opacity, are of a kind that is read.
+bool has_plain_colours(const TiffPage& page) {
+  constexpr std::uint64_t kRgb = 2, kPalette = 3;
+  if (page.format != 1 || (page.planes != 1 && page.planes != 2)) return false;
+  if (page.photometric == kPalette) return page.samples == 1 && page.bits == 8;
+  if (page.bits != 8 && page.bits != 16) return false;
+  return page.photometric == kRgb ? page.samples == 3 || page.samples == 4 : page.photometric == 1 && page.samples == 2;
 }
 
 template <class T>
@@ -92,16 +124,23 @@ Samples read_tiff(const std::filesystem::path& path) {
   samples.intercept = tiff.intercept;
   samples.size = {int(first.width), int(first.height), int(tiff.pages.size())};
   samples.components = int(std::min<std::uint64_t>(first.samples, 1000));
-  if (first.photometric > 1) samples.components = std::max(samples.components, 3);  // colours, possibly by a palette
-  if (samples.components != 1) return samples;
+  const bool is_grey = first.samples == 1 && first.photometric <= 1;
+  if (!is_grey && !has_plain_colours(first)) {
+    samples.components = std::max(samples.components, 3);
+    return samples;
+  }
   for (const TiffPage& page : tiff.pages) check_kind(what, page);
   samples.type = type_of(what, first);
   check_calibration(what, samples, first);
   check_size(what, {samples.size[0], samples.size[1], samples.size[2]}, file.size());
-  const std::size_t page_bytes = std::size_t(first.width) * std::size_t(first.height) * bytes_each(samples.type);
+  const std::size_t width = bytes_each(samples.type);
+  const std::size_t page_bytes = std::size_t(first.width * first.height * first.samples) * width;
   samples.bytes.resize(page_bytes * tiff.pages.size());
-  for (std::size_t i = 0; i < tiff.pages.size(); ++i)
+  for (std::size_t i = 0; i < tiff.pages.size(); ++i) {
     read_page(file, tiff, tiff.pages[i], samples.bytes.data() + i * page_bytes);
+    if (first.planes == 2 && first.samples > 1) join_planes(first, width, samples.bytes.data() + i * page_bytes);
+  }
+  if (first.photometric == 3) look_up_colours(what, first, samples);
   if (first.photometric == 0) invert(what, samples);
   return samples;
 }

@@ -94,6 +94,7 @@ class Walk {
       if (tag == 273) places = numbers_of(entry);
       if (tag == 270) description = check_description(entry);
       if (tag == 279) lengths = numbers_of(entry);
+      if (tag == 320) page.palette = numbers_of(entry);
       if (tag == 322 || tag == 324) page.is_tiled = true;
       if (std::uint64_t* const place = place_of(page, tag)) {
         const auto numbers = numbers_of(entry);
@@ -189,6 +190,8 @@ class Walk {
         return &page.samples;
       case 278:
         return &page.rows_per_strip;
+      case 284:
+        return &page.planes;
       case 317:
         return &page.predictor;
       case 339:
@@ -222,8 +225,9 @@ class Walk {
       throw Error(what() + ": page " + std::to_string(tiff_.pages.size() + 1) + " has a size of " +
                   std::to_string(page.width) + " x " + std::to_string(page.height) + " pixels; it is damaged");
     page.rows_per_strip = std::min(page.rows_per_strip, page.height);
-    const std::uint64_t strips = (page.height + page.rows_per_strip - 1) / page.rows_per_strip;
-    if (page.samples == 1 && (places.size() != strips || lengths.size() != strips)) throw std::out_of_range("strips");
+    const std::uint64_t strips = (page.height + page.rows_per_strip - 1) / page.rows_per_strip *
+                                 (page.planes == 2 ? std::min<std::uint64_t>(page.samples, 1000) : 1);
+    if (page.samples <= 4 && (places.size() != strips || lengths.size() != strips)) throw std::out_of_range("strips");
     for (std::size_t i = 0; i < std::min(places.size(), lengths.size()); ++i) {
       if (!window_.holds(places[i], lengths[i])) throw std::out_of_range("pixels");
       count_bytes(lengths[i]);

@@ -14,15 +14,19 @@ struct TiffStrip {
 
 struct TiffPage {
   std::uint64_t width = 0, height = 0, bits = 1, samples = 1, compression = 1, photometric = 1, fill_order = 1,
-                orientation = 1, rows_per_strip = 0xFFFFFFFF, predictor = 1, format = 1, subfile = 0;
+                orientation = 1, rows_per_strip = 0xFFFFFFFF, predictor = 1, format = 1, subfile = 0, planes = 1;
   bool is_tiled = false;
   std::uint64_t told = 0;  ///< number of pages that belong together by its description, from this one on; 0: not given
   std::vector<TiffStrip> strips;
+  std::vector<std::uint64_t> palette;  ///< all red values, then all green and all blue ones
 
+  /// Number of samples of a pixel that lie side by side (PlanarConfiguration 2 keeps each colour apart).
+  std::uint64_t samples_together() const { return planes == 2 ? 1 : samples; }
   /// Whether both can be pages of one stack.
   bool is_like(const TiffPage& other) const {
     return width == other.width && height == other.height && bits == other.bits && samples == other.samples &&
-           photometric == other.photometric && orientation == other.orientation && format == other.format;
+           photometric == other.photometric && orientation == other.orientation && format == other.format &&
+           planes == other.planes && palette == other.palette;
   }
 };
 

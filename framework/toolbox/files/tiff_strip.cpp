@@ -54,23 +54,25 @@ std::size_t unpack_lzw(const std::string& packed, std::byte* to, std::size_t byt
   }
 }
 
+/// `each`: samples of a pixel. A sample is stored as its difference from that of the pixel before.
 template <class T>
-void add_up(std::byte* row, std::size_t pixels) {
-  T sum = 0;
-  for (std::size_t i = 0; i < pixels; ++i) {
-    T value;
+void add_up(std::byte* row, std::size_t samples, std::size_t each) {
+  for (std::size_t i = each; i < samples; ++i) {
+    T value, before;
     std::memcpy(&value, row + i * sizeof(T), sizeof(T));
-    sum = T(sum + value);
-    std::memcpy(row + i * sizeof(T), &sum, sizeof(T));
+    std::memcpy(&before, row + (i - each) * sizeof(T), sizeof(T));
+    value = T(value + before);
+    std::memcpy(row + i * sizeof(T), &value, sizeof(T));
   }
 }
 
 void undo_differences(const TiffPage& page, std::byte* rows, std::size_t bytes) {
-  const std::size_t row_bytes = std::size_t(page.width) * std::size_t(page.bits / 8);
+  const std::size_t each = std::size_t(page.samples_together()), samples = std::size_t(page.width) * each;
+  const std::size_t row_bytes = samples * std::size_t(page.bits / 8);
   for (std::size_t at = 0; at < bytes; at += row_bytes) {
-    if (page.bits == 8) add_up<std::uint8_t>(rows + at, std::size_t(page.width));
-    if (page.bits == 16) add_up<std::uint16_t>(rows + at, std::size_t(page.width));
-    if (page.bits == 32) add_up<std::uint32_t>(rows + at, std::size_t(page.width));
+    if (page.bits == 8) add_up<std::uint8_t>(rows + at, samples, each);
+    if (page.bits == 16) add_up<std::uint16_t>(rows + at, samples, each);
+    if (page.bits == 32) add_up<std::uint32_t>(rows + at, samples, each);
   }
 }
 

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "file_format.hpp"
 #include "header_lines.hpp"
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "samples.hpp"
 
 namespace marrow::files {
@@ -17,30 +19,36 @@ namespace fs = std::filesystem;
 
 std::string lower_extension(const fs::path& path) { return in_small_letters(path.extension().string()); }
 
-bool is_tiff(const std::string& extension) { return extension == ".tif" || extension == ".tiff"; }
+VolumeSamples read_tiff_volume(const fs::path& path) {
+  VolumeSamples volume{read_tiff(path), {}};
+  if (volume.geometry.components != 1)
+    throw Error(path.string() + ": has " + std::to_string(volume.geometry.components) +
+                " values per voxel; a CT has one");
+  if (!volume.geometry.other_pages.empty())
+    throw Error(path.string() + ": is " + volume.geometry.other_pages +
+                ", whose pages are not slices of one volume; save one of them alone, or, where they are slices, save "
+                "them as such (in ImageJ: Image, Properties)");
+  volume.values = to_float(volume.geometry);
+  volume.geometry.bytes = {};
+  return volume;
+}
+
+[[noreturn]] void refuse_as_volume(const fs::path& path, FileFormat format) {
+  if (format == FileFormat::dicom)
+    throw Error(path.string() + ": is one DICOM file, and a volume is a folder of them, one a slice; name the folder");
+  const std::string other = format == FileFormat::unknown ? name_of_other_format(path) : "a picture (PNG, JPEG or BMP)";
+  throw Error(path.string() + ": " + (other.empty() ? "" : "is " + other + ", ") +
+              "not a volume that can be read; known are .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .tif and a "
+              "folder of DICOM slices (name the folder)");
+}
 
 /// `folder_is_named`: the user named the folder of the file, so other files in it are part of the input.
-VolumeSamples read_single(const fs::path& path, bool folder_is_named) {
-  const std::string extension = lower_extension(path);
-  if (extension == ".mha" || extension == ".mhd") return read_meta_image(path, folder_is_named);
-  if (extension == ".nrrd" || extension == ".nhdr") return read_nrrd(path, folder_is_named);
-  if (extension == ".nii" || (extension == ".gz" && lower_extension(path.stem()) == ".nii")) return read_nifti(path);
-  if (is_tiff(extension)) {
-    VolumeSamples volume{read_tiff(path), {}};
-    if (volume.geometry.components != 1)
-      throw Error(path.string() + ": has " + std::to_string(volume.geometry.components) +
-                  " values per voxel; a CT has one");
-    if (!volume.geometry.other_pages.empty())
-      throw Error(path.string() + ": is " + volume.geometry.other_pages +
-                  ", whose pages are not slices of one volume; save one of them alone, or, where they are slices, save "
-                  "them as such (in ImageJ: Image, Properties)");
-    volume.values = to_float(volume.geometry);
-    volume.geometry.bytes = {};
-    return volume;
-  }
-  throw Error(path.string() +
-              ": not a volume that can be read; known are .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .tif and a "
-              "folder of DICOM slices (name the folder)");
+VolumeSamples read_single(const fs::path& path, FileFormat format, bool folder_is_named) {
+  if (format == FileFormat::meta_image) return read_meta_image(path, folder_is_named);
+  if (format == FileFormat::nrrd) return read_nrrd(path, folder_is_named);
+  if (format == FileFormat::nifti) return read_nifti(path);
+  if (format == FileFormat::tiff) return read_tiff_volume(path);
+  refuse_as_volume(path, format);
 }
 
 /// The MHD or NHDR header in the folder; an empty path if there is none. Throws Error if there are several, or if DICOM
@@ -114,22 +122,26 @@ void check_reading(const VolumeReading& reading) {
     throw Error("voxel_size_mm: expected 3 lengths, got " + std::to_string(reading.voxel_size_mm.size()));
   for (double length : reading.voxel_size_mm)
     if (!(length > 0) || !std::isfinite(length))
-      throw Error("voxel_size_mm: expected positive lengths, got " + std::to_string(length));
+      throw Error("voxel_size_mm: expected positive lengths, got " + formatted("%f", length));
 }
 
 }  // namespace
 
-Volume read_volume_file(const fs::path& path, const VolumeReading& reading) {
+Volume read_volume_file(const fs::path& path, const VolumeReading& reading,
+                        const std::function<void(const std::string&)>& tell) {
   check_reading(reading);
   std::error_code failure;
   if (!fs::exists(path, failure)) throw Error(path.string() + ": there is no such file or folder");
   const bool is_folder = fs::is_directory(path, failure);
   const fs::path file = is_folder ? detached_header_in(path) : path;
-  VolumeSamples samples = file.empty() ? read_dicom_series(path, reading.series_uid) : read_single(file, is_folder);
+  const FileFormat format = file.empty() ? FileFormat::dicom : file_format(file);
+  VolumeSamples samples =
+      file.empty() ? read_dicom_series(path, reading.series_uid) : read_single(file, format, is_folder);
+  if (tell && !samples.note.empty()) tell(samples.note);
   if (samples.geometry.dimensions < 3)
     throw Error(file.string() + ": is one image, not a volume; expected 3 dimensions, got " +
                 std::to_string(samples.geometry.dimensions));
-  if (is_tiff(lower_extension(file)) && reading.voxel_size_mm.empty())
+  if (format == FileFormat::tiff && reading.voxel_size_mm.empty())
     throw Error(file.string() + ": a TIFF does not say how large its voxels are; give voxel_size_mm: [x, y, z]");
   if (!samples.geometry.spacing_field.empty() && reading.voxel_size_mm.empty())
     throw Error(file.string() + ": its header does not say how large its voxels are; add '" +

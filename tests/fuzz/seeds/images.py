@@ -26,6 +26,28 @@ def png(bits=8, colour=0, width=6, height=5, interlaced=0, extra=b""):
     )
 
 
+# 16 x 8 grey pixels.
+JPEG = bytes.fromhex(
+    "ffd8ffe000104a46494600010100000100010000ffdb00430001010101010101010101010101010101010101010101010101010101010101"
+    "010101010101010101010101010101010101010101010101010101010101010101ffc0000b080008001001011100ffc40015000101000000"
+    "00000000000000000000000a0bffc40014100100000000000000000000000000000000ffda0008010100003f0031ea583fffd9"
+)
+
+
+def bmp(bits, colours=0, height=3, method=0):
+    width, palette = 5, b"".join(bytes([i % 256] * 3 + [0]) for i in range(colours))
+    rows = bytes(i % max(1, colours) for i in range((width * bits + 31) // 32 * 4 * abs(height)))
+    masks = struct.pack("<III", 0xFF0000, 0xFF00, 0xFF) if method == 3 else b""
+    start = 54 + len(palette) + len(masks)
+    return (
+        struct.pack("<2sIII", b"BM", start + len(rows), 0, start)
+        + struct.pack("<IiiHHIIIIII", 40, width, height, 1, bits, method, len(rows), 0, 0, colours, 0)
+        + masks
+        + palette
+        + rows
+    )
+
+
 def seeds():
     palette = chunk(b"PLTE", bytes(range(48)))
     files = {
@@ -56,6 +78,11 @@ def seeds():
         "tif_spacing": tiff([(6, 5)], extra=[(296, 3, 3)]),
     }
     result.update({name: b"1t" + content for name, content in tiffs.items()})
+    result["jpeg"] = b"1j" + JPEG
+    result["jpeg_turned"] = b"1j" + JPEG[:2] + b"\xff\xe1\0\x22Exif\0\0II*\0\x08\0\0\0\1\0" + bytes(18) + JPEG[2:]
+    bmps = {"1": bmp(1, 2), "4": bmp(4, 16), "8": bmp(8, 256), "24": bmp(24), "32": bmp(32, height=-3)}
+    result.update({"bmp_" + name: b"1b" + content for name, content in bmps.items()})
+    result["bmp_masks"] = b"1b" + bmp(32, method=3)
     result["tif_pages"] = b"2t" + tiff([(6, 5), (6, 5), (6, 5)])
     result["tif_circle"] = b"2t" + tiff([(6, 5), (6, 5)], circle=True)
     return result
