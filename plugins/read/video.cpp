@@ -1,66 +1,203 @@
 // SPDX-License-Identifier: Apache-2.0
+// Videos by FFmpeg's libraries. OpenCV, which uses them too, cuts every frame to 8 bits, and opens whatever other file
+// a video names.
 #include "video.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cctype>
-#include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
+#include <cmath>
+#include <cstdio>
+#include <memory>
 
 #include "marrow/domain/error.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
+#include "video_picture.hpp"
+
+extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavformat/avformat.h>
+#include <libavutil/display.h>
+}
 
 namespace marrow::read_sequence {
 namespace {
 
 namespace fs = std::filesystem;
 
-cv::Mat as_grey(const cv::Mat& picture) {
-  if (picture.channels() == 1) return picture.clone();
-  cv::Mat grey;
-  cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
-  return grey;
+struct Release {
+  void operator()(AVFormatContext* container) const { avformat_close_input(&container); }
+  void operator()(AVCodecContext* decoder) const { avcodec_free_context(&decoder); }
+  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
+  void operator()(AVPacket* packet) const { av_packet_free(&packet); }
+  void operator()(AVIOContext* bytes) const {
+    av_freep(&bytes->buffer);
+    avio_context_free(&bytes);
+  }
+};
+template <class T>
+using Held = std::unique_ptr<T, Release>;
+
+/// The bytes of the file, for FFmpeg.
+struct Source {
+  const files::InputFile& file;
+  std::int64_t at = 0;
+};
+
+int take(void* opaque, std::uint8_t* to, int most) {
+  Source& source = *static_cast<Source*>(opaque);
+  const std::int64_t count = std::min<std::int64_t>(most, std::int64_t(source.file.size()) - source.at);
+  if (count <= 0) return AVERROR_EOF;
+  try {
+    source.file.read(std::uint64_t(source.at), to, std::size_t(count));
+  } catch (const Error&) {  // no exception may pass through FFmpeg
+    return AVERROR(EIO);
+  }
+  source.at += count;
+  return int(count);
 }
 
-std::vector<Image> decode(const fs::path& path, const files::FrameRange& range) {
-  cv::VideoCapture video(path.string(), cv::CAP_FFMPEG);
-  if (!video.isOpened())
-    throw Error(path.string() + ": cannot be decoded as a video; it is damaged, or FFmpeg does not know its format");
-  const double said = video.get(cv::CAP_PROP_FRAME_COUNT);
-  std::vector<Image> images;
-  cv::Mat picture;
-  int count = 0;
-  while ((range.last == 0 || count < range.last) && video.grab()) {
-    ++count;
-    if (count < range.first || (count - range.first) % range.every != 0) continue;
-    if (!video.retrieve(picture) || picture.depth() != CV_8U)
-      throw Error(path.string() + ": frame " + std::to_string(count) + " cannot be decoded");
-    images.push_back({as_grey(picture)});
+std::int64_t go_to(void* opaque, std::int64_t offset, int whence) {
+  Source& source = *static_cast<Source*>(opaque);
+  const std::int64_t size = std::int64_t(source.file.size());
+  if (whence == AVSEEK_SIZE) return size;
+  whence &= ~AVSEEK_FORCE;
+  const std::int64_t at = offset + (whence == SEEK_CUR ? source.at : whence == SEEK_END ? size : 0);
+  return at < 0 ? AVERROR(EINVAL) : source.at = at;
+}
+
+int refuse_other_file(AVFormatContext*, AVIOContext**, const char*, int, AVDictionary**) { return AVERROR(EACCES); }
+
+class Video {
+ public:
+  Video(const fs::path& path, const char* container) : file_(path) {
+    constexpr int kBufferBytes = 1 << 16;
+    av_log_set_level(AV_LOG_QUIET);  // what matters of it becomes an Error
+    bytes_.reset(avio_alloc_context(static_cast<std::uint8_t*>(av_malloc(kBufferBytes)), kBufferBytes, 0, &source_,
+                                    take, nullptr, go_to));
+    AVFormatContext* opened = avformat_alloc_context();
+    opened->pb = bytes_.get();
+    opened->io_open = refuse_other_file;
+    if (avformat_open_input(&opened, "", av_find_input_format(container), nullptr) < 0) fail_to_open();  // frees it
+    container_.reset(opened);
+    if (avformat_find_stream_info(opened, nullptr) < 0) fail_to_open();
+    const int found = av_find_best_stream(opened, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
+    if (found < 0) throw Error(what() + ": holds no pictures that FFmpeg finds");
+    stream_ = opened->streams[found];
+    check_is_upright();
+    open_decoder();
   }
-  if (range.last == 0 && count < said)
-    throw Error(path.string() + ": says that it has " + std::to_string(long(said)) + " frames, but only " +
-                std::to_string(count) + " can be decoded; to read these, set last to " + std::to_string(count));
-  files::frames_of(range, count, path.string());  // are there the first and the last?
-  return images;
+
+  std::string what() const { return file_.path().string(); }
+
+  /// Number of frames that the header tells of; 0 if it does not.
+  long frames_told() const {
+    if (stream_->nb_frames > 0) return long(stream_->nb_frames);
+    const AVRational rate = av_guess_frame_rate(container_.get(), stream_, nullptr);
+    const double duration_s = double(std::max<std::int64_t>(0, container_->duration)) / AV_TIME_BASE;
+    return rate.den > 0 ? long(std::floor(duration_s * av_q2d(rate) + 0.5)) : 0;
+  }
+
+  /// The next frame; nullptr at the end, or where is_damaged().
+  const AVFrame* next() {
+    while (!is_damaged_) {
+      const int got = avcodec_receive_frame(decoder_.get(), frame_.get());
+      if (got == AVERROR_EOF) return nullptr;
+      is_damaged_ = got == 0 ? !is_whole() : got != AVERROR(EAGAIN) || !send_packet();
+      if (got == 0 && !is_damaged_) return frame_.get();
+    }
+    return nullptr;
+  }
+
+  /// Whether the frame after the last that next() returned is there but cannot be decoded.
+  bool is_damaged() const { return is_damaged_; }
+
+ private:
+  [[noreturn]] void fail_to_open() const {
+    throw Error(what() + ": cannot be decoded as a video; it is cut off or damaged: copy or export it again");
+  }
+
+  void check_is_upright() const {
+    const std::uint8_t* const matrix = av_stream_get_side_data(stream_, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
+    if (!matrix) return;
+    const std::int32_t* const m = reinterpret_cast<const std::int32_t*>(matrix);
+    if (m[0] <= 0 || m[4] <= 0 || m[1] != 0 || m[3] != 0)
+      throw Error(what() +
+                  ": is to be shown turned or mirrored (its header has a display matrix), but its frames are not; save "
+                  "it turned");
+  }
+
+  void open_decoder() {
+    const AVCodecParameters& parameters = *stream_->codecpar;
+    const AVCodec* const codec = avcodec_find_decoder(parameters.codec_id);
+    if (!codec) {
+      char mark[AV_FOURCC_MAX_STRING_SIZE];
+      throw Error(what() + ": its frames are compressed by '" + av_fourcc_make_string(mark, parameters.codec_tag) +
+                  "', for which FFmpeg has no decoder here; convert it, to FFV1 for example");
+    }
+    decoder_.reset(avcodec_alloc_context3(codec));
+    if (avcodec_parameters_to_context(decoder_.get(), &parameters) < 0 ||
+        avcodec_open2(decoder_.get(), codec, nullptr) < 0)
+      fail_to_open();
+  }
+
+  bool is_whole() const { return frame_->decode_error_flags == 0 && !(frame_->flags & AV_FRAME_FLAG_CORRUPT); }
+
+  /// Gives the decoder the next packet, or tells it that there is none. Returns false where the file is damaged.
+  bool send_packet() {
+    while (true) {
+      const int got = av_read_frame(container_.get(), packet_.get());
+      if (got == AVERROR_EOF) return avcodec_send_packet(decoder_.get(), nullptr) == 0;
+      if (got < 0) return false;
+      const bool is_wanted = packet_->stream_index == stream_->index, is_cut_off = packet_->flags & AV_PKT_FLAG_CORRUPT;
+      const int sent = is_wanted && !is_cut_off ? avcodec_send_packet(decoder_.get(), packet_.get()) : 0;
+      av_packet_unref(packet_.get());
+      if (is_wanted) return sent == 0 && !is_cut_off;
+    }
+  }
+
+  const files::InputFile file_;
+  Source source_{file_};
+  Held<AVIOContext> bytes_;  // outlives the container, which reads from it
+  Held<AVFormatContext> container_;
+  AVStream* stream_ = nullptr;
+  Held<AVCodecContext> decoder_;
+  const Held<AVFrame> frame_{av_frame_alloc()};
+  const Held<AVPacket> packet_{av_packet_alloc()};
+  bool is_damaged_ = false;
+};
+
+Image image_of(const Video& video, const AVFrame& frame, int number) {
+  const auto grey = grey_of(frame);
+  if (!grey)
+    throw Error(video.what() + ": frame " + std::to_string(number) +
+                " has a kind of pixels that is not read; expected 8 to 16 bits of grey or colour");
+  return {*grey};
 }
 
 }  // namespace
 
-bool is_video(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return char(std::tolower(c)); });
-  constexpr std::array kKnown{".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg"};
-  return std::find(kKnown.begin(), kKnown.end(), extension) != kKnown.end();
-}
-
-std::vector<Image> read_video(const fs::path& path, const files::FrameRange& range) {
-  files::InputFile(path).size();  // a regular file that can be read
-  try {
-    return decode(path, range);
-  } catch (const cv::Exception& error) {
-    throw Error(path.string() + ": cannot be decoded as a video: " + error.err);
+std::vector<Image> read_video(const fs::path& path, const char* container, const files::FrameRange& range) {
+  Video video(path, container);
+  std::vector<Image> images;
+  int count = 0;
+  while (range.last == 0 || count < range.last) {
+    const AVFrame* const frame = video.next();
+    if (!frame) break;
+    ++count;
+    if (count < range.first || (count - range.first) % range.every != 0) continue;
+    images.push_back(image_of(video, *frame, count));
+    const cv::Mat &first = images.front().pixels, &now = images.back().pixels;
+    if (now.size() != first.size() || now.type() != first.type())
+      throw Error(path.string() + ": frame " + std::to_string(count) +
+                  " has another size or other bits than the first");
   }
+  if (const long told = video.frames_told(); range.last == 0 && count < told)
+    throw Error(path.string() + ": says that it has " + std::to_string(told) + " frames, but only " +
+                std::to_string(count) + " can be decoded; to read these, set last to " + std::to_string(count));
+  if (video.is_damaged())
+    throw Error(path.string() + ": frame " + std::to_string(count + 1) +
+                " is cut off or damaged; to read those before it, set last to " + std::to_string(count));
+  files::frames_of(range, count, path.string());  // are there the first and the last?
+  return images;
 }
 
 }  // namespace marrow::read_sequence

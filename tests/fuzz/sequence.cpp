@@ -2,6 +2,7 @@
 // Sequences: poses of a bone by Autoscoper, pages of a TIFF, frames of a DICOM file, videos.
 #include "marrow/toolbox/files/sequence_files.hpp"
 #include "plugins/read/video.hpp"
+#include "plugins/read/video_container.hpp"
 #include "target.hpp"
 #include "tests/without_registration.hpp"  // before the node
 
@@ -15,7 +16,10 @@ void read(char format, const marrow::files::FrameRange& range, std::string_view 
   if (format == 't') read_tra({put("a.tra", bytes)});
   if (format == 'p') marrow::files::read_image_frames(put("a.tif", bytes), range);
   if (format == 'd') marrow::files::read_image_frames(put("a.dcm", bytes), range);
-  if (format == 'v') marrow::read_sequence::read_video(put("a.avi", bytes), range);
+  if (format != 'v') return;
+  const std::filesystem::path video = put("a.avi", bytes);
+  if (const char* const container = marrow::read_sequence::video_container(video))
+    marrow::read_sequence::read_video(video, container, range);
 }
 
 }  // namespace
