@@ -5,6 +5,7 @@
 #include "marrow/compare/case_rate.hpp"
 #include "marrow/compare/statistics.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -14,15 +15,15 @@ constexpr std::size_t kMostBins = 100;  // the last one holds all starts that ar
 }  // namespace
 
 CaptureRange capture_range(const std::vector<StartOutcome>& outcomes, double bin_width, double least_rate) {
-  if (!(bin_width > 0)) throw Error("the width of a bin is " + std::to_string(bin_width) + "; give a positive one");
+  if (!(bin_width > 0)) throw Error("the width of a bin is " + formatted("%f", bin_width) + "; give a positive one");
   if (!(least_rate >= 0 && least_rate <= 1))
-    throw Error("the success rate is " + std::to_string(least_rate) + "; give a fraction from 0 to 1, such as 0.95");
+    throw Error("the success rate is " + formatted("%f", least_rate) + "; give a fraction from 0 to 1, such as 0.95");
   CaptureRange capture;
   std::vector<CaseRate> rates;
   double farthest = 0;
   for (const StartOutcome& outcome : outcomes) {
     if (!(outcome.error >= 0 && std::isfinite(outcome.error)))
-      throw Error("the error of a start is " + std::to_string(outcome.error) +
+      throw Error("the error of a start is " + formatted("%f", outcome.error) +
                   ", which is no distance; leave runs out whose start is not known");
     farthest = std::max(farthest, outcome.error);
     const std::size_t bin = std::size_t(std::min(outcome.error / bin_width, double(kMostBins - 1)));

@@ -8,6 +8,7 @@
 
 #include "cell_fault.hpp"
 #include "cell_key.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/pose.hpp"
 #include "marrow/runtime/run_folder.hpp"
 #include "marrow/runtime/types.hpp"
@@ -76,7 +77,7 @@ std::optional<marrow::Metric> figure(const Pipeline& pipeline, const RunResult& 
     known.push_back(metric.name);
     if (metric.name != name) continue;
     if (!std::isfinite(metric.value))
-      throw Error("'" + path + "' is " + std::to_string(metric.value) + ", not a finite number");
+      throw Error("'" + path + "' is " + formatted("%f", metric.value) + ", not a finite number");
     return metric;
   }
   throw Error("'" + path + "': there is no figure '" + name + "'; " + suggestion(name, known));

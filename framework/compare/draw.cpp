@@ -8,6 +8,8 @@
 
 #include "marrow/domain/random.hpp"
 
+#include "marrow/domain/number_text.hpp"
+
 namespace marrow::compare {
 namespace {
 
@@ -21,11 +23,7 @@ std::array<double, 3> draw_vector(Random& random, double most) {
 
 }  // namespace
 
-std::string number_text(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
+std::string number_text(double value) { return formatted("%.6g", value); }
 
 std::vector<InputValue> draw_inputs(const std::vector<DrawnInput>& inputs, std::uint64_t seed) {
   Random random(seed);

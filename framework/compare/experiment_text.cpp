@@ -10,6 +10,8 @@
 #include "experiment_sweep.hpp"
 #include "experiment_tune.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
+#include "marrow/domain/plain_text.hpp"
 #include "marrow/domain/printable.hpp"
 #include "runtime/file_names.hpp"
 #include "runtime/text_file.hpp"
@@ -37,7 +39,7 @@ class Reader {
                        "check the path");
       return written_;
     }
-    diagnostics_.remember(file.string(), experiment_.text);
+    diagnostics_.remember(file.string(), plain_text(experiment_.text));
     const YAML::Node root = yaml_.parse(experiment_.text);
     if (diagnostics_.empty()) read_root(root);
     return written_;
@@ -106,8 +108,7 @@ class Reader {
       return true;
     }
     if (double(variants) * double(cases) * double(starts) <= double(kMostCells)) return false;
-    char cells[40];
-    std::snprintf(cells, sizeof cells, "%.0f", double(variants) * double(cases) * double(starts));
+    const std::string cells = formatted("%.0f", double(variants) * double(cases) * double(starts));
     yaml_.fault(start,
                 std::to_string(variants) + " variants, " + std::to_string(cases) + " cases and " +
                     std::to_string(starts) + " starts are " + cells + " cells, at most " + std::to_string(kMostCells) +
@@ -226,8 +227,7 @@ class Reader {
       longest += most + (&column == &matrix_.front() ? 0 : 1);
     }
     if (count > double(kMostVariants)) {
-      char variants[40];
-      std::snprintf(variants, sizeof variants, count < 1e15 ? "%.0f" : "%.0e", count);
+      const std::string variants = formatted(count < 1e15 ? "%.0f" : "%.0e", count);
       yaml_.fault(matrix_place_,
                   std::string("the matrix makes ") + variants + " variants, at most " + std::to_string(kMostVariants) +
                       " can be compared",

@@ -2,11 +2,13 @@
 #include "experiment_tune.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdlib>
 
 #include "draw.hpp"
 #include "experiment_sweep.hpp"
+#include "marrow/domain/number_text.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -20,7 +22,7 @@ constexpr const char* kTuned = "tuned";
 /// Rounded to a power of ten that is at most a thousandth of `range`.
 double rounded(double value, double range) {
   const double step = std::pow(10, std::floor(std::log10(range / 1000)));
-  return std::strtod(number_text(std::round(value / step) * step).c_str(), nullptr);
+  return parsed_number(number_text(std::round(value / step) * step)).value();
 }
 
 }  // namespace
@@ -52,14 +54,16 @@ std::string add_tuned(Experiment& experiment, const std::vector<double>& values)
 bool add_tuned(Experiment& experiment, const std::string& name) {
   if (!experiment.tune || !name.starts_with(std::string(kTuned) + "+")) return false;
   std::vector<double> values;
-  const char* at = name.c_str() + std::string(kTuned).size();
-  while (*at == '+') {
-    char* end = nullptr;
-    values.push_back(std::strtod(at + 1, &end));
-    at = end;
+  const char *at = name.data() + std::string(kTuned).size(), *const end = name.data() + name.size();
+  while (at != end && *at == '+') {
+    double value = 0;
+    const auto [stop, failure] = std::from_chars(at + 1, end, value);
+    if (failure != std::errc()) return false;
+    values.push_back(value);
+    at = stop;
   }
   const std::vector<SweptOption>& options = experiment.tune->options;
-  if (*at || values.size() != options.size()) return false;
+  if (at != end || values.size() != options.size()) return false;
   for (std::size_t o = 0; o < values.size(); ++o)
     if (!(values[o] >= options[o].range[0] && values[o] <= options[o].range[1])) return false;
   if (add_tuned(experiment, values) == name) return true;

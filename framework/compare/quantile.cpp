@@ -6,6 +6,8 @@
 
 #include "marrow/domain/error.hpp"
 
+#include "marrow/domain/number_text.hpp"
+
 namespace marrow::compare {
 
 void check_finite(const std::vector<double>& values, const std::string& what) {
@@ -13,7 +15,7 @@ void check_finite(const std::vector<double>& values, const std::string& what) {
   for (std::size_t i = 0; i < values.size(); ++i)
     if (!std::isfinite(values[i]))
       throw Error(what + " " + std::to_string(i + 1) + " of " + std::to_string(values.size()) + " is " +
-                  std::to_string(values[i]) +
+                  formatted("%f", values[i]) +
                   ", which is no number to compare; count its run as failed, and give the rest");
 }
 

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "normal.hpp"
 #include "quantile.hpp"
 
@@ -82,14 +83,14 @@ double spent(double share, double alpha, Spending spending) {
 
 std::vector<double> levels_of_looks(const std::vector<double>& information, double alpha, Spending spending) {
   if (!(alpha >= 0.001 && alpha <= 0.5))
-    throw Error("alpha is " + std::to_string(alpha) + "; give a fraction from 0.001 to 0.5, such as 0.05");
+    throw Error("alpha is " + formatted("%f", alpha) + "; give a fraction from 0.001 to 0.5, such as 0.05");
   if (information.empty()) throw Error("there are no looks; give at least one");
   WatchedMotion motion;
   std::vector<double> levels;
   double before = 0;
   for (const double share : information) {
     if (!(share > before && share <= 1))
-      throw Error("look " + std::to_string(levels.size() + 1) + " has seen the share " + std::to_string(share) +
+      throw Error("look " + std::to_string(levels.size() + 1) + " has seen the share " + formatted("%f", share) +
                   " of the cases; expected more than at the look before, and at most 1");
     const double chance = spent(share, alpha, spending) - spent(before, alpha, spending);
     levels.push_back(2 * upper_tail(motion.bound_at(share, chance)));
@@ -101,7 +102,7 @@ std::vector<double> levels_of_looks(const std::vector<double>& information, doub
 Interval order_statistic_interval(std::vector<double> values, double level) {
   check_finite(values, "value");
   if (!(level > 0 && level < 1))
-    throw Error("the level is " + std::to_string(level) + "; give a fraction between 0 and 1, such as 0.05");
+    throw Error("the level is " + formatted("%f", level) + "; give a fraction between 0 and 1, such as 0.05");
   std::sort(values.begin(), values.end());
   const std::size_t n = values.size();
   // Twice the probability that fewer than j of n values are below the median; its terms are those of a fair coin.

@@ -8,6 +8,7 @@
 
 #include "marrow/compare/bootstrap.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "normal.hpp"
 #include "quantile.hpp"
@@ -102,8 +103,8 @@ ValuesOfCases differences_of(const std::vector<Pair>& pairs) {
   for (const Pair& pair : pairs) {
     const double difference = pair.variant - pair.reference;
     if (!std::isfinite(difference))
-      throw Error("case '" + pair.case_name + "': got " + std::to_string(pair.reference) + " for the reference and " +
-                  std::to_string(pair.variant) +
+      throw Error("case '" + pair.case_name + "': got " + formatted("%f", pair.reference) + " for the reference and " +
+                  formatted("%f", pair.variant) +
                   " for the variant, expected finite numbers; count such a run as failed, and give the rest");
     by_case[pair.case_name].push_back(difference);
   }
@@ -169,7 +170,7 @@ std::vector<double> holm(const std::vector<double>& p_values) {
   for (std::size_t i = 0; i < p_values.size(); ++i)
     if (!(p_values[i] >= 0 && p_values[i] <= 1))
       throw Error("p-value " + std::to_string(i + 1) + " of " + std::to_string(p_values.size()) + " is " +
-                  std::to_string(p_values[i]) + "; expected a number from 0 to 1");
+                  formatted("%f", p_values[i]) + "; expected a number from 0 to 1");
   std::vector<std::size_t> order(p_values.size());
   std::iota(order.begin(), order.end(), std::size_t(0));
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return p_values[a] < p_values[b]; });

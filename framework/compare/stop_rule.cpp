@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "marrow/compare/sequential.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "quantile.hpp"
 
 namespace marrow::compare {
@@ -26,11 +26,7 @@ Look begin_look(const StopPlan& plan, std::size_t cases) {
   return look;
 }
 
-std::string short_text(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
+std::string short_text(double value) { return formatted("%.3g", value); }
 
 /// What follows from the look.
 std::string end(const StopRule& rule, const Look& look) {

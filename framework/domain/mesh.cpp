@@ -4,21 +4,17 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 
 namespace marrow {
 namespace {
 
 constexpr double kFarthest_mm = 1e6;  // larger than any room; up to here, sums of squares are exact enough
 
-std::string in_metres(double length_mm) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g m", length_mm / 1000);
-  return text;
-}
+std::string in_metres(double length_mm) { return formatted("%.3g m", length_mm / 1000); }
 
 /// Twice the area of a triangle, as a vector along its outward normal.
 Eigen::Vector3d area_vector(const Mesh& mesh, const std::array<std::uint32_t, 3>& t) {

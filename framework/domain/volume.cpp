@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/transform.hpp"
 
 namespace marrow {
@@ -13,11 +13,7 @@ namespace {
 
 constexpr double kFinest_mm = 0.001, kCoarsest_mm = 100, kFarthestOrigin_mm = 1e6;
 
-std::string shortest(double number) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", number);
-  return text;
-}
+std::string shortest(double number) { return formatted("%.6g", number); }
 
 }  // namespace
 
@@ -49,7 +45,7 @@ void check_volume(const Volume& volume, const std::string& what) {
       throw Error(what + ": the volume is empty (size " + std::to_string(grid.size[0]) + " x " +
                   std::to_string(grid.size[1]) + " x " + std::to_string(grid.size[2]) + ")");
     if (!(grid.spacing_mm[k] > 0) || !std::isfinite(grid.spacing_mm[k]))
-      throw Error(what + ": voxel spacing " + std::to_string(grid.spacing_mm[k]) + " mm is not a positive length");
+      throw Error(what + ": voxel spacing " + formatted("%f", grid.spacing_mm[k]) + " mm is not a positive length");
     if (grid.spacing_mm[k] < kFinest_mm || grid.spacing_mm[k] > kCoarsest_mm)
       throw Error(what + ": voxel spacing " + shortest(grid.spacing_mm[k]) + " mm; expected " + shortest(kFinest_mm) +
                   " to " + shortest(kCoarsest_mm) + " mm: is it in another unit?");

@@ -2,10 +2,11 @@
 #include "relations.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <vector>
 
 #include "marrow/domain/printable.hpp"
+
+#include "marrow/domain/number_text.hpp"
 
 namespace marrow {
 namespace {
@@ -21,11 +22,7 @@ double number_of(const OptionValue& value) {
   return whole ? double(*whole) : std::get<double>(value);
 }
 
-std::string number_text(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.10g", value);
-  return text;
-}
+std::string number_text(double value) { return formatted("%.10g", value); }
 
 std::size_t length_of(const OptionValue& value) {
   if (const auto* numbers = std::get_if<std::vector<double>>(&value)) return numbers->size();

@@ -19,6 +19,7 @@
 #include <thread>
 #include <vector>
 
+#include "marrow/domain/number_text.hpp"
 #include "process_identity.hpp"
 #include "shared_folder.hpp"
 #include "store_folder.hpp"
@@ -91,10 +92,9 @@ class HeldClaim {
   /// Writes a sign of life. Closing any descriptor of a file sends to the server what was written, so that other hosts
   /// see it; fsync() would also wait for its disk. A fault is no harm: at worst others take the claim over.
   void beat() {
-    std::array<char, 200> text{};
-    const int size = std::snprintf(text.data(), text.size(), "%s %llu %.3f %012llu\n", this_process().c_str(), number_,
-                                   claim_seconds(), ++beats_);
-    if (pwrite(descriptor_, text.data(), std::size_t(size), 0) == size) close(dup(descriptor_));
+    const std::string text =
+        formatted("%s %llu %.3f %012llu\n", this_process().c_str(), number_, claim_seconds(), ++beats_);
+    if (pwrite(descriptor_, text.data(), text.size(), 0) == ssize_t(text.size())) close(dup(descriptor_));
   }
 
  private:

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/runtime/types.hpp"
 
 namespace marrow {
@@ -45,9 +45,7 @@ Verdict worst_of(const std::vector<NamedVerdict>& verdicts) {
 
 std::string probability_text(double failure_probability) {
   if (std::isnan(failure_probability)) return "not known";
-  char text[32];
-  std::snprintf(text, sizeof text, failure_probability < 0.0995 ? "%.1f %%" : "%.0f %%", 100 * failure_probability);
-  return text;
+  return formatted(failure_probability < 0.0995 ? "%.1f %%" : "%.0f %%", 100 * failure_probability);
 }
 
 }  // namespace marrow

@@ -3,9 +3,9 @@
 // in the same images. Where the robot stands need not be known: its own moves tell.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/geometry/fragments.hpp"
 #include "marrow/toolbox/robot/approach.hpp"
 #include "marrow/toolbox/robot/guide_state.hpp"
@@ -39,11 +39,7 @@ struct Result {
   Metrics figures;
 };
 
-std::string shown(double value, const char* unit) {
-  char text[48];
-  std::snprintf(text, sizeof text, "%.2f %s", value, unit);
-  return text;
-}
+std::string shown(double value, const char* unit) { return formatted("%.2f %s", value, unit); }
 
 /// The way that remains to the fragment's place in the restored bone.
 struct Remaining {

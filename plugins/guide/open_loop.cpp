@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // One move that reduces the fracture. The robot's place in the images is calibrated before, with a target on its hand.
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/geometry/fragments.hpp"
 #include "marrow/toolbox/robot/hand_eye.hpp"
 
@@ -58,8 +58,7 @@ Result open_loop(const List<Pose>& poses, const List<Pose>& hands, const List<Po
                           {"step_mm", shift, "mm"},
                           {"stations", double(hands.size()), ""},
                           {"images", double(hands.size()) + 2, ""}};
-  char text[96];
-  std::snprintf(text, sizeof text, "one move of %.2f degrees and %.2f mm", turn, shift);
+  const std::string text = formatted("one move of %.2f degrees and %.2f mm", turn, shift);
   context.info(text);
   return result;
 }

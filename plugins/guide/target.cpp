@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The pose of a robot's target with beads, from one image of a calibrated C-arm.
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/calibration/board_pose.hpp"
 #include "marrow/toolbox/calibration/correspondence.hpp"
 
@@ -27,16 +27,12 @@ Pose target(const View& view, const Options& options, Context& context) {
   const calibration::ViewPoints points =
       calibration::match_board(board, discs, view.camera.width_px, view.camera.height_px, view.name);
   const calibration::BoardPose found = calibration::board_pose(points, view.camera);
-  char text[160];
-  std::snprintf(text, sizeof text, "%zu beads, residual %.3f px", points.pixels.size(), found.residual_px);
-  context.info(text);
-  if (found.residual_px > options.most_residual_px) {
-    std::snprintf(text, sizeof text,
-                  "': its beads are %.2f px off where its pose shows them, at most %.2f px are allowed",
-                  found.residual_px, options.most_residual_px);
-    throw Error("the target does not fit view '" + view.name + text +
+  context.info(formatted("%zu beads, residual %.3f px", points.pixels.size(), found.residual_px));
+  if (found.residual_px > options.most_residual_px)
+    throw Error("the target does not fit view '" + view.name +
+                formatted("': its beads are %.2f px off where its pose shows them, at most %.2f px are allowed",
+                          found.residual_px, options.most_residual_px) +
                 "; is it this target, and the camera of this image?");
-  }
   Pose pose;
   RigidTransform camera_from_target = found.camera_from_board;
   camera_from_target.source = "target";

@@ -11,9 +11,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/shaft/axis.hpp"
 #include "marrow/toolbox/shaft/model_borders.hpp"
 
@@ -32,11 +32,7 @@ struct Options {
 constexpr double kWidthTolerance = 0.15;  // a pair is not the model's if the widths differ by a larger fraction
 constexpr double kLeastLength_mm = 25;    // at the isocentre
 
-std::string number(double value) {
-  char buffer[40];
-  std::snprintf(buffer, sizeof buffer, "%.1f", value);
-  return buffer;
-}
+std::string number(double value) { return marrow::formatted("%.1f", value); }
 
 /// Information from one view: the pair of borders, and the plane that contains the axis.
 struct Sight {

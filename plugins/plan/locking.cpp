@@ -4,9 +4,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
 #include "marrow/toolbox/geometry/locking_plan.hpp"
 
@@ -38,11 +38,7 @@ struct Result {
 /// squares.
 const double kWithin95 = std::sqrt(-std::log(0.05));
 
-std::string shown(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2f", value);
-  return text;
-}
+std::string shown(double value) { return formatted("%.2f", value); }
 
 /// [v] with [v] w = v x w.
 Matrix3d cross(const Vector3d& v) {

@@ -3,10 +3,10 @@
 // version. The target is a surface in the world, for example touched with a pointer or from another scan. Model and
 // target need not show the same part of the bone.
 #include <cmath>
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
 #include <marrow/domain/decompositions.hpp>
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/match/closest_points.hpp"
 
 namespace {
@@ -38,9 +38,7 @@ void check_frames(const Pose& initial, const Mesh& model, const Mesh& target) {
 }
 
 std::string percent(std::size_t part, std::size_t whole) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.0f %%", 100 * double(part) / double(whole));
-  return text;
+  return formatted("%.0f %%", 100 * double(part) / double(whole));
 }
 
 void add_warnings(const marrow::match::Result& found, const Options& options, Pose& pose, const Context& context) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/search/search.hpp"
 
 namespace {
@@ -37,12 +37,9 @@ std::string disagreement(const marrow::Pose& first, const marrow::Pose& second, 
   const marrow::Vector6d motion = motion_between(first.world_from_model, second.world_from_model, first.frame);
   const double apart_deg = marrow::degrees(motion.head<3>().norm()), apart_mm = motion.tail<3>().norm();
   if (apart_deg <= options.most_apart_deg && apart_mm <= options.most_apart_mm) return "";
-  char text[160];
-  std::snprintf(
-      text, sizeof text,
+  return marrow::formatted(
       "the two costs lead to poses %.3g degrees and %.3g mm apart: one of them is wrong; look at the overlays of both",
       apart_deg, apart_mm);
-  return text;
 }
 
 Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const marrow::Optimizer& optimizer,

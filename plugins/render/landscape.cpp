@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Six plots of the cost around a pose (Fig. 7b of the chapter).
 #include <cmath>
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"
 #include "marrow/toolbox/draw/plot.hpp"
 
@@ -24,8 +24,7 @@ std::optional<cv::Point2d> least_of(const Profile& profile) {
 std::string title(const Profile& profile) {
   const auto least = least_of(profile);
   if (!least) return profile.axis + ": no finite cost";
-  char text[32];
-  std::snprintf(text, sizeof text, ": least at %+.2f ", least->x);
+  const std::string text = marrow::formatted(": least at %+.2f ", least->x);
   return profile.axis + text + profile.unit;
 }
 

@@ -2,9 +2,9 @@
 // Draws the pair of lines that was chosen as the shaft's outer borders, and the rejected pairs with the reasons (Fig. 4
 // of the chapter).
 #include <algorithm>
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"
 
 namespace {
@@ -18,10 +18,8 @@ struct Options {
 };
 
 std::string describe(const marrow::ShaftLines& lines) {
-  char text[80];
-  std::snprintf(text, sizeof text, "chosen: %.1f +- %.1f mm wide, log likelihood %.2f", lines.width_mm,
-                lines.width_deviation_mm, lines.log_likelihood);
-  return text;
+  return marrow::formatted("chosen: %.1f +- %.1f mm wide, log likelihood %.2f", lines.width_mm,
+                           lines.width_deviation_mm, lines.log_likelihood);
 }
 
 /// Draws a number beside the upper end of a line. The legend gives the reason of the rejection with this number.

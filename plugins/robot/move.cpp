@@ -2,10 +2,10 @@
 // A robot makes a motion in small parts. It stops before a force that is too large, and where it cannot go on.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
 #include "held.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/random.hpp"
 
 namespace {
@@ -23,11 +23,7 @@ struct Result {
   Metrics figures;
 };
 
-std::string with_unit(double value, const char* unit) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.0f %s", value, unit);
-  return text;
-}
+std::string with_unit(double value, const char* unit) { return formatted("%.0f %s", value, unit); }
 
 /// Where the held fragment is while the encoders say `base_from_platform`.
 class Robot {

@@ -9,6 +9,7 @@
 #include <marrow/plugin.hpp>
 
 #include <marrow/domain/decompositions.hpp>
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/field/expansion.hpp"
 #include "marrow/toolbox/field/fragments.hpp"
 #include "marrow/toolbox/field/interior.hpp"
@@ -245,9 +246,8 @@ List<SignedField> atlas(const Volume& volume, const List<Seeds>& seeds, const Me
     if (distance_mm < least_mm) least_mm = distance_mm, best = map;
   }
   least_mm = fit(target, vertices, options.keep_part, true, options.affine, options.iterations, best);
-  char line[200];
-  std::snprintf(line, sizeof line, "the template lies %.2f mm from the bone on average, scaled by %.3f", least_mm,
-                std::cbrt(best.linear().determinant()));
+  const std::string line = marrow::formatted("the template lies %.2f mm from the bone on average, scaled by %.3f",
+                                             least_mm, std::cbrt(best.linear().determinant()));
   context.debug(line);
   Mesh moved = whole;
   for (Vector3d& vertex : moved.vertices_mm) vertex = best * vertex;

@@ -2,9 +2,9 @@
 // The chapter's narrow-band level set (Eq 5 and 6 as corrected, see front.hpp). There is one front for each fragment.
 // All fronts move together and never into each other. They start where the fast expansion from the seeds ends
 // (expansion.hpp), with everything inside filled. They come to rest on the edges in the CT.
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/field/expansion.hpp"
 #include "marrow/toolbox/field/fragments.hpp"
 #include "marrow/toolbox/field/front.hpp"
@@ -67,10 +67,9 @@ std::vector<Front> begin(const Volume& volume, const List<Seeds>& seeds, const O
 void log_fronts(const std::vector<Front>& fronts, const List<Seeds>& seeds, int step, double step_mm,
                 Context& context) {
   for (std::size_t f = 0; f < fronts.size(); ++f) {
-    char line[200];
-    std::snprintf(line, sizeof line, "step %d, %s: mean speed %.3f of F0, %zu voxels in the moving band", step,
-                  seeds.name(f).c_str(), fronts[f].mean_motion_mm() / (kStepsPerCycle * step_mm),
-                  fronts[f].band_voxels());
+    const std::string line = marrow::formatted(
+        "step %d, %s: mean speed %.3f of F0, %zu voxels in the moving band", step, seeds.name(f).c_str(),
+        fronts[f].mean_motion_mm() / (kStepsPerCycle * step_mm), fronts[f].band_voxels());
     context.debug(line);
   }
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/field/expansion.hpp"
 #include "marrow/toolbox/field/fragments.hpp"
 #include "marrow/toolbox/field/interior.hpp"
@@ -45,9 +46,8 @@ SignedField field_of(const Volume& volume, const marrow::field::Mask& mask, cons
                                          options.least_rms};
   marrow::field::Contour contour = marrow::field::geodesic(marrow::field::cut_out(volume, mask), std::move(start),
                                                            box.size, {s.x(), s.y(), s.z()}, settings);
-  char line[200];
-  std::snprintf(line, sizeof line, "%s: %d iterations, last change %.4f", name.c_str(), contour.iterations,
-                contour.rms);
+  const std::string line =
+      marrow::formatted("%s: %d iterations, last change %.4f", name.c_str(), contour.iterations, contour.rms);
   context.debug(line);
   for (int z = 0; z < box.size[2]; ++z)
     for (int y = 0; y < box.size[1]; ++y)

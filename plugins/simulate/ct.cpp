@@ -8,6 +8,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/materials.hpp"
 #include "marrow/toolbox/phantom/solid.hpp"
@@ -73,8 +74,8 @@ Grid grid_around(const Phantom& phantom, const CtOptions& options) {
   }
   grid.origin_mm = low;
   if (!(high.z() > low.z()) || grid.size[2] < 2)
-    throw Error("simulate.ct: range_mm " + std::to_string(options.range_mm[0]) + " to " +
-                std::to_string(options.range_mm[1]) + " (from the distal end) holds no part of the bone");
+    throw Error("simulate.ct: range_mm " + formatted("%f", options.range_mm[0]) + " to " +
+                formatted("%f", options.range_mm[1]) + " (from the distal end) holds no part of the bone");
   return grid;
 }
 
@@ -366,7 +367,7 @@ class Scanner {
 Volume cluttered_scan(const ClutteredPhantom& phantom, const CtOptions& options, Context& context) {
   phantom::check_phantom(phantom, "simulate.ct");
   for (double spacing : options.spacing_mm)
-    if (!(spacing > 0)) throw Error("simulate.ct: spacing_mm must be positive, got " + std::to_string(spacing));
+    if (!(spacing > 0)) throw Error("simulate.ct: spacing_mm must be positive, got " + formatted("%f", spacing));
   Volume volume;
   volume.grid = grid_around(phantom.phantom, options);
   volume.values.resize(volume.grid.count());

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/femur_shape.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
@@ -63,9 +64,9 @@ phantom::FemurShape drawn(const FemurOptions& options) {
 
 Bone femur(const FemurOptions& options, Context& context) {
   if (options.canal_diameter_mm + 4 > std::min(options.shaft_ml_mm, options.shaft_ap_mm))
-    throw Error("simulate.femur: a canal of " + std::to_string(options.canal_diameter_mm) +
+    throw Error("simulate.femur: a canal of " + formatted("%f", options.canal_diameter_mm) +
                 " mm leaves less than 2 mm of cortex in a shaft of " +
-                std::to_string(std::min(options.shaft_ml_mm, options.shaft_ap_mm)) + " mm; make the canal narrower");
+                formatted("%f", std::min(options.shaft_ml_mm, options.shaft_ap_mm)) + " mm; make the canal narrower");
   const phantom::FemurShape shape = drawn(options);
   const phantom::FemurField field(shape);
   constexpr double kSteepest = 2;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a robot is told in a study of accuracy: turns about one axis after the other.
 #include <cmath>
-#include <cstdio>
 #include <marrow/plugin.hpp>
+
+#include "marrow/domain/number_text.hpp"
 
 namespace {
 
@@ -29,8 +30,7 @@ List<Pose> sweeps(const Options& options) {
   commands.add("neutral", turned(0, 0, options.pivot_mm));
   for (const std::string& axis : options.axes) {
     const auto add = [&](int step) {
-      char name[48];
-      std::snprintf(name, sizeof name, "r%s%+06.2f", axis.c_str(), step * options.step_deg);
+      const std::string name = formatted("r%s%+06.2f", axis.c_str(), step * options.step_deg);
       commands.add(name, turned(axis[0] - 'x', step * options.step_deg, options.pivot_mm));
     };
     // From neutral to one side, then from neutral to the other. So each motion begins near a known one.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The way of a bone as one value, and as a table (CSV) that other programs read.
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 
@@ -44,8 +44,7 @@ void write_csv(const Trajectory& trajectory, const std::string& path) {
     for (const char* axis : kAxes) text += std::string(prefix) + axis;
   text += ",verdict,failure_probability,note\n";
   const auto add = [&](double value) {
-    char number[40];
-    std::snprintf(number, sizeof number, ",%.10g", value);
+    const std::string number = formatted(",%.10g", value);
     text += number;
   };
   const auto add_degrees_and_mm = [&](const Vector6d& values) {

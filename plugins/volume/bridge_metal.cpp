@@ -5,8 +5,9 @@
 // between their neighbours. Slices that a plate crosses are kept.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <marrow/plugin.hpp>
+
+#include "marrow/domain/number_text.hpp"
 
 namespace {
 
@@ -63,11 +64,9 @@ void bridge(Volume& ct, int below, int above) {
 }
 
 std::string range(const Grid& grid, int below, int above) {
-  char text[96];
   const auto height = [&](int z) { return (grid.origin_mm + grid.direction.col(2) * (z * grid.spacing_mm.z())).z(); };
-  std::snprintf(text, sizeof text, "slices %d to %d (z = %.1f to %.1f mm)", below + 1, above - 1, height(below + 1),
-                height(above - 1));
-  return text;
+  return marrow::formatted("slices %d to %d (z = %.1f to %.1f mm)", below + 1, above - 1, height(below + 1),
+                           height(above - 1));
 }
 
 Volume bridge_metal(const Volume& volume, const Options& options, Context& context) {

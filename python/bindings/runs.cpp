@@ -7,6 +7,7 @@
 
 #include "interruptible.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/runtime/executor.hpp"
 #include "marrow/runtime/run_folder.hpp"
 #include "pipelines.hpp"
@@ -74,8 +75,7 @@ class Observer {
   void keep_in_log(const RunEvent& event) {
     if (!log_) return;
     if (event.kind == RunEvent::Kind::finished) {
-      char seconds[32];
-      std::snprintf(seconds, sizeof seconds, "%.3f s", event.seconds);
+      const std::string seconds = formatted("%.3f s", event.seconds);
       log_->keep(LogLevel::info, place_of(event), seconds);
     } else if (event.kind == RunEvent::Kind::failed) {
       log_->keep(event.level, "", event.text);

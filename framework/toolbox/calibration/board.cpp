@@ -6,6 +6,7 @@
 
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/calibration/correspondence.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 
@@ -20,11 +21,7 @@ constexpr double kLeastThickness_mm = 10;  ///< between the sides: without depth
 constexpr double kLandmarkRatio = 1.3;     ///< least ratio of the diameters of landmarks and other beads
 constexpr std::size_t kMostBeads = 1000;
 
-std::string millimetres(double length) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g mm", length);
-  return text;
-}
+std::string millimetres(double length) { return formatted("%.3g mm", length); }
 
 struct Flat {
   Eigen::Vector3d centre, normal, first;
@@ -52,7 +49,7 @@ void add_beads(const YamlMap& side, const std::string& key, int index, Board& bo
   const auto diameter = group.number("diameter_mm");
   if (diameter && !(*diameter > 0 && *diameter < 100))
     group.fault("diameter_mm",
-                "diameter_mm: expected a length above 0 and below 100 mm, got " + std::to_string(*diameter));
+                "diameter_mm: expected a length above 0 and below 100 mm, got " + formatted("%f", *diameter));
   for (const Eigen::Vector3d& point : group.points("at_mm"))
     board.beads.push_back({point, diameter.value_or(0), index, key == "landmarks"});
 }

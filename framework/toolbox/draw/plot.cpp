@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"
 
 namespace marrow::draw {
@@ -30,11 +30,7 @@ Range range_of(const std::vector<double>& values, double margin) {
   return {range.low - extra, range.high + extra};
 }
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", std::abs(value) < 1e-12 ? 0.0 : value);
-  return text;
-}
+std::string number(double value) { return formatted("%.4g", std::abs(value) < 1e-12 ? 0.0 : value); }
 
 }  // namespace
 

@@ -6,6 +6,7 @@
 
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 
 namespace marrow::exchange {
 namespace {
@@ -38,7 +39,7 @@ Eigen::Vector2i size_px(const ImageSize& size, const std::string& what) {
     throw Error(what + ": size_px: expected [width, height], got " + std::to_string(size.size_px.size()) + " numbers");
   for (const double side : size.size_px)
     if (!(side >= 1 && side <= kLargestSide_px) || side != std::floor(side))
-      throw Error(what + ": size_px: expected 1 to 65536 pixels each way, got " + std::to_string(side));
+      throw Error(what + ": size_px: expected 1 to 65536 pixels each way, got " + formatted("%f", side));
   return {int(size.size_px[0]), int(size.size_px[1])};
 }
 
@@ -50,7 +51,7 @@ Eigen::Vector2d pixel_mm(const std::vector<double>& numbers, const std::string& 
                 std::to_string(numbers.size()));
   for (const double side : numbers)
     if (!(side >= 1e-6 && side <= 1000))
-      throw Error(what + ": pixel_mm: expected a size in mm between 1e-6 and 1000, got " + std::to_string(side));
+      throw Error(what + ": pixel_mm: expected a size in mm between 1e-6 and 1000, got " + formatted("%f", side));
   return {numbers.front(), numbers.back()};
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 
@@ -99,7 +100,7 @@ std::vector<double> Hdf5Reader::numbers(const std::string& key, std::size_t coun
   if (H5Dread(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0)
     refuse(key, "cannot be read; the file is damaged");
   for (const double value : values)
-    if (!std::isfinite(value)) refuse(key, "expected finite numbers, got " + std::to_string(value));
+    if (!std::isfinite(value)) refuse(key, "expected finite numbers, got " + formatted("%f", value));
   return values;
 }
 

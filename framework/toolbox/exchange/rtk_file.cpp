@@ -127,7 +127,7 @@ class RtkReader {
       const double got = (*matrix_)[std::size_t(i)], wanted = expected(i / 4, i % 4);
       if (!(std::abs(got - wanted) <= 1e-3 + 1e-9 * std::abs(wanted)))
         refuse("Matrix: row " + std::to_string(i / 4 + 1) + ", column " + std::to_string(i % 4 + 1) + " is " +
-               std::to_string(got) + ", but the angles and distances give " + std::to_string(wanted) +
+               formatted("%f", got) + ", but the angles and distances give " + formatted("%f", wanted) +
                "; one of them was changed: write it again with RTK");
     }
   }

@@ -8,6 +8,7 @@
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/names.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/printable.hpp"
 
 namespace marrow::exchange {
@@ -26,14 +27,14 @@ std::string group_of(int projection) {
 int side_px(const Hdf5Reader& file, const std::string& key) {
   const double side = file.number(key);
   if (!(side >= 1 && side <= 65536) || side != std::floor(side))
-    file.refuse(key, "expected 1 to 65536 pixels, got " + std::to_string(side));
+    file.refuse(key, "expected 1 to 65536 pixels, got " + formatted("%f", side));
   return int(side);
 }
 
 double spacing_mm(const Hdf5Reader& file, const std::string& key) {
   const double spacing = file.number(key);
   if (!(spacing >= 1e-6 && spacing <= 1000))
-    file.refuse(key, "expected the size of a pixel in mm, between 1e-6 and 1000, got " + std::to_string(spacing));
+    file.refuse(key, "expected the size of a pixel in mm, between 1e-6 and 1000, got " + formatted("%f", spacing));
   return spacing;
 }
 
@@ -41,7 +42,7 @@ template <int Size>
 Eigen::Matrix<double, Size, Size> matrix(const Hdf5Reader& file, const std::string& key) {
   const std::vector<double> values = file.numbers(key, std::size_t(Size * Size));
   for (const double value : values)
-    if (std::abs(value) > 1e9) file.refuse(key, "expected numbers of at most 1e9, got " + std::to_string(value));
+    if (std::abs(value) > 1e9) file.refuse(key, "expected numbers of at most 1e9, got " + formatted("%f", value));
   return Eigen::Map<const Eigen::Matrix<double, Size, Size, Eigen::RowMajor>>(values.data());
 }
 
@@ -85,8 +86,8 @@ std::vector<XregProjection> read_xreg(const std::filesystem::path& path) {
       if (const std::string fault = fault_of_item_name(name); !fault.empty()) file.refuse(key, "its name " + fault);
       const std::vector<double> pixel = file.numbers(key, 2);
       if (std::max(std::abs(pixel[0]), std::abs(pixel[1])) > 1e6)
-        file.refuse(key, "expected a column and a row of at most 1e6, got " + std::to_string(pixel[0]) + ", " +
-                             std::to_string(pixel[1]));
+        file.refuse(key, "expected a column and a row of at most 1e6, got " + formatted("%f", pixel[0]) + ", " +
+                             formatted("%f", pixel[1]));
       projections.back().landmarks.push_back({name, {pixel[0], pixel[1]}});
     }
   }

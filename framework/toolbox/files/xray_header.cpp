@@ -7,6 +7,7 @@
 #include "dicom_pixels.hpp"
 #include "marrow/domain/c_arm.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "patient_orientation.hpp"
 
 namespace marrow::files {
@@ -157,23 +158,24 @@ void check_frame(const DicomHeader& header, int frame, int frames) {
 
 void check_angles(const DicomHeader& header, double primary_deg, double secondary_deg) {
   if (!(std::abs(primary_deg) <= 180))
-    throw Error(header.path().string() + ": " + kPrimaryAngle.text() + " is " + std::to_string(primary_deg) +
+    throw Error(header.path().string() + ": " + kPrimaryAngle.text() + " is " + formatted("%f", primary_deg) +
                 ", expected -180 to 180");
   if (!(std::abs(secondary_deg) <= 90))
-    throw Error(header.path().string() + ": " + kSecondaryAngle.text() + " is " + std::to_string(secondary_deg) +
+    throw Error(header.path().string() + ": " + kSecondaryAngle.text() + " is " + formatted("%f", secondary_deg) +
                 ", expected -90 to 90");
 }
 
 void check_lengths(const DicomHeader& header, const CArm& arm) {
   const std::string what = header.path().string() + ": ";
   if (!(arm.source_to_isocentre_mm < arm.source_to_detector_mm))
-    throw Error(what + "the isocentre (" + std::to_string(arm.source_to_isocentre_mm) +
-                " mm from the source) lies behind the detector (" + std::to_string(arm.source_to_detector_mm) + " mm)");
+    throw Error(what + "the isocentre (" + formatted("%f", arm.source_to_isocentre_mm) +
+                " mm from the source) lies behind the detector (" + formatted("%f", arm.source_to_detector_mm) +
+                " mm)");
   if (!(arm.source_to_detector_mm > 100 && arm.source_to_detector_mm < 5000))
-    throw Error(what + kDistanceSourceToDetector.text() + " is " + std::to_string(arm.source_to_detector_mm) +
+    throw Error(what + kDistanceSourceToDetector.text() + " is " + formatted("%f", arm.source_to_detector_mm) +
                 " mm, which no C-arm has; give source_to_detector_mm");
   if (!(arm.pixel_mm.minCoeff() > 0.001 && arm.pixel_mm.maxCoeff() < 10))
-    throw Error(what + "a pixel of " + std::to_string(arm.pixel_mm.x()) + " x " + std::to_string(arm.pixel_mm.y()) +
+    throw Error(what + "a pixel of " + formatted("%f", arm.pixel_mm.x()) + " x " + formatted("%f", arm.pixel_mm.y()) +
                 " mm is no detector's; give pixel_mm");
 }
 
@@ -260,8 +262,8 @@ void check_all_same(const DicomFile& file, int frames, const XrayGeometry& first
     same = same && are_same(geometry_of_frame(file, frame, overrides).camera, first.camera);
     if (frame > kMostShown) continue;
     const DicomHeader header(file, frame);
-    char text[96];
-    std::snprintf(text, sizeof text, "%sframe %d at %g, %g degrees", frame == 1 ? "" : "; ", frame,
+    const std::string text =
+        formatted("%sframe %d at %g, %g degrees", frame == 1 ? "" : "; ", frame,
                   header.number(kPrimaryAngle).value_or(0), header.number(kSecondaryAngle).value_or(0));
     shown += text;
   }
@@ -289,7 +291,7 @@ XrayPixels read_xray_pixels(const std::filesystem::path& path, int frame) {
   const DicomHeader header(file, frame);
   XrayPixels pixels;
   check_linear(header);
-  pixels.inverted = is_inverted(header);
+  if (is_inverted(header)) pixels.inverted_from = sum_of_limits(read_dicom_pixels(file, frame));
   const auto primary = header.number(kPrimaryAngle), secondary = header.number(kSecondaryAngle);
   if (primary && secondary)
     if (const auto stored = stored_axes(header, carm_axes(*secondary, *primary))) pixels.mirrored = stored->mirrored;

@@ -5,13 +5,14 @@
 #include <set>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 
 namespace marrow::geometry {
 
 Eigen::Vector3d unit_axis(const Eigen::Vector3d& axis, const std::string& what, const std::string& hole) {
   const double length = axis.norm();
   if (!(length > 1e-9) || !std::isfinite(length))
-    throw Error(what + ": the axis of hole '" + hole + "' has the length " + std::to_string(length) +
+    throw Error(what + ": the axis of hole '" + hole + "' has the length " + formatted("%f", length) +
                 ", so it has no direction; give the direction of the hole, such as [1, 0, 0]");
   return axis / length;
 }
@@ -24,7 +25,7 @@ void check_implant(const Implant& implant, const std::string& what) {
                 "edge must be shared by exactly two triangles)");
   if (!(enclosed_volume_mm3(implant.surface) > 0))
     throw Error(what + ": the triangles face inward (enclosed volume " +
-                std::to_string(enclosed_volume_mm3(implant.surface)) + " mm3); reverse their order");
+                formatted("%f", enclosed_volume_mm3(implant.surface)) + " mm3); reverse their order");
   if (implant.holes.empty())
     throw Error(what + ": the implant has no holes, so there is nothing to lock; give each hole's centre and axis");
   std::set<std::string> names;
@@ -33,10 +34,10 @@ void check_implant(const Implant& implant, const std::string& what) {
     if (!hole.centre_mm.allFinite()) throw Error(what + ": the centre of hole '" + hole.name + "' is not finite");
     if (std::abs(unit_axis(hole.axis, what, hole.name).dot(hole.axis) - 1) > 1e-6)
       throw Error(what + ": the axis of hole '" + hole.name + "' must have length 1, got " +
-                  std::to_string(hole.axis.norm()));
+                  formatted("%f", hole.axis.norm()));
     if (!(hole.diameter_mm > 0) || !std::isfinite(hole.diameter_mm))
       throw Error(what + ": the diameter of hole '" + hole.name + "' must be above 0 mm, got " +
-                  std::to_string(hole.diameter_mm));
+                  formatted("%f", hole.diameter_mm));
   }
 }
 

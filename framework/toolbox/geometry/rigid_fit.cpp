@@ -2,10 +2,10 @@
 #include "marrow/toolbox/geometry/rigid_fit.hpp"
 
 #include <cmath>
-#include <cstdio>
 
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 
 namespace marrow::geometry {
 namespace {
@@ -87,10 +87,6 @@ Eigen::Matrix<double, 3, 6> point_by_motion(const FragmentFrame& frame, const Ei
   return derivatives;
 }
 
-std::string short_number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
+std::string short_number(double value) { return formatted("%.3g", value); }
 
 }  // namespace marrow::geometry

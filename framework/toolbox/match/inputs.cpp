@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/match/nearest_outline.hpp"
 
 namespace marrow::match {
@@ -85,7 +86,7 @@ void check_weights(const std::vector<double>& weights, std::size_t views) {
                 " views; give one for each");
   double sum = 0;
   for (const double weight : weights) {
-    if (!(weight >= 0)) throw Error("weights: each must be 0 or more, got " + std::to_string(weight));
+    if (!(weight >= 0)) throw Error("weights: each must be 0 or more, got " + formatted("%f", weight));
     sum += weight;
   }
   if (!weights.empty() && !(sum > 0)) throw Error("weights: one at least must be above 0");

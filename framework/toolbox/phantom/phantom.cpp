@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/phantom/materials.hpp"
 
 namespace marrow::phantom {
@@ -17,7 +18,7 @@ void check_surface(const Mesh& mesh, const std::string& what) {
                 ": the surface is open or not consistently oriented, so it has no inside; close its holes (each edge "
                 "must be shared by exactly two triangles)");
   if (!(enclosed_volume_mm3(mesh) > 0))
-    throw Error(what + ": the triangles face inward (enclosed volume " + std::to_string(enclosed_volume_mm3(mesh)) +
+    throw Error(what + ": the triangles face inward (enclosed volume " + formatted("%f", enclosed_volume_mm3(mesh)) +
                 " mm3); reverse their order");
 }
 
@@ -37,7 +38,7 @@ void check_bone(const Bone& bone, const std::string& what) {
     if (!std::isfinite(bone.fill_z_mm[i]) || (i > 0 && bone.fill_z_mm[i] <= bone.fill_z_mm[i - 1]))
       throw Error(what + ": the positions of the bone share must grow");
     if (!(bone.fill_fraction[i] >= 0 && bone.fill_fraction[i] <= 1))
-      throw Error(what + ": the bone share must lie in 0 to 1, got " + std::to_string(bone.fill_fraction[i]));
+      throw Error(what + ": the bone share must lie in 0 to 1, got " + formatted("%f", bone.fill_fraction[i]));
   }
 }
 

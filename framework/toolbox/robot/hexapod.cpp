@@ -4,19 +4,15 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/random.hpp"
 
 namespace marrow::robot {
 namespace {
 
-std::string in_words(double value, const char* unit) {
-  char text[48];
-  std::snprintf(text, sizeof text, "%.1f %s", value, unit);
-  return text;
-}
+std::string in_words(double value, const char* unit) { return formatted("%.1f %s", value, unit); }
 
 Eigen::Vector3d leg_mm(const Hexapod& hexapod, const RigidTransform& base_from_platform, std::size_t i) {
   return base_from_platform * hexapod.platform_mm[i] - hexapod.base_mm[i];

@@ -3,10 +3,10 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <cstdio>
 #include <marrow/domain/error.hpp>
 #include <string>
 #include "marrow/domain/decompositions.hpp"
+#include "marrow/domain/number_text.hpp"
 
 namespace marrow::shaft {
 namespace {
@@ -38,8 +38,7 @@ Axis axis_of_planes(const std::vector<Plane>& planes) {
   // For two planes at an angle a the squared singular values are 1 +- cos a. Their ratio is tan(a / 2)^2.
   const double angle_deg = degrees(2 * std::atan(spread));
   if (angle_deg < 10) {
-    char text[20];
-    std::snprintf(text, sizeof text, "%.1f", angle_deg);
+    const std::string text = formatted("%.1f", angle_deg);
     throw Error("the " + std::to_string(planes.size()) +
                 " views see the shaft from nearly the same side: the planes of its " + "axis meet at " + text +
                 " degrees, where 10 are needed; use views farther apart, or a single one");

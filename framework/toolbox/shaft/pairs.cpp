@@ -4,10 +4,10 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "brightness.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/shaft/widths.hpp"
 #include "outline.hpp"
 
@@ -28,11 +28,7 @@ struct Pair {
   std::string reason;  // why it is not the shaft; empty for a candidate
 };
 
-std::string text(const char* format, double a, double b = 0, double c = 0) {
-  char buffer[300];
-  std::snprintf(buffer, sizeof buffer, format, a, b, c);
-  return buffer;
-}
+std::string text(const char* format, double a, double b = 0, double c = 0) { return formatted(format, a, b, c); }
 
 /// The common direction of two lines: downwards, or to the right if they are nearly horizontal.
 Eigen::Vector2d direction_of(const Border& one, const Border& other) {

@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <marrow/domain/error.hpp>
 #include <marrow/domain/transform.hpp>
+
+#include "marrow/domain/number_text.hpp"
 
 namespace marrow::shaft {
 namespace {
@@ -86,9 +87,7 @@ double Widths::least_mm() const {
 std::string Widths::range() const {
   double most = 0;
   for (const Width& width : widths_) most = std::max(most, width.mean_mm + kMost * deviation_mm(width));
-  char buffer[80];
-  std::snprintf(buffer, sizeof buffer, "%.1f to %.1f mm", least_mm(), most);
-  return buffer;
+  return formatted("%.1f to %.1f mm", least_mm(), most);
 }
 
 }  // namespace marrow::shaft

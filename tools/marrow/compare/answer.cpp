@@ -7,6 +7,7 @@
 
 #include "compare/comparison.hpp"
 #include "marrow/compare/bootstrap.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/printable.hpp"
 
 namespace marrow::cli {
@@ -123,22 +124,16 @@ std::string capture_text(const Experiment& experiment, const Answer& answer) {
   };
   row("start", [&](std::size_t v) { return experiment.variants[v].name; });
   for (std::size_t b = 0; b < longest.size(); ++b) {
-    char bin[64];
-    std::snprintf(bin, sizeof bin, "%g to %g", longest[b].from, longest[b].to);
+    const std::string bin = formatted("%g to %g", longest[b].from, longest[b].to);
     row(bin, [&](std::size_t v) -> std::string {
       const auto& all = answer.variants[v].capture.bins;
       if (b >= all.size() || !all[b].runs) return "-";
-      char cell[100];
-      std::snprintf(cell, sizeof cell, "%zu/%zu (%.0f to %.0f %%)", all[b].successes, all[b].runs,
-                    100 * all[b].success.lower, 100 * all[b].success.upper);
-      return cell;
+      return formatted("%zu/%zu (%.0f to %.0f %%)", all[b].successes, all[b].runs, 100 * all[b].success.lower,
+                       100 * all[b].success.upper);
     });
   }
   row("95 % or more to", [&](std::size_t v) -> std::string {
-    char cell[100];
-    std::snprintf(cell, sizeof cell, answer.variants[v].capture.is_open ? "at least %.1f" : "%.1f",
-                  answer.variants[v].capture.range);
-    return cell;
+    return formatted(answer.variants[v].capture.is_open ? "at least %.1f" : "%.1f", answer.variants[v].capture.range);
   });
   if (unknown)
     text += std::to_string(unknown) + " runs failed before the error of their start was known, and do not count here\n";
@@ -148,26 +143,22 @@ std::string capture_text(const Experiment& experiment, const Answer& answer) {
 /// The figures of one metric, a row for each variant.
 std::string figure_table(const Experiment& experiment, const Answer& answer, std::size_t m, int width) {
   const compare::MetricChoice& metric = experiment.metrics[m];
-  char line[400];
-  std::snprintf(line, sizeof line, "%-*s %9s %9s %9s %9s %9s  %s\n", width, "", "median", "25 %", "75 %", "95 %",
-                "worst", "median, 95 % interval");
   std::string text = "\n" +
                      printable(metric.label + (answer.units[m].empty() ? "" : " [" + answer.units[m] + "]") +
                                (metric.label == metric.path ? "" : ", " + metric.path)) +
-                     "\n" + line;
+                     "\n" +
+                     formatted("%-*s %9s %9s %9s %9s %9s  %s\n", width, "", "median", "25 %", "75 %", "95 %", "worst",
+                               "median, 95 % interval");
   for (std::size_t v = 0; v < answer.variants.size(); ++v) {
     const VariantFigure& figure = answer.variants[v].figures[m];
     const compare::Summary& summary = figure.summary;
-    char interval[100] = "-";
-    if (figure.has_interval)
-      std::snprintf(interval, sizeof interval, "%.4f to %.4f", figure.median.lower, figure.median.upper);
-    if (figure.count)
-      std::snprintf(line, sizeof line, "%-*s %9.4f %9.4f %9.4f %9.4f %9.4f  %s\n", width,
-                    experiment.variants[v].name.c_str(), summary.median, summary.lower_quartile, summary.upper_quartile,
-                    summary.percentile_95, summary.worst, interval);
-    else
-      std::snprintf(line, sizeof line, "%-*s no cell is done\n", width, experiment.variants[v].name.c_str());
-    text += line;
+    const std::string interval =
+        figure.has_interval ? formatted("%.4f to %.4f", figure.median.lower, figure.median.upper) : "-";
+    const char* name = experiment.variants[v].name.c_str();
+    text += figure.count ? formatted("%-*s %9.4f %9.4f %9.4f %9.4f %9.4f  %s\n", width, name, summary.median,
+                                     summary.lower_quartile, summary.upper_quartile, summary.percentile_95,
+                                     summary.worst, interval.c_str())
+                         : formatted("%-*s no cell is done\n", width, name);
   }
   return text;
 }
@@ -230,22 +221,19 @@ Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows)
 
 std::string table_text(const Experiment& experiment, const Answer& answer) {
   std::ostringstream out;
-  char line[400];
   std::size_t width = 10;
   for (const compare::Variant& variant : experiment.variants) width = std::max(width, variant.name.size() + 2);
-  std::snprintf(line, sizeof line, "%-*s %5s %6s  %-22s %9s %12s\n", int(width), "variant", "runs", "failed",
-                "success (95 % interval)", "s", "evaluations");
-  out << line;
+  out << formatted("%-*s %5s %6s  %-22s %9s %12s\n", int(width), "variant", "runs", "failed", "success (95 % interval)",
+                   "s", "evaluations");
   for (std::size_t v = 0; v < answer.variants.size(); ++v) {
     const VariantSummary& summary = answer.variants[v];
-    char success[60];
-    std::snprintf(success, sizeof success, "%5.1f %% (%.1f to %.1f)",
-                  summary.runs ? 100.0 * double(summary.successes) / double(summary.runs) : 0.0,
-                  100 * summary.success.lower, 100 * summary.success.upper);
-    std::snprintf(line, sizeof line, "%-*s %5zu %6zu  %-22s %9.3f %12.0f\n", int(width),
-                  (experiment.variants[v].name + (v == experiment.baseline ? " *" : "")).c_str(), summary.runs,
-                  summary.failed, success, summary.seconds.summary.median, summary.evaluations.summary.median);
-    out << line;
+    const std::string success = formatted("%5.1f %% (%.1f to %.1f)",
+                                          summary.runs ? 100.0 * double(summary.successes) / double(summary.runs) : 0.0,
+                                          100 * summary.success.lower, 100 * summary.success.upper);
+    out << formatted("%-*s %5zu %6zu  %-22s %9.3f %12.0f\n", int(width),
+                     (experiment.variants[v].name + (v == experiment.baseline ? " *" : "")).c_str(), summary.runs,
+                     summary.failed, success.c_str(), summary.seconds.summary.median,
+                     summary.evaluations.summary.median);
   }
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) out << figure_table(experiment, answer, m, int(width));
   out << verdict_table(experiment, answer) << capture_text(experiment, answer);

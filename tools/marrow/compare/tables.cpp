@@ -6,6 +6,7 @@
 #include <set>
 
 #include "compare/comparison.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/printable.hpp"
 #include "runtime/text_file.hpp"
 
@@ -42,9 +43,7 @@ std::string field(const std::string& raw) {
 
 std::string number_text(const std::optional<double>& value) {
   if (!value) return "";
-  char text[40];
-  std::snprintf(text, sizeof text, "%.9g", *value);
-  return text;
+  return formatted("%.9g", *value);
 }
 
 /// The options that any variant changes.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "compare/tuning.hpp"
+#include "marrow/domain/number_text.hpp"
 
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 namespace marrow::cli {
@@ -9,11 +9,7 @@ namespace {
 
 using nlohmann::json;
 
-std::string text(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
+std::string text(double value) { return formatted("%.4g", value); }
 
 json of(const TuningPoint& point) {
   json result{{"values", point.values}, {"figure", point.figure}, {"runs", point.runs}, {"failed", point.failed}};

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "compare/comparison.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/printable.hpp"
 
 namespace marrow::cli {
@@ -36,11 +37,8 @@ std::string verdict_table(const compare::Experiment& experiment, const Answer& a
   }
   if (!cells) return "";
   const auto rate = [](std::size_t count, std::size_t of, const compare::Interval& interval) -> std::string {
-    char text[80];
     if (!of) return "-";
-    std::snprintf(text, sizeof text, "%zu/%zu (%.1f to %.1f %%)", count, of, 100 * interval.lower,
-                  100 * interval.upper);
-    return text;
+    return formatted("%zu/%zu (%.1f to %.1f %%)", count, of, 100 * interval.lower, 100 * interval.upper);
   };
   char line[400];
   std::snprintf(line, sizeof line, "%-*s %5s  %-26s %6s  %s\n", int(width), "", "cells", "silent failures", "caught",

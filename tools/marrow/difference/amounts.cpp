@@ -2,27 +2,17 @@
 #include "difference/amounts.hpp"
 
 #include <algorithm>
-#include <cstdarg>
 #include <cstdint>
-#include <cstdio>
 #include <fstream>
 #include <map>
 
 #include "difference/numbers.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/runtime/types.hpp"
 #include "marrow/runtime/verdicts.hpp"
 
 namespace marrow::cli {
 namespace {
-
-__attribute__((format(printf, 1, 2))) std::string text(const char* format, ...) {
-  char buffer[512];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(buffer, sizeof buffer, format, arguments);
-  va_end(arguments);
-  return buffer;
-}
 
 double percent(std::size_t part, std::size_t all) { return all ? 100.0 * double(part) / double(all) : 0; }
 
@@ -62,8 +52,8 @@ void compare_numbers(const T& a, const T& b, Amount& amount) {
                   {"same_shape", numbers.same_shape}};
   if (numbers.differ)
     amount.lines.push_back(
-        text("%zu of %zu numbers differ, by at most %.4g", numbers.differ, numbers.count, numbers.largest));
-  if (numbers.texts) amount.lines.push_back(text("%zu texts differ", numbers.texts));
+        formatted("%zu of %zu numbers differ, by at most %.4g", numbers.differ, numbers.count, numbers.largest));
+  if (numbers.texts) amount.lines.push_back(formatted("%zu texts differ", numbers.texts));
   if (!numbers.same_shape) amount.lines.push_back("lists in it are of other lengths");
 }
 
@@ -78,12 +68,12 @@ void compare_placement(const RigidTransform& a, const RigidTransform& b, const F
                distance_mm = (b * point - a * point).norm();
   amount.facts = {{"rotation_deg", angle_deg}, {"displacement_mm", distance_mm}};
   const std::string where = frame ? "the fragment's centroid" : "the origin of '" + a.source + "'";
-  std::string line = text("%.4g deg and %.4g mm apart at %s", angle_deg, distance_mm, where.c_str());
+  std::string line = formatted("%.4g deg and %.4g mm apart at %s", angle_deg, distance_mm, where.c_str());
   if (frame) {
     const Vector6d motion = motion_between(a, b, *frame);
     amount.facts["axial_rotation_deg"] = degrees(motion[2]);
     amount.facts["axial_displacement_mm"] = motion[5];
-    line += text(" (%+.4g deg about and %+.4g mm along its long axis)", degrees(motion[2]), motion[5]);
+    line += formatted(" (%+.4g deg about and %+.4g mm along its long axis)", degrees(motion[2]), motion[5]);
   }
   amount.lines.push_back(angle_deg == 0 && distance_mm == 0 ? "at the same place" : line);
 }
@@ -105,7 +95,7 @@ void compare_poses(const Pose& a, const Pose& b, Amount& amount) {
   compare_placement(a.world_from_model, b.world_from_model, has_frame ? &a.frame : nullptr, amount);
   if (a.cost != b.cost || a.evaluations != b.evaluations)
     amount.lines.push_back(
-        text("cost %.6g, was %.6g; %d evaluations, were %d", b.cost, a.cost, b.evaluations, a.evaluations));
+        formatted("cost %.6g, was %.6g; %d evaluations, were %d", b.cost, a.cost, b.evaluations, a.evaluations));
   else if (hash_of(a.world_from_model) == hash_of(b.world_from_model) && a.warnings == b.warnings)
     amount.lines.push_back("its predicted deviations or the way of the search differ");
   amount.facts["cost"] = {a.cost, b.cost};
@@ -127,13 +117,13 @@ void compare_metrics(const Metrics& a, const Metrics& b, Amount& amount) {
     const Metric* before = find(a, now.name);
     const std::string unit = now.unit.empty() ? "" : " " + now.unit;
     if (!before) {
-      amount.lines.push_back(text("%-24s %.5g%s, was not there", now.name.c_str(), now.value, unit.c_str()));
+      amount.lines.push_back(formatted("%-24s %.5g%s, was not there", now.name.c_str(), now.value, unit.c_str()));
     } else if (now.value == before->value || (std::isnan(now.value) && std::isnan(before->value))) {
       ++same;
       continue;
     } else {
-      amount.lines.push_back(text("%-24s %.5g%s, was %.5g (%+.3g)", now.name.c_str(), now.value, unit.c_str(),
-                                  before->value, now.value - before->value));
+      amount.lines.push_back(formatted("%-24s %.5g%s, was %.5g (%+.3g)", now.name.c_str(), now.value, unit.c_str(),
+                                       before->value, now.value - before->value));
     }
     amount.facts[now.name] = {
         {"before", before ? nlohmann::json(before->value) : nlohmann::json()}, {"now", now.value}, {"unit", now.unit}};
@@ -141,11 +131,11 @@ void compare_metrics(const Metrics& a, const Metrics& b, Amount& amount) {
   }
   for (const Metric& before : a.items) {
     if (find(b, before.name)) continue;
-    amount.lines.push_back(text("%-24s is not there, was %.5g%s", before.name.c_str(), before.value,
-                                (before.unit.empty() ? "" : " " + before.unit).c_str()));
+    amount.lines.push_back(formatted("%-24s is not there, was %.5g%s", before.name.c_str(), before.value,
+                                     (before.unit.empty() ? "" : " " + before.unit).c_str()));
     amount.facts[before.name] = {{"before", before.value}, {"now", nullptr}, {"unit", before.unit}};
   }
-  if (same) amount.lines.push_back(text("%zu other figure%s the same", same, same == 1 ? " is" : "s are"));
+  if (same) amount.lines.push_back(formatted("%zu other figure%s the same", same, same == 1 ? " is" : "s are"));
 }
 
 void compare_verdicts(const Verdict& a, const Verdict& b, Amount& amount) {
@@ -169,8 +159,8 @@ void compare_meshes(const Mesh& a, const Mesh& b, Amount& amount) {
   if (before != now || a.triangles.size() != b.triangles.size()) {
     const double area_before = surface_area_mm2(a), area_now = surface_area_mm2(b);
     amount.facts["area_mm2"] = {area_before, area_now};
-    amount.lines.push_back(text("%zu vertices, were %zu; %zu triangles, were %zu; surface %.6g mm2, was %.6g", now,
-                                before, b.triangles.size(), a.triangles.size(), area_now, area_before));
+    amount.lines.push_back(formatted("%zu vertices, were %zu; %zu triangles, were %zu; surface %.6g mm2, was %.6g", now,
+                                     before, b.triangles.size(), a.triangles.size(), area_now, area_before));
   }
   if (before != now) return;
   double largest_mm = 0;
@@ -182,15 +172,15 @@ void compare_meshes(const Mesh& a, const Mesh& b, Amount& amount) {
   }
   amount.facts["moved"] = moved;
   amount.facts["largest_displacement_mm"] = largest_mm;
-  amount.lines.push_back(text("%zu of %zu vertices lie elsewhere, by at most %.4g mm", moved, now, largest_mm));
+  amount.lines.push_back(formatted("%zu of %zu vertices lie elsewhere, by at most %.4g mm", moved, now, largest_mm));
   if (a.triangles.size() == b.triangles.size() && a.triangles != b.triangles)
     amount.lines.push_back("its triangles join other vertices");
 }
 
 void add_samples(const NumberDifference& numbers, const char* what, const char* unit, Amount& amount) {
   amount.facts.update({{"samples", numbers.count}, {"differ", numbers.differ}, {"largest", numbers.largest}});
-  amount.lines.push_back(text("%zu of %zu %s differ (%.3g %%), by at most %.4g %s", numbers.differ, numbers.count, what,
-                              percent(numbers.differ, numbers.count), numbers.largest, unit));
+  amount.lines.push_back(formatted("%zu of %zu %s differ (%.3g %%), by at most %.4g %s", numbers.differ, numbers.count,
+                                   what, percent(numbers.differ, numbers.count), numbers.largest, unit));
 }
 
 /// Compares samples on grids. If the grids differ in size, the samples cannot be matched.
@@ -198,8 +188,8 @@ void compare_grids(const Grid& a, const Grid& b, const std::vector<float>& value
                    const char* unit, Amount& amount) {
   amount.facts["size"] = {a.size, b.size};
   if (a.size != b.size || values_a.size() != values_b.size()) {
-    amount.lines.push_back(text("%d x %d x %d samples, were %d x %d x %d", b.size[0], b.size[1], b.size[2], a.size[0],
-                                a.size[1], a.size[2]));
+    amount.lines.push_back(formatted("%d x %d x %d samples, were %d x %d x %d", b.size[0], b.size[1], b.size[2],
+                                     a.size[0], a.size[1], a.size[2]));
     return;
   }
   if (hash_of(a) != hash_of(b)) amount.lines.push_back("its grid lies elsewhere or has another spacing");
@@ -218,14 +208,14 @@ void compare_fields(const SignedField& a, const SignedField& b, Amount& amount) 
   }
   amount.facts["voxels_now_inside"] = in;
   amount.facts["voxels_now_outside"] = out;
-  amount.lines.push_back(text("%zu voxels are inside now, %zu are outside now", in, out));
+  amount.lines.push_back(formatted("%zu voxels are inside now, %zu are outside now", in, out));
 }
 
 void compare_pixels(const cv::Mat& a, const cv::Mat& b, Amount& amount) {
   amount.facts["size"] = {{a.cols, a.rows}, {b.cols, b.rows}};
   if (a.size() != b.size() || a.type() != b.type()) {
-    amount.lines.push_back(text("%d x %d pixels of %d bits, were %d x %d of %d", b.cols, b.rows, 8 * int(b.elemSize()),
-                                a.cols, a.rows, 8 * int(a.elemSize())));
+    amount.lines.push_back(formatted("%d x %d pixels of %d bits, were %d x %d of %d", b.cols, b.rows,
+                                     8 * int(b.elemSize()), a.cols, a.rows, 8 * int(a.elemSize())));
     return;
   }
   NumberDifference numbers;
@@ -259,10 +249,10 @@ void compare_edges(const EdgeMap& a, const EdgeMap& b, Amount& amount) {
                   {"changed", changed},
                   {"largest_px", largest_px}};
   amount.lines.push_back(
-      text("%zu edge pixels, were %zu: %zu gone, %zu new", b.pixels.size(), a.pixels.size(), gone, added));
+      formatted("%zu edge pixels, were %zu: %zu gone, %zu new", b.pixels.size(), a.pixels.size(), gone, added));
   if (changed)
     amount.lines.push_back(
-        text("%zu of the %zu common ones differ, their places by at most %.4g px", changed, common, largest_px));
+        formatted("%zu of the %zu common ones differ, their places by at most %.4g px", changed, common, largest_px));
 }
 
 /// Compares two lines: the largest distance of an end from the other line, and the angle between them.
@@ -275,16 +265,16 @@ void compare_lines(const std::string& name, const LineSegment& a, const LineSegm
   amount.facts[name] = {{"distance_px", distance_px}, {"angle_deg", angle_deg}};
   if (hash_of(a) != hash_of(b))
     amount.lines.push_back(
-        text("%s border: %.4g deg and at most %.4g px from where it was", name.c_str(), angle_deg, distance_px));
+        formatted("%s border: %.4g deg and at most %.4g px from where it was", name.c_str(), angle_deg, distance_px));
 }
 
 void compare_shafts(const ShaftLines& a, const ShaftLines& b, Amount& amount) {
   compare_lines("left", a.left, b.left, amount);
   compare_lines("right", a.right, b.right, amount);
   amount.facts["width_mm"] = {a.width_mm, b.width_mm};
-  if (a.width_mm != b.width_mm) amount.lines.push_back(text("width %.6g mm, was %.6g", b.width_mm, a.width_mm));
+  if (a.width_mm != b.width_mm) amount.lines.push_back(formatted("width %.6g mm, was %.6g", b.width_mm, a.width_mm));
   if (a.log_likelihood != b.log_likelihood)
-    amount.lines.push_back(text("log likelihood %.6g, was %.6g", b.log_likelihood, a.log_likelihood));
+    amount.lines.push_back(formatted("log likelihood %.6g, was %.6g", b.log_likelihood, a.log_likelihood));
   if (amount.lines.empty()) amount.lines.push_back("the same borders; the rejected candidates differ");
 }
 
@@ -335,9 +325,9 @@ Amount amount_of_counts(std::uintmax_t before, std::uintmax_t now, std::uintmax_
   Amount amount;
   amount.facts = {{"bytes", {before, now}}, {"bytes_differ", differ}};
   if (before == now)
-    amount.lines.push_back(text("%ju of %ju bytes of %s differ", differ, now, what.c_str()));
+    amount.lines.push_back(formatted("%ju of %ju bytes of %s differ", differ, now, what.c_str()));
   else
-    amount.lines.push_back(text("%s of %ju bytes, were %ju", what.c_str(), now, before));
+    amount.lines.push_back(formatted("%s of %ju bytes, were %ju", what.c_str(), now, before));
   return amount;
 }
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The rows of a comparison for its page, as data.js describes a cell_table.
-#include <cstdio>
 #include <cstdlib>
 #include <unordered_map>
 
+#include "marrow/domain/number_text.hpp"
 #include "report/cell_material.hpp"
 
 namespace marrow::cli {
@@ -15,9 +15,7 @@ using nlohmann::json;
 /// With nine digits: what the tables for other programs have, and half as long as the exact number.
 json rounded(const std::optional<double>& value) {
   if (!value) return {};
-  char text[40];
-  std::snprintf(text, sizeof text, "%.9g", *value);
-  return std::strtod(text, nullptr);
+  return parsed_number(formatted("%.9g", *value)).value();
 }
 
 /// Texts that many cells share, each of them once.

@@ -2,6 +2,7 @@
 #include <thread>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "report/cell_material.hpp"
 #include "report/report.hpp"
 #include "run_files.hpp"
@@ -26,27 +27,23 @@ std::string text_of_file(const fs::path& file) {
 std::string starts_sentence(const Experiment& experiment) {
   if (!experiment.protocol) return "Each run starts where its pipeline starts.";
   const compare::StartProtocol& protocol = *experiment.protocol;
-  char text[400];
-  std::snprintf(text, sizeof text,
-                "%zu starts a case, drawn with seed %llu: rotated by an angle uniform in 0 to %g degrees about a "
-                "direction uniform on the sphere through the "
-                "fragment's centroid, and shifted by 0 to %g mm, uniform, in a direction uniform on the sphere.",
-                protocol.count, static_cast<unsigned long long>(protocol.seed), protocol.rotation_deg,
-                protocol.translation_mm);
+  const std::string text = formatted(
+      "%zu starts a case, drawn with seed %llu: rotated by an angle uniform in 0 to %g degrees about a "
+      "direction uniform on the sphere through the "
+      "fragment's centroid, and shifted by 0 to %g mm, uniform, in a direction uniform on the sphere.",
+      protocol.count, static_cast<unsigned long long>(protocol.seed), protocol.rotation_deg, protocol.translation_mm);
   if (!(protocol.distance_mm > 0)) return text;
-  char scaled[160];
-  std::snprintf(scaled, sizeof scaled,
-                " Each displacement is scaled until the surface has moved by a mean distance uniform in 0 to %g mm.",
+  const std::string scaled =
+      formatted(" Each displacement is scaled until the surface has moved by a mean distance uniform in 0 to %g mm.",
                 protocol.distance_mm);
-  return std::string(text) + scaled;
+  return text + scaled;
 }
 
 std::string success_sentence(const Experiment& experiment, const std::vector<std::string>& units) {
   std::string limits;
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m)
     if (const compare::MetricChoice& metric = experiment.metrics[m]; metric.limit) {
-      char limit[40];
-      std::snprintf(limit, sizeof limit, metric.higher_is_better() ? " above %g" : " below %g", *metric.limit);
+      const std::string limit = formatted(metric.higher_is_better() ? " above %g" : " below %g", *metric.limit);
       limits += (limits.empty() ? "" : " and ") + metric.label + limit + (units[m].empty() ? "" : " " + units[m]);
     }
   return limits.empty() ? "A run that ends without a fault is a success."

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/hash.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
@@ -105,7 +106,7 @@ json trajectory_of(const std::string& text, const std::string& name) {
   json way = {{"name", place_of(name)}};
   while (std::getline(lines, line)) {
     const std::vector<std::string> cells = cells_of(line);
-    const auto number = [&](const std::string& title) { return std::stod(cells.at(column(title))); };
+    const auto number = [&](const std::string& title) { return parsed_number(cells.at(column(title))).value(); };
     json motion = json::array(), deviation = json::array();
     for (const std::string& axis : kAxes) {
       motion.push_back(number(axis));

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "marrow/domain/number_text.hpp"
 #include "workbench/server.hpp"
 
 namespace marrow::workbench {
@@ -14,11 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-std::string gigabytes(std::uintmax_t bytes) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f GB", double(bytes) / 1e9);
-  return text;
-}
+std::string gigabytes(std::uintmax_t bytes) { return formatted("%.1f GB", double(bytes) / 1e9); }
 
 /// The largest angle between an axis of the grid and the patient's axis next to it.
 double obliquity_deg(const Grid& grid) {
@@ -119,32 +115,25 @@ std::vector<std::string> doubts_about(const OpenCt& ct) {
   constexpr double kOblique_deg = 1, kThick = 4;
   const Grid& grid = ct.volume().grid;
   std::vector<std::string> doubts;
-  char text[300];
-  if (ct.lowest_hu > kAir_hu) {
-    std::snprintf(text, sizeof text,
-                  "No value is below -500 HU (the lowest is %.0f), but air is near -1000 HU. Is this a CT? If its file "
+  if (ct.lowest_hu > kAir_hu)
+    doubts.push_back(
+        formatted("No value is below -500 HU (the lowest is %.0f), but air is near -1000 HU. Is this a CT? If its file "
                   "holds HU + 1024, give the offset -1024.",
-                  double(ct.lowest_hu));
-    doubts.push_back(text);
-  }
-  if (const double angle_deg = obliquity_deg(grid); angle_deg > kOblique_deg) {
-    std::snprintf(text, sizeof text,
-                  "The axes of its grid are turned by %.0f degrees from the patient's. The slices follow the grid, so "
+                  double(ct.lowest_hu)));
+  if (const double angle_deg = obliquity_deg(grid); angle_deg > kOblique_deg)
+    doubts.push_back(
+        formatted("The axes of its grid are turned by %.0f degrees from the patient's. The slices follow the grid, so "
                   "they are oblique.",
-                  angle_deg);
-    doubts.push_back(text);
-  }
+                  angle_deg));
   const int fewest = *std::min_element(grid.size.begin(), grid.size.end());
   if (fewest < kFewSlices)
     doubts.push_back("It has only " + std::to_string(fewest) +
                      " slices along one of its axes. Are files of the series missing?");
-  if (const double thick = grid.spacing_mm.maxCoeff(), thin = grid.spacing_mm.minCoeff(); thick > kThick * thin) {
-    std::snprintf(text, sizeof text,
-                  "Its voxels are %.3g mm long and %.3g mm wide, so the bone's surface is not well known along the "
+  if (const double thick = grid.spacing_mm.maxCoeff(), thin = grid.spacing_mm.minCoeff(); thick > kThick * thin)
+    doubts.push_back(
+        formatted("Its voxels are %.3g mm long and %.3g mm wide, so the bone's surface is not well known along the "
                   "longer side.",
-                  thick, thin);
-    doubts.push_back(text);
-  }
+                  thick, thin));
   return doubts;
 }
 

@@ -3,6 +3,7 @@
 
 #include "commands.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/runtime/run_folder.hpp"
 #include "outputs_in_files.hpp"
 #include "run_event.hpp"
@@ -19,8 +20,7 @@ using Kind = RunEvent::Kind;
 void log_event(RunLog& log, const RunEvent& event) {
   const std::string where = event.item.empty() ? event.node : event.node + " (" + event.item + ")";
   if (event.kind == Kind::finished) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.3f s", event.seconds);
+    const std::string text = formatted("%.3f s", event.seconds);
     log.keep(LogLevel::info, where, text);
   } else if (event.kind == Kind::skipped) {
     log.keep(LogLevel::info, where, "skipped: " + event.text);

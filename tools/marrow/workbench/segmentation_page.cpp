@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The requests of the page "Case" about segmenting: a job that segments, first on a coarse grid, then on that of the
 // CT; the outlines in the slices; the surfaces.
-#include <cstdio>
 #include <deque>
 
 #include "marrow/domain/case.hpp"
 #include "marrow/domain/mesh.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/printable.hpp"
 #include "workbench/ct_requests.hpp"
 #include "workbench/segmentation.hpp"
@@ -105,11 +105,10 @@ void check_memory(const Order& order, const Grid& grid) {
   for (const Seeds& seeds : order.seeds) fields += seeds.wanted;
   const std::uintmax_t bytes = fields * grid.count() * sizeof(float);
   if (bytes <= most_ct_bytes()) return;
-  char text[300];
-  std::snprintf(text, sizeof text,
-                "on the grid of the CT, %d fragments would take %.1f GB of memory, and at most %.1f GB are used here; "
-                "the result on the coarse grid stays. Register fewer fragments, or cut the CT to the bone",
-                int(fields), double(bytes) / 1e9, double(most_ct_bytes()) / 1e9);
+  const std::string text = formatted(
+      "on the grid of the CT, %d fragments would take %.1f GB of memory, and at most %.1f GB are used here; "
+      "the result on the coarse grid stays. Register fewer fragments, or cut the CT to the bone",
+      int(fields), double(bytes) / 1e9, double(most_ct_bytes()) / 1e9);
   throw Error(text);
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What marrow says about the cameras of a draft's views, and the pose that its landmarks give.
-#include <cstdio>
 #include <sstream>
 
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/pose.hpp"
 #include "workbench/xray.hpp"
 
@@ -114,11 +114,7 @@ json mirrored(json landmarks, const std::string& view, double width_px) {
   return landmarks;
 }
 
-std::string short_text(double value) {
-  char characters[32];
-  std::snprintf(characters, sizeof characters, "%.2g", value);
-  return characters;
-}
+std::string short_text(double value) { return formatted("%.2g", value); }
 
 /// A sentence about the view whose mirrored image fits best, if it fits at least five times as well as `residual_px`.
 std::vector<std::string> mirrored_view(const Workbench& workbench, const json& views, const json& landmarks,

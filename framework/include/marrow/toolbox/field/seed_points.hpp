@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <cstdio>
 #include <string>
 #include <vector>
 
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/list.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/volume.hpp"
 
 namespace marrow::field {
@@ -31,9 +31,8 @@ inline std::vector<std::vector<Eigen::Vector3d>> seed_indices(const marrow::Volu
     if (seeds[f].points_mm.empty()) throw Error(fragment + ": there are none; give at least one point inside its bone");
     for (std::size_t i = 0; i < seeds[f].points_mm.size(); ++i) {
       const Eigen::Vector3d& point = seeds[f].points_mm[i];
-      char where[120];
-      std::snprintf(where, sizeof where, ": point %zu at (%.1f, %.1f, %.1f) mm", i + 1, point.x(), point.y(),
-                    point.z());
+      const std::string where =
+          formatted(": point %zu at (%.1f, %.1f, %.1f) mm", i + 1, point.x(), point.y(), point.z());
       const Eigen::Vector3d index = volume.grid.index_from_point(point);
       int voxel[3];
       for (int k = 0; k < 3; ++k) {
@@ -48,11 +47,10 @@ inline std::vector<std::vector<Eigen::Vector3d>> seed_indices(const marrow::Volu
           for (int x = voxel[0] - 1; x <= voxel[0] + 1; ++x)
             if (volume.grid.contains(x, y, z)) sum += volume.at(x, y, z), ++count;
       if (sum / count < least_hu) {
-        char value[160];
-        std::snprintf(value, sizeof value,
-                      " is not in bone: the CT shows %.0f HU there, at least %.0f HU expected; move it "
-                      "into cortical or spongy bone",
-                      sum / count, least_hu);
+        const std::string value = formatted(
+            " is not in bone: the CT shows %.0f HU there, at least %.0f HU expected; move it "
+            "into cortical or spongy bone",
+            sum / count, least_hu);
         throw Error(fragment + where + value);
       }
       indices[f].push_back(index);
