@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/plain_text.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/domain/yaml.hpp"
 #include "text_file.hpp"
@@ -24,7 +25,8 @@ std::string show(double value) {
 
 }  // namespace
 
-YAML::Node StrictYaml::parse(const std::string& text) {
+YAML::Node StrictYaml::parse(const std::string& written) {
+  const std::string text = plain_text(written);
   try {
     return parse_yaml(text);
   } catch (const YAML::ParserException& error) {
@@ -171,7 +173,7 @@ std::optional<std::string> read_source(const std::filesystem::path& file, const 
                                        Diagnostics& diagnostics) {
   try {
     std::string text = read_text_file(file, kMostSourceBytes);
-    diagnostics.remember(file.string(), text);
+    diagnostics.remember(file.string(), plain_text(text));
     return text;
   } catch (const Error& error) {
     const std::string fault = error.what();  // begins with the file's name, which the place has already

@@ -28,7 +28,8 @@ class StrictYaml {
   /// For a text that was taken out of a file. All of it counts as written at one place.
   StrictYaml(const Place& only, Diagnostics& diagnostics) : file_(only.file), diagnostics_(diagnostics), only_(only) {}
 
-  /// Parses a text. A syntax error becomes a diagnostic and gives a null node.
+  /// Parses a text, however its writer stored it (plain_text()). A syntax error becomes a diagnostic and gives a null
+  /// node.
   YAML::Node parse(const std::string& text);
   Place place(const YAML::Node& node) const { return place_of(node.Mark()); }
   /// The entries of a map in their order. `what` names the map in messages. If `known` is given, other keys are faults.

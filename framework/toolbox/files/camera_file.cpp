@@ -7,6 +7,7 @@
 
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/plain_text.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 
@@ -22,7 +23,7 @@ class XmalabText {
       throw Error(path.string() +
                   ": expected a camera file: marrow's YAML (.yaml) or XMALab's text (image size, camera "
                   "matrix, rotation, translation)");
-    stream_.str(file.text(0, std::size_t(file.size())));
+    stream_.str(plain_text(file.text(0, std::size_t(file.size()))));
   }
 
   /// Skips empty lines and expects a line with just this title.
@@ -69,7 +70,7 @@ class XmalabText {
     std::string line;
     std::getline(stream_, line);
     ++line_number_;
-    while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
+    while (!line.empty() && line.back() == ' ') line.pop_back();
     return line;
   }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/plain_text.hpp"
 #include "marrow/domain/printable.hpp"
 #include "runtime/text_file.hpp"
 #include "workbench/case_text.hpp"
@@ -81,7 +82,7 @@ json document_of_case(const OpenedFolder& folder, const std::string& case_path) 
   json document{{"ct", nullptr}, {"views", json::array()}, {"fragments", json::object()}};
   if (fs::exists(file)) {
     try {
-      document = json_of(YAML::Load(read_text_file(file, kMostSourceBytes)));
+      document = json_of(YAML::Load(plain_text(read_text_file(file, kMostSourceBytes))));
       adapt(document, case_path.empty() ? "" : case_path + "/");
     } catch (const std::exception& error) {
       throw Error(printable(file.string()) + ": this case cannot be read here: " + printable(error.what()) +

@@ -17,7 +17,7 @@ FilesOfCt::FilesOfCt(const fs::path& place) {
     return;
   }
   std::size_t count = 0;
-  for (fs::directory_iterator entry(place, error), end; !error && entry != end; entry.increment(error)) {
+  for (fs::recursive_directory_iterator entry(place, error), end; !error && entry != end; entry.increment(error)) {
     if (++count > kMostSlices)
       throw Error(printable(place.string()) + ": this folder holds more than " + std::to_string(kMostSlices) +
                   " files; choose the folder of one series");

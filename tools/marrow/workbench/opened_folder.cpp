@@ -6,6 +6,7 @@
 #include <set>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/plain_text.hpp"
 #include "marrow/domain/printable.hpp"
 #include "runtime/text_file.hpp"
 
@@ -28,7 +29,7 @@ std::string format_of(const fs::path& file) {
   if (fs::file_size(file, error) > 200'000 || error) return "";
   try {
     std::smatch format;
-    const std::string text = read_text_file(file, kMostSourceBytes);
+    const std::string text = plain_text(read_text_file(file, kMostSourceBytes));
     return std::regex_search(text, format, kFormat) ? format[1].str() : "";
   } catch (const std::exception&) {
     return "";  // it is listed as a file only
