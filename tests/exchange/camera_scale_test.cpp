@@ -118,12 +118,13 @@ TEST_F(CameraScale, OfViews) {
 TEST_F(CameraScale, OfACase) {
   put(folder / "case/cm.txt", kXmalab);
   put(folder / "case/a.png", bytes_of(folder / "a.png"));
-  put(folder / "case/ct.mhd",
-      "ObjectType = Image\nNDims = 3\nDimSize = 2 2 2\nElementType = MET_SHORT\nElementSpacing = 1 1 "
-      "1\nElementDataFile = ct.raw\n");
-  put(folder / "case/ct.raw", std::string(16, '\0'));
+  put(folder / "case/ct.mha",
+      "ObjectType = Image\nNDims = 3\nDimSize = 2 2 2\nElementType = MET_SHORT\nElementSpacing = 1 1 1\nBinaryData = "
+      "True\n"
+      "ElementDataFile = LOCAL\n" +
+          std::string(16, '\0'));
   const auto text = [](const std::string& camera) {
-    return "marrow-case: 1\nct: ct.mhd\nviews:\n  - {name: ap, image: a.png, camera: " + camera +
+    return "marrow-case: 1\nct: ct.mha\nviews:\n  - {name: ap, image: a.png, camera: " + camera +
            "}\nfragments:\n  distal: {seeds: [[0.5, 0.5, 0.5]]}\n";
   };
   put(folder / "case/case.yaml", text("cm.txt"));

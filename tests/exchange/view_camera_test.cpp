@@ -115,8 +115,10 @@ TEST_F(ViewCamera, WhatIsMissingOrTooMuchIsSaid) {
   shipped::Options wired = with_image("", 4, 4, {{"projection", 0LL}, {"name", "ap"}});
   wired.erase("camera");
   marrow::Camera any{4, 4, Eigen::Vector3d(10, 10, 1).asDiagonal(), {"camera", "world"}};
-  EXPECT_EQ(shipped::refusal("read.view", {{"camera", shipped::item(any)}}, wired),
-            "view 'ap': its camera is wired; projection, pixel_mm and corner_mm are for a camera file: leave them out");
+  EXPECT_EQ(
+      shipped::refusal("read.view", {{"camera", shipped::item(any)}}, wired),
+      "view 'ap': its camera is wired; projection, pixel_mm, corner_mm and scale are for a camera file: leave them "
+      "out");
 }
 
 /// A case with one view, whose camera is given by this text.

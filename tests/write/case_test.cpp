@@ -115,7 +115,7 @@ TEST(WriteCase, DiagnosesWhatReadCaseWouldNotTake) {
   EXPECT_SAYS(write(value, path), "case: the name '' of a fragment is empty; choose another");
   value = example();
   value.ct.values.pop_back();
-  EXPECT_SAYS(write(value, path), "ct.mha: 24 samples expected from the grid's size, got 23");
+  EXPECT_SAYS(write(value, path), ": ct: 24 voxels expected from its size, got 23");
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
