@@ -10,7 +10,8 @@
 namespace marrow::cli {
 namespace {
 
-std::string name_of(const CLI::App& command) { return command.get_name().empty() ? "marrow" : command.get_name(); }
+/// The program itself is not named as it was called: that is a path.
+std::string name_of(const CLI::App& command) { return command.get_parent() ? command.get_name() : "marrow"; }
 
 /// What to do instead of giving `word` ("--case=x") to a command.
 std::string advice_for_option(const CLI::App& command, const std::string& word) {
