@@ -202,6 +202,56 @@ TEST(Markups, DiagnosesFaultsOfFcsv) {
   expect(kFcsv.substr(0, kFcsv.find("1,-53")), "there is no point in it; expected 3D Slicer's list of fiducials");
 }
 
+const std::string kHeader = kFcsv.substr(0, kFcsv.find("1,-53"));
+
+// 3D Slicer under a locale with decimal commas, and tables saved there: 12.5 becomes two cells, and what follows moves.
+TEST(Markups, DecimalCommasAreNoCells) {
+  const TemporaryFolder folder;
+  const auto expect = [&](const std::string& row, const std::string& said) {
+    put(folder / "a.fcsv", kHeader + row + "\n");
+    EXPECT_REFUSED(landmarks_at(folder / "a.fcsv"), "a.fcsv", said);
+    EXPECT_REFUSED(seeds_at(folder / "a.fcsv"), "a.fcsv", said);
+  };
+  const std::string advice =
+      "; a number with a decimal comma makes two cells: write 12.5, not 12,5, and a text with commas in quotation "
+      "marks";
+  const std::string expected = "a.fcsv:4: expected 14 cells, one for each of the columns, got ";
+  expect("1,12,5,30,1,-7,2,0,0,0,1,1,1,0,distal-1,,", expected + "17" + advice);
+  expect("1,12,5,30,-7,0,0,0,1,1,1,0,distal-1,,", expected + "15" + advice);
+  expect("1,12,5,30,1,-7,0,0,0,1,1,1,0,distal-1,,", expected + "16" + advice);
+  expect("1,12,5,30,1,-7,2,0,0,0,1,1,1,0,distal-1,,,2,0", expected + "19" + advice);  // of 3D Slicer 5
+  expect("1,12,5,30,-7,0,0,0,1,1,1,0,distal-1", expected + "13" + advice);            // and without the last two cells
+  expect("1,12.5,30,-7,0,0,0,1,1,1,0,left, not right,,", expected + "15" + advice);
+}
+
+TEST(Markups, RowsOfOtherLengthsThatAreSound) {
+  const TemporaryFolder folder;
+  const auto first_of = [&](const std::string& rows) {
+    put(folder / "a.fcsv", kHeader + rows);
+    return landmarks_at(folder / "a.fcsv")[0].points.at(0);
+  };
+  const Eigen::Vector3d at(12.5, 30.1, -7.2);
+  for (const char* row : {"1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch,,,2,0", "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,1, , ,  2,0",
+                          "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch", "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch,",
+                          "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,7,,"})
+    EXPECT_EQ(first_of(std::string(row) + "\n").model_mm, at) << row;
+  // On Windows 3D Slicer 5 leaves a carriage return inside of its lines.
+  EXPECT_EQ(first_of("1,12.5,30.1,-7.2,0,0,0,1,1,1,0,\"hip, left\",,\r,2,0\n").name, "hip, left");
+  // The fifteenth cell says whether a point is placed: 2. The others are listed only, and lie at (0, 0, 0).
+  const auto placed = first_of("1,0,0,0,0,0,0,1,1,1,0,later,,,0,0\n2,12.5,30.1,-7.2,0,0,0,1,1,1,0,now,,,2,0\n");
+  EXPECT_EQ(placed.name, "now");
+  put(folder / "b.fcsv", with(kFcsv, "= LPS\n", "= LPS,,,,\n"));  // tables fill each line up
+  EXPECT_EQ(landmarks_at(folder / "b.fcsv")[0].points[0].model_mm, kFirst);
+}
+
+// The values are those of the files' texts.
+TEST(Markups, FilesOfOthersWithDecimalCommas) {
+  MARROW_NEED_DATA(data, "strangers/text");
+  EXPECT_SAYS(seeds_at(data / "decimal_comma.fcsv"), "a number with a decimal comma makes two cells");
+  EXPECT_SAYS(landmarks_at(data / "decimal_comma_one.fcsv"), "a number with a decimal comma makes two cells");
+  EXPECT_EQ(landmarks_at(data / "extra_cells.fcsv")[0].points.at(0).model_mm, Eigen::Vector3d(12.5, 30.1, -7.2));
+}
+
 TEST(Markups, DiagnosesSeedsWithoutAFragment) {
   const TemporaryFolder folder;
   put(folder / "a.mrk.json", with(kJson, "distal-2", ""));

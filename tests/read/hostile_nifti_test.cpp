@@ -30,7 +30,7 @@ TEST_F(Hostile, NiftiWhosePlacesAndLengthsAreNone) {
   expect("b.nii", replaced(bytes, 40, number<std::int16_t>(9)), "tells of 9 dimensions");
   expect("b.nii", replaced(bytes, 46, number<std::int16_t>(6)),
          "is cut off or damaged: 576 bytes of samples expected, got 480");
-  expect("b.nii", replaced(bytes, 344, "ni1"), "is not a NIfTI-1 file with its samples in it");
+  expect("b.nii", replaced(bytes, 344, "ni1"), "is not a NIfTI file with its samples in it");
 }
 
 TEST_F(Hostile, NiftiSaysWhereItLies) {

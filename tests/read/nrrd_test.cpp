@@ -30,4 +30,31 @@ TEST_F(Nrrd, CentersAreOfEachAxis) {
     EXPECT_SAYS(grid_with(ends + "\ncenters: " + wrong), "expected one of cell, node and none for each of the axes");
 }
 
+// The first file is what ITK writes for an image of vectors with one component; a value axis of one sample changes
+// nothing in the order of the samples.
+TEST_F(Nrrd, AxesOfOneValueAreNoneOfTheVolume) {
+  std::string samples;
+  for (char i = 0; i < 60; ++i) samples += i;
+  const auto volume_with = [&](const std::string& fields) {
+    put(folder / "b.nrrd", "NRRD0004\ntype: uchar\nencoding: raw\n" + fields + "\n\n" + samples);
+    return marrow::files::read_volume_file(folder / "b.nrrd", {});
+  };
+  const std::string space =
+      "\nspace: left-posterior-superior\nspace origin: (1,2,3)\nspace directions: none (0.5,0,0) (0,2,0) (0,0,3)";
+  for (const std::string& fields :
+       {"dimension: 4\nsizes: 1 5 4 3\nkinds: vector domain domain domain" + space,
+        "dimension: 4\nsizes: 1 5 4 3\nkinds: list domain domain domain\nunits: \"\" \"mm\" \"mm\" \"mm\"" + space,
+        "dimension: 4\nsizes: 1 5 4 3" + space, "dimension: 5\nsizes: 1 5 4 3 1" + space + " none",
+        std::string("dimension: 4\nsizes: 5 4 3 1\nspacings: 0.5 2 3 nan\naxis mins: 0.75 1 1.5 nan")}) {
+    const marrow::Volume volume = volume_with(fields);
+    EXPECT_EQ(volume.grid.size, (std::array<int, 3>{5, 4, 3})) << fields;
+    EXPECT_EQ(volume.grid.spacing_mm, Eigen::Vector3d(0.5, 2, 3)) << fields;
+    EXPECT_EQ(volume.grid.origin_mm, Eigen::Vector3d(1, 2, 3)) << fields;
+    EXPECT_EQ(volume.at(4, 1, 2), 49) << fields;
+  }
+  EXPECT_SAYS(volume_with("dimension: 4\nsizes: 3 5 4 1\nkinds: vector domain domain domain" + space),
+              "has 3 values per voxel; a CT has one");
+  EXPECT_SAYS(volume_with("dimension: 4\nsizes: 5 4 1 3\nspacings: 1 1 1 1"), "has 4 dimensions; expected one volume");
+}
+
 }  // namespace nrrd_test

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include "comma_locale.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 #include "read/files.hpp"
 #include "shipped.hpp"
@@ -59,7 +60,31 @@ TEST_F(ReadTra, WhatIsWrittenIsReadBack) {
   EXPECT_FALSE(again.world_from_bone[1]);
 }
 
+// With decimal commas a line has more cells, and 16 of them can be another pose.
+TEST_F(ReadTra, IsWrittenTheSameUnderAnyLocale) {
+  const marrow::Catalogue catalogue;
+  const auto track = read(kQuarter + kLost).at("track");
+  const auto written = [&] {
+    catalogue.load_writer(track.type).write(track.data.get(), (folder / "w.tra").string());
+    return marrow::test::bytes_of(folder / "w.tra");
+  };
+  const std::string before = written();
+  EXPECT_EQ(before, kQuarter + kLost);
+  MARROW_NEED_COMMA_LOCALE(german);
+  EXPECT_EQ(written(), before);
+}
+
+// pandas and others write NaN as an empty cell. If such a line were passed over, all later frames would move by one.
+TEST_F(ReadTra, ALineOfEmptyCellsIsAFrameWithoutAPose) {
+  const auto out = read(kQuarter + std::string(15, ',') + "\n" + kQuarter + "\n");
+  EXPECT_EQ(out.at("poses").as_list<marrow::Pose>().names(), (std::vector<std::string>{"0001", "0003"}));
+  EXPECT_FALSE(out.at("track").as<marrow::track::AutoscoperTrack>().world_from_bone.at(1));
+}
+
 TEST_F(ReadTra, SaysWhatIsWrong) {
+  EXPECT_EQ(refusal("0,-1,0,1,5,1,0,0,-2,5,0,0,1,300,0,0,0,1\n"),
+            ":1: expected the 16 numbers of a 4x4 matrix, got 18; a number with a decimal comma counts twice: write "
+            "12.5, not 12,5");
   EXPECT_EQ(refusal(kQuarter + "1,2,3\n"), ":2: expected the 16 numbers of a 4x4 matrix, got 3");
   EXPECT_EQ(refusal("0,-1,0,1,1,0,0,x,0,0,1,300,0,0,0,1\n"), ":1:16: expected a number, got 'x'");
   EXPECT_EQ(refusal("2,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1\n"),

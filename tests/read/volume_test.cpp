@@ -104,6 +104,33 @@ TEST(ReadVolume, DetachedHeadersNeedTheFolderThatHoldsTheirData) {
   EXPECT_SAYS(read(folder / "mhd"), "expected one file that lies beside it");
 }
 
+TEST(ReadVolume, DetachedHeadersNameFilesInTheirFolderInAnyForm) {
+  const TemporaryFolder folder;
+  for (const char* header : {"mhd/ct.mhd", "nhdr/ct.nhdr"}) {
+    const auto path = folder / header, ct = path.parent_path();
+    std::filesystem::create_directories(ct / "sub");
+    write_itk(path, turned_grid());
+    std::filesystem::copy_file(ct / "ct.raw", ct / "sub/below.raw");
+    std::filesystem::copy_file(ct / "ct.raw", ct / "odd\\name..raw");
+    const std::string bytes = marrow::test::bytes_of(path);
+    const auto naming = [&](const std::string& file) {
+      marrow::test::put(path, marrow::test::with(bytes, "ct.raw", file));
+      return read(ct).values.at(7);
+    };
+    for (const char* file :
+         {"ct.raw", "./ct.raw", ".\\ct.raw", ".//./ct.raw", "sub/below.raw", ".\\sub\\below.raw", "odd\\name..raw"})
+      EXPECT_EQ(naming(file), 7 * 37 - 1000) << file;
+    for (const char* file :
+         {"../mhd/ct.raw", "sub/../ct.raw", "..\\mhd\\ct.raw", "/etc/hostname", "\\etc\\hostname", "./", "sub/", "."})
+      EXPECT_SAYS(naming(file), "for its samples; expected one file that lies beside it, or in a folder beside it");
+    EXPECT_SAYS(naming("./gone.raw"), "names './gone.raw' for its samples, which is not there");
+    const TemporaryFolder elsewhere;
+    std::filesystem::copy_file(ct / "ct.raw", elsewhere / "ct.raw");
+    std::filesystem::create_directory_symlink(elsewhere.path(), ct / "link");
+    EXPECT_SAYS(naming("link/ct.raw"), "link: is a link to a place outside the folder");
+  }
+}
+
 TEST(ReadVolume, RefusesWhatIsNoCt) {
   const TemporaryFolder folder;
   ItkGrid<float> nan{.size = {2, 2, 2}, .samples = {0, 1, 2, std::numeric_limits<float>::quiet_NaN(), 4, 5, 6, 7}};

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "comma_locale.hpp"
 #include "read/files.hpp"
 #include "track/sequences.hpp"
 #include "write/writing.hpp"
@@ -59,6 +60,13 @@ Trajectory three_frames(int verdicts = 3) {
                                             {"verdicts", shipped::list(verdicts_of_frames(verdicts), "frame")}})
       .at("trajectory")
       .as<Trajectory>();
+}
+
+TEST(Trajectory, TableIsTheSameUnderAnyLocale) {
+  const Trajectory trajectory = three_frames();
+  const auto before = table_of(trajectory);
+  MARROW_NEED_COMMA_LOCALE(german);
+  EXPECT_EQ(table_of(trajectory), before);
 }
 
 TEST(Trajectory, TableOfTimeMotionAndDeviations) {
