@@ -134,7 +134,7 @@ std::vector<Value> Evaluation::call_node(std::size_t node, std::vector<Value>& i
   report(RunEvent::Kind::started, node, item, "");
   const Context::Hooks hooks = make_hooks(node, item, seed_of(recipe.recipe, settings_.seed), warnings);
   if (apart) return call_apart(catalogue_, called, inputs, hooks, settings_);
-  const PluginCode code([&](const std::string& reason) {
+  const PluginCode code("node '" + called.id + "' (" + called.info.name + ")", [&](const std::string& reason) {
     report(RunEvent::Kind::failed, node, item, failure_text(node, item, reason), 0, 0, LogLevel::error);
   });
   const NodeDefinition& definition = catalogue_.load(called.info.name);

@@ -45,11 +45,9 @@ class RunningCode {
     if (own == running_.end() && gettid() == getpid()) return false;
     const PluginCode* code = own != running_.end() ? *own : running_.size() == 1 ? running_[0] : nullptr;
     lock.unlock();
-    constexpr const char* kReason = "it ended the process; a node must return or throw an exception";
-    if (code)
-      code->on_end_(kReason);
-    else
-      std::fprintf(stderr, "marrow: error: one of %zu nodes failed: %s\n", running_.size(), kReason);
+    if (code && code->on_end_) code->on_end_("it ended the process; a node must return or throw an exception");
+    std::fprintf(stderr, "marrow: error: %s ended the process; its exit code is %d\n",
+                 code ? code->what_.c_str() : "one of several nodes that ran", kEndedByPlugin);
     return true;
   }
 
@@ -71,7 +69,8 @@ class RunningCode {
   std::atomic<bool> is_left_to_parent_{false};
 };
 
-PluginCode::PluginCode(std::function<void(const std::string& reason)> on_end) : on_end_(std::move(on_end)) {
+PluginCode::PluginCode(std::string what, std::function<void(const std::string& reason)> on_end)
+    : what_(std::move(what)), on_end_(std::move(on_end)) {
   RunningCode::all().add(this);
 }
 PluginCode::~PluginCode() { RunningCode::all().remove(this); }

@@ -11,11 +11,11 @@ namespace marrow {
 /// The exit code of a process that code of a plugin ended: EX_SOFTWARE of sysexits.h.
 inline constexpr int kEndedByPlugin = 70;
 
-/// Lives as long as code of a plugin runs on this thread. If that ends the process, on_end(reason) is called, and the
-/// exit code is kEndedByPlugin. It is called on the thread that ends the process.
+/// Lives as long as code of a plugin runs on this thread. If that ends the process, on_end(reason) is called on the
+/// thread that does so, the standard error says that it was `what`, and the exit code is kEndedByPlugin.
 class PluginCode {
  public:
-  explicit PluginCode(std::function<void(const std::string& reason)> on_end);
+  explicit PluginCode(std::string what, std::function<void(const std::string& reason)> on_end = nullptr);
   ~PluginCode();
   PluginCode(const PluginCode&) = delete;
   PluginCode& operator=(const PluginCode&) = delete;
@@ -23,6 +23,7 @@ class PluginCode {
  private:
   friend class RunningCode;
 
+  std::string what_;
   std::function<void(const std::string&)> on_end_;
   std::thread::id thread_ = std::this_thread::get_id();
 };

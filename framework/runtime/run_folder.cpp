@@ -70,9 +70,7 @@ void write_value(const Value& value, const fs::path& stem, const fs::path& root,
   try {
     fs::create_directories(file.parent_path());  // so a list of which no item was made has no folder
     const WriterDefinition& definition = catalogue.load_writer(value.type);
-    const PluginCode code([&](const std::string& reason) {
-      std::fprintf(stderr, "marrow: error: the writer of %s: %s\n", printable(file.string()).c_str(), reason.c_str());
-    });
+    const PluginCode code("the writer of " + printable(file.string()));
     ProcessState::of_runs()->keep_during([&] { definition.write(value.data.get(), file.string()); });
     written.files.push_back(file.lexically_relative(root).string());
   } catch (...) {

@@ -121,6 +121,8 @@ class HostileNodes(Runs):
                 result = self.marrow("run", pipeline, "--out", out)
                 self.assertEqual(result.returncode, 70, result.stdout + result.stderr)
                 self.assertIn("marrow: error: " + said, result.stderr)
+                last = "marrow: error: node 'bad0' (test.hostile) ended the process; its exit code is 70\n"
+                self.assertTrue(result.stderr.endswith(last), result.stderr)
                 self.assertIn(said, (out / "log.txt").read_text())
                 self.assertFalse((out / "run.json").exists(), "the run has not finished")
                 self.assertEqual(list((out / "outputs").iterdir()), [])
