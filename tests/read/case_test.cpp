@@ -145,6 +145,18 @@ TEST_F(ReadCase, CtWithWhatItsFileDoesNotSay) {
   EXPECT_EQ(read().ct.values[0], 40 - 1024);
 }
 
+// What was zero in a mask may not be zero after a compression with loss.
+TEST_F(ReadCase, AMaskIsStoredWithoutLoss) {
+  auto elements = marrow::test::fluoroscopy();
+  elements[0x00282110] = "CS:01";  // LossyImageCompression
+  put(folder / "mask.png", marrow::test::dicom_file(elements));
+  const std::string message = message_of([&] { read(); });
+  EXPECT_NE(message.find("mask: was compressed with loss (JPEG or the like), so what was zero may be so no more; save "
+                         "the mask as PNG"),
+            std::string::npos)
+      << message;
+}
+
 TEST_F(ReadCase, EveryFaultIsShownAtItsPlaceAndAllTogether) {
   std::string text = kCase;
   text = with(text, "ct: ct.mha", "ct: ct.mah");

@@ -97,11 +97,11 @@ TEST_F(ImageFormats, FilesForVolumesHoldImagesToo) {
   }
   write_itk(folder / "signed.tif", ramp<std::int16_t>({7, 5}, -100));
   EXPECT_EQ(read("signed.tif").at<float>(4, 6), -3400);
-  read("a.nii");
+  read("a.nii", 1);
   expect_warned(
       "a.nii: NIfTI does not say which row of an image is the upper one; the first that is stored is taken as "
       "the upper one, as ITK writes it: compare it with the anatomy, or save it as PNG");
-  read("a.mha");
+  read("a.mha", 1);
   EXPECT_EQ(warnings, "");
 }
 

@@ -92,6 +92,21 @@ TEST_F(ReadSequence, PartsOfItAreNamedByTheirPlaceInTheWhole) {
   EXPECT_SAYS(frames(), "both: the last frame to be read, 1, lies before the first, 2");
 }
 
+// A folder of a device: DICOM files without an ending, a directory of them, and a picture of one.
+TEST_F(ReadSequence, ImagesAreKnownByTheirContent) {
+  const Path device = folder / "device";
+  for (const int number : {1, 2}) {
+    auto elements = marrow::test::fluoroscopy();
+    elements[0x7FE00010] = "OW:" + std::string(2 * 24, char(number));
+    put(device / ("IM" + std::to_string(number)), marrow::test::dicom_file(elements));
+  }
+  put(device / "DICOMDIR", marrow::test::dicom_file({}));
+  put(device / "preview.jpg", "\xFF\xD8\xFF\xE0");
+  put(device / "notes.txt", "two images");
+  take(device);
+  EXPECT_EQ(greys(), (std::vector<int>{0x0101, 0x0202}));
+}
+
 TEST_F(ReadSequence, FoldersInFoldersByAPattern) {
   for (const int number : {1, 2, 10}) put_image(folder / "deep" / std::to_string(number) / "a" / "image.png", number);
   take(folder / "deep");

@@ -174,7 +174,7 @@ TEST_F(DeepVideo, AMovWhoseFramesAreElsewhereIsRefused) {
   EXPECT_SAYS(read("away.mov"),
               "away.mov: its frames are in another file, which it names; save it as one self-contained file");
   put(folder / "here.mov", mov(1));
-  EXPECT_SAYS(read("here.mov"), "here.mov: cannot be decoded as a video; it is cut off or damaged");
+  EXPECT_SAYS(read("here.mov"), "here.mov: holds no pictures that FFmpeg finds");
 }
 
 }  // namespace video_test

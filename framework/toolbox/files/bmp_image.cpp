@@ -61,8 +61,9 @@ BmpHeader read_bmp_header(const BmpBytes& bytes) {
   header.pixels = bytes.number(10, 4);
   const std::size_t header_bytes = bytes.number(14, 4);
   const bool is_old = header_bytes == 12;
-  header.width = is_old ? bytes.number(18, 2) : std::int32_t(bytes.number(18, 4));
-  header.height = is_old ? bytes.number(20, 2) : std::int32_t(bytes.number(22, 4));
+  const auto length = [&](std::size_t at) { return std::int32_t(bytes.number(at, is_old ? 2 : 4)); };
+  header.width = length(18);
+  header.height = length(is_old ? 20 : 22);
   header.bits = bytes.number(is_old ? 24 : 28, 2);
   header.compression = is_old ? 0 : bytes.number(30, 4);
   header.palette = 14 + header_bytes;
