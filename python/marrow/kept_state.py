@@ -23,8 +23,8 @@ class KeptState:
         self._process.begin_call()
 
     def changed(self) -> str:
-        """What the call has changed, in words; an empty text if it has left all as it was. What a module changes when it
-        is first imported is no fault of the call, and stays."""
+        """What the call has changed, in words; an empty text if it has left all as it was. What a module changes when
+        it is first imported is no fault of the call, and stays."""
         if len(sys.modules) != self._modules:
             self._take()
             return ""

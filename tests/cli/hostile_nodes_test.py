@@ -54,7 +54,7 @@ IN_PYTHON = {
     "locale.setlocale(locale.LC_ALL, 'C')": "the locale was changed while it ran; a node must leave it as it is",
     "os.environ['MARROW_HOSTILE'] = '1'": "the environment was changed while it ran; a node must leave it as it is",
     "os.chdir('/')": "the working folder was changed to / while it ran; a node must leave it as it is",
-    "os.umask(0o111)": "the mask of new files' permissions (umask) was changed while it ran; a node must leave it as it is",
+    "os.umask(0o111)": "the mask of new files' permissions (umask) was changed while it ran; a node must leave it",
     "numpy.seterr(all='ignore')": "numpy's treatment of faults in calculations was changed while it ran; a node must",
 }
 READS_STANDARD_INPUT = "assert sys.stdin.read() == ''"
