@@ -2,6 +2,7 @@
 #pragma once
 // The geometry of an X-ray image from the header of its DICOM file (XA and RF; PS3.3 C.8.7.5).
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,7 +29,9 @@ XrayGeometry read_xray_geometry(const std::filesystem::path& path, int frame, co
 /// How to turn the stored pixels into the image that the camera sees, with bright = air.
 struct XrayPixels {
   bool mirrored = false;
-  bool inverted = false;  ///< higher values mean less radiation
+  /// Set if higher values mean less radiation: the sum of the lowest and the highest value that the stored bits can
+  /// hold, after scaling. A value is inverted by subtracting it from this sum, which is the same for all frames.
+  std::optional<double> inverted_from;
 };
 /// `frame` counts from 1. Throws Error if the values are logarithms, or if the header contradicts itself.
 XrayPixels read_xray_pixels(const std::filesystem::path& path, int frame);
