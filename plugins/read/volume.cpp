@@ -13,9 +13,10 @@ struct Options {
   std::string series_uid;
 };
 
-marrow::Volume volume(const Options& options) {
+marrow::Volume volume(const Options& options, marrow::Context& context) {
   return marrow::files::read_volume_file(
-      options.path, {options.voxel_size_mm, options.flip, options.value_offset_hu, options.series_uid});
+      options.path, {options.voxel_size_mm, options.flip, options.value_offset_hu, options.series_uid},
+      [&](const std::string& line) { context.info(line); });
 }
 
 }  // namespace
@@ -35,5 +36,5 @@ MARROW_PLUGIN(plugin) {
       .option("value_offset_hu", &Options::value_offset_hu,
               "value added to every sample: -1024 if the file holds HU + 1024")
       .option("series_uid", &Options::series_uid,
-              "SeriesInstanceUID of the series to read, if a DICOM folder holds several");
+              "SeriesInstanceUID of the series to read, if a DICOM folder holds several of CT");
 }

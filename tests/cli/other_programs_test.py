@@ -91,7 +91,7 @@ class Dicom(Reading):
                     )
 
     def test_every_other_file_is_read_or_refused_by_name(self):
-        read, refused = [], []
+        read, refused, damaged = [], [], set()
         for path in sorted(DICOM.rglob("*")):
             if not path.is_file() or path.suffix not in (".dcm", "") or path.name.startswith(("README", "DICOMDIR")):
                 continue
@@ -104,8 +104,14 @@ class Dicom(Reading):
             else:
                 refused.append(path.name)
                 self.assertIn(copy.name, result.stderr)
+                if "damaged" in result.stderr or "cut off" in result.stderr:
+                    damaged.add(path.name)
             copy.unlink()
         print("\n    read: %d, refused: %d (%s)" % (len(read), len(refused), ", ".join(refused[:8])))
+        # What is cut off, has a kind of element that there is not, or does not say how it is written.
+        broken = {"MR_truncated.dcm", "rtplan_truncated.dcm", "badVR.dcm", "meta_missing_tsyntax.dcm", "no_meta.dcm"}
+        self.assertLessEqual(damaged, broken)
+        self.assertIn("MR_truncated.dcm", damaged)
         self.assertIn("MR_truncated.dcm", refused)
         self.assertIn("rtplan.dcm", refused)
         self.assertIn("SC_rgb_rle.dcm", refused)

@@ -63,9 +63,11 @@ inline std::string dicom_item(const Elements& elements) {
   return "SQ:" + little(0xE000FFFEu, 4) + little(std::uint32_t(content.size()), 4) + content;
 }
 
-inline std::string dicom_start(const std::string& transfer_syntax) {
-  const std::string meta =
-      dicom_element(0x00020001, "OB", std::string("\0\1", 2)) + dicom_element(0x00020010, "UI", transfer_syntax);
+/// `media_class`: MediaStorageSOPClassUID; empty for none.
+inline std::string dicom_start(const std::string& transfer_syntax, const std::string& media_class = "") {
+  const std::string meta = dicom_element(0x00020001, "OB", std::string("\0\1", 2)) +
+                           (media_class.empty() ? "" : dicom_element(0x00020002, "UI", media_class)) +
+                           dicom_element(0x00020010, "UI", transfer_syntax);
   return std::string(128, '\0') + "DICM" + dicom_element(0x00020000, "UL", little(std::uint32_t(meta.size()), 4)) +
          meta;
 }

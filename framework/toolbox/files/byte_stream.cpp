@@ -29,9 +29,10 @@ class PlainBytes final : public ByteStream {
 
 class UnpackedBytes final : public ByteStream {
  public:
-  UnpackedBytes(const InputFile& file, std::uint64_t begin, std::uint64_t end)
+  /// `window_bits` as zlib takes them: they tell which header and checksum there are.
+  UnpackedBytes(const InputFile& file, std::uint64_t begin, std::uint64_t end, int window_bits)
       : file_(file), packed_(file, begin, end), in_(1 << 16) {
-    if (inflateInit2(&unpacker_, 15 + 32) != Z_OK) throw Error("zlib does not start");  // 32: zlib or gzip
+    if (inflateInit2(&unpacker_, window_bits) != Z_OK) throw Error("zlib does not start");
   }
   ~UnpackedBytes() override { inflateEnd(&unpacker_); }
 
@@ -87,7 +88,11 @@ std::unique_ptr<ByteStream> plain_bytes(const InputFile& file, std::uint64_t beg
 }
 
 std::unique_ptr<ByteStream> unpacked_bytes(const InputFile& file, std::uint64_t begin, std::uint64_t end) {
-  return std::make_unique<UnpackedBytes>(file, begin, end);
+  return std::make_unique<UnpackedBytes>(file, begin, end, 15 + 32);  // 32: zlib or gzip
+}
+
+std::unique_ptr<ByteStream> bare_unpacked_bytes(const InputFile& file, std::uint64_t begin, std::uint64_t end) {
+  return std::make_unique<UnpackedBytes>(file, begin, end, -15);
 }
 
 std::unique_ptr<ByteStream> bytes_of_gzip_or_plain(const InputFile& file) {

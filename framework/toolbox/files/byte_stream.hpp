@@ -21,6 +21,8 @@ class ByteStream {
 std::unique_ptr<ByteStream> plain_bytes(const InputFile& file, std::uint64_t begin, std::uint64_t end);
 /// The decompressed bytes of a zlib or gzip stream between two offsets. Reading to the end verifies the checksum.
 std::unique_ptr<ByteStream> unpacked_bytes(const InputFile& file, std::uint64_t begin, std::uint64_t end);
+/// The same of a Deflate stream without a header or checksum.
+std::unique_ptr<ByteStream> bare_unpacked_bytes(const InputFile& file, std::uint64_t begin, std::uint64_t end);
 /// The decompressed bytes of a gzip file, or the bytes of any other file.
 std::unique_ptr<ByteStream> bytes_of_gzip_or_plain(const InputFile& file);
 

@@ -13,6 +13,11 @@ struct CodecError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// The data may be sound, but are of a kind that is not decoded.
+struct CodecNotRead : CodecError {
+  using CodecError::CodecError;
+};
+
 struct CodedImage {
   std::string bytes;
   int columns = 0, rows = 0, bits_stored = 0, bits_allocated = 0;

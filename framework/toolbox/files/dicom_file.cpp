@@ -3,7 +3,9 @@
 
 #include <algorithm>
 
+#include "byte_stream.hpp"
 #include "marrow/domain/error.hpp"
+#include "samples.hpp"
 
 namespace marrow::files {
 namespace {
@@ -11,6 +13,7 @@ namespace {
 constexpr std::uint32_t kUndefined = 0xFFFFFFFFu;
 constexpr std::uint32_t kItem = 0xFFFEE000u, kItemEnd = 0xFFFEE00Du, kSequenceEnd = 0xFFFEE0DDu, kPixels = 0x7FE00010u;
 constexpr int kDeepest = 32;
+constexpr const char* kDeflated = "1.2.840.10008.1.2.1.99";
 constexpr std::uint64_t kMostElements = 1'000'000;
 
 struct Syntax {
@@ -70,6 +73,24 @@ bool is_short(const std::string& kind) {
   const std::size_t at = kShort.find(kind);
   return at != std::string::npos && at % 3 == 0;
 }
+bool is_kind(const std::string& kind) { return is_long(kind) || is_short(kind); }
+
+bool has_mark(FileWindow& window) { return window.holds(128, 4) && window.text(128, 4) == "DICM"; }
+
+/// Whether the first bytes are an element that a file without a start begins with: of its meta data, or one of the
+/// first of group 8. Without a kind (implicit) its length must be one of such an element.
+bool begins_as_elements(FileWindow& window) {
+  if (!window.holds(0, 12)) return false;
+  const std::string kind = window.text(4, 2);
+  const bool is_explicit = is_kind(kind);
+  for (const bool big_endian : {false, true}) {
+    const std::uint64_t group = window.number(0, 2, big_endian), element = window.number(2, 2, big_endian);
+    if (group == 2 && element <= 1 && is_explicit && !big_endian) return true;
+    if (group == 8 && element <= 0x18 && (is_explicit || (!big_endian && window.number(4, 4, false) <= 64)))
+      return true;
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -79,14 +100,20 @@ class DicomWalk {
   explicit DicomWalk(DicomFile& into) : into_(into), window_(into.file_), size_(into.file_.size()) {}
 
   void all() {
-    if (size_ < 132 || window_.text(128, 4) != "DICM")
-      throw Error(what() + ": is not a DICOM file, or is damaged at its start");
-    at_ = 132;
-    meta_data();
+    start();
     check_syntax();
-    const std::string& uid = into_.transfer_syntax_;
-    into_.big_endian_ = uid == "1.2.840.10008.1.2.2";
-    elements({uid != "1.2.840.10008.1.2", into_.big_endian_}, size_, 0, false, into_.elements_);
+    elements(syntax(), size_, 0, false, into_.elements_);
+  }
+
+  void header() {
+    is_header_ = true;
+    try {
+      start();
+      if (into_.transfer_syntax_ == kDeflated) unpack();
+      elements(syntax(), size_, 0, false, into_.elements_);
+    } catch (const Error& error) {
+      into_.fault_ = error.what();
+    }
   }
 
  private:
@@ -104,6 +131,33 @@ class DicomWalk {
     if (!window_.holds(at_, std::uint64_t(width))) damaged("it ends in the middle of an element");
     at_ += std::uint64_t(width);
     return std::uint32_t(window_.number(at_ - std::uint64_t(width), width, big_endian));
+  }
+
+  /// Reads what comes before the elements. A file without a start does not say how it is written; its first element
+  /// shows it.
+  void start() {
+    const bool has_start = has_mark(window_);
+    if (!has_start && !begins_as_elements(window_))
+      throw Error(what() + ": is not a DICOM file, or is damaged at its start");
+    at_ = has_start ? 132 : 0;
+    meta_data();
+    std::string& uid = into_.transfer_syntax_;
+    if (uid.empty() && !has_start && window_.holds(at_, 8))
+      uid = window_.number(at_, 1, false) == 0  ? "1.2.840.10008.1.2.2"
+            : is_kind(window_.text(at_ + 4, 2)) ? "1.2.840.10008.1.2.1"
+                                                : "1.2.840.10008.1.2";
+    into_.big_endian_ = uid == "1.2.840.10008.1.2.2";
+  }
+  Syntax syntax() const { return {into_.transfer_syntax_ != "1.2.840.10008.1.2", into_.big_endian_}; }
+
+  /// All elements of a deflated file are packed. A header is not longer than what is unpacked here.
+  void unpack() {
+    constexpr std::size_t kMost = 4 << 20;
+    std::string& all = into_.unpacked_ = into_.file_.text(0, std::size_t(at_));
+    all.resize(std::size_t(at_) + kMost);
+    all.resize(std::size_t(at_) + bare_unpacked_bytes(into_.file_, at_, size_)->take(all.data() + at_, kMost));
+    window_ = FileWindow(into_.file_, all);
+    size_ = all.size();
   }
 
   Next next(const Syntax& syntax) {
@@ -142,12 +196,15 @@ class DicomWalk {
     while (at_ + 8 <= size_ && window_.number(at_, 2, false) == 2) {
       const Next element = next({true, false});
       check_fits(element, size_);
-      if (element.tag == 0x00020010 && element.length <= 64) {
-        const std::string uid = window_.text(at_, element.length);
-        into_.transfer_syntax_ = uid.substr(0, uid.find_last_not_of(std::string(" \0", 2)) + 1);
-      }
+      if (element.tag == 0x00020002 && element.length <= 64) into_.media_class_ = uid_of(element);
+      if (element.tag == 0x00020010 && element.length <= 64) into_.transfer_syntax_ = uid_of(element);
       at_ += element.length;
     }
+  }
+
+  std::string uid_of(const Next& element) {
+    const std::string uid = window_.text(at_, element.length);
+    return uid.substr(0, uid.find_last_not_of(std::string(" \0", 2)) + 1);
   }
 
   void check_syntax() const {
@@ -172,14 +229,15 @@ class DicomWalk {
       const Next element = next(syntax);
       if (element.tag == kItemEnd && delimited) return;
       if (element.tag >> 16 == 0xFFFE) damaged("an item's end stands where an element should");
+      if (is_header_ && element.tag == kPixels && depth == 0) return;
       into.push_back({element.tag, {at_, 0}, syntax.big_endian, {}, {}});
       if (element.kind.size() == 2) into.back().kind = {element.kind[0], element.kind[1]};
       const bool are_pixels = element.tag == kPixels && depth == 0;
       if (are_pixels && into_.has_pixels_) damaged("it has its pixels twice");
       into_.has_pixels_ = into_.has_pixels_ || are_pixels;
       if (are_pixels) into_.pixels_are_words_ = element.kind == "OW";
-      if (element.length == kUndefined && are_pixels) {
-        fragments(syntax, end);
+      if (element.length == kUndefined && (element.tag == kPixels || element.kind == "OB" || element.kind == "OW")) {
+        fragments(syntax, end, are_pixels);
       } else if (element.length == kUndefined) {
         items(inside(element, syntax), end, true, depth, into.back());
       } else {
@@ -229,8 +287,9 @@ class DicomWalk {
     if (delimited) damaged("a sequence has no end");
   }
 
-  void fragments(const Syntax& syntax, std::uint64_t end) {
-    into_.is_compressed_ = true;
+  /// Compressed pixels: those of the image itself or, inside a sequence, those of an icon, which are passed over.
+  void fragments(const Syntax& syntax, std::uint64_t end, bool are_pixels) {
+    if (are_pixels) into_.is_compressed_ = true;
     for (bool is_first = true; at_ < end; is_first = false) {
       const Next item = next(syntax);
       if (item.tag == kSequenceEnd) {
@@ -239,10 +298,8 @@ class DicomWalk {
       }
       if (item.tag != kItem) damaged("its compressed pixels are not in items");
       check_fits(item, end);
-      if (is_first)
-        into_.offset_table_ = {at_, item.length};
-      else
-        into_.pixel_parts_.push_back({at_, item.length});
+      if (are_pixels && is_first) into_.offset_table_ = {at_, item.length};
+      if (are_pixels && !is_first) into_.pixel_parts_.push_back({at_, item.length});
       at_ += item.length;
     }
     damaged("its compressed pixels have no end");
@@ -251,9 +308,24 @@ class DicomWalk {
   DicomFile& into_;
   FileWindow window_;
   std::uint64_t size_, at_ = 0, count_ = 0;
+  bool is_header_ = false;
 };
 
-DicomFile::DicomFile(const std::filesystem::path& path) : file_(path) { DicomWalk(*this).all(); }
+bool looks_like_dicom(const std::filesystem::path& path) {
+  const InputFile file(path, true);
+  FileWindow window(file);
+  return has_mark(window) || begins_as_elements(window);
+}
+
+DicomFile::DicomFile(const std::filesystem::path& path, Part part) : file_(path) {
+  DicomWalk walk(*this);
+  part == Part::all ? walk.all() : walk.header();
+}
+
+std::string DicomFile::text(const DicomSpan& span) const {
+  if (unpacked_.empty()) return file_.text(span.begin, std::size_t(span.bytes));
+  return unpacked_.substr(std::size_t(span.begin), std::size_t(span.bytes));
+}
 
 bool is_group_of_values(std::uint32_t tag) {
   return std::find(std::begin(kGroupsOfValues), std::end(kGroupsOfValues), tag) != std::end(kGroupsOfValues);

@@ -31,13 +31,23 @@ const DicomElement* find_element(const std::filesystem::path& path, const DicomE
 
 class DicomFile {
  public:
+  /// `header`: only the elements before the pixels, to tell what the file is. They are also read of transfer syntaxes
+  /// that are not supported. Where they are damaged they end, and fault() says why.
+  enum class Part { all, header };
+
   /// Throws Error if the file is not DICOM, has a transfer syntax that is not supported, or has an element that claims
   /// more bytes than the file holds.
-  explicit DicomFile(const std::filesystem::path& path);
+  explicit DicomFile(const std::filesystem::path& path, Part part = Part::all);
 
   const InputFile& file() const { return file_; }
   const std::filesystem::path& path() const { return file_.path(); }
   const std::string& transfer_syntax() const { return transfer_syntax_; }
+  /// MediaStorageSOPClassUID: what kind of object the file is. It is legible even if the elements are damaged.
+  const std::string& media_class() const { return media_class_; }
+  /// Why not all of the header could be read; empty if it could.
+  const std::string& fault() const { return fault_; }
+  /// The bytes of an element.
+  std::string text(const DicomSpan& span) const;
   bool is_big_endian() const { return big_endian_; }
   const DicomElements& elements() const { return elements_; }
   bool has_pixels() const { return has_pixels_; }
@@ -51,7 +61,8 @@ class DicomFile {
  private:
   friend class DicomWalk;
   InputFile file_;
-  std::string transfer_syntax_;
+  std::string transfer_syntax_, media_class_, fault_;
+  std::string unpacked_;  ///< of a deflated file: its header, at the offsets that elements() gives
   bool big_endian_ = false, has_pixels_ = false, is_compressed_ = false, pixels_are_words_ = false;
   DicomElements elements_;
   std::vector<DicomSpan> pixel_parts_;

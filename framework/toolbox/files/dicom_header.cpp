@@ -100,8 +100,8 @@ const DicomElement* DicomHeader::find(const DicomTag& tag) const {
 std::string DicomHeader::bytes_of(const DicomElement& element, const DicomTag& tag) const {
   if (element.value.bytes > kLongestText)
     throw Error(path().string() + ": " + tag.text() + " has " + std::to_string(element.value.bytes) +
-                " bytes; it is damaged");
-  return file_.file().text(element.value.begin, std::size_t(element.value.bytes));
+                " bytes; at most " + std::to_string(kLongestText) + " are read");
+  return file_.text(element.value);
 }
 
 std::optional<std::string> DicomHeader::text(const DicomTag& tag) const {
@@ -126,7 +126,7 @@ std::optional<std::vector<double>> DicomHeader::numbers(const DicomTag& tag, std
                 (kind == DicomTag::Kind::text
                      ? "'" + shown(value) + "'"
                      : std::to_string(bytes.size()) + " bytes of such numbers or a value that is none") +
-                "; it is damaged");
+                "; its header is wrong: export it again");
   }
   return numbers;
 }

@@ -8,6 +8,7 @@
 #include "codecs.hpp"
 #include "header_lines.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "packbits.hpp"
 
 namespace marrow::files {
@@ -15,8 +16,10 @@ namespace {
 
 using Kind = DicomTag::Kind;
 constexpr DicomTag kClass{0x0008, 0x0016, "SOPClassUID"};
+constexpr DicomTag kModalityOfPixels{0x0008, 0x0060, "Modality"};
 constexpr DicomTag kSamples{0x0028, 0x0002, "SamplesPerPixel", Kind::us};
 constexpr DicomTag kPhotometric{0x0028, 0x0004, "PhotometricInterpretation"};
+constexpr DicomTag kPlanes{0x0028, 0x0006, "PlanarConfiguration", Kind::us};
 constexpr DicomTag kFrames{0x0028, 0x0008, "NumberOfFrames"};
 constexpr DicomTag kRows{0x0028, 0x0010, "Rows", Kind::us};
 constexpr DicomTag kColumns{0x0028, 0x0011, "Columns", Kind::us};
@@ -39,7 +42,7 @@ int whole(const DicomHeader& header, const DicomTag& tag, std::optional<int> mis
                 ", without which its pixels cannot be understood; copy or export it again");
   const double value = given ? *given : *missing;
   if (value != std::floor(value) || std::abs(value) > 1e9)
-    damaged(header.path(), tag.text() + " is " + std::to_string(value) + "; expected a whole number");
+    damaged(header.path(), tag.text() + " is " + formatted("%f", value) + "; expected a whole number");
   return int(value);
 }
 
@@ -52,11 +55,20 @@ void read_size(const DicomHeader& header, DicomPixels& pixels) {
   if (pixels.channels < 1 || pixels.channels > 4)
     damaged(pixels.path, "its header tells of " + std::to_string(pixels.channels) + " values per pixel");
   const std::string photometric = header.text(kPhotometric).value_or("");
-  if (photometric.rfind("PALETTE", 0) == 0) pixels.channels = 3;
+  if (photometric.rfind("PALETTE", 0) == 0) pixels.channels = 3;  // one number that stands for three
   if (pixels.channels == 1 && photometric != "MONOCHROME1" && photometric != "MONOCHROME2")
     throw Error(pixels.path.string() + ": " + kPhotometric.text() +
                 (photometric.empty() ? " is missing" : " is '" + shown(photometric) + "'") +
                 "; expected MONOCHROME1 or MONOCHROME2, as grey pixels have: copy or export it again");
+}
+
+/// A plan or a report has no pixels, and is sound.
+void check_is_image(const DicomFile& file, const DicomHeader& header) {
+  if (file.has_pixels()) return;
+  if (header.has(kRows)) damaged(file.path(), "it has no pixels");
+  const std::string modality = header.text(kModalityOfPixels).value_or("");
+  throw Error(file.path().string() + ": holds no image" + (modality.empty() ? "" : ", it is of modality " + modality) +
+              "; expected a CT slice or an X-ray image");
 }
 
 /// There must be one item per frame in the functional groups. Otherwise values of another frame would be used.
@@ -74,10 +86,10 @@ void read_bits(const DicomHeader& header, DicomPixels& pixels) {
   const int allocated = pixels.bits_allocated, stored = pixels.bits_stored, high = whole(header, kHighBit);
   const int representation = whole(header, kRepresentation);
   if ((allocated != 8 && allocated != 16 && allocated != 32) || stored < 1 || stored > allocated || high != stored - 1)
-    throw Error(pixels.path.string() + ": its pixels have " + std::to_string(stored) + " of " +
-                std::to_string(allocated) + " bits, the highest being " + std::to_string(high) +
-                ", which is not read (or it is damaged); expected 8, 16 or 32 bits: export it "
-                "with 16");
+    throw Error(
+        pixels.path.string() + ": its pixels have " + std::to_string(stored) + " of " + std::to_string(allocated) +
+        " bits, the highest being " + std::to_string(high) +
+        ", which is not read; expected 8, 16 or 32 bits, the highest being the last that is stored: export it with 16");
   if (representation != 0 && representation != 1) damaged(pixels.path, kRepresentation.text() + " is neither 0 nor 1");
   pixels.is_signed = representation == 1;
   const auto slope = header.number(kSlope), intercept = header.number(kIntercept);
@@ -143,6 +155,17 @@ std::vector<std::size_t> parts_by_table(const DicomFile& file, const DicomPixels
   return first;
 }
 
+/// The first part of each frame by the mark with which every JPEG begins. A file need not have a table of offsets.
+std::vector<std::size_t> parts_by_jpeg_start(const DicomFile& file, const DicomPixels& pixels) {
+  std::vector<std::size_t> first;
+  for (std::size_t i = 0; i < pixels.frame_parts.size(); ++i)
+    if (pixels.frame_parts[i].bytes >= 2 && file.file().text(pixels.frame_parts[i].begin, 2) == "\xFF\xD8")
+      first.push_back(i);
+  if (first.size() != std::size_t(pixels.frames) || first[0] != 0) return {};
+  first.push_back(pixels.frame_parts.size());
+  return first;
+}
+
 void find_frames(const DicomFile& file, DicomPixels& pixels) {
   const std::size_t parts = pixels.frame_parts.size(), frames = std::size_t(pixels.frames);
   if (parts < frames)
@@ -154,9 +177,10 @@ void find_frames(const DicomFile& file, DicomPixels& pixels) {
     pixels.first_part_of_frame = {0, parts};
   else
     pixels.first_part_of_frame = parts_by_table(file, pixels);
+  if (pixels.first_part_of_frame.empty()) pixels.first_part_of_frame = parts_by_jpeg_start(file, pixels);
   if (pixels.first_part_of_frame.empty())
-    damaged(pixels.path,
-            "which of its " + std::to_string(parts) + " parts of compressed pixels make up a frame is not said");
+    throw Error(pixels.path.string() + ": does not say which of its " + std::to_string(parts) +
+                " parts of compressed pixels make up a frame; convert it: gdcmconv --raw IN OUT");
 }
 
 /// Whether the bytes after the pixels are only filling: one byte to make the length even, or up to 512 zeros. Anything
@@ -170,9 +194,9 @@ bool is_filled(const DicomFile& file, std::uint64_t pixel_bytes) {
 
 void check_plain(const DicomFile& file, const DicomPixels& pixels) {
   const double held = file.pixel_parts().empty() ? 0 : double(file.pixel_parts()[0].bytes);
-  // Colours may be subsampled (YBR_FULL_422), so a third of the bytes is the least that is expected.
-  const double expected = double(pixels.rows) * pixels.columns * pixels.channels * pixels.frames *
-                          pixels.bits_allocated / 8 * (pixels.channels > 1 ? 1.0 / 3 : 1);
+  // Colours may be subsampled (YBR_FULL_422), so the bytes of one channel are the least that is expected.
+  const double expected =
+      double(pixels.rows) * pixels.columns * pixels.frames * pixels.bits_allocated / 8 * (pixels.is_plain_rgb ? 3 : 1);
   const bool is_too_much = pixels.channels == 1 && held > expected && !is_filled(file, std::uint64_t(expected));
   if (expected > held || is_too_much)
     damaged(pixels.path, "its header tells of " + std::to_string(std::int64_t(expected)) +
@@ -194,6 +218,8 @@ std::vector<std::byte> decoded(const DicomPixels& pixels, const CodedImage& imag
     if (pixels.transfer_syntax == "1.2.840.10008.1.2.4.50") return decode_jpeg_baseline(image);
     if (pixels.transfer_syntax == "1.2.840.10008.1.2.4.80") return decode_jpeg_ls(image);
     return decode_jpeg_lossless(image);
+  } catch (const CodecNotRead& error) {
+    throw Error(pixels.path.string() + ": " + error.what() + "; convert it: gdcmconv --raw IN OUT");
   } catch (const CodecError& error) {
     damaged(pixels.path, error.what());
   }
@@ -201,11 +227,22 @@ std::vector<std::byte> decoded(const DicomPixels& pixels, const CodedImage& imag
 
 std::vector<std::byte> plain_frame(const DicomPixels& pixels, const InputFile& file, int frame) {
   const std::size_t width = std::size_t(pixels.bits_allocated / 8);
-  std::vector<std::byte> bytes(std::size_t(pixels.columns) * std::size_t(pixels.rows) * width);
+  std::vector<std::byte> bytes(std::size_t(pixels.columns) * std::size_t(pixels.rows) * width *
+                               std::size_t(pixels.channels));
   file.read(pixels.frame_parts[0].begin + std::uint64_t(frame - 1) * bytes.size(), bytes.data(), bytes.size());
   if (pixels.big_endian && width > 1)
     for (std::size_t at = 0; at < bytes.size(); at += width) std::reverse(bytes.data() + at, bytes.data() + at + width);
   return bytes;
+}
+
+/// Puts red, green and blue of a pixel side by side.
+std::vector<std::byte> side_by_side(const std::vector<std::byte>& planes, std::size_t width) {
+  std::vector<std::byte> pixels(planes.size());
+  const std::size_t count = planes.size() / (3 * width);
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t k = 0; k < 3; ++k)
+      std::memcpy(pixels.data() + (3 * i + k) * width, planes.data() + (k * count + i) * width, width);
+  return pixels;
 }
 
 /// Keeps only the stored bits. The bits above them may hold overlays.
@@ -264,13 +301,11 @@ DicomPixels read_dicom_pixels(const DicomFile& file, int frame) {
   pixels.big_endian = file.is_big_endian();
   if (header.text(kClass).value_or("").rfind("1.2.840.10008.5.1.4.1.1.481.2", 0) == 0)
     throw Error(pixels.path.string() + ": holds a dose of radiotherapy; expected a CT slice or an X-ray image");
-  if (!file.has_pixels()) damaged(pixels.path, "it has no pixels");
+  check_is_image(file, header);
   read_size(header, pixels);
   check_groups(file, pixels);
-  if (pixels.channels == 1) {
-    read_bits(header, pixels);
-    read_padding(header, pixels);
-  }
+  read_bits(header, pixels);
+  if (pixels.channels == 1) read_padding(header, pixels);
   const bool should_be_compressed =
       pixels.transfer_syntax.rfind("1.2.840.10008.1.2.4", 0) == 0 || pixels.transfer_syntax == "1.2.840.10008.1.2.5";
   if (file.is_compressed() != should_be_compressed)
@@ -279,6 +314,9 @@ DicomPixels read_dicom_pixels(const DicomFile& file, int frame) {
     throw Error(pixels.path.string() +
                 ": its pixels of 8 bits are written in pairs, the second one first (OW, big-endian), which is not "
                 "read; convert it: gdcmconv --raw IN OUT");
+  pixels.is_plain_rgb = pixels.channels == 3 && header.text(kPhotometric).value_or("") == "RGB" &&
+                        !file.is_compressed() && !pixels.is_signed;
+  pixels.planes_are_apart = pixels.is_plain_rgb && header.number(kPlanes).value_or(0) == 1;
   pixels.frame_parts = file.pixel_parts();
   file.is_compressed() ? find_frames(file, pixels) : check_plain(file, pixels);
   return pixels;
@@ -299,12 +337,14 @@ Samples read_dicom_frame(const DicomPixels& pixels, int frame) {
   samples.type = pixels.bits_allocated == 8    ? (pixels.is_signed ? Type::i8 : Type::u8)
                  : pixels.bits_allocated == 16 ? (pixels.is_signed ? Type::i16 : Type::u16)
                                                : (pixels.is_signed ? Type::i32 : Type::u32);
+  samples.components = pixels.channels;
   if (pixels.first_part_of_frame.empty())
     samples.bytes = plain_frame(pixels, file, frame);
   else if (pixels.bits_allocated == 32 && pixels.transfer_syntax != "1.2.840.10008.1.2.5")
     damaged(pixels.path, "JPEG has no pixels of 32 bits");
   else
     samples.bytes = decoded(pixels, coded_frame(pixels, file, frame));
+  if (pixels.planes_are_apart) samples.bytes = side_by_side(samples.bytes, bytes_each(samples.type));
   if (pixels.bits_stored == pixels.bits_allocated) return samples;
   check_padding(pixels, samples.bytes);
   if (pixels.bits_allocated == 8) keep_stored<std::uint8_t>(pixels, samples.bytes);
@@ -320,6 +360,11 @@ void make_padding_air(const DicomPixels& pixels, float* values, std::size_t coun
   const auto [lowest, highest] = std::minmax({scaled((*pixels.padding)[0]), scaled((*pixels.padding)[1])});
   for (std::size_t i = 0; i < count; ++i)
     if (values[i] >= lowest && values[i] <= highest) values[i] = std::min(values[i], kAir_hu);
+}
+
+double sum_of_limits(const DicomPixels& pixels) {
+  const double sum = pixels.is_signed ? -1 : std::ldexp(1, pixels.bits_stored) - 1;  // signed: -2048 to 2047
+  return pixels.slope * sum + 2 * pixels.intercept;
 }
 
 void scaled_values(const DicomPixels& pixels, const Samples& samples, float* values) {

@@ -13,7 +13,9 @@ struct DicomPixels {
   std::string transfer_syntax;
   bool big_endian = false;
   int columns = 0, rows = 0, frames = 1;
-  int channels = 1;  ///< more than one for colours; those are not decoded
+  int channels = 1;               ///< more than one for colours
+  bool is_plain_rgb = false;      ///< red, green and blue without compression: the only colours that are decoded
+  bool planes_are_apart = false;  ///< all red samples, then all green and all blue ones (PlanarConfiguration)
   int bits_allocated = 16, bits_stored = 16;
   bool is_signed = false;
   double slope = 1, intercept = 0;
@@ -31,12 +33,16 @@ struct DicomPixels {
 DicomPixels read_dicom_pixels(const std::filesystem::path& path, int frame);
 DicomPixels read_dicom_pixels(const DicomFile& file, int frame);
 
-/// One frame (from 1) as unsigned or signed integers. Only the stored bits (BitsStored) are kept. Throws Error if the
-/// pixels are damaged or the file has changed.
+/// One frame (from 1) of grey levels or plain RGB as unsigned or signed integers. Only the stored bits (BitsStored) are
+/// kept. Throws Error if the pixels are damaged or the file has changed.
 Samples read_dicom_frame(const DicomPixels& pixels, int frame);
 
 /// Sets pixels that were not measured to air (-1000 HU), unless they are below it. `values` come from scaled_values().
 void make_padding_air(const DicomPixels& pixels, float* values, std::size_t count);
+
+/// The sum of the lowest and the highest value that the stored bits can hold, after scaling: with 12 bits from 0 to
+/// 4095 that is 4095.
+double sum_of_limits(const DicomPixels& pixels);
 
 /// The values for the stored numbers (RescaleSlope, RescaleIntercept).
 void scaled_values(const DicomPixels& pixels, const Samples& samples, float* values);

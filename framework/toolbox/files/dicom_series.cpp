@@ -1,28 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <set>
 #include <tuple>
 
+#include "dicom_folder.hpp"
 #include "dicom_pixels.hpp"
 #include "header_lines.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/large_memory.hpp"
+#include "marrow/domain/number_text.hpp"
 
 namespace marrow::files {
 namespace {
 
 using Vector = std::array<double, 3>;
 
-constexpr double kFarthestOff_mm = 0.1;  // largest distance of a slice from its place in an even, straight grid
+// The largest distance of a slice from its place in an even, straight grid. The positions of neighbours that are
+// rounded to one decimal differ by just as much from that.
+constexpr double kFarthestOff_mm = 0.1 + 1e-6;
 
 constexpr DicomTag kModality{0x0008, 0x0060, "Modality"};
 constexpr DicomTag kPatient{0x0010, 0x0020, "PatientID"};
 constexpr DicomTag kStudy{0x0020, 0x000D, "StudyInstanceUID"};
 constexpr DicomTag kFrameOfReference{0x0020, 0x0052, "FrameOfReferenceUID"};
-constexpr DicomTag kDescription{0x0008, 0x103E, "SeriesDescription"};
-constexpr DicomTag kSeries{0x0020, 0x000E, "SeriesInstanceUID"};
 constexpr DicomTag kPosition{0x0020, 0x0032, "ImagePositionPatient"};
 constexpr DicomTag kOrientation{0x0020, 0x0037, "ImageOrientationPatient"};
 constexpr DicomTag kSpacing{0x0028, 0x0030, "PixelSpacing"};
@@ -38,8 +38,7 @@ Vector normalized(const Vector& a) {
 }
 
 struct Slice {
-  std::string series, description, modality;
-  std::string patient, study, frame_of_reference;
+  std::string modality, patient, study, frame_of_reference;
   std::string unit;  ///< of its values: HU, US (unspecified), or empty if the header does not say
   DicomPixels pixels;
   Samples samples;         ///< without bytes
@@ -48,44 +47,6 @@ struct Slice {
 
   const std::filesystem::path& path() const { return pixels.path; }
 };
-
-/// Whether the name of a file that is not DICOM shows that it is no slice: a licence, a note, a picture. A file with
-/// any other name, such as "IM5", may be the rest of a damaged slice.
-bool is_no_slice_by_name(const std::filesystem::path& path) {
-  static const std::set<std::string> kNames{"authors",  "changelog", "checksums",  "copying", "dicomdir",
-                                            "lockfile", "licence",   "license",    "md5sum",  "md5sums",
-                                            "notice",   "readme",    "sha256sums", "version"};
-  static const std::set<std::string> kExtensions{
-      ".bat",  ".bmp", ".csv",  ".db",  ".doc",  ".docx",   ".exe",  ".gif", ".htm", ".html", ".inf",  ".ini",
-      ".jpeg", ".jpg", ".json", ".log", ".m",    ".md",     ".md5",  ".mha", ".nii", ".nrrd", ".obj",  ".pdf",
-      ".ply",  ".png", ".py",   ".rtf", ".sh",   ".sha256", ".stl",  ".svg", ".tif", ".tiff", ".toml", ".tsv",
-      ".txt",  ".vtk", ".vtp",  ".xls", ".xlsx", ".xml",    ".yaml", ".yml", ".zip"};
-  const std::string name = in_small_letters(path.filename().string()),
-                    extension = in_small_letters(path.extension().string());
-  return name[0] == '.' || kNames.count(name) > 0 || kExtensions.count(extension) > 0 ||
-         (name.size() > 7 && name.compare(name.size() - 7, 7, ".nii.gz") == 0);
-}
-
-[[noreturn]] void refuse_other_file(const std::filesystem::path& path) {
-  const std::uint64_t bytes = InputFile(path, true).size();
-  throw Error(path.string() + ": this file in the series' folder is no whole DICOM file (" +
-              (bytes == 0    ? "it is empty"
-               : bytes < 132 ? "it has " + std::to_string(bytes) + " bytes, at least 132 expected"
-                             : "it has no 'DICM' at byte 128") +
-              "); if it is a slice, it is damaged at its start: fetch it again; if not, remove it from the folder");
-}
-
-/// Only one folder is read, so slices in folders below it would be missed.
-void check_folder_below(const std::filesystem::path& folder) {
-  std::error_code failure, none;
-  for (std::filesystem::recursive_directory_iterator entry(folder, failure), end; entry != end && !failure;
-       entry.increment(failure))
-    if (entry->is_regular_file(none) && (!is_no_slice_by_name(entry->path()) || looks_like_dicom(entry->path())))
-      throw Error(folder.string() + ": this folder inside the series' folder holds files that may be slices ('" +
-                  entry->path().lexically_relative(folder).string() +
-                  "'), and only one folder is read; move them beside the other slices, or this folder elsewhere");
-  if (failure) throw Error(folder.string() + ": cannot be read (" + failure.message() + ")");
-}
 
 Vector column(const Samples& samples, int k) {
   return {samples.direction[k], samples.direction[3 + k], samples.direction[6 + k]};
@@ -105,7 +66,7 @@ void place(const DicomHeader& header, Slice& slice) {
       down{(*orientation)[3], (*orientation)[4], (*orientation)[5]};
   if (std::abs(dot(row, row) - 1) > 1e-2 || std::abs(dot(down, down) - 1) > 1e-2 || std::abs(dot(row, down)) > 1e-3)
     throw Error(slice.path().string() + ": " + kOrientation.text() +
-                " is no pair of axes at right angles; it is damaged");
+                " is no pair of axes at right angles; its header is wrong: export it again");
   const Vector z = normalized(cross(row, down)), x = normalized(cross(down, z)), y = cross(z, x);
   for (std::size_t k = 0; k < 3; ++k) {
     slice.samples.direction[3 * k] = x[k];
@@ -120,8 +81,6 @@ Slice read_slice(const std::filesystem::path& path) {
   const DicomHeader header(file, 1);
   Slice slice;
   slice.pixels = read_dicom_pixels(file, 1);
-  slice.series = header.text(kSeries).value_or("");
-  slice.description = header.text(kDescription).value_or("");
   slice.modality = header.text(kModality).value_or("");
   slice.patient = header.text(kPatient).value_or("");
   slice.study = header.text(kStudy).value_or("");
@@ -135,62 +94,17 @@ Slice read_slice(const std::filesystem::path& path) {
   return slice;
 }
 
-/// All files and folders in a folder, sorted.
-std::set<std::filesystem::path> entries_of(const std::filesystem::path& folder) {
-  std::set<std::filesystem::path> paths;
-  std::error_code failure, none;
-  for (std::filesystem::directory_iterator entry(folder, failure), end; entry != end && !failure;
-       entry.increment(failure)) {
-    check_stays_inside(folder, entry->path());
-    if (entry->is_regular_file(none) || entry->is_directory(none)) paths.insert(entry->path());
-  }
-  if (failure) throw Error(folder.string() + ": cannot be read (" + failure.message() + ")");
-  return paths;
+/// "passed over 3 files that are no slices of the series: DICOMDIR, report.dcm (SR), notes.txt"
+std::string note_about(const std::vector<std::string>& passed_over) {
+  constexpr std::size_t kMost = 20;
+  if (passed_over.empty()) return {};
+  std::string note = "passed over what is no slice of the series: ";
+  for (std::size_t i = 0; i < std::min(kMost, passed_over.size()); ++i) note += (i ? ", " : "") + passed_over[i];
+  if (passed_over.size() > kMost) note += " and " + std::to_string(passed_over.size() - kMost) + " more";
+  return note;
 }
 
-/// The DICOM files of a folder, by series. Another file is skipped only if its name shows that it is no slice.
-/// Otherwise a slice that was cut off or emptied would go unnoticed if it is the first or last one, where it leaves no
-/// gap.
-std::map<std::string, std::vector<Slice>> read_folder(const std::filesystem::path& folder) {
-  std::map<std::string, std::vector<Slice>> series;
-  std::error_code none;
-  std::vector<std::filesystem::path> folders;
-  for (const auto& path : entries_of(folder)) {
-    if (std::filesystem::is_directory(path, none)) {
-      folders.push_back(path);
-    } else if (in_small_letters(path.filename().string()) == "dicomdir") {
-      continue;
-    } else if (looks_like_dicom(path)) {
-      Slice slice = read_slice(path);
-      series[slice.series].push_back(std::move(slice));
-    } else if (!is_no_slice_by_name(path)) {
-      refuse_other_file(path);
-    }
-  }
-  for (const auto& below : folders) check_folder_below(below);
-  return series;
-}
-
-std::vector<Slice> choose_series(const std::filesystem::path& folder, const std::string& series_uid) {
-  auto series = read_folder(folder);
-  if (series.empty()) throw Error(folder.string() + ": holds no DICOM file");
-  std::string all;
-  for (const auto& [uid, slices] : series)
-    all += "\n    " + uid + " (" + slices[0].modality + ", " + std::to_string(slices.size()) + " slices" +
-           (slices[0].description.empty() ? "" : ", " + slices[0].description) + ")";
-  if (series_uid.empty() && series.size() > 1)
-    throw Error(folder.string() + ": holds " + std::to_string(series.size()) +
-                " series; name one with series_uid:" + all);
-  const auto chosen = series_uid.empty() ? series.begin() : series.find(series_uid);
-  if (chosen == series.end()) throw Error(folder.string() + ": holds no series " + series_uid + "; it holds:" + all);
-  return std::move(chosen->second);
-}
-
-std::string millimetres(double length) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g mm", length);
-  return text;
-}
+std::string millimetres(double length) { return formatted("%.4g mm", length); }
 
 /// If one slice says how its values become HU and another one does not, the latter is damaged.
 void check_same_scaling(const DicomPixels& slice, const DicomPixels& first) {
@@ -253,6 +167,25 @@ void check_places(const std::filesystem::path& folder, const std::vector<Slice>&
                 " would; resample the series to an even grid first");
 }
 
+/// Throws Error if two slices lie at the same place, or if one is missing between two. Where slices are closer than
+/// 0.2 mm, check_places() alone would not notice a missing one.
+void check_gaps(const std::filesystem::path& folder, const std::vector<Slice>& slices) {
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < slices.size(); ++i) gaps.push_back(slices[i].position_mm - slices[i - 1].position_mm);
+  std::vector<double> sorted = gaps;
+  const auto middle = sorted.begin() + std::ptrdiff_t((sorted.size() - 1) / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  for (std::size_t i = 0; i < gaps.size(); ++i) {
+    const std::string between =
+        slices[i].path().filename().string() + " and " + slices[i + 1].path().filename().string();
+    if (gaps[i] < 1e-3)
+      throw Error(folder.string() + ": " + between + " lie at the same place; the series has a slice twice");
+    if (gaps[i] > 1.5 * *middle + 1e-3)
+      throw Error(folder.string() + ": " + millimetres(gaps[i]) + " between " + between + ", " + millimetres(*middle) +
+                  " between most slices; a slice is missing or the series is unevenly spaced");
+  }
+}
+
 /// Throws Error unless the slices form one grid: same size, same directions, evenly spaced along their normal.
 void check_slices(const std::filesystem::path& folder, const std::vector<Slice>& slices) {
   const Slice& first = slices[0];
@@ -285,42 +218,21 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
         first.path().string() + ": its header has no " +
         (first.pixels.gives_slope ? "RescaleIntercept (0028,1052)" : "RescaleSlope (0028,1053)") +
         ", nor has any other slice's, so which values are Hounsfield units is not known; export the series again");
-  std::vector<double> gaps;
-  for (std::size_t i = 1; i < slices.size(); ++i) gaps.push_back(slices[i].position_mm - slices[i - 1].position_mm);
-  std::vector<double> sorted = gaps;
-  std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
-  const double usual = sorted[sorted.size() / 2];
-  for (std::size_t i = 0; i < gaps.size(); ++i) {
-    const std::string between =
-        slices[i].path().filename().string() + " and " + slices[i + 1].path().filename().string();
-    if (gaps[i] < 1e-3)
-      throw Error(folder.string() + ": " + between + " lie at the same place; the series has a slice twice");
-    if (std::abs(gaps[i] - usual) > 0.01 * usual + 1e-3)
-      throw Error(folder.string() + ": " + millimetres(gaps[i]) + " between " + between + ", " + millimetres(usual) +
-                  " between most slices; a slice is missing or the series is unevenly spaced");
-    for (int k = 0; k < 3; ++k) {
-      const double step = slices[i + 1].samples.origin_mm[k] - slices[i].samples.origin_mm[k];
-      if (std::abs(step - gaps[i] * column(first.samples, 2)[k]) > 0.02 * usual + 1e-2)
-        throw Error(folder.string() + ": the slices are shifted sideways between " + between +
-                    " (a tilted gantry); resample the series to a straight grid first");
-    }
-  }
+  check_gaps(folder, slices);
   check_places(folder, slices);
 }
 
 }  // namespace
 
-bool looks_like_dicom(const std::filesystem::path& path) {
-  const InputFile file(path, true);
-  return file.size() >= 132 && file.text(128, 4) == "DICM";
-}
-
 VolumeSamples read_dicom_series(const std::filesystem::path& folder, const std::string& series_uid) {
-  std::vector<Slice> slices = choose_series(folder, series_uid);
+  const SeriesFiles files = files_of_series(folder, series_uid);
+  std::vector<Slice> slices;
+  for (const auto& path : files.slices) slices.push_back(read_slice(path));
   std::stable_sort(slices.begin(), slices.end(),
                    [](const Slice& a, const Slice& b) { return a.position_mm < b.position_mm; });
   check_slices(folder, slices);
   VolumeSamples series;
+  series.note = note_about(files.passed_over);
   series.geometry = slices[0].samples;
   series.geometry.dimensions = 3;
   series.geometry.size[2] = int(slices.size());

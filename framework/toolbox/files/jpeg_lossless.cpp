@@ -29,7 +29,7 @@ class LosslessDecoder {
       else if (marker == 0xC3)
         precision_ = frame_precision(segments, image_);
       else if (marker >= 0xC0 && marker <= 0xCF)
-        throw CodecError("the pixels are compressed by another kind of JPEG than the header says");
+        throw CodecNotRead("its pixels are compressed by another kind of JPEG than the header says");
     }
     if (precision_ == 0) throw CodecError("the compressed pixels have no frame header");
     read_scan_header(segments);

@@ -32,14 +32,16 @@ class JpegLsDecoder {
       else if (marker == 0xF8)
         read_parameters(segments);
       else if (marker >= 0xC0 && marker <= 0xCF)
-        throw CodecError("the pixels are compressed by another kind of JPEG than the header says");
+        throw CodecNotRead("its pixels are compressed by another kind of JPEG than the header says");
       else if (marker == 0xDD && segments.word(0) != 0)
-        throw CodecError("the compressed pixels restart within the image, which is not read");
+        throw CodecNotRead("its compressed pixels restart within the image, which is not read");
     }
     if (precision_ == 0) throw CodecError("the compressed pixels have no frame header");
+    if (segments.byte(0) == 1 && segments.byte(3) != 0)
+      throw CodecNotRead("its pixels are compressed with loss by JPEG-LS, which is not read");
     if (segments.byte(0) != 1 || segments.byte(2) != 0 || segments.byte(3) != 0 || segments.byte(4) != 0 ||
         segments.byte(5) != 0)
-      throw CodecError("the scan header of the compressed pixels is damaged, or of an image with loss or colours");
+      throw CodecError("the scan header of the compressed pixels is damaged");
     prepare();
     return image_.bits_allocated == 8 ? samples<std::uint8_t>(segments.rest())
                                       : samples<std::uint16_t>(segments.rest());
@@ -47,7 +49,7 @@ class JpegLsDecoder {
 
  private:
   void read_parameters(const JpegSegments& segments) {
-    if (segments.byte(0) != 1) throw CodecError("the compressed pixels go through a table, which is not read");
+    if (segments.byte(0) != 1) throw CodecNotRead("its compressed pixels go through a table, which is not read");
     max_value_ = segments.word(1);
     for (std::size_t k = 0; k < 3; ++k) thresholds_[k] = segments.word(3 + 2 * k);
     reset_ = segments.word(9);

@@ -124,12 +124,14 @@ void check_size(const std::string& what, const std::array<long long, 3>& size, s
                 double most_samples_per_byte) {
   for (const long long length : size)
     if (length < 1 || length > 100000)
-      throw Error(what + ": its header gives a size of " + std::to_string(length) + "; it is damaged");
+      throw Error(what + ": its header gives a size of " + std::to_string(length) + "; expected 1 to 100000");
   const double samples = double(size[0]) * double(size[1]) * double(size[2]);
   if (samples > std::max(kFewSamples, most_samples_per_byte * double(stored_bytes)))
-    throw Error(what + ": its header claims " + std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " +
-                std::to_string(size[2]) + " samples, but the file has only " + std::to_string(stored_bytes) +
-                " bytes; it is damaged or cut off (or save it without compression)");
+    throw Error(
+        what + ": its header claims " + std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " +
+        std::to_string(size[2]) + " samples, but the file has only " + std::to_string(stored_bytes) +
+        " bytes; it is cut off or its header is wrong, unless nearly all samples are alike: then save it without "
+        "compression");
 }
 
 std::vector<float> read_floats(const InputFile& file, const StoredSamples& stored) {
