@@ -285,7 +285,7 @@ def _line_of(message: Dict[str, Any]) -> bytes:
 
 
 class Requests:
-    """Reads from the standard input as it was at the start. A node, and a process that it starts, find nothing there."""
+    """Reads from the standard input as it was at the start. A node, and a process that it starts, finds nothing."""
 
     def __init__(self) -> None:
         self._lines = open(os.dup(0), "rb")
