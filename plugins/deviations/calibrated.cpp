@@ -25,7 +25,8 @@ marrow::Pose scaled(const marrow::Pose& pose, const marrow::FragmentFrame& axes,
   marrow::Vector6d factors;
   factors << rotation[0], rotation[1], rotation[2], translation[0], translation[1], translation[2];
   marrow::Pose along_axes = in_frame(pose, axes);
-  along_axes.covariance = factors.asDiagonal() * *along_axes.covariance * factors.asDiagonal();
+  marrow::Matrix6d& covariance = along_axes.covariance.value();
+  covariance = factors.asDiagonal() * covariance * factors.asDiagonal();
   return in_frame(along_axes, pose.frame);
 }
 
