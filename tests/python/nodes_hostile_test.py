@@ -189,12 +189,7 @@ class Hostile(Written):
         mark = self.scratch / "begun"
         code = "import marrow; marrow.own.waits(mark=%r)" % str(mark)
         environment = {**os.environ, "PYTHONPATH": os.path.dirname(os.path.dirname(marrow.__file__))}
-        run = subprocess.Popen(
-            ["/usr/bin/python3", "-c", code],
-            env=environment,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        run = subprocess.Popen(["/usr/bin/python3", "-c", code], env=environment, stderr=subprocess.PIPE, text=True)
         self.addCleanup(run.kill)  # where the test ends before
         wait_until(mark.exists, "the node did not begin")
         run.send_signal(signal.SIGINT)
