@@ -92,6 +92,13 @@ TEST_F(DicomSound, BitsInAnotherPlaceAreOnlyCalledNotRead) {
                  "x.dcm: its pixels have 1 of 1 bits");
 }
 
+// Some programs write elements with a kind where the transfer syntax says without, or the reverse.
+TEST_F(DicomSound, ElementsAreReadAsTheFirstOneIsWritten) {
+  const std::string implicit = "1.2.840.10008.1.2", with_kinds = "1.2.840.10008.1.2.1";
+  EXPECT_EQ(image(dicom_start(with_kinds) + implicit_elements(fluoroscopy())).pixels.at<std::uint16_t>(3, 1), 301);
+  EXPECT_EQ(image(dicom_start(implicit) + dicom_elements(fluoroscopy())).pixels.at<std::uint16_t>(3, 1), 301);
+}
+
 TEST_F(DicomSound, ADataSetWithoutAFilesStartIsRead) {
   const Elements all = but(fluoroscopy(), {{0x00080005, "CS:ISO_IR 100"}});
   EXPECT_EQ(image(dicom_elements(all)).pixels.at<std::uint16_t>(3, 1), 301);

@@ -148,7 +148,13 @@ class DicomWalk {
                                                 : "1.2.840.10008.1.2";
     into_.big_endian_ = uid == "1.2.840.10008.1.2.2";
   }
-  Syntax syntax() const { return {into_.transfer_syntax_ != "1.2.840.10008.1.2", into_.big_endian_}; }
+  /// Some programs write elements with a kind where the transfer syntax says without, or the reverse. The first element
+  /// shows what holds: its length is never one that would read as a kind.
+  Syntax syntax() {
+    const bool is_told = window_.holds(at_, 8);
+    return {is_told ? is_kind(window_.text(at_ + 4, 2)) : into_.transfer_syntax_ != "1.2.840.10008.1.2",
+            into_.big_endian_};
+  }
 
   /// All elements of a deflated file are packed. A header is not longer than what is unpacked here.
   void unpack() {

@@ -49,7 +49,8 @@ int whole(const DicomHeader& header, const DicomTag& tag, std::optional<int> mis
 void read_size(const DicomHeader& header, DicomPixels& pixels) {
   pixels.rows = whole(header, kRows, 0);
   pixels.columns = whole(header, kColumns, 0);
-  if (pixels.rows < 1 || pixels.columns < 1) damaged(pixels.path, "its header does not say how large the image is");
+  if (pixels.rows < 1 || pixels.columns < 1)
+    throw Error(pixels.path.string() + ": its header does not say how large the image is; export it again");
   pixels.frames = std::max(1, whole(header, kFrames, 1));
   pixels.channels = whole(header, kSamples);
   if (pixels.channels < 1 || pixels.channels > 4)
@@ -303,8 +304,8 @@ DicomPixels read_dicom_pixels(const DicomFile& file, int frame) {
     throw Error(pixels.path.string() + ": holds a dose of radiotherapy; expected a CT slice or an X-ray image");
   check_is_image(file, header);
   read_size(header, pixels);
-  check_groups(file, pixels);
   read_bits(header, pixels);
+  check_groups(file, pixels);
   if (pixels.channels == 1) read_padding(header, pixels);
   const bool should_be_compressed =
       pixels.transfer_syntax.rfind("1.2.840.10008.1.2.4", 0) == 0 || pixels.transfer_syntax == "1.2.840.10008.1.2.5";

@@ -35,7 +35,7 @@ VolumeSamples read_tiff_volume(const fs::path& path) {
 
 [[noreturn]] void refuse_as_volume(const fs::path& path, FileFormat format) {
   if (format == FileFormat::dicom)
-    throw Error(path.string() + ": is one DICOM file, and a volume is a folder of them, one a slice; name the folder");
+    throw Error(path.string() + ": is one DICOM file; a volume is a folder of DICOM slices (name the folder)");
   const std::string other = format == FileFormat::unknown ? name_of_other_format(path) : "a picture (PNG, JPEG or BMP)";
   throw Error(path.string() + ": " + (other.empty() ? "" : "is " + other + ", ") +
               "not a volume that can be read; known are .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .tif and a "
