@@ -97,7 +97,7 @@ TEST_F(TwoPlaces, QuaternionLongerThanARotationHas) {
   const std::string by_sform = replaced(with_codes(1, 1), 256, number(1.32f));
   EXPECT_TRUE(grid_of(by_sform).direction.isIdentity(1e-6))
       << "the sform of the scanner is used, so it does not matter";
-  expect_refused(replaced(with_codes(2, 1), 256, number(1.32f)), "has the length 1.32");
+  expect_refused(replaced(with_codes(2, 1), 256, number(1.32f) + number(0.f) + number(0.f)), "has the length 1.32");
 }
 
 /// A header of NIfTI-2 by https://nifti.nimh.nih.gov/pub/dist/doc/nifti2.h, whose numbers are wider: 540 bytes, then
