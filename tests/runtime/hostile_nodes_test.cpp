@@ -10,6 +10,7 @@
 
 #include <limits>
 #include <opencv2/core.hpp>
+#include <optional>
 
 #include "framework/runtime/process_state.hpp"
 #include "framework/runtime/thread_state.hpp"
@@ -38,7 +39,7 @@ class HostileNodes : public testing::Test {
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
     marrow::RunSettings settings;
     settings.threads = 4;
-    settings.store = store;
+    settings.store = store ? &*store : nullptr;
     return marrow::run_pipeline(pipeline, catalogue, settings);
   }
   const marrow::NodeRecord& node(const marrow::RunResult& result, const std::string& id) const {
@@ -68,7 +69,7 @@ class HostileNodes : public testing::Test {
   runtime_fixture::Scratch scratch;
   const marrow::Catalogue catalogue{
       {fs::path(MARROW_BINARY_DIR) / "tests" / "plugins", fs::path(MARROW_BINARY_DIR) / "tests" / "hostile_plugins"}};
-  const marrow::Store* store = nullptr;
+  std::optional<marrow::Store> store;
   marrow::Pipeline pipeline;
   std::vector<marrow::Digest> right = healthy(run(""));
 };
@@ -156,10 +157,9 @@ TEST_F(HostileNodes, TheyMayLieAboutSizes) {
 }
 
 TEST_F(HostileNodes, NothingWrongIsKept) {
-  const marrow::Store kept(scratch.path / "store");
-  store = &kept;
+  store.emplace(scratch.path / "store");
   for (const char* how : {"rounding", "locale", "environment", "instructions of OpenCV"}) {
-    kept.collect(0);
+    store->collect(0);
     run(how);
     const marrow::RunResult again = run("");
     EXPECT_EQ(healthy(again), right) << how;

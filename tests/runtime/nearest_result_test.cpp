@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which kept result a plan compares with. The differences are counted by hand.
-#include "runtime/nearest_result.hpp"
+#include "framework/runtime/nearest_result.hpp"
 
 #include <gtest/gtest.h>
 
-#include "runtime/keys.hpp"
+#include "framework/runtime/keys.hpp"
 
 namespace nearest_result_test {
 
