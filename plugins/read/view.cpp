@@ -22,12 +22,13 @@ struct Options {
 marrow::View view(const marrow::Camera* camera, const Options& options, marrow::Context& context) {
   if (!camera && options.camera.empty())
     throw marrow::Error("view '" + options.name + "': the node that is wired to 'camera' gave none");
-  for (const std::string& doubt : marrow::files::doubts_about_sides(options.image, options.frame)) context.warn(doubt);
-  for (const std::string& doubt : marrow::files::doubts_about_pixels(options.image)) context.warn(doubt);
-  return marrow::exchange::read_view_files(
+  marrow::View view = marrow::exchange::read_view_files(
       {options.name, options.image, camera, options.camera, options.calibration, options.frame, options.mirror,
        options.projection, options.pixel_mm, options.corner_mm, options.scale},
       context);
+  for (const std::string& doubt : marrow::files::doubts_about_sides(options.image, options.frame)) context.warn(doubt);
+  for (const std::string& doubt : marrow::files::doubts_about_pixels(options.image)) context.warn(doubt);
+  return view;
 }
 
 }  // namespace

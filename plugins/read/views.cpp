@@ -31,15 +31,15 @@ marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, co
   marrow::List<marrow::View> views;
   for (std::size_t i = 0; i < options.names.size(); ++i) {
     const std::string& name = options.names[i];
-    for (const std::string& doubt : marrow::files::doubts_about_sides(options.images.at(i), options.frame))
-      context.warn(doubt);
-    for (const std::string& doubt : marrow::files::doubts_about_pixels(options.images.at(i))) context.warn(doubt);
     views.add(name,
               marrow::exchange::read_view_files(
                   {name, options.images.at(i), cameras ? &marrow::exchange::camera_of_view(name, *cameras) : nullptr,
                    cameras ? std::filesystem::path() : options.cameras.at(i), options.calibration, options.frame,
                    options.mirror, projection_of(options, i), options.pixel_mm, options.corner_mm, options.scale},
                   context));
+    for (const std::string& doubt : marrow::files::doubts_about_sides(options.images.at(i), options.frame))
+      context.warn(doubt);
+    for (const std::string& doubt : marrow::files::doubts_about_pixels(options.images.at(i))) context.warn(doubt);
   }
   return views;
 }
