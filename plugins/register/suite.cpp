@@ -14,7 +14,10 @@ namespace {
 
 analytic::Body bone() { return {{{0, 0, 8}, {9, 13, 32}}, {{20, -5, -22}, {8, 10, 9}}, {{-17, 7, -25}, {6, 9, 8}}}; }
 RigidTransform truth() { return analytic::moved_by({0.2, -0.15, 0.3}, {3, -2, 5}); }
-FragmentFrame frame() { return fragment_frame(mesh_of(bone())); }
+const FragmentFrame& frame() {
+  static const FragmentFrame kFrame = fragment_frame(mesh_of(bone()));
+  return kFrame;
+}
 
 /// From the true pose, in degrees and mm.
 Vector6d way(const RigidTransform& pose) {
