@@ -220,7 +220,8 @@ TEST(Markups, DecimalCommasAreNoCells) {
   expect("1,12,5,30,-7,0,0,0,1,1,1,0,distal-1,,", expected + "15" + advice);
   expect("1,12,5,30,1,-7,0,0,0,1,1,1,0,distal-1,,", expected + "16" + advice);
   expect("1,12,5,30,1,-7,2,0,0,0,1,1,1,0,distal-1,,,2,0", expected + "19" + advice);  // of 3D Slicer 5
-  expect("1,12,5,30,-7,0,0,0,1,1,1,0,distal-1", expected + "13" + advice);            // and without the last two cells
+  expect("1,12,5,30,-7,0,0,0,1,1,1,0,distal-1,,,2,0", expected + "17" + advice);
+  expect("1,12,5,30,-7,0,0,0,1,1,1,0,distal-1", expected + "13" + advice);  // and without the last two cells
   expect("1,12.5,30,-7,0,0,0,1,1,1,0,left, not right,,", expected + "15" + advice);
 }
 
@@ -231,9 +232,9 @@ TEST(Markups, RowsOfOtherLengthsThatAreSound) {
     return landmarks_at(folder / "a.fcsv")[0].points.at(0);
   };
   const Eigen::Vector3d at(12.5, 30.1, -7.2);
-  for (const char* row : {"1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch,,,2,0", "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,1, , ,  2,0",
-                          "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch", "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch,",
-                          "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,7,,"})
+  for (const char* row : {"1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch,,,2,0", "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch,,,,2,0",
+                          "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,1, , ,  2,0", "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch",
+                          "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch,", "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,7,,"})
     EXPECT_EQ(first_of(std::string(row) + "\n").model_mm, at) << row;
   // On Windows 3D Slicer 5 leaves a carriage return inside of its lines.
   EXPECT_EQ(first_of("1,12.5,30.1,-7.2,0,0,0,1,1,1,0,\"hip, left\",,\r,2,0\n").name, "hip, left");

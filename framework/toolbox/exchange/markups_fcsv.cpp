@@ -99,20 +99,23 @@ struct Header {
   }
 };
 
-/// Whether a number with a decimal comma may have become two cells, so that the coordinates and the label are not where
-/// the columns say. A row may lack cells at its end, where the label shows that nothing has moved.
-bool may_be_shifted(const std::vector<std::string>& cells, const Header& header) {
-  if (cells.size() == header.columns) return false;
-  return cells.size() > header.columns || number_in(cells[header.label]).has_value();
-}
-
-/// 3D Slicer 5 writes two cells more than it names columns: whether the point is placed (0 to 3, 2 if it is), and
-/// whether a program made it (0 or 1). Nothing if the row does not end so.
+/// 3D Slicer 5 ends a row with two cells more than it names columns, some versions after an empty one: whether the
+/// point is placed (0 to 3, 2 if it is), and whether a program made it (0 or 1). Nothing if the row does not end so.
 std::optional<double> status_of(const std::vector<std::string>& cells, const Header& header) {
-  if (cells.size() != header.columns + 2) return std::nullopt;
-  const auto status = number_in(cells[header.columns]), by_program = number_in(cells[header.columns + 1]);
+  if (cells.size() < header.columns + 2) return std::nullopt;
+  const auto is_empty = [](const std::string& cell) { return cell.find_first_not_of(' ') == std::string::npos; };
+  if (!std::all_of(cells.begin() + std::ptrdiff_t(header.columns), cells.end() - 2, is_empty)) return std::nullopt;
+  const auto status = number_in(cells[cells.size() - 2]), by_program = number_in(cells.back());
   const bool is_known = status && by_program && *status >= 0 && *status <= 3 && (*by_program == 0 || *by_program == 1);
   return is_known ? status : std::nullopt;
+}
+
+/// Whether a number with a decimal comma may have become two cells, so that the coordinates and the label are not where
+/// the columns say. A row may lack cells at its end, or have an empty one there, where the label shows that nothing has
+/// moved.
+bool may_be_shifted(const std::vector<std::string>& cells, const Header& header, bool has_status) {
+  if (cells.size() == header.columns + (has_status ? 2 : 0)) return false;
+  return (cells.size() > header.columns && !has_status) || number_in(cells[header.label]).has_value();
 }
 
 /// The point of a row; nothing if it is listed but not placed.
@@ -120,15 +123,14 @@ std::optional<MarkedPoint> point_of(const std::string& text, const Header& heade
   const std::vector<std::string> cells = cells_of(text, line);
   if (const std::size_t least = std::max(header.label, header.x + 2) + 1; cells.size() < least)
     line.refuse("expected at least " + std::to_string(least) + " cells, got " + std::to_string(cells.size()));
-  constexpr double kPlaced = 2;
-  if (const auto status = status_of(cells, header)) {
-    if (*status != kPlaced) return std::nullopt;
-  } else if (may_be_shifted(cells, header)) {
+  const auto status = status_of(cells, header);
+  if (may_be_shifted(cells, header, status.has_value()))
     line.refuse("expected " + std::to_string(header.columns) + " cells, one for each of the columns, got " +
                 std::to_string(cells.size()) +
                 "; a number with a decimal comma makes two cells: write 12.5, not 12,5, and a text with commas in "
                 "quotation marks");
-  }
+  constexpr double kPlaced = 2;
+  if (status && *status != kPlaced) return std::nullopt;
   Eigen::Vector3d at_mm;
   for (int i = 0; i < 3; ++i) at_mm[i] = coordinate(cells[header.x + std::size_t(i)], line);
   return MarkedPoint{cells[header.label], in_lps(at_mm, *header.is_ras)};
