@@ -50,8 +50,8 @@ def import_from_source(file: str, name: str) -> ModuleType:
 def loaded_files(file: str) -> List[str]:
     """All files besides `file` that decide what its nodes do: loaded modules and shared libraries, modules of its own
     folder that it imports when it is called, what tells the version of an installed distribution, and what sets the
-    interpreter up. Of the standard library there is none, because the interpreter stands for it. A link is named as such:
-    it may lead to another file later."""
+    interpreter up. Of the standard library there is none, because the interpreter stands for it. A link is named as
+    such: it may lead to another file later."""
     found: Set[str] = {path for path in map(os.fsdecode, _core.loaded_libraries()) if not is_standard(path)}
     found.update(setup_files())
     for name, module in list(sys.modules.items()):
@@ -66,8 +66,8 @@ def loaded_files(file: str) -> List[str]:
 
 
 def searched_folders(places: Dict[str, List[str]], file: str) -> List[Tuple[str, List[str]]]:
-    """The folders in which modules were looked for, or will be in a call, each with the names of the modules: those that
-    are not there, and those that would be another file if one appeared in the folder."""
+    """The folders in which modules were looked for, or will be in a call, each with the names of the modules: those
+    that are not there, and those that would be another file if one appeared in the folder."""
     found: Dict[str, Set[str]] = {os.path.abspath(place): set() for place in sys.path}
     looked_for = {name: list(sys.path) for name in _STANDARD_NAMES}
     looked_for.update({name.partition(".")[0]: list(sys.path) for name in _names_in_own_files(file)})

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Starts the process that holds the nodes of one Python file (plugin.py): python3 .../marrow/node_process.py FILE
 
-It takes note of every module that is looked for. So it begins before numpy and marrow's package are imported, and itself
-imports nothing that the interpreter has not loaded at its start.
+It takes note of every module that is looked for. So it begins before numpy and marrow's package are imported, and
+itself imports nothing that the interpreter has not loaded at its start.
 """
 import sys
 

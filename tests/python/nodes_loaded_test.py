@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every way of changing what a node written in Python loads changes the key of its result.
 
-The right value of each case is what plain Python gives: the module that its import rules find first. Each case writes the
-number that it expects into that module.
+The right value of each case is what plain Python gives: the module that its import rules find first. Each case writes
+the number that it expects into that module.
 """
 import contextlib
 import os

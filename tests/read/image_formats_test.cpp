@@ -237,8 +237,7 @@ TEST_F(ImageFormats, VolumesWhateverTheirNames) {
   put(folder / "x.nii", kJpeg);
   EXPECT_SAYS(volume("x.nii"), "x.nii: is a picture (PNG, JPEG or BMP), not a volume that can be read; known are .mha");
   put(folder / "slice", marrow::test::dicom_file(marrow::test::fluoroscopy()));
-  EXPECT_SAYS(volume("slice"),
-              "slice: is one DICOM file; a volume is a folder of DICOM slices (name the folder)");
+  EXPECT_SAYS(volume("slice"), "slice: is one DICOM file; a volume is a folder of DICOM slices (name the folder)");
 }
 
 // The mirror of an X-ray image that faces the patient is undone because of its header, not because of its name.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The compiler has nothing to say of marrow's sources: each is compiled as the build does it, with warnings as errors."""
+"""The compiler has nothing to say of marrow's sources: each is compiled as the build does it, with warnings as errors.
+"""
 import json
 import pathlib
 import re

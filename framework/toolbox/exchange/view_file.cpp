@@ -17,10 +17,10 @@ DistortedCamera camera_in_file(const ViewSource& source, const Image& image, con
   if (format == CameraFormat::rtk || format == CameraFormat::xreg) reading.mirror = mirror_of(source.mirror);
   if (format == CameraFormat::rtk || format == CameraFormat::plastimatch)
     reading.size.size_px = {double(image.width()), double(image.height())};
-  const DistortedCamera read = read_camera(source.camera_file, reading);
-  if (const std::string doubt = doubt_about_unit(source.camera_file, read.camera, source.scale); !doubt.empty())
+  const DistortedCamera found = read_camera(source.camera_file, reading);
+  if (const std::string doubt = doubt_about_unit(source.camera_file, found.camera, source.scale); !doubt.empty())
     context.warn("view '" + source.name + "': " + doubt);
-  return read;
+  return found;
 }
 
 }  // namespace

@@ -46,8 +46,8 @@ VolumeSamples read_nrrd(const std::filesystem::path& path, bool folder_is_named)
 /// `is_placed`: the header must say where the volume lies. Else it may be one image, and the grid is not read.
 VolumeSamples read_nifti(const std::filesystem::path& path, bool is_placed = true);
 /// A CT series in HU: all slices of one series in a folder, sorted by position and checked for gaps. `series_uid`
-/// selects the series; empty: the folder must hold only one CT. Other files of the folder are passed over. Throws Error if slices are missing, damaged or do not fit
-/// together.
+/// selects the series; empty: the folder must hold only one CT. Other files of the folder are passed over. Throws Error
+/// if slices are missing, damaged or do not fit together.
 VolumeSamples read_dicom_series(const std::filesystem::path& folder, const std::string& series_uid);
 /// Whether a file has DICOM's mark at byte 128 or, as some programs write it, begins with DICOM elements at once.
 bool looks_like_dicom(const std::filesystem::path& path);

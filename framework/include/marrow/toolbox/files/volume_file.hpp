@@ -21,8 +21,8 @@ struct VolumeReading {
 /// Reads a CT volume from MHA, NRRD, NIfTI, multi-page TIFF (the content tells which), or a folder. A folder holds a
 /// DICOM series, or an MHD or NHDR header with the file that it names. Patient axes are LPS. A left-handed grid is made
 /// right-handed; each voxel keeps its value and its position. Throws Error if the file is damaged or not supported, if
-/// its voxel size is unknown, or if check_volume() refuses the volume. `tell` is given a line for the log that names the
-/// files of a folder which were passed over.
+/// its voxel size is unknown, or if check_volume() refuses the volume. `tell` is given a line for the log that names
+/// the files of a folder which were passed over.
 Volume read_volume_file(const std::filesystem::path& path, const VolumeReading& reading,
                         const std::function<void(const std::string&)>& tell = {});
 
