@@ -40,6 +40,20 @@ class Errors(Case):
         self.assertIn("%s:3:35: error: 'test.constant' has no option 'valu'" % file, str(error))
         self.assertIn("\n  hint: did you mean 'value'?", str(error))
 
+    def test_a_file_stored_by_another_system(self):
+        lines = FAULTY.replace("\n", "\r")
+        for number, stored in enumerate(
+            (b"\xef\xbb\xbf" + FAULTY.encode(), lines.encode(), FAULTY.encode("utf-16"), lines.encode("utf-16"))
+        ):
+            file = self.scratch / ("stored-%d.yaml" % number)
+            file.write_bytes(stored)
+            with self.assertRaises(marrow.PipelineError) as caught:
+                marrow.Pipeline(file)
+            self.assertEqual(
+                [(fault.line, fault.column) for fault in caught.exception.faults], [(3, 35), (6, 16), (7, 35)]
+            )
+            self.assertIn("  a: {uses: test.constant, with: {valu: 1}}\n", str(caught.exception))
+
     def test_a_file_that_is_not_there_or_no_yaml(self):
         with self.assertRaisesRegex(marrow.PipelineError, "nowhere.yaml"):
             marrow.Pipeline(self.scratch / "nowhere.yaml")
