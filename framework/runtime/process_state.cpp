@@ -271,4 +271,13 @@ void ProcessState::keep_during(const std::function<void()>& code) {
   call(code, *this).expect_sound();
 }
 
+void ProcessState::keep_for_process(const std::function<void()>& start) {
+  constexpr int kMostTimes = 10;  // whoever changes the state all the time fails for it
+  for (int time = 0; time < kMostTimes; ++time) {
+    const long before = changes_;
+    start();
+    if (put_back().empty() && changes_ == before) return;
+  }
+}
+
 }  // namespace marrow

@@ -33,6 +33,10 @@ class ProcessState {
   /// throws is thrown.
   void keep_during(const std::function<void()>& code);
 
+  /// Calls code that starts a process, which takes over the state. If the state changes meanwhile, it is put back, and
+  /// the code is called again. Calls of plugin code may contain such calls.
+  void keep_for_process(const std::function<void()>& start);
+
   /// Puts back what has changed. Returns what that was, in words; an empty text if nothing has.
   std::string put_back();
 

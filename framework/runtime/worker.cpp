@@ -22,6 +22,7 @@
 #include "marrow/domain/number_text.hpp"
 #include "marrow/runtime/library.hpp"
 #include "no_process.hpp"
+#include "process_state.hpp"
 #include "process_tree.hpp"
 #include "stopwatch.hpp"
 
@@ -142,7 +143,10 @@ std::string with_number(const char* form, double value) { return formatted(form,
 
 Worker::Worker(const WorkerSettings& settings) {
   auto input = make_pipe(), output = make_pipe();
-  process_ = start(settings, input.first.number(), output.second.number());
+  ProcessState::of_runs()->keep_for_process([&] {
+    close();  // one that took over what a node had changed
+    process_ = start(settings, input.first.number(), output.second.number());
+  });
   to_ = input.second.release();
   from_ = output.first.release();
   fcntl(from_, F_SETFL, O_NONBLOCK);

@@ -34,7 +34,7 @@ void put_case_files() {
 
 void read(char format, std::string_view text) {
   marrow::Context context;
-  if (format == 'c') put("case/case.yaml", text), read_case({marrow::fuzz::folder() / "case"}, context);
+  if (format == 'c') put("case/case.yaml", text), read_case({marrow::fuzz::folder() / "case", {}}, context);
   if (format == 'm') marrow::files::read_camera_file(put("a.yaml", text));
   if (format == 'x') marrow::files::read_camera_file(put("a.txt", text));
   if (format == 'k') marrow::files::read_calibration_file(put("a.yaml", text));

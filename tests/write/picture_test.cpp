@@ -56,7 +56,7 @@ TEST(WritePicture, EdgesAreWhiteOnBlack) {
 TEST(WritePicture, ColoursAndFaults) {
   const TemporaryFolder folder;
   write(marrow::Picture{noise(CV_8UC3, 255)}, folder / "p.png");
-  EXPECT_SAYS(marrow::files::read_image_file(folder / "p.png"), "has 3 channels");
+  EXPECT_SAYS(marrow::files::read_image_file(folder / "p.png"), "has colours: the pixel at column 1 of row 1 has red");
   EXPECT_SAYS(write(marrow::Picture(), folder / "q.png"), "q.png: the image is empty, there is nothing to write");
   EXPECT_FALSE(std::filesystem::exists(folder / "q.png"));
 }

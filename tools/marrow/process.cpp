@@ -5,6 +5,7 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <array>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
@@ -18,6 +19,7 @@ namespace {
 
 std::atomic<bool> stopped{false};
 std::atomic<int> stopped_by{0};
+std::atomic<const char*> stop_text{""};
 
 /// Writes to the standard error without allocating memory, because there may be none left.
 void say(const char* text) {
@@ -48,6 +50,11 @@ extern "C" void on_stop(int signal) {
     end_process(130);
   }
   stopped_by = signal;
+  const char* text = stop_text.load();
+  if (!*text) return;
+  say("\n");
+  say(text);
+  say("\n");
 }
 
 bool nobody_reads(int stream) {
@@ -79,6 +86,16 @@ const std::atomic<bool>& stop_on_signals() {
   std::signal(SIGTERM, on_stop);
   if (std::signal(SIGHUP, on_stop) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);  // started by nohup
   return stopped;
+}
+
+void say_when_stopped(const std::string& line) {
+  // A handler may read one text meanwhile, so the other is written.
+  static std::array<std::array<char, 501>, 2> texts;
+  static std::size_t next = 0;
+  std::array<char, 501>& text = texts[next];
+  next = 1 - next;
+  text[line.copy(text.data(), text.size() - 1)] = 0;
+  stop_text = text.data();
 }
 
 std::filesystem::path this_program() { return std::filesystem::read_symlink("/proc/self/exe"); }

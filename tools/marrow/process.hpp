@@ -20,6 +20,10 @@ int with_output_written(int code);
 /// process at once.
 const std::atomic<bool>& stop_on_signals();
 
+/// The line that the first of these signals prints to stderr; empty, the default: none. At most 500 bytes are shown.
+/// Not to be called from several threads at once.
+void say_when_stopped(const std::string& line);
+
 /// The file of this program, to be started again or to find what is installed beside it.
 std::filesystem::path this_program();
 

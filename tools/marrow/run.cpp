@@ -194,7 +194,7 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   settings.threads = request.threads;
   settings.file_limits = request.file_limits;
   settings.cancelled = &stop_on_signals();
-  StopNotice stop_notice(*settings.cancelled);
+  StopNotice stop_notice;
   settings.observer = [&](const RunEvent& event) {
     stop_notice(event);
     progress(event);
