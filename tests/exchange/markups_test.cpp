@@ -223,6 +223,15 @@ TEST(Markups, DecimalCommasAreNoCells) {
   expect("1,12,5,30,-7,0,0,0,1,1,1,0,distal-1,,,2,0", expected + "17" + advice);
   expect("1,12,5,30,-7,0,0,0,1,1,1,0,distal-1", expected + "13" + advice);  // and without the last two cells
   expect("1,12.5,30,-7,0,0,0,1,1,1,0,left, not right,,", expected + "15" + advice);
+  // As many cells as columns, because as many are missing at the end as there are decimal commas.
+  const std::string moved =
+      "a.fcsv:4: the cells do not stand below their columns: those of the orientation or of vis, sel and lock hold "
+      "other "
+      "numbers" +
+      advice;
+  expect("1,10,5,20,30,0,0,0,1,1,1,0,d-1,", moved);
+  expect("1,10,5,20,5,30,0,0,0,1,1,1,0,d-1", moved);
+  expect("1,10,5,20,5,30,0,0,0,1,1,1,0,d-1,2,0", moved);
 }
 
 TEST(Markups, RowsOfOtherLengthsThatAreSound) {

@@ -70,6 +70,24 @@ class DicomFolder : public testing::Test {
   std::vector<std::string> lines;
 };
 
+TEST_F(DicomFolder, MoreReportsThanSlicesInTheSameSeries) {
+  for (int i = 0; i < 5; ++i) {
+    Elements report = other_object("1.2.840.10008.5.1.4.1.1.88.11", "SR");
+    report[0x0020000E] = ct_slice(0).at(0x0020000E);
+    put_file("r" + std::to_string(i), dicom_file(report));
+  }
+  EXPECT_EQ(read().grid.size[2], 3);
+  EXPECT_EQ(read("1.2.9").grid.size[2], 3);
+}
+
+// A media for patients comes with the program that shows it.
+TEST_F(DicomFolder, ProgramsAndArchivesArePassedOver) {
+  put_file("VIEWER", "MZ\x90" + std::string(200, '\1'));
+  put_file("viewer.bin", "\x7f" + ("ELF" + std::string(200, '\1')));
+  put_file("plugin.dat", "PK\3\4" + std::string(200, '\1'));
+  expect_passed_over("VIEWER, plugin.dat, viewer.bin");
+}
+
 TEST_F(DicomFolder, ObjectsThatAreNoSliceOfACtArePassedOver) {
   const std::string storage = "1.2.840.10008.5.1.4.1.1.";
   const Elements colours{

@@ -64,6 +64,19 @@ TEST_F(DicomPolarity, KeepsTheTypeOfThePixels) {
     EXPECT_EQ(image.pixels.at<std::uint16_t>(0, 1), 3995);
 }
 
+TEST_F(DicomPolarity, OfMoreBitsThanAFloatHoldsIsRefused) {
+  Elements image = fluoroscopy();
+  image[0x00280004] = "CS:MONOCHROME1";
+  image[0x00280010] = image[0x00280011] = "US:1";
+  image[0x00280100] = image[0x00280101] = "US:32";
+  image[0x00280102] = "US:31";
+  image[0x7FE00010] = "OW:" + little(100, 4);
+  put(folder / "x.dcm", dicom_file(image));
+  EXPECT_SAYS(marrow::files::read_image_file(folder / "x.dcm"),
+              "x.dcm: dark is air in this image of 32 bits, and such pixels are inverted up to 24 bits only; export it "
+              "with 16 bits");
+}
+
 // 12 bits with a sign hold -2048 to 2047, which is turned into itself: p becomes -1 - p.
 TEST_F(DicomPolarity, OfPixelsWithASignIsTurnedWithinTheirRange) {
   Elements with_sign = kWhite;

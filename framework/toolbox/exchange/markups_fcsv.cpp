@@ -72,6 +72,8 @@ struct Header {
   bool has_version = false;
   std::optional<bool> is_ras;
   std::size_t x = 1, label = 11, columns = 14;
+  std::vector<std::size_t> of_flags{8, 9, 10};          ///< vis, sel and lock, which are 0 or 1
+  std::vector<std::size_t> of_orientation{4, 5, 6, 7};  ///< ow, ox, oy, oz: an angle and an axis, or a quaternion
 
   void read(const std::string& text, const Line& line) {
     if (const auto version = said(text, "Markups fiducial file version")) {
@@ -95,6 +97,15 @@ struct Header {
         line.refuse("the columns x, y, z do not follow each other; expected " + std::string(kColumns));
       label = place_of("label");
       columns = cells.size();
+      const auto places_of = [&](std::initializer_list<const char*> wanted) {
+        std::vector<std::size_t> places;
+        for (const char* name : wanted)
+          if (const auto found = std::find(cells.begin(), cells.end(), name); found != cells.end())
+            places.push_back(std::size_t(found - cells.begin()));
+        return places;
+      };
+      of_flags = places_of({"vis", "sel", "lock"});
+      of_orientation = places_of({"ow", "ox", "oy", "oz"});
     }
   }
 };
@@ -110,10 +121,24 @@ std::optional<double> status_of(const std::vector<std::string>& cells, const Hea
   return is_known ? status : std::nullopt;
 }
 
+/// Whether cells that are neither coordinates nor texts hold what they never do: a flag that is not 0 or 1, an axis
+/// that is longer than 1, or an angle about no axis.
+bool holds_what_cannot_be(const std::vector<std::string>& cells, const Header& header) {
+  const auto number = [&](std::size_t place) { return place < cells.size() ? number_in(cells[place]) : std::nullopt; };
+  for (const std::size_t flag : header.of_flags)
+    if (const auto value = number(flag); value && *value != 0 && *value != 1) return true;
+  if (header.of_orientation.size() != 4) return false;
+  double longest = 0;
+  for (std::size_t i = 1; i < 4; ++i)
+    longest = std::max(longest, std::abs(number(header.of_orientation[i]).value_or(0)));
+  return longest > 1 || (longest == 0 && std::abs(number(header.of_orientation[0]).value_or(0)) > 1);
+}
+
 /// Whether a number with a decimal comma may have become two cells, so that the coordinates and the label are not where
 /// the columns say. A row may lack cells at its end, or have an empty one there, where the label shows that nothing has
 /// moved.
 bool may_be_shifted(const std::vector<std::string>& cells, const Header& header, bool has_status) {
+  if (holds_what_cannot_be(cells, header)) return true;
   if (cells.size() == header.columns + (has_status ? 2 : 0)) return false;
   return (cells.size() > header.columns && !has_status) || number_in(cells[header.label]).has_value();
 }
@@ -125,8 +150,11 @@ std::optional<MarkedPoint> point_of(const std::string& text, const Header& heade
     line.refuse("expected at least " + std::to_string(least) + " cells, got " + std::to_string(cells.size()));
   const auto status = status_of(cells, header);
   if (may_be_shifted(cells, header, status.has_value()))
-    line.refuse("expected " + std::to_string(header.columns) + " cells, one for each of the columns, got " +
-                std::to_string(cells.size()) +
+    line.refuse((cells.size() == header.columns + (status ? 2 : 0)
+                     ? "the cells do not stand below their columns: those of the orientation or of vis, sel and lock "
+                       "hold other numbers"
+                     : "expected " + std::to_string(header.columns) + " cells, one for each of the columns, got " +
+                           std::to_string(cells.size())) +
                 "; a number with a decimal comma makes two cells: write 12.5, not 12,5, and a text with commas in "
                 "quotation marks");
   constexpr double kPlaced = 2;

@@ -103,6 +103,7 @@ class ObjReader {
   void read_face(std::string_view rest) {
     auto& [points, corners, counts] = result_.polygons;
     std::uint32_t count = 0;
+    rest = rest.substr(0, rest.find('#'));
     for (std::string_view word = next_word(rest); !word.empty(); word = next_word(rest)) {
       const std::string_view number = word.substr(0, word.find('/'));
       long long index = 0;

@@ -85,7 +85,7 @@ bool begins_as_elements(FileWindow& window) {
   const bool is_explicit = is_kind(kind);
   for (const bool big_endian : {false, true}) {
     const std::uint64_t group = window.number(0, 2, big_endian), element = window.number(2, 2, big_endian);
-    if (group == 2 && element <= 1 && is_explicit && !big_endian) return true;
+    if (group == 2 && element <= 0x10 && is_explicit && !big_endian) return true;
     if (group == 8 && element <= 0x18 && (is_explicit || (!big_endian && window.number(4, 4, false) <= 64)))
       return true;
   }

@@ -17,6 +17,17 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMostNamed = 20;  // files in one message
 
+/// By its first bytes. Media for patients come with a program that shows the images.
+bool is_program_or_archive(const fs::path& path) {
+  const InputFile file(path, true);
+  const std::string head = file.text(0, std::size_t(std::min<std::uint64_t>(file.size(), 4)));
+  return head.rfind("MZ", 0) == 0 ||
+         head ==
+             "\x7f"
+             "ELF" ||
+         head == "PK\x03\x04";
+}
+
 /// Whether the name of a file that is not DICOM shows that it is no slice: a licence, a note, a picture, a file of
 /// marrow. A file with any other name, such as "IM5", may be the rest of a damaged slice.
 bool is_no_slice_by_name(const fs::path& path) {
@@ -24,16 +35,17 @@ bool is_no_slice_by_name(const fs::path& path) {
                                             "lockfile", "licence",   "license",    "md5sum",  "md5sums",
                                             "notice",   "readme",    "sha256sums", "version"};
   static const std::set<std::string> kExtensions{
-      ".7z",    ".avi",  ".bat", ".bib",  ".bmp",  ".c",    ".cfg",  ".cpp", ".css",  ".csv",    ".db",
-      ".doc",   ".docx", ".exe", ".fcsv", ".gif",  ".h5",   ".hdf5", ".htm", ".html", ".inf",    ".ini",
-      ".ipynb", ".jpeg", ".jpg", ".js",   ".json", ".lnk",  ".log",  ".m",   ".mat",  ".md",     ".md5",
-      ".mha",   ".mov",  ".mp4", ".mrb",  ".mrml", ".nii",  ".npy",  ".npz", ".nrrd", ".obj",    ".odt",
-      ".pdf",   ".ply",  ".png", ".pptx", ".py",   ".rar",  ".rtf",  ".sh",  ".sha1", ".sha256", ".sqlite",
-      ".stl",   ".svg",  ".tar", ".tfm",  ".tif",  ".tiff", ".toml", ".tra", ".tsv",  ".txt",    ".url",
-      ".vtk",   ".vtp",  ".vtu", ".xls",  ".xlsx", ".xml",  ".yaml", ".yml", ".zip"};
+      ".7z",   ".app",  ".avi",    ".bat", ".bib",    ".bmp",  ".c",    ".cab",  ".cfg",  ".chm",  ".class", ".cpp",
+      ".css",  ".csv",  ".db",     ".dll", ".doc",    ".docx", ".exe",  ".fcsv", ".gif",  ".h5",   ".hdf5",  ".htm",
+      ".html", ".ico",  ".inf",    ".ini", ".ipynb",  ".jar",  ".jpeg", ".jpg",  ".js",   ".json", ".lnk",   ".log",
+      ".m",    ".mat",  ".md",     ".md5", ".mha",    ".mkv",  ".mov",  ".mp3",  ".mp4",  ".mrb",  ".mrml",  ".nii",
+      ".npy",  ".npz",  ".nrrd",   ".obj", ".odt",    ".pdf",  ".ply",  ".png",  ".pptx", ".py",   ".rar",   ".rtf",
+      ".sh",   ".sha1", ".sha256", ".so",  ".sqlite", ".stl",  ".svg",  ".tar",  ".tfm",  ".tif",  ".tiff",  ".toml",
+      ".tra",  ".tsv",  ".ttf",    ".txt", ".url",    ".vtk",  ".vtp",  ".vtu",  ".webm", ".webp", ".wmv",   ".xls",
+      ".xlsx", ".xml",  ".yaml",   ".yml", ".zip",    ".zraw"};
   const std::string name = in_small_letters(path.filename().string()),
                     extension = in_small_letters(path.extension().string());
-  return name[0] == '.' || kNames.count(name) > 0 || kExtensions.count(extension) > 0 ||
+  return name[0] == '.' || is_program_or_archive(path) || kNames.count(name) > 0 || kExtensions.count(extension) > 0 ||
          (name.size() > 7 && name.compare(name.size() - 7, 7, ".nii.gz") == 0);
 }
 
@@ -147,11 +159,16 @@ std::string chosen_series(const fs::path& folder, const std::vector<DicomObject>
   return possible.empty() ? (all.empty() ? "" : all.begin()->first) : possible.begin()->first;
 }
 
-/// The class that most files of the series have. What has this class is a slice, whatever else its header says.
+/// The class that most slices of the series have, or most of its files if none is surely a slice. What has this class
+/// is a slice, whatever else its header says.
 std::string usual_class(const std::vector<DicomObject>& objects, const std::string& series) {
-  std::map<std::string, int> counts;
-  for (const DicomObject& object : objects)
-    if (object.series == series) ++counts[object.class_uid];
+  std::map<std::string, int> counts, of_slices;
+  for (const DicomObject& object : objects) {
+    if (object.series != series) continue;
+    ++counts[object.class_uid];
+    if (object.not_a_slice.empty()) ++of_slices[object.class_uid];
+  }
+  if (!of_slices.empty()) counts = of_slices;
   const auto most =
       std::max_element(counts.begin(), counts.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
   return most == counts.end() ? "" : most->first;

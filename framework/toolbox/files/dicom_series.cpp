@@ -145,21 +145,39 @@ double spacing_of(const std::vector<Slice>& slices) {
   return (slices.back().position_mm - slices.front().position_mm) / double(slices.size() - 1);
 }
 
+double longest(const std::vector<Vector>& vectors) {
+  double most = 0;
+  for (const Vector& one : vectors) most = std::max(most, std::sqrt(dot(one, one)));
+  return most;
+}
+
+/// Not from the first one, because its own position may be rounded, too.
+double farthest_from_mean(std::vector<Vector> vectors) {
+  Vector mean{};
+  for (const Vector& one : vectors)
+    for (std::size_t k = 0; k < 3; ++k) mean[k] += one[k] / double(vectors.size());
+  for (Vector& one : vectors)
+    for (std::size_t k = 0; k < 3; ++k) one[k] -= mean[k];
+  return longest(vectors);
+}
+
 /// Checks each slice against its place in the whole grid, because small errors of single steps add up over a long bone.
 void check_places(const std::filesystem::path& folder, const std::vector<Slice>& slices) {
   const Slice& first = slices[0];
   const Vector normal = column(first.samples, 2);
   const double spacing_mm = spacing_of(slices);
-  double sideways_mm = 0, along_mm = 0;
-  for (std::size_t i = 1; i < slices.size(); ++i) {
+  double along_mm = 0;
+  std::vector<Vector> sideways;
+  for (std::size_t i = 0; i < slices.size(); ++i) {
     Vector off = slices[i].samples.origin_mm;
     for (std::size_t k = 0; k < 3; ++k) off[k] -= first.samples.origin_mm[k];
     const double along = dot(off, normal);
-    sideways_mm = std::max(sideways_mm, std::sqrt(std::max(0.0, dot(off, off) - along * along)));
+    for (std::size_t k = 0; k < 3; ++k) off[k] -= along * normal[k];
+    sideways.push_back(off);
     along_mm = std::max(along_mm, std::abs(along - spacing_mm * double(i)));
   }
-  if (sideways_mm > kFarthestOff_mm)
-    throw Error(folder.string() + ": the slices are shifted sideways, by up to " + millimetres(sideways_mm) +
+  if (farthest_from_mean(sideways) > kFarthestOff_mm)
+    throw Error(folder.string() + ": the slices are shifted sideways, by up to " + millimetres(longest(sideways)) +
                 " (a tilted gantry); resample the series to a straight grid first");
   if (along_mm > kFarthestOff_mm)
     throw Error(folder.string() + ": the slices are unevenly spaced; some lie up to " + millimetres(along_mm) +

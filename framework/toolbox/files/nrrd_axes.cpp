@@ -47,12 +47,12 @@ void remove_axis(HeaderFields& fields, std::size_t axis, std::size_t axes) {
 HeaderFields without_single_samples(HeaderFields fields) {
   std::size_t axes = items_of(fields.text_or("sizes", "")).size();
   if (fields.text_or("dimension", "") != std::to_string(axes)) return fields;
-  const auto remove_if = [&](auto is_wanted) {
-    for (std::size_t axis = axes; axis-- > 0 && axes > 3;)
+  const auto remove_if = [&](std::size_t least, auto is_wanted) {
+    for (std::size_t axis = axes; axis-- > 0 && axes > least;)
       if (items_of(fields.text("sizes"))[axis] == "1" && is_wanted(axis)) remove_axis(fields, axis, axes--);
   };
-  remove_if([&](std::size_t axis) { return holds_values(fields, axis, axes); });
-  remove_if([&](std::size_t axis) { return axis >= 3 && !fields.has("space directions"); });
+  remove_if(1, [&](std::size_t axis) { return holds_values(fields, axis, axes); });
+  remove_if(3, [&](std::size_t axis) { return axis >= 3 && !fields.has("space directions"); });
   return fields;
 }
 

@@ -291,7 +291,15 @@ XrayPixels read_xray_pixels(const std::filesystem::path& path, int frame) {
   const DicomHeader header(file, frame);
   XrayPixels pixels;
   check_linear(header);
-  if (is_inverted(header)) pixels.inverted_from = sum_of_limits(read_dicom_pixels(file, frame));
+  if (is_inverted(header)) {
+    const DicomPixels stored = read_dicom_pixels(file, frame);
+    constexpr int kMostBits = 24;  // which a float holds
+    if (!stored.is_signed && stored.bits_stored > kMostBits)
+      throw Error(path.string() + ": dark is air in this image of " + std::to_string(stored.bits_stored) +
+                  " bits, and such pixels are inverted up to " + std::to_string(kMostBits) +
+                  " bits only; export it with 16 bits");
+    pixels.inverted_from = sum_of_limits(stored);
+  }
   const auto primary = header.number(kPrimaryAngle), secondary = header.number(kSecondaryAngle);
   if (primary && secondary)
     if (const auto stored = stored_axes(header, carm_axes(*secondary, *primary))) pixels.mirrored = stored->mirrored;
