@@ -52,6 +52,58 @@ class Counted : public Bowl {
   mutable std::atomic<int> asked = 0;
 };
 
+/// All that it says lies in the first one or two of its blocks.
+class OfFewBlocks : public Bowl {
+ public:
+  OfFewBlocks(std::size_t few, const Bowl& bowl) : Bowl(bowl), few_(few) {}
+  std::vector<double> without_each_block(const marrow::RigidTransform& pose) const override {
+    std::vector<double> values(9, value(pose));
+    for (std::size_t i = 0; i < few_; ++i) values[i] = 1;
+    return values;
+  }
+
+ private:
+  std::size_t few_;
+};
+
+// With one block left out nothing is left, so no motion of the minimum tells how far the pose may be off.
+TEST(PredictedCovariance, OfOneOrTwoBlocksIsNotKnown) {
+  for (const std::size_t few : {1u, 2u}) {
+    const OfFewBlocks cost(few, Bowl(bottom(), frame(), hessian()));
+    const marrow::FragmentFrame about = frame();
+    const PredictedCovariance predicted(cost, bottom(), about);
+    ASSERT_TRUE(predicted.covariance());
+    for (int axis = 0; axis < 6; ++axis)
+      EXPECT_GT(std::sqrt((*predicted.covariance())(axis, axis)), axis < 3 ? marrow::radians(90) : 100) << axis;
+    EXPECT_EQ(predicted.warnings(1e9, 1e9),
+              std::vector<std::string>{"all that the images say about the pose lies in one or two small parts of them, "
+                                       "so its deviations are not known"});
+  }
+}
+
+/// All blocks count, and hardly anything depends on the pose.
+class NearlyFlat : public Bowl {
+ public:
+  explicit NearlyFlat(const Bowl& bowl) : Bowl(bowl) {}
+  double value(const marrow::RigidTransform& pose) const override { return 1 + 1e-9 * Bowl::value(pose); }
+  std::vector<double> without_each_block(const marrow::RigidTransform& pose) const override {
+    std::vector<double> values(9, value(pose));
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] += 0.1 * double(i);
+    return values;
+  }
+};
+
+// No block moves the minimum, but neither does anything else: this is no perfect fit.
+TEST(PredictedCovariance, OfACostThatHardlyChangesIsNotKnown) {
+  const NearlyFlat cost(Bowl(bottom(), frame(), hessian()));
+  const marrow::FragmentFrame about = frame();
+  const PredictedCovariance predicted(cost, bottom(), about);
+  ASSERT_TRUE(predicted.covariance());
+  for (int axis = 0; axis < 6; ++axis)
+    EXPECT_GT(std::sqrt((*predicted.covariance())(axis, axis)), axis < 3 ? marrow::radians(90) : 100) << axis;
+  EXPECT_EQ(predicted.warnings(5, 5).size(), 6u);
+}
+
 TEST(PredictedCovariance, IsTheSumOfTheMotionsWithoutEachBlock) {
   for (const double information : {1.0, 2.0, 350.0}) {
     const Counted cost(bottom(), frame(), hessian(), information);

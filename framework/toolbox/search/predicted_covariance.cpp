@@ -7,6 +7,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <set>
 
 #include "marrow/domain/decompositions.hpp"
 
@@ -23,7 +25,26 @@ constexpr int kMostRounds = 5;
 constexpr double kMostVariance = 100 * 100;  // in squared steps; used for directions that nothing determines
 constexpr double kMattersBelow = 12;         // rise of a cost along the least certain direction, in units of its noise
 
+constexpr std::size_t kFewBlocks = 2;
+
 std::string number(double value) { return formatted("%.3g", value); }
+
+/// The blocks without which the cost is another.
+std::set<Eigen::Index> blocks_that_speak(const Eigen::VectorXd& without_block, double whole) {
+  constexpr double kRounding = 1e-9;  // relative, of sums from which those of a block are taken away
+  std::set<Eigen::Index> speak;
+  for (Eigen::Index i = 0; i < without_block.size(); ++i)
+    if (!(std::abs(without_block[i] - whole) <= kRounding * std::max(std::abs(without_block[i]), std::abs(whole))))
+      speak.insert(i);
+  return speak;
+}
+
+/// The blocks that say nothing leave the same.
+std::size_t blocks_that_speak(const std::vector<Cost::Expansion>& without_block) {
+  std::map<double, int> alike;
+  for (const Cost::Expansion& one : without_block) ++alike[one.curvature.sum() + one.gradient.sum()];
+  return std::size_t(std::count_if(alike.begin(), alike.end(), [](const auto& one) { return one.second == 1; }));
+}
 
 }  // namespace
 
@@ -44,6 +65,10 @@ PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform&
   at_pose_ = blocks_at(pose);
   if (at_pose_.size() == 0) return;
   ++evaluations_;
+  if (rests_on_few_blocks()) {
+    set_unknown();
+    return;
+  }
   wanted_rise_ = std::sqrt((at_pose_.array() - value_).square().sum());  // the standard deviation of the cost's value
   if (wanted_rise_ == 0) {
     set_exact();
@@ -57,6 +82,11 @@ PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform&
     const auto gradient = gradients();
     const double flat = round == 1 ? kFlat : kFlatLater;
     noise_ = (inverse(h, flat) * gradient.transpose() * gradient).trace() / 6;
+    const bool is_flat = std::all_of(open_.begin(), open_.end(), [](bool open) { return open; });
+    if (is_flat) {
+      move_without_each_block(at_diagonals, flat);
+      return;
+    }
     if (noise_ == 0) {
       set_exact();
       return;
@@ -77,6 +107,10 @@ std::vector<std::string> PredictedCovariance::warnings(double most_deg, double m
   static const std::array<const char*, 6> kAxes = {
       "rotation about the frontal axis",    "rotation about the lateral axis",    "axial rotation",
       "translation along the frontal axis", "translation along the lateral axis", "axial translation"};
+  if (has_few_blocks_)
+    return {
+        "all that the images say about the pose lies in one or two small parts of them, so its deviations are not "
+        "known"};
   std::vector<std::string> warnings;
   for (int axis = 0; axis < 6 && covariance_; ++axis) {
     const bool turn = axis < 3;
@@ -94,6 +128,27 @@ std::vector<std::string> PredictedCovariance::warnings(double most_deg, double m
   return warnings;
 }
 
+/// Whether leaving out a block changes the cost for one or two blocks only, at the pose and near it. Then nothing tells
+/// how far the minimum would move without them. Nearly always the pose itself is enough.
+bool PredictedCovariance::rests_on_few_blocks() {
+  std::set<Eigen::Index> speak = blocks_that_speak(at_pose_, value_);
+  for (const double step : {0.5, 4.0})
+    for (int axis = 0; axis < 6; ++axis)
+      for (const double sense : {1.0, -1.0}) {
+        if (speak.size() > kFewBlocks) return false;
+        const RigidTransform there = pose_at(sense * step * Vector6d::Unit(axis));
+        speak.merge(blocks_that_speak(blocks_at(there), cost_.value(there)));
+        evaluations_ += 2;
+      }
+  return speak.size() <= kFewBlocks;
+}
+
+void PredictedCovariance::set_unknown() {
+  has_few_blocks_ = true;
+  in_units_.setZero();
+  set_covariance(kMostVariance * kMostStep * kMostStep * Matrix6d::Identity());
+}
+
 /// Whether a Hessian determines all six axes.
 bool PredictedCovariance::is_regular(const Matrix6d& hessian) {
   constexpr double kRounding = 1e-12;
@@ -102,13 +157,15 @@ bool PredictedCovariance::is_regular(const Matrix6d& hessian) {
 }
 
 /// By the cost's own derivatives, where it has them. They say little if a direction is nearly flat over degrees or
-/// millimetres, or flat without one of the blocks. Then nothing is set, and the result is false.
+/// millimetres, or flat without one of the blocks, or if only one or two blocks count. Then nothing is set, and the
+/// result is false.
 bool PredictedCovariance::differentiate() {
   constexpr double kMostDeviation = 1;  // degrees or mm
   const std::vector<Cost::Expansion> without_block = cost_.expansion_without_each_block(pose_, frame_);
   const auto whole = cost_.expansion(pose_, frame_);
   if (without_block.empty() || !whole) return false;
   evaluations_ += 2;
+  if (blocks_that_speak(without_block) <= kFewBlocks) return false;
   Vector6d unit = Vector6d::Ones();
   unit.head<3>() *= radians(1);
   Matrix6d sum = Matrix6d::Zero(), mean = Matrix6d::Zero();
@@ -289,6 +346,10 @@ void PredictedCovariance::move_without_each_block(const Eigen::MatrixXd& at_diag
 void PredictedCovariance::set_covariance(const Matrix6d& undetermined) {
   constexpr double kNone = 1e-6;  // degrees or mm; no images tell as little
   if (in_units_.diagonal().maxCoeff() < kNone * kNone) in_units_.diagonal().setConstant(kLeastStep * kLeastStep);
+  // What is known to hundreds of degrees or millimetres is not known, however large the number.
+  const Vector6d most = Vector6d::Constant(kMostVariance * kMostStep * kMostStep);
+  const Vector6d share = most.cwiseQuotient(in_units_.diagonal().cwiseMax(most)).cwiseSqrt();
+  in_units_ = (share.asDiagonal() * in_units_ * share.asDiagonal()).eval();
   Vector6d unit = Vector6d::Ones();
   unit.head<3>() *= radians(1);
   covariance_ = unit.asDiagonal() * (in_units_ + undetermined) * unit.asDiagonal();

@@ -48,6 +48,8 @@ class PredictedCovariance {
  private:
   RigidTransform pose_at(const Vector6d& motion) const { return moved_by_units(pose_, frame_, motion); }
   static bool is_regular(const Matrix6d& hessian);
+  bool rests_on_few_blocks();
+  void set_unknown();
   bool differentiate();
   void set_exact();
   void set_covariance(const Matrix6d& undetermined);
@@ -81,6 +83,7 @@ class PredictedCovariance {
   Matrix6d in_units_;                            ///< the covariance in degrees and mm, without open directions
   std::optional<Matrix6d> covariance_;
   std::array<bool, 6> undetermined_{};  ///< axes
+  bool has_few_blocks_ = false;
   std::vector<RigidTransform> other_minima_;
 };
 
