@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What all nodes of a Python file share besides their inputs: the process."""
-import sys
+import contextlib
+from typing import Iterator
 
 import numpy
 
@@ -11,23 +12,39 @@ class KeptState:
     """The state of the process as it must stay from one call to the next."""
 
     def __init__(self) -> None:
+        self._before_import = ""
+        self._imports = 0
         self._take()
 
     def _take(self) -> None:
         self._process = _core.ProcessState()
         self._numpy = numpy.geterr()
-        self._modules = len(sys.modules)
 
     def begin(self) -> None:
         """A call begins: numbers are calculated with as usual, whatever ran before."""
         self._process.begin_call()
 
+    @contextlib.contextmanager
+    def importing(self) -> Iterator[None]:
+        """While a module runs for the first time. What it changes is no fault of the call, and stays."""
+        if self._imports == 0:
+            self._before_import = self._before_import or self._put_back()
+        self._imports += 1
+        try:
+            yield
+        finally:
+            self._imports -= 1
+            if self._imports == 0:
+                self._take()
+                self.begin()
+
     def changed(self) -> str:
-        """What the call has changed, in words; an empty text if it has left all as it was. What a module changes when
-        it is first imported is no fault of the call, and stays."""
-        if len(sys.modules) != self._modules:
-            self._take()
-            return ""
+        """What the call has changed, in words; an empty text if it has left all as it was."""
+        changed = self._before_import or self._put_back()
+        self._before_import = ""
+        return changed
+
+    def _put_back(self) -> str:
         changed: str = self._process.put_back()
         if not changed and numpy.geterr() != self._numpy:
             changed = "numpy's treatment of faults in calculations was changed"

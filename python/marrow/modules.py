@@ -11,6 +11,7 @@ from typing import Any, Dict, FrozenSet, Iterable, Iterator, List, Optional, Set
 
 from . import _core
 from .installed import is_installed, is_standard, metadata_files, setup_files, setup_folders
+from .trust import existing
 
 _STANDARD_NAMES: FrozenSet[str] = getattr(sys, "stdlib_module_names", frozenset())
 
@@ -56,9 +57,9 @@ def loaded_files(file: str) -> List[str]:
     found.update(setup_files())
     for name, module in list(sys.modules.items()):
         path = getattr(module, "__file__", None)
-        if not isinstance(path, str) or not os.path.isfile(path) or is_standard(os.path.abspath(path)):
+        if not isinstance(path, str) or is_standard(os.path.abspath(path)) or not os.path.isfile(existing(path)):
             continue
-        found.add(os.path.abspath(path))
+        found.add(existing(os.path.abspath(path)))
         found.update(metadata_files(name.partition(".")[0], os.path.abspath(path)))
     found.update(str(path) for path in _own_files(file))
     found.discard(file)
@@ -83,9 +84,20 @@ def searched_folders(places: Dict[str, List[str]], file: str) -> List[Tuple[str,
         found.setdefault(place, set()).add(name)
     for place, name in setup_folders():
         found.setdefault(place, set()).add(name)
+    for place in _portions():
+        found.setdefault(place, set()).add("__init__")
     first = [os.path.abspath(place) for place in sys.path]
     order = list(dict.fromkeys(first)) + sorted(set(found) - set(first))
     return [(place, sorted(found[place])) for place in order]
+
+
+def _portions() -> Iterator[str]:
+    """The folders of packages without __init__.py, which would be others if one had it."""
+    for module in list(sys.modules.values()):
+        if getattr(module, "__file__", None) is None:
+            for folder in list(getattr(module, "__path__", None) or []):
+                if isinstance(folder, str) and os.path.isdir(folder) and not is_standard(folder + os.sep):
+                    yield os.path.abspath(folder)
 
 
 def _place_of(name: str) -> Optional[str]:

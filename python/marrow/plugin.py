@@ -115,7 +115,7 @@ class Process:
     def keeping_state(self, task: Callable[[Dict[str, Any]], Any], request: Dict[str, Any]) -> Any:
         """Does what a request asks for. What it changes for the whole process would change what later calls give."""
         self.load()
-        self.state = self.state or KeptState()
+        self.state = self.trusted.state = self.state or KeptState()
         self.state.begin()
         try:
             result = task(request)
@@ -246,10 +246,17 @@ def _outputs(node: Declaration, returned: Any) -> List[Any]:
     return made
 
 
+def _text_of(error: BaseException) -> str:
+    try:
+        return str(error).strip() or "no message"
+    except Exception:  # the exception's own text is at fault
+        return "no message"
+
+
 def explained(error: BaseException, file: str) -> str:
     """An exception in one sentence, with the last place in the folder of the file. An Error that the node raised on
     purpose speaks for itself."""
-    text = str(error).strip() or "no message"
+    text = _text_of(error)
     if isinstance(error, SyntaxError) and error.filename:
         return "%s, line %s: %s: %s" % (error.filename, error.lineno, type(error).__name__, error.msg)
     folder = str(pathlib.Path(file).parent) + os.sep

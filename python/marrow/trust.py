@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Modules that others could change are not imported by a node written in Python."""
+import contextlib
 import os
 import sys
 from importlib.machinery import ModuleSpec
+from types import ModuleType
 from typing import Any, List, Optional
 
 from . import _core
 from .errors import Error
 from .installed import is_standard
+from .kept_state import KeptState
 
 
 class TrustedModules:
@@ -16,6 +19,7 @@ class TrustedModules:
 
     def __init__(self) -> None:
         self.fault = ""
+        self.state: Optional[KeptState] = None  # is told of each module that runs
 
     def find_spec(self, name: str, path: Any = None, target: Any = None) -> Optional[ModuleSpec]:
         for finder in sys.meta_path:
@@ -25,6 +29,7 @@ class TrustedModules:
             spec: Optional[ModuleSpec] = find(name, path, target)
             if spec is not None:
                 self._expect_trusted(spec)
+                self._tell_of(spec.loader)
                 return spec
         return None
 
@@ -33,10 +38,26 @@ class TrustedModules:
         if self.fault:
             raise Error(self.fault)
 
+    def _tell_of(self, loader: Any) -> None:
+        """Has the loader say when its module runs. Loaders of the interpreter's own modules are classes, which all of
+        these share; that of an archive is asked again for each module."""
+        execute = getattr(loader, "exec_module", None)
+        if execute is None or isinstance(loader, type) or "exec_module" in getattr(loader, "__dict__", {}):
+            return
+
+        def told(module: ModuleType) -> None:
+            with self.state.importing() if self.state else contextlib.nullcontext():
+                execute(module)
+
+        try:
+            loader.exec_module = told
+        except AttributeError:  # a loader that takes no attributes
+            pass
+
     def _expect_trusted(self, spec: ModuleSpec) -> None:
         if not spec.has_location or not spec.origin or is_standard(spec.origin):
             return
-        files = [_existing(spec.origin)]
+        files = [existing(spec.origin)]
         if spec.cached and os.path.isfile(spec.cached):
             files.append(spec.cached)
         fault = untrusted_among(files)
@@ -45,7 +66,7 @@ class TrustedModules:
             raise ImportError(self.fault, name=spec.name, path=spec.origin)
 
 
-def _existing(path: str) -> str:
+def existing(path: str) -> str:
     """The archive of a module that lies in one."""
     while not os.path.exists(path):
         path = os.path.dirname(path)

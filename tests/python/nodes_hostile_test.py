@@ -72,6 +72,25 @@ class Hostile(Written):
         self.assertEqual((made["read"], made["by_a_child"], made["by_a_shell"]), (0, 0, 0))
         self.assertEqual(self.does("")["process"], first)
 
+    def test_what_a_call_changes_beside_an_import_is_its_failure(self):
+        for change in ("os.chdir('/')", "os.environ['ZZZ'] = '1'", "numpy.seterr(all='raise')"):
+            said = self.failure("import numpy\n%s\nimport %s" % (change, "colorsys"))
+            self.assertIn("was changed", said)
+            said = self.failure("import numpy\nimport %s\n%s" % ("sched", change))
+            self.assertIn("was changed", said)
+
+    def test_what_a_module_changes_at_its_import_is_no_failure_of_the_call(self):
+        (self.scratch / "plugins" / "sets.py").write_text("import os\nos.environ['OF_A_MODULE'] = '1'\n")
+        made = self.does("import sets\nmade['set'] = int(os.environ['OF_A_MODULE'])")
+        self.assertEqual(made["set"], 1)
+        self.assertEqual(self.does("made['set'] = int(os.environ['OF_A_MODULE'])")["set"], 1)
+
+    def test_an_exception_whose_text_fails(self):
+        said = self.failure(
+            "class Odd(Exception):\n    def __str__(self):\n        raise ZeroDivisionError\nraise Odd()"
+        )
+        self.assertIn("Odd: no message", said)
+
     def test_no_descriptor_of_marrow_is_left_to_what_a_node_starts(self):
         here, there = self.scratch / "here", self.scratch / "there"
         list_to = "ls /proc/self/fd > '%s'"

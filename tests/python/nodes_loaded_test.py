@@ -9,6 +9,7 @@ import os
 import pathlib
 import subprocess
 import sys
+import zipfile
 
 from package import main, marrow
 from written_nodes import Written, view
@@ -97,6 +98,22 @@ class Loaded(Written):
         self.node(OPTIONAL.replace("fast", "parts.fast"))
         self.kept(500)
         self.module("plugins/parts/fast.py", "VALUE = 5\n")
+        self.kept(5)
+
+    def test_a_module_in_an_archive(self):
+        for value in (1, 2):
+            with zipfile.ZipFile(self.scratch / "l.zip", "w") as archive:
+                archive.writestr("packed.py", "VALUE = %d\n" % value)
+            with self.environment(PYTHONPATH=self.scratch / "l.zip"):
+                if value == 1:
+                    self.node("from packed import VALUE")
+                self.kept(value)
+
+    def test_a_folder_that_becomes_a_package(self):
+        self.module("plugins/portion/part.py", "")
+        self.node("import portion.part\nVALUE = getattr(portion, 'VALUE', 500)")
+        self.kept(500)
+        self.module("plugins/portion/__init__.py", "VALUE = 5\n")
         self.kept(5)
 
     def test_a_module_that_shadows_another(self):
