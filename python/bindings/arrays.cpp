@@ -148,7 +148,7 @@ RigidTransform transform_of(const py::handle& matrix, const std::string& target,
 
 cv::Mat pixels_of(const py::handle& object, const std::string& what) {
   py::object array = real_array(object, what);
-  const auto type = py::str(array.attr("dtype")).cast<std::string>();
+  const auto type = py::str(array.attr("dtype").attr("newbyteorder")("=")).cast<std::string>();
   int depth = type == "uint8"                          ? CV_8U
               : type == "uint16"                       ? CV_16U
               : type == "float32" || type == "float64" ? CV_32F

@@ -74,6 +74,12 @@ class Arrays(Case):
             with self.assertRaisesRegex(marrow.Error, text):
                 marrow.Volume(arguments[0], spacing_mm=arguments[1])
 
+    def test_the_order_of_bytes_is_no_matter(self):
+        for kind in ("u2", "f4"):
+            for order in "<>":
+                given = numpy.array([[1, 258]], order + kind)
+                self.assertEqual(marrow.Image(given).array.tolist(), [[1, 258]])
+
     def test_arrays_of_which_something_would_get_lost(self):
         """What is lost is counted by hand: 2 of 8 values are masked, and 2**24 + 1 = 16777217 is the first whole number
         that has no 32-bit floating-point number (IEEE 754: 24 bits of significand)."""
