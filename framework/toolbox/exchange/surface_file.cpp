@@ -2,6 +2,7 @@
 #include "marrow/toolbox/exchange/surface_file.hpp"
 
 #include <Eigen/Geometry>
+#include <numeric>
 
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/number_text.hpp"
@@ -22,8 +23,14 @@ files::MarkedMesh marked_mesh(const std::filesystem::path& path) {
   return {files::mesh_of(file.polygons, path.string()), file.space};
 }
 
-void turn(Mesh& mesh) {
-  for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
+void turn(Mesh& mesh, SurfaceShape& shape, const std::vector<std::uint32_t>& parts) {
+  std::vector<bool> is_turned(shape.part_volumes_mm3.size(), false);
+  for (const std::uint32_t part : parts) {
+    is_turned[part] = true;
+    shape.part_volumes_mm3[part] *= -1;
+  }
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+    if (is_turned[shape.part_of_triangle[i]]) std::swap(mesh.triangles[i][1], mesh.triangles[i][2]);
 }
 
 /// Of an open surface only: the volume under it as seen from the middle of its corners.
@@ -49,22 +56,26 @@ void warn_of_open(const Mesh& mesh, const SurfaceShape& shape, const std::string
                "; costs that need its outline or its inside may be wrong: repair it (MeshLab, Blender)");
 }
 
-/// Turns a closed surface that faces inwards. The surface as a whole decides, because cavities face inwards as well.
+/// Turns a closed surface that faces inwards. The surface as a whole decides first, because cavities face inwards as
+/// well, and then each part that is no cavity.
 void check_closed(Mesh& mesh, SurfaceShape& shape, const std::string& what, const Context& context) {
-  double volume_mm3 = 0;
-  for (const double part : shape.part_volumes_mm3) volume_mm3 += part;
+  const double volume_mm3 = std::accumulate(shape.part_volumes_mm3.begin(), shape.part_volumes_mm3.end(), 0.0);
+  const std::size_t count = shape.part_volumes_mm3.size();
   if (volume_mm3 < 0) {
-    turn(mesh);
-    for (double& part : shape.part_volumes_mm3) part = -part;
-    context.warn(what +
-                 formatted(": all its triangles faced inwards (enclosed volume %.6g mm3), so they were turned; if "
-                           "the surface was mirrored on its way here, it is still a mirror image",
-                           volume_mm3));
+    std::vector<std::uint32_t> all(count);
+    std::iota(all.begin(), all.end(), 0u);
+    turn(mesh, shape, all);
   }
-  if (const std::size_t count = parts_inside_out(mesh, shape))
-    context.warn(what + ": " + std::to_string(count) + " of its " + std::to_string(shape.part_volumes_mm3.size()) +
-                 " closed parts " + (count == 1 ? "faces" : "face") +
-                 " inwards without being a cavity in another part; turn what faces inwards (MeshLab, Blender)");
+  const std::vector<std::uint32_t> others = parts_inside_out(mesh, shape);
+  turn(mesh, shape, others);
+  const std::size_t turned = volume_mm3 < 0 ? count - others.size() : others.size();
+  if (turned == 0) return;
+  const std::string which = turned == count
+                                ? formatted("all its triangles faced inwards (enclosed volume %.6g mm3)", volume_mm3)
+                                : std::to_string(turned) + " of its " + std::to_string(count) +
+                                      " closed parts faced inwards without being a cavity in another part";
+  context.warn(what + ": " + which +
+               ", so they were turned; if the surface was mirrored on its way here, it is still a mirror image");
 }
 
 void check_shape(Mesh& mesh, const std::string& what, const Context& context) {

@@ -98,7 +98,7 @@ SurfaceShape shape_of(const Mesh& mesh) {
   return shape;
 }
 
-std::size_t parts_inside_out(const Mesh& mesh, const SurfaceShape& shape) {
+std::vector<std::uint32_t> parts_inside_out(const Mesh& mesh, const SurfaceShape& shape) {
   constexpr std::size_t kMostParts = 50;
   constexpr double kNothing = 1e-9;  // of the largest part: its sign is rounding
   const std::vector<double>& volumes = shape.part_volumes_mm3;
@@ -109,16 +109,16 @@ std::size_t parts_inside_out(const Mesh& mesh, const SurfaceShape& shape) {
     if (volumes[part] < -kNothing * largest) inward.push_back(part);
   std::stable_sort(inward.begin(), inward.end(), [&](auto a, auto b) { return volumes[a] < volumes[b]; });
   inward.resize(std::min(inward.size(), kMostParts));
-  std::size_t count = 0;
+  std::vector<std::uint32_t> found;
   for (const std::uint32_t part : inward) {
     const auto first = std::find(shape.part_of_triangle.begin(), shape.part_of_triangle.end(), part);
     const auto& [a, b, c] = mesh.triangles[std::size_t(first - shape.part_of_triangle.begin())];
     // Not a middle of any kind, because the ray from there might meet edges of regular surfaces.
     const Eigen::Vector3d point =
         0.5137 * mesh.vertices_mm[a] + 0.2713 * mesh.vertices_mm[b] + 0.215 * mesh.vertices_mm[c];
-    count += outward_parts_around(point, mesh, shape) <= 0;
+    if (outward_parts_around(point, mesh, shape) <= 0) found.push_back(part);
   }
-  return count;
+  return found;
 }
 
 }  // namespace marrow::exchange

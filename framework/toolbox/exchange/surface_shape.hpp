@@ -23,9 +23,9 @@ struct SurfaceShape {
 /// Parts are triangles that hang together by their edges. The mesh must satisfy check_mesh().
 SurfaceShape shape_of(const Mesh& mesh);
 
-/// The number of parts that face inwards and lie in no part that faces outwards. Others that face inwards are cavities.
-/// The surface must be closed. Only the largest 50 parts that face inwards are looked at.
-std::size_t parts_inside_out(const Mesh& mesh, const SurfaceShape& shape);
+/// The parts that face inwards and lie in no part that faces outwards. Others that face inwards are cavities. The
+/// surface must be closed. Only the largest 50 parts that face inwards are looked at.
+std::vector<std::uint32_t> parts_inside_out(const Mesh& mesh, const SurfaceShape& shape);
 
 /// The place where two triangles without a common corner cross. `is_whole`: all pairs have been compared; a surface of
 /// very many long triangles may need too many comparisons.
