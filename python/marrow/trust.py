@@ -41,7 +41,7 @@ class TrustedModules:
     def _tell_of(self, loader: Any) -> None:
         """Has the loader say when its module runs. Loaders of the interpreter's own modules are classes, which all of
         these share; that of an archive is asked again for each module."""
-        execute = getattr(loader, "exec_module", None)
+        execute: Any = getattr(loader, "exec_module", None)
         if execute is None or isinstance(loader, type) or "exec_module" in getattr(loader, "__dict__", {}):
             return
 
