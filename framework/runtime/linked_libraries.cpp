@@ -2,7 +2,6 @@
 #include "linked_libraries.hpp"
 
 #include <dlfcn.h>
-#include <link.h>
 
 #include <algorithm>
 #include <cstring>
@@ -13,6 +12,7 @@
 
 #include "build_note.hpp"
 #include "keys.hpp"
+#include "loaded_libraries.hpp"
 #include "marrow/domain/error.hpp"
 #include "regular_file.hpp"
 
@@ -21,65 +21,29 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What the loader knows about a library: its own name, and the names of those that it links.
-struct Names {
-  std::string own;
-  std::vector<std::string> needed;
-};
-
-Names names_of(const link_map* library) {
-  Names names;
-  const char* texts = nullptr;
-  for (const ElfW(Dyn)* d = library->l_ld; d && d->d_tag != DT_NULL; ++d)
-    if (d->d_tag == DT_STRTAB) texts = reinterpret_cast<const char*>(d->d_un.d_ptr);
-  // The kernel's own library has an offset from its beginning there, not an address.
-  if (!texts || reinterpret_cast<std::uintptr_t>(texts) < library->l_addr) return names;
-  for (const ElfW(Dyn)* d = library->l_ld; d->d_tag != DT_NULL; ++d) {
-    if (d->d_tag == DT_SONAME) names.own = texts + d->d_un.d_val;
-    if (d->d_tag == DT_NEEDED) names.needed.push_back(texts + d->d_un.d_val);
-  }
-  return names;
+std::set<const link_map*> needed_by(const link_map* library, const LoadedLibraries& loaded) {
+  std::set<const link_map*> needed;
+  for (const std::string& name : entries_of(library).needed)
+    if (const link_map* found = loaded.find(name)) needed.insert(found);
+  return needed;
 }
 
-/// All loaded libraries, in the order of loading, and by the names under which others may need them.
-class Loaded {
- public:
-  explicit Loaded(const link_map* any) {
-    while (any->l_prev) any = any->l_prev;
-    for (const link_map* library = any; library; library = library->l_next) {
-      if (!library->l_name || !*library->l_name) continue;  // the program itself
-      order_.push_back(library);
-      const Names names = names_of(library);
-      for (const std::string& name : {fs::path(library->l_name).filename().string(), names.own})
-        if (!name.empty()) by_name_.try_emplace(name, library);
-    }
-  }
-  std::set<const link_map*> needed_by(const link_map* library) const {
-    std::set<const link_map*> needed;
-    for (const std::string& name : names_of(library).needed)
-      if (const auto found = by_name_.find(name); found != by_name_.end()) needed.insert(found->second);
-    return needed;
-  }
-  /// Adds all libraries that a library needs, directly or indirectly. Does not go into libraries that are in `known`
-  /// already.
-  void add_all(const link_map* library, std::set<const link_map*>& known) const {
-    for (const link_map* one : needed_by(library))
-      if (known.insert(one).second) add_all(one, known);
-  }
-  std::vector<LinkedLibrary> files_of(const std::set<const link_map*>& wanted) const {
-    std::vector<LinkedLibrary> files;
-    for (const link_map* library : order_) {
-      std::error_code error;
-      const fs::path real = wanted.contains(library) ? fs::canonical(library->l_name, error) : fs::path();
-      if (!real.empty() && !error) files.push_back({real.string(), fs::file_size(real)});
-    }
-    return files;
-  }
+/// Adds all libraries that a library needs, directly or indirectly. Does not go into libraries that are in `known`
+/// already.
+void add_all(const link_map* library, const LoadedLibraries& loaded, std::set<const link_map*>& known) {
+  for (const link_map* one : needed_by(library, loaded))
+    if (known.insert(one).second) add_all(one, loaded, known);
+}
 
- private:
-  std::vector<const link_map*> order_;
-  std::map<std::string, const link_map*> by_name_;
-};
+std::vector<LinkedLibrary> files_of_loaded(const std::set<const link_map*>& wanted, const LoadedLibraries& loaded) {
+  std::vector<LinkedLibrary> files;
+  for (const link_map* library : loaded.in_order()) {
+    std::error_code error;
+    const fs::path real = wanted.contains(library) ? fs::canonical(library->l_name, error) : fs::path();
+    if (!real.empty() && !error) files.push_back({real.string(), fs::file_size(real)});
+  }
+  return files;
+}
 
 const link_map* map_of_framework() {
   Dl_info info{};
@@ -138,10 +102,10 @@ const std::vector<LinkedLibrary>& framework_libraries() {
   static const std::vector<LinkedLibrary> libraries = [] {
     const link_map* framework = map_of_framework();
     if (!framework) return std::vector<LinkedLibrary>();
-    const Loaded loaded(framework);
+    const LoadedLibraries loaded(framework);
     std::set<const link_map*> needed;
-    loaded.add_all(framework, needed);
-    return loaded.files_of(needed);
+    add_all(framework, loaded, needed);
+    return files_of_loaded(needed, loaded);
   }();
   return libraries;
 }
@@ -149,16 +113,16 @@ const std::vector<LinkedLibrary>& framework_libraries() {
 std::vector<LinkedLibrary> linked_libraries(void* handle) {
   link_map* self = nullptr;
   if (dlinfo(handle, RTLD_DI_LINKMAP, &self) != 0) return {};
-  const Loaded loaded(self);
+  const LoadedLibraries loaded(self);
   const link_map* framework = map_of_framework();
-  std::set<const link_map*> all, of_framework, wanted = loaded.needed_by(self);
-  if (framework) all.insert(framework), of_framework.insert(framework), loaded.add_all(framework, of_framework);
-  loaded.add_all(self, all);
+  std::set<const link_map*> all, of_framework, wanted = needed_by(self, loaded);
+  if (framework) all.insert(framework), of_framework.insert(framework), add_all(framework, loaded, of_framework);
+  add_all(self, loaded, all);
   for (const link_map* library : all)
     if (!of_framework.contains(library)) wanted.insert(library);
   wanted.erase(framework);
   wanted.erase(self);
-  return loaded.files_of(wanted);
+  return files_of_loaded(wanted, loaded);
 }
 
 Digest identity_of(const LinkedLibrary& library) {

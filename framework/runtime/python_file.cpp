@@ -11,6 +11,7 @@
 #include <mutex>
 #include <set>
 
+#include "apart.hpp"
 #include "descriptions.hpp"
 #include "linked_libraries.hpp"
 #include "manifest.hpp"

@@ -2,14 +2,13 @@
 #include "run_paths.hpp"
 
 #include <dlfcn.h>
-#include <link.h>
 
 #include <algorithm>
-#include <map>
 #include <set>
 #include <sstream>
 
 #include "linked_libraries.hpp"
+#include "loaded_libraries.hpp"
 
 namespace marrow {
 namespace {
@@ -18,29 +17,6 @@ namespace fs = std::filesystem;
 
 /// Folders in which the loader looks before a folder itself, where the processor is of this kind.
 constexpr const char* kVariants[] = {"glibc-hwcaps/x86-64-v4", "glibc-hwcaps/x86-64-v3", "glibc-hwcaps/x86-64-v2", ""};
-
-struct Entries {
-  std::string own_name, run_path;
-  bool is_inherited = false;  ///< the older kind, which is also searched for what the needed libraries need
-  std::vector<std::string> needed;
-};
-
-Entries entries_of(const link_map* library) {
-  Entries entries;
-  const char* texts = nullptr;
-  for (const ElfW(Dyn)* d = library->l_ld; d && d->d_tag != DT_NULL; ++d)
-    if (d->d_tag == DT_STRTAB) texts = reinterpret_cast<const char*>(d->d_un.d_ptr);
-  // The kernel's own library has an offset from its beginning there, not an address.
-  if (!texts || reinterpret_cast<std::uintptr_t>(texts) < library->l_addr) return entries;
-  for (const ElfW(Dyn)* d = library->l_ld; d->d_tag != DT_NULL; ++d) {
-    const char* text = texts + d->d_un.d_val;
-    if (d->d_tag == DT_SONAME) entries.own_name = text;
-    if (d->d_tag == DT_NEEDED) entries.needed.push_back(text);
-    if (d->d_tag == DT_RUNPATH) entries.run_path = text, entries.is_inherited = false;
-    if (d->d_tag == DT_RPATH && entries.run_path.empty()) entries.run_path = text, entries.is_inherited = true;
-  }
-  return entries;
-}
 
 /// The folders of a run path. $ORIGIN is the folder of the library.
 std::vector<std::string> folders_of_run_path(const std::string& run_path, const fs::path& library) {
@@ -58,15 +34,9 @@ std::vector<std::string> folders_of_run_path(const std::string& run_path, const 
 
 class RunPaths {
  public:
-  explicit RunPaths(const link_map* library) {
+  explicit RunPaths(const link_map* library) : loaded_(library) {
     for (const LinkedLibrary& one : framework_libraries()) known_before_.insert(one.path);
     known_before_.insert(framework_file().string());
-    const link_map* first = library;
-    while (first->l_prev) first = first->l_prev;
-    for (; first; first = first->l_next)
-      if (first->l_name && *first->l_name)
-        for (const std::string& name : {entries_of(first).own_name, fs::path(first->l_name).filename().string()})
-          loaded_.try_emplace(name, first);
     add(library, {});
   }
   std::vector<SearchedFolder> folders;
@@ -74,17 +44,17 @@ class RunPaths {
  private:
   void add(const link_map* library, std::vector<std::string> inherited) {
     if (!visited_.insert(library).second) return;
-    const Entries entries = entries_of(library);
+    const DynamicEntries entries = entries_of(library);
     const std::vector<std::string> own = folders_of_run_path(entries.run_path, library->l_name);
     if (entries.is_inherited) inherited.insert(inherited.begin(), own.begin(), own.end());
     for (const std::string& name : entries.needed) {
-      const auto found = loaded_.find(name);
-      if (found == loaded_.end()) continue;
+      const link_map* found = loaded_.find(name);
+      if (!found) continue;
       std::error_code error;
-      const fs::path file = fs::canonical(found->second->l_name, error);
+      const fs::path file = fs::canonical(found->l_name, error);
       if (error || known_before_.contains(file.string())) continue;
       note(name, file, entries.run_path.empty() || entries.is_inherited ? inherited : own);
-      add(found->second, inherited);
+      add(found, inherited);
     }
   }
   void note(const std::string& name, const fs::path& file, const std::vector<std::string>& searched) {
@@ -98,7 +68,7 @@ class RunPaths {
     }
   }
 
-  std::map<std::string, const link_map*> loaded_;
+  const LoadedLibraries loaded_;
   std::set<std::string> known_before_;
   std::set<const link_map*> visited_;
 };
