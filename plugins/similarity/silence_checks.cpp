@@ -3,28 +3,16 @@
 
 #include <algorithm>
 
+#include "marrow/toolbox/analytic/invisible.hpp"
 #include "marrow/toolbox/search/compared.hpp"
 #include "scene.hpp"
 
 namespace marrow::conformance {
 namespace {
 
-/// Draws nothing, as a surface whose triangles face inwards has no outline.
-struct Invisible : OutlineProjector, RadiographProjector {
-  std::vector<OutlinePoint> outline(const Camera&, const RigidTransform&, double) const override { return {}; }
-  std::vector<float> radiograph(const Camera&, const RigidTransform&, const PixelGrid& grid) const override {
-    return std::vector<float>(grid.count());
-  }
-  std::vector<float> radiograph(const Camera&, const RigidTransform&,
-                                const std::vector<Eigen::Vector2f>& pixels) const override {
-    return std::vector<float>(pixels.size());
-  }
-  PixelGrid region(const Camera&, const RigidTransform&) const override { return {60, 60, 1, 120, 120}; }
-};
-
 Inputs inputs_of_nothing_drawn() {
   Inputs inputs = inputs_of({});
-  const auto invisible = std::make_shared<const Invisible>();
+  const auto invisible = std::make_shared<const analytic::InvisibleProjector>(PixelGrid{60, 60, 1, 120, 120});
   inputs.set("projector", Value::of<OutlineProjector>(invisible));
   inputs.set("projector", Value::of<RadiographProjector>(invisible));
   return inputs;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "marrow/toolbox/analytic/body.hpp"
+#include "marrow/toolbox/analytic/invisible.hpp"
 #include "marrow/toolbox/analytic/x_ray_view.hpp"
 #include "shipped.hpp"
 
@@ -17,19 +18,6 @@ constexpr double kPixel_mm = 1.6;
 
 analytic::Body bone() { return {{{0, 0, 8}, {9, 13, 32}}, {{20, -5, -22}, {8, 10, 9}}}; }
 RigidTransform truth() { return analytic::moved_by({0.2, -0.15, 0.3}, {3, -2, 5}); }
-
-/// Draws nothing, as a surface whose triangles face inwards has no outline.
-struct Invisible : OutlineProjector, RadiographProjector {
-  std::vector<OutlinePoint> outline(const Camera&, const RigidTransform&, double) const override { return {}; }
-  std::vector<float> radiograph(const Camera&, const RigidTransform&, const PixelGrid& grid) const override {
-    return std::vector<float>(grid.count());
-  }
-  std::vector<float> radiograph(const Camera&, const RigidTransform&,
-                                const std::vector<Eigen::Vector2f>& pixels) const override {
-    return std::vector<float>(pixels.size());
-  }
-  PixelGrid region(const Camera&, const RigidTransform&) const override { return {20, 20, 1, 80, 80}; }
-};
 
 /// What is given to a cost, and the pose from which it is minimised.
 struct Scene {
@@ -52,7 +40,8 @@ struct Scene {
     start.world_from_model = moved(truth(), start.frame, Vector6d::Constant(0.01));
   }
   void draw_nothing() {
-    outline = std::make_shared<const Invisible>(), radiograph = std::make_shared<const Invisible>();
+    const auto invisible = std::make_shared<const analytic::InvisibleProjector>(PixelGrid{20, 20, 1, 80, 80});
+    outline = invisible, radiograph = invisible;
   }
   void change(const std::function<void(View&, EdgeMap&)>& of_view) {
     List<View> changed_views;

@@ -17,17 +17,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMostNamed = 20;  // files in one message
 
-/// By its first bytes. Media for patients come with a program that shows the images.
-bool is_program_or_archive(const fs::path& path) {
-  const InputFile file(path, true);
-  const std::string head = file.text(0, std::size_t(std::min<std::uint64_t>(file.size(), 4)));
-  return head.rfind("MZ", 0) == 0 ||
-         head ==
-             "\x7f"
-             "ELF" ||
-         head == "PK\x03\x04";
-}
-
 /// Whether the name of a file that is not DICOM shows that it is no slice: a licence, a note, a picture, a file of
 /// marrow. A file with any other name, such as "IM5", may be the rest of a damaged slice.
 bool is_no_slice_by_name(const fs::path& path) {
@@ -45,7 +34,7 @@ bool is_no_slice_by_name(const fs::path& path) {
       ".xlsx", ".xml",  ".yaml",   ".yml", ".zip",    ".zraw"};
   const std::string name = in_small_letters(path.filename().string()),
                     extension = in_small_letters(path.extension().string());
-  return name[0] == '.' || is_program_or_archive(path) || kNames.count(name) > 0 || kExtensions.count(extension) > 0 ||
+  return name[0] == '.' || kNames.count(name) > 0 || kExtensions.count(extension) > 0 ||
          (name.size() > 7 && name.compare(name.size() - 7, 7, ".nii.gz") == 0);
 }
 
@@ -61,6 +50,21 @@ bool is_text_beside_slices(const fs::path& path, const std::set<std::string>& ex
   const std::string head = file.text(0, std::size_t(std::min<std::uint64_t>(file.size(), 4096)));
   return !head.empty() && std::all_of(head.begin(), head.end(),
                                       [](unsigned char c) { return c >= 32 || c == '\t' || c == '\n' || c == '\r'; });
+}
+
+/// By its first bytes. Media for patients come with a program that shows the images.
+bool is_program_or_archive(const fs::path& path) {
+  const InputFile file(path, true);
+  const std::string head = file.text(0, std::size_t(std::min<std::uint64_t>(file.size(), 4)));
+  return head.rfind("MZ", 0) == 0 ||
+         head ==
+             "\x7f"
+             "ELF" ||
+         head == "PK\x03\x04";
+}
+
+bool is_surely_no_slice(const fs::path& path, const std::set<std::string>& extensions_of_dicom) {
+  return is_no_slice_by_name(path) || is_program_or_archive(path) || is_text_beside_slices(path, extensions_of_dicom);
 }
 
 /// What is in a folder.
@@ -112,7 +116,7 @@ void sort_out_others(const fs::path& folder, const Content& content, SeriesFiles
   std::vector<std::string> doubtful;
   for (const fs::path& path : content.others) {
     const std::string name = path.filename().string();
-    if (is_no_slice_by_name(path) || is_text_beside_slices(path, extensions))
+    if (is_surely_no_slice(path, extensions))
       files.passed_over.push_back(name);
     else
       doubtful.push_back(name + ": this file in the series' folder is no whole DICOM file (" + why_not_dicom(path) +
@@ -187,8 +191,7 @@ void check_folders_below(const fs::path& root, const Content& content, const std
         if (object.not_a_slice.empty() && (!object.is_legible || object.series == series))
           doubtful.push_back("'" + object.path.lexically_relative(folder).string() + "'");
       for (const fs::path& path : below.others)
-        if (!is_no_slice_by_name(path) && !is_text_beside_slices(path, {}))
-          doubtful.push_back("'" + path.lexically_relative(folder).string() + "'");
+        if (!is_surely_no_slice(path, {})) doubtful.push_back("'" + path.lexically_relative(folder).string() + "'");
     }
     files.passed_over.push_back(folder.filename().string() + "/");
     if (doubtful.empty()) continue;
