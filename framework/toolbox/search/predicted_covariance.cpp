@@ -7,12 +7,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <set>
 
 #include "marrow/domain/decompositions.hpp"
 
 #include "marrow/domain/number_text.hpp"
+#include "speaking_blocks.hpp"
 
 namespace marrow::search {
 namespace {
@@ -25,26 +24,7 @@ constexpr int kMostRounds = 5;
 constexpr double kMostVariance = 100 * 100;  // in squared steps; used for directions that nothing determines
 constexpr double kMattersBelow = 12;         // rise of a cost along the least certain direction, in units of its noise
 
-constexpr std::size_t kFewBlocks = 2;
-
 std::string number(double value) { return formatted("%.3g", value); }
-
-/// The blocks without which the cost is another.
-std::set<Eigen::Index> blocks_that_speak(const Eigen::VectorXd& without_block, double whole) {
-  constexpr double kRounding = 1e-9;  // relative, of sums from which those of a block are taken away
-  std::set<Eigen::Index> speak;
-  for (Eigen::Index i = 0; i < without_block.size(); ++i)
-    if (!(std::abs(without_block[i] - whole) <= kRounding * std::max(std::abs(without_block[i]), std::abs(whole))))
-      speak.insert(i);
-  return speak;
-}
-
-/// The blocks that say nothing leave the same.
-std::size_t blocks_that_speak(const std::vector<Cost::Expansion>& without_block) {
-  std::map<double, int> alike;
-  for (const Cost::Expansion& one : without_block) ++alike[one.curvature.sum() + one.gradient.sum()];
-  return std::size_t(std::count_if(alike.begin(), alike.end(), [](const auto& one) { return one.second == 1; }));
-}
 
 }  // namespace
 
@@ -165,7 +145,7 @@ bool PredictedCovariance::differentiate() {
   const auto whole = cost_.expansion(pose_, frame_);
   if (without_block.empty() || !whole) return false;
   evaluations_ += 2;
-  if (blocks_that_speak(without_block) <= kFewBlocks) return false;
+  if (count_of_blocks_that_speak(without_block) <= kFewBlocks) return false;
   Vector6d unit = Vector6d::Ones();
   unit.head<3>() *= radians(1);
   Matrix6d sum = Matrix6d::Zero(), mean = Matrix6d::Zero();

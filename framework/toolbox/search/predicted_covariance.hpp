@@ -27,8 +27,9 @@ RigidTransform moved_by_units(const RigidTransform& pose, const FragmentFrame& f
 /// Along the least certain direction the cost may have other minima, or be flatter than its curvature says. So the
 /// variance in this direction becomes that of the density exp(-cost / noise) along it, if this is twice as large.
 ///
-/// No deviation is 0: if no block moves the minimum, all are the least step. The cost must have compared something at
-/// the pose (compared.hpp).
+/// If only one or two blocks say anything, or the cost hardly changes along any axis, nothing is known: all deviations
+/// are huge. No deviation is 0: if no block moves the minimum, all are the least step. The cost must have compared
+/// something at the pose (compared.hpp).
 class PredictedCovariance {
  public:
   PredictedCovariance(const Cost& cost, const RigidTransform& pose, const FragmentFrame& frame);
