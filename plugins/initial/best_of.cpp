@@ -36,10 +36,7 @@ Pose refined(const Pose& start, const marrow::Cost& cost, const marrow::Optimize
 
 /// "second is the best start, with a cost of 0.21; first 0.4, third 0.9".
 std::string comparison_of(const std::vector<Way>& ways, const Way& best) {
-  const auto cost_text = [](const Way& way) {
-    const std::string text = marrow::formatted("%.6g", way.pose.cost);
-    return text;
-  };
+  const auto cost_text = [](const Way& way) { return marrow::formatted("%.6g", way.pose.cost); };
   std::string text = best.name + " is the best start, with a cost of " + cost_text(best), separator = "; ";
   for (const Way& way : ways) {
     if (way.name == best.name) continue;
@@ -74,10 +71,7 @@ Pose best_of(const Pose* first, const Pose* second, const Pose* third, const Pos
     else
       silent += (silent.empty() ? "" : "; ") + name + ": " + why;
   }
-  if (ways.empty())
-    throw marrow::Error("the images say nothing about any start: " + silent +
-                        "; give a start nearer to the bone, or see whether the masks, the edges and the model are "
-                        "right");
+  if (ways.empty()) marrow::search::refuse_pose(silent, "any start");
   if (!silent.empty()) context.info("the images say nothing about a start: " + silent);
   // Of equal ones, the first.
   const auto best =

@@ -173,7 +173,7 @@ void warn_of_image(const fs::path& folder, const YamlMap& map, const marrow::Cam
   for (const std::string& doubt : has_patient_axes ? marrow::files::doubts_about_sides(image, 0, camera)
                                                    : marrow::files::doubts_about_sides(image))
     context.warn(doubt);
-  for (const std::string& doubt : marrow::files::doubts_about_pixels(image)) context.warn(doubt);
+  marrow::files::warn_of_pixels(image, context);
 }
 
 void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result, marrow::Context& context) {

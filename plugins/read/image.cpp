@@ -13,7 +13,7 @@ struct Options {
 };
 
 marrow::Image image(const Options& options, marrow::Context& context) {
-  for (const std::string& doubt : marrow::files::doubts_about_pixels(options.path)) context.warn(doubt);
+  marrow::files::warn_of_pixels(options.path, context);
   return marrow::files::turned_over(marrow::files::read_image_file(options.path, options.frame), options.mirror);
 }
 
@@ -25,8 +25,8 @@ MARROW_PLUGIN(plugin) {
           "Reads a grey image from PNG, TIFF, JPEG, BMP, DICOM, MetaImage, NRRD or NIfTI, whatever its file is named")
       .out("image",
            "grey values, bright = air; 8 and 16 bits are kept, others become float; a DICOM image is scaled as its "
-           "header says; a DICOM X-ray image is also "
-           "mirrored and inverted if needed, so that it fits the camera of its header")
+           "header says; a DICOM X-ray image is also mirrored and inverted if needed, so that it fits the camera of "
+           "its header")
       .option("path", &Options::path, "image file", marrow::required())
       .option("frame", &Options::frame, "frame of a multi-frame file, counted from 1; 0: the file has only one frame",
               marrow::at_least(0))

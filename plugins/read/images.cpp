@@ -19,7 +19,7 @@ marrow::List<marrow::Image> images(const Options& options, marrow::Context& cont
     const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names.at(i);
     marrow::check_item_name("view", name);
     if (images.find(name)) throw marrow::Error("names: two images are named '" + name + "'; name each differently");
-    for (const std::string& doubt : marrow::files::doubts_about_pixels(options.paths[i])) context.warn(doubt);
+    marrow::files::warn_of_pixels(options.paths[i], context);
     images.add(name, marrow::files::read_image_file(options.paths[i], options.frame));
   }
   return images;

@@ -23,8 +23,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("read.mesh", mesh)
       .summary(
           "Reads a surface from STL, PLY, OBJ or VTP; equal vertices are merged, and a closed surface that faces "
-          "inwards "
-          "is turned")
+          "inwards is turned")
       .out("mesh", "the surface in mm")
       .option("path", &Options::path,
               "file; its end says the format: .stl, .ply, .obj or .vtp; where it says SPACE=RAS, it becomes LPS",

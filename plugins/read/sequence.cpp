@@ -27,10 +27,6 @@ struct Options : files::FrameRange {
   double scale = 1;
 };
 
-void warn_of_pixels(const fs::path& image, Context& context) {
-  for (const std::string& doubt : files::doubts_about_pixels(image)) context.warn(doubt);
-}
-
 std::vector<Image> read_images(const fs::path& path, const std::string& pattern, const Options& options,
                                Context& context) {
   if (!fs::is_directory(path)) {
@@ -38,12 +34,12 @@ std::vector<Image> read_images(const fs::path& path, const std::string& pattern,
       throw Error(path.string() + ": a pattern chooses files of a folder, but this is no folder; leave it out");
     const char* const container = read_sequence::video_container(path);
     if (container) return read_sequence::read_video(path, container, options);
-    warn_of_pixels(path, context);
+    files::warn_of_pixels(path, context);
     return files::read_image_frames(path, options);
   }
   const std::vector<fs::path> all = files::frame_files(path, pattern);
   std::vector<Image> images;
-  warn_of_pixels(all.front(), context);  // the others are alike
+  files::warn_of_pixels(all.front(), context);  // the others are alike
   for (const int frame : files::frames_of(options, int(all.size()), path.string())) {
     context.check_cancelled();
     images.push_back(files::read_image_file(all[std::size_t(frame - 1)]));

@@ -27,7 +27,7 @@ marrow::View view(const marrow::Camera* camera, const Options& options, marrow::
        options.projection, options.pixel_mm, options.corner_mm, options.scale},
       context);
   for (const std::string& doubt : marrow::files::doubts_about_sides(options.image, options.frame)) context.warn(doubt);
-  for (const std::string& doubt : marrow::files::doubts_about_pixels(options.image)) context.warn(doubt);
+  marrow::files::warn_of_pixels(options.image, context);
   return view;
 }
 

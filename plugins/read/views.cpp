@@ -39,7 +39,7 @@ marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, co
                   context));
     for (const std::string& doubt : marrow::files::doubts_about_sides(options.images.at(i), options.frame))
       context.warn(doubt);
-    for (const std::string& doubt : marrow::files::doubts_about_pixels(options.images.at(i))) context.warn(doubt);
+    marrow::files::warn_of_pixels(options.images.at(i), context);
   }
   return views;
 }

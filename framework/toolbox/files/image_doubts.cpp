@@ -28,17 +28,15 @@ bool is_lossy_image(const std::filesystem::path& image) {
   return format == FileFormat::jpeg || (format == FileFormat::dicom && is_lossy_dicom(image));
 }
 
-std::vector<std::string> doubts_about_pixels(const std::filesystem::path& image) {
-  std::vector<std::string> doubts;
+void warn_of_pixels(const std::filesystem::path& image, const Context& context) {
   if (is_lossy_image(image))
-    doubts.push_back(image.string() +
-                     ": was compressed with loss (JPEG or the like): grey levels are changed a little, most where "
-                     "edges are, and may have lost bits; use the device's own file where there is one");
+    context.warn(image.string() +
+                 ": was compressed with loss (JPEG or the like): grey levels are changed a little, most where edges "
+                 "are, and may have lost bits; use the device's own file where there is one");
   if (file_format(image) == FileFormat::nifti)
-    doubts.push_back(image.string() +
-                     ": NIfTI does not say which row of an image is the upper one; the first that is stored is taken "
-                     "as the upper one, as ITK writes it: compare it with the anatomy, or save it as PNG");
-  return doubts;
+    context.warn(image.string() +
+                 ": NIfTI does not say which row of an image is the upper one; the first that is stored is taken as "
+                 "the upper one, as ITK writes it: compare it with the anatomy, or save it as PNG");
 }
 
 }  // namespace marrow::files

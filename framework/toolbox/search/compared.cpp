@@ -33,8 +33,8 @@ std::string nothing_compared(const Cost& cost, const RigidTransform& pose, const
   return is_constant(cost, here, pose, frame) ? "the cost is the same at all poses within 16 degrees and mm" : "";
 }
 
-void refuse_pose(const std::string& why) {
-  throw Error("the images say nothing about the pose that was found: " + why +
+void refuse_pose(const std::string& why, const std::string& which) {
+  throw Error("the images say nothing about " + which + ": " + why +
               "; give a start nearer to the bone, or see whether the masks, the edges and the model are right");
 }
 

@@ -9,7 +9,6 @@
 #include <limits>
 
 #include "marrow/domain/decompositions.hpp"
-
 #include "marrow/domain/number_text.hpp"
 #include "speaking_blocks.hpp"
 

@@ -14,7 +14,8 @@ std::string nothing_compared(const Cost& cost, const RigidTransform& pose, const
 /// Throws Error if the images say nothing about a pose that was found.
 void check_compared(const Cost& cost, const RigidTransform& pose, const FragmentFrame& frame);
 /// The error for this reason.
-[[noreturn]] void refuse_pose(const std::string& why_nothing_is_compared);
+[[noreturn]] void refuse_pose(const std::string& why_nothing_is_compared,
+                              const std::string& which = "the pose that was found");
 
 /// Adds a warning for each view that says nothing about the pose, to the pose and to the log, unless the pose has it.
 void warn_of_silent_views(const Cost& cost, Pose& pose, const Context& context);
