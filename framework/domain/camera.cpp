@@ -2,6 +2,7 @@
 #include "marrow/domain/camera.hpp"
 
 #include <Eigen/LU>
+#include <cmath>
 #include <limits>
 
 #include "marrow/domain/error.hpp"
@@ -36,9 +37,16 @@ Plane back_project_line(const Camera& camera, const Eigen::Vector3d& line) {
   return plane;
 }
 
+Eigen::Vector2d offset_at_mm(const Camera& camera, const Eigen::Vector3d& world_mm, const Eigen::Vector2d& offset_px) {
+  const double depth = (camera.camera_from_world * world_mm).z();
+  const Eigen::Matrix3d& k = camera.intrinsics;
+  const double y = offset_px.y() / k(1, 1), x = (offset_px.x() - k(0, 1) * y) / k(0, 0);
+  return {depth * x, depth * y};
+}
+
 double pixel_size_at_mm(const Camera& camera, const Eigen::Vector3d& world_mm) {
   const double depth = (camera.camera_from_world * world_mm).z();
-  return depth / (0.5 * (camera.intrinsics(0, 0) + camera.intrinsics(1, 1)));
+  return depth / std::sqrt(camera.intrinsics(0, 0) * camera.intrinsics(1, 1));
 }
 
 void check_camera(const Camera& camera, const std::string& what) {

@@ -12,6 +12,8 @@
 namespace marrow {
 namespace {
 
+constexpr const char* kNoArea =
+    ": the surface has no area, as all its triangles are points or lines; check the file or the node that it is from";
 constexpr double kFarthest_mm = 1e6;  // larger than any room; up to here, sums of squares are exact enough
 
 std::string in_metres(double length_mm) { return formatted("%.3g m", length_mm / 1000); }
@@ -37,6 +39,7 @@ void check_mesh(const Mesh& mesh, const std::string& what) {
     else if (!(vertex.cwiseAbs().maxCoeff() <= kFarthest_mm))
       throw Error(what + ": a vertex lies " + in_metres(vertex.cwiseAbs().maxCoeff()) +
                   " from the origin; expected coordinates in mm, of at most 1 km");
+  if (!(surface_area_mm2(mesh) > 0)) throw Error(what + kNoArea);
 }
 
 bool is_closed(const Mesh& mesh) {
@@ -69,8 +72,9 @@ double surface_area_mm2(const Mesh& mesh) {
 }
 
 std::vector<Eigen::Vector3d> sample_surface(const Mesh& mesh, std::size_t count) {
-  std::vector<Eigen::Vector3d> points;
   const double step = surface_area_mm2(mesh) / double(count);
+  if (!(step > 0)) throw Error(std::string("points on a surface") + kNoArea);
+  std::vector<Eigen::Vector3d> points;
   double passed = 0;
   for (const auto& t : mesh.triangles) {
     const double area = 0.5 * area_vector(mesh, t).norm();
@@ -103,6 +107,7 @@ FragmentFrame fragment_frame(const Mesh& mesh) {
         weight / 12 * (9 * centre * centre.transpose() + a * a.transpose() + b * b.transpose() + c * c.transpose());
   }
   FragmentFrame frame;
+  frame.is_anatomical = true;
   frame.origin_mm = first / area;
   const Eigen::Matrix3d covariance = second / area - frame.origin_mm * frame.origin_mm.transpose();
   Eigen::Vector3d along = eigen_of_symmetric(covariance).vectors.col(2);

@@ -1,7 +1,55 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/domain/pose.hpp"
 
+#include <algorithm>
+#include <cmath>
+
+#include "marrow/domain/decompositions.hpp"
+#include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
+
 namespace marrow {
+namespace {
+
+constexpr double kRounding = 1e-9;
+
+/// The correlations: the covariance in units of its own deviations, so that radians and mm can be compared. A row whose
+/// variance is 0 stays as it is.
+Matrix6d correlations(const Matrix6d& covariance) {
+  const Vector6d deviation = covariance.diagonal().cwiseSqrt();
+  const Vector6d scale = (deviation.array() > 0).select(deviation.cwiseInverse(), Vector6d::Ones());
+  return scale.asDiagonal() * covariance * scale.asDiagonal();
+}
+
+}  // namespace
+
+void check_covariance(const Matrix6d& covariance, const std::string& what) {
+  constexpr const char* kRemedy = "; a covariance is symmetric and has no negative eigenvalue";
+  const auto place = [](Eigen::Index row, Eigen::Index column) {
+    return "row " + std::to_string(row + 1) + ", column " + std::to_string(column + 1);
+  };
+  for (Eigen::Index i = 0; i < 6; ++i)
+    if (covariance(i, i) < 0)
+      throw Error(what + ": the covariance has the negative variance " + formatted("%g", covariance(i, i)) + " in " +
+                  place(i, i) + kRemedy);
+  if (!covariance.allFinite()) return;
+  const Matrix6d scaled = correlations(covariance);
+  Eigen::Index row = 0, column = 0;
+  if (const double apart = (scaled - scaled.transpose()).cwiseAbs().maxCoeff(&row, &column); apart > kRounding)
+    throw Error(what + ": the covariance is not symmetric: " + formatted("%g", covariance(row, column)) + " in " +
+                place(row, column) + ", but " + formatted("%g", covariance(column, row)) + " in " + place(column, row) +
+                kRemedy);
+  const double least = eigen_of_symmetric<6>(0.5 * (scaled + scaled.transpose())).values[0];
+  if (least < -kRounding)
+    throw Error(what + ": the covariance has a negative eigenvalue (" + formatted("%g", least) +
+                " times its variances)" + kRemedy);
+}
+
+void check_pose(const Pose& pose, const std::string& what) {
+  check_rigid(pose.world_from_model, what);
+  check_rigid({"model", "fragment", pose.frame.axes, pose.frame.origin_mm}, what + ": the axes of its fragment");
+  if (pose.covariance) check_covariance(*pose.covariance, what);
+}
 
 RigidTransform moved(const RigidTransform& world_from_model, const FragmentFrame& frame, const Vector6d& motion) {
   const Eigen::Matrix3d turn = rotation_from_vector(frame.axes * motion.head<3>());

@@ -41,7 +41,8 @@ json json_of(const OptionInfo& option) {
   json j = {{"name", option.name},         {"help", option.help},
             {"unit", option.unit},         {"type", kOptionTypes[int(option.type)]},
             {"required", option.required}, {"default", marrow::json_of(option.default_value)},
-            {"choices", option.choices},   {"length", option.length}};
+            {"choices", option.choices},   {"length", option.length},
+            {"replaces", option.replaces}};
   if (option.minimum) j["minimum"] = *option.minimum;
   if (option.maximum) j["maximum"] = *option.maximum;
   return j;
@@ -170,7 +171,7 @@ int one_of(const char* const (&names)[Count], const std::string& text, const std
 }
 
 OptionInfo option_from(const json& j) {
-  const JsonObject fields(j, "an option", 8 + j.contains("minimum") + j.contains("maximum"));
+  const JsonObject fields(j, "an option", 9 + j.contains("minimum") + j.contains("maximum"));
   OptionInfo option;
   option.name = fields.text("name");
   option.help = fields.text("help");
@@ -180,6 +181,7 @@ OptionInfo option_from(const json& j) {
   option.default_value = default_from(fields, option.type);
   option.choices = fields.texts("choices");
   option.length = std::size_t(fields.integer("length", 0, kMostBytes_of_value));
+  option.replaces = fields.texts("replaces");
   const auto* numbers = std::get_if<std::vector<double>>(&option.default_value);
   if (option.length && (!numbers || numbers->size() != option.length))
     damaged("the default of '" + option.name + "' does not have " + std::to_string(option.length) + " numbers");

@@ -35,6 +35,9 @@ void apply(OptionInfo& option, const Attribute& attribute) {
     case Attribute::Type::required:
       option.required = true;
       break;
+    case Attribute::Type::replaces:
+      option.replaces.assign(attribute.names.begin(), attribute.names.end());
+      break;
   }
 }
 

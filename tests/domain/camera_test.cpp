@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <marrow/domain/camera.hpp>
 
 #include "domain/message_of.hpp"
@@ -68,7 +69,24 @@ TEST(Camera, PixelSizeShrinksTowardsTheSource) {
   camera.intrinsics(1, 1) = 2000;
   EXPECT_DOUBLE_EQ(pixel_size_at_mm(camera, {0, 0, 0}), 0.3);
   EXPECT_DOUBLE_EQ(pixel_size_at_mm(camera, {50, 400, -20}), 0.5);
-  EXPECT_DOUBLE_EQ(pixel_size_at_mm(frontal(), {0, 0, 0}), 600 / 3000.0) << "by the mean of both focal lengths";
+  EXPECT_DOUBLE_EQ(pixel_size_at_mm(frontal(), {0, 0, 0}), 600 / std::sqrt(2000.0 * 4000)) << "the pixel's area";
+}
+
+// A finite difference of project(): a point that moves by the offset in mm moves its image by the offset in pixels.
+// With focal lengths of 2000 and 4000 pixels at 600 mm, (3, 4) pixels are 0.9 mm and 0.6 mm by hand.
+TEST(Camera, AnOffsetInTheImageInMillimetres) {
+  marrow::Camera camera = frontal();
+  camera.intrinsics(0, 0) = 2000;
+  camera.intrinsics(1, 1) = 4000;
+  EXPECT_TRUE(offset_at_mm(camera, {0, 0, 0}, {3, 4}).isApprox(Vector2d(0.9, 0.6), 1e-12));
+  camera.intrinsics(0, 1) = 150;  // skewed
+  const Vector3d point(50, 40, -20);
+  for (const Vector2d& offset_px : {Vector2d(1, 0), Vector2d(0, 1), Vector2d(-3, 2)}) {
+    constexpr double kSmall = 1e-5;
+    const Vector2d mm = kSmall * offset_at_mm(camera, point, offset_px);
+    const Vector3d moved = point + camera.camera_from_world.rotation.transpose() * Vector3d(mm.x(), mm.y(), 0);
+    EXPECT_TRUE(((project(camera, moved) - project(camera, point)) / kSmall).isApprox(offset_px, 1e-6));
+  }
 }
 
 TEST(Camera, CheckNamesTheFault) {

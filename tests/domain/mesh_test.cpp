@@ -166,6 +166,12 @@ TEST(Mesh, CheckNamesTheFault) {
   EXPECT_EQ(message_of([&] { check_mesh(mesh, "model"); }), "model: a triangle names vertex 8, but there are only 8");
   EXPECT_EQ(message_of([&] { check_mesh(Mesh{}, "model"); }), "model: the surface has no triangles");
   EXPECT_EQ(message_of([&] { fragment_frame(Mesh{}); }), "fragment frame: the surface has no triangles");
+  const Mesh line{{{0, 0, 0}, {0, 0, 1}, {0, 0, 3}}, {{0, 1, 2}}};
+  const std::string no_area =
+      ": the surface has no area, as all its triangles are points or lines; check the file or the node that it is from";
+  EXPECT_EQ(message_of([&] { check_mesh(line, "model"); }), "model" + no_area);
+  EXPECT_EQ(message_of([&] { fragment_frame(line); }), "fragment frame" + no_area);
+  EXPECT_EQ(message_of([&] { sample_surface(line, 10); }), "points on a surface" + no_area);
 }
 
 }  // namespace mesh_test

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <marrow/domain/pose.hpp>
 
 #include "domain/message_of.hpp"
@@ -84,6 +85,43 @@ TEST(Pose, ASmallMotionInAnotherFrame) {
   const marrow::RigidTransform start{"ct", "ct"};
   const marrow::Vector6d expected = marrow::motion_between(start, marrow::moved(start, from, motion), to);
   EXPECT_TRUE((marrow::change_of_frame(from, to) * motion).isApprox(expected, 1e-4));
+}
+
+// By hand: [1 c; c 1] has the eigenvalues 1 - c and 1 + c.
+TEST(Covariance, WhatIsNone) {
+  using marrow::Matrix6d;
+  const auto refused = [](const Matrix6d& covariance) {
+    return marrow::test::message_of([&] { marrow::check_covariance(covariance, "pose 'distal'"); });
+  };
+  Matrix6d covariance = marrow::Vector6d(1e-6, 1e-6, 1e-4, 0.01, 0.01, 4).asDiagonal();
+  EXPECT_EQ(refused(covariance), "");
+  EXPECT_EQ(refused(Matrix6d::Zero()), "") << "exactly known";
+  EXPECT_EQ(refused(-Matrix6d::Identity()),
+            "pose 'distal': the covariance has the negative variance -1 in row 1, column 1; a covariance is symmetric "
+            "and has no negative eigenvalue");
+  covariance(2, 5) = 0.01;
+  EXPECT_EQ(refused(covariance),
+            "pose 'distal': the covariance is not symmetric: 0.01 in row 3, column 6, but 0 in row 6, column 3; a "
+            "covariance is symmetric and has no negative eigenvalue");
+  covariance(5, 2) = 0.01;
+  EXPECT_EQ(refused(covariance), "") << "a correlation of 0.5";
+  covariance(2, 5) = covariance(5, 2) = 0.03;
+  EXPECT_EQ(refused(covariance),
+            "pose 'distal': the covariance has a negative eigenvalue (-0.5 times its variances); a covariance is "
+            "symmetric and has no negative eigenvalue")
+      << "a correlation of 1.5";
+  covariance(2, 5) = covariance(5, 2) = 0.02;
+  EXPECT_EQ(refused(covariance), "") << "a correlation of 1 leaves a direction that is exactly known";
+  covariance(5, 5) = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(refused(covariance), "") << "not known along an axis";
+}
+
+TEST(Pose, TheAxesOfAFragmentAreARotation) {
+  marrow::Pose pose;
+  EXPECT_EQ(marrow::test::message_of([&] { marrow::check_pose(pose, "pose"); }), "");
+  pose.frame.axes.col(1) *= -1;
+  EXPECT_NE(marrow::test::message_of([&] { marrow::check_pose(pose, "pose"); }).find("pose: the axes of its fragment"),
+            std::string::npos);
 }
 
 }  // namespace pose_test

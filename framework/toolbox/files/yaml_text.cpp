@@ -63,14 +63,17 @@ void put_borders(YAML::Emitter& out, const Pair& pair) {
 }
 
 /// Standard deviations for human readers: degrees about and mm along the fragment's axes.
-void put_deviations(YAML::Emitter& out, const Matrix6d& covariance) {
+void put_deviations(YAML::Emitter& out, const Matrix6d& covariance, const FragmentFrame& frame) {
   Eigen::Vector3d rotation_deg, translation_mm;
   for (int i = 0; i < 3; ++i) {
     rotation_deg[i] = degrees(std::sqrt(covariance(i, i)));
     translation_mm[i] = std::sqrt(covariance(3 + i, 3 + i));
   }
   out << Key << "predicted_deviation" << Value
-      << Comment("one standard deviation about and along the fragment's frontal, lateral and long axes") << BeginMap;
+      << Comment(frame.is_anatomical
+                     ? "one standard deviation about and along the fragment's frontal, lateral and long axes"
+                     : "one standard deviation about and along the axes of fragment_frame")
+      << BeginMap;
   put_vector(out << Key << "rotation_deg" << Value, rotation_deg);
   put_vector(out << Key << "translation_mm" << Value, translation_mm);
   out << EndMap;
@@ -78,10 +81,13 @@ void put_deviations(YAML::Emitter& out, const Matrix6d& covariance) {
 
 void put_frame(YAML::Emitter& out, const FragmentFrame& frame) {
   out << Key << "fragment_frame" << Value
-      << Comment("the axes that the deviations are about, in CT coordinates; columns: frontal, lateral, long")
+      << Comment(frame.is_anatomical
+                     ? "the axes that the deviations are about, in CT coordinates; columns: frontal, lateral, long"
+                     : "the axes that the deviations are about, in CT coordinates; they are not those of the bone")
       << BeginMap;
   put_vector(out << Key << "origin_mm" << Value, frame.origin_mm);
   put_matrix(out << Key << "axes" << Value, frame.axes);
+  if (!frame.is_anatomical) out << Key << "anatomical" << Value << false;
   out << EndMap;
 }
 
@@ -146,11 +152,11 @@ std::string pose(const Pose& pose) {
   YAML::Emitter out;
   out << BeginMap << Key << "marrow-pose" << Value << 1;
   put_transform(out, pose.world_from_model);
-  if (pose.covariance) put_deviations(out, *pose.covariance);
+  if (pose.covariance) put_deviations(out, *pose.covariance, pose.frame);
   put_texts(out, "warnings", pose.warnings);
   if (std::isfinite(pose.cost)) out << Key << "cost" << Value << number(pose.cost);
   out << Key << "evaluations" << Value << pose.evaluations;
-  put_frame(out, pose.frame);
+  if (pose.frame.is_anatomical || pose.covariance) put_frame(out, pose.frame);
   if (pose.covariance && pose.covariance->allFinite()) {
     out << Key << "covariance" << Value << Comment("of rotation [rad] and translation [mm] about and along these axes");
     put_matrix(out, *pose.covariance);

@@ -18,7 +18,7 @@ void check_frame(const YamlMap& map, const std::string& key, const std::string& 
 }
 
 std::optional<FragmentFrame> frame_from(const YAML::Node& node, YamlFile& file) {
-  const YamlMap map(file, node, "fragment_frame", {"origin_mm", "axes"});
+  const YamlMap map(file, node, "fragment_frame", {"origin_mm", "axes", "anatomical"});
   const auto origin = map.vector3("origin_mm");
   const auto axes = map.matrix("axes", 3, 3);
   if (!origin || !axes) return std::nullopt;
@@ -28,7 +28,7 @@ std::optional<FragmentFrame> frame_from(const YAML::Node& node, YamlFile& file) 
     map.fault("axes", error.what());
     return std::nullopt;
   }
-  return FragmentFrame{*origin, *axes};
+  return FragmentFrame{*origin, *axes, map.boolean_or("anatomical", true)};
 }
 
 }  // namespace

@@ -42,8 +42,12 @@ struct Plane {
 /// and Zisserman 2004, 8.1); Eq 7 of the chapter uses an orthogonal projection instead.
 Plane back_project_line(const Camera& camera, const Eigen::Vector3d& line);
 
-/// Size of a pixel at a world point, in mm: how far the point must move across the viewing direction for its image to
-/// move by one pixel.
+/// How far, along the camera's x and y axes, a world point must move for its image to move by a small offset: the
+/// inverse of the projection's derivative. It holds for pixels of any shape.
+Eigen::Vector2d offset_at_mm(const Camera& camera, const Eigen::Vector3d& world_mm, const Eigen::Vector2d& offset_px);
+
+/// Size of a pixel at a world point, in mm: the square root of its area there, parallel to the detector. Only for what
+/// is the same in all directions, such as a blur; a distance in the image is turned into mm by offset_at_mm().
 double pixel_size_at_mm(const Camera& camera, const Eigen::Vector3d& world_mm);
 
 /// Throws Error if the image size is not positive or a side has more than 65536 pixels, if the camera matrix does not

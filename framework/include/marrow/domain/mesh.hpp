@@ -43,9 +43,12 @@ std::vector<Eigen::Vector3d> sample_surface(const Mesh& mesh, std::size_t count)
 struct FragmentFrame {
   Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
-  using fields = Fields<&FragmentFrame::origin_mm, &FragmentFrame::axes>;
+  /// Whether it is as described above. If not, it is any other origin and axes, such as those of the CT, about which
+  /// nobody may say "the long axis" or "shortening".
+  bool is_anatomical = false;
+  using fields = Fields<&FragmentFrame::origin_mm, &FragmentFrame::axes, &FragmentFrame::is_anatomical>;
 };
-/// Throws Error as check_mesh() does.
+/// Throws Error as check_mesh() does, and if the surface has no area.
 FragmentFrame fragment_frame(const Mesh& mesh);
 
 }  // namespace marrow

@@ -35,6 +35,13 @@ struct Pose {
                         &Pose::evaluations, &Pose::convergence>;
 };
 
+/// Throws Error unless the covariance is symmetric and positive semidefinite, to 1e-9 of its deviations. Infinite and
+/// NaN variances are allowed: they say that the direction is not known. `what` names the pose in the message.
+void check_covariance(const Matrix6d& covariance, const std::string& what);
+/// Throws Error as check_rigid() does, as check_covariance() does if there is a covariance, and if the frame's axes are
+/// not a rotation. `what` names the pose in the message.
+void check_pose(const Pose& pose, const std::string& what);
+
 /// The pose after a small motion (r [rad], t [mm]) as defined at Pose.
 RigidTransform moved(const RigidTransform& world_from_model, const FragmentFrame& frame, const Vector6d& motion);
 

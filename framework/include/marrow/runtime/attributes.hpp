@@ -17,7 +17,7 @@ struct Over {
 };
 /// A property of an option. The texts must live until the option is declared.
 struct Attribute {
-  enum class Type { minimum, maximum, unit, choices, required };
+  enum class Type { minimum, maximum, unit, choices, required, replaces };
   Type type = Type::required;
   double number = 0;
   std::string_view text = {};
@@ -36,6 +36,11 @@ inline Attribute one_of(std::initializer_list<std::string_view> names) {
 }
 /// A pipeline must give this option.
 inline Attribute required() { return {}; }
+/// This option replaces the options of these names of the nodes whose functions reach this node: what such a node says
+/// has no effect here. `marrow check` notes it where a pipeline gives both.
+inline Attribute replaces(std::initializer_list<std::string_view> names) {
+  return {.type = Attribute::Type::replaces, .names = names};
+}
 
 /// The number of option `low` must not be above that of option `high`.
 inline RelationInfo not_above(std::string low, std::string high) {

@@ -52,7 +52,8 @@ struct OptionInfo {
   bool required = false;  ///< a pipeline must give it, because there is no sensible default
   std::optional<double> minimum, maximum;
   std::vector<std::string> choices;
-  std::size_t length = 0;  ///< how many numbers a list must have; 0 = any
+  std::size_t length = 0;             ///< how many numbers a list must have; 0 = any
+  std::vector<std::string> replaces;  ///< options of nodes whose functions reach this node, which then have no effect
 };
 
 /// Conditions between the options of a node.
