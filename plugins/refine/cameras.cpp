@@ -34,7 +34,7 @@ void check_inputs(const List<View>& views, const List<Cost>& costs, const List<P
   if (costs.names() != poses.names())
     throw Error("costs and poses are not of the same bones; wire both from nodes that are called for each fragment");
   for (std::size_t f = 0; f < poses.size(); ++f) {
-    check_rigid(poses[f].world_from_model, "the pose of '" + poses.name(f) + "'");
+    check_pose(poses[f], "the pose of '" + poses.name(f) + "'");
     if (costs[f].view_count() == 0)
       throw Error("the cost of '" + costs.name(f) +
                   "' cannot be split into views: it compares no views, or it holds more than them, such as a prior; "
@@ -86,8 +86,8 @@ Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose
   check_compared(refinement, poses);
   if (!refinement.converged())
     context.warn("the cameras still moved after " + std::to_string(options.max_rounds) + " rounds; raise max_rounds");
-  const std::string text =
-      formatted("the cameras are off by about %.3g times what the options expect", refinement.scale());
+  const std::string text = formatted(
+      "the cameras are off against each other by about %.3g times what the options expect", refinement.scale());
   context.info(text);
   Result result;
   for (std::size_t v = 0; v < views.size(); ++v) {
@@ -145,13 +145,15 @@ MARROW_PLUGIN(plugin) {
               "root mean square error of the principal points; it is corrected by a shift across the depth",
               at_least(0))
       .option("contour_spacing_px", &Options::contour_spacing_px,
-              "for costs of contours: distance between two points of the outline", at_least(0.1))
+              "for costs of contours: distance between two points of the outline", at_least(0.1),
+              replaces({"contour_spacing_px", "ray_step"}))
       .option("reach_px", &Options::reach_px,
-              "for costs of contours: a point with no edge within this distance counts as unmatched", at_least(0.1))
+              "for costs of contours: a point with no edge within this distance counts as unmatched", at_least(0.1),
+              replaces({"reach_px", "reach_mm"}))
       .option("pixel_step", &Options::pixel_step,
               "per level, for costs of grey values: only every n-th pixel is compared; the first level tells how far "
               "the cameras are off, and the last one decides the poses",
-              at_least(1))
+              at_least(1), replaces({"pixel_step"}))
       .option("max_rounds", &Options::max_rounds, "largest number of steps", at_least(1))
       .option(
           "reference", &Options::reference,

@@ -4,8 +4,8 @@
 // off by the same motion, for all bones. So no image is projected anew: a cost that can be split into views tells which
 // pose each view alone would like. Sought are the poses of the bones and one motion for each view. They minimise the
 // sum of the costs, in units of their noise, and of the squares of the motions, in units of the deviations expected of
-// a calibration (a Gaussian prior). The minimum is found by Levenberg and Marquardt's steps. The curvature there gives
-// the covariance of all poses and motions together (Laplace's approximation).
+// a calibration (a Gaussian prior, camera_prior.hpp). The minimum is found by Levenberg and Marquardt's steps. The
+// curvature there gives the covariance of all poses and motions together (Laplace's approximation).
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
@@ -14,11 +14,13 @@
 #include <marrow/domain/decompositions.hpp>
 #include <marrow/plugin.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "bone_in_view.hpp"
+#include "camera_prior.hpp"
 #include "sight.hpp"
 
 #include "marrow/domain/number_text.hpp"
@@ -50,6 +52,7 @@ class Refinement {
       sights_.push_back(sight_of(views[v], centre, options));
       if (views.name(v) == options.reference) sights_.back().deviation *= kOfReference;
     }
+    prior_.emplace(sights_);
     for (const Pose& pose : poses) state_.poses.push_back(pose.world_from_model);
     state_.motions.assign(views.size(), Vector6d::Zero());
     compare_each(options_.pixel_step.front());
@@ -64,11 +67,13 @@ class Refinement {
       converged_ = descend(true, context, first);
       expand(true);
     }
-    covariance_ = weight_ * inverse_of(equations().first) + of_other_scales_;
+    const Eigen::MatrixXd here = std::sqrt(weight_) * root_of_inverse(equations().first);
+    root_.resize(here.rows(), here.cols() + root_of_other_scales_.cols());
+    root_ << here, root_of_other_scales_;
   }
 
   bool converged() const { return converged_; }
-  /// How far off the cameras are, in units of what the options expect.
+  /// How far the cameras are off against each other, in units of what the options expect.
   double scale() const { return scale_; }
   const State& state() const { return state_; }
   /// What a bone is compared by: its cost at the level of the last pixel step; before run(), of the first.
@@ -80,20 +85,22 @@ class Refinement {
     for (std::size_t v = 0; v < views_.size(); ++v) sum += models_[bone * views_.size() + v].value;
     return sum / double(views_.size());
   }
-  Matrix6d covariance_of_pose(std::size_t bone) const { return covariance_.block<6, 6>(at_pose(bone), at_pose(bone)); }
+  Matrix6d covariance_of_pose(std::size_t bone) const {
+    const Eigen::MatrixXd root = root_.middleRows<6>(at_pose(bone));
+    return root * root.transpose();
+  }
   /// Of the bone's small motion relative to the first bone: what both are off by in common does not count.
   Matrix6d covariance_beside_first(std::size_t bone) const {
+    if (bone == 0) return Matrix6d::Zero();
     const auto frame_of = [&](std::size_t f) -> FragmentFrame {
       return {state_.poses[f] * poses_[f].frame.origin_mm, state_.poses[f].rotation * poses_[f].frame.axes};
     };
     Matrix6d change = change_of_frame(frame_of(0), frame_of(bone));  // the first bone's motion, as one of this bone
     change.bottomLeftCorner<3, 3>() *= radians(1);                   // rotations are in degrees here
-    const Matrix6d both = covariance_.block<6, 6>(at_pose(bone), at_pose(0)) * change.transpose();
-    return covariance_of_pose(bone) - both - both.transpose() + change * covariance_of_pose(0) * change.transpose();
+    const Eigen::MatrixXd root = root_.middleRows<6>(at_pose(bone)) - change * root_.middleRows<6>(at_pose(0));
+    return root * root.transpose();
   }
-  Vector6d deviation_of_motion(std::size_t view) const {
-    return covariance_.diagonal().segment<6>(at_motion(view)).cwiseMax(0).cwiseSqrt();
-  }
+  Vector6d deviation_of_motion(std::size_t view) const { return root_.middleRows<6>(at_motion(view)).rowwise().norm(); }
 
  private:
   static constexpr double kOfReference = 1e-3;  ///< how far the reference may move, of what is expected of the others
@@ -105,7 +112,7 @@ class Refinement {
     double evidence = 0;
     State state;
     std::vector<Model> models;
-    Eigen::MatrixXd covariance;
+    Eigen::MatrixXd root;  ///< of the covariance
   };
 
   /// Compares every n-th pixel from now on.
@@ -120,10 +127,10 @@ class Refinement {
     models_.assign(in_views_.size(), Model());
   }
 
-  /// Finds the most probable state if the cameras are off as expected, a tenth and a hundredth of it, and keeps the one
-  /// with the largest marginal likelihood. So cameras that are right stay as they are. The others count in the
-  /// covariance by their likelihood: where the images hardly tell how far the cameras are off, all of them may be
-  /// right.
+  /// Finds the most probable state if the cameras are off against each other as expected, a tenth and a hundredth of
+  /// it, and keeps the one with the largest marginal likelihood. So cameras that are right stay as they are. The others
+  /// count in the covariance by their likelihood: where the images hardly tell how far the cameras are off, all of them
+  /// may be right.
   void choose_scale(Context& context) {
     const State given = state_;
     std::vector<Found> all;
@@ -133,24 +140,28 @@ class Refinement {
       if (scale < 1) state_ = given, models_ = at_given;
       const bool converged = descend(scale == 1, context, at_given);
       expand(scale == 1);
-      all.push_back({scale, converged, evidence(), state_, models_, inverse_of(equations().first)});
-      const std::string text =
-          formatted("cameras off by %g times what is expected: log evidence %.4g", scale, all.back().evidence);
+      all.push_back({scale, converged, evidence(), state_, models_, root_of_inverse(equations().first)});
+      const std::string text = formatted(
+          "cameras off against each other by %g times what is expected: log evidence %.4g", scale, all.back().evidence);
       context.debug(text);
     }
     const auto by_evidence = [](const Found& a, const Found& b) { return a.evidence < b.evidence; };
     const Found& best = *std::max_element(all.begin(), all.end(), by_evidence);
     scale_ = best.scale, converged_ = best.converged, state_ = best.state, models_ = best.models;
+    const Eigen::Index n = best.root.rows();
+    root_of_other_scales_.resize(n, Eigen::Index(all.size() - 1) * (n + 1));
     double sum = 0;
-    of_other_scales_ = Eigen::MatrixXd::Zero(best.covariance.rows(), best.covariance.cols());
+    Eigen::Index column = 0;
     for (const Found& found : all) {
       const double weight = std::exp(found.evidence - best.evidence);
       sum += weight;
-      const Eigen::VectorXd way = way_to(found.state);
-      if (&found != &best) of_other_scales_ += weight * (found.covariance + way * way.transpose());
+      if (&found == &best) continue;
+      root_of_other_scales_.middleCols(column, n) = std::sqrt(weight) * found.root;
+      root_of_other_scales_.col(column + n) = std::sqrt(weight) * way_to(found.state);
+      column += n + 1;
     }
     weight_ = 1 / sum;
-    of_other_scales_ /= sum;
+    root_of_other_scales_ /= std::sqrt(sum);
   }
 
   /// From the state to another one, in degrees and mm.
@@ -167,17 +178,21 @@ class Refinement {
   static Eigen::Index at_pose(std::size_t bone) { return 6 * Eigen::Index(bone); }
   Eigen::Index at_motion(std::size_t view) const { return 6 * Eigen::Index(poses_.size() + view); }
 
+  Eigen::VectorXd all_motions(const State& state) const {
+    Eigen::VectorXd motions(6 * Eigen::Index(views_.size()));
+    for (std::size_t v = 0; v < views_.size(); ++v) motions.segment<6>(6 * Eigen::Index(v)) = state.motions[v];
+    return motions;
+  }
+
   RigidTransform seen(const State& state, std::size_t bone, std::size_t view) const {
     return sights_[view].motion(state.motions[view]) * state.poses[bone];
   }
 
   /// Minus the logarithm of the posterior density, for the costs of the bones in the views.
   double energy(const State& state, const std::vector<double>& costs) const {
-    double sum = 0;
-    for (std::size_t v = 0; v < views_.size(); ++v) {
-      sum += 0.5 * state.motions[v].cwiseQuotient(scale_ * sights_[v].deviation).squaredNorm();
-      for (std::size_t f = 0; f < poses_.size(); ++f) sum += costs[f * views_.size() + v] / noise_[f];
-    }
+    const Eigen::VectorXd motions = all_motions(state);
+    double sum = 0.5 * motions.dot(prior_->inverse_covariance(scale_) * motions);
+    for (std::size_t i = 0; i < costs.size(); ++i) sum += costs[i] / noise_[i / views_.size()];
     return sum;
   }
   /// Of the state, whose costs the models have.
@@ -225,11 +240,11 @@ class Refinement {
     const Eigen::Index n = at_motion(views_.size());
     Eigen::MatrixXd a = Eigen::MatrixXd::Zero(n, n);
     Eigen::VectorXd b = Eigen::VectorXd::Zero(n);
+    const Eigen::MatrixXd weight = prior_->inverse_covariance(scale_);
+    a.bottomRightCorner(weight.rows(), weight.cols()) = weight;
+    b.tail(weight.rows()) = weight * all_motions(state_);
     for (std::size_t v = 0; v < views_.size(); ++v) {
       const Eigen::Index m = at_motion(v);
-      const Vector6d weight = (scale_ * sights_[v].deviation).cwiseAbs2().cwiseInverse();
-      a.block<6, 6>(m, m) += weight.asDiagonal();
-      b.segment<6>(m) += weight.cwiseProduct(state_.motions[v]);
       for (std::size_t f = 0; f < poses_.size(); ++f) {
         const Model& model = models_[f * views_.size() + v];
         const Matrix6d change = sights_[v].of_bone(state_.poses[f], poses_[f].frame), h = model.curvature / noise_[f];
@@ -266,7 +281,7 @@ class Refinement {
   /// The logarithm of the marginal likelihood of the scale, by Laplace's approximation about the state; without a
   /// constant.
   double evidence() const {
-    double sum = -energy() - 6 * double(views_.size()) * std::log(scale_);
+    double sum = prior_->log_factor(scale_) - energy();
     for (const double value : eigen_of_symmetric<Eigen::Dynamic>(equations().first).values)
       sum -= 0.5 * std::log(std::max(value, 1e-9));
     return sum;
@@ -301,29 +316,22 @@ class Refinement {
     return 0;
   }
 
-  static Eigen::MatrixXd inverse_of(Eigen::MatrixXd a) {
-    a.diagonal().array() += 1e-9;
-    Eigen::MatrixXd inverse(a.rows(), a.cols());
-    for (Eigen::Index i = 0; i < a.cols(); ++i)
-      inverse.col(i) = solve_symmetric<Eigen::Dynamic>(a, Eigen::VectorXd::Unit(a.rows(), i));
-    return inverse;
-  }
-
   const List<Cost>& costs_;
   const List<Pose>& poses_;
   const List<View>& views_;
   const Options& options_;
   std::vector<Sight> sights_;
+  std::optional<CameraPrior> prior_;
   std::vector<std::shared_ptr<const Cost>> levels_;
   std::vector<BoneInView> in_views_;  ///< of the first bone in each view, then of the next
   std::vector<Model> models_;
   std::vector<double> noise_;  ///< of each bone's cost in one view
   State state_;
-  double scale_ = 1;                 ///< of the deviations that the options expect
-  double weight_ = 1;                ///< the probability of this scale
-  Eigen::MatrixXd of_other_scales_;  ///< their part of the covariance
+  double scale_ = 1;   ///< of the deviations that the options expect of the cameras against each other
+  double weight_ = 1;  ///< the probability of this scale
+  Eigen::MatrixXd root_of_other_scales_;
   bool converged_ = false;
-  Eigen::MatrixXd covariance_;  ///< in degrees and mm
+  Eigen::MatrixXd root_;  ///< the covariance of all poses and motions, in degrees and mm, is root_ * its transpose
 };
 
 }  // namespace marrow::refine

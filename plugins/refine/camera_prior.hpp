@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <Eigen/Core>
+#include <cmath>
+#include <marrow/domain/decompositions.hpp>
+#include <vector>
+
+#include "sight.hpp"
+
+namespace marrow::refine {
+
+/// What is expected of the cameras' motions: a Gaussian density. A motion that all cameras share changes no image,
+/// because the bones can follow it. So the images cannot tell how large it is, and it always counts as expected. The
+/// scale, which the images tell, is that of the rest: of how far the cameras are off against each other.
+class CameraPrior {
+ public:
+  explicit CameraPrior(const std::vector<Sight>& sights) {
+    const Eigen::Index n = 6 * Eigen::Index(sights.size());
+    Eigen::VectorXd weight(n);
+    Eigen::MatrixXd of_shared = Eigen::MatrixXd::Zero(n, 6);  // each camera's motion, for one of the whole world
+    for (std::size_t v = 0; v < sights.size(); ++v) {
+      const Eigen::Index m = 6 * Eigen::Index(v);
+      weight.segment<6>(m) = sights[v].deviation.cwiseAbs2().cwiseInverse();
+      of_shared.block<3, 3>(m, 0) = of_shared.block<3, 3>(m + 3, 3) = sights[v].axes.transpose();
+    }
+    // The shared motion is the mean of all motions, weighed by their inverse covariances. What is left of each motion
+    // does not correlate with it.
+    const Eigen::MatrixXd weighted = weight.asDiagonal() * of_shared;
+    const Matrix6d normal = of_shared.transpose() * weighted;
+    const Eigen::MatrixXd shared_part = of_shared * inverse_of_symmetric(normal) * weighted.transpose(),
+                          rest = Eigen::MatrixXd::Identity(n, n) - shared_part;
+    shared_ = shared_part.transpose() * weight.asDiagonal() * shared_part;
+    rest_ = rest.transpose() * weight.asDiagonal() * rest;
+  }
+
+  /// The inverse covariance of all motions, if the cameras are off against each other by `scale` times what is
+  /// expected.
+  Eigen::MatrixXd inverse_covariance(double scale) const { return shared_ + rest_ / (scale * scale); }
+  /// The logarithm of the density's factor that depends on the scale.
+  double log_factor(double scale) const { return -double(shared_.rows() - 6) * std::log(scale); }
+
+ private:
+  Eigen::MatrixXd shared_, rest_;
+};
+
+/// A matrix F with F F^T = a^-1, for a symmetric and positive definite matrix. J F F^T J^T is then the covariance of J
+/// x for any J, and never indefinite, however much cancels. The numbers may be of very different size, so they are
+/// scaled first.
+inline Eigen::MatrixXd root_of_inverse(Eigen::MatrixXd a) {
+  a.diagonal().array() += 1e-9;  // for a direction that nothing determines
+  const Eigen::VectorXd scale = a.diagonal().cwiseSqrt().cwiseInverse();
+  const auto eigen = eigen_of_symmetric<Eigen::Dynamic>(scale.asDiagonal() * a * scale.asDiagonal());
+  return scale.asDiagonal() * eigen.vectors * eigen.values.cwiseSqrt().cwiseInverse().asDiagonal();
+}
+
+}  // namespace marrow::refine
