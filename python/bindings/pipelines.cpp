@@ -5,6 +5,7 @@
 
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/run_folder.hpp"
+#include "runtime/judged_poses.hpp"
 #include "runtime/one_node.hpp"
 #include "values.hpp"
 
@@ -59,21 +60,15 @@ py::tuple read_node(const std::string& name, const py::dict& inputs, const Texts
   if (!diagnostics.empty()) return with_faults(nullptr, diagnostics, info);
   OneNode one = pipeline_of_node(name, values, options, *made->known, diagnostics);
   made->pipeline = std::move(one.pipeline);
+  made->is_one_node = true;
   made->given = std::move(one.given);
   return with_faults(made, diagnostics, info);
 }
 
-/// Leaves only these outputs. Throws Error for a name that the pipeline does not have.
+/// Leaves only these outputs, and the verdicts on their poses. Throws Error for a name that the pipeline does not have.
 std::shared_ptr<ReadPipeline> with_only(const ReadPipeline& read, const std::vector<std::string>& names) {
   auto made = std::make_shared<ReadPipeline>(read);
-  std::vector<std::string> known;
-  for (const PipelineOutput& output : read.pipeline.outputs) known.push_back(output.name);
-  for (const std::string& name : names)
-    if (std::find(known.begin(), known.end(), name) == known.end())
-      throw Error("the pipeline has no output '" + name + "'; " + suggestion(name, known));
-  std::erase_if(made->pipeline.outputs, [&](const PipelineOutput& output) {
-    return std::find(names.begin(), names.end(), output.name) == names.end();
-  });
+  keep_outputs(made->pipeline, names);
   return made;
 }
 

@@ -25,6 +25,7 @@ struct ReadPipeline {
   Pipeline pipeline;
   PipelineArguments arguments;
   std::map<std::string, std::vector<Value>> given;  ///< outputs of nodes that are not called
+  bool is_one_node = false;                         ///< of a node that is called as a function
 };
 
 /// A list of dictionaries, in the order of the file: file, line, column, message, hint, node, port, option. What is not

@@ -11,6 +11,7 @@
 #include "marrow/runtime/executor.hpp"
 #include "marrow/runtime/run_folder.hpp"
 #include "pipelines.hpp"
+#include "runtime/judged_poses.hpp"
 #include "runtime/place_of_results.hpp"
 #include "values.hpp"
 
@@ -122,6 +123,11 @@ void run_into(Run& run, const RunOptions& options, RunSettings& settings, Observ
     observer.log_to(folder->log());
     for (const std::string& note : run.read->pipeline.notes) folder->log().keep(LogLevel::info, "", "note: " + note);
   }
+  if (!run.read->is_one_node)
+    for (std::string& note : notes_on_poses(run.read->pipeline)) {
+      if (folder) folder->log().keep(LogLevel::info, "", "note: " + note);
+      run.warnings.emplace_back("", std::move(note));
+    }
   std::optional<Store> store;
   if (options.keep) {
     const std::string fault = store.emplace().prepare();

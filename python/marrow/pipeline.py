@@ -67,7 +67,7 @@ class Pipeline:
         """Runs the pipeline and returns its outputs.
 
         progress: True writes a line for each node; a function is called with each event, a dictionary.
-        only: the outputs to compute.
+        only: the outputs to compute. The verdicts on their poses come with them.
         given: values in the place of nodes, which are not run then: {"model": mesh}. For a node with several outputs, a
         dictionary or a named tuple of them.
         folder: where to write the run as `marrow run` does, new or empty; True for runs/NAME.

@@ -31,9 +31,22 @@ class Run(Case):
         final = result["errors"]["distal"]["final"]
         self.assertEqual(dict(final.values), {metric["name"]: metric["value"] for metric in metrics})
         self.assertLess(final["mtre_mm"], 2)
-        self.assertEqual(list(result), ["pose", "errors", "edges"])
+        self.assertEqual(list(result), ["verdict", "pose", "errors", "edges"], "no pose comes without its verdict")
         self.assertEqual(result["edges"].axis, "view")
         self.assertEqual(list(result["edges"]), ["frontal", "lateral"])
+
+    def test_a_pose_that_nobody_judges_is_told(self):
+        (self.scratch / "p.yaml").write_text(
+            "marrow-pose: 1\ntarget: world\nsource: ct\nrotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n"
+            "translation_mm: [0, 0, 7]\n"
+        )
+        (self.scratch / "read.yaml").write_text(
+            "marrow: 1\nnodes:\n  found: {uses: read.pose, with: {path: p.yaml}}\noutputs: {found: found}\n"
+        )
+        result = marrow.Pipeline(self.scratch / "read.yaml").run(keep=False)
+        self.assertEqual(
+            result.warnings, ["nobody judges the output 'found': this pipeline has no verdict on that pose"]
+        )
 
     def test_an_option_is_changed(self):
         folder, _ = small_case()

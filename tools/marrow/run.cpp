@@ -11,13 +11,13 @@
 #include "commands.hpp"
 #include "fruitless_run.hpp"
 #include "marrow/domain/error.hpp"
-#include "marrow/domain/names.hpp"
 #include "marrow/domain/number_text.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/run_folder.hpp"
 #include "outputs_in_files.hpp"
 #include "process.hpp"
 #include "run_event.hpp"
+#include "runtime/judged_poses.hpp"
 #include "runtime/place_of_results.hpp"
 #include "runtime/shared_store.hpp"
 #include "runtime/verdict_json.hpp"
@@ -261,28 +261,25 @@ bool has_wrong_pose(const std::vector<NamedVerdict>& verdicts) {
                      [](const NamedVerdict& one) { return one.verdict.judgement == Judgement::wrong; });
 }
 
-/// Leaves only these outputs. Then only the nodes that they need run. False, with a message, if one is not known.
-bool keep_outputs(Pipeline& pipeline, const std::vector<std::string>& names) {
-  std::vector<std::string> known;
-  for (const PipelineOutput& output : pipeline.outputs) known.push_back(output.name);
-  for (const std::string& name : names)
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
-      std::fprintf(stderr, "marrow: error: --only: the pipeline has no output '%s'; %s\n", printable(name).c_str(),
-                   suggestion(name, known).c_str());
-      return false;
-    }
-  if (!names.empty())
-    std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) {
-      return std::find(names.begin(), names.end(), output.name) == names.end();
-    });
-  return true;
+/// Leaves only these outputs, and the verdicts on their poses. Then only the nodes that they need run. False, with a
+/// message, if one is not known.
+bool keep_only(Pipeline& pipeline, const std::vector<std::string>& names) {
+  if (names.empty()) return true;
+  try {
+    keep_outputs(pipeline, names);
+    return true;
+  } catch (const Error& error) {
+    std::fprintf(stderr, "marrow: error: --only: %s\n", printable(error.what()).c_str());
+    return false;
+  }
 }
 
 int run(const RunRequest& request) {
   const std::atomic<bool>& is_stopped = stop_on_signals();
   const Catalogue catalogue;
   Pipeline pipeline;
-  if (!load(request.pipeline, catalogue, pipeline, true) || !keep_outputs(pipeline, request.only)) return 2;
+  if (!load(request.pipeline, catalogue, pipeline, true) || !keep_only(pipeline, request.only)) return 2;
+  for (std::string& note : notes_on_poses(pipeline)) pipeline.notes.push_back(std::move(note));
   expect_files_can_hold(pipeline, catalogue);
   if (is_stopped) {
     std::fprintf(stderr, "marrow: %s before anything was made\n", stopped_text().c_str());
@@ -315,7 +312,9 @@ void add_run(CLI::App& app, int& code) {
   add_pipeline_arguments(command, request->pipeline);
   command->add_option("--out", request->folder,
                       "folder to write; new or empty (default: runs/NAME, or runs/NAME-2 ... where that is there)");
-  command->add_option("--only", request->only, "compute and write only this output; may be given several times")
+  command
+      ->add_option("--only", request->only,
+                   "compute and write only this output, and the verdicts on its poses; may be given several times")
       ->take_all()
       ->expected(1)
       ->type_name("OUTPUT");
