@@ -4,6 +4,8 @@
 #include <array>
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/geometry/targets.hpp"
+
 namespace {
 
 struct Options {
@@ -12,24 +14,33 @@ struct Options {
   int samples = 81;
 };
 
-constexpr std::array<const char*, 6> kAxes{"rotation about the frontal axis",    "rotation about the lateral axis",
-                                           "rotation about the long axis",       "translation along the frontal axis",
-                                           "translation along the lateral axis", "translation along the long axis"};
+using Axes = std::array<const char*, 6>;
+constexpr Axes kOfBone{"rotation about the frontal axis",    "rotation about the lateral axis",
+                       "rotation about the long axis",       "translation along the frontal axis",
+                       "translation along the lateral axis", "translation along the long axis"};
+constexpr Axes kOfModel{"rotation about the x axis",    "rotation about the y axis",    "rotation about the z axis",
+                        "translation along the x axis", "translation along the y axis", "translation along the z axis"};
 
-marrow::Landscape landscape(const marrow::Cost& cost, const marrow::Pose& pose, const marrow::Truth* truth,
-                            const Options& options, marrow::Context& context) {
-  marrow::check_rigid(pose.world_from_model, "pose");
+marrow::Landscape landscape(const marrow::Cost& cost, const marrow::Pose& found, const marrow::Mesh* model,
+                            const marrow::Truth* truth, const Options& options, marrow::Context& context) {
+  marrow::Pose pose = found;
+  if (model) {
+    marrow::geometry::check_model(pose.world_from_model, *model);
+    pose.frame = marrow::fragment_frame(*model);
+  }
+  const Axes& axes = pose.frame.is_anatomical ? kOfBone : kOfModel;
+  marrow::check_pose(pose, "pose");
   marrow::Landscape landscape;
   for (int axis = 0; axis < 6; ++axis) {
     context.check_cancelled();
-    context.progress(axis / 6.0, kAxes[std::size_t(axis)]);
+    context.progress(axis / 6.0, axes[std::size_t(axis)]);
     const bool turns = axis < 3;
     const auto motion_of = [&](double offset) {
       marrow::Vector6d motion = marrow::Vector6d::Zero();
       motion[axis] = turns ? marrow::radians(offset) : offset;
       return motion;
     };
-    marrow::Landscape::Profile profile{kAxes[std::size_t(axis)], turns ? "deg" : "mm", {}, {}, {}};
+    marrow::Landscape::Profile profile{axes[std::size_t(axis)], turns ? "deg" : "mm", {}, {}, {}};
     std::vector<marrow::RigidTransform> poses;
     for (int i = 0; i < options.samples; ++i) {
       profile.offsets.push_back((turns ? options.range_deg : options.range_mm) * (2.0 * i / (options.samples - 1) - 1));
@@ -51,7 +62,8 @@ MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.landscape", landscape)
       .summary("Profiles of the cost around a pose, along each of the six axes of the fragment")
       .in("cost", "cost to evaluate")
-      .in("pose", "pose in the middle; its frame gives the axes")
+      .in("pose", "pose in the middle; its frame gives the axes, unless there is a model")
+      .in("model", "surface of the fragment: it gives the axes")
       .in("truth", "exact pose; its offset from the pose is noted in each profile")
       .out("landscape", "six profiles: costs at offsets from the pose, in degrees or mm")
       .option("range_deg", &Options::range_deg, "largest rotation to either side", marrow::at_least(1e-3),

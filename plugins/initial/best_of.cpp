@@ -3,6 +3,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/number_text.hpp"
+#include "marrow/toolbox/geometry/start_axes.hpp"
 #include "marrow/toolbox/search/compared.hpp"
 #include "marrow/toolbox/search/search.hpp"
 
@@ -46,8 +47,9 @@ std::string comparison_of(const std::vector<Way>& ways, const Way& best) {
   return text;
 }
 
-Pose best_of(const Pose* first, const Pose* second, const Pose* third, const Pose* fourth, const marrow::Cost& cost,
-             const marrow::Optimizer& optimizer, const Options& options, marrow::Context& context) {
+Pose best_of(const Pose* first, const Pose* second, const Pose* third, const Pose* fourth, const marrow::Mesh* model,
+             const marrow::Cost& cost, const marrow::Optimizer& optimizer, const Options& options,
+             marrow::Context& context) {
   std::vector<std::pair<std::string, const Pose*>> starts{
       {"first", first}, {"second", second}, {"third", third}, {"fourth", fourth}};
   std::erase_if(starts, [](const auto& start) { return !start.second; });
@@ -55,7 +57,7 @@ Pose best_of(const Pose* first, const Pose* second, const Pose* third, const Pos
     throw marrow::Error(
         "no way led to a start: none of the inputs first, second, third and fourth is there; see why the nodes that "
         "they are wired to gave none");
-  for (const auto& [name, start] : starts) marrow::check_rigid(start->world_from_model, name);
+  for (const auto& [name, start] : starts) marrow::check_pose(*start, name);
   const auto level = cost.at_level({options.contour_spacing_px, options.reach_px, options.pixel_step});
   std::vector<Way> ways;
   std::string silent;  // the starts about which the images say nothing, and why
@@ -63,7 +65,8 @@ Pose best_of(const Pose* first, const Pose* second, const Pose* third, const Pos
   const double share = 1.0 / double(starts.size());
   for (const auto& [name, start] : starts) {
     const double done = share * double(tried++);
-    const Pose pose = refined(*start, *level, optimizer, options, context, done, share);
+    const Pose about_its_axes = marrow::geometry::with_fragment_axes(*start, model, context);
+    const Pose pose = refined(about_its_axes, *level, optimizer, options, context, done, share);
     evaluations += pose.evaluations;
     const std::string why = marrow::search::nothing_compared(*level, pose.world_from_model, pose.frame);
     if (why.empty())
@@ -91,16 +94,18 @@ MARROW_PLUGIN(plugin) {
       .in("second", "another start")
       .in("third", "another start")
       .in("fourth", "another start; starts that are not there are left out, but one must be there")
+      .in("model", "surface of the fragment: it gives the axes of a start that has none")
       .in("cost", "cost of a pose")
       .in("optimizer", "minimiser that refines each start")
       .out("pose", "the start of least cost, refined; of equal ones, the first")
       .option("contour_spacing_px", &Options::contour_spacing_px, "distance between two points of the outline",
-              marrow::at_least(0.1))
+              marrow::at_least(0.1), marrow::replaces({"contour_spacing_px", "ray_step"}))
       .option("reach_px", &Options::reach_px,
               "a point with no edge within this distance counts as unmatched; the first steps are proportional to it",
-              marrow::at_least(0.1))
+              marrow::at_least(0.1), marrow::replaces({"reach_px", "reach_mm"}))
       .option("pixel_step", &Options::pixel_step,
-              "for costs of grey values: only every n-th pixel is compared; 0: as the cost says", marrow::at_least(0))
+              "for costs of grey values: only every n-th pixel is compared; 0: as the cost says", marrow::at_least(0),
+              marrow::replaces({"pixel_step"}))
       .option("max_evaluations", &Options::max_evaluations, "largest number of evaluations of the cost for each start",
               marrow::at_least(1));
 }

@@ -60,7 +60,9 @@ marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, 
   marrow::search::check_options(settings);
   marrow::Pose middle;
   middle.world_from_model = start ? start->world_from_model : marrow::RigidTransform{"world", model.frame};
-  marrow::check_rigid(middle.world_from_model, "start");
+  marrow::check_pose(middle, "start");
+  if (!start)
+    context.info("there is no start, so the search is around the place at which CT coordinates are world coordinates");
   middle.frame = marrow::fragment_frame(model);
   const marrow::search::Levels levels = levels_of(cost, settings);
   marrow::search::Search search(optimizer, middle, settings, context);
@@ -97,12 +99,15 @@ MARROW_PLUGIN(plugin) {
               "number of best candidates after the first level that go through all levels; the last level chooses",
               marrow::at_least(1))
       .option("contour_spacing_px", &Options::contour_spacing_px,
-              "per level: distance between two points of the outline")
+              "per level: distance between two points of the outline",
+              marrow::replaces({"contour_spacing_px", "ray_step"}))
       .option("reach_px", &Options::reach_px,
-              "per level: a point with no edge within this distance counts as unmatched")
+              "per level: a point with no edge within this distance counts as unmatched",
+              marrow::replaces({"reach_px", "reach_mm"}))
       .relation(marrow::same_length({"contour_spacing_px", "reach_px"}))
       .option("pixel_step", &Options::pixel_step,
-              "per level, for costs of grey values: only every n-th pixel is compared")
+              "per level, for costs of grey values: only every n-th pixel is compared",
+              marrow::replaces({"pixel_step"}))
       .relation(marrow::as_many_or_none("pixel_step", "contour_spacing_px"))
       .option("max_evaluations", &Options::max_evaluations,
               "largest number of evaluations of the cost for each search of a level", marrow::at_least(1))

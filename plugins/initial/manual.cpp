@@ -39,18 +39,23 @@ marrow::Vector6d scaled(const marrow::Vector6d& motion, const marrow::Pose& pose
   return high * motion;
 }
 
-marrow::Pose manual(const marrow::Mesh& model, const marrow::Pose* start, const Options& options) {
+marrow::Pose manual(const marrow::Mesh& model, const marrow::Pose* start, const Options& options,
+                    const marrow::Context& context) {
   marrow::check_mesh(model, "model");
   if (!start && options.needs_start)
     throw marrow::Error(
         "there is no start; give the approximate placement of the fragment, in case.yaml under 'start' "
         "(docs/case.md)");
   marrow::Pose pose;
-  if (start)
+  if (start) {
     pose.world_from_model = start->world_from_model;
-  else
+  } else {
     pose.world_from_model.source = model.frame;
-  marrow::check_rigid(pose.world_from_model, "start");
+    context.warn(
+        "there is no start, so CT coordinates are taken as world coordinates; if the bone is elsewhere in the images, "
+        "give its approximate placement, in case.yaml under 'start' (docs/case.md)");
+  }
+  marrow::check_pose(pose, "start");
   pose.frame = marrow::fragment_frame(model);
   marrow::Vector6d motion;
   for (int i = 0; i < 3; ++i) {

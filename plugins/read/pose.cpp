@@ -6,6 +6,7 @@
 
 #include "marrow/toolbox/exchange/itk_transform.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
+#include "marrow/toolbox/geometry/targets.hpp"
 
 namespace {
 
@@ -14,7 +15,8 @@ struct Options {
   std::string maps = "world_to_ct";
 };
 
-marrow::Pose pose(const Options& options) {
+/// `frame`: that of what is placed, which a transform file does not name.
+marrow::Pose pose_in(const Options& options, const std::string& frame) {
   if (!marrow::exchange::is_itk_transform_file(options.path)) {
     if (options.maps != "world_to_ct")
       throw marrow::Error(options.path.string() +
@@ -24,9 +26,16 @@ marrow::Pose pose(const Options& options) {
   }
   marrow::Pose pose;
   pose.world_from_model = options.maps == "ct_to_world"
-                              ? marrow::exchange::read_itk_transform(options.path, "world", "ct")
-                              : inverse(marrow::exchange::read_itk_transform(options.path, "ct", "world"));
+                              ? marrow::exchange::read_itk_transform(options.path, "world", frame)
+                              : inverse(marrow::exchange::read_itk_transform(options.path, frame, "world"));
   return pose;
+}
+
+marrow::Pose pose(const marrow::Mesh* model, const Options& options) {
+  const marrow::Pose read = pose_in(options, model ? model->frame : "ct");
+  if (!model) return read;
+  marrow::geometry::check_model(read.world_from_model, *model);
+  return in_frame(read, fragment_frame(*model));
 }
 
 }  // namespace
@@ -37,6 +46,7 @@ MARROW_PLUGIN(plugin) {
           "Reads a pose from marrow's YAML or from a transform of ITK and 3D Slicer, for example a start that was "
           "found "
           "by hand, or the result of another run")
+      .in("model", "surface of the fragment: it gives the pose its axes, which a transform file does not have")
       .out("pose", "pose of the model in the world")
       .option("path", &Options::path,
               "pose file; .tfm or .txt: a transform of ITK and 3D Slicer, any other: marrow's YAML", marrow::required())

@@ -26,7 +26,7 @@ struct Result {
 };
 
 void check_frames(const Pose& initial, const Mesh& model, const Mesh& target) {
-  check_rigid(initial.world_from_model, "the pose to start from");
+  check_pose(initial, "the pose to start from");
   check_mesh(model, "model");
   check_mesh(target, "target");
   if (model.frame != initial.world_from_model.source)
@@ -70,6 +70,7 @@ Result icp(const Pose& initial, const Mesh& model, const Mesh& target, const Opt
                 " mm, but three at least are needed; give a better start, or raise reach_mm");
   Result result;
   Pose start = initial;
+  if (!start.frame.is_anatomical) start.frame = fragment_frame(model);
   start.covariance.reset();
   start.convergence.clear();
   result.stages.add("start", start);

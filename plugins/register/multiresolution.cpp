@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/geometry/start_axes.hpp"
 #include "marrow/toolbox/search/search.hpp"
 
 namespace {
@@ -12,10 +13,11 @@ struct Result {
   marrow::List<marrow::Pose> stages;
 };
 
-Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimizer, const marrow::Pose& initial,
-                       const SearchOptions& options, marrow::Context& context) {
+Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimizer, const marrow::Pose& start,
+                       const marrow::Mesh* model, const SearchOptions& options, marrow::Context& context) {
   marrow::search::check_options(options);
-  marrow::check_rigid(initial.world_from_model, "the pose to start from");
+  marrow::check_pose(start, "the pose to start from");
+  const marrow::Pose initial = marrow::geometry::with_fragment_axes(start, model, context);
   const marrow::search::Levels levels = marrow::search::levels_of(cost, options);
   const marrow::Cost& last = *levels.back();
   marrow::search::Search search(optimizer, initial, options, context);
@@ -40,6 +42,7 @@ MARROW_PLUGIN(plugin) {
       .in("cost", "cost of a pose")
       .in("optimizer", "minimiser")
       .in("initial", "pose to start from, and the fragment's axes")
+      .in("model", "surface of the fragment: it gives the axes of a start that has none")
       .out("pose", &Result::pose, "pose of least cost, with its predicted covariance")
       .out("stages", &Result::stages, "poses of the search: start, axial, final", marrow::over("stage"));
   marrow::search::declare<SearchOptions>(node);

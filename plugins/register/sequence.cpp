@@ -2,6 +2,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/number_text.hpp"
+#include "marrow/toolbox/geometry/start_axes.hpp"
 #include "marrow/toolbox/search/search.hpp"
 
 namespace {
@@ -32,6 +33,17 @@ void check_finer(const Options& options) {
     marrow::search::check_level_list(*values, name);
 }
 
+/// The pose to which the first cost leads from the result of the second. So whether they agree depends on this result
+/// alone: the first search may have gone elsewhere only because of where it began.
+marrow::Pose led_back(const marrow::Pose& result, const marrow::Cost& cost, const marrow::Optimizer& optimizer,
+                      const marrow::search::Steps& steps, const Options& options, marrow::Context& context) {
+  Search search(optimizer, result, options, context);
+  search.refine(cost, marrow::search::kAllAxes, steps, 1, 0);
+  marrow::Pose pose = result;
+  pose.world_from_model = search.pose();
+  return pose;
+}
+
 /// A warning if the results of both costs are far apart, because then one of them is wrong. Empty if they agree.
 std::string disagreement(const marrow::Pose& first, const marrow::Pose& second, const Options& options) {
   const marrow::Vector6d motion = motion_between(first.world_from_model, second.world_from_model, first.frame);
@@ -43,11 +55,12 @@ std::string disagreement(const marrow::Pose& first, const marrow::Pose& second, 
 }
 
 Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const marrow::Optimizer& optimizer,
-                const marrow::Optimizer* finer_optimizer, const marrow::Pose& initial, const Options& options,
-                marrow::Context& context) {
+                const marrow::Optimizer* finer_optimizer, const marrow::Pose& start, const marrow::Mesh* model,
+                const Options& options, marrow::Context& context) {
   marrow::search::check_options(options);
   check_finer(options);
-  marrow::check_rigid(initial.world_from_model, "the pose to start from");
+  marrow::check_pose(start, "the pose to start from");
+  const marrow::Pose initial = marrow::geometry::with_fragment_axes(start, model, context);
   const marrow::search::Levels levels = marrow::search::levels_of(cost, options);
   Search coarse(optimizer, initial, options, context);
   Result result;
@@ -69,9 +82,12 @@ Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const 
   }
   result.pose = final_pose_of(search, first, *level, steps, options, context);
   result.pose.evaluations += first.evaluations;
-  if (const std::string warning = disagreement(first, result.pose, options); !warning.empty()) {
-    context.warn(warning);
-    result.pose.warnings.push_back(warning);
+  if (!disagreement(first, result.pose, options).empty()) {
+    const marrow::Pose back = led_back(result.pose, *levels.back(), optimizer, coarse.steps_of(0), options, context);
+    if (const std::string warning = disagreement(back, result.pose, options); !warning.empty()) {
+      context.warn(warning);
+      result.pose.warnings.push_back(warning);
+    }
   }
   result.stages.add("final", result.pose);
   return result;
@@ -89,12 +105,13 @@ MARROW_PLUGIN(plugin) {
       .in("optimizer", "minimiser")
       .in("finer_optimizer", "minimiser of finer_cost; none: the same as for cost")
       .in("initial", "pose to start from, and the fragment's axes")
+      .in("model", "surface of the fragment: it gives the axes of a start that has none")
       .out("pose", &Result::pose,
            "pose with the least finer_cost, near the pose with the least cost; with its predicted covariance")
       .out("stages", &Result::stages, "poses of the search: start, first, final", marrow::over("stage"));
   marrow::search::declare<Options>(node);
   node.option("finer_pixel_step", &Options::finer_pixel_step,
-              "per level of finer_cost: only every n-th pixel is compared")
+              "per level of finer_cost: only every n-th pixel is compared", marrow::replaces({"finer_cost.pixel_step"}))
       .option("finer_step_deg", &Options::finer_step_deg,
               "per level of finer_cost: first step of the rotations about the frontal and lateral axes")
       .option("finer_step_axial_deg", &Options::finer_step_axial_deg,

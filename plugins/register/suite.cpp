@@ -131,10 +131,11 @@ double off_mm(const Subject& subject) {
   return sum / double(points.size());
 }
 
-bool takes_a_cost(const Subject& subject) {
+bool takes(const Subject& subject, const std::string& input) {
   const auto& ports = subject.info().inputs;
-  return std::any_of(ports.begin(), ports.end(), [](const PortInfo& one) { return one.name == "cost"; });
+  return std::any_of(ports.begin(), ports.end(), [&](const PortInfo& one) { return one.name == input; });
 }
+bool takes_a_cost(const Subject& subject) { return takes(subject, "cost"); }
 
 /// The number of inputs without anything to compare that lead to a pose.
 double poses_of_nothing(const Subject& subject) {
@@ -161,6 +162,17 @@ double views_not_named(const Subject& subject) {
   const std::vector<std::string> warnings = subject.output(inputs, "pose").as<Pose>().warnings;
   return std::none_of(warnings.begin(), warnings.end(),
                       [](const std::string& text) { return text.find(Silent::kSaid) != std::string::npos; });
+}
+
+/// The angle between the model's long axis and that of the pose, from a start that has no axes of its own.
+double long_axis_off_deg(const Subject& subject) {
+  if (!takes(subject, "model")) throw NotApplicable("it takes no model");
+  Inputs inputs = sample();
+  Pose initial = inputs.at("initial").as<Pose>();
+  initial.frame = {};
+  inputs.set("initial", item(initial));
+  const FragmentFrame found = subject.output(inputs, "pose").as<Pose>().frame;
+  return degrees(found.axes.col(2).cross(frame().axes.col(2)).norm());
 }
 
 std::vector<Trial> trials() {
@@ -202,7 +214,9 @@ Suite register_suite() {
         0, "poses"},
        poses_of_nothing},
       {{"silent_view", "poses without a warning that names a view that says nothing, where others do", 0, "poses"},
-       views_not_named}};
+       views_not_named},
+      {{"long_axis", "the long axis of the pose from that of the model, if the start has no axes", 1e-3, "deg"},
+       long_axis_off_deg}};
   return suite;
 }
 

@@ -7,9 +7,10 @@
 #include <marrow/domain/decompositions.hpp>
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/geometry/start_axes.hpp"
 #include "marrow/toolbox/search/compared.hpp"
 #include "marrow/toolbox/search/search.hpp"
-#include "marrow/toolbox/track/track_state.hpp"
+#include "marrow/toolbox/track/motion_model.hpp"
 
 namespace {
 
@@ -155,12 +156,21 @@ bool is_unusual(const Pose& found, const track::TrackState& state) {
 }
 
 Result tracked(const Cost& cost, const Cost* finer_cost, const Optimizer& optimizer, const Optimizer* finer_optimizer,
-               const Pose& initial, const track::TrackState* state, const Options& options, Context& context) {
-  check_rigid(initial.world_from_model, "the predicted pose");
+               const Pose& start, const track::TrackState* state, const Mesh* model, const Options& options,
+               Context& context) {
+  check_pose(start, "the predicted pose");
+  const Pose initial = geometry::with_fragment_axes(start, model, context);
   Pose predicted = initial;
-  if (!initial.covariance || !initial.covariance->allFinite()) predicted.covariance = unknown_covariance(options);
+  if (const std::string unknown = track::why_unknown(initial.covariance); !unknown.empty()) {
+    if (initial.covariance) context.warn("the predicted pose counts as hardly known: " + unknown);
+    predicted.covariance = unknown_covariance(options);
+  }
   std::optional<Matrix6d> covariance;
   if (state && state->frame % options.covariance_every != 0) covariance = state->usual_covariance;
+  if (covariance && !start.frame.is_anatomical) {
+    const Matrix6d change = change_of_frame(state->fragment, initial.frame);
+    covariance = change * *covariance * change.transpose();
+  }
   Frame frame(cost, finer_cost, optimizer, finer_optimizer, predicted, covariance, options, context);
   Result result;
   result.stages.add("predicted", initial);
@@ -188,21 +198,24 @@ MARROW_PLUGIN(plugin) {
       .in("optimizer", "minimiser")
       .in("finer_optimizer", "minimiser of finer_cost; none: the same as for cost")
       .in("initial",
-          "predicted pose with its covariance, and the fragment's axes; without a covariance, it counts as hardly "
-          "known")
+          "predicted pose with its covariance, and the fragment's axes; without a covariance, "
+          "or with one that says nothing, it counts as hardly known")
+      .in("model", "surface of the fragment: it gives the axes of a start that has none")
       .in("state", "what is known before the frame; then most frames take over the covariance of a frame before")
       .out("pose", &Result::pose, "pose of least cost, with its predicted covariance")
       .out("stages", &Result::stages, "poses of the search: predicted, near (if it was found but not enough), final",
            over("stage"))
-      .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline")
-      .option("reach_px", &Options::reach_px, "per level: distance beyond which a point counts as unmatched")
+      .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline",
+              replaces({"contour_spacing_px", "ray_step"}))
+      .option("reach_px", &Options::reach_px, "per level: distance beyond which a point counts as unmatched",
+              replaces({"reach_px", "reach_mm"}))
       .option("step_deg", &Options::step_deg,
               "per level: first step of the rotations about the frontal and lateral axes")
       .option("step_axial_deg", &Options::step_axial_deg, "per level: first step of the axial rotation")
       .option("step_mm", &Options::step_mm, "per level: first step of the translations")
       .relation(same_length({"contour_spacing_px", "reach_px", "step_deg", "step_axial_deg", "step_mm"}))
       .option("finer_pixel_step", &Options::finer_pixel_step,
-              "per level of finer_cost: only every n-th pixel is compared")
+              "per level of finer_cost: only every n-th pixel is compared", replaces({"finer_cost.pixel_step"}))
       .option("step_tolerance", &Options::step_tolerance, "a level ends when steps fall below this part of the first",
               at_least(1e-6), at_most(1))
       .option("max_evaluations", &Options::max_evaluations, "largest number of evaluations of a cost per level",

@@ -2,6 +2,7 @@
 // What is known of a bone before the first frame of a sequence.
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/geometry/start_axes.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 
 namespace {
@@ -19,8 +20,9 @@ struct Options {
   double acceleration_mm_s2 = 5000;
 };
 
-TrackState begin(const Pose& start, const Options& options) {
-  check_rigid(start.world_from_model, "the pose of the first frame");
+TrackState begin(const Pose& first, const Mesh* model, const Options& options, const Context& context) {
+  check_pose(first, "the pose of the first frame");
+  const Pose start = geometry::with_fragment_axes(first, model, context);
   TrackState state;
   state.frame_rate_hz = options.frame_rate_hz;
   state.acceleration_per_s2 << Eigen::Vector3d::Constant(radians(options.acceleration_deg_s2)),
@@ -41,6 +43,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("track.begin", begin)
       .summary("What is known before the first frame: about where the bone is, and how fast it may move")
       .in("start", "approximate pose in the first frame, with the fragment's axes")
+      .in("model", "surface of the fragment: it gives the axes of a start that has none")
       .out("state", "the bone at rest, with the deviations that the options give")
       .option("frame_rate_hz", &Options::frame_rate_hz, "frames a second", at_least(1e-6), unit("Hz"))
       .option("start_deg", &Options::start_deg, "standard deviation of the start's rotations", at_least(1e-6))
@@ -48,10 +51,11 @@ MARROW_PLUGIN(plugin) {
       .option("speed_deg_s", &Options::speed_deg_s, "standard deviation of the first angular velocity", at_least(0),
               unit("deg/s"))
       .option("speed_mm_s", &Options::speed_mm_s, "standard deviation of the first velocity", at_least(0), unit("mm/s"))
-      .option("acceleration_deg_s2", &Options::acceleration_deg_s2,
-              "standard deviation of the angular acceleration about each axis: the larger, the wider a frame is "
-              "searched",
-              at_least(1e-6), unit("deg/s^2"))
+      .option(
+          "acceleration_deg_s2", &Options::acceleration_deg_s2,
+          "standard deviation of a frame's mean angular acceleration about each axis: the larger, the wider a frame "
+          "is searched",
+          at_least(1e-6), unit("deg/s^2"))
       .option("acceleration_mm_s2", &Options::acceleration_mm_s2,
-              "standard deviation of the acceleration along each axis", at_least(1e-6), unit("mm/s^2"));
+              "standard deviation of a frame's mean acceleration along each axis", at_least(1e-6), unit("mm/s^2"));
 }

@@ -13,7 +13,7 @@ namespace {
 
 using marrow::Judgement;
 using marrow::Verdict;
-using marrow::verdicts::Spread;
+using marrow::verdicts::Spread, marrow::verdicts::about_the_bones_axes;
 
 struct Options {
   double doubtful_above = 0.05;
@@ -84,7 +84,7 @@ void judge_by_warnings(const marrow::Pose& pose, Verdict& verdict) {
 /// A rotation about the long axis between the prior and the pose that images and prior have led to, in standard
 /// deviations. The pose lies between the two, so its difference from the prior has the variance of the prior minus that
 /// of the pose; this is the same as comparing prior and images with the sum of their variances. Nothing if the images
-/// say hardly more than the prior.
+/// say hardly more than the prior. Both covariances are about the bone's axes.
 std::optional<double> deviations_of(double apart_rad, const marrow::Pose& pose, const marrow::Pose& prior) {
   constexpr double kLeastNews = 0.01;  // of the prior's variance
   const double of_prior = (*prior.covariance)(2, 2), news = of_prior - (*pose.covariance)(2, 2);
@@ -92,10 +92,10 @@ std::optional<double> deviations_of(double apart_rad, const marrow::Pose& pose, 
   return apart_rad / std::sqrt(news);
 }
 
-/// A prior that the images contradict makes the pose doubtful: one of the two is wrong.
+/// A prior that the images contradict makes the pose doubtful: one of the two is wrong. Both are about the bone's axes.
 void judge_by_prior(const marrow::Pose& pose, const marrow::Pose& prior, const Options& options, Verdict& verdict,
                     marrow::Context& context) {
-  marrow::check_rigid(prior.world_from_model, "the prior");
+  marrow::check_pose(prior, "the prior");
   if (!prior.covariance)
     throw marrow::Error("the prior has no covariance; take it from a node that predicts one, such as a fit of markers");
   if (!pose.covariance) return;
@@ -117,11 +117,12 @@ void judge_by_prior(const marrow::Pose& pose, const marrow::Pose& prior, const O
 
 Verdict predicted(const marrow::Pose& pose, const marrow::Mesh& mesh, const marrow::Pose* prior, const Options& options,
                   marrow::Context& context) {
-  marrow::check_rigid(pose.world_from_model, "pose");
+  marrow::check_pose(pose, "pose");
   Verdict verdict;
   judge_by_deviations(pose, mesh, options, verdict);
   judge_by_warnings(pose, verdict);
-  if (prior) judge_by_prior(pose, *prior, options, verdict, context);
+  if (prior)
+    judge_by_prior(about_the_bones_axes(pose, mesh), about_the_bones_axes(*prior, mesh), options, verdict, context);
   return verdict;
 }
 

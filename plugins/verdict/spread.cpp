@@ -10,7 +10,8 @@
 namespace marrow::verdicts {
 namespace {
 
-/// A matrix whose product with six standard normal numbers has this covariance.
+/// A matrix whose product with six standard normal numbers has this covariance. check_pose() has refused one with a
+/// negative eigenvalue; what is left of that is rounding.
 Matrix6d root_of(const Matrix6d& covariance) {
   const auto eigen = eigen_of_symmetric<6>(covariance);
   return eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
@@ -22,8 +23,15 @@ bool is_determined(const Pose& pose) {
   return pose.covariance && pose.covariance->allFinite() && !pose.covariance->isZero(0);
 }
 
-Spread spread_of(const Pose& pose, const Mesh& mesh) {
+Pose about_the_bones_axes(const Pose& pose, const Mesh& mesh) {
+  const FragmentFrame frame = fragment_frame(mesh);
+  const bool has_them = pose.frame.origin_mm == frame.origin_mm && pose.frame.axes == frame.axes;
+  return has_them ? pose : in_frame(pose, frame);
+}
+
+Spread spread_of(const Pose& as_found, const Mesh& mesh) {
   constexpr int kTargets = 200;
+  const Pose pose = about_the_bones_axes(as_found, mesh);
   const std::vector<Eigen::Vector3d> targets_mm = geometry::targets_mm(pose.world_from_model, &mesh, nullptr, kTargets);
   const Matrix6d root = root_of(*pose.covariance);
   Random random(1);

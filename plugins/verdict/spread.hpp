@@ -13,7 +13,9 @@ struct Spread {
 /// Whether a pose has a covariance that comparisons gave. A covariance of 0 comes from images that say nothing: no
 /// registration knows a pose exactly.
 bool is_determined(const Pose& pose);
-/// `pose` has a finite covariance. The targets are 200 points of the mesh.
+/// The pose, with its covariance about and along the axes of the bone's surface, whatever axes it came with.
+Pose about_the_bones_axes(const Pose& pose, const Mesh& mesh);
+/// `pose` has a finite covariance. The targets are 200 points of the mesh, which also gives the long axis.
 Spread spread_of(const Pose& pose, const Mesh& mesh);
 
 }  // namespace marrow::verdicts

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include "project/shapes.hpp"
 #include "shipped.hpp"
 
 namespace landscape_test {
@@ -45,6 +46,22 @@ TEST(Landscape, IsTheCostAlongEachAxisOfTheFragment) {
     EXPECT_NEAR(profile.costs[80], 56.25, 1e-6);  // 10 - 2.5 squared
     EXPECT_NEAR(profile.truth.value(), 2.5, 1e-9);
   }
+}
+
+TEST(Landscape, SpeaksOfTheLongAxisOnlyWhereItIsKnown) {
+  marrow::Pose pose;
+  const auto cost = marrow::Value::of<marrow::Cost>(std::make_shared<const Bowl>(pose.world_from_model, pose.frame));
+  const auto axis_of = [&](const shipped::Inputs& more) {
+    shipped::Inputs inputs{{"cost", cost}, {"pose", shipped::item(pose)}};
+    inputs.insert(more.begin(), more.end());
+    return shipped::call("evaluate.landscape", inputs, {{"samples", std::int64_t{3}}})
+        .at("landscape")
+        .as<marrow::Landscape>()
+        .profiles.at(2)
+        .axis;
+  };
+  EXPECT_EQ(axis_of({}), "rotation about the z axis");
+  EXPECT_EQ(axis_of({{"model", shipped::item(shapes::cylinder(12, 100))}}), "rotation about the long axis");
 }
 
 }  // namespace landscape_test

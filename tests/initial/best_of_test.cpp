@@ -137,4 +137,15 @@ TEST(BestOf, AStartAboutWhichTheImagesSayNothingIsNone) {
             "shows nothing of the bone");
 }
 
+TEST(BestOf, TheModelGivesTheAxesOfAStartThatHasNone) {
+  Trial trial;
+  Pose start = trial.away(5);
+  start.frame = {};
+  trial.inputs["second"] = shipped::item(start);
+  trial.inputs["model"] = shipped::item(shapes::cylinder(14, 120));
+  const Pose best = trial.run();
+  EXPECT_TRUE(best.frame.is_anatomical);
+  EXPECT_LT((best.frame.origin_mm - trial.bottom.frame.origin_mm).norm(), 1e-9);
+}
+
 }  // namespace best_of_test

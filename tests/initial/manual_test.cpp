@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include "evaluate/listener.hpp"
 #include "initial/tube.hpp"
 #include "shipped.hpp"
 
@@ -62,6 +63,20 @@ TEST(Manual, FailsWithoutAStartIfItNeedsOne) {
 TEST(Manual, RefusesAnEmptyModel) {
   EXPECT_EQ(shipped::refusal("initial.manual", {{"model", shipped::item(marrow::Mesh{})}}),
             "model: the surface has no triangles");
+}
+
+TEST(Manual, SaysThatWithoutAStartTheCtIsTheWorld) {
+  listener::Listener listener;
+  shipped::Inputs inputs{{"model", shipped::item(tube::cylinder(14, 90))}};
+  shipped::call("initial.manual", inputs, {}, listener.context);
+  EXPECT_EQ(listener.warnings,
+            std::vector<std::string>{
+                "there is no start, so CT coordinates are taken as world coordinates; if the bone is elsewhere in the "
+                "images, give its approximate placement, in case.yaml under 'start' (docs/case.md)"});
+  listener.warnings.clear();
+  inputs["start"] = shipped::item(marrow::Pose());
+  shipped::call("initial.manual", inputs, {}, listener.context);
+  EXPECT_TRUE(listener.warnings.empty());
 }
 
 }  // namespace manual_test

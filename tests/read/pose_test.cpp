@@ -88,15 +88,89 @@ TEST(ReadPose, DiagnosesFaults) {
   };
   expect(with(kPose, "[1, 0, 0]", "[1, 0]"), "p.yaml:4:11: pose: rotation: expected 3 rows of 3 numbers");
   expect(with(kPose, "[1, 0, 0]", "[-1, 0, 0]"), "not a rotation (off orthonormal by 0");
-  expect(with(kPose, "source: ct", "source: world"), "p.yaml:3:9: pose: source: expected the frame 'ct', got 'world'");
+  expect(with(kPose, "source: ct", "source: world"),
+         "p.yaml:3:9: pose: source: expected the frame of what was registered, such as 'ct' or 'implant', got 'world'");
+  expect(with(kPose, "target: world", "target: ct"), "p.yaml:2:9: pose: target: expected the frame 'world', got 'ct'");
   expect(with(kPose, "translation_mm", "translation"), "unknown key 'translation'; did you mean 'translation_mm'?");
   expect(with(kPose, "marrow-pose: 1\n", ""), "key 'marrow-pose' is missing");
   expect(kPose + "covariance: [[1]]\n", "covariance: expected 6 rows of 6 numbers");
+  const std::string of_five =
+      "[0, 1, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0], [0, 0, 0, 0, 1, 0], [0, 0, 0, 0, 0, 1]]\n";
+  expect(
+      kPose + "covariance: [[-1, 0, 0, 0, 0, 0], " + of_five,
+      "p.yaml:6:13: pose: covariance: the covariance has the negative variance -1 in row 1, column 1; a covariance is "
+      "symmetric and has no negative eigenvalue");
+  expect(
+      kPose + "covariance: [[1, 0, 0, 0, 0, 0.5], " + of_five,
+      "p.yaml:6:13: pose: covariance: the covariance is not symmetric: 0.5 in row 1, column 6, but 0 in row 6, column "
+      "1; a covariance is symmetric and has no negative eigenvalue");
   expect(kPose + "convergence: 5\n", "convergence: expected a list, got '5'");
   expect(kPose + "convergence:\n  - [1, 2]\n  - [1.5, 2]\n", "p.yaml:8:5: pose: convergence: expected a pair");
   expect("- a\n", "expected a YAML map of keys and values, got a list of 1");
   expect("", "expected a YAML map of keys and values, got nothing");
   expect(kPose + "---\n" + kPose, "the file goes on after the end of its first document");
+}
+
+/// A box of 20 x 24 x 100 mm whose middle is at (30, 0, 0), along the direction that turn() makes of z.
+Eigen::Matrix3d turn() { return marrow::rotation_from_vector({0.5, -0.6, 0}); }
+marrow::Mesh oblique_box() {
+  marrow::Mesh mesh;
+  for (const double z : {-50, 50})
+    for (const double y : {-12, 12})
+      for (const double x : {-10, 10})
+        mesh.vertices_mm.push_back(turn() * Eigen::Vector3d(x, y, z) + Eigen::Vector3d(30, 0, 0));
+  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return mesh;
+}
+
+marrow::Pose pose_of_box_at(const std::filesystem::path& path) {
+  return shipped::call("read.pose", {{"model", shipped::item(oblique_box())}}, {{"path", path.string()}})
+      .at("pose")
+      .as<marrow::Pose>();
+}
+
+TEST(ReadPose, TheModelGivesTheAxesThatATransformFileDoesNotHave) {
+  const TemporaryFolder folder;
+  put(folder / "p.tfm", R"(#Insight Transform File V1.0
+#Transform 0
+Transform: AffineTransform_double_3_3
+Parameters: 1 0 0 0 1 0 0 0 1 -4 5 -6
+FixedParameters: 0 0 0
+)");
+  EXPECT_FALSE(pose_at(folder / "p.tfm").frame.is_anatomical);
+  const marrow::Pose pose = pose_of_box_at(folder / "p.tfm");
+  EXPECT_TRUE(pose.frame.is_anatomical);
+  EXPECT_LT((pose.frame.origin_mm - Eigen::Vector3d(30, 0, 0)).norm(), 1e-9);
+  EXPECT_LT((pose.frame.axes.col(2) - turn().col(2)).norm(), 1e-9);
+  EXPECT_EQ(pose.world_from_model.translation_mm, Eigen::Vector3d(4, -5, 6));
+}
+
+TEST(ReadPose, TheModelTurnsTheCovarianceToItsAxes) {
+  // By hand: 0.1 degrees about the CT's z, which runs 30 mm beside the box's middle, moves the middle by 30 mm * 0.1
+  // degrees along y. The box's axes: the long one; x made orthogonal to it; the one that completes them.
+  const Eigen::Vector3d along = turn().col(2), across = Eigen::Vector3d::UnitX() - along * along.x();
+  Eigen::Matrix3d axes;
+  axes << across.normalized(), along.cross(across.normalized()), along;
+  const TemporaryFolder folder;
+  const double angle = marrow::radians(0.1);
+  put(folder / "p.yaml", kPose + "covariance:\n  - [0, 0, 0, 0, 0, 0]\n  - [0, 0, 0, 0, 0, 0]\n  - [0, 0, " +
+                             std::to_string(1e6 * angle * angle) + "e-6, 0, 0, 0]\n" +
+                             "  - [0, 0, 0, 0, 0, 0]\n  - [0, 0, 0, 0, 0, 0]\n  - [0, 0, 0, 0, 0, 0]\n");
+  const marrow::Pose pose = pose_of_box_at(folder / "p.yaml");
+  marrow::Vector6d motion;
+  motion << angle * axes.row(2).transpose(), 30 * angle * axes.row(1).transpose();
+  EXPECT_LT((*pose.covariance - motion * motion.transpose()).norm(), 1e-5 * motion.squaredNorm());
+}
+
+TEST(ReadPose, RefusesAModelInAnotherFrame) {
+  const TemporaryFolder folder;
+  put(folder / "p.yaml", kPose);
+  marrow::Mesh mesh = oblique_box();
+  mesh.frame = "elsewhere";
+  EXPECT_EQ(shipped::refusal("read.pose", {{"model", shipped::item(mesh)}}, {{"path", (folder / "p.yaml").string()}}),
+            "the model is in the frame 'elsewhere', but the pose takes points in 'ct'; give the model that was "
+            "registered");
 }
 
 }  // namespace pose_test

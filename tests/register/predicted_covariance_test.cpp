@@ -16,7 +16,9 @@ using marrow::Vector6d;
 using marrow::search::PredictedCovariance;
 using well::Bowl;
 
-marrow::FragmentFrame frame() { return {Eigen::Vector3d(5, -3, 80), marrow::rotation_from_vector({0.1, -0.2, 0.3})}; }
+marrow::FragmentFrame frame() {
+  return {Eigen::Vector3d(5, -3, 80), marrow::rotation_from_vector({0.1, -0.2, 0.3}), true};
+}
 marrow::RigidTransform bottom() {
   return {"world", "ct", marrow::rotation_from_vector({0.2, 0.1, -0.4}), Eigen::Vector3d(12, -7, 30)};
 }
@@ -198,8 +200,9 @@ TEST(PredictedCovariance, IsThatOfTheMinimaWithoutEachBlock) {
   const PredictedCovariance predicted(cost, pose, about);
   ASSERT_TRUE(predicted.covariance());
   EXPECT_LT((*predicted.covariance() - expected).norm(), 1e-6 * expected.norm());
-  EXPECT_EQ(predicted.evaluations(), 3 + 13 + 4)
-      << "the value, the derivatives twice, every second of 25 poses on a line, and those between that matter";
+  EXPECT_EQ(predicted.evaluations(), 3 + 12 + 13 + 4)
+      << "the value, the derivatives twice, both ends of six lines, every second of 25 poses on a line, and those "
+         "between that matter";
   // Derivatives say nothing about a minimum that is wider than degrees, and this cost has no blocks to try.
   EXPECT_FALSE(PredictedCovariance(Squares(50), pose, about).covariance());
 }

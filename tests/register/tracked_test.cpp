@@ -14,7 +14,7 @@ using marrow::Vector6d;
 
 Pose truth() {
   Pose pose;
-  pose.frame = {Eigen::Vector3d(5, -3, 80), marrow::rotation_from_vector({0.1, -0.2, 0.3})};
+  pose.frame = {Eigen::Vector3d(5, -3, 80), marrow::rotation_from_vector({0.1, -0.2, 0.3}), true};
   pose.world_from_model = {"world", "ct", marrow::rotation_from_vector({0.2, 0.1, -0.4}), Eigen::Vector3d(12, -7, 30)};
   return pose;
 }

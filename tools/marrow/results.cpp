@@ -19,11 +19,10 @@ void print_pose(const std::string& name, const Pose& pose) {
     std::printf("    %10.6f %10.6f %10.6f   %10.4f mm\n", t.rotation(row, 0), t.rotation(row, 1), t.rotation(row, 2),
                 t.translation_mm[row]);
   if (pose.covariance) {
-    const Vector6d sd = pose.covariance->diagonal().cwiseMax(0).cwiseSqrt();
-    std::printf(
-        "    predicted standard deviation about and along the frontal, lateral and long axes: %.3f %.3f %.3f deg, %.3f "
-        "%.3f %.3f mm\n",
-        degrees(sd[0]), degrees(sd[1]), degrees(sd[2]), sd[3], sd[4], sd[5]);
+    const Vector6d sd = pose.covariance->diagonal().cwiseSqrt();
+    std::printf("    predicted standard deviation about and along the %s axes: %.3f %.3f %.3f deg, %.3f %.3f %.3f mm\n",
+                pose.frame.is_anatomical ? "frontal, lateral and long" : "x, y and z", degrees(sd[0]), degrees(sd[1]),
+                degrees(sd[2]), sd[3], sd[4], sd[5]);
   }
   for (const std::string& warning : pose.warnings) std::printf("    warning: %s\n", printable_lines(warning).c_str());
 }

@@ -22,7 +22,8 @@
 //     evaluations, cached_nodes, values: [number | null per metric],
 //     verdict (the worst), failure_probability, verdicts: [{item, judgement: "trusted" | "doubtful" | "wrong",
 //     failure_probability: number | null, reasons: [text], remedies: [text]}],          may be missing, as may be
-//     poses: [{name, target, source, matrix: [16], deviations: [6: degrees, mm] | null}],
+//     poses: [{name, target, source, matrix: [16], deviations: [6: degrees, mm] | null,
+//       has_bone_axes}],
 //     trajectories: [{name, frames: [name], time_s: [number], found: [bool], world_from_model: [[16]],
 //     motion: [[6: degrees, mm]] from the first frame along the bone's own axes, deviation: the same}],
 //     pictures: [{name: "overlay/distal/frontal", picture: id}], convergence: [[evaluations, cost], ...] | null,

@@ -42,7 +42,8 @@ const Verdict = (() => {
            el('caption', {}, entry.name + ': ' + entry.target + '_from_' + entry.source), el('tbody', {}, rows)),
         deviations &&
             el('p', {class: 'note'},
-               'Predicted standard deviations about and along the frontal, lateral and long axes: ' + text(0, '°') +
+               'Predicted standard deviations about and along the ' +
+                   (entry.has_bone_axes ? 'frontal, lateral and long' : 'x, y and z') + ' axes: ' + text(0, '°') +
                    '; ' + text(3, ' mm')));
   }
 

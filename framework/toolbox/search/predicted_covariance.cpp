@@ -9,21 +9,18 @@
 #include <limits>
 
 #include "marrow/domain/decompositions.hpp"
-#include "marrow/domain/number_text.hpp"
 #include "speaking_blocks.hpp"
 
 namespace marrow::search {
 namespace {
 
-constexpr double kMostStep = 16, kLeastStep = 1.0 / 256;                            // degrees or mm
+constexpr double kLeastStep = 1.0 / 256;                                            // degrees or mm
 constexpr double kLeastRise = 0.5, kGoodRise = 1, kAimedRise = 1.7, kMostRise = 3;  // in units of the wanted rise
 constexpr double kFlat = 0.1, kFlatLater = 0.5;  // in units of the wanted rise: the least curvature along a step
 constexpr double kWantedRise = 10;               // of the cost by a step, in units of its noise
 constexpr int kMostRounds = 5;
 constexpr double kMostVariance = 100 * 100;  // in squared steps; used for directions that nothing determines
 constexpr double kMattersBelow = 12;         // rise of a cost along the least certain direction, in units of its noise
-
-std::string number(double value) { return formatted("%.3g", value); }
 
 }  // namespace
 
@@ -70,9 +67,11 @@ PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform&
       set_exact();
       return;
     }
-    const double least_curvature = eigen_of_symmetric(h).values[0] / wanted_rise_, wanted_before = wanted_rise_;
+    // After the first round, those directions that are still open have no curvature to look at.
+    const auto left_out = round > 1 ? std::count(open_.begin(), open_.end(), true) : 0;
+    const double least_curvature = eigen_of_symmetric(h).values[left_out] / wanted_rise_, wanted_before = wanted_rise_;
     wanted_rise_ = std::min(wanted_rise_, kWantedRise * noise_);
-    const bool steps_are_right = wanted_rise_ > 0.5 * wanted_before && (round > 1 || least_curvature > kFlatLater);
+    const bool steps_are_right = wanted_rise_ > 0.5 * wanted_before && least_curvature > kFlatLater;
     if (steps_are_right || round == kMostRounds) {
       move_without_each_block(at_diagonals, flat);
       break;
@@ -80,31 +79,6 @@ PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform&
     turn_steps(h);
   }
   widen();
-}
-
-std::vector<std::string> PredictedCovariance::warnings(double most_deg, double most_mm) const {
-  static const std::array<const char*, 6> kAxes = {
-      "rotation about the frontal axis",    "rotation about the lateral axis",    "axial rotation",
-      "translation along the frontal axis", "translation along the lateral axis", "axial translation"};
-  if (has_few_blocks_)
-    return {
-        "all that the images say about the pose lies in one or two small parts of them, so its deviations are not "
-        "known"};
-  std::vector<std::string> warnings;
-  for (int axis = 0; axis < 6 && covariance_; ++axis) {
-    const bool turn = axis < 3;
-    const double sd = std::sqrt((*covariance_)(axis, axis)), shown = turn ? degrees(sd) : sd;
-    if (shown <= (turn ? most_deg : most_mm)) continue;
-    if (undetermined_[std::size_t(axis)])
-      warnings.push_back(std::string(kAxes[std::size_t(axis)]) +
-                         " is not determined by these images: the cost hardly changes within " + number(kMostStep) +
-                         (turn ? " degrees" : " mm"));
-    else
-      warnings.push_back(std::string(kAxes[std::size_t(axis)]) +
-                         " is poorly determined by these images: its predicted standard deviation is " + number(shown) +
-                         (turn ? " degrees" : " mm"));
-  }
-  return warnings;
 }
 
 /// Whether leaving out a block changes the cost for one or two blocks only, at the pose and near it. Then nothing tells
@@ -135,11 +109,11 @@ bool PredictedCovariance::is_regular(const Matrix6d& hessian) {
   return eigenvalues[0] > kRounding * eigenvalues[5];
 }
 
-/// By the cost's own derivatives, where it has them. They say little if a direction is nearly flat over degrees or
-/// millimetres, or flat without one of the blocks, or if only one or two blocks count. Then nothing is set, and the
-/// result is false.
+/// By the cost's own derivatives, where it has them. They say little if a direction is nearly flat over many degrees or
+/// millimetres, or flat without one of the blocks, or if only one or two blocks count, or if the cost does not rise as
+/// they say. Then nothing is set, and the result is false.
 bool PredictedCovariance::differentiate() {
-  constexpr double kMostDeviation = 1;  // degrees or mm
+  constexpr double kMostDeviation = 8;  // degrees or mm
   const std::vector<Cost::Expansion> without_block = cost_.expansion_without_each_block(pose_, frame_);
   const auto whole = cost_.expansion(pose_, frame_);
   if (without_block.empty() || !whole) return false;
@@ -156,9 +130,31 @@ bool PredictedCovariance::differentiate() {
     mean += h / double(without_block.size());
   }
   if (!sum.allFinite() || sum.diagonal().maxCoeff() > kMostDeviation * kMostDeviation) return false;
+  if (!rises_as_derivatives_say(mean, sum)) return false;
   noise_ = (mean * sum).trace() / 6;
   in_units_ = sum;
   set_covariance(Matrix6d::Zero());
+  is_by_derivatives_ = true;
+  return true;
+}
+
+/// Whether the cost rises along each eigenvector of the covariance, four deviations to both sides, by a quarter at
+/// least of what its curvature says. About the axis of a body of revolution the slopes of single facets give a
+/// curvature, but all turns cost the same.
+bool PredictedCovariance::rises_as_derivatives_say(const Matrix6d& hessian, const Matrix6d& covariance) {
+  constexpr double kDeviations = 4, kLeastShare = 0.25;
+  const SymmetricEigen<6> eigen = eigen_of_symmetric(covariance);
+  std::vector<RigidTransform> poses;
+  Vector6d expected;
+  for (int i = 0; i < 6; ++i) {
+    const Vector6d motion = kDeviations * std::sqrt(std::max(eigen.values[i], 0.0)) * eigen.vectors.col(i);
+    expected[i] = 0.5 * motion.dot(hessian * motion);
+    for (const double sense : {1.0, -1.0}) poses.push_back(pose_at(sense * motion));
+  }
+  const std::vector<double> values = cost_.values(poses);
+  evaluations_ += int(poses.size());
+  for (std::size_t i = 0; i < 6; ++i)
+    if (0.5 * (values[2 * i] + values[2 * i + 1]) - value_ < kLeastShare * expected[Eigen::Index(i)]) return false;
   return true;
 }
 

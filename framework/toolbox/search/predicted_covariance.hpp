@@ -36,6 +36,8 @@ class PredictedCovariance {
 
   /// Covariance of (r, t) in rad and mm, as in Pose. Absent if the cost has no blocks.
   const std::optional<Matrix6d>& covariance() const { return covariance_; }
+  /// Whether the cost's own derivatives gave it.
+  bool is_by_derivatives() const { return is_by_derivatives_; }
   int evaluations() const { return evaluations_; }
   /// The cost at the pose.
   double value() const { return value_; }
@@ -43,15 +45,19 @@ class PredictedCovariance {
   /// first; there are two at most.
   const std::vector<RigidTransform>& other_minima() const { return other_minima_; }
 
-  /// A sentence for each axis that the images hardly determine.
+  /// A sentence for each axis that the images hardly determine. If the axes are not anatomical, also for a direction of
+  /// rotation between them.
   std::vector<std::string> warnings(double most_deg, double most_mm) const;
 
  private:
+  static constexpr double kMostStep = 16;  ///< in degrees or mm
+
   RigidTransform pose_at(const Vector6d& motion) const { return moved_by_units(pose_, frame_, motion); }
   static bool is_regular(const Matrix6d& hessian);
   bool rests_on_few_blocks();
   void set_unknown();
   bool differentiate();
+  bool rises_as_derivatives_say(const Matrix6d& hessian, const Matrix6d& covariance);
   void set_exact();
   void set_covariance(const Matrix6d& undetermined);
   void guess_steps();
@@ -84,7 +90,7 @@ class PredictedCovariance {
   Matrix6d in_units_;                            ///< the covariance in degrees and mm, without open directions
   std::optional<Matrix6d> covariance_;
   std::array<bool, 6> undetermined_{};  ///< axes
-  bool has_few_blocks_ = false;
+  bool has_few_blocks_ = false, is_by_derivatives_ = false;
   std::vector<RigidTransform> other_minima_;
 };
 

@@ -58,7 +58,9 @@ std::vector<RigidTransform> Search::scan(const Cost& cost) {
   const Scan scan = options_.scan_poses > 0 ? scattered_scan(options_) : axial_scan(options_);
   std::vector<RigidTransform> poses;
   for (const Vector6d& motion : scan.motions) poses.push_back(moved_by_units(pose_, frame_, motion));
-  const std::vector<double> values = cost.values(poses);
+  std::vector<double> values = cost.values(poses);
+  for (double& value : values)
+    if (std::isnan(value)) value = std::numeric_limits<double>::infinity();  // nothing can be sorted among NaN
   evaluations_ += int(poses.size());
   std::vector<int> order(poses.size()), chosen;
   std::iota(order.begin(), order.end(), 0);
@@ -88,7 +90,8 @@ double Search::refine(const Cost& cost, const std::vector<int>& axes, const Step
   problem.initial_step.resize(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const int axis = axes[std::size_t(i)];
-    problem.initial_step[i] = axis == kAxialRotation ? steps.axial_deg : axis < 3 ? steps.deg : steps.mm;
+    const bool is_axial = axis == kAxialRotation && frame_.is_anatomical;
+    problem.initial_step[i] = is_axial ? steps.axial_deg : axis < 3 ? steps.deg : steps.mm;
   }
   problem.max_evaluations = options_.max_evaluations;
   problem.step_tolerance = steps.tolerance;
@@ -161,6 +164,35 @@ Pose pose_of(const Search& search, const Pose& initial, const Cost& cost) {
 
 namespace {
 
+/// The sum of the variances, of the rotations in square degrees and of the translations in square mm.
+double size_of(const PredictedCovariance& predicted) {
+  const Vector6d variance = predicted.covariance()->diagonal();
+  const double sum = degrees(degrees(variance.head<3>().sum())) + variance.tail<3>().sum();
+  return std::isfinite(sum) ? sum : std::numeric_limits<double>::infinity();
+}
+
+/// A cost whose own derivatives do not tell how it rises is rough: a few hundredths of a degree away, the same
+/// prediction may be several times as large. So it is made at five poses next to each other, and the middle one is
+/// taken. It belongs to the pose, not to the point of the rough ground at which the search happened to stop.
+PredictedCovariance on_rough_ground(const PredictedCovariance& at_pose, const Cost& cost, const RigidTransform& pose,
+                                    const FragmentFrame& frame, int& evaluations) {
+  constexpr double kStep = 0.03;  // degrees and mm
+  constexpr int kSenses[4][6] = {
+      {1, 1, 1, 1, 1, 1}, {1, -1, -1, 1, -1, -1}, {-1, 1, -1, -1, 1, -1}, {-1, -1, 1, -1, -1, 1}};
+  std::vector<PredictedCovariance> all{at_pose};
+  for (const auto& senses : kSenses) {
+    Vector6d motion;
+    for (int axis = 0; axis < 6; ++axis) motion[axis] = kStep * senses[axis];
+    all.emplace_back(cost, moved_by_units(pose, frame, motion), frame);
+    evaluations += all.back().evaluations();
+  }
+  std::vector<std::size_t> order(all.size());
+  std::iota(order.begin(), order.end(), std::size_t(0));
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return size_of(all[a]) < size_of(all[b]); });
+  return all[order[order.size() / 2]];
+}
+
 /// Goes to the best of the minima along the least certain direction, and predicts the covariance there.
 PredictedCovariance settle(Search& search, const FragmentFrame& frame, const Cost& cost, const Steps& steps,
                            int& evaluations) {
@@ -180,7 +212,9 @@ PredictedCovariance settle(Search& search, const FragmentFrame& frame, const Cos
       best = search.pose();
     }
     search.go_to(best);
-    if (least >= predicted.value()) return predicted;
+    if (least < predicted.value()) continue;
+    const bool is_rough = predicted.covariance() && !predicted.is_by_derivatives() && cost.expansion(here, frame);
+    return is_rough ? on_rough_ground(predicted, cost, here, frame, evaluations) : predicted;
   }
 }
 
@@ -195,6 +229,7 @@ Pose final_pose_of(Search& search, const Pose& initial, const Cost& cost, const 
   if (predicted.covariance() && !predicted.covariance()->allFinite())
     refuse_pose("without some blocks of the images the cost is not a number");
   Pose pose = pose_of(search, initial, cost);
+  pose.warnings.clear();  // those of the start are not of this pose
   pose.convergence = search.convergence(cost);
   pose.covariance = predicted.covariance();
   pose.evaluations += evaluations;

@@ -91,8 +91,7 @@ void compare_texts(const std::vector<std::string>& a, const std::vector<std::str
 }
 
 void compare_poses(const Pose& a, const Pose& b, Amount& amount) {
-  const bool has_frame = !a.frame.origin_mm.isZero();
-  compare_placement(a.world_from_model, b.world_from_model, has_frame ? &a.frame : nullptr, amount);
+  compare_placement(a.world_from_model, b.world_from_model, a.frame.is_anatomical ? &a.frame : nullptr, amount);
   if (a.cost != b.cost || a.evaluations != b.evaluations)
     amount.lines.push_back(
         formatted("cost %.6g, was %.6g; %d evaluations, were %d", b.cost, a.cost, b.evaluations, a.evaluations));

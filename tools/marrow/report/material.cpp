@@ -47,14 +47,11 @@ json pose_of(const fs::path& path, const std::string& name) {
   }
   for (const double last : {0, 0, 0, 1}) matrix.push_back(last);
   if (pose.covariance) {
-    const Vector6d deviation = pose.covariance->diagonal().cwiseMax(0).cwiseSqrt();
+    const Vector6d deviation = pose.covariance->diagonal().cwiseSqrt();
     for (int i = 0; i < 6; ++i) deviations.push_back(i < 3 ? degrees(deviation[i]) : deviation[i]);
   }
-  return {{"name", place_of(name)},
-          {"target", t.target},
-          {"source", t.source},
-          {"matrix", matrix},
-          {"deviations", deviations}};
+  return {{"name", place_of(name)}, {"target", t.target},       {"source", t.source},
+          {"matrix", matrix},       {"deviations", deviations}, {"has_bone_axes", pose.frame.is_anatomical}};
 }
 
 /// The rows "  - [evaluations, cost]" below "convergence:" in a pose file.

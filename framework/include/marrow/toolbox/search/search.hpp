@@ -49,7 +49,8 @@ struct Found {
 };
 
 /// First steps of a search: of the rotations about the frontal and lateral axes, of the axial rotation, and of the
-/// translations. The search ends when steps fall below `tolerance` times the first ones.
+/// translations. About axes that are not anatomical all rotations begin with `deg`. The search ends when steps fall
+/// below `tolerance` times the first ones.
 struct Steps {
   double deg = 1, axial_deg = 1, mm = 1, tolerance = 0.1;
 };
@@ -101,11 +102,11 @@ class Search {
 
 /// The search's pose with its cost and number of evaluations, without covariance. The rest is that of `initial`.
 Pose pose_of(const Search& search, const Pose& initial, const Cost& cost);
-/// The same at the end of a search, with the convergence. If the cost can leave out blocks, also with the predicted
-/// covariance and with warnings about axes that the images hardly determine. Along the direction that they determine
-/// least, the cost may have several minima, and the start decides in which the search ends. So the others are refined
-/// with `steps`, and the search goes to the best of them. Throws Error if the images say nothing about the pose
-/// (compared.hpp); a view that says nothing, where others do, is a warning.
+/// The same at the end of a search, without the warnings of the start, and with the convergence. If the cost can leave
+/// out blocks, also with the predicted covariance and with warnings about axes that the images hardly determine. Along
+/// the direction that they determine least, the cost may have several minima, and the start decides in which the search
+/// ends. So the others are refined with `steps`, and the search goes to the best of them. Throws Error if the images
+/// say nothing about the pose (compared.hpp); a view that says nothing, where others do, is a warning.
 Pose final_pose_of(Search& search, const Pose& initial, const Cost& cost, const Steps& steps,
                    const SearchOptions& options, Context& context);
 
@@ -138,10 +139,13 @@ Node& declare(Node& node) {
       .option("finalists", &Options::finalists,
               "number of best candidates after the first level that go through all levels; the last level chooses",
               marrow::at_least(1))
-      .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline")
-      .option("reach_px", &Options::reach_px, "per level: distance beyond which a point counts as unmatched")
+      .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline",
+              marrow::replaces({"contour_spacing_px", "ray_step"}))
+      .option("reach_px", &Options::reach_px, "per level: distance beyond which a point counts as unmatched",
+              marrow::replaces({"reach_px", "reach_mm"}))
       .option("pixel_step", &Options::pixel_step,
-              "per level, for grey values: compare every n-th pixel; none: as the cost says")
+              "per level, for grey values: compare every n-th pixel; none: as the cost says",
+              marrow::replaces({"cost.pixel_step"}))
       .option("step_deg", &Options::step_deg,
               "per level: first step of the rotations about the frontal and lateral axes")
       .option("step_axial_deg", &Options::step_axial_deg,
