@@ -40,7 +40,8 @@ constexpr const char* kStart = "a start nearer to the bone, by hand or by landma
 constexpr const char* kGiven =
     "a check of what was given: the bone, the side, which image belongs to which camera, the signs of its angles";
 constexpr const char* kKnownCameras =
-    "cameras that are known better, by a calibration; then give refine.cameras smaller rotation_deg and shift_mm";
+    "cameras that are known better, by a calibration; then give refine.cameras smaller rotation_deg, shift_mm, "
+    "focal_percent and centre_px";
 constexpr const char* kCameras = "a check of the cameras' calibration (camera.check), or refine.cameras";
 constexpr Words kWords[] = {
     {"decoys_scatter", "the cost of random poses scatters by %.2f of what they lie above this pose", kStart},
@@ -51,6 +52,8 @@ constexpr Words kWords[] = {
     {"contour_best_turned", "turned about its long axis, the bone's contour fits %.2f times as well", kAxial},
     {"other_minimum", "a search from elsewhere ends at another pose that is %.2f times as good", kView},
     {"better_minimum", "a search from elsewhere ends at a pose that is better, by %.2f of the cost's rise", kStart},
+    {"apart_mm", "the cost leads to a pose %.2f mm away", kStart},
+    {"apart_deg", "the cost leads to a pose that is turned by %.1f degrees about the long axis", kStart},
     {"restarts_mm", "searches from starts nearby end %.2f mm apart", kView},
     {"restarts_deg", "searches from starts nearby end %.1f degrees apart about the long axis", kAxial},
     {"contour_apart_mm", "contour and grey values lead to poses %.2f mm apart", kLook},
@@ -124,6 +127,9 @@ Evidence gather(const Judged& judged, const Pose* contour_pose, const Pose& sear
   const auto fine = compared(cost, options);
   const auto coarse = cost.at_level({2 * kSpacing_px, 2 * kReach_px, 2 * options.pixel_step});
   Evidence evidence, of_views, of_contour, of_outline;
+  std::optional<verdicts::Apart> apart;
+  if (contour_pose)
+    apart = {judged.off_mm(contour_pose->world_from_model), judged.axial_deg(contour_pose->world_from_model)};
   tbb::parallel_invoke(
       [&] {
         context.progress(0, "the cost of other poses");
@@ -139,16 +145,38 @@ Evidence gather(const Judged& judged, const Pose* contour_pose, const Pose& sear
         add(of_contour, verdicts::views_alone(judged, *contour, views, "contour_"));
       },
       [&] {
+        if (contour_cost) apart = verdicts::second_cost(judged, *contour_cost);
+      },
+      [&] {
         if (projector && edges) of_outline = verdicts::outline_on_edges(judged, *projector, views, *edges);
       });
   for (const Evidence* more : {&of_views, &of_contour, &of_outline}) add(evidence, *more);
-  if (contour_pose) {
-    evidence.push_back({"contour_apart_mm", judged.off_mm(contour_pose->world_from_model), "mm"});
-    evidence.push_back({"contour_apart_deg", judged.axial_deg(contour_pose->world_from_model), "deg"});
+  if (apart) {
+    evidence.push_back({"contour_apart_mm", apart->mm, "mm"});
+    evidence.push_back({"contour_apart_deg", apart->deg, "deg"});
   }
   add_predicted(searched, mesh, evidence);
   evidence.push_back({"warnings", double(judged.pose.warnings.size()), ""});
   return evidence;
+}
+
+const Words* words_of(const std::string& figure) {
+  const auto found =
+      std::find_if(std::begin(kWords), std::end(kWords), [&](const Words& words) { return figure == words.figure; });
+  return found == std::end(kWords) ? nullptr : &*found;
+}
+
+/// A pose from which a cost leads away as far as a failure is doubtful, however likely the model finds it.
+void doubt_what_a_cost_denies(const Evidence& figures, Verdict& verdict) {
+  for (const char* by : {"", "contour_"})
+    for (const Metric& figure : figures) {
+      const bool is_far = (figure.name == std::string(by) + "apart_mm" && figure.value > kMostError_mm) ||
+                          (figure.name == std::string(by) + "apart_deg" && figure.value > kMostAxialError_deg);
+      if (!is_far) continue;
+      verdict.judgement = std::max(verdict.judgement, Judgement::doubtful);
+      verdict.reasons.push_back(filled(words_of(figure.name)->reason, figure.value) + "; both cannot be right");
+      verdict.remedies.emplace_back(words_of(figure.name)->remedy);
+    }
 }
 
 /// The figures that speak most against the pose, each with what would settle it.
@@ -159,9 +187,8 @@ void explain(std::vector<FailureModel::Contribution> contributions, Verdict& ver
   for (const FailureModel::Contribution& one : contributions) {
     if (verdict.reasons.size() == kMostReasons || !(one.log_odds > 0)) break;
     if (!one.figure) continue;
-    const auto words = std::find_if(std::begin(kWords), std::end(kWords),
-                                    [&](const Words& words) { return one.figure->name == words.figure; });
-    if (words == std::end(kWords)) continue;
+    const Words* words = words_of(one.figure->name);
+    if (!words) continue;
     verdict.reasons.push_back(filled(words->reason, one.figure->value));
     const bool is_new =
         std::find(verdict.remedies.begin(), verdict.remedies.end(), words->remedy) == verdict.remedies.end();
@@ -172,13 +199,13 @@ void explain(std::vector<FailureModel::Contribution> contributions, Verdict& ver
 /// Throws Error if the model names a figure that this node does not know.
 void check_figures(const FailureModel& model, const std::filesystem::path& path) {
   for (const FailureModel::Term& term : model.terms)
-    if (std::none_of(std::begin(kWords), std::end(kWords),
-                     [&](const Words& words) { return term.figure == words.figure; }))
+    if (!words_of(term.figure))
       throw Error(path.string() + ": there is no figure '" + term.figure +
                   "'; fit the model again with tools/fit_verdict");
 }
 
-/// Another pose of the bone, found by another cost; null if there is none.
+/// Another pose of the bone, found by another cost; null if there is none. It is only for pipelines without this cost:
+/// it depends on where its own search began.
 const Pose* other_pose(const Pose* contour_pose, const List<Pose>* stages) {
   return contour_pose ? contour_pose : stages ? stages->find("first") : nullptr;
 }
@@ -188,7 +215,7 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
               const OutlineProjector* projector, const Mesh& mesh, const List<Pose>* others,
               const List<SignedField>* other_bones, const Options& options, Context& context) {
   constexpr int kTargets = 100;
-  check_rigid(pose.world_from_model, "pose");
+  check_pose(pose, "pose");
   if (!others != !other_bones) throw Error("others and other_bones belong together; wire both or none");
   FailureModel model;
   if (!options.failure_model.empty()) {
@@ -200,6 +227,7 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
   // A pose may have changed after its search, as refine.cameras does. Then its covariance includes what the images
   // cannot tell, which is no evidence against the search.
   const Pose& searched = stages && !stages->empty() ? (*stages)[stages->size() - 1] : pose;
+  check_pose(searched, "the last pose of stages");
   Verdict verdict;
   const std::string why_nothing =
       search::nothing_compared(*compared(cost, options), pose.world_from_model, judged.frame);
@@ -225,6 +253,7 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
     verdict.judgement = Judgement::doubtful;
     verdict.reasons.push_back(filled("the bone reaches %.1f mm into another bone", inside_mm));
   }
+  doubt_what_a_cost_denies(verdict.figures, verdict);
   if (verdict.judgement == Judgement::wrong) verdict.remedies.emplace_back(kGiven);
   if (predicted > model.doubtful_above)
     explain_predicted(spread, predicted, is_determined && &searched != &pose, verdict);
@@ -238,13 +267,15 @@ MARROW_PLUGIN(plugin) {
   plugin.node("verdict.evidence", judge)
       .summary("Judges a pose by evidence of many kinds, weighed by a failure model")
       .in("pose", "pose to judge")
-      .in("contour_pose", "pose of the same bone, found by its contour")
+      .in("contour_pose", "pose of the same bone, found by its contour; not used if contour_cost finds one itself")
       .in("stages",
-          "poses of the search: 'first' is by contour (register.sequence), unless contour_pose is given; the last one "
-          "has the predicted deviations of the search, without those that come from the cameras (refine.cameras)",
+          "poses of the search: the last one has the predicted deviations of the search, without those that come from "
+          "the cameras (refine.cameras); 'first' takes the place of contour_pose",
           over("stage"))
       .in("cost", "cost whose minimum the pose is")
-      .in("contour_cost", "another cost of the same bone, such as that of the contour")
+      .in("contour_cost",
+          "another cost of the same bone, such as that of the contour: where it leads from the pose, and how it "
+          "changes")
       .in("optimizer", "minimiser of the cost")
       .in("views", "X-ray views", over("view"))
       .in("edges", "edge pixels of each view", over("view"))
@@ -257,7 +288,7 @@ MARROW_PLUGIN(plugin) {
               "file of tools/fit_verdict; none: the figures alone, to fit one, and the pose is doubtful")
       .option("pixel_step", &Options::pixel_step,
               "for costs of grey values: only every n-th pixel is compared, and half as many far from the pose",
-              at_least(1), at_most(32))
+              at_least(1), at_most(32), replaces({"cost.pixel_step"}))
       .option("most_intersection_mm", &Options::most_intersection_mm,
               "a pose is doubtful if the bone reaches deeper into one of the others", at_least(0));
 }

@@ -18,6 +18,9 @@ double intersection_mm(const Judged& judged, const Mesh& mesh, const List<Pose>&
       continue;  // the bone itself
     const SignedField* bone = other_bones.find(others.name(i));
     if (!bone) throw Error("other_bones has no '" + others.name(i) + "'; give it the same fragments as others");
+    if (bone->grid.frame != pose.source)
+      throw Error("other_bones: '" + others.name(i) + "' is in frame '" + bone->grid.frame + "', but its pose takes '" +
+                  pose.source + "'; give the field of the bone that was registered");
     const RigidTransform other_from_model = inverse(pose) * judged.pose.world_from_model;
     for (const Eigen::Vector3d& point : points_mm) {
       const Eigen::Vector3d index = bone->grid.index_from_point(other_from_model * point);

@@ -21,6 +21,14 @@ RigidTransform Judged::moved_by(const RigidTransform& from, const Vector6d& deg_
   return moved(from, frame, motion);
 }
 
+std::vector<RigidTransform> near_starts(const Judged& judged) {
+  constexpr double kMotions[][6] = {{1.5, -1.5, 4, 2, -2, 2}, {-1.5, 1.5, -4, -2, 2, -2}, {2, 2, -6, -1, -1, 3}};
+  std::vector<RigidTransform> starts;
+  for (const auto& deg_and_mm : kMotions)
+    starts.push_back(judged.moved_by(judged.pose.world_from_model, Vector6d::Map(deg_and_mm)));
+  return starts;
+}
+
 Minimum minimum_near(const Judged& judged, const Cost& cost, const RigidTransform& from, const FirstSteps& steps,
                      int max_evaluations) {
   judged.context->check_cancelled();

@@ -37,6 +37,16 @@ struct FirstSteps {
 Minimum minimum_near(const Judged& judged, const Cost& cost, const RigidTransform& from, const FirstSteps& steps,
                      int max_evaluations);
 
+/// Three poses from which a search should come back to the pose.
+std::vector<RigidTransform> near_starts(const Judged& judged);
+
+/// How far another pose of the bone is from the pose: mTRE, and about the long axis.
+struct Apart {
+  double mm = 0, deg = 0;
+};
+/// Where a second cost leads from the pose: to the minimum next to it, or to one around it that is clearly better.
+Apart second_cost(const Judged& judged, const Cost& cost);
+
 /// Figures for or against a pose: 0 speaks for it, a larger value against it.
 using Evidence = std::vector<Metric>;
 

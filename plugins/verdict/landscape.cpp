@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "judged.hpp"
+#include "marrow/domain/quantile.hpp"
 #include "marrow/domain/random.hpp"
-#include "marrow/toolbox/geometry/targets.hpp"
 
 namespace marrow::verdicts {
 namespace {
@@ -55,8 +55,8 @@ Evidence landscape(const Judged& judged, const Cost& cost, const std::string& pr
   const double own = values[0];
   const std::vector<double> of_decoys(values.begin() + 1, values.begin() + 1 + kDecoys);
   const std::vector<double> of_turn(values.begin() + 1 + kDecoys, values.end());
-  const double median = geometry::quantile(of_decoys, 0.5);
-  const double scatter = geometry::quantile(of_decoys, 0.84) - geometry::quantile(of_decoys, 0.16);
+  const double median = quantile(of_decoys, 0.5);
+  const double scatter = quantile(of_decoys, 0.84) - quantile(of_decoys, 0.16);
   const auto least = [](const std::vector<double>& of) { return *std::min_element(of.begin(), of.end()); };
   constexpr double kMostScatter = 10;
   return {

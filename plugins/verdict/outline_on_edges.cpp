@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "judged.hpp"
-#include "marrow/toolbox/geometry/targets.hpp"
+#include "marrow/domain/quantile.hpp"
 #include "marrow/toolbox/match/nearest_edges.hpp"
 
 namespace marrow::verdicts {
@@ -37,6 +37,11 @@ std::size_t part_of(const Judged& judged, const OutlinePoint& point, double from
   return std::size_t(2 * place + (point.normal_u > 0));
 }
 
+/// The part of an offset that points out of an outline: across it, in mm, because pixels may not be square.
+double outwards(const Eigen::Vector2d& offset_mm, const Eigen::Vector2d& along_mm) {
+  return (offset_mm.x() * along_mm.y() - offset_mm.y() * along_mm.x()) / along_mm.norm();
+}
+
 Fit in_view(const Judged& judged, const std::vector<OutlinePoint>& outline, const View& view, const EdgeMap& edges) {
   const match::NearestEdges nearest(edges, view.mask, radians(kTolerance_deg));
   double from_mm = std::numeric_limits<double>::infinity(), to_mm = -from_mm;
@@ -49,15 +54,17 @@ Fit in_view(const Judged& judged, const std::vector<OutlinePoint>& outline, cons
   std::array<std::vector<double>, std::size_t(2 * kParts)> of_part_mm;
   std::size_t unexplained = 0;
   for (const OutlinePoint& point : outline) {
-    const double pixel_mm = pixel_size_at_mm(view.camera, judged.pose.world_from_model * point.model_mm.cast<double>());
     const EdgePixel* edge = nearest.find(point.u_px, point.v_px, point.normal_u, point.normal_v);
     if (!edge) {
       ++unexplained;
       continue;
     }
-    const double du = double(edge->u_px) - point.u_px, dv = double(edge->v_px) - point.v_px;
-    const double across_mm = pixel_mm * (du * point.normal_u + dv * point.normal_v);
-    const double along_px = std::abs(dv * point.normal_u - du * point.normal_v);
+    const Eigen::Vector2d normal(point.normal_u, point.normal_v), along(-normal.y(), normal.x()),
+        off(double(edge->u_px) - point.u_px, double(edge->v_px) - point.v_px);
+    const Eigen::Vector3d world_mm = judged.pose.world_from_model * point.model_mm.cast<double>();
+    const double across_mm =
+        outwards(offset_at_mm(view.camera, world_mm, off), offset_at_mm(view.camera, world_mm, along));
+    const double along_px = std::abs(off.dot(along));
     unexplained += std::abs(across_mm) > kExplained_mm || along_px > kMostAlong_px;
     if (std::abs(across_mm) > kReach_mm || along_px > kMostAlong_px) continue;
     all_mm.push_back(across_mm);
@@ -66,12 +73,12 @@ Fit in_view(const Judged& judged, const std::vector<OutlinePoint>& outline, cons
   Fit result;
   result.unexplained = outline.empty() ? 1 : double(unexplained) / double(outline.size());
   if (all_mm.empty()) return {1, kReach_mm, kReach_mm};
-  const double median_mm = geometry::quantile(all_mm, 0.5);
+  const double median_mm = quantile(all_mm, 0.5);
   for (const auto& part_mm : of_part_mm)
     if (part_mm.size() >= kLeastPoints)
-      result.part_mm = std::max(result.part_mm, std::abs(geometry::quantile(part_mm, 0.5) - median_mm));
+      result.part_mm = std::max(result.part_mm, std::abs(quantile(part_mm, 0.5) - median_mm));
   for (double& one : all_mm) one = std::abs(one - median_mm);
-  result.spread_mm = geometry::quantile(all_mm, 0.5);
+  result.spread_mm = quantile(all_mm, 0.5);
   return result;
 }
 
