@@ -5,12 +5,27 @@
 
 namespace {
 
+/// The first models need points one step away to either side, so bounds may not be nearer to each other than two steps.
+void check_bounds(const marrow::MinimisationProblem& problem) {
+  if (problem.lower.size() == 0 || problem.upper.size() == 0) return;
+  for (Eigen::Index i = 0; i < problem.start.size(); ++i) {
+    const double range = problem.upper[i] - problem.lower[i], step = problem.initial_step[i];
+    if (range > 0 && range < 2 * step)
+      throw marrow::Error("BOBYQA needs bounds that are two initial steps apart: those of coordinate " +
+                          std::to_string(i + 1) + " are " + marrow::formatted("%g", range) +
+                          " apart, and its step is " + marrow::formatted("%g", step) +
+                          "; use smaller steps or another optimizer");
+  }
+}
+
 class Bobyqa : public marrow::Optimizer {
  public:
   marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
+    marrow::search::check_problem(problem);
     if (problem.start.size() < 2)
       throw marrow::Error("BOBYQA minimises functions of two or more numbers, got " +
                           std::to_string(problem.start.size()) + "; use another optimizer");
+    check_bounds(problem);
     return marrow::search::NloptRun(nlopt::LN_BOBYQA, problem).run();
   }
 };

@@ -9,6 +9,7 @@
 #include <random>
 #include <thread>
 
+#include "marrow/domain/error.hpp"
 #include "marrow/domain/functions.hpp"
 
 namespace marrow::conformance {
@@ -156,6 +157,49 @@ double differing_results(const Subject& subject) {
   return double(std::count_if(found.begin(), found.end(), [&](const Eigen::VectorXd& one) { return one != expected; }));
 }
 
+/// How many problems without sense the optimizer takes.
+double nonsense_taken(const Subject& subject) {
+  const Made optimizer = made(subject);
+  std::vector<MinimisationProblem> problems;
+  problems.push_back(problem_of(sphere, 0));
+  problems.back().start = problems.back().initial_step = Eigen::VectorXd();
+  for (const double tolerance : {0.0, -1.0, double(NAN), double(INFINITY)}) {
+    problems.push_back(problem_of(sphere, 0));
+    problems.back().step_tolerance = tolerance;
+  }
+  problems.push_back(problem_of(sphere, 0));
+  problems.back().start[2] = NAN;
+  int taken = 0;
+  for (const MinimisationProblem& problem : problems) {
+    try {
+      (*optimizer).minimise(problem);
+      ++taken;
+    } catch (const Error&) {
+    }
+  }
+  return taken;
+}
+
+/// 1 if the optimizer gives a point as the best although no value is a number.
+double best_of_nothing(const Subject& subject) {
+  const Made optimizer = made(subject);
+  try {
+    (*optimizer).minimise(problem_of([](const Eigen::VectorXd&) { return std::nan(""); }, 0));
+  } catch (const Error&) {
+    return 0;
+  }
+  return 1;
+}
+
+/// Evaluations until the steps are below a coarse tolerance, in % of a budget that need not be spent.
+double evaluations_to_tolerance(const Subject& subject) {
+  const Made optimizer = made(subject);
+  MinimisationProblem problem = problem_of(sphere, 0);
+  problem.step_tolerance = 0.1;
+  problem.max_evaluations = 20000;
+  return 100.0 * (*optimizer).minimise(problem).evaluations / problem.max_evaluations;
+}
+
 double lost_exceptions(const Subject& subject) {
   const Made optimizer = made(subject);
   int calls = 0;
@@ -199,6 +243,12 @@ Suite optimizer_suite() {
       nan_left);
   add("repeated", "results of four simultaneous threads that differ from the result of one thread", 0, "results",
       differing_results);
+  add("tolerance", "a bowl of six variables, a step tolerance of 0.1: evaluations in percent of a budget of 20000", 50,
+      "%", evaluations_to_tolerance);
+  add("nonsense", "problems without coordinates, with a start or a step tolerance that is no number that are taken", 0,
+      "problems", nonsense_taken);
+  add("nothing_finite", "results for a function that is NaN everywhere; an error is right", 0, "results",
+      best_of_nothing);
   add("exceptions", "exceptions of the function that do not reach the caller", 0, "exceptions", lost_exceptions);
   return suite;
 }

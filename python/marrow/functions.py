@@ -90,6 +90,11 @@ def minimum(node: Declaration, arguments: Dict[str, Any], request: Dict[str, Any
         reason = str(spent)
     if not problem.evaluations:
         raise Error("%s: it asked for no value of the function; call problem(points)" % name)
+    if not numpy.isfinite(problem.least):
+        raise Error(
+            "the optimizer found no least value: the function is not finite at any of the %d points that were tried"
+            % problem.evaluations
+        )
     if not isinstance(reason, str) or not reason:
         raise Error("%s: it returned %r; return in words why it ended" % (name, reason))
     return reason

@@ -43,7 +43,7 @@ class Problem:
         """The greatest value of each coordinate [n]; inf where there is none."""
         self.max_evaluations = int(max_evaluations)
         """How many values may be asked for."""
-        self.step_tolerance = float(step_tolerance)
+        self.step_tolerance = float("nan" if step_tolerance is None else step_tolerance)
         """It is time to end when steps are shorter than this fraction of initial_step."""
         self.evaluations = 0
         """How many values were asked for."""
@@ -89,6 +89,8 @@ class Problem:
 
     def _check(self) -> None:
         size = self.start.shape
+        if size == (0,):
+            raise Error("the optimizer got a start without coordinates; it needs one at least")
         good = len(size) == 1 and self.initial_step.shape == size and bool((self.initial_step > 0).all())
         if not (good and numpy.isfinite(self.start).all() and numpy.isfinite(self.initial_step).all()):
             raise Error("the optimizer needs a finite start and one positive initial step per coordinate")
@@ -96,6 +98,8 @@ class Problem:
             raise Error("the optimizer's start lies outside the bounds")
         if self.max_evaluations < 1:
             raise Error("the optimizer needs at least one evaluation, got max_evaluations = %d" % self.max_evaluations)
+        if not 0 < self.step_tolerance < numpy.inf:
+            raise Error("the optimizer needs a positive, finite step_tolerance, got %g" % self.step_tolerance)
 
 
 def _numbers(given: Any, what: str) -> Any:

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
 #include "optimizer_behaviour.hpp"
 
 namespace bobyqa_test {
@@ -9,6 +11,7 @@ TEST(Bobyqa, FindsTheMinimum) { optimizer_behaviour::finds_the_minimum(*bobyqa()
 TEST(Bobyqa, KeepsToBoundsAndBudget) { optimizer_behaviour::keeps_to_bounds_and_budget(*bobyqa()); }
 TEST(Bobyqa, TakesNanForTheWorst) { optimizer_behaviour::takes_nan_for_the_worst(*bobyqa()); }
 TEST(Bobyqa, LetsExceptionsPass) { optimizer_behaviour::lets_exceptions_pass(*bobyqa()); }
+TEST(Bobyqa, RefusesWhatIsNowhereFinite) { optimizer_behaviour::refuses_what_is_nowhere_finite(*bobyqa()); }
 TEST(Bobyqa, RefusesNonsense) { optimizer_behaviour::refuses_nonsense(*bobyqa()); }
 
 TEST(Bobyqa, RefusesOneDimension) {
@@ -21,6 +24,19 @@ TEST(Bobyqa, RefusesOneDimension) {
   } catch (const marrow::Error& error) {
     EXPECT_STREQ(error.what(), "BOBYQA minimises functions of two or more numbers, got 1; use another optimizer");
   }
+}
+
+TEST(Bobyqa, SaysWhichBoundsAreTooNear) {
+  auto problem = optimizer_behaviour::valley();
+  problem.lower = Eigen::Vector2d(-2, 0.75);
+  problem.upper = Eigen::Vector2d(2, 1.25);
+  EXPECT_EQ(optimizer_behaviour::refusal_of(*bobyqa(), problem),
+            "BOBYQA needs bounds that are two initial steps apart: those of coordinate 2 are 0.5 apart, and its step "
+            "is 0.5; use smaller steps or another optimizer");
+  problem.initial_step = Eigen::Vector2d(0.5, 0.2);
+  const auto result = bobyqa()->minimise(problem);
+  // By hand: along the valley y = x^2 from the start, where x is negative, the least is nearest to (1, 1) at y = 0.75.
+  EXPECT_LE(result.value, problem.function(Eigen::Vector2d(-std::sqrt(0.75), 0.75)) + 1e-3);
 }
 
 }  // namespace bobyqa_test

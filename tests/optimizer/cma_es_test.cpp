@@ -9,6 +9,7 @@ TEST(CmaEs, FindsTheMinimum) { optimizer_behaviour::finds_the_minimum(*cma_es())
 TEST(CmaEs, KeepsToBoundsAndBudget) { optimizer_behaviour::keeps_to_bounds_and_budget(*cma_es()); }
 TEST(CmaEs, TakesNanForTheWorst) { optimizer_behaviour::takes_nan_for_the_worst(*cma_es()); }
 TEST(CmaEs, LetsExceptionsPass) { optimizer_behaviour::lets_exceptions_pass(*cma_es()); }
+TEST(CmaEs, RefusesWhatIsNowhereFinite) { optimizer_behaviour::refuses_what_is_nowhere_finite(*cma_es()); }
 TEST(CmaEs, RefusesNonsense) { optimizer_behaviour::refuses_nonsense(*cma_es()); }
 
 }  // namespace cma_es_test

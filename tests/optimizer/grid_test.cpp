@@ -16,6 +16,7 @@ TEST(Grid, FollowsTheBestAndBecomesFiner) {
 }
 TEST(Grid, TakesNanForTheWorst) { optimizer_behaviour::takes_nan_for_the_worst(*grid()); }
 TEST(Grid, LetsExceptionsPass) { optimizer_behaviour::lets_exceptions_pass(*grid()); }
+TEST(Grid, RefusesWhatIsNowhereFinite) { optimizer_behaviour::refuses_what_is_nowhere_finite(*grid()); }
 TEST(Grid, RefusesNonsense) {
   optimizer_behaviour::refuses_nonsense(*grid());
   EXPECT_EQ(shipped::refusal("optimizer.grid", {}, {{"points", std::int64_t{4}}}),

@@ -15,6 +15,9 @@ TEST(LevenbergMarquardt, KeepsToBoundsAndBudget) {
 }
 TEST(LevenbergMarquardt, TakesNanForTheWorst) { optimizer_behaviour::takes_nan_for_the_worst(*levenberg_marquardt()); }
 TEST(LevenbergMarquardt, LetsExceptionsPass) { optimizer_behaviour::lets_exceptions_pass(*levenberg_marquardt()); }
+TEST(LevenbergMarquardt, RefusesWhatIsNowhereFinite) {
+  optimizer_behaviour::refuses_what_is_nowhere_finite(*levenberg_marquardt());
+}
 TEST(LevenbergMarquardt, RefusesNonsense) { optimizer_behaviour::refuses_nonsense(*levenberg_marquardt()); }
 
 // The valley is the sum of the squares of r = (10 (y - x^2), 1 - x).

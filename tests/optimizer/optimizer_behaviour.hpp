@@ -9,6 +9,7 @@
 #include <marrow/domain/functions.hpp>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "shipped.hpp"
 
@@ -83,15 +84,18 @@ inline void lets_exceptions_pass(const marrow::Optimizer& optimizer) {
   EXPECT_EQ(calls, 5);
 }
 
+/// Why an optimizer refuses a problem; empty if it does not.
+inline std::string refusal_of(const marrow::Optimizer& optimizer, const marrow::MinimisationProblem& problem) {
+  try {
+    optimizer.minimise(problem);
+  } catch (const marrow::Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
 inline void refuses_nonsense(const marrow::Optimizer& optimizer) {
-  const auto message = [&](const marrow::MinimisationProblem& problem) -> std::string {
-    try {
-      optimizer.minimise(problem);
-    } catch (const marrow::Error& error) {
-      return error.what();
-    }
-    return "";
-  };
+  const auto message = [&](const marrow::MinimisationProblem& problem) { return refusal_of(optimizer, problem); };
   auto problem = valley();
   problem.initial_step[1] = 0;
   EXPECT_EQ(message(problem), "the optimizer needs a finite start and one positive initial step per coordinate");
@@ -104,6 +108,32 @@ inline void refuses_nonsense(const marrow::Optimizer& optimizer) {
   problem = valley();
   problem.max_evaluations = 0;
   EXPECT_EQ(message(problem), "the optimizer needs at least one evaluation, got max_evaluations = 0");
+  problem = valley();
+  problem.start = problem.initial_step = Eigen::VectorXd();
+  EXPECT_EQ(message(problem), "the optimizer got a start without coordinates; it needs one at least");
+  problem = valley();
+  problem.upper = Eigen::Vector2d(9, std::nan(""));
+  EXPECT_EQ(message(problem), "the optimizer got a bound that is not a number");
+  const std::pair<double, std::string> tolerances[] = {
+      {std::nan(""), "nan"}, {0, "0"}, {-0.5, "-0.5"}, {std::numeric_limits<double>::infinity(), "inf"}};
+  for (const auto& [tolerance, text] : tolerances) {
+    problem = valley();
+    problem.step_tolerance = tolerance;
+    EXPECT_EQ(message(problem), "the optimizer needs a positive, finite step_tolerance, got " + text);
+  }
+}
+
+/// A function that is nowhere a number has no best point. How many points are tried is the optimizer's matter.
+inline void refuses_what_is_nowhere_finite(const marrow::Optimizer& optimizer) {
+  auto problem = valley();
+  int calls = 0;
+  for (const double value : {std::nan(""), std::numeric_limits<double>::infinity()}) {
+    calls = 0;
+    problem.function = [&](const Eigen::VectorXd&) { return ++calls, value; };
+    const std::string said = refusal_of(optimizer, problem);
+    EXPECT_EQ(said, "the optimizer found no least value: the function is not finite at any of the " +
+                        std::to_string(calls) + " points that were tried");
+  }
 }
 
 }  // namespace optimizer_behaviour

@@ -99,6 +99,21 @@ class Optimizers(Written):
         found = self.minimise(lambda x: numpy.nan if x[0] > 0.7 else bowl(x))
         self.assertLess(numpy.abs(found.x - [0.7, -2]).max(), 1e-3)
 
+    def test_a_function_that_is_nowhere_finite_has_no_least_value(self):
+        """By hand: the start, and in each of 14 rounds of halved steps four points around it (0.5^14 < 1e-4)."""
+        with self.assertRaisesRegex(
+            marrow.Error,
+            "the optimizer found no least value: the function is not finite at any of the 57 points that were tried",
+        ):
+            self.minimise(lambda x: numpy.nan)
+
+    def test_a_problem_that_makes_no_sense(self):
+        for tolerance, text in ((numpy.nan, "nan"), (numpy.inf, "nan"), (-1, "-1"), (0, "0")):
+            with self.assertRaisesRegex(marrow.Error, "needs a positive, finite step_tolerance, got %s$" % text):
+                self.minimise(step_tolerance=tolerance)
+        with self.assertRaisesRegex(marrow.Error, "the optimizer got a start without coordinates; it needs one"):
+            marrow.optimizer.steps().minimise(bowl, [], [])
+
     def test_it_registers_with_a_cost(self):
         self.plugin(
             """

@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plain search along the coordinates, and five that are wrong in one way each: the suite must catch each of them.
+// A plain search along the coordinates, and others that are wrong in one way each: the suite must catch each of them.
 #include <atomic>
 #include <cmath>
 #include <marrow/plugin.hpp>
 
 namespace {
 
-enum class Fault { none, lazy, spending, unbounded, fooled, changing };
+enum class Fault { none, lazy, spending, unbounded, fooled, changing, tireless, trusting, inventive };
 
 template <Fault fault>
 class Search : public marrow::Optimizer {
  public:
   marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
     static std::atomic<int> runs{0};
+    const double tolerance = problem.step_tolerance;
+    if (fault != Fault::trusting &&
+        (problem.start.size() == 0 || !problem.start.allFinite() || !(tolerance > 0) || !std::isfinite(tolerance)))
+      throw marrow::Error("this problem makes no sense");
     marrow::MinimisationResult result{problem.start, INFINITY, 0, "steps are below the tolerance"};
     const int budget = problem.max_evaluations + (fault == Fault::spending ? 3 : 0);
     const auto value = [&](Eigen::VectorXd& x) {
@@ -23,7 +27,7 @@ class Search : public marrow::Optimizer {
     };
     result.value = value(result.x);
     double step = fault == Fault::changing ? 1 + 0.01 * ++runs : 1;
-    while (fault != Fault::lazy && step > problem.step_tolerance) {
+    while (fault != Fault::lazy && (fault == Fault::tireless || step > tolerance)) {
       bool any = false;
       for (Eigen::Index i = 0; i < result.x.size(); ++i)
         for (const double sign : {1.0, -1.0}) {
@@ -38,6 +42,7 @@ class Search : public marrow::Optimizer {
         }
       if (!any) step *= 0.5;
     }
+    if (fault != Fault::inventive && result.value >= 1e300) throw marrow::Error("there is no least value");
     return result;
   }
 };
@@ -59,4 +64,7 @@ MARROW_PLUGIN(plugin) {
   add("optimizer.unbounded", make<Fault::unbounded>);
   add("optimizer.fooled", make<Fault::fooled>);
   add("optimizer.changing", make<Fault::changing>);
+  add("optimizer.tireless", make<Fault::tireless>);
+  add("optimizer.trusting", make<Fault::trusting>);
+  add("optimizer.inventive", make<Fault::inventive>);
 }

@@ -7,28 +7,36 @@
 #include <limits>
 #include <marrow/domain/error.hpp>
 #include <marrow/domain/functions.hpp>
+#include <marrow/domain/number_text.hpp>
 #include <optional>
 #include <string>
 
 namespace marrow::search {
 
-/// Throws Error unless start and steps are finite, steps are positive and as many as coordinates, bounds are empty or
-/// complete, the start lies within them, and max_evaluations is at least 1.
+/// Throws Error unless there are coordinates, start and steps are finite, steps are positive and as many as
+/// coordinates, bounds are empty or complete, the start lies within them, step_tolerance is positive and finite, and
+/// max_evaluations is at least 1.
 inline void check_problem(const MinimisationProblem& problem) {
   const auto n = problem.start.size();
+  if (n == 0) throw Error("the optimizer got a start without coordinates; it needs one at least");
   if (problem.initial_step.size() != n || !(problem.initial_step.array() > 0).all() ||
       !problem.initial_step.allFinite() || !problem.start.allFinite())
     throw Error("the optimizer needs a finite start and one positive initial step per coordinate");
-  for (const auto* bound : {&problem.lower, &problem.upper})
+  for (const auto* bound : {&problem.lower, &problem.upper}) {
     if (bound->size() && bound->size() != n)
       throw Error("the optimizer got bounds for " + std::to_string(bound->size()) + " of " + std::to_string(n) +
                   " coordinates");
+    if (bound->array().isNaN().any()) throw Error("the optimizer got a bound that is not a number");
+  }
   if ((problem.lower.size() && (problem.lower.array() > problem.start.array()).any()) ||
       (problem.upper.size() && (problem.upper.array() < problem.start.array()).any()))
     throw Error("the optimizer's start lies outside the bounds");
   if (problem.max_evaluations < 1)
     throw Error("the optimizer needs at least one evaluation, got max_evaluations = " +
                 std::to_string(problem.max_evaluations));
+  if (!(problem.step_tolerance > 0) || !std::isfinite(problem.step_tolerance))
+    throw Error("the optimizer needs a positive, finite step_tolerance, got " +
+                formatted("%g", problem.step_tolerance));
 }
 
 /// Evaluates a problem in scaled coordinates y = (x - start) / initial_step. Refers to the problem, which must outlive
@@ -77,6 +85,7 @@ class Evaluations {
   }
 
   /// Calls algorithm(*this), which returns the reason why it stopped, and returns the best point found. Catches Spent.
+  /// Throws Error if no value was finite: there is no best point then.
   template <class Algorithm>
   MinimisationResult run(const Algorithm& algorithm) {
     try {
@@ -84,6 +93,9 @@ class Evaluations {
     } catch (const Spent&) {
       result_.stopped_because = "the budget of evaluations is spent";
     }
+    if (!std::isfinite(result_.value))
+      throw Error("the optimizer found no least value: the function is not finite at any of the " +
+                  std::to_string(result_.evaluations) + " points that were tried");
     return result_;
   }
 

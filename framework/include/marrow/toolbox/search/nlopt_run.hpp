@@ -2,6 +2,8 @@
 #pragma once
 #include <exception>
 #include <nlopt.hpp>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "marrow/toolbox/search/evaluations.hpp"
@@ -9,8 +11,8 @@
 namespace marrow::search {
 
 /// Runs one of NLopt's derivative-free algorithms on a problem. The algorithm works in units of the initial step, so
-/// that all coordinates have the same scale. Throws Error as check_problem() does. Exceptions of the function pass
-/// through.
+/// that all coordinates have the same scale. Throws Error as check_problem() does, and if NLopt refuses the problem.
+/// Exceptions of the function pass through.
 class NloptRun {
  public:
   NloptRun(nlopt::algorithm algorithm, const MinimisationProblem& problem)
@@ -22,6 +24,9 @@ class NloptRun {
     if (problem.lower.size()) optimizer_.set_lower_bounds(scaled(problem.lower));
     if (problem.upper.size()) optimizer_.set_upper_bounds(scaled(problem.upper));
   }
+
+  /// For algorithms that end when a box is small, and not a step: the side of this box as a fraction of the range.
+  void end_at_part_of_range(double fraction) { optimizer_.set_xtol_rel(fraction); }
 
   MinimisationResult run() {
     return evaluate_.run([&](Evaluations&) -> std::string {
@@ -35,6 +40,9 @@ class NloptRun {
         // NLopt replaces the function's exceptions by its own, so evaluate() has kept the original one.
         if (thrown_) std::rethrow_exception(thrown_);
         throw;
+      } catch (const std::invalid_argument& refused) {
+        throw Error(std::string("the optimizer cannot minimise this function within these bounds: NLopt says: ") +
+                    refused.what());
       }
     });
   }
@@ -47,9 +55,10 @@ class NloptRun {
 
   static double evaluate(const std::vector<double>& y, std::vector<double>&, void* self) {
     NloptRun& run = *static_cast<NloptRun*>(self);
+    if (run.thrown_) return 0;  // some of NLopt's algorithms ask for a few more values before they stop
     try {
       return run.evaluate_(Eigen::VectorXd::Map(y.data(), Eigen::Index(y.size())));
-    } catch (...) {  // thrown by the function; or Spent, because some of NLopt's algorithms exceed their budget
+    } catch (...) {  // thrown by the function; or Spent, because some algorithms exceed their budget
       run.thrown_ = std::current_exception();
       run.optimizer_.force_stop();
       return 0;
