@@ -76,6 +76,19 @@ void check_option(const OptionInfo& option, std::vector<std::string>& faults) {
     faults.push_back(name + ": its default '" + *text + "' is not one of its choices");
 }
 
+/// Each name is that of an option, or input.option with an input that takes functions.
+void check_replaces(const NodeInfo& node, const OptionInfo& option, std::vector<std::string>& faults) {
+  for (const std::string& name : option.replaces) {
+    const std::string what = "option '" + option.name + "' replaces '" + name + "': ";
+    const std::size_t dot = name.find('.');
+    if (!is_name(name.substr(dot + 1))) faults.push_back(what + "names are lower_case");
+    if (dot != std::string::npos && std::none_of(node.inputs.begin(), node.inputs.end(), [&](const PortInfo& input) {
+          return input.type.is_function && input.name == name.substr(0, dot);
+        }))
+      faults.push_back(what + "there is no input '" + name.substr(0, dot) + "' that takes functions");
+  }
+}
+
 std::vector<TypeInfo> types_of(const PortInfo& port) { return {port.type}; }
 const std::vector<TypeInfo>& types_of(const KindPort& port) { return port.types; }
 
@@ -163,6 +176,7 @@ void check_declaration(NodeDefinition& node) {
   std::set<std::string> names;
   for (const OptionInfo& option : info.options) {
     check_option(option, faults);
+    check_replaces(info, option, faults);
     if (!names.insert(option.name).second) faults.push_back("option '" + option.name + "' is named twice");
   }
 

@@ -19,6 +19,7 @@
 #include "pipeline_options.hpp"
 #include "pipeline_references.hpp"
 #include "pipeline_repetition.hpp"
+#include "pipeline_replaced.hpp"
 #include "pipeline_text.hpp"
 #include "pipeline_trial.hpp"
 
@@ -56,6 +57,7 @@ class Resolver {
     for (const auto& [name, value] : written_.outputs) resolve_output(name, value);
     point_at_renamed();
     check_circles(written_, diagnostics_);
+    if (diagnostics_.empty()) note_replaced_options();
     if (diagnostics_.empty()) order_and_find_axes(pipeline_, diagnostics_);
     note_unused_inputs();
     return std::move(pipeline_);
@@ -294,6 +296,10 @@ class Resolver {
     for (const WrittenNode& node : written_.nodes) nodes.emplace(node.id, node.place);
     point_at_renamed("node", nodes, ids_.used, ids_.unknown);
     point_at_renamed("input", written_.input_places, input_texts_.used, input_texts_.unknown);
+  }
+
+  void note_replaced_options() {
+    for (std::string& note : notes_of_replaced_options(written_, pipeline_)) pipeline_.notes.push_back(std::move(note));
   }
 
   /// A value of such an input would change nothing.

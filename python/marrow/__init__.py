@@ -50,6 +50,7 @@ from .annotations import (
     named,
     not_above,
     over,
+    replaces,
     same_length,
     unit,
 )

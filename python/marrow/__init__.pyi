@@ -37,6 +37,7 @@ from .annotations import length as length
 from .annotations import named as named
 from .annotations import not_above as not_above
 from .annotations import over as over
+from .annotations import replaces as replaces
 from .annotations import same_length as same_length
 from .annotations import unit as unit
 from .comparison import Comparison as Comparison

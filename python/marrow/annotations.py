@@ -11,6 +11,7 @@ __all__ = [
     "at_most",
     "unit",
     "length",
+    "replaces",
     "over",
     "named",
     "not_above",
@@ -49,6 +50,11 @@ def unit(text: str) -> Note:
 def length(count: int) -> Note:
     """How many numbers a list has."""
     return Note("length", int(count))
+
+
+def replaces(*options: str) -> Note:
+    """Options of the nodes whose functions reach this node: what a pipeline gives to such a node has no effect here."""
+    return Note("replaces", list(options))
 
 
 def over(axis: str) -> Note:

@@ -70,6 +70,18 @@ TEST(Declaration, DefaultNotAmongChoices) {
       .option("word", &Options::word, "h", marrow::one_of({"x", "y"}));
   EXPECT_NE(faults(plugin).find("option 'word': its default 'a' is not one of its choices"), std::string::npos);
 }
+TEST(Declaration, ReplacesWhatNoFunctionBrings) {
+  Plugin plugin;
+  plugin.node("test.plain", plain)
+      .summary("s")
+      .in("a", "h")
+      .out("b", "h")
+      .option("size_mm", &Options::size_mm, "h", marrow::replaces({"size_mm", "a.size_mm", "Size"}));
+  EXPECT_EQ(faults(plugin).find("replaces 'size_mm'"), std::string::npos);
+  EXPECT_NE(faults(plugin).find("option 'size_mm' replaces 'a.size_mm': there is no input 'a' that takes functions"),
+            std::string::npos);
+  EXPECT_NE(faults(plugin).find("option 'size_mm' replaces 'Size': names are lower_case"), std::string::npos);
+}
 TEST(Declaration, OptionNamedTwice) {
   Plugin plugin;
   plugin.node("test.plain", plain)

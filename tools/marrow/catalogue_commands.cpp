@@ -73,6 +73,7 @@ void print_node(const NodeInfo& node, const LibraryInfo& library, const KindInfo
     std::printf("  %-26s %s\n", printable(option.name).c_str(), printable(option.help).c_str());
     std::printf("  %-26s %s; %s\n", "", printable(range_text(option)).c_str(),
                 option.required ? "must be given" : printable("default " + yaml_text(option.default_value)).c_str());
+    if (!option.replaces.empty()) std::printf("  %-26s %s\n", "", printable(replaces_text(option)).c_str());
   }
   if (node.random) std::printf("\nRandom: its result depends on the run's seed.\n");
   print_checks(node, kind);

@@ -59,6 +59,7 @@ json option_json(const OptionInfo& option) {
   if (option.minimum) j["minimum"] = *option.minimum;
   if (option.maximum) j["maximum"] = *option.maximum;
   if (!option.choices.empty()) j["choices"] = option.choices;
+  if (!option.replaces.empty()) j["replaces"] = replaces_text(option);
   return j;
 }
 
@@ -149,6 +150,12 @@ std::string relation_text(const RelationInfo& relation) {
       return all + " has no item twice";
   }
   return all;
+}
+
+std::string replaces_text(const OptionInfo& option) {
+  std::string names;
+  for (const std::string& name : option.replaces) names += (names.empty() ? "'" : ", '") + name + "'";
+  return names.empty() ? "" : "takes the place of " + names + " of the functions that reach this node";
 }
 
 std::string range_text(const OptionInfo& option) {

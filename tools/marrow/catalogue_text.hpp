@@ -19,6 +19,8 @@ std::string port_text(const KindPort& port);
 std::string yaml_text(const OptionValue& value);
 /// "number, 0 to 100 px", "one of: a, b".
 std::string range_text(const OptionInfo& option);
+/// What the option replaces, in words; empty if nothing.
+std::string replaces_text(const OptionInfo& option);
 /// "'low' is not above 'high'".
 std::string relation_text(const RelationInfo& relation);
 

@@ -38,7 +38,10 @@ def options_part(node):
     entries = []
     for option in node["options"]:
         told = "%s; %s" % (option["range"], default_text(option))
-        entries.append(entry("node-option", node["name"] + "." + option["name"], told, plain(option["help"])))
+        help_text = plain(option["help"])
+        if "replaces" in option:
+            help_text += "; " + re.sub(r"'([^']*)'", r"`\1`", option["replaces"])
+        entries.append(entry("node-option", node["name"] + "." + option["name"], told, help_text))
     relations = ["- " + re.sub(r"'(?:in\.)?([^']*)'", r"`\1`", relation) for relation in node["relations"]]
     return sections(*entries, relations and "What must hold:", "\n".join(relations))
 
