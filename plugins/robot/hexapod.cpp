@@ -36,7 +36,7 @@ RobotState state_of(const Options& options) {
   return state;
 }
 
-Result hexapod(const phantom::Phantom& phantom, const Options& options) {
+Result hexapod(const phantom::Phantom& phantom, const Options& options, Context& context) {
   const std::string what = "robot.hexapod";
   phantom::check_phantom(phantom, what);
   const Held held(phantom, options, options.fragment, options.reference, what);
@@ -46,6 +46,9 @@ Result hexapod(const phantom::Phantom& phantom, const Options& options) {
   RobotState& state = result.state;
   // As planned, the base's axes are those of the world, and the fragment's middle lies above the platform at home.
   const robot::Hexapod nominal = robot::make_hexapod(options);
+  robot::check_workspace(nominal, options, nominal.base_from_home, what + ": home");
+  const double condition = robot::condition(nominal, nominal.base_from_home);
+  if (const std::string text = robot::doubtful_condition(condition, "home"); !text.empty()) context.warn(text);
   state.base_from_platform = nominal.base_from_home;
   RigidTransform planned{"base", "world"};
   planned.translation_mm = nominal.base_from_home * Eigen::Vector3d(0, 0, options.grip_mm) - middle_mm;

@@ -91,20 +91,22 @@ Result move(const phantom::Phantom& phantom, const RobotState& state, const Pose
   Result result{state, before, {}};
   result.report.stopped.clear();
   result.report.is_pressed = false;
-  RigidTransform at = robot.held().fragment().world_from_ct;
+  RigidTransform at = state.world_from_ct;
   Load load = robot.held().load_at(at);
   result.report.largest_load = load;
+  double worst = 0;
   const bool is_motion = turn_deg > 1e-9 || way_mm > 1e-9;
   for (int i = 1; i <= parts && is_motion; ++i) {
     context.check_cancelled();
     const RigidTransform platform = part_of(told, hand_mm, double(i) / parts) * state.base_from_platform;
+    RigidTransform next;
     try {
       robot::check_workspace(robot.nominal(), state.limits, platform, "the motion");
+      next = robot.world_from_ct(platform);
     } catch (const Error& error) {
       result.report.stopped = error.what();
       break;
     }
-    const RigidTransform next = robot.world_from_ct(platform);
     const Load there = robot.held().load_at(next);
     if (there.force_n > state.force.stop_n && there.force_n > load.force_n) {
       result.report.stopped = "the force would pass " + with_unit(state.force.stop_n, "N");
@@ -112,6 +114,7 @@ Result move(const phantom::Phantom& phantom, const RobotState& state, const Pose
       break;
     }
     at = next, load = there;
+    worst = std::max(worst, robot::condition(robot.nominal(), platform));
     result.state.base_from_platform = platform;
     result.report.largest_load.force_n = std::max(result.report.largest_load.force_n, load.force_n);
     result.report.largest_load.torque_nm = std::max(result.report.largest_load.torque_nm, load.torque_nm);
@@ -128,6 +131,7 @@ Result move(const phantom::Phantom& phantom, const RobotState& state, const Pose
     context.warn("the load is large: " + with_unit(report.largest_load.force_n, "N") + " (warning at " +
                  with_unit(state.force.warn_n, "N") + "), " + with_unit(report.largest_load.torque_nm, "Nm"));
   if (!report.stopped.empty()) context.warn("the robot stopped: " + report.stopped);
+  if (const std::string text = robot::doubtful_condition(worst, "the motion"); !text.empty()) context.warn(text);
   Load& largest = result.state.largest_load;
   largest.force_n = std::max(largest.force_n, report.largest_load.force_n);
   largest.torque_nm = std::max(largest.torque_nm, report.largest_load.torque_nm);
@@ -141,7 +145,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("robot.move", move)
       .summary("A robot moves the fragment that it holds; it stops before too large a force and at its limits")
       .random()
-      .in("phantom", "the bone before the motion, with the fragment where the robot holds it (robot.scene)")
+      .in("phantom", "the broken bone; the fragment that is held is where the state says")
       .in("state", "the robot before the motion")
       .in("motion", "motion in the axes of the robot's base: new place of a point from its old place")
       .in("report", "what the robot said before")

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Before it grips the fragment, a robot shows a target with beads on its hand to the C-arm, in several poses.
+#include <algorithm>
 #include <cmath>
 #include <marrow/plugin.hpp>
 
@@ -66,12 +67,14 @@ Result stations(const RobotState& state, const Camera& camera, const View* state
   Calibration device;
   device.width_px = camera.width_px, device.height_px = camera.height_px, device.intrinsics = camera.intrinsics;
   Result result;
+  double worst = robot::condition(nominal, nominal.base_from_home);
   for (int i = 0; i < options.stations; ++i) {
     context.check_cancelled();
     const std::string name = "station" + std::to_string(i + 1);
     marrow::Random random(std::uint64_t(options.station_seed), std::uint64_t(i));
     const RigidTransform told = drawn(random, options, about_mm) * nominal.base_from_home;
     robot::check_workspace(nominal, state.limits, told, "robot.stations: " + name);
+    worst = std::max(worst, robot::condition(nominal, told));
     Vector6d lengths = robot::leg_lengths_mm(nominal, told);
     for (int k = 0; k < 6; ++k) lengths[k] += state.errors.leg_sd_mm * random.normal();
     RigidTransform camera_from_board = camera.camera_from_world * state.world_from_base *
@@ -87,6 +90,7 @@ Result stations(const RobotState& state, const Camera& camera, const View* state
     hand.world_from_model = {"robot", "hand", told.rotation, told.translation_mm};
     result.hands.add(name, hand);
   }
+  if (const std::string text = robot::doubtful_condition(worst, "a station"); !text.empty()) context.warn(text);
   return result;
 }
 

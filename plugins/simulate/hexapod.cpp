@@ -77,9 +77,10 @@ RigidTransform misplaced(const RigidTransform& platform_from_ct, const Eigen::Ve
   return error * platform_from_ct;
 }
 
-Metrics lengths_in_words(const Vector6d& lengths_mm) {
+Metrics figures_of(const Vector6d& lengths_mm, double condition) {
   Metrics metrics;
   for (int i = 0; i < 6; ++i) metrics.items.push_back({"leg" + std::to_string(i + 1), lengths_mm[i], "mm"});
+  metrics.items.push_back({"condition", condition, ""});
   return metrics;
 }
 
@@ -91,6 +92,8 @@ Result hexapod(const phantom::Phantom& phantom, const List<Pose>& commands, cons
   const RigidTransform upright = platform_from_ct(fragment, options.grip_mm),
                        world = world_from_base(nominal, upright, fragment, options),
                        mounted = misplaced(upright, fragment.frame.origin_mm, options, context.seed());
+  robot::check_workspace(nominal, options, nominal.base_from_home, "simulate.hexapod: home");
+  double worst = robot::condition(nominal, nominal.base_from_home);
   Result result;
   result.start.world_from_model = world * nominal.base_from_home * upright;
   for (std::size_t i = 0; i < commands.size(); ++i) {
@@ -101,13 +104,16 @@ Result hexapod(const phantom::Phantom& phantom, const List<Pose>& commands, cons
     const RigidTransform told = nominal.base_from_home * motion;
     robot::check_workspace(nominal, options, told, "simulate.hexapod: motion '" + name + "'");
     Vector6d lengths = robot::leg_lengths_mm(nominal, told);
-    result.legs.add(name, lengths_in_words(lengths));
+    const double condition = robot::condition(nominal, told);
+    worst = std::max(worst, condition);
+    result.legs.add(name, figures_of(lengths, condition));
     marrow::Random random(context.seed(), i + 1);
     for (int k = 0; k < 6; ++k) lengths[k] += options.leg_sd_mm * random.normal();
     const RigidTransform platform = world * robot::pose_of_legs(built, lengths, told).base_from_platform;
     result.platform.add(name, Truth{platform});
     result.fragment.add(name, Truth{platform * mounted});
   }
+  if (const std::string text = robot::doubtful_condition(worst, "a motion"); !text.empty()) context.warn(text);
   return result;
 }
 
@@ -123,7 +129,11 @@ MARROW_PLUGIN(plugin) {
       .out("platform", &Result::platform, "exact pose of the platform in the world", over("position"))
       .out("fragment", &Result::fragment, "exact pose of the fragment: world from CT", over("position"))
       .out("start", &Result::start, "where the fragment would be with the platform at home, if nothing were off")
-      .out("legs", &Result::legs, "length of each leg as the controller sets it", over("position"))
+      .out("legs", &Result::legs,
+           "length of each leg as the controller sets it, and the condition of the legs: how many times as far an "
+           "error of "
+           "them moves the platform in the worst direction as in the best one",
+           over("position"))
       .option("fragment", &Options::fragment, "name of the fragment on the platform")
       .option("base_radius_mm", &Options::base_radius_mm, "radius of the circle of the base's joints", at_least(1))
       .option("platform_radius_mm", &Options::platform_radius_mm, "the same of the platform", at_least(1))

@@ -110,7 +110,8 @@ TEST(Hexapod, LegsInOneLineWithTheirPlatformDoNotHoldIt) {
   Vector6d lengths = robot::leg_lengths_mm(hexapod, hexapod.base_from_home);
   lengths[0] += 1;
   EXPECT_EQ(message_of([&] { robot::pose_of_legs(hexapod, lengths, hexapod.base_from_home); }),
-            "the hexapod's legs do not hold the platform in this pose: it is singular");
+            "the hexapod's legs do not hold the platform in this pose: the pose is singular, at most 100 is allowed; "
+            "give another motion, or another shape of the hexapod");
 }
 
 TEST(Hexapod, SmallErrorsOfLegsBecomeSmallErrorsOfThePose) {

@@ -4,7 +4,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/number_text.hpp"
 #include "marrow/domain/random.hpp"
@@ -31,6 +33,19 @@ Matrix6d slopes_of(const Hexapod& hexapod, const RigidTransform& base_from_platf
     slopes.row(Eigen::Index(i)) << arm.cross(along).transpose(), along.transpose();
   }
   return slopes;
+}
+
+/// The same, with a rotation in mm of the platform's joints.
+Matrix6d slopes_per_mm(const Hexapod& hexapod, const RigidTransform& base_from_platform) {
+  double squares = 0;
+  for (const Eigen::Vector3d& joint : hexapod.platform_mm) squares += joint.squaredNorm() / 6;
+  Matrix6d slopes = slopes_of(hexapod, base_from_platform);
+  slopes.leftCols<3>() /= std::sqrt(squares);
+  return slopes;
+}
+
+std::string condition_in_words(double value) {
+  return std::isfinite(value) ? formatted("the condition of its legs is %.0f", value) : "the pose is singular";
 }
 
 }  // namespace
@@ -79,6 +94,43 @@ Vector6d joint_angles_rad(const Hexapod& hexapod, const RigidTransform& base_fro
   return angles;
 }
 
+double condition(const Hexapod& hexapod, const RigidTransform& base_from_platform) {
+  constexpr double kSingular = 1e-14;  // of the largest square, within which a square cannot be told from 0
+  const Matrix6d slopes = slopes_per_mm(hexapod, base_from_platform);
+  if (!slopes.allFinite()) return std::numeric_limits<double>::infinity();
+  const Vector6d squares = eigen_of_symmetric<6>(slopes.transpose() * slopes).values;
+  return squares[0] > kSingular * squares[5] ? std::sqrt(squares[5] / squares[0])
+                                             : std::numeric_limits<double>::infinity();
+}
+
+std::string doubtful_condition(double worst, const std::string& what) {
+  if (!(worst > kDoubtfulCondition)) return "";
+  return what + formatted(
+                    " comes near a singular pose of the hexapod: the condition of its legs is %.0f, and above "
+                    "%.0f an error of a leg moves the platform several times as far as usual",
+                    worst, kDoubtfulCondition);
+}
+
+namespace {
+
+/// Throws Error unless the legs hold the platform, also on the way from home. The message begins with `begin`.
+void check_held(const Hexapod& hexapod, const RigidTransform& base_from_platform, const std::string& begin) {
+  const double value = condition(hexapod, base_from_platform);
+  if (!(value <= kMostCondition))
+    throw Error(
+        begin + "the hexapod's legs do not hold the platform in this pose: " + condition_in_words(value) +
+        formatted(", at most %.0f is allowed; give another motion, or another shape of the hexapod", kMostCondition));
+  // The determinant changes its sign at a singular pose.
+  if (slopes_per_mm(hexapod, base_from_platform).determinant() *
+          slopes_per_mm(hexapod, hexapod.base_from_home).determinant() <
+      0)
+    throw Error(begin +
+                "the hexapod cannot come from home to this pose: on the way its legs pass a singular pose, where "
+                "they do not hold the platform; give a smaller motion");
+}
+
+}  // namespace
+
 void check_workspace(const Hexapod& hexapod, const HexapodLimits& limits, const RigidTransform& base_from_platform,
                      const std::string& what) {
   const Vector6d lengths = leg_lengths_mm(hexapod, base_from_platform),
@@ -94,23 +146,27 @@ void check_workspace(const Hexapod& hexapod, const HexapodLimits& limits, const 
       throw Error(begin + " would turn by " + in_words(degrees(angles[i]), "degrees") + " in its joint, its limit is " +
                   in_words(limits.joint_deg, "degrees") + "; give a smaller motion");
   }
+  check_held(hexapod, base_from_platform, what + ": ");
 }
 
 PlatformPose pose_of_legs(const Hexapod& hexapod, const Vector6d& lengths_mm, const RigidTransform& start) {
   constexpr int kMostSteps = 30;
   constexpr double kExact_mm = 1e-9, kLargestTurn_rad = 0.5;
   check_rigid(start, "the pose to start from");
+  check_held(hexapod, start, "");
   PlatformPose found{start, 0};
   for (;; ++found.steps) {
     const Vector6d missing = lengths_mm - leg_lengths_mm(hexapod, found.base_from_platform);
     if (!missing.allFinite()) throw Error("the lengths of the hexapod's legs are not all numbers");
-    if (missing.cwiseAbs().maxCoeff() < kExact_mm) return found;
-    if (found.steps == kMostSteps)
-      throw Error("no pose of the platform near the start has these lengths of the legs: after " +
-                  std::to_string(kMostSteps) + " steps a leg still differs by " +
-                  in_words(missing.cwiseAbs().maxCoeff(), "mm"));
+    if (missing.cwiseAbs().maxCoeff() < kExact_mm) {
+      check_held(hexapod, found.base_from_platform, "");
+      return found;
+    }
     const Eigen::FullPivLU<Matrix6d> slopes(slopes_of(hexapod, found.base_from_platform));
-    if (!slopes.isInvertible()) throw Error("the hexapod's legs do not hold the platform in this pose: it is singular");
+    if (found.steps == kMostSteps || !slopes.isInvertible())
+      throw Error("no pose of the platform near the start has these lengths of the legs: after " +
+                  std::to_string(found.steps) + " steps a leg still differs by " +
+                  in_words(missing.cwiseAbs().maxCoeff(), "mm"));
     Vector6d step = slopes.solve(missing);
     if (const double turn = step.head<3>().norm(); turn > kLargestTurn_rad) step *= kLargestTurn_rad / turn;
     found.base_from_platform.rotation = rotation_from_vector(step.head<3>()) * found.base_from_platform.rotation;

@@ -47,8 +47,22 @@ Vector6d leg_lengths_mm(const Hexapod& hexapod, const RigidTransform& base_from_
 /// By how much each leg is turned from its direction at home: the larger of the angles in its two joints.
 Vector6d joint_angles_rad(const Hexapod& hexapod, const RigidTransform& base_from_platform);
 
-/// Throws Error unless all legs and joints are within the limits. The message begins with `what`, names the leg, and
-/// says what it would need and what it can do.
+/// How well the legs hold the platform: the condition of the legs' Jacobian, which is how many times as far an error of
+/// the legs moves the platform in the worst direction as in the best one. A rotation counts as the motion that it gives
+/// to the platform's joints (root mean square distance from the platform's middle). 2 to 7 is usual. It is infinite in
+/// a singular pose: there the platform is free to move while the legs keep their lengths.
+double condition(const Hexapod& hexapod, const RigidTransform& base_from_platform);
+
+constexpr double kDoubtfulCondition = 20;  ///< above it, an error of the legs counts several times as much as usual
+constexpr double kMostCondition = 100;     ///< above it, the legs do not hold the platform
+
+/// A warning of the worst of several poses; empty if its condition is not above kDoubtfulCondition. It begins with
+/// `what`.
+std::string doubtful_condition(double worst, const std::string& what);
+
+/// Throws Error unless all legs and joints are within the limits and the legs hold the platform: its condition is not
+/// above kMostCondition, and it does not lie behind a singular pose, seen from home. The message begins with `what`,
+/// and says what a leg would need and what it can do.
 void check_workspace(const Hexapod& hexapod, const HexapodLimits& limits, const RigidTransform& base_from_platform,
                      const std::string& what);
 
@@ -60,7 +74,7 @@ struct PlatformPose {
 
 /// The pose with these lengths that Newton's method finds from `start`. (Up to 40 poses have the same lengths:
 /// Dietmaier 1998. The start decides.) The lengths then agree to 1e-9 mm. Throws Error if there is no such pose near
-/// the start, or if the legs do not hold the platform there.
+/// the start, or if the legs do not hold the platform there (kMostCondition).
 PlatformPose pose_of_legs(const Hexapod& hexapod, const Vector6d& lengths_mm, const RigidTransform& start);
 
 }  // namespace marrow::robot
