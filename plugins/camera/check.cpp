@@ -141,13 +141,12 @@ Picture draw(const View& view, const SeenPoints& points, const Mesh* mesh, const
 
 std::string text(double value) { return formatted("%.3g", value); }
 
-/// The warnings about one view, the most probable first.
+/// The warnings about one view, the most probable first. `mistake`: the sentence that explains its points, if any.
 std::vector<std::string> warnings_of(const View& view, const InView& points, const Mesh* mesh, const Options& options,
-                                     double error) {
+                                     double error, const std::optional<std::string>& mistake) {
   std::vector<Eigen::Vector3d> object = points.known.world_mm;
   if (mesh) object.insert(object.end(), mesh->vertices_mm.begin(), mesh->vertices_mm.end());
   std::vector<std::string> warnings;
-  const auto mistake = calibration::explanation(view.camera, points.known);
   if (mistake) warnings.push_back(*mistake);
   for (const std::string& sentence : calibration::implausible_numbers(
            view.camera, {options.source_to_detector_mm, options.pixel_mm, options.detector_mm}, object))
@@ -173,9 +172,9 @@ void add_metrics(const View& view, const InView& points, double error, Metrics& 
   const std::string name = view.name + ".";
   double worst = 0, millimetres = 0;
   for (std::size_t i = 0; i < points.all.pixels.size(); ++i) {
-    const double off = (project(view.camera, points.all.world_mm[i]) - points.all.pixels[i]).norm();
-    worst = std::max(worst, off);
-    millimetres += off * pixel_size_at_mm(view.camera, points.all.world_mm[i]) / double(points.all.pixels.size());
+    const Eigen::Vector2d off = project(view.camera, points.all.world_mm[i]) - points.all.pixels[i];
+    worst = std::max(worst, off.norm());
+    millimetres += offset_at_mm(view.camera, points.all.world_mm[i], off).norm() / double(points.all.pixels.size());
   }
   metrics.items.push_back({name + "points", double(points.all.pixels.size()), ""});
   if (points.all.pixels.empty()) return;
@@ -209,14 +208,24 @@ Checked check(const List<View>& views, const Mesh* mesh, const Options& options,
   Checked checked;
   int warnings = 0;
   double squares = 0, count = 0;
+  std::vector<InView> in_views;
+  std::vector<Camera> cameras;
+  std::vector<SeenPoints> known;
   for (const View& view : views) {
     check_view(view);
-    const InView seen = points_in(view, points, views);
+    in_views.push_back(points_in(view, points, views));
+    cameras.push_back(view.camera);
+    known.push_back(in_views.back().known);
+  }
+  const auto mistakes = calibration::explanations(cameras, known);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const View& view = views[i];
+    const InView& seen = in_views[i];
     const double error = calibration::reprojection_error_px(view.camera, seen.all);
     squares += error * error * double(seen.all.pixels.size());
     count += double(seen.all.pixels.size());
     add_metrics(view, seen, error, checked.metrics);
-    const auto sentences = warnings_of(view, seen, mesh, options, error);
+    const auto sentences = warnings_of(view, seen, mesh, options, error, mistakes[i]);
     for (const std::string& sentence : sentences) context.warn("view '" + view.name + "': " + sentence);
     warnings += int(sentences.size());
     const std::string verdict = seen.all.pixels.empty() ? "" : ": " + text(error) + " px";

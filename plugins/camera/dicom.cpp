@@ -3,6 +3,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/names.hpp"
+#include "marrow/toolbox/files/escaped_name.hpp"
 #include "marrow/toolbox/files/xray_header.hpp"
 
 namespace {
@@ -19,7 +20,8 @@ struct Options {
 marrow::List<marrow::Camera> dicom(const Options& options, marrow::Context& context) {
   marrow::List<marrow::Camera> cameras;
   for (std::size_t i = 0; i < options.paths.size(); ++i) {
-    const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names.at(i);
+    const std::string name =
+        options.names.empty() ? marrow::files::unescaped_name(options.paths[i].stem().string()) : options.names.at(i);
     marrow::check_item_name("view", name);
     if (cameras.find(name)) throw marrow::Error("names: two views are named '" + name + "'; name each differently");
     const auto geometry = marrow::files::read_xray_geometry(

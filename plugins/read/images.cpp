@@ -2,6 +2,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/names.hpp"
+#include "marrow/toolbox/files/escaped_name.hpp"
 #include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 
@@ -16,7 +17,8 @@ struct Options {
 marrow::List<marrow::Image> images(const Options& options, marrow::Context& context) {
   marrow::List<marrow::Image> images;
   for (std::size_t i = 0; i < options.paths.size(); ++i) {
-    const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names.at(i);
+    const std::string name =
+        options.names.empty() ? marrow::files::unescaped_name(options.paths[i].stem().string()) : options.names.at(i);
     marrow::check_item_name("view", name);
     if (images.find(name)) throw marrow::Error("names: two images are named '" + name + "'; name each differently");
     marrow::files::warn_of_pixels(options.paths[i], context);

@@ -16,6 +16,16 @@ struct Options {
   Eigen::Vector3d pivot_mm{0, 0, 90};
 };
 
+/// As many digits after the point as tell each step, two at least.
+int digits_of(double step_deg) {
+  constexpr int kLeast = 2, kMost = 6;
+  for (int digits = kLeast; digits < kMost; ++digits) {
+    const double units = step_deg * std::pow(10, digits);
+    if (std::abs(units - std::round(units)) < 1e-6) return digits;
+  }
+  return kMost;
+}
+
 Pose turned(int axis, double angle_deg, const Eigen::Vector3d& pivot_mm) {
   Pose pose;
   pose.world_from_model = {
@@ -26,11 +36,12 @@ Pose turned(int axis, double angle_deg, const Eigen::Vector3d& pivot_mm) {
 
 List<Pose> sweeps(const Options& options) {
   const int steps = int(std::floor(options.range_deg / options.step_deg + 1e-9));
+  const int digits = digits_of(options.step_deg);
   List<Pose> commands;
   commands.add("neutral", turned(0, 0, options.pivot_mm));
   for (const std::string& axis : options.axes) {
     const auto add = [&](int step) {
-      const std::string name = formatted("r%s%+06.2f", axis.c_str(), step * options.step_deg);
+      const std::string name = formatted("r%s%+0*.*f", axis.c_str(), 4 + digits, digits, step * options.step_deg);
       commands.add(name, turned(axis[0] - 'x', step * options.step_deg, options.pivot_mm));
     };
     // From neutral to one side, then from neutral to the other. So each motion begins near a known one.
@@ -46,7 +57,8 @@ MARROW_PLUGIN(plugin) {
   plugin.node("simulate.sweeps", sweeps)
       .summary("Motions that a platform is told to make: turns about x, y and z, each from one side to the other")
       .out("commands",
-           "motions from home, with z upwards: first 'neutral', then for example 'rx+03.00' for 3 degrees about x",
+           "motions from home, with z upwards: first 'neutral', then for example 'rx+03.00' for 3 degrees about x; a "
+           "step of 0.015 degrees has three digits after the point",
            over("position"))
       .option("axes", &Options::axes, "axes of the platform at home", one_of({"x", "y", "z"}))
       .relation(at_least_one({"axes"}))

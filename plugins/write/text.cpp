@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "marrow/toolbox/files/atomic_write.hpp"
+#include "marrow/toolbox/files/escaped_name.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 
 namespace {
@@ -11,7 +12,7 @@ namespace {
 using marrow::files::write_text;
 
 void pose(const marrow::Pose& pose, const std::string& path) {
-  check_rigid(pose.world_from_model, path);
+  check_pose(pose, path);
   write_text(path, marrow::files::pose(pose));
 }
 
@@ -42,7 +43,8 @@ void stop(const marrow::Stop& stop, const std::string& path) {
 
 /// A file holds the landmarks of one fragment, and is named after it.
 void landmarks(const marrow::Landmarks& landmarks, const std::string& path) {
-  write_text(path, marrow::files::landmarks(landmarks, std::filesystem::path(path).stem().string()));
+  const std::string fragment = marrow::files::unescaped_name(std::filesystem::path(path).stem().string());
+  write_text(path, marrow::files::landmarks(landmarks, fragment));
 }
 
 void metrics(const marrow::Metrics& metrics, const std::string& path) {

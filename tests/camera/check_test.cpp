@@ -47,7 +47,7 @@ SeenPoints points_of(const Camera& camera, int count = 20) {
 }
 
 void expect_explained(const Camera& camera, const SeenPoints& points, const std::string& said) {
-  const auto sentence = calibration::explanation(camera, points);
+  const auto sentence = calibration::explanations({camera}, {points}).at(0);
   ASSERT_TRUE(sentence) << said;
   EXPECT_NE(sentence->find(said), std::string::npos) << *sentence;
   const std::size_t at = sentence->find("only ");
@@ -58,7 +58,7 @@ void expect_explained(const Camera& camera, const SeenPoints& points, const std:
 TEST(Explanation, NoneForARightCamera) {
   for (double beta : {0.0, 35.0, 90.0}) {
     const Camera camera = camera_at(12, beta);
-    EXPECT_FALSE(calibration::explanation(camera, points_of(camera)));
+    EXPECT_FALSE(calibration::explanations({camera}, {points_of(camera)}).at(0));
     EXPECT_NEAR(calibration::reprojection_error_px(camera, points_of(camera)), 0.2 * std::sqrt(2), 0.1);
   }
 }
@@ -124,6 +124,7 @@ TEST(Explanation, MatrixOfAnImageOfAnotherSize) {
   Camera camera = camera_at(12, 35);
   const SeenPoints points = points_of(camera);
   camera.intrinsics.topRows<2>() *= 0.5;
+  camera.intrinsics.topRightCorner<2, 1>().array() -= 0.25;  // pixel u covers 2 u and 2 u + 1
   expect_explained(camera, points, "the camera matrix is that of an image half as large");
 }
 
@@ -243,6 +244,23 @@ TEST(CheckNode, RightCamerasNeedNoWarning) {
     EXPECT_EQ(ran.value("one.points"), 12);
     EXPECT_EQ(ran.value("warnings"), 0);
     EXPECT_EQ(ran.pictures().names(), views.names());
+  }
+}
+
+// A camera whose pixels are twice as high as wide, moved by 3 mm along its x or y axis, has missed each point by 3 mm.
+TEST(CheckNode, MillimetresAtTheObjectHoldForPixelsOfAnyShape) {
+  const TemporaryFolder folder;
+  for (const int axis : {0, 1}) {
+    Camera right = camera_at(5, 0);
+    right.intrinsics.row(1) *= 0.5;
+    List<View> views;
+    views.add("one", view_of("one", right));
+    put(folder / "points.yaml", points_text(views, 12, true));
+    Camera moved = right;
+    moved.camera_from_world.translation_mm[axis] += 3;
+    views = {};
+    views.add("one", view_of("one", moved));
+    EXPECT_NEAR(run(views, folder / "points.yaml").value("one.mean_at_object"), 3, 0.1) << axis;
   }
 }
 

@@ -76,6 +76,11 @@ SeenPoints points_of(const Camera& camera, int count = 20) {
   return points;
 }
 
+/// Of one view by itself.
+std::optional<std::string> explanation(const Camera& camera, const SeenPoints& points) {
+  return calibration::explanations({camera}, {points}).at(0);
+}
+
 TEST(Plausibility, AnglesOfTheImage) {
   for (const auto& [angle, said] : {std::pair(59.9, false), {60.1, true}, {2.02, false}, {1.98, true}})
     EXPECT_EQ(says("opens an image of 640 px", with_focal(focal_of_angle(angle), focal_of_angle(angle))), said)
@@ -219,20 +224,88 @@ TEST(Explanation, OfEveryUnit) {
            {"metres", 1000}, {"centimetres", 10}, {"inches", 25.4}, {"micrometres", 0.001}}) {
     SeenPoints points = points_of(right);
     for (auto& point : points.world_mm) point /= factor;
-    auto sentence = calibration::explanation(right, points);
+    auto sentence = explanation(right, points);
     ASSERT_TRUE(sentence) << unit;
     EXPECT_TRUE(sentence->ends_with("if the points are in " + unit + ", not mm")) << *sentence;
     Camera camera = right;
     camera.camera_from_world.translation_mm /= factor;
-    sentence = calibration::explanation(camera, points_of(right));
+    sentence = explanation(camera, points_of(right));
     ASSERT_TRUE(sentence) << unit;
     EXPECT_TRUE(sentence->ends_with("if the camera's translation is in " + unit + ", not mm")) << *sentence;
   }
   Camera twice = right;
   twice.intrinsics.topRows<2>() *= 2;
+  twice.intrinsics.topRightCorner<2, 1>().array() += 0.5;
   EXPECT_TRUE(
-      calibration::explanation(twice, points_of(right))
-          ->ends_with("if the camera matrix is that of an image twice as large; multiply its first two rows by 0.5"));
+      explanation(twice, points_of(right))
+          ->ends_with("if the camera matrix is that of an image twice as large; multiply its first two rows by 0.5, "
+                      "and then subtract 0.25 from the principal point"));
+}
+
+/// The error that a sentence says is left.
+double left_px(const std::string& sentence) { return std::stod(sentence.substr(sentence.find("only ") + 5)); }
+
+// Two pixels of the larger image, with the middles 2 u and 2 u + 1, are pixel u of the smaller one: so place u there is
+// place 2 u + 0.5 here, and place v here is place (v - 0.5) / 2 there.
+TEST(Explanation, SizesOfImagesAreSaidToTheHalfPixel) {
+  const Camera right = right_camera();
+  Camera half = right, twice = right;
+  Eigen::Matrix3d smaller, larger;
+  smaller << 0.5, 0, -0.25, 0, 0.5, -0.25, 0, 0, 1;
+  larger << 2, 0, 0.5, 0, 2, 0.5, 0, 0, 1;
+  half.intrinsics = smaller * right.intrinsics;
+  twice.intrinsics = larger * right.intrinsics;
+  const auto of_half = explanation(half, points_of(right)), of_twice = explanation(twice, points_of(right));
+  ASSERT_TRUE(of_half && of_twice);
+  EXPECT_TRUE(
+      of_half->ends_with("if the camera matrix is that of an image half as large; multiply its first two rows "
+                         "by 2, and then add 0.5 to the principal point"))
+      << *of_half;
+  EXPECT_LT(left_px(*of_half), 1e-6);
+  EXPECT_LT(left_px(*of_twice), 1e-6) << *of_twice;
+}
+
+/// Cameras that look along y and along x, with the principal point in the middle of the image.
+std::vector<Camera> crossed_cameras() {
+  std::vector<Camera> cameras;
+  for (const double beta : {0.0, 90.0}) {
+    const CArm arm{640, 512, {0.5, 0.5}, 1000, 600, Vector3d::Zero()};
+    cameras.push_back(carm_camera(arm, world_from_camera_rotation(0, radians(beta))));
+  }
+  return cameras;
+}
+
+// In a view along y a mirrored image looks like points whose x axis is reversed, in one along x like points whose y
+// axis is. Only the image is the same mistake in both.
+TEST(Explanation, MirroredImagesAreNotReversedPoints) {
+  const std::vector<Camera> cameras = crossed_cameras();
+  std::vector<SeenPoints> mirrored;
+  for (const Camera& camera : cameras) {
+    mirrored.push_back(points_of(camera));
+    for (Vector2d& pixel : mirrored.back().pixels) pixel.x() = 639 - pixel.x();
+  }
+  for (const auto& sentence : calibration::explanations(cameras, mirrored)) {
+    ASSERT_TRUE(sentence);
+    EXPECT_TRUE(sentence->ends_with("if the image is mirrored left to right; mirror it back")) << *sentence;
+  }
+  const std::vector<SeenPoints> one{points_of(cameras[0]), mirrored[1]};
+  const auto of_one = calibration::explanations(cameras, one);
+  EXPECT_FALSE(of_one[0]);
+  ASSERT_TRUE(of_one[1]);
+  EXPECT_TRUE(of_one[1]->ends_with("if the image is mirrored left to right; mirror it back")) << *of_one[1];
+}
+
+// Points with a reversed axis are the same points in both views. The view along this axis sees them nearer or farther.
+TEST(Explanation, ReversedPointsAreNotMirroredImages) {
+  const std::vector<Camera> cameras = crossed_cameras();
+  std::vector<SeenPoints> reversed;
+  for (const Camera& camera : cameras) {
+    reversed.push_back(points_of(camera));
+    for (Vector3d& point : reversed.back().world_mm) point.x() = -point.x();
+  }
+  for (const auto& sentence : calibration::explanations(cameras, reversed))
+    if (sentence) EXPECT_TRUE(sentence->ends_with("if the x axis of the points is reversed")) << *sentence;
+  EXPECT_TRUE(calibration::explanations(cameras, reversed)[0]);
 }
 
 TEST(Explanation, OnlyOfWhatIsFarOffAndThenMuchBetter) {
@@ -244,11 +317,11 @@ TEST(Explanation, OnlyOfWhatIsFarOffAndThenMuchBetter) {
       points.pixels[i] = Vector2d(639 - points.pixels[i].x(), points.pixels[i].y() + (i % 2 ? noise_px : -noise_px));
     return points;
   };
-  EXPECT_TRUE(calibration::explanation(right, mirrored(0)));
-  EXPECT_TRUE(calibration::explanation(right, mirrored(12.5))) << "what is left may be a fiftieth of the image";
-  EXPECT_FALSE(calibration::explanation(right, mirrored(13.1)));
-  EXPECT_TRUE(calibration::explanation(right, mirrored(0, 4)));
-  EXPECT_FALSE(calibration::explanation(right, mirrored(0, 3)));
+  EXPECT_TRUE(explanation(right, mirrored(0)));
+  EXPECT_TRUE(explanation(right, mirrored(12.5))) << "what is left may be a fiftieth of the image";
+  EXPECT_FALSE(explanation(right, mirrored(13.1)));
+  EXPECT_TRUE(explanation(right, mirrored(0, 4)));
+  EXPECT_FALSE(explanation(right, mirrored(0, 3)));
   // Points near the line about which they are mirrored move little: by d px, and stay off by a part of that.
   const auto near_line = [&](double off_px, double rest_px) {
     SeenPoints points = points_of(right);
@@ -260,11 +333,10 @@ TEST(Explanation, OnlyOfWhatIsFarOffAndThenMuchBetter) {
     }
     return points;
   };
-  EXPECT_TRUE(calibration::explanation(right, near_line(6.5, 0)));
-  EXPECT_FALSE(calibration::explanation(right, near_line(6.3, 0)))
-      << "less than a hundredth of the image is no mistake";
-  EXPECT_TRUE(calibration::explanation(right, near_line(10, 2))) << "five times better: sqrt(104) to 2";
-  EXPECT_FALSE(calibration::explanation(right, near_line(10, 2.1)));
+  EXPECT_TRUE(explanation(right, near_line(6.5, 0)));
+  EXPECT_FALSE(explanation(right, near_line(6.3, 0))) << "less than a hundredth of the image is no mistake";
+  EXPECT_TRUE(explanation(right, near_line(10, 2))) << "five times better: sqrt(104) to 2";
+  EXPECT_FALSE(explanation(right, near_line(10, 2.1)));
 }
 
 TEST(Refit, NeedsSixPoints) {

@@ -168,8 +168,8 @@ TEST(ForeignTexts, FaultsAreNamedAtTheirLine) {
   const TemporaryFolder folder;
   put(folder / "a.tra", utf16("1,0,0,1,0,1,0,2,0,0,1,3,0,0,0,1\r\n1,0,0\r\n", false));
   EXPECT_SAYS(track(folder / "a.tra"), "a.tra:2: expected the 16 numbers of a 4x4 matrix, got 3");
-  put(folder / "a.yaml", "marrow-pose: 1\rtarget: world\rsource: bone\r");
-  EXPECT_SAYS(pose(folder / "a.yaml"), "a.yaml:3:9: pose: source: expected the frame 'ct', got 'bone'");
+  put(folder / "a.yaml", "marrow-pose: 1\rtarget: world\rsource: world\r");
+  EXPECT_SAYS(pose(folder / "a.yaml"), "a.yaml:3:9: pose: source: expected the frame of what was registered");
 }
 
 // Files that were refused, or read as if the first line were a word of its own. The values are those written in them.

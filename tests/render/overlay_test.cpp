@@ -75,6 +75,24 @@ bool contains(const cv::Mat& picture, int height, const cv::Scalar& colour) {
   return false;
 }
 
+// OpenCV's fonts have ASCII only. The names that stand for the others are written by hand.
+TEST(Overlay, WritesNamesWithoutTheirMarks) {
+  const auto titled = [](const std::string& name) {
+    marrow::View named = view();
+    named.name = name;
+    return overlay(pose_at(0), {}, kTripled, named);
+  };
+  const std::pair<const char*, const char*> names[] = {
+      {"H\u00fcfte gro\u00df", "Hufte gross"},
+      {"Hu\u0308fte", "Hufte"},
+      {"\u0141\u00f3d\u017a \u2013 \u010d\u00c6\u00ff\u017f", "Lodz - cAEys"},
+      {"30\u00b0", "30 deg"},
+      {"\u5de6 \U0001f9b4\xb0", "? ??"}};
+  for (const auto& [name, plain] : names)
+    EXPECT_EQ(cv::norm(titled(name), titled(plain), cv::NORM_INF), 0) << name << " is not drawn as " << plain;
+  EXPECT_GT(cv::norm(titled("Hufte"), titled("Hu?fte"), cv::NORM_INF), 0);
+}
+
 // Pixel u of the image has its centre at 3 u + 1 in a panel of three times the size.
 TEST(Overlay, DrawsTheResultWhereTheProjectorSays) {
   const cv::Mat picture = overlay(pose_at(10));

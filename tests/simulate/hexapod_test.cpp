@@ -54,6 +54,16 @@ TEST(SimulateSweeps, BeginAtNeutralAndGoFromThereToEitherSide) {
   EXPECT_LT((last * Eigen::Vector3d(0, 0, 90) - Eigen::Vector3d(0, 0, 90)).norm(), 1e-9);
 }
 
+TEST(SimulateSweeps, NamesTellAllStepsApart) {
+  const auto names = [](double range_deg, double step_deg) {
+    return sweeps({{"axes", std::vector<std::string>{"z"}}, {"range_deg", range_deg}, {"step_deg", step_deg}}).names();
+  };
+  EXPECT_EQ(names(0.03, 0.015),
+            (std::vector<std::string>{"neutral", "rz+00.000", "rz+00.015", "rz+00.030", "rz-00.015", "rz-00.030"}));
+  EXPECT_EQ(names(0.5, 0.5), (std::vector<std::string>{"neutral", "rz+00.00", "rz+00.50", "rz-00.50"}));
+  EXPECT_EQ(names(1, 1.0 / 3)[2], "rz+00.333333");
+}
+
 TEST(SimulateHexapod, WithoutErrorsItDoesWhatItIsTold) {
   const List<Pose> commands = sweeps({{"range_deg", 15.0}, {"step_deg", 15.0}});
   const auto made = hexapod(commands, {});

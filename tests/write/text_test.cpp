@@ -45,6 +45,27 @@ TEST(WriteText, PoseReadsBackTheSameToTheLastBit) {
   EXPECT_NE(text.find(", 0.35"), std::string::npos) << "degrees about the long axis\n" << text;
 }
 
+// A nail is registered in a frame of its own.
+TEST(WriteText, PoseOfAnImplantReadsBackTheSame) {
+  const TemporaryFolder folder;
+  marrow::Pose value = example_pose();
+  value.world_from_model.source = "implant";
+  write(value, folder / "pose.yaml");
+  const marrow::Pose read = marrow::files::read_pose_file(folder / "pose.yaml");
+  EXPECT_EQ(marrow::hash_of(read), marrow::hash_of(value));
+  EXPECT_EQ(read.world_from_model.source, "implant");
+}
+
+// The run writes a list's items to files whose names are escaped. What is in the file is for people.
+TEST(WriteText, LandmarksNameTheirFragmentAsItIs) {
+  const TemporaryFolder folder;
+  marrow::Landmarks landmarks;
+  landmarks.points = {{"a", {1, 2, 3}}};
+  write(landmarks, folder / "L%2FR.yaml");
+  const YAML::Node written = YAML::LoadFile((folder / "L%2FR.yaml").string());
+  EXPECT_EQ(written["fragments"].begin()->first.as<std::string>(), "L/R") << bytes_of(folder / "L%2FR.yaml");
+}
+
 TEST(WriteText, PoseWithoutPredictionAndWithInfinities) {
   const TemporaryFolder folder;
   marrow::Pose value = example_pose();

@@ -112,6 +112,8 @@ void check_object(const Camera& camera, const std::vector<Eigen::Vector3d>& obje
 struct Mistake {
   std::string sentence;
   std::function<void(Camera&, SeenPoints&)> undo;
+  bool is_of_points = false;  ///< of their places in the world, which are the same in all views
+  bool is_of_unit = false;
 };
 
 Mistake pixel_mistake(const std::string& sentence,
@@ -122,17 +124,24 @@ Mistake pixel_mistake(const std::string& sentence,
 }
 
 Mistake point_mistake(const std::string& sentence, const Eigen::Vector3d& scale) {
-  return {sentence, [scale](Camera&, SeenPoints& points) {
+  return {sentence,
+          [scale](Camera&, SeenPoints& points) {
             for (auto& point : points.world_mm) point = point.cwiseProduct(scale);
-          }};
+          },
+          true};
 }
 
 Mistake pose_mistake(const std::string& sentence, const std::function<void(RigidTransform&)>& change) {
   return {sentence, [change](Camera& camera, SeenPoints&) { change(camera.camera_from_world); }};
 }
 
-Mistake matrix_mistake(const std::string& sentence, double scale) {
-  return {sentence, [scale](Camera& camera, SeenPoints&) { camera.intrinsics.topRows<2>() *= scale; }};
+/// A pixel of the image before it was resized covers `scale` pixels. The middle of the first pixel is 0 in both images,
+/// so places are multiplied about the image's corner, at -0.5.
+Mistake size_mistake(const std::string& sentence, double scale) {
+  return {sentence, [scale](Camera& camera, SeenPoints&) {
+            camera.intrinsics.topRows<2>() *= scale;
+            camera.intrinsics.topRightCorner<2, 1>().array() += 0.5 * (scale - 1);
+          }};
 }
 
 std::vector<Mistake> all_mistakes() {
@@ -165,18 +174,121 @@ std::vector<Mistake> all_mistakes() {
                    }),
       pose_mistake("the camera's translation is the source's position; it must be -R times that",
                    [](RigidTransform& pose) { pose.translation_mm = -(pose.rotation * pose.translation_mm).eval(); }),
-      matrix_mistake("the camera matrix is that of an image half as large; multiply its first two rows by 2", 2),
-      matrix_mistake("the camera matrix is that of an image twice as large; multiply its first two rows by 0.5", 0.5)};
+      size_mistake(
+          "the camera matrix is that of an image half as large; multiply its first two rows by 2, and then add 0.5 to "
+          "the principal point",
+          2),
+      size_mistake(
+          "the camera matrix is that of an image twice as large; multiply its first two rows by 0.5, and then subtract "
+          "0.25 from the principal point",
+          0.5)};
   const std::vector<std::pair<const char*, double>> units{
       {"metres", 1000}, {"centimetres", 10}, {"inches", 25.4}, {"micrometres", 0.001}};
   for (const auto& [unit, factor] : units) {
     mistakes.push_back(
         point_mistake("the points are in " + std::string(unit) + ", not mm", Eigen::Vector3d::Constant(factor)));
+    mistakes.back().is_of_unit = true;
     mistakes.push_back(pose_mistake("the camera's translation is in " + std::string(unit) + ", not mm",
                                     [factor = factor](RigidTransform& pose) { pose.translation_mm *= factor; }));
+    mistakes.back().is_of_unit = true;
   }
   return mistakes;
 }
+
+/// The error before a mistake is undone, and the largest that may remain. Three points can be explained by chance, and
+/// an error below 1 % of the image is not due to a mistake of these kinds.
+struct Trouble {
+  bool exists = false;
+  double error_px = 0, most_left_px = 0;
+};
+
+Trouble trouble_of(const Camera& camera, const SeenPoints& points) {
+  Trouble trouble;
+  trouble.error_px = reprojection_error_px(camera, points);
+  trouble.exists = points.world_mm.size() >= 4 && !(trouble.error_px < 0.01 * camera.width_px);
+  trouble.most_left_px = std::min(trouble.error_px / kBetter, kExplained * camera.width_px);
+  return trouble;
+}
+
+/// Whether the source is as far from the points as devices are.
+bool is_distance_plausible(const Camera& camera, const SeenPoints& points) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& point : points.world_mm) box.extend(point);
+  const double distance_mm = (source_position_mm(camera) - box.center()).norm();
+  return distance_mm >= kNearest_mm && distance_mm <= kFarthest_mm;
+}
+
+/// Points in metres and a translation in micrometres are seen at the same places, so of units the distance decides.
+double error_without(const Mistake& mistake, Camera camera, SeenPoints points) {
+  mistake.undo(camera, points);
+  if (mistake.is_of_unit && !is_distance_plausible(camera, points)) return std::numeric_limits<double>::infinity();
+  return reprojection_error_px(camera, points);
+}
+
+class Explanations {
+ public:
+  Explanations(const std::vector<Camera>& cameras, const std::vector<SeenPoints>& points)
+      : mistakes_(all_mistakes()), troubles_(cameras.size()), left_px_(cameras.size()) {
+    for (std::size_t v = 0; v < cameras.size(); ++v) {
+      troubles_[v] = trouble_of(cameras[v], points[v]);
+      for (const Mistake& mistake : mistakes_) left_px_[v].push_back(error_without(mistake, cameras[v], points[v]));
+    }
+  }
+
+  std::vector<std::optional<std::string>> sentences() const {
+    const auto of_all = best([&](std::size_t m) { return explains_all(m); }, [&](std::size_t m) { return sum_px(m); });
+    std::vector<std::optional<std::string>> found(troubles_.size());
+    for (std::size_t v = 0; v < troubles_.size(); ++v) {
+      const auto left_px = [&](std::size_t m) { return left_px_[v][m]; };
+      auto mistake = of_all;
+      for (const bool is_of_points : {false, true})
+        if (!mistake)
+          mistake =
+              best([&](std::size_t m) { return explains(v, m) && mistakes_[m].is_of_points == is_of_points; }, left_px);
+      if (mistake && troubles_[v].exists) found[v] = sentence(v, *mistake);
+    }
+    return found;
+  }
+
+ private:
+  /// Of the mistakes that may count, the one with the least error. Of those that are nearly alike, the first.
+  std::optional<std::size_t> best(const std::function<bool(std::size_t)>& counts,
+                                  const std::function<double(std::size_t)>& error_px) const {
+    constexpr double kAlike = 0.9, kRounding_px = 1e-6;
+    std::optional<std::size_t> best;
+    for (std::size_t m = 0; m < mistakes_.size(); ++m)
+      if (counts(m) && (!best || error_px(m) < kAlike * error_px(*best) - kRounding_px)) best = m;
+    return best;
+  }
+  bool explains(std::size_t view, std::size_t mistake) const {
+    return troubles_[view].exists && left_px_[view][mistake] < troubles_[view].most_left_px;
+  }
+  /// Whether undoing it would be right in all views with an error. Points may also not become wrong in another view.
+  bool explains_all(std::size_t mistake) const {
+    for (std::size_t v = 0; v < troubles_.size(); ++v) {
+      if (troubles_[v].exists && !explains(v, mistake)) return false;
+      if (!troubles_[v].exists && mistakes_[mistake].is_of_points && left_px_[v][mistake] > troubles_[v].error_px)
+        return false;
+    }
+    return true;
+  }
+  double sum_px(std::size_t mistake) const {
+    double sum = 0;
+    for (std::size_t v = 0; v < troubles_.size(); ++v)
+      if (troubles_[v].exists) sum += left_px_[v][mistake];
+    return sum;
+  }
+  std::string sentence(std::size_t view, std::size_t mistake) const {
+    const double error_px = troubles_[view].error_px;
+    return "the reprojection error is " +
+           (std::isfinite(error_px) ? text(error_px) + " px" : std::string("without bound")) + ", and only " +
+           text(left_px_[view][mistake]) + " px if " + mistakes_[mistake].sentence;
+  }
+
+  const std::vector<Mistake> mistakes_;
+  std::vector<Trouble> troubles_;
+  std::vector<std::vector<double>> left_px_;  ///< of each view, without each mistake
+};
 
 }  // namespace
 
@@ -198,24 +310,9 @@ double reprojection_error_px(const Camera& camera, const SeenPoints& points) {
   return std::sqrt(squares / double(std::max<std::size_t>(1, points.world_mm.size())));
 }
 
-std::optional<std::string> explanation(const Camera& camera, const SeenPoints& points) {
-  // Three points can be explained by chance. An error below 1 % of the image is not due to a mistake of these kinds.
-  const double error = reprojection_error_px(camera, points);
-  if (points.world_mm.size() < 4 || error < 0.01 * camera.width_px) return std::nullopt;
-  double best = std::min(error / kBetter, kExplained * camera.width_px);
-  std::optional<std::string> sentence;
-  for (const Mistake& mistake : all_mistakes()) {
-    Camera right = camera;
-    SeenPoints changed = points;
-    mistake.undo(right, changed);
-    const double left = reprojection_error_px(right, changed);
-    if (!(left < best)) continue;
-    best = left;
-    sentence = "the reprojection error is " +
-               (std::isfinite(error) ? text(error) + " px" : std::string("without bound")) + ", and only " +
-               text(left) + " px if " + mistake.sentence;
-  }
-  return sentence;
+std::vector<std::optional<std::string>> explanations(const std::vector<Camera>& cameras,
+                                                     const std::vector<SeenPoints>& points) {
+  return Explanations(cameras, points).sentences();
 }
 
 std::optional<Refit> refit_pose(const Camera& camera, const SeenPoints& points) {

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <marrow/domain/error.hpp>
+#include <marrow/domain/quantile.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/toolbox/image/line_integrals.hpp"
+#include "plain_letters.hpp"
 
 namespace marrow::draw {
 namespace {
@@ -18,12 +20,6 @@ constexpr int kRowHeight = 24;
 bool drawable(cv::Point2d p) { return std::abs(p.x) < 1e5 && std::abs(p.y) < 1e5; }
 cv::Point fixed_point(cv::Point2d p) {
   return {int(std::lround(p.x * (1 << kShift))), int(std::lround(p.y * (1 << kShift)))};
-}
-
-float percentile(std::vector<float> values, double fraction) {
-  const auto at = values.begin() + std::ptrdiff_t(fraction * double(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
 }
 
 cv::Mat stretched(const cv::Mat& image, const cv::Mat& mask, Contrast contrast) {
@@ -39,7 +35,8 @@ cv::Mat stretched(const cv::Mat& image, const cv::Mat& mask, Contrast contrast) 
     for (int u = 0; u < values.cols; ++u)
       if (finite.at<unsigned char>(v, u) && (mask.empty() || mask.at<unsigned char>(v, u)))
         used.push_back(values.at<float>(v, u));
-  const float low = used.empty() ? 0 : percentile(used, 0.005), high = used.empty() ? 0 : percentile(used, 0.995);
+  const double low = used.empty() ? 0 : quantile_in_place(used, 0.005),
+               high = used.empty() ? 0 : quantile_in_place(used, 0.995);
   cv::Mat grey(values.size(), CV_8U, cv::Scalar(128));
   if (high > low) values.convertTo(grey, CV_8U, 255.0 / (high - low), -255.0 * low / (high - low));
   if (high > low && contrast == Contrast::local) cv::createCLAHE(3.0, {8, 8})->apply(grey, grey);
@@ -91,12 +88,12 @@ void draw_dot(cv::Mat& canvas, cv::Point2d at, double radius, const cv::Scalar& 
 }
 
 void draw_text(cv::Mat& canvas, const std::string& text, cv::Point at, const cv::Scalar& colour, double size) {
-  cv::putText(canvas, text, at, cv::FONT_HERSHEY_SIMPLEX, size, colour, 1, cv::LINE_AA);
+  cv::putText(canvas, in_plain_letters(text), at, cv::FONT_HERSHEY_SIMPLEX, size, colour, 1, cv::LINE_AA);
 }
 
 cv::Size text_size(const std::string& text, double size) {
   int baseline = 0;
-  return cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, size, 1, &baseline);
+  return cv::getTextSize(in_plain_letters(text), cv::FONT_HERSHEY_SIMPLEX, size, 1, &baseline);
 }
 
 void draw_segment(Panel& panel, const LineSegment& segment, const cv::Scalar& colour, int thickness) {

@@ -42,7 +42,10 @@ std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTran
   if (!map.valid()) return std::nullopt;
   RigidTransform transform = expected;
   check_frame(map, "target", expected.target);
-  check_frame(map, "source", expected.source);
+  if (!expected.source.empty())
+    check_frame(map, "source", expected.source);
+  else if (const auto source = map.text("source"))
+    transform.source = *source;
   if (map.has("matrix")) {
     for (const char* key : {"rotation", "translation_mm"})
       if (map.has(key)) map.fault(key, std::string(key) + ": 'matrix' already gives it; keep one of the two");
@@ -154,6 +157,18 @@ void check_version(const YamlMap& map, const std::string& key) {
 
 namespace {
 
+std::optional<Matrix6d> covariance_from(const YamlMap& map) {
+  const auto covariance = map.matrix("covariance", 6, 6);
+  if (!covariance) return std::nullopt;
+  try {
+    check_covariance(*covariance, "covariance");
+  } catch (const Error& error) {
+    map.fault("covariance", error.what());
+    return std::nullopt;
+  }
+  return Matrix6d(*covariance);
+}
+
 /// Pairs of evaluations and the least cost after them.
 std::vector<Pose::Progress> convergence_from(const YamlMap& map) {
   std::vector<Pose::Progress> convergence;
@@ -186,12 +201,15 @@ Pose read_pose_file(const std::filesystem::path& path) {
   const YamlMap map(file, file.root(), "pose", keys);
   check_version(map, "marrow-pose");
   Pose pose;
-  if (const auto transform = transform_from(map, pose.world_from_model)) pose.world_from_model = *transform;
+  if (map.has("source") && map.text("source") == "world")
+    map.fault("source",
+              "source: expected the frame of what was registered, such as 'ct' or 'implant', got 'world'; this file "
+              "holds another transform");
+  if (const auto transform = transform_from(map, {"world", ""})) pose.world_from_model = *transform;
   if (map.has("fragment_frame"))
     if (const auto frame = frame_from(map.node("fragment_frame"), file)) pose.frame = *frame;
   // predicted_deviation is only for human readers; the covariance contains it.
-  if (map.has("covariance"))
-    if (const auto covariance = map.matrix("covariance", 6, 6)) pose.covariance = *covariance;
+  if (map.has("covariance")) pose.covariance = covariance_from(map);
   pose.warnings = map.texts_or_none("warnings");
   if (map.has("cost")) pose.cost = map.number("cost").value_or(0);
   if (map.has("evaluations")) pose.evaluations = map.integer("evaluations").value_or(0);

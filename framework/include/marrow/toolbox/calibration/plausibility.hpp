@@ -30,10 +30,14 @@ std::vector<std::string> implausible_numbers(const Camera& camera, const Device&
 /// Infinite if a point lies behind the source.
 double reprojection_error_px(const Camera& camera, const SeenPoints& points);
 
-/// A sentence about the single mistake (mirrored image, flipped axis, wrong unit, inverted pose ...) that explains the
-/// points best. Undoing it must reduce the error to a fifth and to less than 2 % of the image's width. std::nullopt if
-/// there is no such mistake, the error is below 1 % of the width, or there are fewer than four points.
-std::optional<std::string> explanation(const Camera& camera, const SeenPoints& points);
+/// For each view a sentence about the single mistake (mirrored image, flipped axis, wrong unit, inverted pose ...) that
+/// explains its points best. Undoing it must reduce the error to a fifth and to less than 2 % of the image's width.
+/// std::nullopt if there is no such mistake, the error is below 1 % of the width, or there are fewer than four points.
+/// One view alone may not tell whether its image is mirrored or an axis of the points reversed. So a mistake that
+/// explains all views counts first. One of the points, which all views share, counts otherwise only where no other
+/// does.
+std::vector<std::optional<std::string>> explanations(const std::vector<Camera>& cameras,
+                                                     const std::vector<SeenPoints>& points);
 
 /// Result of refit_pose(): the error that remains, and how far the new pose is from the camera's: angle, and
 /// displacement of the points' centre.
