@@ -27,7 +27,7 @@ using Status = NodeRecord::Status;
 void expect_sound(const std::vector<Value>& outputs, const std::vector<PortInfo>& ports) {
   for (std::size_t i = 0; i < outputs.size(); ++i)
     for_leaves(outputs[i], [&](const Value& leaf) {
-      if (const std::string fault = fault_of_sizes(leaf); !fault.empty())
+      if (const std::string fault = fault_of_value(leaf); !fault.empty())
         throw Error("it gave an output '" + ports.at(i).name + "' that cannot be: " + fault);
     });
 }

@@ -4,7 +4,9 @@
 #include <algorithm>
 
 #include "marrow/domain/camera.hpp"
+#include "marrow/domain/error.hpp"
 #include "marrow/domain/mesh.hpp"
+#include "marrow/domain/pose.hpp"
 #include "marrow/domain/volume.hpp"
 #include "marrow/runtime/types.hpp"
 
@@ -34,9 +36,18 @@ std::string fault_of_view(const View& view) {
          std::to_string(view.image.pixels.rows);
 }
 
+std::string fault_of_pose(const Pose& pose) {
+  try {
+    check_pose(pose, "the pose");
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
 }  // namespace
 
-std::string fault_of_sizes(const Value& value) {
+std::string fault_of_value(const Value& value) {
   if (!value.data) return "";
   if (value.type == TypeInfo::of<Volume>()) {
     const auto& volume = value.as<Volume>();
@@ -48,6 +59,7 @@ std::string fault_of_sizes(const Value& value) {
   }
   if (value.type == TypeInfo::of<Mesh>()) return fault_of_mesh(value.as<Mesh>());
   if (value.type == TypeInfo::of<View>()) return fault_of_view(value.as<View>());
+  if (value.type == TypeInfo::of<Pose>()) return fault_of_pose(value.as<Pose>());
   return "";
 }
 

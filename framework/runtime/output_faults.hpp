@@ -6,8 +6,9 @@
 
 namespace marrow {
 
-/// What is wrong with the sizes of a value of marrow's own types, in words: nodes that take it rely on them, and would
-/// read beyond its end. An empty text for a sound value and for one that is not here. `value` is no list.
-std::string fault_of_sizes(const Value& value);
+/// What is wrong with a value of marrow's own types, in words. Nodes that take it rely on its sizes, and would read
+/// beyond its end. A pose must be rigid, and its covariance one that exists (check_pose()): a negative variance would
+/// pass for a deviation of 0. An empty text for a sound value and for one that is not here. `value` is no list.
+std::string fault_of_value(const Value& value);
 
 }  // namespace marrow

@@ -36,6 +36,7 @@ Result calibrated(const marrow::List<marrow::Pose>& stages, const marrow::Mesh& 
   const marrow::FragmentFrame axes = marrow::fragment_frame(model);
   Result result;
   for (std::size_t i = 0; i < stages.size(); ++i) {
+    check_pose(stages[i], "the pose of stage '" + stages.name(i) + "'");
     const bool is_first = stages.name(i) == "first" && i + 1 < stages.size();
     result.stages.add(stages.name(i), scaled(stages[i], axes, is_first ? options.first_rotation : options.rotation,
                                              is_first ? options.first_translation : options.translation));

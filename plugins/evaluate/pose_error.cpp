@@ -40,6 +40,7 @@ marrow::Metrics pose_error(const marrow::Pose& pose, const marrow::Truth& truth,
                            const Options& options) {
   const marrow::RigidTransform &found = pose.world_from_model, &exact = truth.world_from_model;
   marrow::geometry::check_poses(found, exact);
+  marrow::check_pose(pose, "pose");
   marrow::geometry::check_model(found, model);
   const marrow::FragmentFrame frame = marrow::fragment_frame(model);
   const marrow::Vector6d motion = marrow::motion_between(exact, found, frame);

@@ -200,8 +200,8 @@ MARROW_PLUGIN(plugin) {
       .in("initial",
           "predicted pose with its covariance, and the fragment's axes; without a covariance, "
           "or with one that says nothing, it counts as hardly known")
-      .in("model", "surface of the fragment: it gives the axes of a start that has none")
       .in("state", "what is known before the frame; then most frames take over the covariance of a frame before")
+      .in("model", "surface of the fragment: it gives the axes of a start that has none")
       .out("pose", &Result::pose, "pose of least cost, with its predicted covariance")
       .out("stages", &Result::stages, "poses of the search: predicted, near (if it was found but not enough), final",
            over("stage"))

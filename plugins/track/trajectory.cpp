@@ -62,7 +62,7 @@ void write_csv(const Trajectory& trajectory, const std::string& path) {
     }
     add_degrees_and_mm(
         motion_between(trajectory.states.front().now.world_from_model, pose, trajectory.states.front().fragment));
-    add_degrees_and_mm(state.now.covariance.diagonal().head<6>().cwiseMax(0).cwiseSqrt());
+    add_degrees_and_mm(state.now.covariance.diagonal().head<6>().cwiseSqrt());
     if (trajectory.verdicts.empty()) {
       text += ",,";
     } else {

@@ -139,7 +139,11 @@ TEST_F(HostileNodes, TheyMayLieAboutSizes) {
            "it gave an output 'volume' that cannot be: its grid has 1000 x 1000 x 1000 voxels, but there are 8 values"),
        {"mesh",
         "it gave an output 'mesh' that cannot be: a triangle has the vertex 1000000, but there are 3 vertices, counted "
-        "from 0"}}) {
+        "from 0"},
+       {"pose",
+        "it gave an output 'pose' that cannot be: the pose: the covariance has the negative variance -1 in row 1, "
+        "column "
+        "1; a covariance is symmetric and has no negative eigenvalue"}}) {
     marrow::Diagnostics diagnostics;
     pipeline = marrow::read_pipeline(scratch.write("lies.yaml",
                                                    "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: 5}}\n"

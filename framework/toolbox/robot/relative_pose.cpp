@@ -18,8 +18,8 @@ double largest(const Eigen::Matrix3d& covariance) {
 }  // namespace
 
 RelativePose relative_pose(const Pose& fragment, const Pose& reference) {
-  check_rigid(fragment.world_from_model, "the pose of the fragment");
-  check_rigid(reference.world_from_model, "the pose of the reference");
+  check_pose(fragment, "the pose of the fragment");
+  check_pose(reference, "the pose of the reference");
   RelativePose relative;
   relative.reference_from_fragment = inverse(reference.world_from_model) * fragment.world_from_model;
   relative.reference_from_fragment.target = "reference";

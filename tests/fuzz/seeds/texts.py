@@ -74,7 +74,7 @@ target: world
 source: ct
 {MATRIX}
 fragment_frame: {{origin_mm: [1, 2, 3], axes: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}
-covariance: [{", ".join(["[1, 0, 0, 0, 0, 0]"] * 6)}]
+covariance: [{", ".join(str([int(row == column) for column in range(6)]) for row in range(6))}]
 predicted_deviation: {{rotation_deg: [1, 1, 1]}}
 warnings: [mind the gap]
 cost: 0.5

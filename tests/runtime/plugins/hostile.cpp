@@ -97,6 +97,7 @@ struct LiarOptions {
 struct Lies {
   std::optional<marrow::Volume> volume;
   std::optional<marrow::Mesh> mesh;
+  std::optional<marrow::Pose> pose;
 };
 
 /// A value that holds less than it says.
@@ -104,6 +105,8 @@ Lies lie(const Metrics&, const LiarOptions& options) {
   Lies lies;
   if (options.about == "mesh")
     lies.mesh = marrow::Mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 1, 1000000}}};
+  else if (options.about == "pose")
+    lies.pose.emplace().covariance = marrow::Matrix6d(-marrow::Matrix6d::Identity());
   else
     lies.volume.emplace().grid.size = {1000, 1000, 1000};
   if (lies.volume) lies.volume->values.resize(8);
@@ -152,7 +155,8 @@ MARROW_PLUGIN(plugin) {
       .in("a", "anything")
       .out("volume", &Lies::volume, "a volume")
       .out("mesh", &Lies::mesh, "a mesh")
-      .option("about", &LiarOptions::about, "volume or mesh");
+      .out("pose", &Lies::pose, "a pose")
+      .option("about", &LiarOptions::about, "volume, mesh or pose");
   plugin.node("test.sensitive", sensitive)
       .summary("What it gives shows harm that was done")
       .in("a", "number")

@@ -57,7 +57,7 @@ Pipeline read_for_case(const Workbench& workbench, const fs::path& file, const s
 
 json deviations_of(const Pose& pose) {
   if (!pose.covariance || !pose.covariance->allFinite()) return nullptr;
-  const auto deviation = [&](int i) { return std::sqrt(std::max(0., (*pose.covariance)(i, i))); };
+  const auto deviation = [&](int i) { return std::sqrt((*pose.covariance)(i, i)); };
   json deviations;
   static constexpr const char* kAxes[] = {"frontal", "lateral", "long"};
   for (int i = 0; i < 3; ++i)
