@@ -2,6 +2,7 @@
 // The target on a robot's hand, and the one move that follows from it.
 #include <gtest/gtest.h>
 
+#include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/board_views.hpp"
 #include "shipped.hpp"
 
@@ -65,6 +66,7 @@ Scene scene() {
   Pose proximal, distal;
   proximal.world_from_model = {"world", "ct", rotation_from_vector({0.1, 0.2, 0.3}), {1, 2, 3}};
   distal.world_from_model = {"world", "ct", rotation_from_vector({0.2, 0.1, 0.4}), {9, -2, -3}};
+  proximal.frame.is_anatomical = distal.frame.is_anatomical = true;
   scene.poses.add("proximal", proximal);
   scene.poses.add("distal", distal);
   const RigidTransform hand_from_target{"hand", "target", rotation_from_vector({0.5, 0, 1}), {10, 20, 90}};
@@ -95,6 +97,75 @@ TEST(OpenLoop, OneMoveBringsTheFragmentToItsPlace) {
     EXPECT_LT(degrees(geodesic_angle_rad(after.rotation, place.rotation)), 1e-4) << method;
     EXPECT_LT((after.translation_mm - place.translation_mm).norm(), 1e-3) << method;
   }
+}
+
+/// The target is seen with an error in each station.
+Scene with_noise(Scene scene, double noise_deg, double noise_mm) {
+  Random random(4);
+  const auto drawn = [&](double deviation) {
+    const double x = random.normal(), y = random.normal(), z = random.normal();
+    return Eigen::Vector3d(deviation * Eigen::Vector3d(x, y, z));
+  };
+  List<Pose> targets;
+  for (std::size_t i = 0; i < scene.targets.size(); ++i) {
+    Pose target = scene.targets[i];
+    target.world_from_model.rotation =
+        rotation_from_vector(drawn(radians(noise_deg))) * target.world_from_model.rotation;
+    target.world_from_model.translation_mm += drawn(noise_mm);
+    targets.add(scene.targets.name(i), target);
+  }
+  scene.targets = targets;
+  return scene;
+}
+
+TEST(OpenLoop, SaysHowFarFromItsPlaceTheMoveLeavesTheFragment) {
+  for (const std::string method : {"ax_zb", "ax_xb"}) {
+    const Scene made = with_noise(scene(), 0.02, 0.05);
+    const auto outputs = shipped::call("guide.open_loop", inputs(made), {{"method", method}});
+    const RigidTransform after = inverse(kBase) * outputs.at("motion").as<Pose>().world_from_model * kBase *
+                                 made.poses.find("distal")->world_from_model;
+    const RigidTransform& place = made.poses.find("proximal")->world_from_model;
+    const double left_deg = shipped::figure(outputs.at("figures"), "left_deg"),
+                 left_mm = shipped::figure(outputs.at("figures"), "left_mm");
+    EXPECT_LT(degrees(geodesic_angle_rad(after.rotation, place.rotation)), 4 * left_deg) << method;
+    EXPECT_LT((after.translation_mm - place.translation_mm).norm(), 4 * left_mm) << method;
+    EXPECT_LT(left_mm, 0.5) << method;
+  }
+}
+
+TEST(OpenLoop, AMoveByARobotWhosePlaceIsHardlyKnownIsRefused) {
+  for (const std::string method : {"ax_zb", "ax_xb"}) {
+    const Scene made = with_noise(scene(), 0.5, 1);
+    const std::string text = shipped::refusal("guide.open_loop", inputs(made), {{"method", method}});
+    EXPECT_TRUE(
+        text.starts_with("the stations do not tell well enough where the robot is: this move would leave the "
+                         "fragment "))
+        << method << ": " << text;
+    EXPECT_TRUE(
+        text.ends_with(" mm from its place (one standard deviation), at most 2 degrees and 2 mm are allowed; "
+                       "turn the robot further between stations, about axes that are at least 30 degrees "
+                       "apart, or raise most_deviation_deg and most_deviation_mm"))
+        << method << ": " << text;
+    EXPECT_EQ(shipped::refusal("guide.open_loop", inputs(made),
+                               {{"method", method}, {"most_deviation_deg", 90.0}, {"most_deviation_mm", 1000.0}}),
+              "")
+        << method;
+  }
+}
+
+TEST(OpenLoop, SaysThatThePosesDoNotShowTheFragmentsMiddle) {
+  Scene made = scene();
+  List<Pose> without;
+  for (std::size_t i = 0; i < made.poses.size(); ++i) {
+    Pose pose = made.poses[i];
+    pose.frame.is_anatomical = false;
+    without.add(made.poses.name(i), pose);
+  }
+  made.poses = without;
+  EXPECT_EQ(shipped::refusal("guide.open_loop", inputs(made)),
+            "the pose of 'distal' does not say where the fragment's middle is and how its long axis runs, as a matrix "
+            "alone does not; wire the surfaces of both fragments to 'models', or give the node that reads the pose its "
+            "model");
 }
 
 TEST(OpenLoop, NeedsHandAndTargetOfTheSameStations) {

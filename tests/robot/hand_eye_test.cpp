@@ -75,7 +75,7 @@ TEST(HandEye, AMoveThatFailedHardlyCounts) {
 }
 
 TEST(HandEye, AxXbInClosedForm) {
-  const RigidTransform found = robot::solve_ax_xb(kMoves);
+  const RigidTransform found = robot::solve_ax_xb(kMoves).robot_from_reference;
   EXPECT_LT(turn_deg(found), 1e-6);
   EXPECT_LT(shift_mm(found), 1e-6);
   EXPECT_EQ(found.target, "robot");
@@ -88,8 +88,8 @@ TEST(HandEye, AxXbSaysWhatIsMissing) {
   EXPECT_EQ(message_of([] {
               robot::solve_ax_xb({kMoves[0], move(motion({5, 0, 0}, {0, 3, 1}))});
             }),
-            "the motions of the hand-eye transform turn about one axis only; give motions whose axes are at least 30 "
-            "degrees apart");
+            "the motions of the hand-eye transform do not tell how the robot is turned: about one axis nothing is "
+            "known; turn it further, about axes that are at least 30 degrees apart");
 }
 
 std::vector<robot::Station> stations(const RigidTransform& hand_from_target, const RigidTransform& base_from_world,
@@ -137,8 +137,8 @@ TEST(HandEye, AxZbSaysWhatIsMissing) {
   for (int i = 0; i < 3; ++i)
     about_one_axis[std::size_t(i)].base_from_hand.rotation = rotation_from_vector({0, 0, 0.2 * i});
   EXPECT_EQ(message_of([&] { robot::solve_ax_zb(about_one_axis); }),
-            "the stations of the robot turn about one axis only; give motions whose axes are at least 30 degrees "
-            "apart");
+            "the stations of the robot do not tell how the robot is turned: about one axis nothing is known; turn it "
+            "further, about axes that are at least 30 degrees apart");
 }
 
 }  // namespace hand_eye_test

@@ -10,6 +10,7 @@
 #include "least_squares.hpp"
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 
 namespace marrow::robot {
 namespace {
@@ -57,15 +58,37 @@ std::vector<Eigen::Matrix3d> turns_of_a_cube() {
   return turns;
 }
 
-/// The smallest eigenvalue's share says whether the axes differ: sine squared of the angle that they spread over.
-void check_axes(const std::vector<Eigen::Vector3d>& turns_rad, const std::string& what) {
-  constexpr double kLeastSine = 0.17;  // 10 degrees
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector3d& turn : turns_rad)
-    if (turn.norm() > 1e-6) spread += turn.normalized() * turn.normalized().transpose();
-  const Eigen::Vector3d values = eigen_of_symmetric<3>(spread).values;
-  if (!(values[1] > kLeastSine * kLeastSine * 0.5 * values.sum()))
-    throw Error(what + " turn about one axis only; give motions whose axes are at least 30 degrees apart");
+/// No rotation and no shift is known better than this, however well the motions fit: it may be by chance.
+constexpr double kLeastNoise_rad = 1e-4, kLeastNoise_mm = 0.01;
+
+/// The variance of residuals, of which the fit has used up some; at least the square of `least`.
+double variance_of(double squares, double freedom, double least) {
+  return std::max(squares / std::max(1.0, freedom), least * least);
+}
+
+/// A matrix of information, and a little more in all directions: what nothing determines then has a variance that is
+/// huge, but a number.
+Eigen::MatrixXd with_a_little(const Eigen::MatrixXd& information, double most) {
+  return information + 1e-14 * most * Eigen::MatrixXd::Identity(information.rows(), information.cols());
+}
+
+Eigen::Matrix3d skew_of(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d skew;
+  skew << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return skew;
+}
+
+/// Turns about one axis say nothing about how the robot is turned about it, and noise in them is no second axis. Both
+/// show in the covariance: a turn counts by its size against the noise.
+void check_turned(const Eigen::Matrix3d& covariance_of_turn, const std::string& what) {
+  constexpr double kMost_deg = 10, kNothing_deg = 60;
+  const double deviation_deg = degrees(std::sqrt(eigen_of_symmetric<3>(covariance_of_turn).values[2]));
+  if (deviation_deg <= kMost_deg) return;
+  const std::string known = deviation_deg < kNothing_deg
+                                ? formatted("it is known to %.0f degrees only (one standard deviation)", deviation_deg)
+                                : "about one axis nothing is known";
+  throw Error(what + " do not tell how the robot is turned: " + known +
+              "; turn it further, about axes that are at least 30 degrees apart");
 }
 
 Eigen::Matrix3d minus_identity(const Eigen::Matrix3d& rotation) { return rotation - Eigen::Matrix3d::Identity(); }
@@ -112,36 +135,100 @@ HandEye estimate_hand_eye(const std::vector<Move>& moves, const RigidTransform& 
   return best;
 }
 
-RigidTransform solve_ax_xb(const std::vector<Move>& moves) {
+HandEye solve_ax_xb(const std::vector<Move>& moves) {
   if (moves.size() < 2)
     throw Error("the hand-eye transform needs 2 motions or more; there are " + std::to_string(moves.size()));
-  std::vector<Eigen::Vector3d> turns;
-  Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
+  const Eigen::Index rows = 3 * Eigen::Index(moves.size());
+  Eigen::Matrix3d products = Eigen::Matrix3d::Zero(), information = Eigen::Matrix3d::Zero();
   for (const Move& move : moves) {
-    turns.push_back(vector_from_rotation(move.told.rotation));
-    products += turns.back() * vector_from_rotation(move.seen.rotation).transpose();
+    const Eigen::Vector3d turn = vector_from_rotation(move.told.rotation);
+    products += turn * vector_from_rotation(move.seen.rotation).transpose();
+    information += turn.squaredNorm() * Eigen::Matrix3d::Identity() - turn * turn.transpose();
   }
-  check_axes(turns, "the motions of the hand-eye transform");
   RigidTransform x{moves[0].told.source, moves[0].seen.source, nearest_rotation(products), Eigen::Vector3d::Zero()};
-  Eigen::MatrixXd matrix(3 * Eigen::Index(moves.size()), 3);
-  Eigen::VectorXd right(matrix.rows());
+  double squares = 0;
+  Eigen::MatrixXd matrix(rows, 3), by_turn(rows, 3);  // the right side's derivatives by a turn of X
+  Eigen::VectorXd right(rows);
   for (std::size_t i = 0; i < moves.size(); ++i) {
-    matrix.middleRows<3>(3 * Eigen::Index(i)) = minus_identity(moves[i].told.rotation);
-    right.segment<3>(3 * Eigen::Index(i)) = x.rotation * moves[i].seen.translation_mm - moves[i].told.translation_mm;
+    const Eigen::Index row = 3 * Eigen::Index(i);
+    squares +=
+        (vector_from_rotation(moves[i].told.rotation) - x.rotation * vector_from_rotation(moves[i].seen.rotation))
+            .squaredNorm();
+    matrix.middleRows<3>(row) = minus_identity(moves[i].told.rotation);
+    right.segment<3>(row) = x.rotation * moves[i].seen.translation_mm - moves[i].told.translation_mm;
+    by_turn.middleRows<3>(row) = -skew_of(x.rotation * moves[i].seen.translation_mm);
   }
+  const Eigen::Matrix3d of_turn = variance_of(squares, double(rows - 3), kLeastNoise_rad) *
+                                  with_a_little(information, information.trace()).inverse();
+  check_turned(of_turn, "the motions of the hand-eye transform");
   x.translation_mm = least(matrix, right);
-  return x;
+  // A turn of X about the base's axes moves the least squares' solution by `lever`.
+  const Eigen::Matrix3d inverse = with_a_little(matrix.transpose() * matrix, matrix.squaredNorm()).inverse(),
+                        lever = inverse * matrix.transpose() * by_turn;
+  const double of_shift =
+      variance_of((matrix * x.translation_mm - right).squaredNorm(), double(rows - 3), kLeastNoise_mm);
+  Eigen::Matrix<double, 6, 3> by;  // a motion of the frame "reference", by the turn
+  by << x.rotation.transpose(), x.rotation.transpose() * lever;
+  HandEye found{x, by * of_turn * by.transpose()};
+  found.covariance.bottomRightCorner<3, 3>() += x.rotation.transpose() * (of_shift * inverse) * x.rotation;
+  return found;
 }
+
+namespace {
+
+/// X and Z after a small motion of each.
+RobotWorld changed(const RobotWorld& start, const Eigen::VectorXd& by) {
+  return {changed(start.hand_from_target, Eigen::Vector3d::Zero(), by.head<6>()),
+          changed(start.base_from_world, Eigen::Vector3d::Zero(), by.tail<6>())};
+}
+
+/// What A X and Z B differ by at each station: the rotation in units of `rotation_rad`, then the shift in units of
+/// `shift_mm`.
+Eigen::VectorXd differences(const std::vector<Station>& stations, const RobotWorld& found, double rotation_rad,
+                            double shift_mm) {
+  Eigen::VectorXd all(6 * Eigen::Index(stations.size()));
+  for (std::size_t i = 0; i < stations.size(); ++i) {
+    const RigidTransform one = stations[i].base_from_hand * found.hand_from_target,
+                         other = found.base_from_world * stations[i].world_from_target;
+    const Eigen::Index row = 6 * Eigen::Index(i);
+    all.segment<3>(row) = vector_from_rotation(other.rotation * one.rotation.transpose()) / rotation_rad;
+    all.segment<3>(row + 3) = (other.translation_mm - one.translation_mm) / shift_mm;
+  }
+  return all;
+}
+
+/// The least squares near a start, 1 degree counted as 1 mm, and the covariance of Z. If H is the sum's Hessian, and M
+/// that with each residual multiplied by its own deviation, it is the part of H^-1 M H^-1 that belongs to Z: the
+/// residuals' noise, as the solution follows it.
+RobotWorld refined(const RobotWorld& start, const std::vector<Station>& stations) {
+  const Eigen::VectorXd step =
+      (Eigen::VectorXd(12) << 1e-5, 1e-5, 1e-5, 1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-3, 1e-3, 1e-3).finished();
+  const auto least_from = [&](const RobotWorld& from, double rotation_rad, double shift_mm, int most_rounds) {
+    return least_squares(
+        [&](const Eigen::VectorXd& by) { return differences(stations, changed(from, by), rotation_rad, shift_mm); },
+        step, most_rounds);
+  };
+  RobotWorld found = changed(start, least_from(start, radians(1), 1, 30).change);
+  const Eigen::VectorXd left = differences(stations, found, radians(1), 1);
+  const auto by_station = left.reshaped(6, left.size() / 6);
+  const double freedom = 0.5 * double(left.size()) - 6,
+               rotation_deg =
+                   std::sqrt(variance_of(by_station.topRows(3).squaredNorm(), freedom, degrees(kLeastNoise_rad))),
+               shift_mm = std::sqrt(variance_of(by_station.bottomRows(3).squaredNorm(), freedom, kLeastNoise_mm));
+  const Eigen::MatrixXd hessian = least_from(found, radians(1), 1, 1).hessian,
+                        scatter = least_from(found, radians(1) / rotation_deg, 1 / shift_mm, 1).hessian;
+  const double most = hessian.trace();
+  const Eigen::MatrixXd gain = with_a_little(hessian, most).inverse().bottomRows<6>();
+  found.covariance = gain * with_a_little(scatter, most) * gain.transpose();
+  return found;
+}
+
+}  // namespace
 
 RobotWorld solve_ax_zb(const std::vector<Station>& stations) {
   const Eigen::Index count = Eigen::Index(stations.size());
   if (count < 3)
     throw Error("the robot's place needs 3 stations or more; there are " + std::to_string(stations.size()));
-  std::vector<Eigen::Vector3d> turns;
-  for (const Station& station : stations)
-    turns.push_back(
-        vector_from_rotation(stations[0].base_from_hand.rotation.transpose() * station.base_from_hand.rotation));
-  check_axes(turns, "the stations of the robot");
   // sum kron(R_B, R_A) vec(R_X) = n vec(R_Z): the singular vectors of the largest singular value.
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(9, 9);
   for (const Station& station : stations)
@@ -170,24 +257,20 @@ RobotWorld solve_ax_zb(const std::vector<Station>& stations) {
   const Eigen::VectorXd shifts = least(matrix, right);
   start.hand_from_target.translation_mm = shifts.head<3>();
   start.base_from_world.translation_mm = shifts.tail<3>();
-  const auto at = [&](const Eigen::VectorXd& change) {
-    return RobotWorld{changed(start.hand_from_target, Eigen::Vector3d::Zero(), change.head<6>()),
-                      changed(start.base_from_world, Eigen::Vector3d::Zero(), change.tail<6>())};
-  };
-  const LeastSquares found = least_squares(
-      [&](const Eigen::VectorXd& change) {
-        const RobotWorld now = at(change);
-        Eigen::VectorXd all(6 * count);
-        for (Eigen::Index i = 0; i < count; ++i) {
-          const RigidTransform one = stations[std::size_t(i)].base_from_hand * now.hand_from_target,
-                               other = now.base_from_world * stations[std::size_t(i)].world_from_target;
-          all.segment<3>(6 * i) = vector_from_rotation(other.rotation * one.rotation.transpose()) / radians(1);
-          all.segment<3>(6 * i + 3) = other.translation_mm - one.translation_mm;
-        }
-        return all;
-      },
-      (Eigen::VectorXd(12) << 1e-5, 1e-5, 1e-5, 1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-3, 1e-3, 1e-3).finished(), 30);
-  return at(found.change);
+  const RobotWorld found = refined(start, stations);
+  check_turned(found.covariance.topLeftCorner<3, 3>(), "the stations of the robot");
+  return found;
+}
+
+Matrix6d left_by(const RigidTransform& motion, const Matrix6d& covariance, const Eigen::Vector3d& place_mm) {
+  // E W E^-1 is to first order e - Ad_W e after W. Ad_W takes (r, t) to (R r, R t + t_W x R r).
+  Matrix6d by = Matrix6d::Identity();
+  by.topLeftCorner<3, 3>() -= motion.rotation;
+  by.bottomRightCorner<3, 3>() -= motion.rotation;
+  by.bottomLeftCorner<3, 3>() -= skew_of(motion.translation_mm) * motion.rotation;
+  Matrix6d about_place = Matrix6d::Identity();
+  about_place.bottomLeftCorner<3, 3>() = -skew_of(place_mm);
+  return about_place * by * covariance * by.transpose() * about_place.transpose();
 }
 
 }  // namespace marrow::robot

@@ -29,8 +29,8 @@ struct HandEyeNoise {
 
 struct HandEye {
   RigidTransform robot_from_reference{"robot", "reference"};
-  /// Of a small motion (r [rad], t [mm]) of the robot, about the middle of the fragment before the last move, along the
-  /// axes of "reference". That of the guess, if there is no move.
+  /// By estimate_hand_eye(): of a small motion (r [rad], t [mm]) of the robot, about the middle of the fragment before
+  /// the last move, along the axes of "reference". That of the guess, if there is no move.
   Matrix6d covariance = Matrix6d::Identity();
 };
 
@@ -43,8 +43,10 @@ HandEye estimate_hand_eye(const std::vector<Move>& moves, const RigidTransform& 
 
 /// AX = XB for two motions or more with different axes, in closed form: the rotation that takes the rotation vectors of
 /// B to those of A (Park and Martin, IEEE TRA 10, 1994), then the translation from (R_A - I) t_X = R_X t_B - t_A by
-/// least squares. Throws Error if there are too few motions or their axes are less than 10 degrees apart.
-RigidTransform solve_ax_xb(const std::vector<Move>& moves);
+/// least squares. The covariance is that of a small motion of the frame "reference" about its origin, by what the
+/// motions leave over; each is taken as independent of the others. Throws Error if there are too few motions, or if
+/// they do not tell the rotation to 10 degrees, because they are too small or about one axis only.
+HandEye solve_ax_xb(const std::vector<Move>& moves);
 
 /// A pose of the robot's hand, and that of the target on it as the camera sees it.
 struct Station {
@@ -54,11 +56,18 @@ struct Station {
 struct RobotWorld {
   RigidTransform hand_from_target{"hand", "target"};  ///< X
   RigidTransform base_from_world{"base", "world"};    ///< Z
+  /// Of a small motion (r [rad], t [mm]) of the world about its origin, by what the stations leave over.
+  Matrix6d covariance = Matrix6d::Identity();
 };
 
 /// A_i X = Z B_i for three stations or more: both rotations from the Kronecker product (Shah, J Mech Robot 5, 2013),
 /// both translations by least squares, then all twelve numbers together by the stations' residuals, 1 degree counted as
-/// 1 mm. Throws Error if the stations are too few or turn about one axis only.
+/// 1 mm. Throws Error if the stations are too few, or if they do not tell the rotation to 10 degrees, because their
+/// turns are too small or about one axis only.
 RobotWorld solve_ax_zb(const std::vector<Station>& stations);
+
+/// How far from the place meant a motion of the world leaves a fragment, if it is told with a base_from_world of this
+/// covariance: the covariance of a small motion (r [rad], t [mm]) about a point of the world, along its axes.
+Matrix6d left_by(const RigidTransform& motion, const Matrix6d& covariance, const Eigen::Vector3d& place_mm);
 
 }  // namespace marrow::robot
