@@ -7,9 +7,10 @@
 #include <thread>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/quantile.hpp"
 #include "marrow/domain/random.hpp"
 #include "normal.hpp"
-#include "quantile.hpp"
+#include "value_checks.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -51,7 +52,8 @@ std::vector<double> of_resamples(const BootstrapSettings& settings,
 
 Interval interval_of(std::vector<double> medians, double confidence) {
   std::sort(medians.begin(), medians.end());
-  return {quantile(medians, (1 - confidence) / 2), quantile(medians, (1 + confidence) / 2), confidence};
+  return {quantile_of_sorted(medians, (1 - confidence) / 2), quantile_of_sorted(medians, (1 + confidence) / 2),
+          confidence};
 }
 
 /// Counts how often each value was drawn. The values are known by their ranks, so a median is found by counting up to
@@ -67,12 +69,12 @@ class DrawnRanks {
   }
   /// Of the values in rising order. Forgets what was drawn.
   double take_median(const std::vector<double>& sorted) {
-    const std::size_t lower = rank_at((drawn_ - 1) / 2), upper = drawn_ % 2 ? lower : rank_at(drawn_ / 2);
+    const QuantilePlace place = quantile_place(drawn_, 0.5);
+    const std::size_t lower = rank_at(place.below), upper = place.above > place.below ? rank_at(place.above) : lower;
     std::fill(counts_.begin(), counts_.end(), 0u);
     std::fill(blocks_.begin(), blocks_.end(), 0u);
-    const bool is_one = drawn_ % 2;
     drawn_ = 0;
-    return is_one ? sorted[lower] : 0.5 * (sorted[lower] + sorted[upper]);
+    return std::lerp(sorted[lower], sorted[upper], place.part);
   }
 
  private:
@@ -137,7 +139,7 @@ Interval median_of_case_means_interval(const ValuesOfCases& given, const Bootstr
                                           sum += own[random.index(own.size())];
                                         mean = sum / double(own.size());
                                       }
-                                      return median_in_place(means);
+                                      return quantile_in_place(means, 0.5);
                                     };
                                   }),
                      settings.confidence);

@@ -9,7 +9,7 @@
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/number_text.hpp"
 #include "normal.hpp"
-#include "quantile.hpp"
+#include "value_checks.hpp"
 
 namespace marrow::compare {
 namespace {

@@ -9,9 +9,10 @@
 #include "marrow/compare/bootstrap.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/number_text.hpp"
+#include "marrow/domain/quantile.hpp"
 #include "marrow/domain/random.hpp"
 #include "normal.hpp"
-#include "quantile.hpp"
+#include "value_checks.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -86,10 +87,10 @@ Summary summarise(const std::vector<double>& values, bool higher_is_better) {
   Summary summary;
   summary.count = sorted.size();
   summary.mean = std::accumulate(sorted.begin(), sorted.end(), 0.0) / static_cast<double>(sorted.size());
-  summary.median = median_of_sorted(sorted);
-  summary.lower_quartile = quantile(sorted, 0.25);
-  summary.upper_quartile = quantile(sorted, 0.75);
-  summary.percentile_95 = quantile(sorted, higher_is_better ? 0.05 : 0.95);
+  summary.median = quantile_of_sorted(sorted, 0.5);
+  summary.lower_quartile = quantile_of_sorted(sorted, 0.25);
+  summary.upper_quartile = quantile_of_sorted(sorted, 0.75);
+  summary.percentile_95 = quantile_of_sorted(sorted, higher_is_better ? 0.05 : 0.95);
   summary.worst = higher_is_better ? sorted.front() : sorted.back();
   return summary;
 }
@@ -140,10 +141,11 @@ Interval median_interval(const std::vector<double>& differences, std::uint64_t s
   std::vector<double> medians(resamples);
   for (double& median : medians) {
     for (double& value : drawn) value = sorted[random.index(sorted.size())];
-    median = median_in_place(drawn);
+    median = quantile_in_place(drawn, 0.5);
   }
   std::sort(medians.begin(), medians.end());
-  return {quantile(medians, (1 - confidence) / 2), quantile(medians, (1 + confidence) / 2), confidence};
+  return {quantile_of_sorted(medians, (1 - confidence) / 2), quantile_of_sorted(medians, (1 + confidence) / 2),
+          confidence};
 }
 
 SignedRank signed_rank_test(const std::vector<double>& differences, SignedRankMethod method) {
@@ -189,7 +191,7 @@ Comparison compare_pairs(const std::vector<Pair>& pairs, std::uint64_t seed, dou
   Comparison comparison;
   comparison.cases = differences.size();
   comparison.pairs = pairs.size();
-  comparison.median_difference = median_of_sorted(differences);
+  comparison.median_difference = quantile_of_sorted(differences, 0.5);
   comparison.interval = median_of_case_means_interval(cases, {seed, confidence, resamples_for(pairs.size()), 0});
   comparison.test = signed_rank_test(differences);
   return comparison;

@@ -8,7 +8,7 @@
 #include "marrow/compare/sequential.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/number_text.hpp"
-#include "quantile.hpp"
+#include "marrow/domain/quantile.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -97,7 +97,7 @@ Look look_at_difference(const StopPlan& plan, std::size_t cases, const std::vect
   const std::vector<double> differences = case_differences(pairs);
   look.p = signed_rank_test(differences).p;
   look.is_met = look.p < look.level;
-  look.difference = median_of_sorted(differences);
+  look.difference = quantile_of_sorted(differences, 0.5);
   if (look.level > 0) look.interval = order_statistic_interval(differences, look.level);
   return look;
 }

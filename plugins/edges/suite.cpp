@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "marrow/domain/quantile.hpp"
 #include "marrow/runtime/types.hpp"
 
 namespace marrow::conformance {
@@ -104,12 +105,7 @@ std::vector<double> distances(const EdgeMap& map, const Shape& shape) {
     if (std::abs(distance) <= kNear_px) found.push_back(distance);
   }
   expect(found.size() >= 100, "it finds " + std::to_string(found.size()) + " pixels of an edge that is hundreds long");
-  std::sort(found.begin(), found.end());
   return found;
-}
-
-double quantile(const std::vector<double>& sorted, double fraction) {
-  return sorted[std::size_t(fraction * double(sorted.size() - 1))];
 }
 
 double bias(const Subject& subject, const Shape& shape) {
@@ -117,8 +113,8 @@ double bias(const Subject& subject, const Shape& shape) {
 }
 
 double spread(const Subject& subject, const Shape& shape) {
-  const std::vector<double> sorted = distances(edges_of(subject, shape), shape);
-  return 0.5 * (quantile(sorted, 0.975) - quantile(sorted, 0.025));
+  const std::vector<double> found = distances(edges_of(subject, shape), shape);
+  return 0.5 * (quantile(found, 0.975) - quantile(found, 0.025));
 }
 
 double false_percent(const Subject& subject, const Shape& shape) {
@@ -151,8 +147,7 @@ double direction_error(const Subject& subject, const Shape& shape) {
       angles.push_back(degrees(std::acos(
           std::clamp(shape.outward(p.u_px, p.v_px).dot(Eigen::Vector2d(p.direction_u, p.direction_v)), -1.0, 1.0))));
   expect(!angles.empty(), "it finds no edge at all");
-  std::sort(angles.begin(), angles.end());
-  return quantile(angles, 0.9);
+  return quantile_in_place(angles, 0.9);
 }
 
 std::vector<Trial> trials() {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/quantile.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 
 namespace {
@@ -22,11 +23,6 @@ double value_of(const Metrics& metrics, const std::string& name, const std::stri
     known += (known.empty() ? "" : ", ") + metric.name;
   }
   throw Error("frame '" + frame + "' has no figure '" + name + "'; there are " + known);
-}
-
-/// The value below which this share of the sorted values lies.
-double quantile(const std::vector<double>& sorted, double share) {
-  return sorted[std::size_t(std::llround(share * double(sorted.size() - 1)))];
 }
 
 Metrics frames(const List<Metrics>& metrics, const List<TrackState>* states, const Options& options) {
@@ -51,8 +47,8 @@ Metrics frames(const List<Metrics>& metrics, const List<TrackState>* states, con
     }
     std::sort(values.begin(), values.end());
     const std::string unit = name.ends_with("_mm") ? "mm" : name.ends_with("_deg") ? "deg" : "";
-    result.items.push_back({"median_" + name, quantile(values, 0.5), unit});
-    result.items.push_back({"p95_" + name, quantile(values, 0.95), unit});
+    result.items.push_back({"median_" + name, quantile_of_sorted(values, 0.5), unit});
+    result.items.push_back({"p95_" + name, quantile_of_sorted(values, 0.95), unit});
     result.items.push_back({"worst_" + name, values.back(), unit});
     result.items.push_back({"rms_" + name, std::sqrt(squares / double(values.size())), unit});
   }

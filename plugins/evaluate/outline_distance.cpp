@@ -7,11 +7,11 @@
 #include <marrow/plugin.hpp>
 #include <vector>
 
-#include "marrow/toolbox/geometry/targets.hpp"
+#include "marrow/domain/quantile.hpp"
 
 namespace {
 
-using marrow::geometry::quantile;
+using marrow::quantile;
 
 /// Finds the nearest edge pixel with a gradient of similar direction. Edge pixels are sorted into square cells. The
 /// cells are visited in growing square rings around the point.
@@ -102,15 +102,15 @@ Distances measure(const marrow::RigidTransform& world_from_model, const marrow::
     if (!in_mask(view, point)) continue;
     const marrow::EdgePixel* edge =
         search.nearest(point.u_px, point.v_px, point.normal_u, point.normal_v, options.reach_px, least_cosine);
-    double px = options.reach_px;
+    const Eigen::Vector2d normal(point.normal_u, point.normal_v);
+    Eigen::Vector2d off = options.reach_px * normal;
     if (edge) {
-      const double du = double(edge->u_px) - point.u_px, dv = double(edge->v_px) - point.v_px;
-      px = std::hypot(du, dv);
-      distances.across_px.push_back(du * point.normal_u + dv * point.normal_v);
+      off = Eigen::Vector2d(double(edge->u_px) - point.u_px, double(edge->v_px) - point.v_px);
+      distances.across_px.push_back(off.dot(normal));
     }
     const Eigen::Vector3d world_mm = world_from_model * point.model_mm.cast<double>();
-    distances.px.push_back(px);
-    distances.mm.push_back(px * marrow::pixel_size_at_mm(view.camera, world_mm));
+    distances.px.push_back(edge ? off.norm() : options.reach_px);
+    distances.mm.push_back(marrow::offset_at_mm(view.camera, world_mm, off).norm());
   }
   return distances;
 }
@@ -135,7 +135,7 @@ void report(const std::string& prefix, const Distances& distances, marrow::Metri
 marrow::Metrics outline_distance(const marrow::Pose& pose, const marrow::OutlineProjector& projector,
                                  const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges,
                                  const Options& options, marrow::Context& context) {
-  marrow::check_rigid(pose.world_from_model, "pose");
+  marrow::check_pose(pose, "pose");
   marrow::Metrics per_view;
   Distances all;
   for (std::size_t i = 0; i < views.size(); ++i) {

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "marrow/domain/manifold.hpp"
+#include "marrow/domain/quantile.hpp"
 #include "marrow/runtime/types.hpp"
 
 namespace marrow::conformance {
@@ -157,8 +158,7 @@ double distance_95(const Subject& subject, const Shape& shape) {
   std::vector<double> distances;
   for (const Eigen::Vector3d& point : sample_surface(mesh_of(subject, shape.inputs), 20000))
     distances.push_back(std::abs(shape.distance(point)));
-  std::sort(distances.begin(), distances.end());
-  return distances[distances.size() * 95 / 100];
+  return quantile_in_place(distances, 0.95);
 }
 
 double area_error(const Subject& subject, const Shape& shape) {

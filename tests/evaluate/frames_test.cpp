@@ -29,6 +29,18 @@ TEST(Frames, AreSummedUp) {
   EXPECT_NEAR(shipped::figure(sums, "rms_axial_deg"), std::sqrt(130 / 5.0), 1e-12);
 }
 
+TEST(Frames, HaveQuantilesAsNumpyHasThem) {
+  // numpy.quantile([1, 3], [0.5, 0.95]) and of [3, 1, 2, 10]: between two ranks, the value is between theirs.
+  const auto sums_of = [](const std::vector<double>& values) {
+    return shipped::call("evaluate.frames", {{"metrics", shipped::list(figures(values), "frame")}}, kBoth)
+        .at("metrics");
+  };
+  EXPECT_NEAR(shipped::figure(sums_of({1, 3}), "median_mtre_mm"), 2, 1e-12);
+  EXPECT_NEAR(shipped::figure(sums_of({1, 3}), "p95_mtre_mm"), 2.9, 1e-12);
+  EXPECT_NEAR(shipped::figure(sums_of({3, 1, 2, 10}), "median_axial_deg"), 2.5, 1e-12);
+  EXPECT_NEAR(shipped::figure(sums_of({3, 1, 2, 10}), "p95_axial_deg"), 8.95, 1e-12);
+}
+
 TEST(Frames, LostOnesDoNotCount) {
   List<TrackState> states;
   for (int i = 0; i < 3; ++i) {

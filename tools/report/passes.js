@@ -9,10 +9,11 @@ const Passes = (() => {
 
   function summary({node, passes, end}) {
     const failed = passes.filter((pass) => !isDone(pass)).length;
-    const seconds = passes.map((pass) => pass.seconds).sort((a, b) => a - b);
+    const seconds = passes.map((pass) => pass.seconds).sort((a, b) => a - b), half = (seconds.length - 1) / 2;
     return node + ': ' + passes.length + (passes.length === 1 ? ' pass' : ' passes') +
         (failed ? ', ' + failed + ' not done' : '') +
-        (seconds.length ? '; median ' + withUnit(seconds[Math.floor(seconds.length / 2)], 's') : '') +
+        (seconds.length ? '; median ' + withUnit((seconds[Math.floor(half)] + seconds[Math.ceil(half)]) / 2, 's') :
+                          '') +
         (end ? '; ended because ' + end : '');
   }
 

@@ -8,6 +8,7 @@
 
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/quantile.hpp"
 
 namespace marrow::calibration {
 namespace {
@@ -26,19 +27,13 @@ cv::Mat1f darkness_of(const cv::Mat1f& image, double largest_px) {
   return background - smooth;
 }
 
-float quantile(std::vector<float>& values, double fraction) {
-  const auto at = values.begin() + std::ptrdiff_t(fraction * double(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 /// The least darkness of a pixel that may belong to a bead.
 double threshold_of(const cv::Mat1f& darkness, double least_contrast) {
   std::vector<float> values(darkness.begin(), darkness.end());
-  const float middle = quantile(values, 0.5), darkest = quantile(values, 0.9995);
-  for (float& value : values) value = std::abs(value - middle);
-  const double noise = 1.4826 * quantile(values, 0.5);
-  return middle + std::max(kNoiseFactor * noise, least_contrast * double(darkest - middle));
+  const double middle = quantile_in_place(values, 0.5), darkest = quantile_in_place(values, 0.9995);
+  for (float& value : values) value = std::abs(value - float(middle));
+  const double noise = 1.4826 * quantile_in_place(values, 0.5);
+  return middle + std::max(kNoiseFactor * noise, least_contrast * (darkest - middle));
 }
 
 /// Area, centre and second moments of the pixels of a component that are darker than half its peak.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/geometry/targets.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "marrow/domain/error.hpp"
@@ -55,13 +54,6 @@ double root_mean_square(const std::vector<double>& values) {
   double sum = 0;
   for (const double value : values) sum += value * value;
   return std::sqrt(sum / double(values.size()));
-}
-
-double quantile(std::vector<double> values, double fraction) {
-  std::sort(values.begin(), values.end());
-  const double at = fraction * double(values.size() - 1);
-  const std::size_t below = std::size_t(at), above = std::min(below + 1, values.size() - 1);
-  return values[below] + (at - double(below)) * (values[above] - values[below]);
 }
 
 }  // namespace marrow::geometry

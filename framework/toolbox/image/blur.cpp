@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "marrow/domain/quantile.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
 
 namespace marrow::image {
@@ -85,21 +86,19 @@ double blur_px(const cv::Mat& image, const EdgeMap& edges) {
   if (edges.pixels.empty() || image.empty()) return 0;
   std::vector<float> magnitudes;
   for (const EdgePixel& edge : edges.pixels) magnitudes.push_back(edge.magnitude);
-  const auto middle = magnitudes.begin() + std::ptrdiff_t(magnitudes.size() / 2);
-  std::nth_element(magnitudes.begin(), middle, magnitudes.end());
+  const double middle = quantile_in_place(magnitudes, 0.5);
   const GreyScale scale(image);
   const std::size_t step = std::max<std::size_t>(1, edges.pixels.size() / 2 / kMost);
   std::vector<double> blurs;
   std::size_t strong = 0;
   for (const EdgePixel& edge : edges.pixels) {
-    if (edge.magnitude < *middle || strong++ % step != 0) continue;
+    if (edge.magnitude < middle || strong++ % step != 0) continue;
     const std::vector<double> profile = profile_across(image, scale, edge);
     if (profile.empty()) continue;
     if (const auto blur = blur_of(profile)) blurs.push_back(*blur);
   }
   if (blurs.size() < kLeast) return 0;
-  std::nth_element(blurs.begin(), blurs.begin() + std::ptrdiff_t(blurs.size() / 2), blurs.end());
-  return blurs[blurs.size() / 2];
+  return quantile_in_place(blurs, 0.5);
 }
 
 }  // namespace marrow::image

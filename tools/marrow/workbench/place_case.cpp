@@ -6,6 +6,7 @@
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
+#include "marrow/domain/quantile.hpp"
 #include "marrow/runtime/types.hpp"
 #include "workbench/place.hpp"
 
@@ -76,9 +77,7 @@ double brightest_mm(const PlacedBone& bone, const List<View>& views) {
   std::vector<float> values = bone.radiograph->radiograph(camera, middle, grid);
   std::erase_if(values, [](float value) { return !(value > 0); });
   if (values.empty()) return 1;
-  const auto at = values.begin() + std::ptrdiff_t(values.size() - 1 - values.size() / 200);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
+  return quantile_in_place(values, 0.995);
 }
 
 }  // namespace

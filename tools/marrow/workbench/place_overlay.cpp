@@ -7,6 +7,7 @@
 
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
+#include "marrow/domain/quantile.hpp"
 #include "workbench/place.hpp"
 
 namespace marrow::workbench {
@@ -77,15 +78,11 @@ std::string outline_bytes(const OverlayWish& wish, json& about) {
 
 std::string grey_bytes(const View& view, int step_px) {
   const cv::Mat small = means_of_squares(view.image.pixels, step_px);
-  std::vector<float> sorted(small.begin<float>(), small.end<float>());
-  std::erase_if(sorted, [](float value) { return !std::isfinite(value); });
-  if (sorted.empty()) return std::string(small.total(), '\0');
-  const auto at = [&](double fraction) {
-    const auto place = sorted.begin() + std::ptrdiff_t(fraction * double(sorted.size() - 1));
-    std::nth_element(sorted.begin(), place, sorted.end());
-    return double(*place);
-  };
-  const double dark = at(0.005), bright = std::max(at(0.995), dark + 1e-9);
+  std::vector<float> values(small.begin<float>(), small.end<float>());
+  std::erase_if(values, [](float value) { return !std::isfinite(value); });
+  if (values.empty()) return std::string(small.total(), '\0');
+  const double dark = quantile_in_place(values, 0.005),
+               bright = std::max(quantile_in_place(values, 0.995), dark + 1e-9);
   cv::Mat bytes;
   small.convertTo(bytes, CV_8U, 255 / (bright - dark), -255 * dark / (bright - dark));
   return bytes_of(bytes);

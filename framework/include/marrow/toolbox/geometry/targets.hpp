@@ -24,10 +24,8 @@ std::vector<Eigen::Vector3d> targets_mm(const RigidTransform& pose, const Mesh* 
 std::vector<double> target_errors_mm(const RigidTransform& pose, const RigidTransform& truth,
                                      const std::vector<Eigen::Vector3d>& targets_mm);
 
-/// These three need at least one value.
+/// These two need at least one value.
 double mean(const std::vector<double>& values);
 double root_mean_square(const std::vector<double>& values);
-/// Quantile, with linear interpolation between the sorted values. `fraction` is between 0 and 1.
-double quantile(std::vector<double> values, double fraction);
 
 }  // namespace marrow::geometry

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "value_checks.hpp"
+
+#include <cmath>
+
+#include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
+
+namespace marrow::compare {
+
+void check_finite(const std::vector<double>& values, const std::string& what) {
+  if (values.empty()) throw Error("there are no " + what + "s; give at least one");
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (!std::isfinite(values[i]))
+      throw Error(what + " " + std::to_string(i + 1) + " of " + std::to_string(values.size()) + " is " +
+                  formatted("%f", values[i]) +
+                  ", which is no number to compare; count its run as failed, and give the rest");
+}
+
+void check_resamples(std::size_t resamples) {
+  if (resamples < 1000)
+    throw Error("got " + std::to_string(resamples) +
+                " resamples; the bounds need at least 1000 (10000 is the default)");
+}
+
+}  // namespace marrow::compare
