@@ -25,8 +25,8 @@ struct Frame {
   Pose pose;
 };
 
-/// The registered pose in the state's frame of axes. Its deviations are at least those of the options: a covariance
-/// that is too small would shut out all later frames.
+/// Of a pose in the state's frame of axes. Its deviations are at least those of the options: a covariance that is too
+/// small would shut out all later frames.
 Measurement measured_by(const Pose& pose, double scale, const Options& options) {
   Measurement measured{pose.world_from_model, scale * *pose.covariance};
   for (int i = 0; i < 6; ++i) {
@@ -36,20 +36,11 @@ Measurement measured_by(const Pose& pose, double scale, const Options& options) 
   return measured;
 }
 
-/// Whether there is a pose with deviations. No registration knows a pose exactly: deviations that are all 0 come from
-/// images that say nothing.
-bool is_measured(const Pose* pose) {
-  return pose && pose->covariance && pose->covariance->allFinite() && !pose->covariance->isZero(0);
-}
-
 /// Why the frame's pose is not taken. Empty if it is.
 std::string why_lost(const TrackState& state, const Pose* pose, const Verdict* verdict, double surprise,
                      const Options& options) {
   if (!pose) return "no pose was found";
-  if (!is_measured(pose))
-    return pose->covariance && pose->covariance->isZero(0)
-               ? "its predicted deviations are 0, so its registration compared nothing"
-               : "the images do not determine the pose";
+  if (std::string unknown = track::why_unknown(pose->covariance); !unknown.empty()) return unknown;
   if (verdict && verdict->judgement == Judgement::wrong)
     return "its verdict is wrong" + (verdict->reasons.empty() ? "" : ": " + verdict->reasons[0]);
   if (pose->cost > options.most_cost_ratio * state.usual_cost)
@@ -61,16 +52,22 @@ std::string why_lost(const TrackState& state, const Pose* pose, const Verdict* v
 
 Frame filter(const TrackState& predicted, const Pose* pose, const Verdict* verdict, const Options& options,
              Context& context) {
+  if (pose) check_pose(*pose, "the registered pose");
   Frame frame{predicted, {}};
   TrackState& state = frame.state;
   std::optional<Measurement> measured;
+  std::optional<Matrix6d> usual;
   const double scale = predicted.usual_covariance ? predicted.noise_scale : options.first_scale;
-  if (is_measured(pose)) measured = measured_by(*pose, scale, options);
+  if (pose && track::why_unknown(pose->covariance).empty()) {
+    const Pose in_axes = in_frame(*pose, predicted.fragment);
+    measured = measured_by(in_axes, scale, options);
+    usual = in_axes.covariance;
+  }
   const double surprise = measured ? track::surprise(predicted, *measured) : state.surprise;
   const std::string lost = why_lost(predicted, pose, verdict, surprise, options);
   if (lost.empty()) {
     state = track::updated(predicted, *measured);
-    state.usual_covariance = pose->covariance;
+    state.usual_covariance = usual;
     constexpr double kShare = 0.1, kShareOfCost = 0.3;  // of the newest frame in the scale and in the usual cost
     constexpr double kExpected = 6;
     // If the poses scatter more than their covariances say, the surprises are too large on average.

@@ -48,11 +48,16 @@ TEST(TrackFilter, FollowsABoneWithinItsDeviations) {
     surprises += state.surprise / kFrames;
     const Vector6d error = motion_between(truth, state.now.world_from_model, state.fragment);
     squares += error.dot(state.now.covariance.topLeftCorner<6, 6>().inverse() * error) / kFrames;
-    Vector6d acceleration;
-    for (int k = 0; k < 6; ++k) acceleration[k] = state.acceleration_per_s2[k] * random.normal();
+    // White acceleration: its mean over the frame moves the bone as if it were constant, the rest has the variance
+    // (a dt^2)^2 / 12 and leaves the velocity as it is.
     const double dt = 1 / state.frame_rate_hz;
-    truth = moved(truth, state.fragment, velocity * dt + 0.5 * dt * dt * acceleration);
-    velocity += dt * acceleration;
+    Vector6d mean, rest;
+    for (int k = 0; k < 6; ++k) {
+      mean[k] = state.acceleration_per_s2[k] * random.normal();
+      rest[k] = state.acceleration_per_s2[k] * random.normal() / std::sqrt(12);
+    }
+    truth = moved(truth, state.fragment, velocity * dt + dt * dt * (0.5 * mean + rest));
+    velocity += dt * mean;
   }
   // Chi-squared with 6 degrees of freedom; a little less, because the scale of the noise is never below 1.
   EXPECT_NEAR(surprises, 5.5, 1);
@@ -75,7 +80,7 @@ TEST(TrackFilter, SaysWhyABoneIsLost) {
   const Pose dear = pose_at(there, state, 0.5);
   EXPECT_EQ(note(&dear), "its cost is 0.5, where 0.2 is usual");
   const Pose far = pose_at(moved(there, state.fragment, six(0, 0, 60, 0, 0, 0)), state);
-  EXPECT_EQ(note(&far).substr(0, 54), "it is not where the motion leads: squared distance 168");
+  EXPECT_EQ(note(&far).substr(0, 54), "it is not where the motion leads: squared distance 165");
   marrow::Verdict wrong;
   wrong.judgement = marrow::Judgement::wrong;
   wrong.reasons = {"the shaft is too wide"};
@@ -119,6 +124,37 @@ TEST(TrackFilter, APoseThatIsKnownExactlyIsNone) {
   EXPECT_FALSE(after.is_found());
   EXPECT_EQ(after.note, "its predicted deviations are 0, so its registration compared nothing");
   EXPECT_FALSE(after.usual_covariance);
+}
+
+TEST(TrackFilter, APoseWithoutDeviationsThatCanBeWeighedIsNone) {
+  const TrackState state = marrow::track::predicted(sequences::begin());
+  const auto note = [&](const marrow::Matrix6d& covariance) {
+    Pose pose = pose_at(state.predicted.world_from_model, state);
+    pose.covariance = covariance;
+    const TrackState after = state_of(filtered(state, &pose));
+    EXPECT_FALSE(after.is_found());
+    EXPECT_FALSE(after.usual_covariance);
+    return after.note;
+  };
+  marrow::Matrix6d right = kNoise.cwiseAbs2().asDiagonal(), flat = right, open = right;
+  flat.row(5).setZero(), flat.col(5).setZero();
+  EXPECT_EQ(note(flat), "its predicted deviation is 0 in one direction, which no image tells exactly");
+  EXPECT_EQ(note(1e-14 * marrow::Matrix6d::Identity()),
+            "its predicted deviation is 0 in one direction, which no image tells exactly");
+  open(2, 2) = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(note(open), "the images do not determine the pose");
+}
+
+TEST(TrackFilter, ACovarianceInOtherAxesIsTurned) {
+  // The same knowledge about other axes: what is loose along x there is loose along y here.
+  const TrackState state = marrow::track::predicted(sequences::begin());
+  Pose pose = pose_at(state.predicted.world_from_model, state);
+  const Pose same =
+      marrow::in_frame(pose, {state.fragment.origin_mm + Eigen::Vector3d(40, -30, 20),
+                              state.fragment.axes * marrow::rotation_from_vector({0, 0, marrow::kPi / 2})});
+  const marrow::Matrix6d expected = state_of(filtered(state, &pose)).now.covariance.topLeftCorner<6, 6>(),
+                         found = state_of(filtered(state, &same)).now.covariance.topLeftCorner<6, 6>();
+  EXPECT_LT((found - expected).norm(), 1e-9 * expected.norm());
 }
 
 }  // namespace filter_test

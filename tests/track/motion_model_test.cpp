@@ -43,13 +43,15 @@ TEST(MotionModel, ErrorsGoOnAsTheMotionCarriesThem) {
   }
 }
 
-TEST(MotionModel, AnAccelerationShiftsHalfASquare) {
+TEST(MotionModel, AWhiteAccelerationAddsItsExactCovariance) {
+  // The integral of (s, 1) (s, 1)^T over the frame times a^2 dt: a^2 (dt^4 / 3, dt^3 / 2; dt^3 / 2, dt^2).
   TrackState state =
       sequences::begin({{"frame_rate_hz", 10.0}, {"acceleration_deg_s2", 90.0}, {"acceleration_mm_s2", 70.0}});
   state.now.covariance.setZero();
   const TrackState next = marrow::track::predicted(state);
-  EXPECT_NEAR(std::sqrt(next.now.covariance(2, 2)), marrow::radians(0.45), 1e-12);
-  EXPECT_NEAR(std::sqrt(next.now.covariance(5, 5)), 0.35, 1e-12);
+  EXPECT_NEAR(std::sqrt(next.now.covariance(2, 2)), marrow::radians(0.9 / std::sqrt(3)), 1e-12);
+  EXPECT_NEAR(std::sqrt(next.now.covariance(5, 5)), 0.7 / std::sqrt(3), 1e-12);
+  EXPECT_NEAR(next.now.covariance(5, 11), 70 * 70 * 0.001 / 2, 1e-12);
   EXPECT_NEAR(std::sqrt(next.now.covariance(8, 8)), marrow::radians(9), 1e-12);
   EXPECT_NEAR(std::sqrt(next.now.covariance(11, 11)), 7, 1e-12);
 }

@@ -94,13 +94,14 @@ TEST(Smooth, IsTheLeastSquaresSolution) {
       add(row, along(states[std::size_t(i)].measured->world_from_model), noise);
     }
     if (i + 1 == kFrames) break;
-    // One acceleration moves position and velocity together; a hair of noise of their own keeps the problem regular.
+    // A white acceleration changes the velocity, and the position by half as much times dt. What it adds to that has
+    // the variance (a dt^2)^2 / 12 and does not depend on the velocity: 1/4 and 1/12 make the 1/3 of white noise.
     row.setZero();
     row[2 * i + 3] = 1, row[2 * i + 1] = -1;
     add(row, 0, acceleration * dt);
     row.setZero();
     row[2 * i + 2] = 1, row[2 * i] = -1, row[2 * i + 1] = -0.5 * dt, row[2 * i + 3] = -0.5 * dt;
-    add(row, 0, 1e-6);
+    add(row, 0, acceleration * dt * dt / std::sqrt(12));
   }
   const Eigen::VectorXd best = normal.ldlt().solve(right);
   for (int i = 0; i < kFrames; ++i) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
 
 namespace marrow::track {
@@ -44,11 +45,20 @@ Matrix12d transition(const Vector6d& velocity_per_s, double dt_s) {
   return matrix;
 }
 
-/// The covariance that accelerations add during one frame.
+/// The covariance that white acceleration adds during one frame: the integral, over the moments of the frame, of what a
+/// change of velocity at that moment has become by the frame's end. Gauss and Legendre's sum over three moments is
+/// exact for a bone that does not turn: on each axis a^2 (dt^4 / 3, dt^3 / 2; dt^3 / 2, dt^2) for motion and velocity.
 Matrix12d process_noise(const Vector6d& acceleration_per_s2, const Vector6d& velocity_per_s, double dt_s) {
-  Eigen::Matrix<double, 12, 6> gain;
-  gain << 0.5 * dt_s * dt_s * of_addition(velocity_per_s * dt_s), dt_s * Matrix6d::Identity();
-  return gain * acceleration_per_s2.cwiseAbs2().asDiagonal() * gain.transpose();
+  constexpr double kOff = 0.3872983346207417;  // sqrt(3 / 20)
+  constexpr std::array<double, 3> kLeft{0.5 - kOff, 0.5, 0.5 + kOff}, kWeight{5 / 18.0, 8 / 18.0, 5 / 18.0};
+  Matrix12d sum = Matrix12d::Zero();
+  for (std::size_t i = 0; i < kLeft.size(); ++i) {
+    const double left_s = kLeft[i] * dt_s;
+    Eigen::Matrix<double, 12, 6> effect;
+    effect << left_s * of_addition(velocity_per_s * left_s), Matrix6d::Identity();
+    sum += kWeight[i] * dt_s * dt_s * effect * acceleration_per_s2.cwiseAbs2().asDiagonal() * effect.transpose();
+  }
+  return sum;
 }
 
 Matrix6d innovation_covariance(const TrackState& state, const Measurement& measured) {
@@ -134,6 +144,17 @@ Vector6d likeliest_acceleration(const std::vector<TrackState>& states) {
 }
 
 }  // namespace
+
+std::string why_unknown(const std::optional<Matrix6d>& covariance) {
+  constexpr double kLeast = 1e-6;  // degrees or mm: far below what any image tells
+  if (!covariance || !covariance->allFinite()) return "the images do not determine the pose";
+  if (covariance->isZero(0)) return "its predicted deviations are 0, so its registration compared nothing";
+  Vector6d unit = Vector6d::Ones();
+  unit.head<3>() *= degrees(1);
+  if (!(eigen_of_symmetric<6>(unit.asDiagonal() * *covariance * unit.asDiagonal()).values[0] > kLeast * kLeast))
+    return "its predicted deviation is 0 in one direction, which no image tells exactly";
+  return "";
+}
 
 TrackState predicted(const TrackState& state) {
   const double dt_s = 1 / state.frame_rate_hz;

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// An error-state Kalman filter on SE(3) for a bone of constant velocity with white acceleration, and its smoother.
+// An error-state Kalman filter on SE(3) for a bone of constant velocity with white acceleration, and its smoother. The
+// acceleration is white from moment to moment. If it were constant during each frame, it would explain any pose by
+// itself where it is large beside the noise of the poses, and the filter would nearly oscillate (docs/method.md).
 // Sola, Quaternion kinematics for the error-state Kalman filter, arXiv 1711.02508, 2017; Rauch, Tung, Striebel, AIAA
 // Journal 3(8), 1965. The error is a small motion as defined at Pose and a difference of velocities.
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "marrow/toolbox/track/track_state.hpp"
@@ -11,6 +15,11 @@ namespace marrow::track {
 
 /// The state one frame later, without a measurement: `now` and `predicted` are the prediction.
 TrackState predicted(const TrackState& state);
+
+/// Why a registered pose with this covariance says nothing about the bone, in words; empty if it can be weighed. It
+/// cannot if the covariance is absent, not finite, or 0 in a direction: no registration knows a pose exactly, so such a
+/// one compared nothing. A covariance is as check_covariance() wants it.
+std::string why_unknown(const std::optional<Matrix6d>& covariance);
 
 /// The pose in `now` with its covariance.
 Pose pose_of(const TrackState& state);

@@ -38,8 +38,9 @@ struct Measurement {
 struct TrackState {
   int frame = -1;  ///< its number from 0 on; -1: before the first
   double frame_rate_hz = 0;
-  /// Standard deviations of the accelerations [rad/s^2, mm/s^2] along the six axes. They are taken as constant during a
-  /// frame and independent from frame to frame.
+  /// Standard deviations of a frame's mean accelerations [rad/s^2, mm/s^2] along the six axes. The accelerations are
+  /// white: independent from moment to moment. So during a frame each velocity changes by the acceleration times the
+  /// frame's time.
   Vector6d acceleration_per_s2 = Vector6d::Ones();
   FragmentFrame fragment;
   Kinematics now;                       ///< with the frame's measurement, if there is one
