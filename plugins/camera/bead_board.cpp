@@ -5,7 +5,9 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/number_text.hpp"
+#include "marrow/domain/quantile.hpp"
 #include "marrow/toolbox/calibration/correspondence.hpp"
+#include "marrow/toolbox/calibration/determined.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
@@ -48,9 +50,8 @@ bool take_outliers(std::vector<ViewPoints>& views, const CalibrationResult& fit,
   std::vector<double> sizes;
   for (const auto& view : fit.views)
     for (const auto& residual : view.residuals_px) sizes.push_back(residual.norm());
-  std::nth_element(sizes.begin(), sizes.begin() + std::ptrdiff_t(sizes.size() / 2), sizes.end());
   // For a normal distribution in two directions, the median length is 1.177 standard deviations.
-  const double limit = deviations * std::max(sizes[sizes.size() / 2] / 1.17741, 1e-6);
+  const double limit = deviations * std::max(quantile_in_place(sizes, 0.5) / 1.17741, 1e-6);
   bool any = false;
   for (std::size_t n = 0; n < views.size(); ++n) {
     ViewPoints kept{views[n].name, {}, {}, {}};
@@ -175,6 +176,8 @@ BeadBoardResult bead_board(const List<Image>& images, const BeadBoardOptions& op
   BeadBoardResult result;
   result.calibration = fit.calibration;
   check_distortion(fit.calibration.intrinsics, fit.calibration.distortion, width, height, "the calibration");
+  if (const std::string text = calibration::doubtful_focal_length(fit.calibration, "the images"); !text.empty())
+    context.warn(text);
   result.report = report_of(fit, outliers);
   for (std::size_t n = 0; n < views.size(); ++n) {
     result.cameras.add(views[n].name, {width, height, fit.calibration.intrinsics, fit.views[n].camera_from_world});

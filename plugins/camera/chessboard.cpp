@@ -6,7 +6,9 @@
 #include <marrow/plugin.hpp>
 #include <opencv2/calib3d.hpp>
 
+#include "marrow/toolbox/calibration/calibrate.hpp"
 #include "marrow/toolbox/calibration/chessboard.hpp"
+#include "marrow/toolbox/calibration/determined.hpp"
 
 namespace {
 
@@ -34,7 +36,7 @@ std::string size_of(const cv::Mat& pixels) {
 
 /// What OpenCV's calibration finds. The last three terms of its distortion are not used or not always.
 struct Fit {
-  cv::Mat1d matrix = cv::Mat1d::eye(3, 3), distortion = cv::Mat1d::zeros(1, 5), deviation, residuals;
+  cv::Mat1d matrix = cv::Mat1d::eye(3, 3), distortion = cv::Mat1d::zeros(1, 5), residuals;
   std::vector<cv::Mat> rotations, translations;
   double residual_px = 0;
 };
@@ -55,31 +57,46 @@ Fit fitted(const std::vector<Seen>& seen, const cv::Size& size, const Options& o
   Fit fit;
   const double root_mean_square =
       cv::calibrateCamera(std::vector<std::vector<cv::Point3f>>(seen.size(), board), pixels, size, fit.matrix,
-                          fit.distortion, fit.rotations, fit.translations, fit.deviation, cv::noArray(), fit.residuals,
+                          fit.distortion, fit.rotations, fit.translations, cv::noArray(), cv::noArray(), fit.residuals,
                           flags, {cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 100, 1e-12});
   fit.residual_px = root_mean_square / std::sqrt(2.0);  // OpenCV's is the length, this is that of a coordinate
   return fit;
 }
 
-Calibration calibration_of(const Fit& fit, const cv::Size& size) {
+RigidTransform camera_from_board(const Fit& fit, std::size_t i) {
+  const cv::Mat1d turn = fit.rotations[i], shift = fit.translations[i];
+  return {"camera", "board", rotation_from_vector({turn(0), turn(1), turn(2)}), {shift(0), shift(1), shift(2)}};
+}
+
+/// OpenCV's own deviations leave out what it takes for singular: of boards that were never tilted it gave a focal
+/// length 3 times too long, known to half a pixel.
+void add_deviations(const std::vector<Seen>& seen, const Fit& fit, const Options& options, Calibration& device) {
+  std::vector<calibration::ViewPoints> views;
+  calibration::CalibrationResult result{device, {}};
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    views.push_back({seen[i].name, calibration::corners_mm(options), seen[i].pixels, {}});
+    result.views.emplace_back().camera_from_world = camera_from_board(fit, i);
+  }
+  calibration::add_deviations(views, {options.radial_terms, false, true}, result);
+  device.focal_deviation_px = result.calibration.focal_deviation_px;
+  device.principal_deviation_px = result.calibration.principal_deviation_px;
+  device.distortion_deviation = result.calibration.distortion_deviation;
+}
+
+Calibration calibration_of(const std::vector<Seen>& seen, const Fit& fit, const cv::Size& size,
+                           const Options& options) {
   Calibration result;
   result.width_px = size.width;
   result.height_px = size.height;
   result.intrinsics << fit.matrix(0, 0), 0, fit.matrix(0, 2), 0, fit.matrix(1, 1), fit.matrix(1, 2), 0, 0, 1;
   result.distortion.k = {fit.distortion(0, 0), fit.distortion(0, 1), fit.distortion(0, 4)};
-  const auto deviation = [&](int i) { return fit.deviation(i, 0); };  // fx, fy, cx, cy, k1, k2, p1, p2, k3
-  result.focal_deviation_px = {deviation(0), deviation(1)};
-  result.principal_deviation_px = {deviation(2), deviation(3)};
-  result.distortion_deviation = {deviation(4), deviation(5), deviation(8)};
   result.residual_px = fit.residual_px;
+  add_deviations(seen, fit, options, result);
   return result;
 }
 
 Camera camera_of(const Fit& fit, std::size_t i, const Calibration& device, const RigidTransform& world_from_board) {
-  const cv::Mat1d turn = fit.rotations[i], shift = fit.translations[i];
-  const RigidTransform camera_from_board{
-      "camera", "board", rotation_from_vector({turn(0), turn(1), turn(2)}), {shift(0), shift(1), shift(2)}};
-  return {device.width_px, device.height_px, device.intrinsics, camera_from_board * inverse(world_from_board)};
+  return {device.width_px, device.height_px, device.intrinsics, camera_from_board(fit, i) * inverse(world_from_board)};
 }
 
 Metrics report_of(const Fit& fit, const Calibration& c, std::size_t photographs) {
@@ -132,9 +149,11 @@ Result chessboard(const List<Picture>& boards, const List<Picture>* placed, cons
                   " at its known place, so the camera's place is not known");
   const Fit fit = fitted(seen, size, options);
   Result result;
-  result.calibration = calibration_of(fit, size);
+  result.calibration = calibration_of(seen, fit, size, options);
   check_distortion(result.calibration.intrinsics, result.calibration.distortion, size.width, size.height,
                    "the calibration");
+  if (const std::string text = calibration::doubtful_focal_length(result.calibration, "the photographs"); !text.empty())
+    context.warn(text);
   result.report = report_of(fit, result.calibration, seen.size());
   const RigidTransform world_from_board = calibration::world_from_board(options, options);
   for (std::size_t i = first_placed; i < seen.size(); ++i)

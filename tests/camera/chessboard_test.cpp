@@ -40,6 +40,24 @@ std::string refusal(const List<Picture>& photographs, const List<Picture>& place
       {{"boards", shipped::list(photographs, "photograph")}, {"placed", shipped::list(placed, "view")}}, options);
 }
 
+/// Photographs of the board held at different places, but always parallel to the image, by one camera.
+List<Picture> parallel() {
+  const Value arm = shipped::call("simulate.camera_arm", {}, {{"repeat_sd_deg", 0.0}}).at("arm");
+  return shipped::call("simulate.chessboard", {{"arm", arm}}, {{"tilt_deg", 0.0}}, Context(3))
+      .at("boards")
+      .as_list<Picture>();
+}
+
+TEST(Chessboard, BoardsThatAreNotTiltedDoNotTellTheFocalLength) {
+  // A board of twice the size at twice the distance looks the same.
+  const std::string text = shipped::refusal("camera.chessboard", {{"boards", shipped::list(parallel(), "photograph")}});
+  EXPECT_TRUE(text.starts_with("the photographs hardly tell the focal length: it is ")) << text;
+  EXPECT_TRUE(
+      text.ends_with(" px (one standard deviation); take the board tilted by 20 degrees or more, to another "
+                     "side in each"))
+      << text;
+}
+
 Picture plain(int width = 640) { return {cv::Mat(480, width, CV_8UC3, cv::Scalar(90, 100, 110))}; }
 
 TEST(Chessboard, CornersAreFoundInTheirOrder) {

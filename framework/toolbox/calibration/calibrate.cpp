@@ -8,6 +8,7 @@
 
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/quantile.hpp"
 
 namespace marrow::calibration {
 namespace {
@@ -124,9 +125,10 @@ std::vector<int> free_columns(const CalibrationModel& model) {
   return columns;
 }
 
-/// Adds the residuals, and one standard deviation of each parameter, from the derivatives at the minimum and the size
-/// of the residuals. The poses of different views are coupled only through the inner parameters, so each pose is
-/// eliminated by itself (Schur complement).
+}  // namespace
+
+// The poses of different views are coupled only through the inner parameters, so each pose is eliminated by itself
+// (Schur complement).
 void add_deviations(const std::vector<ViewPoints>& views, const CalibrationModel& model, CalibrationResult& result) {
   const std::vector<int> columns = free_columns(model);
   const Eigen::Index inner = Eigen::Index(columns.size());
@@ -172,6 +174,8 @@ void add_deviations(const std::vector<ViewPoints>& views, const CalibrationModel
   }
 }
 
+namespace {
+
 double starting_focal_px(const std::vector<ViewPoints>& views, const Eigen::Vector2d& middle_px) {
   std::vector<double> focals;
   for (const ViewPoints& view : views) {
@@ -187,8 +191,7 @@ double starting_focal_px(const std::vector<ViewPoints>& views, const Eigen::Vect
     throw Error(
         "the beads that are seen do not determine a camera: at least 8 of them, on both sides of the board, are needed "
         "in a view");
-  std::nth_element(focals.begin(), focals.begin() + std::ptrdiff_t(focals.size() / 2), focals.end());
-  return focals[focals.size() / 2];
+  return quantile_in_place(focals, 0.5);
 }
 
 int solver_flags(const CalibrationModel& model) {

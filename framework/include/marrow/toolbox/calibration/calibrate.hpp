@@ -49,6 +49,11 @@ struct ClosedForm {
 /// at the middle of the image. std::nullopt if there are fewer than 8 points or they do not determine a camera.
 std::optional<ClosedForm> closed_form_camera(const ViewPoints& view, const Eigen::Vector2d& middle_px);
 
+/// Adds the residuals, and one standard deviation of each parameter, to a calibration that is fitted to the views: from
+/// the derivatives at the minimum and the size of the residuals. What nothing determines has a deviation that is huge,
+/// or no number.
+void add_deviations(const std::vector<ViewPoints>& views, const CalibrationModel& model, CalibrationResult& result);
+
 /// Estimates the camera and the poses of all views. Throws Error if a view has fewer than 8 points, if the points do
 /// not determine the parameters, or if the image is mirrored.
 CalibrationResult calibrate(const std::vector<ViewPoints>& views, int width_px, int height_px,
