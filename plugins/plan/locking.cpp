@@ -8,6 +8,7 @@
 
 #include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
+#include "marrow/toolbox/geometry/length_quantile.hpp"
 #include "marrow/toolbox/geometry/locking_plan.hpp"
 
 namespace {
@@ -20,7 +21,8 @@ using geometry::Implant;
 using geometry::LockingPlan;
 
 struct LockingOptions {
-  Vector3d from{1, -0.5, 0};
+  std::string side = "unknown";
+  std::vector<double> from;
   double guide_mm = 100;
   double most_deg = 1;
   double most_mm = 0.5;
@@ -34,10 +36,6 @@ struct Result {
   Verdict verdict;
 };
 
-/// For a normal distribution in a plane that is the same in all directions, 95 % lie within this many root mean
-/// squares.
-const double kWithin95 = std::sqrt(-std::log(0.05));
-
 std::string shown(double value) { return formatted("%.2f", value); }
 
 /// [v] with [v] w = v x w.
@@ -50,7 +48,8 @@ Matrix3d cross(const Vector3d& v) {
 /// A small motion (r, t) of the pose in its frame turns the axis by r x axis and moves the centre by r x arm + t. Only
 /// what lies across the axis counts.
 void predict(const Pose& pose, const Hole& hole, LockingPlan::Drill& drill) {
-  drill.deviation_deg = drill.deviation_mm = std::nan("");
+  constexpr double kMost = 0.95;
+  drill.deviation_deg = drill.deviation_mm = drill.most_deg = drill.most_mm = std::nan("");
   if (!pose.covariance) return;
   const Vector3d axis = pose.frame.axes.transpose() * hole.axis,
                  arm = pose.frame.axes.transpose() * (hole.centre_mm - pose.frame.origin_mm);
@@ -58,8 +57,12 @@ void predict(const Pose& pose, const Hole& hole, LockingPlan::Drill& drill) {
   Eigen::Matrix<double, 3, 6> turn, shift;
   turn << -cross(axis), Matrix3d::Zero();
   shift << -across * cross(arm), across;
-  drill.deviation_deg = degrees(std::sqrt(std::max(0.0, (turn * *pose.covariance * turn.transpose()).trace())));
-  drill.deviation_mm = std::sqrt(std::max(0.0, (shift * *pose.covariance * shift.transpose()).trace()));
+  const Matrix3d of_turn = turn * *pose.covariance * turn.transpose(),
+                 of_shift = shift * *pose.covariance * shift.transpose();
+  drill.deviation_deg = degrees(std::sqrt(std::max(0.0, of_turn.trace())));
+  drill.deviation_mm = std::sqrt(std::max(0.0, of_shift.trace()));
+  drill.most_deg = degrees(geometry::length_quantile(of_turn, kMost));
+  drill.most_mm = geometry::length_quantile(of_shift, kMost);
 }
 
 /// The C-arm turned so that the ray through the hole's centre runs along its axis. With the viewing direction w, the
@@ -97,23 +100,41 @@ int views_that_show(const Vector3d& point, const List<View>& views) {
 void doubt(const LockingOptions& options, int seen, LockingPlan::Drill& drill) {
   if (std::isnan(drill.deviation_deg))
     drill.doubts.push_back("the pose of the nail has no predicted deviations, so nothing says how far the hole is off");
-  const double most_deg = kWithin95 * drill.deviation_deg, most_mm = kWithin95 * drill.deviation_mm;
-  if (!(most_deg <= options.most_deg) && !std::isnan(most_deg))
-    drill.doubts.push_back("the direction of the hole is known to " + shown(most_deg) +
+  if (!(drill.most_deg <= options.most_deg) && !std::isnan(drill.most_deg))
+    drill.doubts.push_back("the direction of the hole is known to " + shown(drill.most_deg) +
                            " degrees only (95 %), and the limit is " + shown(options.most_deg));
-  if (!(most_mm <= options.most_mm) && !std::isnan(most_mm))
-    drill.doubts.push_back("the place of the hole is known to " + shown(most_mm) +
+  if (!(drill.most_mm <= options.most_mm) && !std::isnan(drill.most_mm))
+    drill.doubts.push_back("the place of the hole is known to " + shown(drill.most_mm) +
                            " mm only (95 %), and the limit is " + shown(options.most_mm));
   if (seen < 2) drill.doubts.push_back(seen == 0 ? "no view shows the hole" : "only one view shows the hole");
 }
 
-LockingPlan::Drill drill_of(const Hole& hole, const Pose& pose, const LockingOptions& options) {
+/// The direction in the world from which the drill comes: from the outer side, a little from the front.
+Vector3d drills_come_from(const LockingOptions& options) {
+  if (options.from.empty()) {
+    if (options.side == "unknown")
+      throw Error(
+          "plan.locking: nothing says from which side the drill comes; give 'side' (left or right: of the leg), or "
+          "'from', such as [1, 0, 0] for the patient's left");
+    return {options.side == "left" ? 1.0 : -1.0, -0.5, 0};
+  }
+  if (options.from.size() != 3)
+    throw Error("plan.locking: from takes one direction, as [1, 0, 0], got " + std::to_string(options.from.size()) +
+                " numbers");
+  const Vector3d from = Vector3d::Map(options.from.data());
+  if (!(from.norm() > 0))
+    throw Error(
+        "plan.locking: from has the length 0; give the direction from which the drill comes, such as [1, 0, 0]");
+  return from;
+}
+
+LockingPlan::Drill drill_of(const Hole& hole, const Pose& pose, const Vector3d& from, const LockingOptions& options) {
   LockingPlan::Drill drill;
   drill.hole = hole.name;
   drill.diameter_mm = hole.diameter_mm;
   drill.centre_mm = pose.world_from_model * hole.centre_mm;
   drill.direction = pose.world_from_model.rotation * hole.axis;
-  if (drill.direction.dot(options.from) > 0) drill.direction = -drill.direction;
+  if (drill.direction.dot(from) > 0) drill.direction = -drill.direction;
   drill.guide_mm = drill.centre_mm - options.guide_mm * drill.direction;
   predict(pose, hole, drill);
   aim(options, drill);
@@ -149,8 +170,8 @@ Verdict judge(const LockingPlan& plan, const std::vector<std::string>& about_all
   }
   double most_deg = 0, most_mm = 0;
   for (const LockingPlan::Drill& drill : plan.drills) {
-    most_deg = std::max(most_deg, kWithin95 * drill.deviation_deg);
-    most_mm = std::max(most_mm, kWithin95 * drill.deviation_mm);
+    most_deg = std::max(most_deg, drill.most_deg);
+    most_mm = std::max(most_mm, drill.most_mm);
   }
   verdict.reasons = {"the axes of the holes are known to " + shown(most_deg) + " degrees and " + shown(most_mm) +
                      " mm (95 %)"};
@@ -160,10 +181,8 @@ Verdict judge(const LockingPlan& plan, const std::vector<std::string>& about_all
 Result locking(const Implant& implant, const Pose& pose, const List<View>& views, const Cost* cost,
                const LockingOptions& options) {
   geometry::check_implant(implant, "plan.locking");
-  check_rigid(pose.world_from_model, "plan.locking: the pose of the nail");
-  if (!(options.from.norm() > 0))
-    throw Error(
-        "plan.locking: from has the length 0; give the direction from which the drill comes, such as [1, 0, 0]");
+  check_pose(pose, "plan.locking: the pose of the nail");
+  const Vector3d from = drills_come_from(options);
   Result result;
   result.plan.isocentre_mm = options.isocentre_mm;
   result.plan.source_to_isocentre_mm = options.source_to_isocentre_mm;
@@ -171,7 +190,7 @@ Result locking(const Implant& implant, const Pose& pose, const List<View>& views
   const std::vector<std::string> about_all = doubts_about(pose, at_holes, options);
   int seen_at_all = 0;
   for (const Hole& hole : implant.holes) {
-    LockingPlan::Drill drill = drill_of(hole, pose, options);
+    LockingPlan::Drill drill = drill_of(hole, pose, from, options);
     const int seen = views_that_show(drill.centre_mm, views);
     seen_at_all += seen;
     drill.doubts = about_all;
@@ -202,8 +221,12 @@ MARROW_PLUGIN(plugin) {
       .out("verdict", &Result::verdict,
            "doubtful if the predicted deviations of a hole's axis are too large, if fewer than two views show a hole, "
            "if the registration warns, or if `cost` is too large")
+      .option("side", &LockingOptions::side, "side of the leg: the drill comes from its outer side",
+              one_of({"unknown", "left", "right"}))
       .option("from", &LockingOptions::from,
-              "direction in the world from which the drill comes, such as the outer side", unit(""))
+              "direction in the world from which the drill comes, [x, y, z]; empty: the outer side, a little from the "
+              "front",
+              unit(""))
       .option("guide_mm", &LockingOptions::guide_mm, "distance of the drill guide from the hole's centre", at_least(0))
       .option("most_deg", &LockingOptions::most_deg,
               "a hole is doubtful if its direction may be off by more than this (95 %)", at_least(0))

@@ -51,4 +51,15 @@ inline shipped::Inputs inputs(const marrow::geometry::Implant& implant, const ma
       {"implant", shipped::item(implant)}, {"pose", shipped::item(pose)}, {"views", shipped::list(views(), "view")}};
 }
 
+/// The options, of a left leg if they say nothing of where the drill comes from.
+inline shipped::Options of_left_leg(shipped::Options options) {
+  if (!options.count("from") && !options.count("side")) options["side"] = std::string("left");
+  return options;
+}
+
+inline shipped::Outputs locking(const marrow::geometry::Implant& implant, const marrow::Pose& pose,
+                                const shipped::Options& options = {}) {
+  return shipped::call("plan.locking", inputs(implant, pose), of_left_leg(options));
+}
+
 }  // namespace implants

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <marrow/domain/functions.hpp>
+#include <marrow/domain/random.hpp>
 #include <marrow/domain/verdict.hpp>
 
 #include "plan/implants.hpp"
@@ -15,7 +16,7 @@ using implants::inputs, implants::pose, implants::rod;
 using marrow::geometry::Implant, marrow::geometry::LockingPlan;
 
 LockingPlan::Drill drill_of(const marrow::Pose& at, const shipped::Options& options = {}) {
-  return shipped::call("plan.locking", inputs(rod(), at), options).at("plan").as<LockingPlan>().drills.at(0);
+  return implants::locking(rod(), at, options).at("plan").as<LockingPlan>().drills.at(0);
 }
 
 TEST(PlanLocking, AxisAndGuideFollowThePose) {
@@ -96,8 +97,58 @@ TEST(PlanLocking, DeviationsComeFromThePosesCovariance) {
   EXPECT_TRUE(predicted({0, 0, 0, 0.9, 0.3, 0.4}).isApprox(Vector2d(0, 0.5), 1e-9)) << "along the axis does not count";
 }
 
+TEST(PlanLocking, TheDrillComesFromTheOuterSideOfTheLeg) {
+  const marrow::Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
+  EXPECT_TRUE(drill_of(at, {{"side", "left"}}).guide_mm.isApprox(Vector3d(100, 0, 0), 1e-9)) << "the patient's left";
+  EXPECT_TRUE(drill_of(at, {{"side", "right"}}).guide_mm.isApprox(Vector3d(-100, 0, 0), 1e-9)) << "his right";
+  const auto from_front = drill_of(pose({0, 0, marrow::kPi / 2}, {0, 0, 50}, {0, 0, 0}), {{"side", "right"}});
+  EXPECT_TRUE(from_front.guide_mm.isApprox(Vector3d(0, -100, 0), 1e-9)) << "a hole from front to back";
+}
+
+/// The quantiles are those of scipy: the distribution of x^2 + y^2 by quadrature (scipy.integrate.quad over x of the
+/// density times 2 norm.cdf(sqrt(r^2 - x^2) / deviation of y) - 1), solved for 0.95 by brentq.
+TEST(PlanLocking, NinetyFivePerCentAreThatForAnyShapeOfTheCovariance) {
+  struct Case {
+    double ratio, quantile;  // of the two deviations; in deviations of the larger one
+  };
+  for (const Case& one : {Case{0, 1.959963985}, Case{0.2, 1.970407501}, Case{0.5, 2.035858720}, Case{1, 2.447746831}}) {
+    marrow::Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
+    const double turn = marrow::radians(0.4);
+    marrow::Vector6d deviations;
+    deviations << 0, turn * one.ratio, turn, 0, 0, 0;
+    at.covariance = marrow::Matrix6d(deviations.cwiseAbs2().asDiagonal());
+    EXPECT_NEAR(drill_of(at).most_deg, 0.4 * one.quantile, 1e-8) << one.ratio;
+    deviations << 0, 0, 0, 0, 0.3 * one.ratio, 0.3;
+    at.covariance = marrow::Matrix6d(deviations.cwiseAbs2().asDiagonal());
+    EXPECT_NEAR(drill_of(at).most_mm, 0.3 * one.quantile, 1e-8) << one.ratio;
+  }
+}
+
+/// 4000 draws of poses from a covariance whose largest part is a turn about the nail: 95 % of the holes' axes turn by
+/// no more than what is said. (Three deviations of the share are 1.0 %.)
+TEST(PlanLocking, NinetyFivePerCentOfDrawnPosesAreWithin) {
+  marrow::Pose at = pose({0.1, 0.2, 0.3}, {0, 0, 50}, {0, 0, 0});
+  marrow::Vector6d deviations;
+  deviations << marrow::radians(0.05), marrow::radians(0.08), marrow::radians(0.6), 0.1, 0.3, 0.2;
+  at.covariance = marrow::Matrix6d(deviations.cwiseAbs2().asDiagonal());
+  const auto drill = drill_of(at);
+  marrow::Random random(7);
+  constexpr int kDraws = 4000;
+  int within_deg = 0, within_mm = 0;
+  for (int i = 0; i < kDraws; ++i) {
+    marrow::Vector6d motion;
+    for (int k = 0; k < 6; ++k) motion[k] = deviations[k] * random.normal();
+    const marrow::RigidTransform true_pose = moved(at.world_from_model, at.frame, motion);
+    const Vector3d axis = true_pose.rotation * Vector3d::UnitX(), off = true_pose * Vector3d(0, 0, 50);
+    within_deg += marrow::degrees(std::asin(axis.cross(drill.direction).norm())) < drill.most_deg;
+    within_mm += (off - drill.centre_mm).cross(drill.direction).norm() < drill.most_mm;
+  }
+  EXPECT_NEAR(within_deg / double(kDraws), 0.95, 0.0104);
+  EXPECT_NEAR(within_mm / double(kDraws), 0.95, 0.0104);
+}
+
 marrow::Verdict verdict_of(const marrow::Pose& at, const shipped::Options& options = {}) {
-  return shipped::call("plan.locking", inputs(rod(), at), options).at("verdict").as<marrow::Verdict>();
+  return implants::locking(rod(), at, options).at("verdict").as<marrow::Verdict>();
 }
 
 /// A cost that is the same everywhere.
@@ -124,10 +175,11 @@ TEST(PlanLocking, DoubtsAreSaidInWords) {
     EXPECT_FALSE(verdict.remedies.empty());
     EXPECT_EQ(verdict.reasons.at(0), reason);
   };
-  at.covariance->diagonal() << 0, 0, std::pow(marrow::radians(0.7), 2), 0, 0, 0;
-  is_doubted("distal: the direction of the hole is known to 1.21 degrees only (95 %), and the limit is 1.00");
-  at.covariance->diagonal() << 0, 0, 0, 0, 0.3 * 0.3, 0;
-  is_doubted("distal: the place of the hole is known to 0.52 mm only (95 %), and the limit is 0.50");
+  // One direction of a turn or shift: 1.96 deviations.
+  at.covariance->diagonal() << 0, 0, std::pow(marrow::radians(0.57), 2), 0, 0, 0;
+  is_doubted("distal: the direction of the hole is known to 1.12 degrees only (95 %), and the limit is 1.00");
+  at.covariance->diagonal() << 0, 0, 0, 0, 0.27 * 0.27, 0;
+  is_doubted("distal: the place of the hole is known to 0.53 mm only (95 %), and the limit is 0.50");
   at.covariance.reset();
   is_doubted("distal: the pose of the nail has no predicted deviations, so nothing says how far the hole is off");
   at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
@@ -138,18 +190,21 @@ TEST(PlanLocking, DoubtsAreSaidInWords) {
   at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
   shipped::Inputs with_cost = inputs(rod(), at);
   with_cost["cost"] = marrow::Value::of<marrow::Cost>(std::make_shared<const Constant>(0.6));
-  const marrow::Verdict verdict = shipped::call("plan.locking", with_cost).at("verdict").as<marrow::Verdict>();
+  const marrow::Verdict verdict =
+      shipped::call("plan.locking", with_cost, {{"side", "left"}}).at("verdict").as<marrow::Verdict>();
   EXPECT_EQ(verdict.reasons.at(0),
             "the images do not show the holes where this pose has them: the cost there is 0.60, and the limit is 0.35");
-  EXPECT_EQ(
-      shipped::call("plan.locking", with_cost, {{"most_cost", 0.7}}).at("verdict").as<marrow::Verdict>().judgement,
-      marrow::Judgement::trusted);
+  EXPECT_EQ(shipped::call("plan.locking", with_cost, {{"side", "left"}, {"most_cost", 0.7}})
+                .at("verdict")
+                .as<marrow::Verdict>()
+                .judgement,
+            marrow::Judgement::trusted);
 }
 
 TEST(PlanLocking, RefusesWhatCannotBePlanned) {
   const marrow::Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
   const auto refusal = [](const Implant& implant, const marrow::Pose& pose, const shipped::Options& options = {}) {
-    return shipped::refusal("plan.locking", inputs(implant, pose), options);
+    return shipped::refusal("plan.locking", inputs(implant, pose), implants::of_left_leg(options));
   };
   Implant without = rod();
   without.holes.clear();
@@ -185,6 +240,11 @@ TEST(PlanLocking, RefusesWhatCannotBePlanned) {
             "check the pose");
   EXPECT_EQ(refusal(rod(), at, {{"from", std::vector<double>{0, 0, 0}}}),
             "plan.locking: from has the length 0; give the direction from which the drill comes, such as [1, 0, 0]");
+  EXPECT_EQ(refusal(rod(), at, {{"from", std::vector<double>{1, 0}}}),
+            "plan.locking: from takes one direction, as [1, 0, 0], got 2 numbers");
+  EXPECT_EQ(shipped::refusal("plan.locking", inputs(rod(), at)),
+            "plan.locking: nothing says from which side the drill comes; give 'side' (left or right: of the leg), or "
+            "'from', such as [1, 0, 0] for the patient's left");
   EXPECT_EQ(refusal(rod(), at, {{"isocentre_mm", std::vector<double>{0, 0, 700}}}),
             "plan.locking: hole 'distal' lies 700.00 mm from the isocentre, but the C-arm's source is only 600.00 mm "
             "from it; check isocentre_mm and the pose");
@@ -192,7 +252,7 @@ TEST(PlanLocking, RefusesWhatCannotBePlanned) {
 
 TEST(PlanBodies, BonesNailAndARodForEachHole) {
   const marrow::Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
-  const auto plan = shipped::call("plan.locking", inputs(rod(), at)).at("plan");
+  const auto plan = implants::locking(rod(), at).at("plan");
   marrow::List<marrow::Mesh> bones;
   bones.add("femur", rod().surface);
   bones.add("without a pose", rod().surface);

@@ -20,12 +20,14 @@ struct LockingPlan {
     /// Predicted root mean squares: the angle between planned and true axis, and the distance between the two at the
     /// hole's centre. NaN if the pose has no covariance.
     double deviation_deg = 0, deviation_mm = 0;
+    /// What 95 % of these angles and distances do not exceed.
+    double most_deg = 0, most_mm = 0;
     /// The C-arm's angles at which the ray through the hole's centre runs along its axis. So it is seen as a circle.
     double alpha_deg = 0, beta_deg = 0;
     std::vector<std::string> doubts;  ///< in words; empty if the axis can be relied on
-    using fields =
-        Fields<&Drill::hole, &Drill::centre_mm, &Drill::direction, &Drill::diameter_mm, &Drill::guide_mm,
-               &Drill::deviation_deg, &Drill::deviation_mm, &Drill::alpha_deg, &Drill::beta_deg, &Drill::doubts>;
+    using fields = Fields<&Drill::hole, &Drill::centre_mm, &Drill::direction, &Drill::diameter_mm, &Drill::guide_mm,
+                          &Drill::deviation_deg, &Drill::deviation_mm, &Drill::most_deg, &Drill::most_mm,
+                          &Drill::alpha_deg, &Drill::beta_deg, &Drill::doubts>;
   };
   std::vector<Drill> drills;
   /// The C-arm for which the angles hold.
@@ -36,4 +38,4 @@ struct LockingPlan {
 
 }  // namespace marrow::geometry
 
-MARROW_VALUE_TYPE(marrow::geometry::LockingPlan, "locking_plan", 1)
+MARROW_VALUE_TYPE(marrow::geometry::LockingPlan, "locking_plan", 2)
