@@ -6,18 +6,16 @@
 
 namespace {
 
-using marrow::geometry::displacement;
 using marrow::geometry::FragmentPair;
-using marrow::geometry::pose_of;
 
 struct Reduction {
   marrow::Pose pose;
   marrow::Metrics motion;
 };
 
-Reduction reduction(const marrow::List<marrow::Pose>& poses, const FragmentPair& options) {
-  const marrow::Vector6d motion = displacement(poses, options);
-  const marrow::Pose &moved = pose_of(poses, options.moved), &reference = pose_of(poses, options.reference);
+Reduction reduction(const marrow::List<marrow::Pose>& poses, const marrow::List<marrow::Mesh>* models,
+                    const FragmentPair& options) {
+  const auto [moved, reference] = marrow::geometry::poses_of_pair(poses, options, models);
   Reduction result;
   result.pose = moved;
   result.pose.world_from_model = reference.world_from_model;
@@ -29,11 +27,10 @@ Reduction reduction(const marrow::List<marrow::Pose>& poses, const FragmentPair&
   const Eigen::Vector3d turn_deg = marrow::degrees(turn.angle()) * turn.axis();
   const Eigen::Vector3d shift_mm =
       reference.world_from_model * moved.frame.origin_mm - moved.world_from_model * moved.frame.origin_mm;
-  result.motion.items = {
-      {"turn_x_deg", turn_deg.x(), "deg"}, {"turn_y_deg", turn_deg.y(), "deg"},
-      {"turn_z_deg", turn_deg.z(), "deg"}, {"turn_deg", marrow::degrees(motion.head<3>().norm()), "deg"},
-      {"shift_x_mm", shift_mm.x(), "mm"},  {"shift_y_mm", shift_mm.y(), "mm"},
-      {"shift_z_mm", shift_mm.z(), "mm"},  {"shift_mm", shift_mm.norm(), "mm"}};
+  result.motion.items = {{"turn_x_deg", turn_deg.x(), "deg"}, {"turn_y_deg", turn_deg.y(), "deg"},
+                         {"turn_z_deg", turn_deg.z(), "deg"}, {"turn_deg", turn_deg.norm(), "deg"},
+                         {"shift_x_mm", shift_mm.x(), "mm"},  {"shift_y_mm", shift_mm.y(), "mm"},
+                         {"shift_z_mm", shift_mm.z(), "mm"},  {"shift_mm", shift_mm.norm(), "mm"}};
   return result;
 }
 
@@ -43,6 +40,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("fracture.reduction", reduction)
       .summary("The pose of a fragment that restores the bone as the CT shows it, and the motion to this pose")
       .in("poses", "poses of both fragments", marrow::over("fragment"))
+      .in("models", "surfaces of both fragments; they give the centroid if a pose does not", marrow::over("fragment"))
       .out("pose", &Reduction::pose, "pose of the moved fragment in the restored bone")
       .out("motion", &Reduction::motion,
            "in world coordinates: the rotation vector about the fragment's centroid, and the shift of the centroid, "

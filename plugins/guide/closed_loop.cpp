@@ -126,13 +126,13 @@ void learn(GuideState& state, const RigidTransform& seen, const Eigen::Vector3d&
 }
 
 /// The poses of the next pair: as wide as the motion and what is known of the robot's place say.
-List<Pose> predicted(const List<Pose>& poses, const RigidTransform& motion, const Vector6d& step,
-                     const Matrix6d& hand_eye, const Options& options) {
+List<Pose> predicted(const List<Pose>& poses, const List<Mesh>& models, const RigidTransform& motion,
+                     const Vector6d& step, const Matrix6d& hand_eye, const Options& options) {
   constexpr double kLeast_deg = 0.5, kLeast_mm = 1;
   List<Pose> result;
   const Pose& reference = geometry::pose_of(poses, options.reference);
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    Pose pose = poses[i];
+    Pose pose = geometry::with_own_axes(poses[i], poses.name(i), &models);
     double turn = radians(kLeast_deg), shift = kLeast_mm;
     if (poses.name(i) == options.moved) {
       RigidTransform in_ct = motion;
@@ -199,7 +199,7 @@ Command command_for(const GuideState& state, const RobotReport& report, const Le
 Result closed_loop(const List<Pose>& poses, const GuideState& before, const RobotReport& report,
                    const List<SignedField>& fields, const List<Mesh>& models, const List<Verdict>* verdicts,
                    const List<View>* views, const Options& options, Context& context) {
-  const Pose &moved = geometry::pose_of(poses, options.moved), &reference = geometry::pose_of(poses, options.reference);
+  const auto [moved, reference] = geometry::poses_of_pair(poses, options, &models);
   const auto part_of = [](const auto& list, const std::string& name, const std::string& what) -> const auto& {
     if (const auto* item = list.find(name)) return *item;
     throw Error("there is no " + what + " of the fragment '" + name + "'; give those of both fragments");
@@ -235,7 +235,7 @@ Result closed_loop(const List<Pose>& poses, const GuideState& before, const Robo
     result.stop.reason = leg.stage + ": " + result.stop.reason;
   }
   result.motion.world_from_model = command.told;
-  result.predicted = predicted(poses, command.expected, command.step, command.hand_eye, options);
+  result.predicted = predicted(poses, models, command.expected, command.step, command.hand_eye, options);
   context.info("pair " + std::to_string(state.pairs) + ": " + result.stop.reason);
   result.figures.items = {
       {"pairs", double(state.pairs), ""},
@@ -263,7 +263,7 @@ MARROW_PLUGIN(plugin) {
       .in("state", "what is known from the pairs before")
       .in("report", "what the robot says of its last motion")
       .in("fields", "both fragments in the CT, to keep them apart", over("fragment"))
-      .in("models", "surfaces of both fragments", over("fragment"))
+      .in("models", "surfaces of both fragments; they give the axes of poses that have none", over("fragment"))
       .in("verdicts", "verdicts on the poses; a wrong one ends the loop", over("fragment"))
       .in("views", "the newest images, to count them; none: two in each pair", over("view"))
       .out("state", &Result::state, "what is known after this pair")

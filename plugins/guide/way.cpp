@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/geometry/start_axes.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 
 namespace {
@@ -9,10 +10,11 @@ using namespace marrow;
 using track::TrackState;
 using track::Trajectory;
 
-Trajectory way(const List<Pose>& poses) {
+Trajectory way(const List<Pose>& poses, const Mesh* model, const Context& context) {
   Trajectory result;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Pose& pose = poses[i];
+    check_pose(poses[i], "the pose of " + poses.name(i));
+    const Pose pose = geometry::with_fragment_axes(poses[i], model, context);
     TrackState state;
     state.frame = int(i);
     state.frame_rate_hz = 1;
@@ -37,5 +39,6 @@ MARROW_PLUGIN(plugin) {
   plugin.node("guide.way", way)
       .summary("The way of a fragment from pair to pair of images, for the report; one second stands for one pair")
       .in("poses", "pose of the fragment in each pair", over("pass"))
+      .in("model", "surface of the fragment: it gives the axes of poses that have none")
       .out("trajectory", "the poses with their deviations");
 }

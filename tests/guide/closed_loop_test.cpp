@@ -113,6 +113,24 @@ std::vector<shipped::Outputs> loop(const std::string& hand_eye, const Eigen::Vec
   return pairs;
 }
 
+TEST(ClosedLoop, PosesWithoutAxesOfTheirOwnAreTakenAboutTheirSurfaces) {
+  // A covariance about the CT's origin, as a file gives it, is the same one about the fragment's middle.
+  const List<Pose> own = poses(displaced({6, -5, 9}, {8, -6, -10}));
+  List<Pose> from_files;
+  for (std::size_t i = 0; i < own.size(); ++i) from_files.add(own.name(i), in_frame(own[i], FragmentFrame()));
+  const auto expected = shipped::call("guide.closed_loop", inputs(own)),
+             found = shipped::call("guide.closed_loop", inputs(from_files));
+  const RigidTransform &one = expected.at("motion").as<Pose>().world_from_model,
+                       &other = found.at("motion").as<Pose>().world_from_model;
+  EXPECT_LT((one.rotation - other.rotation).norm(), 1e-9);
+  EXPECT_LT((one.translation_mm - other.translation_mm).norm(), 1e-6);
+  EXPECT_NEAR(shipped::figure(expected.at("figures"), "shift_mm"), shipped::figure(found.at("figures"), "shift_mm"),
+              1e-9);
+  const auto poses_one = expected.at("predicted").as_list<Pose>(), poses_other = found.at("predicted").as_list<Pose>();
+  for (std::size_t i = 0; i < poses_one.size(); ++i)
+    EXPECT_EQ(poses_one[i].frame.origin_mm, poses_other[i].frame.origin_mm) << poses_one.name(i);
+}
+
 TEST(ClosedLoop, ReducesTheFractureWhereverTheRobotStands) {
   for (const Eigen::Vector3d& stand :
        {Eigen::Vector3d(0, 5, 0), Eigen::Vector3d(60, -50, 40), Eigen::Vector3d(-100, 90, 60)}) {

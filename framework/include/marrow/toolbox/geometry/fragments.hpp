@@ -6,6 +6,7 @@
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/list.hpp"
 #include "marrow/domain/pose.hpp"
+#include "marrow/toolbox/geometry/targets.hpp"
 
 namespace marrow::geometry {
 
@@ -15,12 +16,12 @@ struct FragmentPair {
   std::string reference = "proximal";
 };
 
-/// The pose of this name. Throws Error if there is none, or if a pose before it is not rigid or is between other frames
-/// than the first one.
+/// The pose of this name. Throws Error if there is none, as check_pose() does for it and for those before it, and if
+/// one of these is between other frames than the first one.
 inline const Pose& pose_of(const List<Pose>& poses, const std::string& name) {
   std::string known;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    check_rigid(poses[i].world_from_model, "the pose of '" + poses.name(i) + "'");
+    check_pose(poses[i], "the pose of '" + poses.name(i) + "'");
     if (poses[i].world_from_model.source != poses[0].world_from_model.source ||
         poses[i].world_from_model.target != poses[0].world_from_model.target)
       throw Error("the poses of '" + poses.name(0) + "' and '" + poses.name(i) +
@@ -32,14 +33,29 @@ inline const Pose& pose_of(const List<Pose>& poses, const std::string& name) {
               "; name both fragments with moved and reference, and register both");
 }
 
-/// The small motion (r [rad], t [mm], see motion_between()) of the moved fragment about its own axes, relative to the
-/// reference fragment: zero if both lie beside each other as in the CT. Throws Error as pose_of() does, or if both
-/// names are the same.
-inline Vector6d displacement(const List<Pose>& poses, const FragmentPair& pair) {
+/// The pose with the axes of its fragment: its own, or those of the fragment's surface in `models`, which may be null.
+/// A covariance is turned into these axes. Throws Error if there are neither, and as check_model() does.
+inline Pose with_own_axes(const Pose& pose, const std::string& name, const List<Mesh>* models) {
+  const Mesh* model = models ? models->find(name) : nullptr;
+  if (model) check_model(pose.world_from_model, *model);
+  if (pose.frame.is_anatomical) return pose;
+  if (!model)
+    throw Error("the pose of '" + name +
+                "' does not say where the fragment's middle is and how its long axis runs, as a matrix alone does "
+                "not; wire the surfaces of both fragments to 'models', or give the node that reads the pose its model");
+  return in_frame(pose, fragment_frame(*model));
+}
+
+/// The poses of both fragments, with their own axes.
+struct PosesOfPair {
+  Pose moved, reference;
+};
+/// Throws Error as pose_of() and with_own_axes() do, and if both names are the same.
+inline PosesOfPair poses_of_pair(const List<Pose>& poses, const FragmentPair& pair, const List<Mesh>* models) {
   if (pair.moved == pair.reference)
     throw Error("moved and reference both name '" + pair.moved + "'; they must be two fragments");
-  const Pose &moved = pose_of(poses, pair.moved), &reference = pose_of(poses, pair.reference);
-  return motion_between(reference.world_from_model, moved.world_from_model, moved.frame);
+  return {with_own_axes(pose_of(poses, pair.moved), pair.moved, models),
+          with_own_axes(pose_of(poses, pair.reference), pair.reference, models)};
 }
 
 }  // namespace marrow::geometry
