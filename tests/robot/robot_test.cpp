@@ -92,6 +92,16 @@ TEST(Robot, DoesWhatItIsToldInItsOwnAxes) {
   EXPECT_EQ(phantom::fragment_named(now, "distal", "test").world_from_ct.translation_mm, to.translation_mm);
 }
 
+TEST(Robot, GoesOnFromWhereItIsWhateverThePhantomShows) {
+  const Phantom phantom = broken({0, 0, 0}, {5, 0, -8});
+  const shipped::Outputs once = move(phantom, gripped(phantom), shift(3, -2, -4));
+  const RigidTransform there = once.at("state").as<RobotState>().world_from_ct;
+  // No motion, with the phantom from before the first one.
+  const shipped::Outputs again = move(phantom, once, shift(0, 0, 0));
+  EXPECT_EQ(again.at("state").as<RobotState>().world_from_ct.translation_mm, there.translation_mm);
+  EXPECT_EQ(again.at("report").as<RobotReport>().load.force_n, once.at("report").as<RobotReport>().load.force_n);
+}
+
 TEST(Robot, YieldsAndErrs) {
   const Phantom phantom = broken({0, 0, 0}, {5, 0, -4});
   const shipped::Outputs exact = gripped(phantom), real = gripped(phantom, {});
