@@ -109,7 +109,7 @@ Distances measure(const marrow::RigidTransform& world_from_model, const marrow::
       distances.across_px.push_back(off.dot(normal));
     }
     const Eigen::Vector3d world_mm = world_from_model * point.model_mm.cast<double>();
-    distances.px.push_back(edge ? off.norm() : options.reach_px);
+    distances.px.push_back(edge ? std::hypot(off.x(), off.y()) : options.reach_px);
     distances.mm.push_back(marrow::offset_at_mm(view.camera, world_mm, off).norm());
   }
   return distances;

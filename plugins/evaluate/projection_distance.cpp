@@ -46,9 +46,10 @@ Distances distances_of(const View& view, const RigidTransform& pose, const Rigid
                        ? " at the pose found"
                        : " at the true pose; is the truth of another world frame?"));
     distances.px.push_back(apart.norm());
-    distances.mm.push_back(apart.norm() * pixel_size_at_mm(view.camera, truth * target));
-    const Eigen::Vector2d focal_px(view.camera.intrinsics(0, 0), view.camera.intrinsics(1, 1));
-    if (detector_mm > 0) distances.detector_mm.push_back(detector_mm * apart.cwiseQuotient(focal_px).norm());
+    const double mm = offset_at_mm(view.camera, truth * target, apart).norm();
+    distances.mm.push_back(mm);
+    const double depth_mm = (view.camera.camera_from_world * (truth * target)).z();
+    if (detector_mm > 0) distances.detector_mm.push_back(mm * detector_mm / depth_mm);
   }
   return distances;
 }

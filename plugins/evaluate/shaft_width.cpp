@@ -162,8 +162,8 @@ MARROW_PLUGIN(plugin) {
       .in("lines", "borders of the shaft in each view", marrow::over("view"))
       .in("views", "X-ray views; only their cameras are used", marrow::over("view"))
       .out("metrics",
-           "for each view, the diameter in the middle of its borders, and the magnification there relative to the "
-           "isocentre; gives a warning if no shaft has this diameter")
+           "for each view, the diameter in the middle of its borders, and the magnification there relative to "
+           "the depth at which the borders' own width was taken; gives a warning if no shaft has this diameter")
       .option("width_mm", &Options::width_mm,
               "mean outer diameters of the shaft, one for each direction from which the bone may be seen; empty: those "
               "of a femur, 15 to 55 mm")

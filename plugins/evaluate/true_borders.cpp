@@ -16,6 +16,12 @@ namespace {
 using Points = std::vector<Eigen::Vector2d>;
 using Edges = std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>>;
 
+/// The edges of an outline in the image, and the middle of all their ends, relative to the source.
+struct Outline {
+  Edges edges;
+  Eigen::Vector3d middle_mm = Eigen::Vector3d::Zero();
+};
+
 /// Coordinates in px along a pair of borders: x runs along the line midway between them, from its start; y runs to the
 /// right.
 struct Stretch {
@@ -39,8 +45,8 @@ struct Stretch {
 
 /// The projected edges where the surface turns away from the source or ends, in the coordinates of the stretch.
 /// Triangles beyond the stretch, or not completely in front of the source, are ignored.
-Edges outline_edges(const marrow::Mesh& model, const marrow::RigidTransform& camera_from_model,
-                    const Eigen::Matrix3d& intrinsics, const Stretch& stretch) {
+Outline outline_of(const marrow::Mesh& model, const marrow::RigidTransform& camera_from_model,
+                   const Eigen::Matrix3d& intrinsics, const Stretch& stretch) {
   std::vector<Eigen::Vector3d> seen(model.vertices_mm.size());  // relative to the source
   Points flat(seen.size());
   for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -61,12 +67,15 @@ Edges outline_edges(const marrow::Mesh& model, const marrow::RigidTransform& cam
       ++(faces ? edge.facing : edge.turned_away);
     }
   }
-  Edges edges;
+  Outline outline;
   for (const auto& [edge, side] : sides) {
-    const bool inner = side.facing + side.turned_away == 2 && side.facing != 1;
-    if (!inner) edges.emplace_back(flat[edge >> 32], flat[edge & 0xffffffff]);
+    if (side.facing + side.turned_away == 2 && side.facing != 1) continue;
+    const std::size_t from = edge >> 32, to = edge & 0xffffffff;
+    outline.edges.emplace_back(flat[from], flat[to]);
+    outline.middle_mm += 0.5 * (seen[from] + seen[to]);
   }
-  return edges;
+  if (!outline.edges.empty()) outline.middle_mm /= double(outline.edges.size());
+  return outline;
 }
 
 /// The outermost points on the left and on the right, at 0, 1, 2, ... px along the stretch, wherever there is an edge.
@@ -122,18 +131,21 @@ Line line_of(Points points, double tolerance_px) {
 
 std::optional<Borders> borders_beside(const marrow::ShaftLines& pair, const marrow::Mesh& model,
                                       const marrow::RigidTransform& world_from_model, const marrow::Camera& camera,
-                                      double tolerance_px) {
+                                      double tolerance_mm) {
   const Stretch stretch(pair);
   if (!(stretch.length_px >= 1)) return std::nullopt;
-  const Edges edges = outline_edges(model, camera.camera_from_world * world_from_model, camera.intrinsics, stretch);
-  const auto [on_left, on_right] = outermost(edges, stretch);
+  const Outline outline = outline_of(model, camera.camera_from_world * world_from_model, camera.intrinsics, stretch);
+  const auto [on_left, on_right] = outermost(outline.edges, stretch);
   if (on_left.size() < 10 || 3 * double(on_left.size()) < stretch.length_px) return std::nullopt;
+  const Eigen::Vector3d middle_mm = inverse(camera.camera_from_world) * outline.middle_mm;
+  const double tolerance_px = tolerance_mm / pixel_size_at_mm(camera, middle_mm);
   const Line left = line_of(on_left, tolerance_px), right = line_of(on_right, tolerance_px);
   const auto segment = [&](const Line& line) {
     return marrow::LineSegment{stretch.to_pixel({0, line.at(0)}),
                                stretch.to_pixel({stretch.length_px, line.at(stretch.length_px)})};
   };
-  return Borders{segment(left), segment(right), right.at(stretch.length_px / 2) - left.at(stretch.length_px / 2)};
+  return Borders{segment(left), segment(right), right.at(stretch.length_px / 2) - left.at(stretch.length_px / 2),
+                 middle_mm};
 }
 
 }  // namespace true_borders

@@ -30,7 +30,7 @@ struct Options {
 };
 
 constexpr double kWidthTolerance = 0.15;  // a pair is not the model's if the widths differ by a larger fraction
-constexpr double kLeastLength_mm = 25;    // at the isocentre
+constexpr double kLeastLength_mm = 25;    // at the bone
 
 std::string number(double value) { return marrow::formatted("%.1f", value); }
 
@@ -42,29 +42,50 @@ struct Sight {
   Plane plane;
 };
 
+Eigen::Vector2d along_pair(const ShaftLines& lines) {
+  return (lines.left.to_px - lines.left.from_px + lines.right.to_px - lines.right.from_px).normalized();
+}
+
+/// The length in mm of a pixel across a pair of borders: the pixel's area over its length along them.
+double across_mm(const Sight& sight, const Eigen::Vector3d& bone_mm) {
+  const double pixel_mm = marrow::pixel_size_at_mm(*sight.camera, bone_mm);
+  return pixel_mm * pixel_mm / marrow::offset_at_mm(*sight.camera, bone_mm, along_pair(sight.lines)).norm();
+}
+
 /// Distance of a pair's borders in their middle, measured across them, with the inset added on both sides.
 double width_px(const ShaftLines& lines, double inset_px) {
-  const Eigen::Vector2d along =
-      (lines.left.to_px - lines.left.from_px + lines.right.to_px - lines.right.from_px).normalized();
+  const Eigen::Vector2d along = along_pair(lines);
   const Eigen::Vector2d between =
       0.5 * (lines.right.from_px + lines.right.to_px - lines.left.from_px - lines.left.to_px);
   return std::abs(along.x() * between.y() - along.y() * between.x()) + 2 * inset_px;
 }
 
+/// The middle of the model in the world.
+Eigen::Vector3d middle_of(const Pose& pose) { return pose.world_from_model * pose.frame.origin_mm; }
+
+/// Size of a pixel at the bone. Throws Error unless it lies in front of the source.
+double pixel_at_bone_mm(const Eigen::Vector3d& bone_mm, const Camera& camera, const std::string& view) {
+  const double pixel_mm = marrow::pixel_size_at_mm(camera, bone_mm);
+  if (!(pixel_mm > 0))
+    throw marrow::Error("view '" + view +
+                        "': the model does not lie in front of the X-ray source; give a start nearer to the bone");
+  return pixel_mm;
+}
+
 /// The best pair of a view at the position of the model. This is the pair that the shaft node chose, if the model
 /// appears there. Otherwise it is the first rejected pair that is as wide as the model and long enough to give a
 /// direction.
-ShaftLines lines_of_model(const Mesh& model, const RigidTransform& start, const Camera& camera, const ShaftLines& found,
+ShaftLines lines_of_model(const Mesh& model, const Pose& start, const Camera& camera, const ShaftLines& found,
                           const std::string& view, const Options& options) {
-  const double pixel_mm = std::abs(marrow::pixel_size_at_mm(camera, Eigen::Vector3d::Zero()));
+  const double pixel_mm = pixel_at_bone_mm(middle_of(start), camera, view);
   const double tolerance_px = options.tolerance_mm / pixel_mm;
-  if (model_borders(model, start, camera, found, tolerance_px)) return found;
+  if (model_borders(model, start.world_from_model, camera, found, tolerance_px)) return found;
   for (const ShaftLines::Rejected& other : found.rejected) {
     ShaftLines lines;
     lines.left = other.left;
     lines.right = other.right;
     if ((lines.left.to_px - lines.left.from_px).norm() * pixel_mm < kLeastLength_mm) continue;
-    const auto borders = model_borders(model, start, camera, lines, tolerance_px);
+    const auto borders = model_borders(model, start.world_from_model, camera, lines, tolerance_px);
     if (!borders) continue;
     const double width = width_px(lines, options.border_inset_mm / pixel_mm);
     if (std::abs(width - borders->width_px) < kWidthTolerance * borders->width_px) return lines;
@@ -74,7 +95,7 @@ ShaftLines lines_of_model(const Mesh& model, const RigidTransform& start, const 
                       "pair of lines fit it; give a start nearer to the bone");
 }
 
-std::vector<Sight> sights_of(const Mesh& model, const RigidTransform& start, const List<ShaftLines>& lines,
+std::vector<Sight> sights_of(const Mesh& model, const Pose& start, const List<ShaftLines>& lines,
                              const List<View>& views, const Options& options) {
   if (lines.empty()) throw marrow::Error("there are no shaft lines; wire the lines of at least one view");
   std::vector<Sight> sights;
@@ -93,13 +114,12 @@ std::vector<Sight> sights_of(const Mesh& model, const RigidTransform& start, con
 }
 
 /// The model's borders in every view, for a given pose.
-std::vector<ModelBorders> borders_of(const Mesh& model, const RigidTransform& world_from_model,
-                                     const std::vector<Sight>& sights, double tolerance_mm) {
+std::vector<ModelBorders> borders_of(const Mesh& model, const Pose& pose, const std::vector<Sight>& sights,
+                                     double tolerance_mm) {
   std::vector<std::optional<ModelBorders>> found(sights.size());
   tbb::parallel_for(std::size_t(0), sights.size(), [&](std::size_t i) {
-    const double pixel_mm = marrow::pixel_size_at_mm(*sights[i].camera, Eigen::Vector3d::Zero());
-    found[i] =
-        model_borders(model, world_from_model, *sights[i].camera, sights[i].lines, tolerance_mm / std::abs(pixel_mm));
+    const double pixel_mm = pixel_at_bone_mm(middle_of(pose), *sights[i].camera, sights[i].name);
+    found[i] = model_borders(model, pose.world_from_model, *sights[i].camera, sights[i].lines, tolerance_mm / pixel_mm);
   });
   std::vector<ModelBorders> borders;
   for (std::size_t i = 0; i < sights.size(); ++i) {
@@ -129,7 +149,7 @@ RigidTransform move_by_planes(const std::vector<Sight>& sights, const std::vecto
 RigidTransform move_by_width(const Sight& sight, const ModelBorders& borders, const Eigen::Vector3d& anchor,
                              double inset_mm) {
   const Eigen::Vector3d source = marrow::source_position_mm(*sight.camera);
-  const double inset_px = inset_mm / marrow::pixel_size_at_mm(*sight.camera, anchor);
+  const double inset_px = inset_mm / across_mm(sight, anchor);
   const double nearer = borders.width_px / width_px(sight.lines, inset_px);
   // The model's own axis is projected to the plane between its borders. So a perfect start does not move.
   const Plane model_plane = bisecting_plane(*sight.camera, borders.left, borders.right);
@@ -149,7 +169,7 @@ std::vector<std::string> doubts(const std::vector<Sight>& sights, const std::vec
                                 const Eigen::Vector3d& anchor, double inset_mm) {
   std::vector<std::string> warnings;
   for (std::size_t i = 0; i < sights.size(); ++i) {
-    const double pixel_mm = marrow::pixel_size_at_mm(*sights[i].camera, anchor);
+    const double pixel_mm = across_mm(sights[i], anchor);
     const double seen_mm = width_px(sights[i].lines, inset_mm / pixel_mm) * pixel_mm,
                  model_mm = borders[i].width_px * pixel_mm;
     if (sights.size() > 1 && std::abs(seen_mm - model_mm) > kWidthTolerance * model_mm)
@@ -174,22 +194,22 @@ Pose shaft_axis(const Mesh& model, const List<ShaftLines>& lines, const List<Vie
     pose.world_from_model = start->world_from_model;
   else
     pose.world_from_model.source = model.frame;
-  marrow::check_rigid(pose.world_from_model, "start");
-  const std::vector<Sight> sights = sights_of(model, pose.world_from_model, lines, views, options);
+  marrow::check_pose(pose, "start");
   pose.frame = marrow::fragment_frame(model);
+  const std::vector<Sight> sights = sights_of(model, pose, lines, views, options);
   for (int round = 0; round < options.rounds; ++round) {
-    const std::vector<ModelBorders> borders = borders_of(model, pose.world_from_model, sights, options.tolerance_mm);
-    const Eigen::Vector3d anchor = pose.world_from_model * pose.frame.origin_mm;
+    const std::vector<ModelBorders> borders = borders_of(model, pose, sights, options.tolerance_mm);
+    const Eigen::Vector3d anchor = middle_of(pose);
     const RigidTransform move = sights.size() == 1
                                     ? move_by_width(sights[0], borders[0], anchor, options.border_inset_mm)
                                     : move_by_planes(sights, borders, anchor);
     pose.world_from_model = move * pose.world_from_model;
     ++pose.evaluations;
-    const double shift_mm = (pose.world_from_model * pose.frame.origin_mm - anchor).norm();
+    const double shift_mm = (middle_of(pose) - anchor).norm();
     if (shift_mm < 1e-2 && marrow::geodesic_angle_rad(move.rotation, Eigen::Matrix3d::Identity()) < 1e-4) break;
   }
-  pose.warnings = doubts(sights, borders_of(model, pose.world_from_model, sights, options.tolerance_mm),
-                         pose.world_from_model * pose.frame.origin_mm, options.border_inset_mm);
+  pose.warnings =
+      doubts(sights, borders_of(model, pose, sights, options.tolerance_mm), middle_of(pose), options.border_inset_mm);
   return pose;
 }
 
@@ -206,9 +226,9 @@ MARROW_PLUGIN(plugin) {
       .option("rounds", &Options::rounds, "largest number of rounds; each measures the model's axis again",
               marrow::at_least(1), marrow::at_most(100))
       .option("tolerance_mm", &Options::tolerance_mm,
-              "largest distance, in mm at the isocentre, of a silhouette point from the model's border line",
+              "largest distance, in mm at the bone, of a silhouette point from the model's border line",
               marrow::at_least(0.01))
       .option("border_inset_mm", &Options::border_inset_mm,
-              "distance of a round bone's edge inside its outline, in mm at the isocentre, because attenuation begins "
+              "distance of a round bone's edge inside its outline, in mm at the bone, because attenuation begins "
               "gradually; it matters if a single view gives the depth from the width");
 }

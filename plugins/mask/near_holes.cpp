@@ -2,7 +2,6 @@
 // A nail that slides along its own axis changes its image only at its tip and its holes. A cost that looks at these
 // places alone shows whether the holes are where the pose says.
 #include <marrow/plugin.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "marrow/toolbox/geometry/implant.hpp"
 
@@ -11,6 +10,15 @@ namespace {
 struct Options {
   double radius_mm = 4.5;
 };
+
+/// Marks the pixels of a disc about a point, parallel to the detector. In an image whose pixels are not square it is
+/// an ellipse.
+void mark_disc(const marrow::Camera& camera, const Eigen::Vector3d& centre, const Eigen::Vector2d& pixel,
+               double radius_mm, cv::Mat1b& marked) {
+  for (int v = 0; v < marked.rows; ++v)
+    for (int u = 0; u < marked.cols; ++u)
+      if (offset_at_mm(camera, centre, Eigen::Vector2d(u, v) - pixel).norm() <= radius_mm) marked(v, u) = 255;
+}
 
 marrow::View near_holes(const marrow::View& view, const marrow::geometry::Implant& implant, const marrow::Pose& pose,
                         const Options& options) {
@@ -23,8 +31,7 @@ marrow::View near_holes(const marrow::View& view, const marrow::geometry::Implan
     const Eigen::Vector3d centre = pose.world_from_model * hole.centre_mm;
     const Eigen::Vector2d pixel = project(camera, centre);
     if (!pixel.allFinite() || pixel.cwiseAbs().maxCoeff() > 1e6) continue;
-    const int radius_px = int(options.radius_mm / pixel_size_at_mm(camera, centre) + 0.5);
-    cv::circle(near, {int(pixel.x() + 0.5), int(pixel.y() + 0.5)}, radius_px, 255, cv::FILLED);
+    mark_disc(camera, centre, pixel, options.radius_mm, near);
   }
   marrow::View result = view;
   if (!view.mask.empty()) near.setTo(0, view.mask == 0);

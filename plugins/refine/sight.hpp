@@ -48,12 +48,13 @@ inline Sight sight_of(const View& view, const Eigen::Vector3d& centre_mm, const 
   if (!(depth_mm > 0))
     throw Error("view '" + view.name + "': the bones do not lie in front of its camera; look at the overlays first");
   const double each = 1 / std::sqrt(3.0), each_of_two = 1 / std::sqrt(2.0);
-  const double shift = each * expected.shift_mm,
-               centre = each_of_two * expected.centre_px * pixel_size_at_mm(view.camera, centre_mm),
-               depth = expected.focal_percent / 100 * depth_mm, turn = each * expected.rotation_deg;
+  const Eigen::Vector2d centre =
+      offset_at_mm(view.camera, centre_mm, Eigen::Vector2d::Constant(each_of_two * expected.centre_px));
+  const double shift = each * expected.shift_mm, depth = expected.focal_percent / 100 * depth_mm,
+               turn = each * expected.rotation_deg;
   Sight sight{centre_mm, view.camera.camera_from_world.rotation.transpose(), Vector6d()};
-  const double across = std::hypot(shift, centre);
-  sight.deviation << turn, turn, turn, across, across, std::hypot(shift, depth);
+  sight.deviation << turn, turn, turn, std::hypot(shift, centre.x()), std::hypot(shift, centre.y()),
+      std::hypot(shift, depth);
   return sight;
 }
 

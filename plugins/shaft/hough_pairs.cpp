@@ -75,8 +75,9 @@ std::vector<Border> hough_lines(const EdgeMap& edges, const Scale& scale) {
   return lines;
 }
 
-marrow::ShaftLines hough_pairs(const EdgeMap& edges, const marrow::View& view, const LineOptions& options) {
-  const Scale scale = checked_scale(edges, view, options);
+marrow::ShaftLines hough_pairs(const EdgeMap& edges, const marrow::View& view, const marrow::List<marrow::View>* views,
+                               const LineOptions& options, marrow::Context& context) {
+  const Scale scale = checked_scale(edges, view, views, options, context);
   return best_pair(edges, view, supported_lines(edges, hough_lines(edges, scale), scale, options), scale, options);
 }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "marrow/toolbox/image/grey_range.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
 #include "marrow/toolbox/shaft/pairs.hpp"
 
@@ -31,9 +32,7 @@ cv::Mat eight_bits(const marrow::View& view, double pixel_mm) {
   view.image.pixels.convertTo(grey, CV_32F);
   if (!cv::checkRange(grey))
     throw marrow::Error("view '" + view.name + "': the image holds pixels that are not finite (NaN or infinity)");
-  double largest = 0;
-  cv::minMaxLoc(grey, nullptr, &largest);
-  if (!(largest > 0))
+  if (!(marrow::image::grey_range(grey).greatest > 0))
     throw marrow::Error("view '" + view.name +
                         "': the image has no positive grey value, so its logarithm cannot be taken");
   grey = -marrow::image::line_integrals(grey);
@@ -93,8 +92,10 @@ std::vector<Border> segment_lines(const EdgeMap& edges, const marrow::View& view
   return lines;
 }
 
-marrow::ShaftLines line_segments(const EdgeMap& edges, const marrow::View& view, const Options& options) {
-  const Scale scale = checked_scale(edges, view, options);
+marrow::ShaftLines line_segments(const EdgeMap& edges, const marrow::View& view,
+                                 const marrow::List<marrow::View>* views, const Options& options,
+                                 marrow::Context& context) {
+  const Scale scale = checked_scale(edges, view, views, options, context);
   return best_pair(edges, view, supported_lines(edges, segment_lines(edges, view, scale, options), scale, options),
                    scale, options);
 }
@@ -110,6 +111,6 @@ MARROW_PLUGIN(plugin) {
           .in("view", "X-ray view; its camera and its grey values are used")
           .out("lines", "the two outer borders of the shaft, and the rejected pairs")
           .option("resolution_mm", &Options::resolution_mm,
-                  "size of a pixel, in mm at the isocentre, to which the image is reduced to find segments",
+                  "size of a pixel, in mm at the shaft, to which the image is reduced to find segments",
                   marrow::at_least(0.05), marrow::at_most(10)));
 }

@@ -113,9 +113,9 @@ std::vector<Border> ransac_lines(const EdgeMap& edges, const Scale& scale, const
   return lines;
 }
 
-marrow::ShaftLines ransac(const EdgeMap& edges, const marrow::View& view, const Options& options,
-                          marrow::Context& context) {
-  const Scale scale = checked_scale(edges, view, options);
+marrow::ShaftLines ransac(const EdgeMap& edges, const marrow::View& view, const marrow::List<marrow::View>* views,
+                          const Options& options, marrow::Context& context) {
+  const Scale scale = checked_scale(edges, view, views, options, context);
   return best_pair(edges, view, supported_lines(edges, ransac_lines(edges, scale, options, context), scale, options),
                    scale, options);
 }

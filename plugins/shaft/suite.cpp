@@ -243,7 +243,8 @@ double canal_unseen_percent(const Subject& subject) {
   return 100.0 * unseen / double(bones().size());
 }
 
-/// The largest error of the width at the isocentre's depth, in units of the deviation that the node gives.
+/// The largest error of the width at the depth that a C-arm has its isocentre, in units of the deviation that the node
+/// gives.
 double width_error(const Subject& subject) {
   return largest(subject, [](const Bone& bone, const ShaftLines& lines) {
     const double nearer = kDistance_mm / (kDistance_mm + bone.point.z());
@@ -307,7 +308,7 @@ std::vector<Trial> trials() {
              View view{"frontal", {}, {}, {}};
              return Inputs{{"edges", item(EdgeMap())}, {"view", item(view)}};
            }},
-          {"isocentre_behind_source", [] {
+          {"world_origin_behind_source", [] {
              View view = view_of(bones()[0]);
              view.camera.camera_from_world.translation_mm.z() = -kDistance_mm;
              return Inputs{{"edges", item(edges_of(bones()[0]))}, {"view", item(view)}};

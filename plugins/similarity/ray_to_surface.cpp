@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "marrow/domain/central_rays.hpp"
 #include "marrow/domain/number_text.hpp"
+#include "marrow/toolbox/match/block_expansions.hpp"
 #include "marrow/toolbox/match/views_cost.hpp"
 
 namespace {
@@ -107,6 +109,8 @@ struct Loss {
   double operator()(double d) const { return worst() * (1 - std::pow(1 - share(d), 3)); }
   /// Derivative with respect to the distance, divided by the distance.
   double weight(double d) const { return std::pow(1 - share(d), 2); }
+  /// Second derivative.
+  double curvature(double d) const { return (1 - share(d)) * (1 - 5 * share(d)); }
   double share(double d) const { return std::min(1.0, d * d / (reach * reach)); }
 };
 
@@ -150,12 +154,7 @@ class RayToSurface : public marrow::match::ViewsCost {
       for (const auto& touch : touches) {
         if (!touch) continue;
         const double one = share / double(touches.size()) * touch->like;
-        // If the model moves by a small (r, t), the ray moves relative to it by -(r x (p - o) + t), in the fragment's
-        // axes.
-        const Eigen::Vector3d normal = frame.axes.transpose() * touch->normal,
-                              arm = frame.axes.transpose() * (touch->point - frame.origin_mm);
-        marrow::Vector6d slope;
-        slope << -arm.cross(normal), -normal;
+        const marrow::Vector6d slope = slope_of(*touch, frame);
         const double weight = loss_.weight(touch->distance_mm);
         about.value += one * (loss_(touch->distance_mm) - loss_.worst());
         about.gradient += one * weight * touch->distance_mm * slope;
@@ -165,12 +164,54 @@ class RayToSurface : public marrow::match::ViewsCost {
     return about;
   }
 
-  /// Uses every n-th edge pixel, with n from the contour spacing. The reach is converted to mm at the isocentre.
+  /// With a distance that all edges have in common as one more unknown. Blur moves all edges inwards: this pulls
+  /// opposite borders to opposite sides, so it hardly moves the pose, but each block by itself shows it. Five blocks
+  /// along an image, as for the contour. One view alone gives none: its least cost lies centimetres away from
+  /// the bone along the rays.
+  std::vector<Expansion> expansion_without_each_block(const marrow::RigidTransform& world_from_model,
+                                                      const marrow::FragmentFrame& frame) const override {
+    constexpr int kBlocksAlong = 5;
+    if (scene_->views.size() < 2) return {};
+    std::vector<std::vector<std::optional<Touch>>> views;
+    std::vector<double> weights;
+    for (std::size_t i = 0; i < scene_->views.size(); ++i) {
+      views.push_back(touches_of(i, world_from_model));
+      weights.push_back(marrow::match::weight_of(scene_->options.weights, i));
+    }
+    const double common_mm = common_distance_mm(views, weights);
+    std::vector<marrow::match::BlockExpansions> of_views;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      marrow::match::BlockExpansions& sums =
+          of_views.emplace_back(marrow::match::Blocks::of(scene_->views[i].camera, kBlocksAlong));
+      for (std::size_t k = 0; k < views[i].size(); ++k) {
+        const Ray& ray = scene_->rays[i][k * step_];
+        sums.count(ray.u_px, ray.v_px);
+        const std::optional<Touch>& touch = views[i][k];
+        if (!touch) continue;
+        const double left_mm = touch->distance_mm - common_mm;
+        sums.add(ray.u_px, ray.v_px, slope_of(*touch, frame), touch->like * loss_.weight(left_mm) * left_mm,
+                 touch->like * loss_.curvature(left_mm));
+      }
+    }
+    std::vector<Expansion> without = marrow::match::BlockExpansions::without_each(of_views, weights, 1, true);
+    // The pose is that of least cost without this unknown, so what all blocks have in common is the cost's own slope.
+    // Where noise hides some edges, the pull of the others is left, which a common distance hides: kMore covers it, as
+    // measured (docs/results.md, Deviations and noise).
+    constexpr double kMore = 1.3;
+    const marrow::Vector6d whole = expansion(world_from_model, frame)->gradient;
+    marrow::Vector6d mean = marrow::Vector6d::Zero();
+    for (const Expansion& one : without) mean += one.gradient / double(without.size());
+    for (Expansion& one : without) one.gradient = whole + kMore * (one.gradient - mean);
+    return without;
+  }
+
+  /// Uses every n-th edge pixel, with n from the contour spacing. The reach is converted to mm where the views meet. If
+  /// they do not tell how far away the bone is, reach_mm is taken as that of a usual level, and the others in
+  /// proportion.
   std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
-    const marrow::Camera& camera = scene_->views[0].camera;
-    const Eigen::Vector3d isocentre = Eigen::Vector3d::Zero();
-    const bool is_seen = (camera.camera_from_world * isocentre).z() > 0;
-    const double reach_mm = is_seen ? level.reach_px * pixel_size_at_mm(camera, isocentre) : scene_->options.reach_mm;
+    const std::optional<Eigen::Vector3d> bone_mm = marrow::meeting_point_mm(scene_->views);
+    const double reach_mm = bone_mm ? level.reach_px * pixel_size_at_mm(scene_->views[0].camera, *bone_mm)
+                                    : level.reach_px / marrow::CostLevel().reach_px * scene_->options.reach_mm;
     return std::make_shared<RayToSurface>(scene_, std::max(1, int(std::lround(level.contour_spacing_px))), reach_mm);
   }
 
@@ -185,9 +226,43 @@ class RayToSurface : public marrow::match::ViewsCost {
     return marrow::formatted("no ray through an edge passes within %.3g mm of the model's surface", loss_.reach);
   }
 
+  /// How the distance changes with a small motion of the model: by (r, t) the ray moves relative to the model by
+  /// -(r x (p - o) + t), in the fragment's axes.
+  static marrow::Vector6d slope_of(const Touch& touch, const marrow::FragmentFrame& frame) {
+    const Eigen::Vector3d normal = frame.axes.transpose() * touch.normal,
+                          arm = frame.axes.transpose() * (touch.point - frame.origin_mm);
+    marrow::Vector6d slope;
+    slope << -arm.cross(normal), -normal;
+    return slope;
+  }
+
+  /// The distance of least cost, by iteratively reweighted means.
+  double common_distance_mm(const std::vector<std::vector<std::optional<Touch>>>& views,
+                            const std::vector<double>& weights) const {
+    constexpr int kRounds = 5;
+    double common_mm = 0;
+    for (int round = 0; round < kRounds; ++round) {
+      double sum = 0, total = 0;
+      for (std::size_t i = 0; i < views.size(); ++i)
+        for (const std::optional<Touch>& touch : views[i]) {
+          if (!touch) continue;
+          const double weight =
+              weights[i] / double(views[i].size()) * touch->like * loss_.weight(touch->distance_mm - common_mm);
+          sum += weight * touch->distance_mm;
+          total += weight;
+        }
+      if (!(total > 0)) break;
+      common_mm = sum / total;
+    }
+    return common_mm;
+  }
+
   double value_of(const marrow::match::BlockSums::Sums& sums) const {
     return loss_.worst() + (sums.weights > 0 ? sums.values / sums.weights : 0);
   }
+
+  /// No deviations follow from values: what all edges have in common must be taken away first.
+  std::vector<double> without_each_block(const marrow::RigidTransform&) const override { return {}; }
 
   Split split(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
     const marrow::match::BlockSums found = sums(view, world_from_model);
@@ -339,9 +414,12 @@ MARROW_PLUGIN(plugin) {
       .in("other_projectors", "projectors of the other fragments' outlines; this fragment's own may be among them",
           marrow::over("fragment"))
       .out("cost", "mean of Tukey's biweight of the distances [mm^2]")
-      .option("reach_mm", &Options::reach_mm,
-              "rays farther from the surface than this belong to something else; limited by the field's largest value",
-              marrow::at_least(0.1))
+      .option(
+          "reach_mm", &Options::reach_mm,
+          "rays farther from the surface than this belong to something else; limited by the field's largest value. "
+          "In a search the level's reach_px counts, in mm where the views meet; with views that do not meet, such as "
+          "a single one, reach_mm is the reach at 8 px, and other levels have theirs in proportion",
+          marrow::at_least(0.1))
       .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
               "largest angle between the directions of edge and surface", marrow::at_least(10), marrow::at_most(180))
       .option("edge_offset_mm", &Options::edge_offset_mm, "distance of the edges outside the surface; negative: inside")

@@ -51,7 +51,7 @@ TEST(TrueBorders, OfACylinderAreTheLinesThatTouchIt) {
     const RigidTransform pose = posed({15 * unit(random), 15 * unit(random), 90 * unit(random)},
                                       {30 * unit(random), 30 * unit(random), 20 * unit(random)});
     const ShaftLines exact = tube::borders(camera, pose.translation_mm, pose.rotation.col(2), kRadius_mm, 100, 400);
-    const auto borders = true_borders::borders_beside(exact, model, pose, camera, 1 / kPixel_mm);
+    const auto borders = true_borders::borders_beside(exact, model, pose, camera, 1);
     ASSERT_TRUE(borders);
     worst = std::max(worst, worst_mm(*borders, exact));
     const Eigen::Vector2d between =
@@ -76,7 +76,7 @@ TEST(TrueBorders, OfAConeAreTheLinesThatTouchIt) {
       const cone::Cone known{pose * Eigen::Vector3d(0, 0, -kRadius_mm / slope),
                              (slope > 0 ? 1 : -1) * pose.rotation.col(2), std::atan(std::abs(slope))};
       const ShaftLines exact = cone::borders(camera, known, 120, 380);
-      const auto borders = true_borders::borders_beside(exact, model, pose, camera, 1 / kPixel_mm);
+      const auto borders = true_borders::borders_beside(exact, model, pose, camera, 1);
       ASSERT_TRUE(borders);
       EXPECT_LT(worst_mm(*borders, exact), kLimit_mm) << slope << ", " << angle;
     }
@@ -92,7 +92,7 @@ TEST(TrueBorders, OfABoxAreItsEdges) {
   };
   ShaftLines edges;
   edges.left = edge(10), edges.right = edge(-10);  // they run down
-  const auto borders = true_borders::borders_beside(edges, model, posed({0, 0, 0}, {0, 0, 0}), camera, 3);
+  const auto borders = true_borders::borders_beside(edges, model, posed({0, 0, 0}, {0, 0, 0}), camera, 3 * kPixel_mm);
   ASSERT_TRUE(borders);
   EXPECT_LT(worst_mm(*borders, edges), 1e-9);
   EXPECT_NEAR(borders->width_px, 20 * camera.intrinsics(0, 0) / 585, 1e-9);
@@ -109,7 +109,7 @@ TEST(TrueBorders, DoNotDependOnThePairBeside) {
         for (Eigen::Vector2d* end : {&border->from_px, &border->to_px})
           *end = Eigen::Rotation2Dd(marrow::radians(turn_deg)) * (*end - Eigen::Vector2d(256, 256)) +
                  Eigen::Vector2d(256 + shift_px, 256);
-      const auto borders = true_borders::borders_beside(pair, cylinder(), pose, camera, 3);
+      const auto borders = true_borders::borders_beside(pair, cylinder(), pose, camera, 3 * kPixel_mm);
       ASSERT_TRUE(borders);
       EXPECT_LT(worst_mm(*borders, exact), kLimit_mm);
     }
@@ -123,7 +123,7 @@ TEST(TrueBorders, OfASurfaceThatEndsAreThoseOfItsPart) {
   const ShaftLines exact = tube::borders(camera, pose.translation_mm, pose.rotation.col(2), kRadius_mm, 100, 400);
   Mesh part = cylinder();
   std::erase_if(part.triangles, [&](const auto& t) { return part.vertices_mm[t[0]].z() > 10; });
-  const auto borders = true_borders::borders_beside(exact, part, pose, camera, 3);
+  const auto borders = true_borders::borders_beside(exact, part, pose, camera, 3 * kPixel_mm);
   ASSERT_TRUE(borders);
   EXPECT_LT(worst_mm(*borders, exact), 0.05);
 }
@@ -136,7 +136,7 @@ TEST(TrueBorders, WhatFlaresFartherThanTheToleranceIsNoShaft) {
   const ShaftLines exact = tube::borders(camera, {0, 0, 0}, {0, 0, 1}, kRadius_mm, 140, 400);  // z up to 41 mm
   const RigidTransform pose = posed({0, 0, 0}, {0, 0, 0});
   const auto within = [&](double tolerance_mm) {
-    return worst_mm(*true_borders::borders_beside(exact, model, pose, camera, tolerance_mm / kPixel_mm), exact);
+    return worst_mm(*true_borders::borders_beside(exact, model, pose, camera, tolerance_mm), exact);
   };
   std::printf("a flare of 45 degrees: off by %.3f mm, without tolerance %.3f mm\n", within(1), within(100));
   EXPECT_LT(within(1), 0.1);
@@ -147,13 +147,14 @@ TEST(TrueBorders, NeedTheSurfaceInAThirdOfTheStretch) {
   const marrow::Camera camera = radiograph::camera(0);
   const ShaftLines pair = tube::borders(camera, {0, 0, 0}, {0, 0, 1}, kRadius_mm, 56, 456);  // 140.6 mm
   const auto shown = [&](double half_mm, const Eigen::Vector3d& at) {
-    return true_borders::borders_beside(pair, cylinder(half_mm), posed({0, 0, 0}, at), camera, 3).has_value();
+    return true_borders::borders_beside(pair, cylinder(half_mm), posed({0, 0, 0}, at), camera, 3 * kPixel_mm)
+        .has_value();
   };
   EXPECT_TRUE(shown(25, {0, 0, 0}));
   EXPECT_FALSE(shown(22, {0, 0, 0}));
   EXPECT_FALSE(shown(100, {0, 0, 300}));
   EXPECT_FALSE(shown(100, {0, -1000, 0}));  // behind the source
-  EXPECT_FALSE(true_borders::borders_beside({}, cylinder(), posed({0, 0, 0}, {0, 0, 0}), camera, 3));
+  EXPECT_FALSE(true_borders::borders_beside({}, cylinder(), posed({0, 0, 0}, {0, 0, 0}), camera, 3 * kPixel_mm));
 }
 
 }  // namespace true_borders_test

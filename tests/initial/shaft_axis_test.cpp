@@ -210,6 +210,10 @@ TEST(ShaftAxis, SaysWhatIsMissing) {
   }();
   EXPECT_EQ(refusal(model, setup.lines, one_view, nullptr),
             "there are shaft lines of a view 'at 90', but no view of that name");
+  Pose behind;
+  behind.world_from_model.translation_mm = {0, -700, 0};
+  EXPECT_EQ(refusal(model, setup.lines, setup.views, &behind),
+            "view 'at 0': the model does not lie in front of the X-ray source; give a start nearer to the bone");
   EXPECT_EQ(refusal(model, {}, setup.views, nullptr), "there are no shaft lines; wire the lines of at least one view");
   Pose far;
   far.world_from_model.translation_mm = {0, 0, 400};

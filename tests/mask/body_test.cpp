@@ -57,4 +57,24 @@ TEST(MaskNearHoles, KeepsOnlyWhatIsNearAHole) {
   EXPECT_EQ(int(mask.at<std::uint8_t>(256, 256 - 32)), 0);
 }
 
+TEST(MaskNearHoles, KeepsADiscInThePatientAlsoWherePixelsAreNotSquare) {
+  marrow::View view = implants::views()[0];
+  view.camera.intrinsics.row(1) *= 0.5;  // pixels twice as high as wide
+  const cv::Mat mask = shipped::call("mask.near_holes",
+                                     {{"view", shipped::item(view)},
+                                      {"implant", shipped::item(implants::rod())},
+                                      {"pose", shipped::item(implants::pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0}))}},
+                                     {{"radius_mm", 10.0}})
+                           .at("view")
+                           .as<marrow::View>()
+                           .mask;
+  // The hole is at (255.5, 127.75). 10 mm are 28.4 px along u and 14.2 px along v.
+  const auto at = [&](int u, int v) { return int(mask.at<std::uint8_t>(v, u)); };
+  EXPECT_EQ(at(255 + 28, 128), 255);
+  EXPECT_EQ(at(255 + 30, 128), 0);
+  EXPECT_EQ(at(256, 127 + 14), 255);
+  EXPECT_EQ(at(256, 127 + 16), 0);
+  EXPECT_NEAR(cv::countNonZero(mask), marrow::kPi * 28.44 * 14.22, 15);
+}
+
 }  // namespace mask_body_test

@@ -78,10 +78,8 @@ TEST_P(Shaft, FindsTheFemurOfARealKnee) {
   view.image.pixels = cv::imread(path, cv::IMREAD_GRAYSCALE);
   view.camera.width_px = view.image.width();
   view.camera.height_px = view.image.height();
-  view.camera.intrinsics << 8700, 0, 880, 0, 8700, 880, 0, 0,
-      1;  // about 0.158 mm a pixel where the world's origin lies
-  view.camera.camera_from_world.translation_mm = {0, 0, 1370};
-  const ShaftLines lines = find_shaft(find_edges(view), view);
+  view.camera.intrinsics << 8700, 0, 880, 0, 8700, 880, 0, 0, 1;  // about 0.158 mm a pixel at 1370 mm
+  const ShaftLines lines = find_shaft(find_edges(view), view, {{"source_to_shaft_mm", 1370.0}});
   const auto angle_deg = [](const marrow::LineSegment& s) {
     return marrow::degrees(std::atan2(s.to_px.y() - s.from_px.y(), s.to_px.x() - s.from_px.x()));
   };

@@ -5,37 +5,25 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "marrow/domain/decompositions.hpp"
+#include "marrow/domain/central_rays.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
 #include "moments.hpp"
+#include "smoothed_at_bone.hpp"
 
 namespace marrow::match {
 namespace {
 
-/// The point nearest to the middle rays of all views, where the bone is. For one view: the world's origin.
-Eigen::Vector3d middle_of(const List<View>& views) {
-  Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const View& view : views) {
-    const Eigen::Vector3d axis = view.camera.camera_from_world.rotation.row(2).transpose();
-    const Eigen::Matrix3d one = Eigen::Matrix3d::Identity() - axis * axis.transpose();
-    across += one;
-    sum += one * source_position_mm(view.camera);
-  }
-  const bool are_parallel = eigen_of_symmetric(across).values[0] < 1e-3;
-  return are_parallel ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(solve_symmetric(across, sum));
-}
-
-/// The length at the bone of this many pixels, the mean over the views. 0 if the bone's place is not known.
-double length_at_bone_mm(const List<View>& views, double pixels) {
-  const Eigen::Vector3d middle = middle_of(views);
+/// The projector of the radiographs that are compared with images smoothed by `sigma_px`. Where the views meet tells
+/// how far away the bone is; without such a point each pose tells it. Null if the projector cannot be smoothed.
+std::shared_ptr<const RadiographProjector> as_smooth_as_images(const RadiographProjector& projector,
+                                                               const List<View>& views, double sigma_px) {
+  if (!(sigma_px > 0)) return nullptr;
+  const std::optional<Eigen::Vector3d> middle_mm = meeting_point_mm(views);
+  if (!middle_mm) return smoothed_at_bone(projector, sigma_px);
   double sum = 0;
-  for (const View& view : views) {
-    if (!((view.camera.camera_from_world * middle).z() > 0)) return 0;
-    sum += pixels * pixel_size_at_mm(view.camera, middle);
-  }
-  return sum / double(views.size());
+  for (const View& view : views) sum += sigma_px * pixel_size_at_mm(view.camera, *middle_mm);
+  return projector.smoothed(sum / double(views.size()));
 }
 
 class IntensityCost : public ViewsCost {
@@ -48,8 +36,7 @@ class IntensityCost : public ViewsCost {
         options_(options),
         worst_(worst),
         measure_of_(std::move(measure_of)) {
-    const double sigma_mm = length_at_bone_mm(views, options.blur_px * options.pixel_step);
-    if (sigma_mm > 0) smoothed_ = projector.smoothed(sigma_mm);
+    smoothed_ = as_smooth_as_images(projector, views, options.blur_px * options.pixel_step);
     for (const View& view : views) {
       images_.push_back(image_of(view));
       measures_.push_back(measure_of_(images_.back()));
@@ -101,6 +88,7 @@ class IntensityCost : public ViewsCost {
   }
 
   Split split(std::size_t view, const RigidTransform& world_from_model) const override {
+    if (!options_.has_blocks) return {value_in_view(view, world_from_model), {}};
     const Blocks blocks = Blocks::of(views_[view].camera);
     const Patch patch = patch_of(view, world_from_model);
     if (patch.rendered.empty()) return {worst_, std::vector<double>(std::size_t(blocks.count()), worst_)};
@@ -120,7 +108,7 @@ class IntensityCost : public ViewsCost {
     split.without_block.assign(std::size_t(blocks.count()), split.value);
     const std::vector<char> counts = patch.counts;
     const int step = options_.pixel_step;
-    const auto side = [&](int block) { return (block * blocks.side_px + step - 1) / step; };
+    const auto side = [&](int block) { return int(std::ceil(block * blocks.side_px / step)); };
     for (int row = 0; row < blocks.rows; ++row)
       for (int column = 0; column < blocks.columns; ++column) {
         const int left = std::max(side(column) - patch.left, 0), top = std::max(side(row) - patch.top, 0),

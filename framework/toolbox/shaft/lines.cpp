@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <marrow/domain/central_rays.hpp>
 #include <marrow/domain/error.hpp>
 #include <tuple>
 
@@ -29,6 +30,20 @@ void check_inputs(const EdgeMap& edges, const View& view) {
       throw Error(what + "the edge map holds numbers that are not finite (NaN or infinity); look at the edge detector");
 }
 
+/// A point on the central ray of a view, at the depth of the shaft.
+Eigen::Vector3d place_of_shaft(const View& view, const List<View>* views, const LineOptions& options,
+                               Context& context) {
+  constexpr double kUsual_mm = 600;
+  if (!(options.source_to_shaft_mm > 0) && views)
+    if (const auto meeting_mm = meeting_point_mm(*views)) return *meeting_mm;
+  if (!(options.source_to_shaft_mm > 0))
+    context.warn("view '" + view.name +
+                 "': how far the shaft is from the X-ray source is not known; 600 mm are assumed, and all its lengths "
+                 "in mm depend on this. Wire 'views' with two views or more, or set source_to_shaft_mm");
+  const double depth_mm = options.source_to_shaft_mm > 0 ? options.source_to_shaft_mm : kUsual_mm;
+  return source_position_mm(view.camera) + depth_mm * view.camera.camera_from_world.rotation.row(2).transpose();
+}
+
 /// Whether two borders are the same line: similar directions, and close to each other at the middle of the image.
 bool same_line(const Border& one, const Border& other, const Eigen::Vector2d& middle, double tolerance_px) {
   const Eigen::Vector2d direction = along(one);
@@ -39,13 +54,19 @@ bool same_line(const Border& one, const Border& other, const Eigen::Vector2d& mi
 
 }  // namespace
 
-Scale checked_scale(const EdgeMap& edges, const View& view, const LineOptions& options) {
+double Scale::across_mm(const Eigen::Vector2d& offset_px, const Eigen::Vector2d& along_px) const {
+  const Eigen::Vector2d offset = mm_from_px * offset_px, along = (mm_from_px * along_px).normalized();
+  return std::abs(along.x() * offset.y() - along.y() * offset.x());
+}
+
+Scale checked_scale(const EdgeMap& edges, const View& view, const List<View>* views, const LineOptions& options,
+                    Context& context) {
   check_inputs(edges, view);
+  const Eigen::Vector3d shaft_mm = place_of_shaft(view, views, options, context);
   Scale scale;
-  scale.pixel_mm = pixel_size_at_mm(view.camera, Eigen::Vector3d::Zero());
-  if (!(scale.pixel_mm > 0))
-    throw Error("view '" + view.name +
-                "': the world's origin, the isocentre, does not lie in front of the X-ray source");
+  scale.pixel_mm = pixel_size_at_mm(view.camera, shaft_mm);
+  scale.mm_from_px.col(0) = offset_at_mm(view.camera, shaft_mm, Eigen::Vector2d::UnitX());
+  scale.mm_from_px.col(1) = offset_at_mm(view.camera, shaft_mm, Eigen::Vector2d::UnitY());
   scale.min_length_px = options.min_length_mm / scale.pixel_mm;
   scale.gap_px = options.gap_mm / scale.pixel_mm;
   scale.support = {options.tolerance_mm / scale.pixel_mm, std::cos(radians(15))};

@@ -38,10 +38,16 @@ Eigen::Vector2d direction_of(const Border& one, const Border& other) {
   return turn ? Eigen::Vector2d(-direction) : direction;
 }
 
-/// Distance in mm between the two lines in the middle of their stretch, at the depth of the isocentre.
-double width_of(const Pair& pair, double pixel_mm) {
+/// Distance in mm between the two lines in the middle of their stretch, at the depth of the shaft.
+double width_of(const Pair& pair, const Scale& scale) {
+  const Eigen::Vector2d& along = pair.stretch.along;
   const double s = 0.5 * (pair.stretch.from + pair.stretch.to);
-  return (point_at(pair.left, pair.stretch.along, s) - point_at(pair.right, pair.stretch.along, s)).norm() * pixel_mm;
+  return scale.across_mm(point_at(pair.left, along, s) - point_at(pair.right, along, s), along);
+}
+
+/// Length in mm of a pair's stretch, at the depth of the shaft.
+double length_of(const Pair& pair, const Scale& scale) {
+  return pair.stretch.length() * scale.length_mm(pair.stretch.along);
 }
 
 /// All that is needed to judge pairs.
@@ -61,12 +67,14 @@ double width_deviation_of(const Pair& pair, const Scene& scene) {
   const auto variance_px = [](const Border& border) {
     return kSharing_px * border.spread_px * border.spread_px / std::max(1, border.pixels);
   };
-  return std::hypot(scene.scale.pixel_mm * std::sqrt(variance_px(pair.left) + variance_px(pair.right)),
+  const Eigen::Vector2d& along = pair.stretch.along;
+  const double across_mm = scene.scale.across_mm({-along.y(), along.x()}, along);
+  return std::hypot(across_mm * std::sqrt(variance_px(pair.left) + variance_px(pair.right)),
                     scene.options.magnification_tolerance * pair.width_mm);
 }
 
 void score(const Scene& scene, Pair& pair) {
-  pair.width_mm = width_of(pair, scene.scale.pixel_mm);
+  pair.width_mm = width_of(pair, scene.scale);
   const double taper_deg = degrees(std::acos(std::clamp(-pair.left.normal.dot(pair.right.normal), 0.0, 1.0)));
   pair.score =
       kEvidencePer_mm * pair.weight * pair.supported_mm + scene.widths.log_likelihood(pair.width_mm, taper_deg);
@@ -74,7 +82,7 @@ void score(const Scene& scene, Pair& pair) {
 
 /// The reason why a pair is not the shaft, from its edges only; empty if it may be the shaft.
 std::string reason_by_edges(const Scene& scene, const Pair& pair, const Eigen::Vector2d& to_left) {
-  const double length_mm = pair.stretch.length() * scene.scale.pixel_mm;
+  const double length_mm = length_of(pair, scene.scale);
   if (length_mm < scene.options.min_length_mm)
     return text("its borders run side by side for %.0f mm only, of %.0f mm wanted", length_mm,
                 scene.options.min_length_mm);
@@ -101,7 +109,7 @@ std::string reason_by_image(const Scene& scene, Pair& pair) {
   if (outer.length() >= scene.scale.min_length_px) cut(pair, outer);
   cut(pair, stretch_with_steps(scene.image, pair.left, pair.right, pair.stretch, scene.bone_step, pixel_mm,
                                scene.scale.gap_px));
-  const double length_mm = pair.stretch.length() * pixel_mm;
+  const double length_mm = length_of(pair, scene.scale);
   if (length_mm < scene.options.min_length_mm)
     return text("a border is too faint for bone but for %.0f mm, of %.0f mm wanted, as muscle's is (%.1f mm wide)",
                 length_mm, scene.options.min_length_mm, pair.width_mm);
@@ -122,7 +130,7 @@ void judge_edges(const Scene& scene, Pair& pair) {
   int supported = 0;
   pair.stretch =
       common_stretch(scene.edges, pair.left, pair.right, scene.scale.support, direction, scene.scale.gap_px, supported);
-  pair.supported_mm = supported * scene.scale.pixel_mm;
+  pair.supported_mm = supported * scene.scale.length_mm(direction);
   pair.weight = 1;
   const double middle = 0.5 * (pair.stretch.from + pair.stretch.to);
   if (to_left.dot(point_at(pair.left, direction, middle) - point_at(pair.right, direction, middle)) < 0)
@@ -212,7 +220,7 @@ void move_to_outline(const Scene& scene, Pair& pair) {
   const std::optional<double> left = beyond_px(pair.left), right = beyond_px(pair.right);
   pair.left.rho += left.value_or(right.value_or(0));
   pair.right.rho += right.value_or(left.value_or(0));
-  pair.width_mm = width_of(pair, scene.scale.pixel_mm);
+  pair.width_mm = width_of(pair, scene.scale);
 }
 
 LineSegment segment_of(const Border& border, const Stretch& stretch) {

@@ -42,9 +42,11 @@ void turn(marrow::LineSegment& segment, double degrees) {
 }
 
 template <Fault fault>
-marrow::ShaftLines shaft(const marrow::EdgeMap& edges, const marrow::View& view, const LineOptions& options) {
+marrow::ShaftLines shaft(const marrow::EdgeMap& edges, const marrow::View& view,
+                         const marrow::List<marrow::View>* views, const LineOptions& options,
+                         marrow::Context& context) {
   if (fault == Fault::crashing && edges.pixels.size() < 2) std::abort();
-  const Scale scale = checked_scale(edges, view, options);
+  const Scale scale = checked_scale(edges, view, views, options, context);
   marrow::ShaftLines lines =
       best_pair(edges, view, supported_lines(edges, lines_of(edges), scale, options), scale, options);
   if (fault == Fault::inner)

@@ -17,20 +17,26 @@ ShaftLines best_pair(const EdgeMap& edges, const View& view, const std::vector<B
 /// The options of a node that calls best_pair().
 template <class Builder>
 void declare_line_options(Builder&& node) {
-  node.option("width_mm", &LineOptions::width_mm,
+  node.in("views", "all views of the bone: the shaft lies as deep as the point where their central rays meet",
+          over("view"))
+      .option("source_to_shaft_mm", &LineOptions::source_to_shaft_mm,
+              "distance of the shaft from the X-ray source along the central ray; 0: that of the point where the views "
+              "meet. If they do not, or are not wired, 600 mm are assumed, with a warning",
+              at_least(0))
+      .option("width_mm", &LineOptions::width_mm,
               "mean outer diameters, one for each direction from which the bone may be seen; none: a femur's, by level")
       .option("width_deviation_mm", &LineOptions::width_deviation_mm, "standard deviations of these diameters")
       .relation(same_length({"width_mm", "width_deviation_mm"}))
       .option("magnification_tolerance", &LineOptions::magnification_tolerance,
-              "relative standard deviation of the magnification, because the shaft may lie off the isocentre",
+              "relative standard deviation of the magnification, because the shaft may lie nearer or deeper",
               at_least(0), at_most(1))
-      .option("min_length_mm", &LineOptions::min_length_mm, "shortest common length of both borders, at the isocentre",
+      .option("min_length_mm", &LineOptions::min_length_mm, "shortest common length of both borders, at the shaft",
               at_least(1))
       .option("max_angle_deg", &LineOptions::max_angle_deg, "largest angle between the borders: shafts taper",
               at_least(0), at_most(45))
       .option("tolerance_mm", &LineOptions::tolerance_mm,
-              "largest distance of an edge pixel from its line, at the isocentre", at_least(0.01))
-      .option("gap_mm", &LineOptions::gap_mm, "widest gap that a border may have, at the isocentre", at_least(0))
+              "largest distance of an edge pixel from its line, at the shaft", at_least(0.01))
+      .option("gap_mm", &LineOptions::gap_mm, "widest gap that a border may have, at the shaft", at_least(0))
       .option("lines", &LineOptions::lines, "largest number of lines that are tried", at_least(2), at_most(1000))
       .option("least_log_likelihood", &LineOptions::least_log_likelihood,
               "least log-likelihood of a pair: 0.1 for each mm of clear borders, minus the cost of its width and taper")
