@@ -103,12 +103,13 @@ MARROW_PLUGIN(plugin) {
               at_most(65))
       .option("neck_shaft_deg", &FemurOptions::neck_shaft_deg, "angle between neck and shaft", at_least(100),
               at_most(150))
-      .option("anteversion_deg", &FemurOptions::anteversion_deg, "rotation of the neck to the front", at_least(-20),
+      .option("anteversion_deg", &FemurOptions::anteversion_deg,
+              "angle of the neck's axis to the front of the line that touches both condyles at the back", at_least(-20),
               at_most(50))
       .option("bow_radius_mm", &FemurOptions::bow_radius_mm, "radius of the shaft's bow, convex to the front",
               at_least(400))
-      .option("bicondylar_width_mm", &FemurOptions::bicondylar_width_mm, "width across both condyles", at_least(55),
-              at_most(110))
+      .option("bicondylar_width_mm", &FemurOptions::bicondylar_width_mm, "width across both condyles and epicondyles",
+              at_least(55), at_most(110))
       .option("shaft_ml_mm", &FemurOptions::shaft_ml_mm, "mid-shaft diameter, medial to lateral", at_least(18),
               at_most(45))
       .option("shaft_ap_mm", &FemurOptions::shaft_ap_mm,

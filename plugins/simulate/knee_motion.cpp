@@ -78,7 +78,10 @@ std::vector<Body> other_leg(const ClutteredPhantom& phantom) {
 class Knee {
  public:
   Knee(const ClutteredPhantom& phantom, const Options& options)
-      : phantom_(phantom), options_(options), fragment_(phantom::distal_fragment(phantom.phantom)) {}
+      : phantom_(phantom),
+        options_(options),
+        fragment_(phantom::distal_fragment(phantom.phantom)),
+        lateral_x_(phantom::distal_end(phantom.phantom.bone.outer).lateral_x) {}
 
   Posture at(int frame) const {
     const double phase = 2 * kPi * frame / options_.frame_rate_hz / options_.period_s;
@@ -87,13 +90,14 @@ class Knee {
     const Eigen::Vector3d knee_mm = world_from_bone * phantom::knee_axis_at(phantom_.phantom.bone.outer);
     const Eigen::Matrix3d& axes = world_from_bone.rotation;
     RigidTransform femur = turned_about(
-        knee_mm, axes * radians(options_.swing_deg) * Eigen::Vector3d(-bent, 0.2 * bent, 0.4 * bent), "world");
-    femur.translation_mm += options_.shift_mm * Eigen::Vector3d(0.3 * std::sin(phase), 0.5 * bent, std::sin(phase));
+        knee_mm, axes * turn(radians(options_.swing_deg) * Eigen::Vector3d(-bent, 0.2 * bent, 0.4 * bent)), "world");
+    femur.translation_mm +=
+        options_.shift_mm * Eigen::Vector3d(lateral_x_ * 0.3 * std::sin(phase), 0.5 * bent, std::sin(phase));
     const RigidTransform bend =
-        turned_about(knee_mm, axes * Eigen::Vector3d(radians(options_.flexion_deg) * bent, 0, 0), "world");
-    const RigidTransform turn =
-        turned_about(knee_mm, axes * Eigen::Vector3d(0, 0, radians(options_.axial_deg) * bent), "world");
-    const RigidTransform stays{"world", "world"}, lower_leg = femur * bend * turn;
+        turned_about(knee_mm, axes * turn({radians(options_.flexion_deg) * bent, 0, 0}), "world");
+    const RigidTransform inwards =
+        turned_about(knee_mm, axes * turn({0, 0, -radians(options_.axial_deg) * bent}), "world");
+    const RigidTransform stays{"world", "world"}, lower_leg = femur * bend * inwards;
 
     Posture posture;
     for (const Fragment& fragment : phantom_.phantom.fragments)
@@ -109,6 +113,11 @@ class Knee {
   }
 
  private:
+  /// A rotation vector of this leg. It is given for a left one, and of a right one it is the mirror image.
+  Eigen::Vector3d turn(const Eigen::Vector3d& of_left) const {
+    return {of_left.x(), lateral_x_ * of_left.y(), lateral_x_ * of_left.z()};
+  }
+
   bool is_blank(int frame) const {
     return options_.blank.size() == 2 && frame + 1 >= options_.blank[0] && frame + 1 <= options_.blank[1];
   }
@@ -117,13 +126,15 @@ class Knee {
   RigidTransform crossing(int frame) const {
     constexpr double kBehind_mm = 110, kWay_mm = 240;
     RigidTransform shift{"world", "world"};
-    shift.translation_mm = {kWay_mm * (double(frame) / std::max(1, options_.frames - 1) - 0.5), kBehind_mm, 60};
+    shift.translation_mm = {lateral_x_ * kWay_mm * (double(frame) / std::max(1, options_.frames - 1) - 0.5), kBehind_mm,
+                            60};
     return shift;
   }
 
   const ClutteredPhantom& phantom_;
   const Options& options_;
   Fragment fragment_;
+  double lateral_x_;  ///< direction of x that leads to the outer side: +1 for a left leg
 };
 
 Motion knee_motion(const ClutteredPhantom& phantom, const Options& options) {
@@ -154,7 +165,7 @@ MARROW_PLUGIN(plugin) {
       .option("frame_rate_hz", &Options::frame_rate_hz, "frames a second", at_least(1e-3), unit("Hz"))
       .option("period_s", &Options::period_s, "time from stretched to bent and back", at_least(1e-3), unit("s"))
       .option("flexion_deg", &Options::flexion_deg, "largest flexion, from the knee's flexion at rest")
-      .option("axial_deg", &Options::axial_deg, "rotation of the lower leg about its long axis at the largest flexion")
+      .option("axial_deg", &Options::axial_deg, "internal rotation of the lower leg at the largest flexion")
       .option("swing_deg", &Options::swing_deg, "rotation of the femur at the largest flexion")
       .option("shift_mm", &Options::shift_mm, "how far the femur is shifted on its way")
       .option("blank", &Options::blank, "first and last frame that the closed shutter makes blank; none: no frame")

@@ -64,6 +64,28 @@ TEST(KneeMotion, BendsByTheFlexionAskedFor) {
   EXPECT_LT((truth(5, "tibia") * in_ct - axis_mm).norm(), 1e-6) << "about the axis of the knee";
 }
 
+/// The front of a leg that turns inwards goes to the other leg: to the patient's right on the left side.
+TEST(KneeMotion, TheLowerLegTurnsInwardsOnBothSides) {
+  const auto front_goes_to_left_mm = [](const std::string& side) {
+    const auto femur = simulated::femur({{"side", side}, {"resolution_mm", 2.0}});
+    const auto whole = shipped::call("simulate.whole", {{"bone", shipped::item(femur)}}).at("phantom");
+    const auto phantom = shipped::call("simulate.clutter", {{"phantom", whole}}, {{"knee", "mild"}}).at("phantom");
+    const auto postures = shipped::call("simulate.knee_motion", {{"phantom", phantom}},
+                                        {{"frames", std::int64_t(6)},
+                                         {"frame_rate_hz", 10.0},
+                                         {"period_s", 1.0},
+                                         {"flexion_deg", 0.0},
+                                         {"swing_deg", 0.0},
+                                         {"shift_mm", 0.0}})
+                              .at("postures")
+                              .as_list<phantom::Posture>();
+    const RigidTransform turn = postures[5].bodies.at(0).value();  // the tibia at its largest flexion
+    return (turn.rotation * Eigen::Vector3d(0, -100, 0)).x();
+  };
+  EXPECT_NEAR(front_goes_to_left_mm("left"), -100 * std::sin(radians(10)), 1e-6);
+  EXPECT_NEAR(front_goes_to_left_mm("right"), 100 * std::sin(radians(10)), 1e-6);
+}
+
 TEST(KneeMotion, TruthsAndSurfacesMoveTogether) {
   const auto frames = moving({{"frames", std::int64_t(4)}});
   const auto first = bones(frames[0]).at("truths").as_list<Truth>(),

@@ -51,21 +51,52 @@ constexpr std::array<Node, 9> kCanal{{{0.06, 12.0},
                                       {0.83, 2.6},
                                       {0.90, 12.0}}};
 
+// Half the width that the parts of the distal end are placed by, before they are scaled.
+constexpr double kHalfWidthMm = 41;
+// Of the points of the medial condyle that lie farthest back, from those of the lateral one: to the medial side, and to
+// the back. The line through them is the one from which anteversion is measured.
+constexpr double kCondylesApartMm = 49.5, kCondylesRiseMm = 4;
+
 }  // namespace
 
-FemurField::FemurField(const FemurShape& shape) : shape_(shape), scale_(shape.bicondylar_width_mm / 82) {
+FemurField::FemurField(const FemurShape& shape)
+    : shape_(shape), scale_(0.5 * shape.bicondylar_width_mm / kHalfWidthMm) {
   const double head_radius = 0.5 * shape.head_diameter_mm;
   const double out = shape.neck_length_mm * std::sin(shape.neck_shaft_rad),
                up = -shape.neck_length_mm * std::cos(shape.neck_shaft_rad);
   const double z = shape.length_mm - head_radius;
   neck_base_ = {0, bow(z - up), z - up};
-  head_ = neck_base_ + Vector3d(out * std::cos(shape.anteversion_rad), -out * std::sin(shape.anteversion_rad), up);
+  const double forward_rad = shape.anteversion_rad - std::atan2(kCondylesRiseMm, kCondylesApartMm);
+  head_ = neck_base_ + Vector3d(out * std::cos(forward_rad), -out * std::sin(forward_rad), up);
+  // Parts swell where they are joined, and where the shaft joins them, so the width is not that of the parts.
+  for (int round = 0; round < 5; ++round) scale_ *= shape.bicondylar_width_mm / distal_width_mm();
   Random random(shape.seed, 7);
   for (Wave& wave : waves_) {
     const Vector3d direction(random.normal(), random.normal(), random.normal());
     wave = {direction.normalized() * 2 * 3.14159265358979323846 / (35 + 65 * random.uniform_above_0()),
             2 * 3.14159265358979323846 * random.uniform_above_0()};
   }
+}
+
+double FemurField::distal_width_mm() const {
+  // No part of the distal end is wider than its epicondyles, which lie around here.
+  const double behind = bow(0.06 * shape_.length_mm) - 4;
+  const auto reaches = [&](double x) {
+    for (double z = 18 * scale_; z <= 48 * scale_; z += 1)
+      for (double y = behind - 14 * scale_; y <= behind + 22 * scale_; y += 1)
+        if (outer_at({x, y, z}) <= 0) return true;
+    return false;
+  };
+  double width = 0;
+  for (const double side : {-1.0, 1.0}) {
+    double inside = 0.7 * kHalfWidthMm * scale_, outside = 1.3 * kHalfWidthMm * scale_;
+    for (int step = 0; step < 14; ++step) {
+      const double middle = 0.5 * (inside + outside);
+      (reaches(side * middle) ? inside : outside) = middle;
+    }
+    width += inside;
+  }
+  return width;
 }
 
 /// The y coordinate (towards the back) of the shaft's axis: an arc, convex to the front, with y = 0 at a fifth of the
@@ -93,7 +124,7 @@ double FemurField::shaft(const Vector3d& p) const {
 }
 
 double FemurField::distal(const Vector3d& p) const {
-  const double s = scale_, half = 0.5 * shape_.bicondylar_width_mm;
+  const double s = scale_, half = kHalfWidthMm * s;
   const double axis = bow(0.06 * shape_.length_mm) - 4;
   const Vector3d q(p.x(), p.y() - axis, p.z());
   // Each condyle is two discs, a smaller one at the back and a larger one at the front, because its radius of curvature

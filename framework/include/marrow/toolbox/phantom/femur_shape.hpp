@@ -6,7 +6,9 @@
 
 namespace marrow::phantom {
 
-/// Parameters of a femur. Defaults are means from the literature.
+/// Parameters of a femur. Defaults are means from the literature. Anteversion: the angle between the neck's axis and
+/// the line that touches both condyles at the back, seen along the shaft. Bicondylar width: across both condyles and
+/// epicondyles, along this line.
 struct FemurShape {
   double length_mm = 446;
   double head_diameter_mm = 46.6;
@@ -49,9 +51,10 @@ class FemurField {
   double distal(const Eigen::Vector3d& p) const;
   double proximal(const Eigen::Vector3d& p) const;
   double bow(double z) const;
+  double distal_width_mm() const;  ///< across both condyles and epicondyles
 
   FemurShape shape_;
-  double scale_;  ///< of the distal end, from the bicondylar width
+  double scale_;  ///< of the distal end, for the bicondylar width that is asked for
   Eigen::Vector3d head_, neck_base_;
   std::array<Wave, 12> waves_;
 };
