@@ -36,9 +36,10 @@ void check_finer(const Options& options) {
 /// The pose to which the first cost leads from the result of the second. So whether they agree depends on this result
 /// alone: the first search may have gone elsewhere only because of where it began.
 marrow::Pose led_back(const marrow::Pose& result, const marrow::Cost& cost, const marrow::Optimizer& optimizer,
-                      const marrow::search::Steps& steps, const Options& options, marrow::Context& context) {
+                      const Options& options, marrow::Context& context) {
   Search search(optimizer, result, options, context);
-  search.refine(cost, marrow::search::kAllAxes, steps, 1, 0);
+  for (const std::size_t level : {std::size_t(0), options.step_deg.size() - 1})
+    search.refine(cost, marrow::search::kAllAxes, search.steps_of(level), 1, 0);
   marrow::Pose pose = result;
   pose.world_from_model = search.pose();
   return pose;
@@ -83,7 +84,7 @@ Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const 
   result.pose = final_pose_of(search, first, *level, steps, options, context);
   result.pose.evaluations += first.evaluations;
   if (!disagreement(first, result.pose, options).empty()) {
-    const marrow::Pose back = led_back(result.pose, *levels.back(), optimizer, coarse.steps_of(0), options, context);
+    const marrow::Pose back = led_back(result.pose, *levels.back(), optimizer, options, context);
     if (const std::string warning = disagreement(back, result.pose, options); !warning.empty()) {
       context.warn(warning);
       result.pose.warnings.push_back(warning);

@@ -44,7 +44,7 @@ std::vector<RigidTransform> near_starts(const Judged& judged);
 struct Apart {
   double mm = 0, deg = 0;
 };
-/// Where a second cost leads from the pose: to the minimum next to it, or to one around it that is clearly better.
+/// How far a second cost leads from the pose: the medians over the best of the minima that it has around it.
 Apart second_cost(const Judged& judged, const Cost& cost);
 
 /// Figures for or against a pose: 0 speaks for it, a larger value against it.

@@ -71,7 +71,7 @@ class OnlyVerdicts(Case):
 
     def test_a_pose_without_a_verdict_is_told(self):
         result, record = self.only("other", code=0)
-        self.assertEqual(record["verdicts"], [])
+        self.assertNotIn("verdicts", record)
         self.assertIn(
             "marrow: note: nobody judges the output 'other': this pipeline has no verdict on that pose\n", result.stderr
         )
@@ -83,7 +83,7 @@ class OnlyVerdicts(Case):
 
     def test_what_needs_no_pose_needs_no_verdict(self):
         result, record = self.only("bone", code=0)
-        self.assertEqual(record["verdicts"], [])
+        self.assertNotIn("verdicts", record)
         self.assertNotIn("nobody judges", result.stderr)
 
 
