@@ -7,6 +7,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/quantile.hpp"
 #include "marrow/toolbox/geometry/targets.hpp"
 #include "marrow/toolbox/vtk/poly_data.hpp"
 
@@ -17,6 +18,18 @@ using namespace marrow;
 struct Options {
   int points = 20000;
 };
+
+/// The sign of the distance that VTK gives outside of a surface: it goes by the triangles' normals, which face outwards
+/// if the surface encloses a positive volume. Seen from its middle, this also holds where it is not quite closed.
+double sign_outside(Mesh reference, const Context& context) {
+  if (!is_closed(reference))
+    context.warn("the reference is no closed surface; the sign of bias_mm then is that of the nearest triangle's side");
+  const Eigen::Vector3d middle_mm = fragment_frame(reference).origin_mm;
+  for (Eigen::Vector3d& vertex : reference.vertices_mm) vertex -= middle_mm;
+  if (enclosed_volume_mm3(reference) >= 0) return 1;
+  context.warn("the triangles of the reference face inwards; bias_mm takes them as facing outwards");
+  return -1;
+}
 
 /// Signed distances (negative inside) from points spread over one surface to another surface. The vertices count only
 /// for the largest distance, which is usually at a vertex. For the mean they would be unfair: a finer mesh has more of
@@ -54,14 +67,12 @@ Metrics surface_distance(const Mesh& mesh, const Mesh& reference, const Options&
   std::vector<double> both;
   for (const Distances* one : {&there, &back})
     for (const double distance : one->of_points_mm) both.push_back(std::abs(distance));
-  if (!is_closed(reference))
-    context.warn("the reference is no closed surface; the sign of bias_mm then is that of the nearest triangle's side");
   Metrics metrics;
   metrics.items = {{"mean_mm", geometry::mean(both), "mm"},
                    {"rms_mm", geometry::root_mean_square(both), "mm"},
-                   {"p95_mm", geometry::quantile(both, 0.95), "mm"},
+                   {"p95_mm", quantile(both, 0.95), "mm"},
                    {"max_mm", std::max(there.largest_mm, back.largest_mm), "mm"},
-                   {"bias_mm", geometry::mean(there.of_points_mm), "mm"}};
+                   {"bias_mm", sign_outside(reference, context) * geometry::mean(there.of_points_mm), "mm"}};
   return metrics;
 }
 

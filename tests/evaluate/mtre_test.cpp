@@ -44,6 +44,12 @@ TEST(Mtre, SaysWhatIsWrong) {
                 "evaluate.mtre",
                 {{"pose", shipped::item(shifted(0, 0, 0))}, {"truth", exact()}, {"model", shipped::item(other)}}),
             "the model is in the frame 'stl', but the pose takes points in 'ct'; give the model that was registered");
+  const marrow::Mesh line{{{0, 0, 0}, {0, 0, 1}, {0, 0, 3}}, {{0, 1, 2}}};
+  EXPECT_EQ(
+      shipped::refusal("evaluate.mtre",
+                       {{"pose", shipped::item(shifted(0, 0, 0))}, {"truth", exact()}, {"model", shipped::item(line)}}),
+      "model: the surface has no area, as all its triangles are points or lines; check the file or the node that "
+      "it is from");
   marrow::Pose pose;
   pose.world_from_model.source = "mri";
   EXPECT_EQ(

@@ -51,6 +51,24 @@ TEST(SurfaceDistance, OfConcentricBalls) {
   EXPECT_NEAR(shipped::figure(distance(ball(20, 40), ball(22, 40)), "bias_mm"), -2, 0.012) << "too small";
 }
 
+TEST(SurfaceDistance, AnInsideOutReferenceHasTheSameBias) {
+  marrow::Mesh reference = box({0, 0, 0}, {20, 20, 40}), soup = ball(20, 40);
+  const marrow::Mesh larger = box({0, 0, 0}, {22, 22, 42});
+  const double right = shipped::figure(distance(larger, reference), "bias_mm");
+  EXPECT_GT(right, 0.9);
+  for (auto& t : reference.triangles) std::swap(t[0], t[1]);
+  for (auto& t : soup.triangles) std::swap(t[0], t[1]);
+  EXPECT_NEAR(shipped::figure(distance(larger, reference), "bias_mm"), right, 1e-9);
+  EXPECT_NEAR(shipped::figure(distance(ball(22, 40), soup), "bias_mm"), 2, 0.012) << "its patches share no vertices";
+  std::vector<std::string> lines;
+  marrow::Context::Hooks hooks;
+  hooks.log = [&](std::string_view text, marrow::LogLevel) { lines.emplace_back(text); };
+  shipped::call("evaluate.surface_distance", {{"mesh", shipped::item(larger)}, {"reference", shipped::item(reference)}},
+                {}, marrow::Context(hooks));
+  EXPECT_EQ(lines, std::vector<std::string>{
+                       "the triangles of the reference face inwards; bias_mm takes them as facing outwards"});
+}
+
 TEST(SurfaceDistance, OfBoxesOfWhichOneIsLonger) {
   // 20 x 20 x 40 in 20 x 20 x 46. The longer one's ends (areas 400) lie 3 mm off the shorter one, and of its sides what
   // sticks out (20 x 3, four times at each end) 0 to 3 mm: 2 * (400 * 3 + 240 * 1.5) over its area of 4480. The shorter

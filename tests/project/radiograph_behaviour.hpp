@@ -186,8 +186,23 @@ inline void a_field_leaves_the_rest_out(const Make& make) {
   };
   EXPECT_GT(projector->radiograph(camera(0), shapes::centred_at({0, 0, 0}), pixels(-20)).at(0), 50);
   EXPECT_EQ(projector->radiograph(camera(0), shapes::centred_at({0, 0, 0}), pixels(20)).at(0), 0);
+  const auto refusal = [&] {
+    try {
+      make(two, &field);
+    } catch (const marrow::Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  field.grid.origin_mm.x() += 500;
+  EXPECT_EQ(refusal(),
+            "the field does not lie where the volume lies: voxels of the same index are up to 500 mm apart; wire the "
+            "field that was segmented from this volume");
+  field.grid = two.grid;
+  field.values_mm.pop_back();
+  EXPECT_EQ(refusal().substr(0, 14), "the field has ");
   field.grid.size = {2, 2, 2};
-  EXPECT_THROW(make(two, &field), marrow::Error);
+  EXPECT_EQ(refusal().substr(0, 45), "the field has another size than the volume: 2");
 }
 
 inline void refuses_nonsense(const Make& make) {

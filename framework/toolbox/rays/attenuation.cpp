@@ -7,14 +7,10 @@
 #include <cmath>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/same_place.hpp"
 
 namespace marrow::rays {
 namespace {
-
-void check_field(const Volume& volume, const SignedField& field) {
-  if (field.grid.size != volume.grid.size || field.values_mm.size() != volume.grid.count())
-    throw Error("the field has another size than the volume; wire the one that was segmented from it");
-}
 
 void find_box(Attenuation& attenuation) {
   const Grid& grid = attenuation.grid;
@@ -110,7 +106,12 @@ Attenuation smoothed(const Attenuation& attenuation, double sigma_mm) {
 
 Attenuation attenuation_of(const Volume& volume, const SignedField* field, const AttenuationOptions& options) {
   check_volume(volume, "the volume to project");
-  if (field) check_field(volume, *field);
+  if (field) {
+    check_same_grid(field->grid, volume.grid);
+    if (field->values_mm.size() != field->grid.count())
+      throw Error("the field has " + std::to_string(field->values_mm.size()) + " values for " +
+                  std::to_string(field->grid.count()) + " voxels");
+  }
   Attenuation attenuation;
   attenuation.grid = volume.grid;
   attenuation.thousandths.resize(volume.grid.count());

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/same_place.hpp"
 
 namespace marrow::robot {
 namespace {
@@ -94,6 +95,8 @@ Gap::Gap(const Mesh& moved, const SignedField& of_moved, const Mesh& reference, 
       of_reference_(of_reference),
       on_moved_(points_of(moved, of_reference)),
       on_reference_(points_of(reference, of_moved)) {
+  check_lies_in(moved, of_moved.grid, "the moved fragment's surface", "its field");
+  check_lies_in(reference, of_reference.grid, "the reference's surface", "its field");
   if (on_moved_.empty() || on_reference_.empty())
     throw Error("the two fragments are nowhere within 3 mm of each other in the CT; are they sides of one fracture?");
 }

@@ -11,6 +11,7 @@
 #include <numeric>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/number_text.hpp"
 #include "marrow/domain/transform.hpp"
 
 namespace marrow::surface {
@@ -144,6 +145,25 @@ Mesh largest_component(Mesh mesh) {
     if (part[t[0]] != kDropped) mesh.triangles[triangles++] = {part[t[0]], part[t[1]], part[t[2]]};
   mesh.triangles.resize(triangles);
   return mesh;
+}
+
+void check_stable(const Taubin& taubin, const std::string& what) {
+  const double band = taubin.pass_band, lambda = taubin.lambda;
+  // A pair of steps multiplies a wave of the frequency k by 1 + lambda |mu| k (pass_band - k), with k up to 2. The
+  // factor of k = 2 is at least -1 as long as (2 - pass_band) lambda^2 + pass_band lambda <= 1.
+  const double most_lambda = (std::sqrt(band * band + 4 * (2 - band)) - band) / (2 * (2 - band));
+  if (!(lambda <= most_lambda))
+    throw Error(what + ": with lambda " + formatted("%g", lambda) + " and pass_band " + formatted("%g", band) +
+                " the shortest waves grow with each step, and tear the surface apart; give a lambda of at most " +
+                formatted("%.3f", std::floor(1000 * most_lambda) / 1000));
+  // The factor is largest at k = pass_band / 2.
+  constexpr double kMostGrowth = 1.15;
+  const double growth = 1 + lambda * lambda / (1 - lambda * band) * band * band / 4;
+  const double most_iterations = std::floor(std::log(kMostGrowth) / std::log(growth));
+  if (taubin.iterations > most_iterations)
+    throw Error(what + ": " + std::to_string(taubin.iterations) +
+                " iterations inflate waves of the surface by more than 15 %; give at most " +
+                formatted("%.0f", most_iterations) + ", or a smaller pass_band or lambda");
 }
 
 void smooth(Mesh& mesh, const Taubin& taubin) {

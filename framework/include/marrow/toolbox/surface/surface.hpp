@@ -3,6 +3,7 @@
 // The common part of the meshers: checks of the field, and the last steps on the surface.
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "marrow/domain/mesh.hpp"
 #include "marrow/domain/volume.hpp"
@@ -41,11 +42,13 @@ marrow::Mesh largest_component(marrow::Mesh mesh);
 
 /// Smoothing without shrinking: `iterations` pairs of a smoothing and an inflating step (Taubin, A signal processing
 /// approach to fair surface design, SIGGRAPH 1995). Shapes longer than about 2 pi / sqrt(pass_band) edges keep their
-/// size. The surface must be closed.
+/// size. The surface must be closed. lambda and pass_band are above 0, and pass_band is at most 1.
 struct Taubin {
   int iterations = 10;
   double lambda = 0.5, pass_band = 0.1;
 };
+/// Throws Error unless no wave of any surface grows by more than 15 %. `what` names the mesh in the message.
+void check_stable(const Taubin& taubin, const std::string& what);
 void smooth(marrow::Mesh& mesh, const Taubin& taubin);
 
 /// The last steps of each mesher: keep only the largest component, then smooth.
