@@ -130,8 +130,8 @@ cv::Mat large_components(cv::Mat& labels, int min_pixels) {
   return kept;
 }
 
-marrow::EdgeMap adaptive_relaxation(const marrow::View& view, const Options& options) {
-  const Prepared image = prepare(view, options.sigma_px, options.logarithm);
+marrow::EdgeMap adaptive_relaxation(const marrow::View& view, const Options& options, marrow::Context& context) {
+  const Prepared image = prepare(view, options.sigma_px, options.logarithm, context);
   const Gradient gradient = gaussian_gradient(image.values, options.sigma_px);
   const Thresholds thresholds = local_thresholds(image, gradient, options);
   cv::Mat labels = classified(image, gradient, thresholds, options.thin);

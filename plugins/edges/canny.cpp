@@ -25,8 +25,8 @@ struct Options {
 
 constexpr float kUnit = 64;  // one standard deviation of the noise in the 16 bit gradient that OpenCV needs
 
-marrow::EdgeMap canny(const marrow::View& view, const Options& options) {
-  const Prepared image = prepare(view, options.sigma_px, options.logarithm);
+marrow::EdgeMap canny(const marrow::View& view, const Options& options, marrow::Context& context) {
+  const Prepared image = prepare(view, options.sigma_px, options.logarithm, context);
   const Gradient gradient = gaussian_gradient(image.values, options.sigma_px);
   const cv::Mat noise = block_noise(image, gradient);
   const cv::Mat median = window_percentiles(gradient, image.usable, options.window_px, {50, 50, 50})[0];

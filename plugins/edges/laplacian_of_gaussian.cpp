@@ -51,8 +51,9 @@ std::optional<float> way_to_zero(const cv::Mat& laplacian, const Gradient& gradi
   return side * here / (here - there);
 }
 
-marrow::EdgeMap laplacian_of_gaussian(const marrow::View& view, const ThresholdOptions& options) {
-  const Prepared image = prepare(view, options.sigma_px, options.logarithm);
+marrow::EdgeMap laplacian_of_gaussian(const marrow::View& view, const ThresholdOptions& options,
+                                      marrow::Context& context) {
+  const Prepared image = prepare(view, options.sigma_px, options.logarithm, context);
   const Gradient gradient = gradient_of(image.values, gaussian_kernel(options.sigma_px, kReach));
   const cv::Mat values = laplacian(image.values, options.sigma_px);
   return edges_above_noise(image, gradient, options, [&](int u, int v) { return way_to_zero(values, gradient, u, v); });

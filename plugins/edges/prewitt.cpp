@@ -7,9 +7,9 @@ namespace {
 
 using namespace marrow::image;
 
-marrow::EdgeMap prewitt(const marrow::View& view, const ThresholdOptions& options) {
+marrow::EdgeMap prewitt(const marrow::View& view, const ThresholdOptions& options, marrow::Context& context) {
   static const Kernel kMask{{1 / 3.0f, 1 / 3.0f, 1 / 3.0f}, {-0.5f, 0, 0.5f}};
-  return mask_edges(view, options, kMask);
+  return mask_edges(view, options, kMask, context);
 }
 
 }  // namespace

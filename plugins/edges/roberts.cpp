@@ -8,9 +8,9 @@ namespace {
 
 using namespace marrow::image;
 
-marrow::EdgeMap roberts(const marrow::View& view, const ThresholdOptions& options) {
+marrow::EdgeMap roberts(const marrow::View& view, const ThresholdOptions& options, marrow::Context& context) {
   static const Kernel kMask{{0.5f, 0.5f}, {-1, 1}};
-  return mask_edges(view, options, kMask);
+  return mask_edges(view, options, kMask, context);
 }
 
 }  // namespace

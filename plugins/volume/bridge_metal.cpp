@@ -2,12 +2,14 @@
 // Metal makes streaks in the slices of a CT that show it. They are worst where a long piece lies within a slice, such
 // as a screw across a bone: what is left of the bone's border there leads every segmentation astray. A screw is seen in
 // few slices, and a bone hardly changes from one of its sides to the other. So these slices are replaced by what lies
-// between their neighbours. Slices that a plate crosses are kept.
+// between their neighbours. Slices that only a plate crosses are kept.
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/number_text.hpp"
+#include "marrow/domain/quantile.hpp"
 
 namespace {
 
@@ -22,31 +24,58 @@ struct Options {
   double longest_mm = 15;
 };
 
-/// The number of voxels of a slice that are metal, and whose four neighbours are. So noise does not count.
-int metal_voxels(const Volume& ct, int z, double metal_hu) {
+/// The metal of a slice: voxels that are metal and whose four neighbours are. So noise does not count.
+struct Metal {
+  int voxels = 0;
+  double across_mm = 0;  ///< diagonal of the box around them
+};
+
+Metal metal_of(const Volume& ct, int z, double metal_hu) {
   const Grid& grid = ct.grid;
   const auto is_metal = [&](int x, int y) { return double(ct.at(x, y, z)) > metal_hu; };
-  int count = 0;
+  Metal metal;
+  Eigen::AlignedBox2d box;
   for (int y = 1; y + 1 < grid.size[1]; ++y)
     for (int x = 1; x + 1 < grid.size[0]; ++x)
-      count += is_metal(x, y) && is_metal(x - 1, y) && is_metal(x + 1, y) && is_metal(x, y - 1) && is_metal(x, y + 1);
-  return count;
+      if (is_metal(x, y) && is_metal(x - 1, y) && is_metal(x + 1, y) && is_metal(x, y - 1) && is_metal(x, y + 1)) {
+        ++metal.voxels;
+        box.extend(Eigen::Vector2d(x * grid.spacing_mm.x(), y * grid.spacing_mm.y()));
+      }
+  if (metal.voxels > 0) metal.across_mm = box.sizes().norm();
+  return metal;
 }
 
-/// The slices to replace: those with more metal than usual for the slices that show any, and their neighbours.
+/// In a few slices in a row there is no plate, only screws: there long metal counts by its length. In more, slices with
+/// more metal than usual for them show a screw besides the plate.
 std::vector<bool> slices_of_long_metal(const Volume& ct, const Options& options) {
-  const int slices = ct.grid.size[2], margin = int(std::ceil(options.margin_mm / ct.grid.spacing_mm.z() - 1e-9));
-  std::vector<int> counts, with_metal;
-  for (int z = 0; z < slices; ++z) {
-    counts.push_back(metal_voxels(ct, z, options.metal_hu));
-    if (counts.back() > 0) with_metal.push_back(counts.back());
+  constexpr double kLong_mm = 10;
+  const std::size_t slices = std::size_t(ct.grid.size[2]);
+  std::vector<Metal> metal;
+  for (int z = 0; z < ct.grid.size[2]; ++z) metal.push_back(metal_of(ct, z, options.metal_hu));
+  std::vector<bool> is_long(slices, false), is_of_plate(slices, false);
+  std::vector<double> with_plate;
+  for (std::size_t first = 0, end = 0; first < slices; first = end + 1) {
+    for (end = first; end < slices && metal[end].voxels > 0;) ++end;
+    const bool has_plate = double(end - first) * ct.grid.spacing_mm.z() > options.longest_mm;
+    for (std::size_t z = first; z < end; ++z) {
+      is_of_plate[z] = has_plate;
+      is_long[z] = !has_plate && metal[z].across_mm > kLong_mm;
+      if (has_plate) with_plate.push_back(metal[z].voxels);
+    }
   }
+  const double usual = with_plate.empty() ? 0 : marrow::quantile_in_place(with_plate, 0.5);
+  for (std::size_t z = 0; z < slices; ++z)
+    if (is_of_plate[z]) is_long[z] = metal[z].voxels > options.times_median * usual;
+  return is_long;
+}
+
+/// The slices to replace: those of long metal, and their neighbours.
+std::vector<bool> slices_to_replace(const Volume& ct, const Options& options) {
+  const int slices = ct.grid.size[2], margin = int(std::ceil(options.margin_mm / ct.grid.spacing_mm.z() - 1e-9));
+  const std::vector<bool> is_long = slices_of_long_metal(ct, options);
   std::vector<bool> bad(std::size_t(slices), false);
-  if (with_metal.empty()) return bad;
-  const auto middle = with_metal.begin() + std::ptrdiff_t(with_metal.size() / 2);
-  std::nth_element(with_metal.begin(), middle, with_metal.end());
   for (int z = 0; z < slices; ++z)
-    if (counts[std::size_t(z)] > options.times_median * *middle)
+    if (is_long[std::size_t(z)])
       std::fill(bad.begin() + std::max(z - margin, 0), bad.begin() + std::min(z + margin + 1, slices), true);
   return bad;
 }
@@ -72,7 +101,7 @@ std::string range(const Grid& grid, int below, int above) {
 Volume bridge_metal(const Volume& volume, const Options& options, Context& context) {
   marrow::check_volume(volume, "the CT");
   Volume ct = volume;
-  const std::vector<bool> bad = slices_of_long_metal(volume, options);
+  const std::vector<bool> bad = slices_to_replace(volume, options);
   const int slices = volume.grid.size[2];
   for (int z = 0; z < slices; ++z) {
     if (!bad[std::size_t(z)]) continue;
@@ -100,9 +129,11 @@ MARROW_PLUGIN(plugin) {
       .in("volume", "CT in Hounsfield units; its slices lie across the third axis of its grid")
       .out("volume", "the CT with these slices interpolated; without metal, the same CT")
       .option("metal_hu", &Options::metal_hu, "metal is above this value", marrow::unit("HU"))
-      .option("times_median", &Options::times_median,
-              "a slice is replaced if it shows this many times more metal than the median of the slices with metal",
-              marrow::at_least(1))
+      .option(
+          "times_median", &Options::times_median,
+          "where metal goes on over more than longest_mm, as a plate does: a slice is replaced if it shows this many "
+          "times more metal than the median of these slices. Elsewhere it is if its metal is longer than 10 mm",
+          marrow::at_least(1))
       .option("margin_mm", &Options::margin_mm, "slices nearer than this to one of them are replaced too",
               marrow::at_least(0))
       .option("longest_mm", &Options::longest_mm, "longer gaps stay as they are, with a warning", marrow::at_least(0));

@@ -61,7 +61,9 @@ TEST(AdaptiveRelaxation, KeepsThickEdgesOnRequest) {
   const auto view = edges::drawn(64, [](double u, double) { return u < 30 ? 5000.0 : 9000.0; });
   Options options;
   options.thin = false;
-  EXPECT_GE(adaptive_relaxation(view, options).pixels.size(), adaptive_relaxation(view, Options{}).pixels.size());
+  marrow::Context context;
+  EXPECT_GE(adaptive_relaxation(view, options, context).pixels.size(),
+            adaptive_relaxation(view, Options{}, context).pixels.size());
 }
 
 }  // namespace

@@ -52,6 +52,26 @@ TEST(BridgeMetal, ReplacesTheSlicesOfAScrewByWhatLiesBetween) {
             std::vector<std::string>{"slices 13 to 16 (z = 15.6 to 19.2 mm) show long metal, and are bridged"});
 }
 
+TEST(BridgeMetal, ReplacesTheSlicesOfAScrewWithoutAPlate) {
+  // By hand: slice 14 becomes the mean of 12^2 and 16^2.
+  marrow::Volume one = ct(), two = ct();
+  add_metal(one, 14, 14, 16);
+  add_metal(two, 7, 8, 16);
+  add_metal(two, 20, 22, 14);
+  const Bridged run(one);
+  EXPECT_EQ(run.lines,
+            std::vector<std::string>{"slices 13 to 15 (z = 15.6 to 18.0 mm) show long metal, and are bridged"});
+  EXPECT_NEAR(run.ct.at(10, 9, 14), 0.5 * 144 + 0.5 * 256, 1e-3);
+  EXPECT_EQ(run.ct.at(10, 9, 12), 144);
+  const Bridged both(two);
+  EXPECT_EQ(both.lines,
+            (std::vector<std::string>{"slices 6 to 9 (z = 7.2 to 10.8 mm) show long metal, and are bridged",
+                                      "slices 19 to 23 (z = 22.8 to 27.6 mm) show long metal, and are bridged"}));
+  marrow::Volume clip = ct();
+  add_metal(clip, 14, 16, 6);
+  EXPECT_EQ(Bridged(clip).ct.values, clip.values) << "a clip of 6 mm makes no streaks along a bone";
+}
+
 TEST(BridgeMetal, LeavesACtWithoutMetalAsItIs) {
   EXPECT_EQ(Bridged(ct()).ct.values, ct().values);
   marrow::Volume plate = ct();

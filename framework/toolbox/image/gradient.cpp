@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <marrow/domain/error.hpp>
+#include <marrow/domain/quantile.hpp>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 
+#include "marrow/toolbox/image/grey_range.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
 #include "usable.hpp"
 
@@ -27,22 +29,16 @@ void for_bands(int rows, Function function) {
                     [&](int band) { function(band * kBandRows, std::min(rows, (band + 1) * kBandRows)); });
 }
 
-float median(std::vector<float>& values, double fraction = 0.5) {
-  const auto middle = values.begin() + std::ptrdiff_t(double(values.size() - 1) * fraction);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Standard deviation of Gaussian noise with the same median absolute deviation.
 float deviation(std::vector<float>& values) {
-  const float centre = median(values);
+  const float centre = float(quantile_in_place(values, 0.5));
   for (float& value : values) value = std::abs(value - centre);
-  return 1.4826f * median(values);
+  return 1.4826f * float(quantile_in_place(values, 0.5));
 }
 
 }  // namespace
 
-Prepared prepare(const View& view, double sigma_px, bool logarithm) {
+Prepared prepare(const View& view, double sigma_px, bool logarithm, const Context& context) {
   check_view(view);
   const std::string what = "view '" + view.name + "'";
   const int type = view.image.pixels.type();
@@ -52,15 +48,18 @@ Prepared prepare(const View& view, double sigma_px, bool logarithm) {
   view.image.pixels.convertTo(grey, CV_32F);
   if (type == CV_32FC1 && !cv::checkRange(grey))
     throw Error(what + ": the image holds pixels that are not finite (NaN or infinity)");
-  double smallest = 0, largest = 0;
-  cv::minMaxLoc(grey, &smallest, &largest);
-  if (smallest == largest) {
+  const GreyRange range = grey_range(grey);
+  if (range.least == range.greatest) {
     std::ostringstream text;
-    text << what << ": all pixels have the same value " << smallest << ", so there is no edge; check the image file";
+    text << what << ": all pixels have the same value " << range.least << ", so there is no edge; check the image file";
     throw Error(text.str());
   }
-  if (logarithm && largest <= 0)
+  if (logarithm && range.greatest <= 0)
     throw Error(what + ": the image has no positive grey value, so its logarithm cannot be taken");
+  warn_of_greys(view, context);
+  if (range.beyond > 0) grey = cv::min(cv::max(grey, range.least), range.greatest);
+  const double dark = range.dark(), smallest = range.least - dark, largest = range.greatest - dark;
+  if (dark < 0) grey -= dark;
   Prepared prepared;
   prepared.usable = usable_pixels(view, grey, smallest, largest, int(std::ceil(3 * sigma_px)));
   if (cv::countNonZero(prepared.usable) == 0)
@@ -159,9 +158,10 @@ NoiseLevel::NoiseLevel(const Prepared& image, const Gradient& gradient) {
       values.push_back(blocks[i].first);
       noises.push_back(blocks[i].second);
     }
-    const float value = median(values);
+    const float value = float(quantile_in_place(values, 0.5));
     const float least = float(rounding * image.slope(value));
-    noise_of_value_.emplace_back(value, std::max(least, median(noises, 0.3)));  // texture only adds to the noise
+    constexpr double kQuietest = 0.3;  // texture only adds to the noise
+    noise_of_value_.emplace_back(value, std::max(least, float(quantile_in_place(noises, kQuietest))));
   }
   if (noise_of_value_.empty())
     noise_of_value_.emplace_back(0.0f, float(rounding * image.slope(image.values.at<float>(0, 0))));

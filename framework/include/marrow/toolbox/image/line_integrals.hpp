@@ -6,7 +6,7 @@
 
 namespace marrow::image {
 
-/// The scale of an image's grey values, whose brightest value is taken as air. Bright = air.
+/// The scale of an image's grey values (grey_range.hpp), whose brightest value is taken as air. Bright = air.
 class GreyScale {
  public:
   /// Darker values count as this fraction of the brightest. They hold scatter and noise, which their logarithm would
@@ -16,12 +16,14 @@ class GreyScale {
   /// `image` has one channel of any type; NaN is ignored. Without a positive value, all of the image counts as dark.
   explicit GreyScale(const cv::Mat& image);
 
-  double brightest() const { return brightest_; }
-  /// -ln(grey / brightest), without unit: 0 for air, at most 5.3. NaN for NaN.
+  /// The grey value where no light falls, and by how much that behind air is above it.
+  double dark() const { return dark_; }
+  double air() const { return air_; }
+  /// -ln((grey - dark) / air), without unit: 0 for air and what is brighter, at most 5.3. NaN for NaN.
   double line_integral(double grey) const;
 
  private:
-  double brightest_ = 1;
+  double dark_ = 0, air_ = 1;
 };
 
 /// GreyScale::line_integral() of each pixel, as CV_32F.

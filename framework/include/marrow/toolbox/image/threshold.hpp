@@ -25,7 +25,7 @@ EdgeMap edges_above_noise(const Prepared& image, const Gradient& gradient, const
 
 /// Edges by a small mask (Roberts, Prewitt, Sobel) applied to the smoothed image: ridges of the gradient's magnitude.
 /// Throws Error as prepare() does.
-EdgeMap mask_edges(const View& view, const ThresholdOptions& options, const Kernel& mask);
+EdgeMap mask_edges(const View& view, const ThresholdOptions& options, const Kernel& mask, const Context& context);
 
 /// Declares all options except sigma_px.
 template <class Builder>

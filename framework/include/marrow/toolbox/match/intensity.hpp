@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "marrow/plugin.hpp"
+#include "marrow/toolbox/image/grey_range.hpp"
 #include "marrow/toolbox/match/views_cost.hpp"
 
 namespace marrow::match {
@@ -62,6 +63,7 @@ struct IntensityOptions {
   double blur_px = 0.5;
   std::vector<double> weights;
   int least_margin_steps = 0;  ///< no option: the least margin that the measure needs, in compared pixels
+  bool has_blocks = true;      ///< no option: whether leaving out a block tells something (ViewsCost::split())
 };
 
 /// A cost that is the weighted mean of a measure over the views. In each view only the region that may show the model
@@ -80,7 +82,9 @@ std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector,
 template <auto kMeasure, class Options = IntensityOptions, int kWorst = 2>
 std::shared_ptr<const Cost> intensity_node(const RadiographProjector& projector, const List<View>& views,
                                            const List<Pose>* others, const List<RadiographProjector>* other_projectors,
-                                           const List<OutlineProjector>* other_outlines, const Options& options) {
+                                           const List<OutlineProjector>* other_outlines, const Options& options,
+                                           Context& context) {
+  for (const View& view : views) image::warn_of_greys(view, context);
   IntensityOptions own = options;
   if constexpr (requires { options.patch_pixels; }) own.least_margin_steps = options.patch_pixels;
   const auto called = [options](const Patch& patch) {
