@@ -14,7 +14,7 @@ from pictures import read_grey
 from values import read_camera, read_pose, read_view_image
 
 FINE = 4  # pixels of the shadow in a pixel of the image
-ALLOWED_PX, ALLOWED_PERCENT = 0.08, 3
+ALLOWED_PX, ALLOWED_PERCENT = 0.15, 3  # a shadow of coarse triangles lies outside a smooth outline
 
 
 def shadow(mesh, place, camera):

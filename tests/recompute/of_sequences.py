@@ -75,13 +75,13 @@ def joint(call):
     right, up = (np.asarray(options[name], float) for name in ("right", "up"))
     axes = np.column_stack([right, np.cross(up, right), np.cross(right, np.cross(up, right))])
     axes /= np.linalg.norm(axes, axis=0)
-    upper, lower = (call.many(port, read_way) for port in ("proximal", "distal"))
+    upper, lower = (call.all(port, read_way) for port in ("proximal", "distal"))
     (_, above), (_, below) = next(iter(upper.items())), next(iter(lower.items()))
     first = above.poses[0].inverse() @ below.poses[0]
     above, below = (states[call.item].poses[0] for states in (upper, lower))
     relative = (above.rotation @ axes).T @ (below.rotation @ axes)
-    # relative = turn about x, then about the turned y, then about the turned z
-    flexion, adduction, internal = Rotation.from_matrix(relative).as_euler("XYZ", degrees=True)
+    # Of the axes right, front and up: a turn about the first takes up to the back, one about the last front to the left.
+    extension, adduction, internal = Rotation.from_matrix(relative).as_euler("XYZ", degrees=True)
     apart_mm = below(options["centre_mm"]) - above(options["centre_mm"])
     x, z = above.rotation @ axes[:, 0], below.rotation @ axes[:, 2]
     floating = np.cross(z, x) / np.linalg.norm(np.cross(z, x))
@@ -91,9 +91,9 @@ def joint(call):
     # The angle of a turn that is hardly one has the rounding of the table in it, and its axis all of it.
     of_axis = OF_TABLE * (1 + np.linalg.norm(since.shift_mm) / max(np.radians(angle), 1e-9))
     return {
-        "flexion_deg": within(flexion, np.degrees(OF_TABLE)),
+        "flexion_deg": within(-extension, np.degrees(OF_TABLE)),
         "adduction_deg": within(adduction, np.degrees(OF_TABLE)),
-        "internal_rotation_deg": within(-internal, np.degrees(OF_TABLE)),
+        "internal_rotation_deg": within(internal, np.degrees(OF_TABLE)),
         "right_mm": within(apart_mm @ x, 1e-6),
         "front_mm": within(apart_mm @ floating, 1e-6),
         "distraction_mm": within(-apart_mm @ z, 1e-6),

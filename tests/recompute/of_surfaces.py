@@ -14,11 +14,11 @@ def dice(call):
     inside = field.values_mm < 0
     where = other.index(field.points_mm(indices(field)))
     is_other = (at(other, where) < 0) & covers(other, where)
-    beyond = ~covers(field, field.index(other.points_mm(indices(other))))[other.values_mm.ravel() < 0]
+    beyond = ~covers(field, field.index(other.points_mm(indices(other)))) & (other.values_mm.ravel() < 0)
     voxel, other_voxel = np.prod(field.spacing_mm), np.prod(other.spacing_mm)
     volume = inside.sum() * voxel
     common = (inside.ravel() & is_other).sum() * voxel
-    of_other = is_other.sum() * voxel + beyond[other.values_mm.ravel() < 0].sum() * other_voxel
+    of_other = is_other.sum() * voxel + beyond.sum() * other_voxel
     # A voxel whose interpolated value is 0 but for rounding may count on either side.
     unclear = (np.abs(at(other, where)) < 1e-5).sum() * voxel
     return {

@@ -85,16 +85,8 @@ def between(probability, low, high):
 
 
 def judgement(probability, doubtful_above, wrong_above):
-    """None where the probability is so close to a limit that either judgement may be right."""
-    names = {
-        "wrong" if at > wrong_above else "doubtful" if at > doubtful_above else "trusted"
-        for at in (probability.value - probability.allowed, probability.value + probability.allowed)
-    }
-    return names.pop() if len(names) == 1 else None
-
-
-def without_unknown(figures):
-    return {name: value for name, value in figures.items() if value is not None}
+    """By the printed probability, which is compared by itself."""
+    return "wrong" if probability > wrong_above else "doubtful" if probability > doubtful_above else "trusted"
 
 
 def is_determined(pose):
@@ -112,7 +104,7 @@ def predicted(call):
         "failure_probability": spread.failure,
         "predicted_mtre_mm": spread.mtre_mm,
         "predicted_axial_deg": spread.axial_deg,
-        "judgement": judgement(spread.failure, options["doubtful_above"], options["wrong_above"]),
+        "judgement": judgement(call.printed["failure_probability"], options["doubtful_above"], options["wrong_above"]),
     }
     contradicted = False
     if call.has("prior"):
@@ -120,7 +112,7 @@ def predicted(call):
         result |= figures
     if (pose.warnings or contradicted) and result["judgement"] == "trusted":
         result["judgement"] = "doubtful"
-    return without_unknown(result)
+    return result
 
 
 def against_prior(pose, prior, frame, options):
@@ -151,7 +143,7 @@ def of_evidence(call, printed):
     by_model = 1 / (1 + math.exp(-log_odds))
     result = figures_of_poses(call, pose, bone)
     result["failure_probability"] = within(1 - (1 - by_model) * (1 - covered.value), (1 - by_model) * covered.allowed)
-    result["judgement"] = judgement(result["failure_probability"], model["doubtful_above"], model["wrong_above"])
+    result["judgement"] = judgement(printed["failure_probability"], model["doubtful_above"], model["wrong_above"])
     is_denied = any(
         printed.get(by + "apart_mm", 0) > MOST_MM or printed.get(by + "apart_deg", 0) > MOST_DEG
         for by in ("", "contour_")
@@ -159,7 +151,7 @@ def of_evidence(call, printed):
     is_denied |= printed.get("intersection_mm", 0) > options["most_intersection_mm"]
     if is_denied and result["judgement"] == "trusted":
         result["judgement"] = "doubtful"
-    return without_unknown(result)
+    return result
 
 
 def figures_of_poses(call, pose, bone):

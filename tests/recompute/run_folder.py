@@ -7,6 +7,7 @@ import dataclasses
 import json
 import pathlib
 
+from figures import NotRecomputed
 from values import read_yaml
 
 
@@ -46,7 +47,8 @@ class Run:
         """References to all values that the nodes have made."""
         nodes = self.record["nodes"]  # those of a body have its name and a slash before their own
         done = [node for node in nodes if node["status"] == "done" and "/" not in node["id"]]
-        return ["%s.%s" % (node["id"], port) for node in done for port in node.get("keys", {})]
+        made = ["%s.%s" % (node["id"], port) for node in done for port in node.get("keys", {})]
+        return [reference for reference in made if ".last_" not in reference]  # the same as that of the last pass
 
     def outputs_of(self, folder):
         references = read_yaml(folder / "pipeline.yaml")["outputs"]
@@ -156,6 +158,13 @@ def for_output(reference):
     return "for_" + reference.replace(".", "_")
 
 
+class Options(dict):
+    """The options of a node. Another version of it may have others."""
+
+    def __missing__(self, name):
+        raise NotRecomputed("the node of this run has no option '%s'" % name)
+
+
 class Call:
     """One call of a node: the values of its inputs, for the item that it has made."""
 
@@ -163,7 +172,7 @@ class Call:
         self.run, self.node, self.item = run, node, item
         self.file, self.printed = file, printed
         self.parts = [part for part in item.split("/") if part]
-        self.options = node.options
+        self.options = Options(node.options)
 
     def beside(self, port):
         """The file of another output of the same call."""
@@ -185,6 +194,10 @@ class Call:
         if len(fitting) != 1:
             raise Missing("%s for %s" % (self.run.wire(self.node, port), self.item or "the run"))
         return read(files[fitting[0]])
+
+    def all(self, port, read):
+        """The values of all items of an input, by their whole names."""
+        return {item: read(file) for item, file in self.files(port).items()}
 
     def many(self, port, read):
         """The values of an input that takes a list, by the names of its items."""
