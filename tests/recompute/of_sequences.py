@@ -80,7 +80,7 @@ def joint(call):
     first = above.poses[0].inverse() @ below.poses[0]
     above, below = (states[call.item].poses[0] for states in (upper, lower))
     relative = (above.rotation @ axes).T @ (below.rotation @ axes)
-    # Of the axes right, front and up: a turn about the first takes up to the back, one about the last front to the left.
+    # Of right, front and up: a turn about the first takes up to the back, one about the last takes front to the left.
     extension, adduction, internal = Rotation.from_matrix(relative).as_euler("XYZ", degrees=True)
     apart_mm = below(options["centre_mm"]) - above(options["centre_mm"])
     x, z = above.rotation @ axes[:, 0], below.rotation @ axes[:, 2]
