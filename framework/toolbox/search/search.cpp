@@ -173,18 +173,22 @@ double size_of(const PredictedCovariance& predicted) {
 
 /// A cost whose own derivatives do not tell how it rises is rough: a few hundredths of a degree away, the same
 /// prediction may be several times as large. So it is made at five poses next to each other, and the middle one is
-/// taken. It belongs to the pose, not to the point of the rough ground at which the search happened to stop.
+/// taken. It belongs to the pose, not to the point of the rough ground at which the search happened to stop. What
+/// nothing determines stays so.
 PredictedCovariance on_rough_ground(const PredictedCovariance& at_pose, const Cost& cost, const RigidTransform& pose,
                                     const FragmentFrame& frame, int& evaluations) {
   constexpr double kStep = 0.03;  // degrees and mm
   constexpr int kSenses[4][6] = {
       {1, 1, 1, 1, 1, 1}, {1, -1, -1, 1, -1, -1}, {-1, 1, -1, -1, 1, -1}, {-1, -1, 1, -1, -1, 1}};
+  constexpr double kUnknown = 90;  // degrees and mm
+  if (size_of(at_pose) > kUnknown * kUnknown) return at_pose;
   std::vector<PredictedCovariance> all{at_pose};
   for (const auto& senses : kSenses) {
     Vector6d motion;
     for (int axis = 0; axis < 6; ++axis) motion[axis] = kStep * senses[axis];
-    all.emplace_back(cost, moved_by_units(pose, frame, motion), frame);
-    evaluations += all.back().evaluations();
+    const PredictedCovariance beside(cost, moved_by_units(pose, frame, motion), frame);
+    evaluations += beside.evaluations();
+    if (!beside.is_by_derivatives()) all.push_back(beside);
   }
   std::vector<std::size_t> order(all.size());
   std::iota(order.begin(), order.end(), std::size_t(0));
