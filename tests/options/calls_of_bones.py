@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How the nodes are called that make models, features and poses: (inputs, options) by the node's name."""
+
+
+def calls(s):
+    def views_and(**more):
+        return {"views": s.views, **more}
+
+    def others(of_outlines):
+        drawn = {"other_projectors": s.both_outlines if of_outlines else s.both_drrs}
+        return {"others": s.parts.starts, **drawn, **({} if of_outlines else {"other_outlines": s.both_outlines})}
+
+    search = dict(scan_rotation_deg=6, scan_translation_mm=6, candidates=2, max_evaluations=60)
+    made = {
+        "edges.%s" % name: lambda: ({"view": s.views["frontal"]}, {})
+        for name in ("adaptive_relaxation", "canny", "laplacian_of_gaussian", "prewitt", "roberts", "sobel")
+    }
+    made.update(
+        {
+            "mesh.%s" % name: lambda: ({"field": s.two_parts}, {})
+            for name in ("flying_edges", "marching_cubes", "surface_nets")
+        }
+    )
+    made.update({"mesh.%s" % name: lambda: ({"field": s.two_parts}, {}) for name in ("delaunay", "poisson")})
+    made.update(
+        {"project.%s" % n: lambda: ({"volume": s.volume, "field": s.field}, {}) for n in ("joseph", "ray_casting")}
+    )
+    made.update(
+        {
+            "shaft.%s"
+            % n: lambda: (
+                {"edges": s.edges["frontal"], "view": s.views["frontal"]},
+                {"width_mm": [28], "width_deviation_mm": [2]},
+            )
+            for n in ("hough_pairs", "line_segments", "ransac")
+        }
+    )
+    made.update(
+        {
+            "similarity.%s" % name: lambda: (views_and(projector=s.drr, **others(False)), {})
+            for name in (
+                "entropy_of_difference",
+                "gradient_correlation",
+                "gradient_difference",
+                "gradient_orientation",
+                "metal_gradient_correlation",
+                "mutual_information",
+                "normalised_cross_correlation",
+                "patch_correlation",
+                "patch_gradient_correlation",
+                "pattern_intensity",
+            )
+        }
+    )
+
+    def segment(**more):
+        return {"volume": s.volume, "seeds": s.case.seeds, **more}
+
+    made.update(
+        {
+            "segment.%s" % name: lambda: (segment(), {})
+            for name in ("distance_regularised", "level_set", "region_growing", "sparse_field", "threshold")
+        }
+    )
+    made.update(
+        {
+            "mesh.simplify": lambda: ({"mesh": s.mesh}, {"triangles": 900}),
+            "mesh.smooth": lambda: ({"mesh": s.closed_mesh}, {}),
+            "segment.atlas": lambda: (segment(template=s.mesh), {"iterations": 4}),
+            "project.siddon_jacobs": lambda: ({"volume": s.volume, "field": s.field}, {}),
+            "project.lightfield": lambda: (
+                {"volume": s.volume, "field": s.field, "views": s.views},
+                {"step_mm": 12, "step_deg": 6, "range_deg": 6},
+            ),
+            "project.silhouette": lambda: ({"mesh": s.mesh, "volume": s.volume}, {}),
+            "project.silhouette_edges": lambda: ({"mesh": s.mesh, "volume": s.volume}, {}),
+            "similarity.contour_distance": lambda: (
+                views_and(
+                    projector=s.outline, edges=s.edges, **others(True), **s.with_mesh("similarity.contour_distance")
+                ),
+                {},
+            ),
+            "similarity.drr_edges": lambda: (
+                views_and(
+                    projector=s.drr,
+                    edges=s.edges,
+                    outline=s.outline,
+                    **others(True),
+                    **s.with_mesh("similarity.drr_edges")
+                ),
+                {},
+            ),
+            "similarity.gradient_projection": lambda: (views_and(mesh=s.mesh, volume=s.volume), {}),
+            "similarity.ray_to_surface": lambda: (
+                views_and(
+                    field=s.field,
+                    edges=s.edges,
+                    projector=s.outline,
+                    **others(True),
+                    **s.with_mesh("similarity.ray_to_surface")
+                ),
+                {},
+            ),
+            "similarity.with_prior": lambda: ({"cost": s.grey, "prior": s.known, "found": s.found.pose}, {}),
+            "register.icp": lambda: ({"initial": s.start, "model": s.mesh, "target": s.placed}, {"points": 300}),
+            "register.multiresolution": lambda: (
+                {"cost": s.contour, "optimizer": s.optimizer, "initial": s.start},
+                search,
+            ),
+            "register.sequence": lambda: (
+                {"cost": s.contour, "finer_cost": s.grey, "optimizer": s.optimizer, "initial": s.start},
+                search,
+            ),
+            "register.tracked": lambda: (
+                {
+                    "cost": s.contour,
+                    "finer_cost": s.grey,
+                    "optimizer": s.optimizer,
+                    "initial": s.found.pose,
+                    "state": s.track,
+                },
+                {"wide_poses": 20, "gate": 0.01},
+            ),
+            "initial.best_of": lambda: (
+                {"first": s.start, "second": s.parts.starts["distal"], "cost": s.contour, "optimizer": s.optimizer},
+                {},
+            ),
+            "initial.fiducials": lambda: ({"model": s.mesh, "landmarks": s.skin}, {}),
+            "initial.global_search": lambda: (
+                {"model": s.mesh, "cost": s.contour, "optimizer": s.optimizer, "start": s.start},
+                {"poses": 60, "candidates": 6, "finalists": 2, "max_evaluations": 60},
+            ),
+            "initial.landmarks": lambda: ({"model": s.mesh, "landmarks": s.landmarks, "views": s.views}, {}),
+            "initial.manual": lambda: ({"model": s.mesh, "start": s.start}, {"rotation_deg": [3, 1, 2]}),
+            "initial.shaft_axis": lambda: ({"model": s.mesh, "lines": s.lines, "views": s.views}, {}),
+            "initial.skin_markers": lambda: ({"model": s.mesh, "landmarks": s.skin}, {}),
+            "deviations.calibrated": lambda: ({"stages": s.sequence.stages, "model": s.mesh}, {}),
+            "refine.cameras": lambda: (
+                {"views": s.views, "costs": {"distal": s.contour}, "poses": {"distal": s.found.pose}},
+                {"max_rounds": 3},
+            ),
+            "verdict.evidence": lambda: (
+                {
+                    "pose": s.found.pose,
+                    "cost": s.grey,
+                    "contour_cost": s.contour,
+                    "optimizer": s.optimizer,
+                    "views": s.views,
+                    "edges": s.edges,
+                    "projector": s.outline,
+                    "mesh": s.mesh,
+                    "others": {"other": s.start},
+                    "other_bones": {"other": s.field},
+                },
+                {"failure_model": str(s.pipelines / "verdict" / "femora-contour.yaml")},
+            ),
+            "verdict.predicted": lambda: ({"pose": s.found.pose, "mesh": s.mesh, "prior": s.known}, {}),
+            "mask.body": lambda: ({"view": s.views["frontal"], "projector": s.drr, "pose": s.start}, {}),
+            "mask.near_holes": lambda: (
+                {"view": s.views["frontal"], "implant": s.nail.implant, "pose": s.nailed.start},
+                {},
+            ),
+            "volume.bridge_metal": lambda: ({"volume": s.metal}, {}),
+            "volume.filled_surface": lambda: ({"mesh": s.closed_mesh}, {"spacing_mm": 3}),
+        }
+    )
+    made.update(
+        {"optimizer.%s" % n: lambda: ({}, {}) for n in ("bobyqa", "cma_es", "direct", "grid", "lbfgs", "nelder_mead")}
+    )
+    made.update({"optimizer.%s" % n: lambda: ({}, {}) for n in ("levenberg_marquardt", "powell", "sbplx")})
+    return made

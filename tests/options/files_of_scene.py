@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files for the nodes that read some, written by a pipeline."""
+import pathlib
+
+from package import SCRATCH, SOURCE, marrow
+
+PIPELINE = """marrow: 1
+nodes:
+  cameras:  {uses: camera.carm, with: {width_px: 96, height_px: 96, pixel_mm: 3}}
+  bone:     {uses: simulate.femur, with: {resolution_mm: 4}}
+  phantom:  {uses: simulate.fracture, in: {bone: bone}}
+  views:    {uses: simulate.fluoroscopy, in: {phantom: phantom, cameras: cameras}}
+  volume:   {uses: simulate.ct, in: {phantom: phantom}, with: {spacing_mm: [4, 4, 5], range_mm: [0, 250]}}
+  case:     {uses: simulate.case, in: {volume: volume, views: views, phantom: phantom}, with: {start: exact}}
+  case_parts: {uses: simulate.case_parts, in: {case: case}}
+  parts:    {uses: simulate.truth, in: {phantom: phantom}}
+  start:    {uses: initial.manual, in: {model: parts.models.distal, start: parts.starts.distal},
+    with: {rotation_deg: [1, 2, 3]}}
+  nail:     {uses: simulate.nail, with: {resolution_mm: 2}}
+  seen:     {uses: simulate.landmarks, in: {phantom: phantom, cameras: cameras}}
+  rtk:      {uses: write.rtk, in: {cameras: cameras}, with: {pixel_mm: [3]}}
+  matrix:   {uses: write.plastimatch, in: {camera: cameras.frontal}, with: {pixel_mm: [3]}}
+  xreg:     {uses: write.xreg, in: {cameras: cameras, landmarks: seen.landmarks.distal}, with: {pixel_mm: [3]}}
+  transform: {uses: write.tfm, in: {pose: start}}
+  points:   {uses: write.fcsv, in: {landmarks: seen.landmarks.distal}}
+  shown:    {uses: simulate.bead_board, with: {board: BOARD, views: 4, width_px: 512, height_px: 512, pixel_mm: 0.6}}
+  found:    {uses: camera.bead_board, in: {images: shown.images}, with: {board: BOARD}}
+outputs: {case: case, cameras: cameras, model: parts.models.distal, start: start, nail: nail.implant, rtk: rtk,
+  matrix: matrix, xreg: xreg, transform: transform, points: points, seeds: case_parts.seeds.distal,
+  calibration: found.calibration, landmarks: seen.landmarks.distal, beads: shown.images}
+"""
+
+
+def written():
+    """The folder with the pipeline's outputs."""
+    folder = SCRATCH / "files"
+    if not folder.exists():
+        text = PIPELINE.replace("BOARD", str(SOURCE / "pipelines" / "calibration" / "board.yaml"))
+        pipeline = SCRATCH / "files.yaml"
+        pipeline.write_text(text)
+        marrow.Pipeline(pipeline).run(folder=folder)
+    return folder / "outputs"
+
+
+def surface_of(mesh, name, scale=1.0):
+    """An OBJ file of a mesh."""
+    path = pathlib.Path(SCRATCH / (name + ".obj"))
+    lines = ["v %.6f %.6f %.6f" % tuple(scale * point) for point in mesh.vertices_mm]
+    lines += ["f %d %d %d" % tuple(triangle + 1) for triangle in mesh.triangles]
+    path.write_text("\n".join(lines) + "\n")
+    return path

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Values for options that cannot be guessed, or that count only together with others: by node.option, a function of the
+scene that gives sets of options. A key "in.NAME" is an input."""
+from files_of_scene import surface_of, written
+
+
+def files(*names):
+    """One try for each file."""
+
+    def tries(s, option):
+        return [{option: str(written() / name)} for name in names]
+
+    return tries
+
+
+def one(**options):
+    """These options in the call before and after the change; `to` is the other value of the option."""
+
+    def tries(s, option):
+        changed = {key.replace("__", "."): value(s) if callable(value) else value for key, value in options.items()}
+        return [{**{key: value for key, value in changed.items() if key != "to"}, option: changed["to"]}]
+
+    return tries
+
+
+TRIES = {
+    # By grey values, a level has pixels and not points.
+    "initial.best_of.pixel_step": one(in__cost=lambda s: s.grey, to=4),
+    "initial.global_search.pixel_step": one(in__cost=lambda s: s.grey, to=[8, 4, 2]),
+    "initial.global_search.needs_start": one(in__start=None, to=True),
+    "initial.manual.needs_start": one(in__start=None, to=True),
+    "register.multiresolution.pixel_step": one(in__cost=lambda s: s.grey, to=[8, 4, 2]),
+    "register.sequence.pixel_step": one(in__cost=lambda s: s.grey, to=[8, 4, 2]),
+    "register.multiresolution.scan_side_deg": one(scan_poses=30, to=6),
+    "register.multiresolution.scan_side_mm": one(scan_poses=30, to=6),
+    "register.sequence.scan_side_deg": one(scan_poses=30, to=6),
+    "register.sequence.scan_side_mm": one(scan_poses=30, to=6),
+    # Files
+    "camera.bead_board.board": one(to=lambda s: str(written() / "nothing.yaml")),
+    "camera.check.points": one(to=""),
+    "read.camera.path": files("rtk.xml", "xreg.h5"),
+    "read.camera.projection": one(path=lambda s: str(written() / "rtk.xml"), to=1),
+    "read.cameras.path": files("xreg.h5"),
+    "read.cameras.names": one(to=["left", "right"]),
+    "read.cameras.projections": one(to=[1, 0]),
+    "read.case.path": files("nothing"),
+    "read.image.path": files("case/lateral.png"),
+    "read.images.paths": one(to=lambda s: [str(written() / "case" / "lateral.png")]),
+    "read.images.names": one(to=["left", "right"]),
+    "read.implant.holes": files("nothing.yaml"),
+    "read.implant.surface": files("model.ply"),
+    "read.landmarks.path": files("points.fcsv"),
+    "read.landmarks.fragment": one(path=lambda s: str(written() / "points.fcsv"), to="other"),
+    "read.landmarks.seen": one(
+        to=lambda s: str(written() / "xreg.h5"),
+        path=lambda s: str(written() / "points.fcsv"),
+        views=["frontal", "lateral"],
+    ),
+    "read.landmarks.views": one(
+        to=["left", "right"], path=lambda s: str(written() / "points.fcsv"), seen=lambda s: str(written() / "xreg.h5")
+    ),
+    "read.landmarks.mirror": one(
+        to="left_right",
+        path=lambda s: str(written() / "points.fcsv"),
+        seen=lambda s: str(written() / "xreg.h5"),
+        views=["frontal", "lateral"],
+    ),
+    "read.mesh.path": one(to=lambda s: str(surface_of(s.coarse_mesh, "other"))),
+    "read.pose.path": files("start.yaml"),
+    "read.seeds.path": files("points.fcsv"),
+    "read.seeds.fragment": one(path=lambda s: str(written() / "points.fcsv"), to="other"),
+    "read.view.name": one(to="left"),
+    "read.view.image": files("case/lateral.png"),
+    "read.view.camera": files("case/frontal.camera.yaml", "rtk.xml"),
+    "read.view.projection": one(camera=lambda s: str(written() / "rtk.xml"), to=1),
+    "read.view.corner_mm": one(to=[-100, -90]),
+    "read.view.calibration": files("calibration.yaml"),
+    "read.views.names": one(to=["left", "right"]),
+    "read.views.images": one(to=lambda s: [str(written() / "case" / "lateral.png")] * 2),
+    "read.views.cameras": one(to=lambda s: [str(written() / "rtk.xml")] * 2),
+    "read.views.projections": one(cameras=lambda s: [str(written() / "rtk.xml")] * 2, to=[0, 1]),
+    "read.views.corner_mm": one(to=[-100, -90]),
+    "read.views.calibration": files("calibration.yaml"),
+    "read.volume.path": files("nothing.mha"),
+    "read.volume.flip": one(to=["x"]),
+    "read.camera.corner_mm": one(to=[-100, -90]),
+    "read.camera.size_px": one(to=[90, 96]),
+    "read.camera.pixel_mm": one(to=[2.5]),
+    "read.cameras.corner_mm": one(to=[-100, -90]),
+    "read.cameras.size_px": one(to=[90, 96]),
+    "read.cameras.pixel_mm": one(to=[2.5]),
+    "read.view.pixel_mm": one(to=[2.5]),
+    "read.views.pixel_mm": one(to=[2.5]),
+    "robot.stations.board": one(to=lambda s: str(written() / "nothing.yaml")),
+    "guide.target.board": one(to=lambda s: str(written() / "nothing.yaml")),
+    "simulate.bead_board.board": one(to=lambda s: str(written() / "nothing.yaml")),
+    "simulate.surface.outer": one(to=lambda s: str(surface_of(s.mesh, "finer"))),
+    "simulate.surface.inner": one(cortex_mm=[], to=lambda s: str(surface_of(s.coarse_mesh, "inner", 0.6))),
+    "verdict.evidence.failure_model": one(to=""),
+    # What a device has is compared with what follows from the camera: 1000 mm and 1.9 mm.
+    "camera.check.source_to_detector_mm": one(pixel_mm=1.9, to=500),
+    "camera.check.pixel_mm": one(source_to_detector_mm=1000, to=1),
+    "camera.check.detector_mm": one(pixel_mm=1.9, to=100),
+    # Voxels that are softer than this within the bone's margin.
+    **{"project.%s.below_hu" % name: one(to=300) for name in ("joseph", "lightfield", "ray_casting", "siddon_jacobs")},
+    "project.lightfield.most_mb": one(step_mm=5, step_deg=3, to=1),
+    "evaluate.projection_distance.source_to_detector_mm": one(to=[1000]),
+    "fracture.misalignment.fracture_mm": one(to=[0, 0, 40]),
+    "plan.locking.from": one(to=[0, -1, 0]),
+    "track.filter.first_scale": one(in__state=lambda s: s.first_predicted, to=20),
+    **{
+        "track.predict.keyframe_%s" % name: one(in__keyframes=lambda s: s.keyframes, to=0.5)
+        for name in ("deg", "mm", "speed_deg_s", "speed_mm_s")
+    },
+    "simulate.knee_motion.blank": one(to=[2, 3]),
+    "verdict.predicted.doubtful_above": one(in__pose=lambda s: s.known, to=0.45),
+    "verdict.predicted.wrong_above": one(in__pose=lambda s: s.known, to=0.06),
+    "read.volume.voxel_size_mm": one(to=[1, 1, 1]),
+    "register.multiresolution.reach_px": one(to=[2, 1, 0.5]),
+    # Names
+    "camera.carm.names": one(to=["a", "b"]),
+    "evaluate.frames.figures": one(to=["mtre_mm"]),
+    "render.curves.figures": one(to=["mtre_mm"]),
+    "refine.cameras.reference": one(to="frontal"),
+    "simulate.bones.bodies": one(to=["distal"]),
+    "simulate.camera_arm.names": one(to=["a", "b"]),
+    "simulate.camera_faults.only": one(to=["frontal"]),
+    "simulate.case.register": one(to=["proximal"]),
+    "simulate.sweeps.axes": one(to=["x"]),
+}
+for _node in (
+    "evaluate.reduced",
+    "evaluate.reduction_gap",
+    "fracture.misalignment",
+    "fracture.reduction",
+    "guide.closed_loop",
+    "guide.open_loop",
+):
+    TRIES[_node + ".moved"] = one(reference="distal", to="proximal")
+    TRIES[_node + ".reference"] = one(to="nobody")
+for _node in ("simulate.hexapod", "simulate.photograph", "robot.hexapod"):
+    TRIES[_node + ".fragment"] = one(to="proximal")
+TRIES["robot.hexapod.fragment"] = one(reference="distal", to="proximal")
+TRIES["robot.hexapod.reference"] = one(to="nobody")
+for _node in (
+    "contour_distance",
+    "drr_edges",
+    "entropy_of_difference",
+    "gradient_correlation",
+    "gradient_difference",
+    "gradient_orientation",
+    "gradient_projection",
+    "metal_gradient_correlation",
+    "mutual_information",
+    "normalised_cross_correlation",
+    "patch_correlation",
+    "patch_gradient_correlation",
+    "pattern_intensity",
+    "ray_to_surface",
+):
+    TRIES["similarity.%s.weights" % _node] = one(to=[1, 3])
+for _node in ("hough_pairs", "line_segments", "ransac"):
+    TRIES["shaft.%s.width_mm" % _node] = one(to=[20])
+    TRIES["shaft.%s.width_deviation_mm" % _node] = one(to=[0.1])
+    TRIES["shaft.%s.magnification_tolerance" % _node] = one(width_deviation_mm=[0.1], to=0.5)
