@@ -117,6 +117,16 @@ void bind_values(py::module_& module) {
           "type", [](const OtherValue& other) { return other.value.type.id; },
           "The name of the type, as messages show it.")
       .def("__repr__", [](const OtherValue& other) { return "<marrow " + other.value.type.id + ">"; });
+  module.def(
+      "digest_of",
+      [](const py::object& object) -> std::optional<std::string> {
+        const std::optional<Value> value = known_value(object);
+        if (!value || !value->type.content) return std::nullopt;
+        return value->type.content->hash(value->data.get()).hex();
+      },
+      py::arg("value"),
+      "A text that is the same for values of the same content, of types of plugins too. None for functions, lists and "
+      "what is no value of marrow.");
 }
 
 }  // namespace marrow::python

@@ -252,6 +252,10 @@ class OtherValue:
     @property
     def type(self) -> str: ...
 
+def digest_of(value: Any) -> Optional[str]:
+    """A text that is the same for values of the same content, of types of plugins too. None for functions, lists and
+    what is no value of marrow."""
+
 _Pose = Union[Pose, ArrayLike]
 
 class Cost(OtherValue):
