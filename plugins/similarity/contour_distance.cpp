@@ -110,10 +110,11 @@ class ContourDistance : public marrow::match::ViewsCost {
   }
 
   /// Each point keeps its edge. The curvature is that of the loss, which far from 0 is less than in expansion(). Five
-  /// blocks along an image: on a border, errors are alike over 20 to 40 mm of the bone.
+  /// blocks along an image: on a border, errors are alike over 20 to 40 mm of the bone. Ten if there is one view: the
+  /// few larger blocks that show the border would hardly be more than the seven unknowns.
   std::vector<Expansion> expansion_without_each_block(const marrow::RigidTransform& world_from_model,
                                                       const marrow::FragmentFrame& frame) const override {
-    constexpr int kBlocksAlong = 5;
+    const int blocks_along = scene_->views.size() > 1 ? 5 : 10;
     const bool symmetric = scene_->options.symmetric;
     const std::vector<Matches> views = match(world_from_model);
     const double offset = offset_of(views);
@@ -122,7 +123,7 @@ class ContourDistance : public marrow::match::ViewsCost {
     for (std::size_t i = 0; i < views.size(); ++i) {
       const marrow::Camera& camera = scene_->views[i].camera;
       const marrow::RigidTransform camera_from_model = camera.camera_from_world * world_from_model;
-      marrow::match::BlockExpansions sums(marrow::match::Blocks::of(camera, kBlocksAlong));
+      marrow::match::BlockExpansions sums(marrow::match::Blocks::of(camera, blocks_along));
       const auto add = [&](const std::vector<Residual>& residuals, double of_each) {
         for (const Residual& r : residuals) {
           const double across = double(r.along_normal) - offset, square = distance2(r, offset);

@@ -10,6 +10,9 @@ using marrow::match::Patch;
 
 struct Options : marrow::match::IntensityOptions {
   int bins = 64;
+
+  /// The histogram is of the whole image: what a block adds to its entropy depends on all other blocks.
+  Options() { has_blocks = false; }
 };
 
 /// Entropy of the whole image after scale * rendered is subtracted, divided by its entropy before. Bins cover the
@@ -47,7 +50,7 @@ MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.entropy_of_difference", entropy_of_difference);
   node.summary(
           "Entropy of the difference between image and radiograph, divided by the entropy of the image (Buzug et al. "
-          "1997; Penney et al., IEEE Trans Med Imaging 1998)")
+          "1997; Penney et al., IEEE Trans Med Imaging 1998); it predicts no deviations")
       .trait("unmoved_by_gain");
   marrow::match::declare<Options>(node);
   node.option("bins", &Options::bins, "number of bins of the histogram over the image's range of values",

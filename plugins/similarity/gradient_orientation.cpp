@@ -3,11 +3,17 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/quantile.hpp"
 #include "marrow/toolbox/match/intensity.hpp"
 
 namespace {
 
 using marrow::match::Patch;
+
+/// Which pixels are compared changes with the pose, and each block by itself would choose others.
+struct Options : marrow::match::IntensityOptions {
+  Options() { has_blocks = false; }
+};
 
 /// The median length of the gradients that count and are not zero.
 double median_length(const std::vector<float>& u, const std::vector<float>& v, const std::vector<char>& counts) {
@@ -15,8 +21,7 @@ double median_length(const std::vector<float>& u, const std::vector<float>& v, c
   for (std::size_t i = 0; i < u.size(); ++i)
     if (counts[i] && (u[i] != 0 || v[i] != 0)) lengths.push_back(std::hypot(u[i], v[i]));
   if (lengths.empty()) return INFINITY;
-  std::nth_element(lengths.begin(), lengths.begin() + std::ptrdiff_t(lengths.size() / 2), lengths.end());
-  return lengths[lengths.size() / 2];
+  return marrow::quantile_in_place(lengths, 0.5);
 }
 
 /// Mean of (1 - cos(angle)) / 2 over the pixels where both gradients are longer than their medians. If these are less
@@ -37,7 +42,7 @@ double value(const Patch& patch) {
   return used > 0 ? 1 - sum / std::max(used, 0.1 * all) : 1;
 }
 
-constexpr auto gradient_orientation = marrow::match::intensity_node<value, marrow::match::IntensityOptions, 1>;
+constexpr auto gradient_orientation = marrow::match::intensity_node<value, Options, 1>;
 
 }  // namespace
 
@@ -45,7 +50,7 @@ MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.gradient_orientation", gradient_orientation);
   node.summary(
           "Difference between the directions of the gradients (after De Silva et al., Phys Med Biol 2016, with the "
-          "cosine instead of the logarithm)")
+          "cosine instead of the logarithm); it predicts no deviations")
       .trait("unmoved_by_gain");
-  marrow::match::declare<marrow::match::IntensityOptions>(node);
+  marrow::match::declare<Options>(node);
 }

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "marrow/domain/quantile.hpp"
+#include "marrow/domain/same_place.hpp"
+#include "marrow/toolbox/image/grey_range.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
 #include "marrow/toolbox/match/views_cost.hpp"
 
@@ -64,8 +67,7 @@ std::vector<SurfacePoint> points_of(const marrow::Volume& volume, const marrow::
   // A single bright spot must not outweigh all other points.
   std::vector<double> strengths;
   for (const SurfacePoint& point : points) strengths.push_back(point.strength);
-  std::nth_element(strengths.begin(), strengths.begin() + std::ptrdiff_t(strengths.size() / 2), strengths.end());
-  const double median = strengths[strengths.size() / 2];
+  const double median = marrow::quantile_in_place(strengths, 0.5);
   for (SurfacePoint& point : points) point.strength = std::min(point.strength / median, 2.0);
   return points;
 }
@@ -88,13 +90,8 @@ GradientImage gradients_of(const marrow::View& view, double blur_px) {
   for (int row = 0; row < magnitude.rows; ++row)
     for (int column = 0; column < magnitude.cols; ++column)
       if (image.counts.at<std::uint8_t>(row, column)) steep.push_back(magnitude.at<float>(row, column));
-  float unit = 0;
-  if (!steep.empty()) {
-    const auto at = steep.begin() + std::ptrdiff_t(0.95 * double(steep.size() - 1));
-    std::nth_element(steep.begin(), at, steep.end());
-    unit = *at;
-  }
-  const double scale = unit > 1e-6f ? 1 / double(unit) : 0;  // a constant image has no gradients
+  const double unit = steep.empty() ? 0 : marrow::quantile_in_place(steep, 0.95);
+  const double scale = unit > 1e-6 ? 1 / unit : 0;  // a constant image has no gradients
   image.u *= scale;
   image.v *= scale;
   return image;
@@ -114,7 +111,7 @@ class GradientProjection : public marrow::match::ViewsCost {
 
   double value_in_view(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
     const Sums found = sums(view, world_from_model);
-    return value_of(found.inside.all(), found.all);
+    return value_of(found.inside, found.all);
   }
 
   /// Uses fewer points on levels with a wider contour spacing, and smoother images on levels with a larger pixel step.
@@ -126,7 +123,7 @@ class GradientProjection : public marrow::match::ViewsCost {
  private:
   /// Of the points inside image and mask, and the weight of all points.
   struct Sums {
-    marrow::match::BlockSums inside;
+    marrow::match::BlockSums::Sums inside;
     double all = 0;
   };
 
@@ -140,15 +137,15 @@ class GradientProjection : public marrow::match::ViewsCost {
     return marrow::match::in_view(scene_->views, view, silence_of(sums(view, world_from_model)));
   }
   static std::string silence_of(const Sums& found) {
-    if (!(found.inside.all().weights > 0)) return "no part of the bone that rays touch lies inside image and mask";
-    if (!(found.inside.all().values > 0)) return "it has no gradient like the CT's where rays touch the bone";
+    if (!(found.inside.weights > 0)) return "no part of the bone that rays touch lies inside image and mask";
+    if (!(found.inside.values > 0)) return "it has no gradient like the CT's where rays touch the bone";
     return {};
   }
 
+  /// No blocks: which points rays touch changes with the pose, so each block asks for another pose, and only all of
+  /// them together for the right one.
   Split split(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
-    const Sums found = sums(view, world_from_model);
-    return {value_of(found.inside.all(), found.all),
-            found.inside.without_each([&](const auto& inside) { return value_of(inside, found.all); })};
+    return {value_in_view(view, world_from_model), {}};
   }
 
   /// Tomazevic's criterion is the sum of |a| |b| f(angle) over the points, with f = cos^4 up to a right angle. Here it
@@ -160,7 +157,7 @@ class GradientProjection : public marrow::match::ViewsCost {
     const marrow::RigidTransform camera_from_model = camera.camera_from_world * world_from_model;
     const Eigen::Vector3d source = inverse(camera_from_model).translation_mm;
     const double touch = std::sin(marrow::radians(scene_->options.touch_deg));
-    Sums found{marrow::match::BlockSums(marrow::match::Blocks::of(camera)), 0};
+    Sums found;
     for (std::size_t i = 0; i < scene_->points.size(); i += point_step_) {
       const SurfacePoint& p = scene_->points[i];
       const double sine = p.normal.dot((p.point_mm - source).normalized()) / touch;
@@ -172,8 +169,8 @@ class GradientProjection : public marrow::match::ViewsCost {
       Eigen::Vector2d g;
       const Eigen::Vector2d pixel = (camera.intrinsics * at).hnormalized();
       if (!sample(images_[view], pixel, g)) continue;
-      const double value = weight * likeness(camera, at, camera_from_model.rotation * p.direction, g);
-      found.inside.add(pixel.x(), pixel.y(), value, weight);
+      found.inside.values += weight * likeness(camera, at, camera_from_model.rotation * p.direction, g);
+      found.inside.weights += weight;
     }
     return found;
   }
@@ -219,14 +216,13 @@ std::shared_ptr<const marrow::Cost> gradient_projection(
     const marrow::Mesh& mesh, const marrow::Volume& volume, const marrow::List<marrow::View>& views,
     const marrow::RadiographProjector* projector, const marrow::List<marrow::Pose>* others,
     const marrow::List<marrow::RadiographProjector>* other_projectors,
-    const marrow::List<marrow::OutlineProjector>* other_outlines, const Options& options) {
+    const marrow::List<marrow::OutlineProjector>* other_outlines, const Options& options, marrow::Context& context) {
   marrow::check_mesh(mesh, "the mesh of the bone");
   marrow::check_volume(volume, "the volume that the mesh was made from");
-  if (volume.grid.frame != mesh.frame)
-    throw marrow::Error("the mesh is in frame '" + mesh.frame + "', but the volume in frame '" + volume.grid.frame +
-                        "'; give the volume that the mesh was made from");
+  marrow::check_lies_in(mesh, volume.grid, "the mesh", "the volume");
   marrow::match::check_views(views);
   marrow::match::check_weights(options.weights, views.size());
+  for (const marrow::View& view : views) marrow::image::warn_of_greys(view, context);
   const marrow::List<marrow::View> own = marrow::match::without_shadows(
       views, marrow::match::shadows_of(projector, others, other_projectors, other_outlines));
   const auto scene = std::make_shared<GradientProjection::Scene>(
@@ -240,7 +236,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("similarity.gradient_projection", gradient_projection)
       .summary(
           "1 - similarity of the back-projected image gradients and the CT's gradients where rays touch the bone "
-          "(Tomazevic et al.; Livyatan et al., IEEE TMI 2003)")
+          "(Tomazevic et al.; Livyatan et al., IEEE TMI 2003); it predicts no deviations")
       .trait("unmoved_by_gain")
       .in("mesh", "surface of the bone")
       .in("volume", "CT from which the surface was made")

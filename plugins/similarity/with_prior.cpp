@@ -9,6 +9,7 @@
 #include <marrow/domain/decompositions.hpp>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/quantile.hpp"
 #include "marrow/toolbox/geometry/rigid_fit.hpp"
 
 namespace {
@@ -42,7 +43,7 @@ class Prior {
   Prior(const Pose& pose, double degrees_of_freedom)
       : pose_(pose), weight_(degrees_of_freedom + 6), information_(inverse_of_symmetric(*pose.covariance)) {
     const auto eigen = eigen_of_symmetric<6>(information_);
-    root_ = eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
+    root_ = eigen.vectors * eigen.values.cwiseSqrt().asDiagonal();
   }
 
   Vector6d motion(const RigidTransform& pose) const {
@@ -98,21 +99,22 @@ double noise_of(const Cost& cost, const Pose& found) {
     }
   }
   const std::vector<double> values = cost.values(poses);
-  std::array<double, 6> noise{};
+  std::vector<double> noise(6);
   for (std::size_t i = 0; i < 6; ++i) {
     const double rise = 0.5 * (values[2 * i + 1] + values[2 * i + 2]) - values[0];
     noise[i] = 2 * rise / (steps[i] * steps[i]);
   }
-  std::sort(noise.begin(), noise.end());
-  return std::max(1e-12, 0.5 * (noise[2] + noise[3]));
+  return std::max(1e-12, quantile_in_place(noise, 0.5));
 }
 
 /// The prior counts the same at each level of the cost: a coarse level is too rough for a noise of its own.
 class WithPrior : public Cost {
  public:
+  /// `noise`: what a unit of the prior counts. `noise_times`: how much of it the images' blocks do not show.
   /// `images` is kept by `owner`, or by the runtime.
-  WithPrior(std::shared_ptr<const Prior> prior, double noise, const Cost& images, std::shared_ptr<const Cost> owner)
-      : prior_(std::move(prior)), noise_(noise), images_(images), owner_(std::move(owner)) {}
+  WithPrior(std::shared_ptr<const Prior> prior, double noise, double noise_times, const Cost& images,
+            std::shared_ptr<const Cost> owner)
+      : prior_(std::move(prior)), noise_(noise), noise_times_(noise_times), images_(images), owner_(std::move(owner)) {}
 
   double value(const RigidTransform& pose) const override { return images_.value(pose) + term(pose); }
   std::vector<double> values(const std::vector<RigidTransform>& poses) const override {
@@ -122,7 +124,7 @@ class WithPrior : public Cost {
   }
   std::shared_ptr<const Cost> at_level(const CostLevel& level) const override {
     const std::shared_ptr<const Cost> images = images_.at_level(level);
-    return std::make_shared<WithPrior>(prior_, noise_, *images, images);
+    return std::make_shared<WithPrior>(prior_, noise_, noise_times_, *images, images);
   }
 
   std::optional<Expansion> expansion(const RigidTransform& pose, const FragmentFrame& frame) const override {
@@ -142,12 +144,13 @@ class WithPrior : public Cost {
   }
 
   /// The blocks of the images, and six residuals of the prior, each with its expected size. So a deviation that is
-  /// predicted from them is that of images and prior together.
+  /// predicted from them is that of images and prior together. What a block changes is told larger than it is, as the
+  /// noise of the images is.
   std::vector<double> without_each_block(const RigidTransform& pose) const override {
     std::vector<double> without = images_.without_each_block(pose);
     if (without.empty()) return without;
-    const double prior = term(pose), whole = images_.value(pose) + prior;
-    for (double& value : without) value += prior;
+    const double images = images_.value(pose), whole = images + term(pose);
+    for (double& value : without) value = whole + std::sqrt(noise_times_) * (value - images);
     const Vector6d motion = prior_->motion(pose);
     const Vector6d residuals = std::sqrt(prior_->weight(motion)) * prior_->root().transpose() * motion;
     for (const double residual : residuals) without.push_back(whole + noise_ * residual);
@@ -156,14 +159,14 @@ class WithPrior : public Cost {
   std::vector<Expansion> expansion_without_each_block(const RigidTransform& pose,
                                                       const FragmentFrame& frame) const override {
     std::vector<Expansion> without = images_.expansion_without_each_block(pose, frame);
-    const auto whole = expansion(pose, frame);
-    if (without.empty() || !whole) return {};
+    const auto images = images_.expansion(pose, frame), whole = expansion(pose, frame);
+    if (without.empty() || !images || !whole) return {};
     const Expansion prior = term_about(pose, frame);
     Matrix6d mean = Matrix6d::Zero();
     const double count = double(without.size());
     for (Expansion& one : without) {
       one.value += prior.value;
-      one.gradient += prior.gradient;
+      one.gradient = whole->gradient + std::sqrt(noise_times_) * (one.gradient - images->gradient);
       one.curvature += prior.curvature;
       mean += one.curvature / count;
     }
@@ -186,13 +189,13 @@ class WithPrior : public Cost {
   }
 
   std::shared_ptr<const Prior> prior_;
-  double noise_;
+  double noise_, noise_times_;
   const Cost& images_;
   std::shared_ptr<const Cost> owner_;
 };
 
 void check_pose(const Pose& pose, const std::string& name, const std::string& remedy) {
-  check_rigid(pose.world_from_model, name);
+  marrow::check_pose(pose, name);
   if (!pose.covariance) throw Error(name + " has no covariance; " + remedy);
   if (!pose.covariance->allFinite() || !(eigen_of_symmetric<6>(*pose.covariance).values[0] > 0))
     throw Error(name + " has a covariance that is not positive definite; " + remedy);
@@ -208,7 +211,7 @@ std::shared_ptr<const Cost> with_prior(const Cost& cost, const Pose& prior, cons
                 "', but the pose found by the images from '" + found.world_from_model.source + "' to '" +
                 found.world_from_model.target + "'; give poses of the same model");
   return std::make_shared<WithPrior>(std::make_shared<const Prior>(prior, options.degrees_of_freedom),
-                                     options.noise_times * noise_of(cost, found), cost, nullptr);
+                                     options.noise_times * noise_of(cost, found), options.noise_times, cost, nullptr);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@ TEST(EntropyOfDifference, IsBestAtTheTruth) { intensity_behaviour::is_best_at_th
 TEST(EntropyOfDifference, IsUnmovedByBrightness) { intensity_behaviour::is_unmoved_by_brightness(kNode); }
 TEST(EntropyOfDifference, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(kNode, 2); }
 TEST(EntropyOfDifference, LevelsCompareFewerPixels) { intensity_behaviour::levels_compare_fewer_pixels(kNode); }
+TEST(EntropyOfDifference, PredictsNoDeviations) { intensity_behaviour::has_no_blocks(kNode); }
 TEST(EntropyOfDifference, RefusesNonsense) { intensity_behaviour::refuses_nonsense(kNode); }
 
 }  // namespace entropy_of_difference_test

@@ -158,21 +158,29 @@ inline void refuses_nonsense(const std::string& node) {
   EXPECT_THROW(make(node, projector, {}), marrow::Error);
 }
 
+/// A cost whose blocks say nothing about its error gives none, so no deviations are predicted from it.
+inline void has_no_blocks(const std::string& node) {
+  const auto projector = std::make_shared<const BlobProjector>();
+  const auto cost = make(node, projector, views_of(view_of()));
+  EXPECT_EQ(cost->without_each_block(at(1, 0.5)), std::vector<double>());
+  EXPECT_EQ(cost->at_level({4, 8, 1})->without_each_block(at(1, 0.5)), std::vector<double>());
+}
+
 /// Without a block the cost is what it is with a mask that leaves the block out.
 inline void blocks_are_masks(const std::string& node) {
   const auto projector = std::make_shared<const BlobProjector>();
   const View whole = view_of();
   const auto cost = make(node, projector, views_of(whole));
   const std::vector<double> without = cost->without_each_block(at(1, 0.5));
-  ASSERT_EQ(without.size(), 5u * 4) << "of 48 px";
-  for (const int block : {4, 6, 7, 12}) {
+  ASSERT_EQ(without.size(), 8u * 7) << "of 25 px";
+  for (const int block : {7, 20, 28, 35}) {
     View view = whole;
     view.mask = cv::Mat(170, 200, CV_8U, cv::Scalar(255));
-    cv::rectangle(view.mask, cv::Rect(block % 5 * 48, block / 5 * 48, 48, 48), 0, cv::FILLED);
+    cv::rectangle(view.mask, cv::Rect(block % 8 * 25, block / 8 * 25, 25, 25), 0, cv::FILLED);
     EXPECT_NEAR(without[std::size_t(block)], make(node, projector, views_of(view))->value(at(1, 0.5)), 1e-12) << block;
   }
-  EXPECT_EQ(without[4], cost->value(at(1, 0.5)));
-  EXPECT_NE(without[7], cost->value(at(1, 0.5)));
+  EXPECT_EQ(without[7], cost->value(at(1, 0.5)));
+  EXPECT_NE(without[28], cost->value(at(1, 0.5)));
 }
 
 }  // namespace intensity_behaviour

@@ -27,7 +27,28 @@ TEST(Blocks, CoverTheImage) {
   EXPECT_EQ(blocks.at(999, 299), 23);
   EXPECT_EQ(blocks.at(2000, -5), 7) << "beyond the image counts as its border";
   EXPECT_EQ(Blocks::of(camera, 5).side_px, 200);
-  EXPECT_EQ(Blocks::of(shapes::c_arm(0, 200)).side_px, 48);
+}
+
+// The same picture of twice as many pixels has the same blocks, so the same deviations follow from it.
+TEST(Blocks, AreTheSamePartsOfAnImageOfAnySize) {
+  for (const int along : {5, 8, 10})
+    for (const int width_px : {50, 200, 253, 383, 500, 512}) {
+      marrow::Camera camera = shapes::c_arm(0, width_px);
+      camera.height_px = 3 * width_px / 5;
+      const Blocks blocks = Blocks::of(camera, along);
+      EXPECT_NEAR(blocks.side_px, double(width_px) / along, 0.03 * width_px / along);
+      for (int times = 2; times < 16; times *= 2) {
+        marrow::Camera larger = camera;
+        larger.width_px *= times;
+        larger.height_px *= times;
+        const Blocks same = Blocks::of(larger, along);
+        EXPECT_NEAR(same.side_px, times * blocks.side_px, 0.01 * same.side_px) << width_px << " x " << times;
+        if (width_px * times >= 768) continue;  // sides of whole pixels, which the smaller image has no halves of
+        EXPECT_EQ(same.side_px, times * blocks.side_px) << width_px << " x " << times;
+        EXPECT_EQ(same.columns, blocks.columns);
+        EXPECT_EQ(same.rows, blocks.rows);
+      }
+    }
 }
 
 TEST(BlockSums, WithoutEachBlock) {

@@ -164,6 +164,45 @@ TEST(WithPrior, ItsSixResidualsStandForItsCovariance) {
   EXPECT_NEAR(squares / (kUnit * kUnit), 10.0 / 11, 1e-6) << "q = 1, and the weight of Student's t is 10 / 11";
 }
 
+/// Without each of two blocks it is tilted to another side.
+class Tilted : public Differentiable {
+ public:
+  using Differentiable::Differentiable;
+  std::vector<Expansion> expansion_without_each_block(const marrow::RigidTransform& pose,
+                                                      const marrow::FragmentFrame& frame) const override {
+    std::vector<Expansion> without = Differentiable::expansion_without_each_block(pose, frame);
+    without[0].gradient += Vector6d::Constant(0.1);
+    without[1].gradient -= Vector6d::Constant(0.1);
+    return without;
+  }
+};
+
+// Of noise that is four times that of the blocks, each block shows half the deviation.
+TEST(WithPrior, WhatABlockChangesGrowsWithTheNoise) {
+  Trial trial(with_deviations(truth(), six(2, 5, 3)));
+  trial.images = std::make_shared<Tilted>(truth().world_from_model, truth().frame, Matrix6d::Identity(), kInformation);
+  trial.inputs["cost"] = marrow::Value::of<Cost>(trial.images);
+  const auto turned = pose_at(truth(), 0, 0, 5, 0, 0, 0).world_from_model;
+  const auto cost_with = [&](double times) {
+    trial.made = shipped::call("similarity.with_prior", trial.inputs, {{"noise_times", times}}).at("cost");
+    return std::static_pointer_cast<const Cost>(trial.made.data);
+  };
+  const std::vector<double> of_images = trial.images->without_each_block(turned);
+  for (const double times : {1.0, 4.0}) {
+    const auto cost = cost_with(times);
+    const std::vector<double> values = cost->without_each_block(turned);
+    for (std::size_t i = 0; i < of_images.size(); ++i)
+      EXPECT_NEAR(values[i] - cost->value(turned), std::sqrt(times) * (of_images[i] - trial.images->value(turned)),
+                  1e-12);
+    const Vector6d whole = cost->expansion(turned, truth().frame)->gradient;
+    const auto without = cost->expansion_without_each_block(turned, truth().frame);
+    for (int axis = 0; axis < 6; ++axis) {
+      EXPECT_NEAR(without[0].gradient[axis] - whole[axis], 0.1 * std::sqrt(times), 1e-12);
+      EXPECT_NEAR(without[1].gradient[axis] - whole[axis], -0.1 * std::sqrt(times), 1e-12);
+    }
+  }
+}
+
 /// Tells its derivatives, but not those without each block.
 class Whole : public Differentiable {
  public:

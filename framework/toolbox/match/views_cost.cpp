@@ -3,17 +3,20 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <numeric>
 
 namespace marrow::match {
 
 Blocks Blocks::of(const Camera& camera, int along) {
-  constexpr int kLeastSide_px = 48;
-  Blocks blocks;
-  blocks.side_px = std::max(kLeastSide_px, std::max(camera.width_px, camera.height_px) / along);
-  blocks.columns = std::max(1, (camera.width_px + blocks.side_px - 1) / blocks.side_px);
-  blocks.rows = std::max(1, (camera.height_px + blocks.side_px - 1) / blocks.side_px);
-  return blocks;
+  // A block's side is a whole number of pixels, or for a smaller image of their halves, quarters and so on.
+  constexpr int kLeastForPixels_px = 384;
+  const int longer_px = std::max({camera.width_px, camera.height_px, 1});
+  int parts = 1;
+  while (longer_px * parts < kLeastForPixels_px) parts *= 2;
+  const int side = longer_px * parts / along;
+  const auto count = [&](int length_px) { return std::max(1, (length_px * parts + side - 1) / side); };
+  return {double(side) / parts, count(camera.width_px), count(camera.height_px)};
 }
 
 ViewsCost::ViewsCost(std::size_t views, const std::vector<double>& weights) {
@@ -35,6 +38,7 @@ double ViewsCost::mean_of(const std::vector<double>& of_view) const {
 
 std::vector<double> ViewsCost::without_each_block(const RigidTransform& world_from_model) const {
   const std::vector<Split> views = splits(world_from_model);
+  if (std::any_of(views.begin(), views.end(), [](const Split& view) { return view.without_block.empty(); })) return {};
   const double total = std::accumulate(weights_.begin(), weights_.end(), 0.0);
   double all = 0;
   for (std::size_t i = 0; i < views.size(); ++i) all += weights_[i] / total * views[i].value;

@@ -12,9 +12,11 @@ namespace marrow::match {
 /// The squares of an image that are left out one at a time to find how uncertain a minimum is. Errors of neighbouring
 /// pixels are alike; errors of different squares are taken as independent.
 struct Blocks {
-  int side_px = 1, columns = 1, rows = 1;
+  double side_px = 1;
+  int columns = 1, rows = 1;
 
-  /// Blocks of at least 48 px, and about `along` of them along the longer side of the image.
+  /// About `along` blocks along the longer side of the image, whatever its pixels are: an image of twice as many pixels
+  /// has the same blocks.
   static Blocks of(const Camera& camera, int along = 8);
   int count() const { return columns * rows; }
   /// The block of a pixel. Positions outside the image belong to the nearest block.
@@ -68,7 +70,8 @@ class ViewsCost : public Cost {
   std::vector<std::string> silent_views(const RigidTransform& world_from_model) const override;
 
   /// The cost in a view, and the same without each block of the view in turn. For costs that are sums over pixels or
-  /// points it takes about as long as value_in_view().
+  /// points it takes about as long as value_in_view(). A cost gives no blocks in any view if those of a right pose do
+  /// not all ask for this pose: then how the minimum moves without one of them says nothing about its error.
   struct Split {
     double value = 0;
     std::vector<double> without_block;
