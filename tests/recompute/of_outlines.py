@@ -9,12 +9,12 @@ from scipy.ndimage import binary_fill_holes, gaussian_filter, map_coordinates
 from scipy.spatial import cKDTree
 
 import surface
-from figures import within
+from figures import NotRecomputed, within
 from pictures import read_grey
-from values import read_camera, read_pose, read_view_image
+from values import read_camera, read_field, read_pose, read_view_image
 
 FINE = 4  # pixels of the shadow in a pixel of the image
-ALLOWED_PX, ALLOWED_PERCENT = 0.15, 3  # a shadow of coarse triangles lies outside a smooth outline
+ALLOWED_PX, ALLOWED_PERCENT = 0.1, 3
 
 
 def shadow(mesh, place, camera):
@@ -66,6 +66,7 @@ def edges(picture, image, sigma_px):
 def outline_distance(call):
     options, place = call.options, call.one("pose", read_pose).world_from_ct
     mesh = call.one("projector.mesh", surface.read)
+    check_whole(mesh, call)
     cameras, images = call.many("views", read_camera), call.many("views", read_view_image)
     sigma_px = call.run.option("sigma_px")
     result, everywhere = {}, []
@@ -76,6 +77,17 @@ def outline_distance(call):
         everywhere.append((off, off * cameras[view].on_a_plane([[1, 0]], [depth_mm])[0, 0], across))
         result |= figures(view + "_", *everywhere[-1])
     return result | figures("", *(np.concatenate(parts) for parts in zip(*everywhere)))
+
+
+def check_whole(mesh, call):
+    """Where the CT ends, the outline is left out, which is not done here."""
+    wire = call.run.wire(call.node, "projector.volume")
+    if not wire:
+        return
+    ct = call.one("projector.volume", read_field)
+    index, last = ct.index(mesh.vertices_mm), np.array(ct.values_mm.shape) - 1
+    if np.minimum(index, last - index).min() < 3:
+        raise NotRecomputed("the bone reaches the end of the CT, where its outline is left out")
 
 
 def to_edges(points, normals, places, directions, options):

@@ -47,7 +47,7 @@ RECOMPUTED = {
     ),
     ("evaluate.outline_distance", "metrics"): (
         of_outlines.outline_distance,
-        ("pose", "views", "edges", "projector.mesh"),
+        ("pose", "views", "edges", "projector.mesh", "projector.volume"),
     ),
     ("evaluate.shaft_lines", "metrics"): (of_shafts.shaft_lines, ("lines", "view", "models", "truths")),
     ("evaluate.dice", "metrics"): (of_surfaces.dice, ("field", "reference")),

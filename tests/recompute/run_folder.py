@@ -139,6 +139,8 @@ class Run:
         case = read_yaml(folder / "case.yaml")
         if port == "truth":
             return {item: one["truth"] for item, one in case["fragments"].items() if "truth" in one}
+        if port == "ct" and str(case["ct"]).endswith(".mha"):
+            return {"": folder / case["ct"]}
         if port == "views":
             views = {view["name"]: view for view in case["views"]}
             if all(is_plain_camera(folder, view["camera"]) for view in views.values()):
