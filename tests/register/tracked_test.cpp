@@ -105,6 +105,21 @@ TEST(Tracked, AStartWithoutACovarianceIsHardlyKnown) {
   EXPECT_LT(apart(shipped::call("register.tracked", inputs(bowl(), without)).at("pose").as<Pose>()), 0.05);
 }
 
+TEST(Tracked, AStartThatIsKnownExactlyIsHardlyKnown) {
+  // Three deviations of 0 would leave nothing to search; the right pose is 5.9 mm and degrees away.
+  Pose exact = predicted({2, -1, 3, 1, 4, -2}, 0, 0);
+  std::vector<std::string> lines;
+  marrow::Context::Hooks hooks;
+  hooks.log = [&](std::string_view text, marrow::LogLevel) { lines.emplace_back(text); };
+  const Pose found =
+      shipped::call("register.tracked", inputs(bowl(), exact), {}, marrow::Context(hooks)).at("pose").as<Pose>();
+  EXPECT_LT(apart(found), 0.05);
+  EXPECT_EQ(std::count(lines.begin(), lines.end(),
+                       "the predicted pose counts as hardly known: its predicted deviations are 0, so its registration "
+                       "compared nothing"),
+            1);
+}
+
 /// A bowl that says nothing within some distance of a pose, as where an edge lies beyond the reach of an outline.
 class MuteNear : public well::Bowl {
  public:
