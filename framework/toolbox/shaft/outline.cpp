@@ -16,6 +16,10 @@ constexpr double kInwards_mm = 0.3, kOutwards_mm = 1.2;  // range of positions i
 constexpr double kPiece_mm = 4;                          // a bowed border is followed in pieces of this length
 constexpr double kLeastBlur_px = 0.3, kMostBlur_px = 5;
 
+/// How many samples a length has at the shaft. A number that is whole but for rounding is taken as whole, so that a
+/// moved world does not change it.
+int samples_in(double length_mm, double pixel_mm) { return int(length_mm / pixel_mm / kSample_px + 1e-6); }
+
 /// std::nullopt outside the image, and at dead pixels.
 std::optional<double> line_integral_at(const cv::Mat& image, const image::GreyScale& scale, const Eigen::Vector2d& at) {
   const int u = int(std::floor(at.x())), v = int(std::floor(at.y()));
@@ -103,12 +107,12 @@ Eigen::VectorXd without_slope(Eigen::VectorXd profile) {
 std::optional<double> outline_beyond_edges_px(const cv::Mat& image, const EdgeMap& edges, const Border& border,
                                               const Support& support, const Stretch& stretch, double width_px,
                                               double pixel_mm) {
-  const int reach = std::max(4, int(kReach_mm / pixel_mm / kSample_px));
+  const int reach = std::max(4, samples_in(kReach_mm, pixel_mm));
   const std::vector<double> profile = profile_of(image, edges, border, support, stretch, pixel_mm, reach);
   if (profile.empty()) return std::nullopt;
   const Eigen::VectorXd measured =
       without_slope(Eigen::Map<const Eigen::VectorXd>(profile.data(), Eigen::Index(profile.size())));
-  const int inwards = int(kInwards_mm / pixel_mm / kSample_px), outwards = int(kOutwards_mm / pixel_mm / kSample_px);
+  const int inwards = samples_in(kInwards_mm, pixel_mm), outwards = samples_in(kOutwards_mm, pixel_mm);
   double best_gain = 0;
   int best = outwards;
   for (double blur_px = kLeastBlur_px; blur_px < kMostBlur_px; blur_px *= 1.1) {
