@@ -97,7 +97,7 @@ TEST(Multiresolution, SurvivesNoiseGapsOutliersAndAFatModel) {
     const marrow::Vector6d error = error_of(result.pose, femur().truth);
     // The gaps may hide one of the condyles, from which the axial rotation is seen: the prediction knows.
     const double axial_sd_deg = marrow::degrees(std::sqrt((*result.pose.covariance)(2, 2)));
-    EXPECT_LT(axial_sd_deg, 1.5);
+    EXPECT_LT(axial_sd_deg, 2);
     EXPECT_LT(std::abs(error[2]), 1.5) << error.transpose();
     EXPECT_LT(error.head<2>().norm(), 0.3) << error.transpose();
     EXPECT_LT(error.tail<3>().norm(), 0.3) << error.transpose();

@@ -200,9 +200,9 @@ TEST(PredictedCovariance, IsThatOfTheMinimaWithoutEachBlock) {
   const PredictedCovariance predicted(cost, pose, about);
   ASSERT_TRUE(predicted.covariance());
   EXPECT_LT((*predicted.covariance() - expected).norm(), 1e-6 * expected.norm());
-  EXPECT_EQ(predicted.evaluations(), 3 + 12 + 13 + 4)
+  EXPECT_EQ(predicted.evaluations(), 3 + 12 + 13 + 4 + 65 + 2)
       << "the value, the derivatives twice, both ends of six lines, every second of 25 poses on a line, and those "
-         "between that matter";
+         "between that matter; the same of 129 turns about the long axis";
   // Derivatives say nothing about a minimum that is wider than degrees, and this cost has no blocks to try.
   EXPECT_FALSE(PredictedCovariance(Squares(50), pose, about).covariance());
 }

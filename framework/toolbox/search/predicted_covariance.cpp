@@ -36,6 +36,7 @@ PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform&
   ++evaluations_;
   if (differentiate()) {
     widen();
+    look_around();
     return;
   }
   at_pose_ = blocks_at(pose);
@@ -355,6 +356,28 @@ void PredictedCovariance::widen() {
   Vector6d unit = eigen.vectors.col(5);
   unit.head<3>() *= radians(1);
   *covariance_ += (squares / sum - variance) * unit * unit.transpose();
+}
+
+/// The same for turns about the long axis, out to the longest step. Derivatives are of one place, but about the axis of
+/// a body of revolution facets alone make the minimum, and others lie all around.
+void PredictedCovariance::look_around() {
+  constexpr int kLong = 2;
+  constexpr double kLeastStep_deg = 0.25, kLeastRatio = 2;
+  const double variance = in_units_(kLong, kLong);
+  const int side = int(kMostStep / std::max(std::sqrt(variance), kLeastStep_deg)) / 2 * 2;
+  const double step = kMostStep / std::max(side, 1);
+  std::vector<RigidTransform> poses;
+  for (int i = -side; i <= side; ++i) poses.push_back(pose_at(i * step * Vector6d::Unit(kLong)));
+  const std::vector<double> values = values_along(poses);
+  double sum = 0, squares = 0;
+  for (int i = -side; i <= side && noise_ > 0; ++i) {
+    const double density = std::exp(-std::max(0.0, values[std::size_t(i + side)] - value_) / noise_);
+    sum += density;
+    squares += density * (i * step) * (i * step);
+  }
+  const double now = (*covariance_)(kLong, kLong) * degrees(1) * degrees(1);
+  if (!(sum > 0) || squares / sum < kLeastRatio * now) return;
+  (*covariance_)(kLong, kLong) = squares / sum * radians(1) * radians(1);
 }
 
 /// The cost at poses on a line, a standard deviation or less apart. Every second comes first. Those between are

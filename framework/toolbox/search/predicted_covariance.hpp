@@ -72,6 +72,7 @@ class PredictedCovariance {
   void move_without_each_block(const Eigen::MatrixXd& at_diagonals, double flat);
   void turn_steps(const Matrix6d& hessian);
   void widen();
+  void look_around();
   std::vector<double> values_along(const std::vector<RigidTransform>& poses);
   void find_other_minima(const std::vector<RigidTransform>& poses, const std::vector<double>& values);
 
