@@ -144,8 +144,9 @@ struct MinimisationResult {
 class Optimizer {
  public:
   virtual ~Optimizer();
-  /// Returns the best point found. A function value that is not finite counts as the worst. Exceptions of the function
-  /// pass through.
+  /// Returns the best point found. A function value that is not finite counts as the worst. Throws Error if the problem
+  /// has no coordinates, no positive and finite steps and tolerance, or bounds that exclude the start; and if no value
+  /// is finite. Exceptions of the function pass through.
   virtual MinimisationResult minimise(const MinimisationProblem& problem) const = 0;
 };
 

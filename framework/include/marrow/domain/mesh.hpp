@@ -19,8 +19,8 @@ struct Mesh {
   using fields = Fields<&Mesh::vertices_mm, &Mesh::triangles, &Mesh::frame>;
 };
 
-/// Throws Error if there are no triangles, an index is out of range, or a vertex is not finite or has a coordinate of
-/// more than 1 km. `what` names the mesh in the message.
+/// Throws Error if there are no triangles, an index is out of range, a vertex is not finite or has a coordinate of more
+/// than 1 km, or the surface has no area. `what` names the mesh in the message.
 void check_mesh(const Mesh& mesh, const std::string& what);
 
 /// True if each edge is shared by exactly two triangles that run along it in opposite directions.
@@ -31,7 +31,7 @@ double enclosed_volume_mm3(const Mesh& mesh);
 double surface_area_mm2(const Mesh& mesh);
 
 /// `count` points in a fixed pattern (not random), spread evenly by area over the surface. They serve as target points
-/// of an mTRE.
+/// of an mTRE. Throws Error if the surface has no area.
 std::vector<Eigen::Vector3d> sample_surface(const Mesh& mesh, std::size_t count);
 
 /// The anatomical axes of a long-bone fragment, in the frame of its mesh. All of marrow's tables use them. Origin: the
@@ -48,7 +48,7 @@ struct FragmentFrame {
   bool is_anatomical = false;
   using fields = Fields<&FragmentFrame::origin_mm, &FragmentFrame::axes, &FragmentFrame::is_anatomical>;
 };
-/// Throws Error as check_mesh() does, and if the surface has no area.
+/// Throws Error as check_mesh() does.
 FragmentFrame fragment_frame(const Mesh& mesh);
 
 }  // namespace marrow

@@ -37,7 +37,8 @@ inline Attribute one_of(std::initializer_list<std::string_view> names) {
 /// A pipeline must give this option.
 inline Attribute required() { return {}; }
 /// This option replaces the options of these names of the nodes whose functions reach this node: what such a node says
-/// has no effect here. `marrow check` notes it where a pipeline gives both.
+/// has no effect here. "input.option" is only meant for nodes behind this input. An empty list or a 0 replaces nothing.
+/// `marrow check` notes it where a pipeline gives both.
 inline Attribute replaces(std::initializer_list<std::string_view> names) {
   return {.type = Attribute::Type::replaces, .names = names};
 }
