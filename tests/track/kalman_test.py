@@ -103,7 +103,8 @@ class Kalman(unittest.TestCase):
                 responses.append(marrow.track.predict(bone.state).pose.matrix[0, 3] / IMPULSE)
             found = NOISE * np.sum(np.square(responses)) ** 0.5
             print(
-                f"{rate_hz} Hz: poses of {NOISE} mm predict one to {found:.5f} mm; by the Lyapunov equation {expected:.5f}"
+                f"{rate_hz} Hz: poses of {NOISE} mm predict one to {found:.5f} mm, "
+                f"by the Lyapunov equation to {expected:.5f}"
             )
             self.assertAlmostEqual(found / expected, 1, delta=1e-4)
 
