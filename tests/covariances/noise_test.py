@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """The predicted deviations of nodes that fit points are right over 60 draws of noise: the ratio of two root mean
-squares of 60 errors or more is known to a tenth, the shares within one and two deviations (68 and 95 %) to a few points.
-The study beside this test does the same for the costs."""
+squares of 60 errors or more is known to a tenth, the shares within one and two deviations (68 and 95 %) to a few
+points. The study beside this test does the same for the costs."""
 import pathlib
 import sys
 import unittest
