@@ -157,7 +157,7 @@ class BadData(Case):
             (
                 "node 'shaft' (shaft.hough_pairs) for lateral failed: view 'lateral': the edge map is empty, so there"
                 " is no shaft in it; look at the image, and lower the thresholds of the edge detector (its inputs:"
-                " edges = edges, view = case.views)"
+                " edges = edges, view = case.views, views = case.views)"
             ),
             error,
         )

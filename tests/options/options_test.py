@@ -1,29 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each option of each node changes an output, or is refused, or is listed with the reason why it does neither."""
 import keyword
+import pathlib
 import sys
 import time
 import unittest
 
-import calls_of_bones
-import calls_of_files
-import calls_of_simulation
-from alternatives import alternatives
-from digests import digest_of
-from no_effect import NO_EFFECT
-from package import main, marrow
-from scene import Scene
-from tries import TRIES
-from untried import UNTRIED
-
-sys.path.insert(0, str(__import__("pathlib").Path(__file__).resolve().parent.parent))
+TESTS = pathlib.Path(__file__).resolve().parent.parent
+sys.path += [str(TESTS), str(TESTS / "python")]
+import calls_of_bones  # noqa: E402
+import calls_of_files  # noqa: E402
+import calls_of_simulation  # noqa: E402
+from alternatives import alternatives  # noqa: E402
+from digests import digest_of  # noqa: E402
+from no_effect import NO_EFFECT  # noqa: E402
+from package import main, marrow  # noqa: E402
 from sample import sample  # noqa: E402
+from scene import Scene  # noqa: E402
+from tries import TRIES  # noqa: E402
+from untried import UNTRIED  # noqa: E402
 
 SCENE = Scene()
 CALLS = {}
 for module in (calls_of_bones, calls_of_simulation, calls_of_files):
     CALLS.update(module.calls(SCENE))
-NODES = {name: marrow._core.node_info(name) for name in marrow._core.node_names() if not name.startswith("test.")}
+OF_TESTS = ("test.", "parse.test_")
+NODES = {name: marrow._core.node_info(name) for name in marrow._core.node_names() if not name.startswith(OF_TESTS)}
 
 
 def result_of(name, inputs, options):
