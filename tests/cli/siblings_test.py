@@ -83,7 +83,7 @@ class Siblings(Case):
         print("   predicted %.3f and %.3f mm in the image, %.3f mm along the beam" % (frontal, along, lateral))
         self.assertLess(max(abs(shift[0]), abs(shift[1])), 0.5)
         self.assertLess(abs(turn[2]), 0.5)
-        self.assertGreater(lateral, 3 * max(frontal, along))  # the lateral axis lies along the beam of the frontal view
+        self.assertGreater(lateral, 2 * max(frontal, along))  # nearly along the beam; the axis is inclined to it
         errors = metrics(out / "outputs" / "errors" / "distal" / "final.json")
         self.assertGreater(errors["predicted_max_mm"], 3 * errors["predicted_along_mm"])
 
