@@ -11,6 +11,9 @@ using marrow::match::Patch;
 
 struct Options : marrow::match::IntensityOptions {
   int bins = 32;
+
+  /// The histogram is of all pixels: what a block adds to its entropy depends on all other blocks.
+  Options() { has_blocks = false; }
 };
 
 /// 2 - (H(a) + H(b)) / H(a, b): 0 if a and b determine each other, 1 if they are independent.
@@ -39,7 +42,7 @@ MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.mutual_information", mutual_information);
   node.summary(
           "2 - normalised mutual information; it assumes no particular relation between the grey values (Studholme et "
-          "al. 1999; Penney et al. 1998)")
+          "al. 1999; Penney et al. 1998); it predicts no deviations")
       .trait("unmoved_by_gain");
   marrow::match::declare<Options>(node);
   node.option("bins", &Options::bins, "number of bins of each histogram", marrow::at_least(4), marrow::at_most(256));
