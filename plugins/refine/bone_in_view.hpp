@@ -120,7 +120,9 @@ class BoneInView {
   }
   static void check_count(std::size_t blocks, std::size_t expected) {
     if (blocks != expected)
-      throw Error("the cost gives no values without each block of the images; use a cost of the kind similarity");
+      throw Error(
+          "the cost gives no values without each block of the images; use a cost that predicts deviations, such as "
+          "that of the contour");
   }
   /// Of the slopes about their mean, which is that of the whole cost in this view, and what the other views add.
   Matrix6d scatter(const std::array<Sample, 12>& ends) const {

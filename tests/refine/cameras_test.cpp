@@ -175,7 +175,8 @@ TEST(RefineCameras, ACostOfViewsNeedsItsBlocks) {
   Bone blind({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 0, 0})}, 0);
   blind.cost = std::make_shared<SplitInViews>(blind.cost);
   EXPECT_EQ(shipped::refusal("refine.cameras", inputs({blind})),
-            "the cost gives no values without each block of the images; use a cost of the kind similarity");
+            "the cost gives no values without each block of the images; use a cost that predicts deviations, such as "
+            "that of the contour");
 }
 
 TEST(RefineCameras, SaysWhatIsWrong) {
@@ -187,7 +188,8 @@ TEST(RefineCameras, SaysWhatIsWrong) {
   EXPECT_EQ(shipped::refusal("refine.cameras", inputs({Bone({none, none, none})})),
             "the cost of 'distal' compares 3 views, but there are 2; make it of the same views");
   EXPECT_EQ(shipped::refusal("refine.cameras", inputs({Bone({none, none}, 0)})),
-            "the cost gives no values without each block of the images; use a cost of the kind similarity");
+            "the cost gives no values without each block of the images; use a cost that predicts deviations, such as "
+            "that of the contour");
   EXPECT_EQ(shipped::refusal("refine.cameras", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), none}, 1e4, 40)},
                                                       [] {
                                                         marrow::List<marrow::View> behind;
