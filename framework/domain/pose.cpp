@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
@@ -35,10 +36,12 @@ void check_covariance(const Matrix6d& covariance, const std::string& what) {
   if (!covariance.allFinite()) return;
   const Matrix6d scaled = correlations(covariance);
   Eigen::Index row = 0, column = 0;
-  if (const double apart = (scaled - scaled.transpose()).cwiseAbs().maxCoeff(&row, &column); apart > kRounding)
+  if (const double apart = (scaled - scaled.transpose()).cwiseAbs().maxCoeff(&row, &column); apart > kRounding) {
+    if (row > column) std::swap(row, column);
     throw Error(what + ": the covariance is not symmetric: " + formatted("%g", covariance(row, column)) + " in " +
                 place(row, column) + ", but " + formatted("%g", covariance(column, row)) + " in " + place(column, row) +
                 kRemedy);
+  }
   const double least = eigen_of_symmetric<6>(0.5 * (scaled + scaled.transpose())).values[0];
   if (least < -kRounding)
     throw Error(what + ": the covariance has a negative eigenvalue (" + formatted("%g", least) +

@@ -32,7 +32,9 @@ class Noise(unittest.TestCase):
                     self.assertTrue(0.5 < of[group] < 2, "%s: %.2f" % (group, of[group]))
                 self.assertTrue(0.58 < of["within one"] < 0.78, of["within one"])
                 self.assertTrue(0.9 < of["within two"] < 0.99, of["within two"])
-                self.assertTrue(0.7 < of["mahalanobis"] < 1.4, of["mahalanobis"])
+                # One view knows the depth to 19 mm. That far, errors do not lie in an ellipsoid any more.
+                most = 4 if "1 view" in name else 1.4
+                self.assertTrue(0.7 < of["mahalanobis"] < most, of["mahalanobis"])
 
     def test_each_cost_is_in_the_study(self):
         costs = set(dir(marrow.similarity)) - {"with_prior"}
@@ -40,7 +42,7 @@ class Noise(unittest.TestCase):
         self.assertLessEqual(costs, of_study)
 
     def test_figures_of_normal_errors_are_those_of_the_normal_distribution(self):
-        random, root = np.random.default_rng(2), np.diag([1, 2, 3, 4, 5, 6]) @ np.linalg.qr(np.eye(6) + 0.3)[0]
+        random, root = np.random.default_rng(2), 0.1 * np.diag([1, 2, 3, 4, 5, 6]) @ np.linalg.qr(np.eye(6) + 0.3)[0]
         draws = [(root @ random.normal(size=6), root @ root.T) for _ in range(4000)]
         of = figures.of(draws, {"all": range(6)})
         self.assertAlmostEqual(of["all"], 1, delta=0.03)

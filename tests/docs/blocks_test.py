@@ -24,7 +24,7 @@ AROUND = """#include <marrow/conformance.hpp>
 void calls(const marrow::View& view) {
   %s
 }
-struct Options { double low = 1, high = 2; };
+struct Options { double low = 1, high = 2, reach_px = 8; };
 marrow::View one(const marrow::View& view, const Options&) { return view; }
 marrow::conformance::Suite denoise_suite() { return {}; }
 MARROW_PLUGIN(plugin) {
