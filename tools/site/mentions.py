@@ -68,7 +68,7 @@ def declared_in(path):
     left out: where a node's option is renamed, its old name is known no more."""
     text = path.read_text(errors="replace")
     found = re.findall(r"\b(\w+)\(", text) + re.findall(r"\b(?:class|struct|enum|enum class) (\w+)", text)
-    lines = [line for line in text.splitlines() if not re.search(r"option|relation\(", line)]
+    lines = [line for line in text.splitlines() if not re.search(r"option|relation\(|replaces\(", line)]
     return found + re.findall(r'"([a-z][a-z0-9_]*)"', "\n".join(lines))
 
 
