@@ -82,14 +82,16 @@ void smooth(std::vector<float>& values, const std::array<int, 3>& size, std::siz
 Attenuation smoothed(const Attenuation& attenuation, double sigma_mm) {
   // A Gaussian leaves 3e-6 of the waves that are as long as this distance, so a sum sees none of them.
   constexpr double kSafeSpacing = 1.25;  // in standard deviations
+  constexpr double kTie = 1e-9;          // the last digits of a depth in another world must not decide
   if (attenuation.is_empty() || !(sigma_mm > 0)) return attenuation;
   Attenuation result;
   result.grid = attenuation.grid;
   std::array<int, 3> reach;
   Eigen::Vector3d first;
   for (std::size_t k = 0; k < 3; ++k) {
-    reach[k] = int(std::ceil(3 * sigma_mm / attenuation.grid.spacing_mm[int(k)]));
-    result.enough[k] = std::max(1, int(kSafeSpacing * sigma_mm / attenuation.grid.spacing_mm[int(k)]));
+    const double sigma = sigma_mm / attenuation.grid.spacing_mm[int(k)];
+    reach[k] = int(std::ceil(3 * sigma - kTie));
+    result.enough[k] = std::max(1, int(kSafeSpacing * sigma + kTie));
     result.grid.size[k] = attenuation.last[k] - attenuation.first[k] + 1 + 2 * reach[k];
     first[int(k)] = attenuation.first[k] - reach[k];
   }
