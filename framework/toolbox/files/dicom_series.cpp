@@ -9,7 +9,6 @@
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/large_memory.hpp"
 #include "marrow/domain/number_text.hpp"
-#include "marrow/domain/quantile.hpp"
 
 namespace marrow::files {
 namespace {
@@ -191,14 +190,17 @@ void check_places(const std::filesystem::path& folder, const std::vector<Slice>&
 void check_gaps(const std::filesystem::path& folder, const std::vector<Slice>& slices) {
   std::vector<double> gaps;
   for (std::size_t i = 1; i < slices.size(); ++i) gaps.push_back(slices[i].position_mm - slices[i - 1].position_mm);
-  const double usual_mm = gaps.empty() ? 0 : quantile(gaps, 0.5);
+  // Not the mean of both middle ones: of a short gap and one with a slice missing, the short one is usual.
+  std::vector<double> sorted = gaps;
+  const auto middle = sorted.begin() + std::ptrdiff_t((sorted.size() - 1) / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
   for (std::size_t i = 0; i < gaps.size(); ++i) {
     const std::string between =
         slices[i].path().filename().string() + " and " + slices[i + 1].path().filename().string();
     if (gaps[i] < 1e-3)
       throw Error(folder.string() + ": " + between + " lie at the same place; the series has a slice twice");
-    if (gaps[i] > 1.5 * usual_mm + 1e-3)
-      throw Error(folder.string() + ": " + millimetres(gaps[i]) + " between " + between + ", " + millimetres(usual_mm) +
+    if (gaps[i] > 1.5 * *middle + 1e-3)
+      throw Error(folder.string() + ": " + millimetres(gaps[i]) + " between " + between + ", " + millimetres(*middle) +
                   " between most slices; a slice is missing or the series is unevenly spaced");
   }
 }
