@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What calibrations, the correction of cameras and a robot's calibration say of themselves."""
+"""What the correction of cameras and a calibration say of themselves."""
 import pathlib
 
 import costs
-import fits
 import numpy as np
 import scene
 
@@ -12,13 +11,14 @@ import marrow
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 # Of the cameras' errors, as the options of refine.cameras have them by default.
 CAMERA_DEG, CAMERA_MM, FOCAL_PERCENT, CENTRE_PX = 0.5 / np.sqrt(3), 1 / np.sqrt(3), 1.0, 5 / np.sqrt(2)
-STATIONS, TARGET_DEG, TARGET_MM = 8, 0.1, 0.2
 IMAGES = 8
 
 
 def wrong_camera(camera, random):
-    """The camera as a calibration gives it: a little off."""
+    """The camera as a calibration gives it: a little off, turned about the world's origin, where the bone is."""
     off = scene.rigid(np.radians(CAMERA_DEG) * random.normal(size=3), CAMERA_MM * random.normal(size=3))
+    middle = np.array(camera.camera_from_world)[:3, 3]
+    off[:3, 3] += middle - off[:3, :3] @ middle
     intrinsics = np.array(camera.intrinsics)
     intrinsics[:2, :2] *= 1 + 0.01 * FOCAL_PERCENT * random.normal()
     intrinsics[:2, 2] += CENTRE_PX * random.normal(size=2)
@@ -38,24 +38,6 @@ def refined(name, count, random):
     return scene.error(truth, corrected), corrected.covariance
 
 
-def open_loop(random):
-    """One move by a robot whose place follows from a target that is seen with noise."""
-    base_from_world, hand_from_target = fits.a_pose(random), fits.a_pose(random)
-    hands, targets = {}, {}
-    for station in range(STATIONS):
-        hand = fits.a_pose(random)
-        seen = np.linalg.inv(base_from_world) @ hand @ hand_from_target
-        noise = scene.rigid(np.radians(TARGET_DEG) * random.normal(size=3), TARGET_MM * random.normal(size=3))
-        name = "station %d" % station
-        hands[name] = marrow.Pose(hand, target="base", source="hand")
-        targets[name] = marrow.Pose(seen @ noise, target="world", source="target")
-    proximal, distal = fits.a_pose(random), fits.a_pose(random)
-    poses = {"proximal": marrow.Pose(proximal), "distal": marrow.Pose(distal)}
-    moved = marrow.guide.open_loop(poses=poses, hands=hands, targets=targets)
-    right = base_from_world @ proximal @ np.linalg.inv(distal) @ np.linalg.inv(base_from_world)
-    return scene.error(right, moved.motion), moved.motion.covariance
-
-
 def bead_board(random):
     """Focal lengths and principal point of an X-ray device."""
     board, side_px, pixel_mm = str(ROOT / "pipelines/calibration/board.yaml"), 512, 0.6
@@ -73,6 +55,5 @@ FITS = {
     "refine.cameras, patch_gradient_correlation, 2 views": lambda random: refined(
         "patch_gradient_correlation", 2, random
     ),
-    "guide.open_loop": open_loop,
     "camera.bead_board": bead_board,
 }
