@@ -153,6 +153,7 @@ marrow::Pose example_pose() {
   marrow::Pose pose;
   pose.frame.origin_mm = {10, 20, 30};
   pose.frame.axes << 0, 1, 0, 0, 0, 1, 1, 0, 0;
+  pose.frame.is_anatomical = true;
   return pose;
 }
 
@@ -184,6 +185,14 @@ convergence:  # evaluations, and the least cost after them
   - [10, 2.5]
   - [20, .inf]
 )");
+}
+
+TEST(YamlText, PoseWithoutAxesOfItsFragment) {
+  marrow::Pose pose;
+  EXPECT_EQ(marrow::files::pose(pose), kTransformOfPose + "warnings: []\ncost: 0\nevaluations: 0\n");
+  pose = example_pose();
+  pose.frame.is_anatomical = false;
+  EXPECT_NE(marrow::files::pose(pose).find("    - [1, 0, 0]\n  anatomical: false\n"), std::string::npos);
 }
 
 TEST(YamlText, PoseOfWhichLittleIsKnown) {

@@ -79,6 +79,11 @@ void put_deviations(YAML::Emitter& out, const Matrix6d& covariance, const Fragme
   out << EndMap;
 }
 
+/// The axes and the origin of the CT: what a pose has that came with no frame.
+bool is_of_ct(const FragmentFrame& frame) {
+  return !frame.is_anatomical && frame.origin_mm.isZero(0) && frame.axes == Eigen::Matrix3d::Identity();
+}
+
 void put_frame(YAML::Emitter& out, const FragmentFrame& frame) {
   out << Key << "fragment_frame" << Value
       << Comment(frame.is_anatomical
@@ -156,7 +161,7 @@ std::string pose(const Pose& pose) {
   put_texts(out, "warnings", pose.warnings);
   if (std::isfinite(pose.cost)) out << Key << "cost" << Value << number(pose.cost);
   out << Key << "evaluations" << Value << pose.evaluations;
-  if (pose.frame.is_anatomical || pose.covariance) put_frame(out, pose.frame);
+  if (!is_of_ct(pose.frame) || pose.covariance) put_frame(out, pose.frame);
   if (pose.covariance && pose.covariance->allFinite()) {
     out << Key << "covariance" << Value << Comment("of rotation [rad] and translation [mm] about and along these axes");
     put_matrix(out, *pose.covariance);
