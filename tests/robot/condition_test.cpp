@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "domain/message_of.hpp"
 #include "marrow/toolbox/robot/hexapod.hpp"
 #include "tests/simulate/nodes.hpp"
 
@@ -12,18 +13,10 @@ namespace condition_test {
 
 using namespace marrow;
 using robot::Hexapod;
+using test::message_of;
 
 RigidTransform pose(const Eigen::Vector3d& rotation_deg, const Eigen::Vector3d& at_mm) {
   return {"base", "platform", rotation_from_vector(rotation_deg * kPi / 180), at_mm};
-}
-
-std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 /// With numpy: rows [(R b x u) / L, u] of each leg, with u its direction, b its joint on the platform and L the root

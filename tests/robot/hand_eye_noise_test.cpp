@@ -4,11 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
 
+#include "domain/message_of.hpp"
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/robot/hand_eye.hpp"
@@ -18,21 +18,13 @@ namespace hand_eye_noise_test {
 using namespace marrow;
 using robot::Move;
 using robot::Station;
+using test::message_of;
 
 const RigidTransform kHand{"hand", "target", rotation_from_vector({0.3, 2.5, -1}), {10, 60, -20}};
 const RigidTransform kBase{"base", "world", rotation_from_vector({-2, 0.2, 1}), {400, -100, 80}};
 /// The move that is wanted, and where it leads the fragment's middle.
 const RigidTransform kMotion{"world", "world", rotation_from_vector({0.2, -0.1, 0.3}), {12, -20, 25}};
 const Eigen::Vector3d kPlace(20, -30, 100);
-
-std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
 
 Eigen::Vector3d drawn(Random& random, double deviation) {
   const double x = random.normal(), y = random.normal(), z = random.normal();

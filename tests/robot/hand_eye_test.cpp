@@ -2,6 +2,7 @@
 // Hand-eye calibration against motions that are made with a known transform.
 #include <gtest/gtest.h>
 
+#include "domain/message_of.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/robot/hand_eye.hpp"
 #include "marrow/toolbox/robot/servo.hpp"
@@ -10,6 +11,7 @@ namespace hand_eye_test {
 
 using namespace marrow;
 using robot::Move;
+using test::message_of;
 
 const RigidTransform kTrue{"robot", "reference", rotation_from_vector({1.1, -2, 0.7}), {120, -40, 300}};
 const Eigen::Vector3d kCentre(5, -8, 90);
@@ -30,15 +32,6 @@ const std::vector<Move> kMoves{move(motion({8, 0, 0}, {5, 2, 0})), move(motion({
 
 double turn_deg(const RigidTransform& found) { return degrees(geodesic_angle_rad(found.rotation, kTrue.rotation)); }
 double shift_mm(const RigidTransform& found) { return (found * kCentre - kTrue * kCentre).norm(); }
-
-std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
 
 RigidTransform far_guess() { return {"robot", "reference", Eigen::Matrix3d::Identity(), {100, -20, 260}}; }
 

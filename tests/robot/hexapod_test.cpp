@@ -2,6 +2,7 @@
 // The kinematics of a hexapod against lengths computed by hand, and against each other.
 #include <gtest/gtest.h>
 
+#include "domain/message_of.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/robot/hexapod.hpp"
 
@@ -9,21 +10,13 @@ namespace hexapod_test {
 
 using namespace marrow;
 using robot::Hexapod;
+using test::message_of;
 
 /// Legs in pairs from one joint at 0, 120 and 240 degrees to joints at 60, 180 and 300 degrees.
 Hexapod simple() { return robot::make_hexapod({300, 100, 0, 0, 400}); }
 
 RigidTransform pose(const Eigen::Vector3d& rotation_deg, const Eigen::Vector3d& at_mm) {
   return {"base", "platform", rotation_from_vector(rotation_deg * kPi / 180), at_mm};
-}
-
-std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST(Hexapod, LegsAtHomeAreAsLongAsComputedByHand) {
