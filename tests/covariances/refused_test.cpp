@@ -45,7 +45,7 @@ std::vector<Wrong> wrong() {
   indefinite(1, 1) = 4, indefinite(4, 4) = 9;
   indefinite(1, 4) = indefinite(4, 1) = 12;
   return {{-Matrix6d::Identity(), ": the covariance has the negative variance -1 in row 1, column 1" + remedy},
-          {unsymmetric, ": the covariance is not symmetric: 0 in row 6, column 1, but 0.5 in row 1, column 6" + remedy},
+          {unsymmetric, ": the covariance is not symmetric: 0.5 in row 1, column 6, but 0 in row 6, column 1" + remedy},
           {indefinite, ": the covariance has a negative eigenvalue (-1 times its variances)" + remedy}};
 }
 

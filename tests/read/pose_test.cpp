@@ -101,8 +101,8 @@ TEST(ReadPose, DiagnosesFaults) {
       "p.yaml:6:13: pose: covariance: the covariance has the negative variance -1 in row 1, column 1; a covariance is "
       "symmetric and has no negative eigenvalue");
   expect(kPose + "covariance: [[1, 0, 0, 0, 0, 0.5], " + of_five,
-         "p.yaml:6:13: pose: covariance: the covariance is not symmetric: 0 in row 6, column 1, but 0.5 in row 1, "
-         "column 6; a covariance is symmetric and has no negative eigenvalue");
+         "p.yaml:6:13: pose: covariance: the covariance is not symmetric: 0.5 in row 1, column 6, but 0 in row 6, "
+         "column 1; a covariance is symmetric and has no negative eigenvalue");
   expect(kPose + "convergence: 5\n", "convergence: expected a list, got '5'");
   expect(kPose + "convergence:\n  - [1, 2]\n  - [1.5, 2]\n", "p.yaml:8:5: pose: convergence: expected a pair");
   expect("- a\n", "expected a YAML map of keys and values, got a list of 1");
