@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "domain/shapes.hpp"
 #include "register/well.hpp"
 #include "shipped.hpp"
 
@@ -14,16 +15,7 @@ namespace covariances_test {
 
 using marrow::Matrix6d, marrow::Pose;
 
-/// A box of 30 x 20 x 100 mm about the origin.
-marrow::Mesh box() {
-  marrow::Mesh mesh;
-  for (const double z : {-50, 50})
-    for (const double y : {-10, 10})
-      for (const double x : {-15, 15}) mesh.vertices_mm.emplace_back(x, y, z);
-  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  return mesh;
-}
+marrow::Mesh box() { return marrow::test::box({0, 0, 0}, {30, 20, 100}); }
 
 Pose with(const Matrix6d& covariance) {
   Pose pose;

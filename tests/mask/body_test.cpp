@@ -37,18 +37,23 @@ TEST(MaskBody, LeavesOutTheBodyAndAMargin) {
   EXPECT_EQ(int(close.at<std::uint8_t>(20, 255)), 255) << "beyond the rod's end";
 }
 
+/// What is left of a view within 10 mm of a rod's hole.
+cv::Mat near_hole(const marrow::View& view) {
+  return shipped::call("mask.near_holes",
+                       {{"view", shipped::item(view)},
+                        {"implant", shipped::item(implants::rod())},
+                        {"pose", shipped::item(implants::pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0}))}},
+                       {{"radius_mm", 10.0}})
+      .at("view")
+      .as<marrow::View>()
+      .mask;
+}
+
 TEST(MaskNearHoles, KeepsOnlyWhatIsNearAHole) {
   marrow::View view = implants::views()[0];
   view.mask = cv::Mat(512, 512, CV_8U, cv::Scalar(255));
   view.mask.at<std::uint8_t>(256, 256) = 0;
-  const cv::Mat mask = shipped::call("mask.near_holes",
-                                     {{"view", shipped::item(view)},
-                                      {"implant", shipped::item(implants::rod())},
-                                      {"pose", shipped::item(implants::pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0}))}},
-                                     {{"radius_mm", 10.0}})
-                           .at("view")
-                           .as<marrow::View>()
-                           .mask;
+  const cv::Mat mask = near_hole(view);
   // The hole is in the middle of the image. 10 mm are 10 * 1000 / 600 / 0.586 = 28.4 px.
   EXPECT_EQ(int(mask.at<std::uint8_t>(256, 250)), 255);
   EXPECT_EQ(int(mask.at<std::uint8_t>(256, 256)), 0) << "what was left out stays so";
@@ -60,14 +65,7 @@ TEST(MaskNearHoles, KeepsOnlyWhatIsNearAHole) {
 TEST(MaskNearHoles, KeepsADiscInThePatientAlsoWherePixelsAreNotSquare) {
   marrow::View view = implants::views()[0];
   view.camera.intrinsics.row(1) *= 0.5;  // pixels twice as high as wide
-  const cv::Mat mask = shipped::call("mask.near_holes",
-                                     {{"view", shipped::item(view)},
-                                      {"implant", shipped::item(implants::rod())},
-                                      {"pose", shipped::item(implants::pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0}))}},
-                                     {{"radius_mm", 10.0}})
-                           .at("view")
-                           .as<marrow::View>()
-                           .mask;
+  const cv::Mat mask = near_hole(view);
   // The hole is at (255.5, 127.75). 10 mm are 28.4 px along u and 14.2 px along v.
   const auto at = [&](int u, int v) { return int(mask.at<std::uint8_t>(v, u)); };
   EXPECT_EQ(at(255 + 28, 128), 255);

@@ -7,6 +7,9 @@ import numpy
 from package import SCRATCH, SOURCE, marrow
 
 
+SHORT_SEARCH = {"candidates": 1, "scan_rotation_deg": 3, "scan_translation_mm": 3}
+
+
 class Scene:
     """A femur in two parts, its CT in coarse voxels, two small X-ray images, and what is made of them."""
 
@@ -106,24 +109,13 @@ class Scene:
     def found(self):
         """A pose with a covariance, and the stages to it."""
         return marrow.register.multiresolution(
-            cost=self.contour,
-            optimizer=self.optimizer,
-            initial=self.start,
-            candidates=1,
-            scan_rotation_deg=3,
-            scan_translation_mm=3,
+            cost=self.contour, optimizer=self.optimizer, initial=self.start, **SHORT_SEARCH
         )
 
     @functools.cached_property
     def sequence(self):
         return marrow.register.sequence(
-            cost=self.contour,
-            finer_cost=self.grey,
-            optimizer=self.optimizer,
-            initial=self.start,
-            candidates=1,
-            scan_rotation_deg=3,
-            scan_translation_mm=3,
+            cost=self.contour, finer_cost=self.grey, optimizer=self.optimizer, initial=self.start, **SHORT_SEARCH
         )
 
     @functools.cached_property

@@ -3,22 +3,14 @@
 // A box, a cost with wells at given poses, and a pose to judge by them.
 #include <cmath>
 
+#include "domain/shapes.hpp"
 #include "shipped.hpp"
 
 namespace wells {
 
 using marrow::Pose, marrow::RigidTransform, marrow::Vector6d, marrow::Verdict;
 
-/// A box of 30 x 20 x 100 mm about the origin.
-inline marrow::Mesh box() {
-  marrow::Mesh mesh;
-  for (const double z : {-50, 50})
-    for (const double y : {-10, 10})
-      for (const double x : {-15, 15}) mesh.vertices_mm.emplace_back(x, y, z);
-  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  return mesh;
-}
+inline marrow::Mesh box() { return marrow::test::box({0, 0, 0}, {30, 20, 100}); }
 
 /// A cost with wells: in each view it is 1 - the deepest of depth * exp(-(distance / 10)^2), where the distance from a
 /// well's pose counts a degree as a millimetre.

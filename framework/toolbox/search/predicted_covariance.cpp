@@ -342,20 +342,14 @@ void PredictedCovariance::widen() {
   const double variance = eigen.values[5];
   if (!(variance > 0) || !(noise_ > 0)) return;
   const double step = std::min(kReach * std::sqrt(variance), kMostStep) / kSide;
-  std::vector<RigidTransform> poses;
-  for (int i = -kSide; i <= kSide; ++i) poses.push_back(pose_at(i * step * eigen.vectors.col(5)));
+  const std::vector<RigidTransform> poses = line(eigen.vectors.col(5), step, kSide);
   const std::vector<double> values = values_along(poses);
   find_other_minima(poses, values);
-  double sum = 0, squares = 0;
-  for (int i = -kSide; i <= kSide; ++i) {
-    const double density = std::exp(-std::max(0.0, values[std::size_t(i + kSide)] - value_) / noise_);
-    sum += density;
-    squares += density * (i * step) * (i * step);
-  }
-  if (squares / sum < kLeastRatio * variance) return;
+  const double of_density = variance_of_density(values, step);
+  if (of_density < kLeastRatio * variance) return;
   Vector6d unit = eigen.vectors.col(5);
   unit.head<3>() *= radians(1);
-  *covariance_ += (squares / sum - variance) * unit * unit.transpose();
+  *covariance_ += (of_density - variance) * unit * unit.transpose();
 }
 
 /// The same for turns about the long axis, out to the longest step. Derivatives are of one place, but about the axis of
@@ -363,21 +357,32 @@ void PredictedCovariance::widen() {
 void PredictedCovariance::look_around() {
   constexpr int kLong = 2;
   constexpr double kLeastStep_deg = 0.25, kLeastRatio = 2;
-  const double variance = in_units_(kLong, kLong);
-  const int side = int(kMostStep / std::max(std::sqrt(variance), kLeastStep_deg)) / 2 * 2;
+  if (!(noise_ > 0)) return;
+  const int side = int(kMostStep / std::max(std::sqrt(in_units_(kLong, kLong)), kLeastStep_deg)) / 2 * 2;
   const double step = kMostStep / std::max(side, 1);
+  const double of_density = variance_of_density(values_along(line(Vector6d::Unit(kLong), step, side)), step);
+  const double now = (*covariance_)(kLong, kLong) * degrees(1) * degrees(1);
+  if (of_density < kLeastRatio * now) return;
+  (*covariance_)(kLong, kLong) = of_density * radians(1) * radians(1);
+}
+
+/// Poses along a direction, `side` to either side of the pose.
+std::vector<RigidTransform> PredictedCovariance::line(const Vector6d& direction, double step, int side) const {
   std::vector<RigidTransform> poses;
-  for (int i = -side; i <= side; ++i) poses.push_back(pose_at(i * step * Vector6d::Unit(kLong)));
-  const std::vector<double> values = values_along(poses);
+  for (int i = -side; i <= side; ++i) poses.push_back(pose_at(i * step * direction));
+  return poses;
+}
+
+/// About the pose, of the density exp(-cost / noise) at the poses of line().
+double PredictedCovariance::variance_of_density(const std::vector<double>& values, double step) const {
+  const int side = int(values.size()) / 2;
   double sum = 0, squares = 0;
-  for (int i = -side; i <= side && noise_ > 0; ++i) {
+  for (int i = -side; i <= side; ++i) {
     const double density = std::exp(-std::max(0.0, values[std::size_t(i + side)] - value_) / noise_);
     sum += density;
     squares += density * (i * step) * (i * step);
   }
-  const double now = (*covariance_)(kLong, kLong) * degrees(1) * degrees(1);
-  if (!(sum > 0) || squares / sum < kLeastRatio * now) return;
-  (*covariance_)(kLong, kLong) = squares / sum * radians(1) * radians(1);
+  return squares / sum;
 }
 
 /// The cost at poses on a line, a standard deviation or less apart. Every second comes first. Those between are

@@ -73,6 +73,8 @@ class PredictedCovariance {
   void turn_steps(const Matrix6d& hessian);
   void widen();
   void look_around();
+  std::vector<RigidTransform> line(const Vector6d& direction, double step, int side) const;
+  double variance_of_density(const std::vector<double>& values, double step) const;
   std::vector<double> values_along(const std::vector<RigidTransform>& poses);
   void find_other_minima(const std::vector<RigidTransform>& poses, const std::vector<double>& values);
 

@@ -6,7 +6,7 @@
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/list.hpp"
 #include "marrow/domain/pose.hpp"
-#include "marrow/toolbox/geometry/targets.hpp"
+#include "marrow/toolbox/geometry/start_axes.hpp"
 
 namespace marrow::geometry {
 
@@ -36,14 +36,12 @@ inline const Pose& pose_of(const List<Pose>& poses, const std::string& name) {
 /// The pose with the axes of its fragment: its own, or those of the fragment's surface in `models`, which may be null.
 /// A covariance is turned into these axes. Throws Error if there are neither, and as check_model() does.
 inline Pose with_own_axes(const Pose& pose, const std::string& name, const List<Mesh>* models) {
-  const Mesh* model = models ? models->find(name) : nullptr;
-  if (model) check_model(pose.world_from_model, *model);
-  if (pose.frame.is_anatomical) return pose;
-  if (!model)
+  const Pose result = about_fragment_axes(pose, models ? models->find(name) : nullptr);
+  if (!result.frame.is_anatomical)
     throw Error("the pose of '" + name +
                 "' does not say where the fragment's middle is and how its long axis runs, as a matrix alone does "
                 "not; wire the surfaces of both fragments to 'models', or give the node that reads the pose its model");
-  return in_frame(pose, fragment_frame(*model));
+  return result;
 }
 
 /// The poses of both fragments, with their own axes.
