@@ -27,8 +27,9 @@ using Status = NodeRecord::Status;
 void expect_sound(const std::vector<Value>& outputs, const std::vector<PortInfo>& ports) {
   for (std::size_t i = 0; i < outputs.size(); ++i)
     for_leaves(outputs[i], [&](const Value& leaf) {
-      if (const std::string fault = fault_of_value(leaf); !fault.empty())
-        throw Error("it gave an output '" + ports.at(i).name + "' that cannot be: " + fault);
+      std::string fault = fault_of_value(leaf);
+      if (fault.empty()) fault = fault_of_figures(ports.at(i), leaf);
+      if (!fault.empty()) throw Error("it gave an output '" + ports.at(i).name + "' that cannot be: " + fault);
     });
 }
 

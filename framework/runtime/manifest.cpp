@@ -17,7 +17,7 @@ namespace marrow {
 namespace {
 
 using nlohmann::json;
-constexpr int kManifestVersion = 4;  // 4: with folders in which files were looked for
+constexpr int kManifestVersion = 5;  // 5: with the names of figures
 constexpr const char* kOptionTypes[] = {"boolean", "integer", "number", "text", "path", "numbers", "texts", "paths"};
 constexpr const char* kRelationTypes[] = {"not_above",   "below",        "same_length", "as_many_or_none",
                                           "exactly_one", "at_least_one", "distinct"};
@@ -30,11 +30,8 @@ json json_of(const TypeInfo& type) {
 }
 
 json json_of(const PortInfo& port) {
-  return {{"name", port.name},
-          {"help", port.help},
-          {"type", json_of(port.type)},
-          {"optional", port.optional},
-          {"axis", port.axis}};
+  return {{"name", port.name},         {"help", port.help}, {"type", json_of(port.type)},
+          {"optional", port.optional}, {"axis", port.axis}, {"figures", port.figures}};
 }
 
 json json_of(const OptionInfo& option) {
@@ -139,9 +136,9 @@ TypeInfo type_from(const json& j) {
 }
 
 PortInfo port_from(const json& j) {
-  const JsonObject fields(j, "a port", 5);
-  return {fields.text("name"), fields.text("help"), type_from(fields.at("type")), fields.boolean("optional"),
-          fields.text("axis")};
+  const JsonObject fields(j, "a port", 6);
+  return {fields.text("name"),        fields.text("help"), type_from(fields.at("type")),
+          fields.boolean("optional"), fields.text("axis"), fields.texts("figures")};
 }
 
 OptionValue default_from(const JsonObject& fields, OptionType type) {

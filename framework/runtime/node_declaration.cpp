@@ -4,6 +4,7 @@
 
 #include "manifest.hpp"
 #include "marrow/runtime/node_builder.hpp"
+#include "marrow/runtime/types.hpp"
 
 namespace marrow::detail {
 namespace {
@@ -122,6 +123,17 @@ void NodeDeclaration::add_output(std::string_view name, std::string_view help, c
 
 void NodeDeclaration::output_fault(std::string_view name, const char* fault) {
   node_.faults.push_back("output '" + std::string(name) + "': " + fault);
+}
+
+void NodeDeclaration::name_figures(std::initializer_list<std::string_view> names) {
+  if (node_.info.outputs.empty()) {
+    node_.faults.push_back(".figures() belongs after an .out()");
+    return;
+  }
+  PortInfo& port = node_.info.outputs.back();
+  if (port.type != TypeInfo::of<Metrics>())
+    output_fault(port.name, ".figures() is for an output of figures, which are Metrics");
+  port.figures.assign(names.begin(), names.end());
 }
 
 void NodeDeclaration::add_option(std::string_view name, std::string_view help, const MemberType& type,

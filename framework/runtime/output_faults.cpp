@@ -45,7 +45,29 @@ std::string fault_of_pose(const Pose& pose) {
   return "";
 }
 
+/// Whether a pattern, in which * stands for any text, describes the whole text.
+bool fits(std::string_view pattern, std::string_view text) {
+  if (pattern.empty()) return text.empty();
+  if (pattern[0] != '*') return !text.empty() && pattern[0] == text[0] && fits(pattern.substr(1), text.substr(1));
+  for (std::size_t skipped = 0; skipped <= text.size(); ++skipped)
+    if (fits(pattern.substr(1), text.substr(skipped))) return true;
+  return false;
+}
+
 }  // namespace
+
+bool may_have_figure(const PortInfo& port, const std::string& name) {
+  return port.figures.empty() || std::any_of(port.figures.begin(), port.figures.end(),
+                                             [&](const std::string& pattern) { return fits(pattern, name); });
+}
+
+std::string fault_of_figures(const PortInfo& port, const Value& value) {
+  if (!value.data || port.figures.empty() || value.type != TypeInfo::of<Metrics>()) return "";
+  for (const Metric& metric : value.as<Metrics>().items)
+    if (!may_have_figure(port, metric.name))
+      return "the figure '" + metric.name + "' is not among those that its declaration names";
+  return "";
+}
 
 std::string fault_of_value(const Value& value) {
   if (!value.data) return "";

@@ -30,6 +30,7 @@ py::dict dict_of(const PortInfo& port) {
   made["type"] = port.type.id;
   made["optional"] = port.optional;
   made["axis"] = port.axis;
+  made["figures"] = port.figures;
   return made;
 }
 

@@ -46,6 +46,7 @@ from .annotations import (
     below,
     distinct,
     exactly_one,
+    figures,
     length,
     named,
     not_above,

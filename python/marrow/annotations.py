@@ -62,6 +62,12 @@ def over(axis: str) -> Note:
     return Note("axis", axis)
 
 
+def figures(*names: str) -> Note:
+    """The names that the figures of an output of Metrics can have; * stands for any text, as in "*.median_px". A node
+    that makes another figure fails. With it, a figure that cannot be is refused before anything runs."""
+    return Note("figures", list(names))
+
+
 def named(name: str) -> Note:
     """The name of the only output. Not needed if the node's kind names it."""
     return Note("name", name)

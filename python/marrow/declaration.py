@@ -61,7 +61,7 @@ def declared(
             raise Error("%s: an optimizer, and nothing else, has a parameter 'problem: marrow.Problem'" % name)
         if makes:
             kind = _core.type_description(makes)
-            manifest["outputs"] = [{"name": "", "help": "", "type": kind, "optional": False, "axis": ""}]
+            manifest["outputs"] = [{"name": "", "help": "", "type": kind, "optional": False, "axis": "", "figures": []}]
         else:
             _add_outputs(made, hints.get("return"))
         setattr(function, "__marrow_node__", made)
@@ -184,6 +184,7 @@ def _port(where: str, name: str, hint: Any, is_output: bool) -> Dict[str, Any]:
         "type": _core.type_description(str(getattr(kind, "type"))),
         "optional": optional or (is_output and is_list),
         "axis": notes.get("axis", ""),
+        "figures": notes.get("figures", []),
     }
 
 

@@ -86,7 +86,11 @@ json node_json(const NodeInfo& node) {
                            {"optional", port.optional},
                            {"help", port.help}});
   for (const PortInfo& port : node.outputs)
-    j["outputs"].push_back({{"name", port.name}, {"type", port.type.id}, {"axis", port.axis}, {"help", port.help}});
+    j["outputs"].push_back({{"name", port.name},
+                            {"type", port.type.id},
+                            {"axis", port.axis},
+                            {"figures", port.figures},
+                            {"help", port.help}});
   for (const OptionInfo& option : node.options) j["options"].push_back(option_json(option));
   for (const RelationInfo& relation : node.relations) j["relations"].push_back(relation_text(relation));
   return j;

@@ -21,6 +21,9 @@ struct PortInfo {
   TypeInfo type;
   bool optional = false;  ///< an input that may be left unwired, or an output that may be absent
   std::string axis;       ///< the axis that a list port takes or makes; empty for one item
+  /// Of an output of figures (Metrics): the names that its figures can have, in which * stands for any text; empty if
+  /// they are not known before the node is called.
+  std::vector<std::string> figures = {};
 };
 
 enum class OptionType { boolean, integer, number, text, path, numbers, texts, paths };

@@ -49,6 +49,7 @@ class NodeDeclaration {
   void name_input(std::string_view name, std::string_view help, const Over& axis);
   void add_output(std::string_view name, std::string_view help, const Over& axis, ReturnedPart part);
   void output_fault(std::string_view name, const char* fault);
+  void name_figures(std::initializer_list<std::string_view> names);
   /// An option whose member is `offset` bytes from the beginning of the options struct. It has the unit that the suffix
   /// of its name gives ("mm" for "sigma_mm").
   void add_option(std::string_view name, std::string_view help, const MemberType& type, std::ptrdiff_t offset,
@@ -126,6 +127,13 @@ class NodeBuilder {
   NodeBuilder& out(std::string_view name, M S::*member, std::string_view help, const Over& axis = {}) {
     static_assert(std::is_base_of_v<S, R>, "the output is not a member of the struct that the node returns");
     add_output<M>(name, help, axis, detail::bytes_between(&place(), &(place().*member)));
+    return *this;
+  }
+
+  /// The names that the figures of the last output can have; * stands for any text, as in "*.median_px". A node that
+  /// makes another figure fails. With it, a figure that cannot be is refused before anything runs.
+  NodeBuilder& figures(std::initializer_list<std::string_view> names) {
+    declaration_.name_figures(names);
     return *this;
   }
 
