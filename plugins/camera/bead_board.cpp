@@ -223,10 +223,15 @@ MARROW_PLUGIN(plugin) {
            "camera matrix and distortion of the device, with standard deviations")
       .out("report", &BeadBoardResult::report,
            "the same as figures, with the residuals and the numbers of beads and outliers")
+      .figures({"residual", "worst_residual", "beads", "outliers", "focal_u", "focal_u_deviation", "principal_u",
+                "principal_u_deviation", "focal_v", "focal_v_deviation", "principal_v", "principal_v_deviation", "k1",
+                "k1_deviation", "k2", "k2_deviation", "k3", "k3_deviation"})
       .out("poses", &BeadBoardResult::poses,
            "per view: number of beads, residual, and standard deviations of the camera's pose along and about its own "
            "axes",
            over("view"))
+      .figures({"beads", "residual", "rotation_x_deviation", "rotation_y_deviation", "rotation_z_deviation",
+                "translation_x_deviation", "translation_y_deviation", "translation_z_deviation"})
       .out("picture", &BeadBoardResult::pictures, "each image with the beads found and their residuals", over("view"))
       .option("board", &BeadBoardOptions::board, "file with the positions of the board's beads (YAML, docs/case.md)",
               required())

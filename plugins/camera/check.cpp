@@ -249,6 +249,7 @@ MARROW_PLUGIN(plugin) {
       .in("views", "images with the cameras to check", over("view"))
       .in("mesh", "surface of a known object in world coordinates; it is drawn into the images")
       .out("metrics", &Checked::metrics, "reprojection errors, and the number of warnings")
+      .figures({"error", "warnings", "*.points", "*.error", "*.worst", "*.mean_at_object", "*.error_with_free_pose"})
       .out("picture", &Checked::pictures, "each image with the seen and the expected positions of the points",
            over("view"))
       .option("points", &Options::points,

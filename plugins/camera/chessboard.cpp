@@ -176,6 +176,9 @@ MARROW_PLUGIN(plugin) {
       .out("report", &Result::report,
            "the same as figures, with the residual of a coordinate and the root mean square distance in the worst "
            "photograph")
+      .figures({"photographs", "residual", "worst_photograph", "focal_u", "focal_u_deviation", "principal_u",
+                "principal_u_deviation", "focal_v", "focal_v_deviation", "principal_v", "principal_v_deviation", "k1",
+                "k2", "k3"})
       .option("columns", &Options::columns, "number of inner corners in a row", at_least(3), at_most(100))
       .option("rows", &Options::rows, "number of inner corners in a column; one even, one odd", at_least(3),
               at_most(100))

@@ -52,5 +52,6 @@ MARROW_PLUGIN(plugin) {
       .in("truth", "exact camera matrix and distortion")
       .out("metrics",
            "errors of focal length and principal point, root mean square error of the distortion over the image, and "
-           "the residual");
+           "the residual")
+      .figures({"focal_error", "principal_u_error", "principal_v_error", "distortion_error", "residual"});
 }

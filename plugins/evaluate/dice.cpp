@@ -71,5 +71,6 @@ MARROW_PLUGIN(plugin) {
       .in("reference", "segmentation to compare with; it is interpolated at the voxels of the field")
       .out("metrics",
            "Dice = 2 |A and B| / (|A| + |B|), Jaccard = |A and B| / |A or B|, and both volumes; parts of the reference "
-           "beyond the field's grid count as missed");
+           "beyond the field's grid count as missed")
+      .figures({"dice", "jaccard", "volume_mm3", "reference_mm3"});
 }

@@ -65,5 +65,6 @@ MARROW_PLUGIN(plugin) {
       .out("metrics",
            "number of frames and of lost ones; of the absolute values of each figure: median_NAME, p95_NAME, "
            "worst_NAME, rms_NAME")
+      .figures({"frames", "frames_lost", "median_*", "p95_*", "worst_*", "rms_*"})
       .option("figures", &Options::figures, "names of the figures");
 }

@@ -82,9 +82,11 @@ MARROW_PLUGIN(plugin) {
            "angle between planned and true axis; distance between the axes at the hole's centre; angle between the ray "
            "of the planned view through the true hole and its axis; the predicted deviations; 1 if the plan doubts it",
            over("hole"))
+      .figures({"angle_deg", "offset_mm", "view_deg", "predicted_angle_deg", "predicted_offset_mm", "flagged"})
       .out("summary", &Result::summary,
            "the worst of the holes; 1 or 0: whether the plan doubts a hole (flagged), whether one is off by more than "
            "most_deg or most_mm (off), and whether one is off that the plan does not doubt (silent)")
+      .figures({"angle_deg", "offset_mm", "view_deg", "flagged", "off", "silent"})
       .option("most_deg", &Options::most_deg, "a hole is off if its axis is turned by more than this", at_least(0))
       .option("most_mm", &Options::most_mm, "a hole is off if its axis is farther away than this", at_least(0));
 }

@@ -38,5 +38,6 @@ MARROW_PLUGIN(plugin) {
       .in("landmarks", "landmarks to use as targets instead")
       .relation(at_least_one({"in.model", "in.landmarks"}))
       .out("metrics", "mTRE (mean; van de Kraats et al., IEEE TMI 2005), root mean square and largest error")
+      .figures({"mtre_mm", "rms_mm", "max_mm"})
       .option("points", &Options::points, "number of targets spread over the surface", at_least(1), at_most(1e6));
 }

@@ -178,6 +178,9 @@ MARROW_PLUGIN(plugin) {
            "with an edge in reach; the median offset of the edges along the outline's normal (positive: outside), "
            "caused by blur or by a model that is too thick or too thin; the median deviation from this offset. First "
            "for all views together, then for each view")
+      .figures({"median_px", "p90_px", "median_mm", "p90_mm", "matched_percent", "offset_px", "spread_px",
+                "*_median_px", "*_p90_px", "*_median_mm", "*_p90_mm", "*_matched_percent", "*_offset_px",
+                "*_spread_px"})
       .option("spacing_px", &Options::spacing_px, "distance between two outline points", marrow::at_least(0.1),
               marrow::at_most(100))
       .option("reach_px", &Options::reach_px,

@@ -36,6 +36,7 @@ MARROW_PLUGIN(plugin) {
       .out("metrics",
            "rotation angle (geodesic); signed rotation about the long axis; displacement of the centroid; mean "
            "distance between the positions of the surface's points in both poses")
+      .figures({"rotation_deg", "axial_deg", "translation_mm", "distance_mm"})
       .option("points", &Options::points, "number of points spread over the surface", marrow::at_least(1),
               marrow::at_most(1e6));
 }

@@ -83,6 +83,26 @@ MARROW_PLUGIN(plugin) {
            "centroid: its length, its signed parts along the long, frontal and lateral axes, and its length across the "
            "long axis; mTRE; means of the three absolute angles and of the three absolute translations; predicted "
            "standard deviations if the pose has a covariance")
+      .figures({"rotation_deg",
+                "frontal_deg",
+                "lateral_deg",
+                "axial_deg",
+                "translation_mm",
+                "along_mm",
+                "along_frontal_mm",
+                "along_lateral_mm",
+                "across_mm",
+                "mtre_mm",
+                "chapter_rotation_deg",
+                "chapter_translation_mm",
+                "predicted_frontal_deg",
+                "predicted_lateral_deg",
+                "predicted_axial_deg",
+                "predicted_max_deg",
+                "predicted_along_mm",
+                "predicted_along_frontal_mm",
+                "predicted_along_lateral_mm",
+                "predicted_max_mm"})
       .option("points", &Options::points, "number of targets spread over the surface for the mTRE", marrow::at_least(1),
               marrow::at_most(1e6));
 }

@@ -97,6 +97,7 @@ MARROW_PLUGIN(plugin) {
       .out("metrics",
            "for all views together and for each view: mPD in pixels, in mm at the target's depth (divided by the "
            "magnification) and, if source_to_detector_mm is given, in mm on the detector")
+      .figures({"mpd_px", "mpd_mm", "mpd_detector_mm", "*_mpd_px", "*_mpd_mm", "*_mpd_detector_mm"})
       .option("points", &Options::points, "number of targets spread over the surface", at_least(1), at_most(1e6))
       .option("source_to_detector_mm", &Options::source_to_detector_mm,
               "distance from the source to the detector, one for all views or one for each view; empty: not known");

@@ -38,6 +38,7 @@ MARROW_PLUGIN(plugin) {
       .out("metrics",
            "rotation angle (geodesic), signed rotation about the long axis, shift of the centroid and its signed part "
            "along the long axis")
+      .figures({"rotation_deg", "axial_deg", "translation_mm", "along_mm"})
       .option("moved", &geometry::FragmentPair::moved, "fragment that is moved")
       .option("reference", &geometry::FragmentPair::reference, "fragment that stays");
 }

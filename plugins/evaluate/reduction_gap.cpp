@@ -78,6 +78,7 @@ MARROW_PLUGIN(plugin) {
            "for points on the fracture: mean distance from their place in the restored bone before and after the "
            "reduction, and the largest distance after it; the remaining rotation and the remaining shift of the "
            "centroid, which are the errors of the misalignment")
+      .figures({"before_mm", "gap_mm", "largest_gap_mm", "rotation_deg", "translation_mm"})
       .option("moved", &Options::moved, "fragment that is moved")
       .option("reference", &Options::reference, "fragment that stays")
       .option("border_mm", &Options::border_mm,

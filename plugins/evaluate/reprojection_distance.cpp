@@ -66,5 +66,6 @@ MARROW_PLUGIN(plugin) {
       .relation(at_least_one({"in.model", "in.landmarks"}))
       .in("views", "X-ray views; only their cameras are used", over("view"))
       .out("metrics", "mRPD for all views together and for each view; an error along the beam of a view does not count")
+      .figures({"mrpd_mm", "*_mrpd_mm"})
       .option("points", &Options::points, "number of targets spread over the surface", at_least(1), at_most(1e6));
 }

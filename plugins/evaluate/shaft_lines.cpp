@@ -122,6 +122,8 @@ MARROW_PLUGIN(plugin) {
            "larger distance from it in the middle; the largest distance at an end (more than a few mm means a wrong "
            "pair); angle and distance of the axis, the line midway between the borders; found width minus true width "
            "(negative if the edges lie inside the outline); true width; length; log-likelihood from the shaft node")
+      .figures({"border_angle_deg", "border_offset_mm", "worst_mm", "axis_angle_deg", "axis_offset_mm",
+                "width_error_mm", "true_width_mm", "length_mm", "log_likelihood"})
       .option("tolerance_mm", &Options::tolerance_mm,
               "largest distance, in mm at the bone, of a silhouette point from the line fitted to the outline",
               marrow::at_least(0.01));

@@ -164,6 +164,7 @@ MARROW_PLUGIN(plugin) {
       .out("metrics",
            "for each view, the diameter in the middle of its borders, and the magnification there relative to "
            "the depth at which the borders' own width was taken; gives a warning if no shaft has this diameter")
+      .figures({"*_width_mm", "*_magnification"})
       .option("width_mm", &Options::width_mm,
               "mean outer diameters of the shaft, one for each direction from which the bone may be seen; empty: those "
               "of a femur, 15 to 55 mm")

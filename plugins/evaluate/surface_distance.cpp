@@ -88,5 +88,6 @@ MARROW_PLUGIN(plugin) {
       .out("metrics",
            "figures over the points of both surfaces; bias is the mean signed distance of the mesh from the reference, "
            "positive if the mesh is too large")
+      .figures({"mean_mm", "rms_mm", "p95_mm", "max_mm", "bias_mm"})
       .option("points", &Options::points, "number of points spread over each surface", at_least(100), at_most(1e6));
 }

@@ -148,6 +148,8 @@ MARROW_PLUGIN(plugin) {
           "(positive: procurvatum, apex to the front); internal torsion, about the long axis; shift of the fracture's "
           "faces across it, its medial and anterior parts; shortening. If the side is not known, varus, internal and "
           "medial are replaced by the patient's left: apex_left_deg, torsion_left_deg, left_shift_mm")
+      .figures({"angulation_deg", "shift_mm", "varus_deg", "apex_left_deg", "procurvatum_deg", "internal_torsion_deg",
+                "torsion_left_deg", "medial_shift_mm", "left_shift_mm", "anterior_shift_mm", "shortening_mm"})
       .option("moved", &Options::moved, "one fragment; the one that is lower in the CT is the distal one")
       .option("reference", &Options::reference, "the other fragment")
       .option("side", &Options::side,

@@ -45,6 +45,8 @@ MARROW_PLUGIN(plugin) {
       .out("motion", &Reduction::motion,
            "in world coordinates: the rotation vector about the fragment's centroid, and the shift of the centroid, "
            "with their lengths")
+      .figures(
+          {"turn_x_deg", "turn_y_deg", "turn_z_deg", "turn_deg", "shift_x_mm", "shift_y_mm", "shift_z_mm", "shift_mm"})
       .option("moved", &FragmentPair::moved, "fragment that is moved")
       .option("reference", &FragmentPair::reference, "fragment that stays");
 }

@@ -272,6 +272,8 @@ MARROW_PLUGIN(plugin) {
       .out("predicted", &Result::predicted, "poses that are expected in the next images", over("fragment"))
       .out("figures", &Result::figures,
            "pairs and images so far, what remains and how exactly it is known, distance between the bones, next step")
+      .figures({"pairs", "images", "rotation_deg", "shift_mm", "deviation_deg", "deviation_mm", "distance_mm",
+                "step_deg", "step_mm", "robot_known_to_deg", "reduced"})
       .option("moved", &Options::moved, "fragment that the robot holds")
       .option("reference", &Options::reference, "fragment that stays")
       .option("hand_eye", &Options::hand_eye,

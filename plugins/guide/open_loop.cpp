@@ -114,6 +114,7 @@ MARROW_PLUGIN(plugin) {
       .out("figures", &Result::figures,
            "size of the motion, how far from its place it leaves the fragment because the robot's place is not known "
            "better (standard deviations in the worst direction), and the number of images")
+      .figures({"step_deg", "step_mm", "left_deg", "left_mm", "stations", "images"})
       .option("moved", &Options::moved, "fragment that the robot holds")
       .option("reference", &Options::reference, "fragment that stays")
       .option("method", &Options::method,

@@ -134,6 +134,9 @@ MARROW_PLUGIN(plugin) {
       .out("motions", &Result::motions,
            "motion of each camera, about and along the axes of its image (u, v, depth), and its predicted deviations",
            over("view"))
+      .figures({"rotation_u_deg", "rotation_v_deg", "rotation_depth_deg", "shift_u_mm", "shift_v_mm", "shift_depth_mm",
+                "predicted_rotation_u_deg", "predicted_rotation_v_deg", "predicted_rotation_depth_deg",
+                "predicted_shift_u_mm", "predicted_shift_v_mm", "predicted_shift_depth_mm"})
       .option("rotation_deg", &Options::rotation_deg, "root mean square of the cameras' rotations", at_least(1e-6))
       .option("shift_mm", &Options::shift_mm, "root mean square of the cameras' shifts", at_least(1e-6))
       .option(

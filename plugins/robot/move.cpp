@@ -151,5 +151,6 @@ MARROW_PLUGIN(plugin) {
       .in("report", "what the robot said before")
       .out("state", &Result::state, "the robot after the motion")
       .out("report", &Result::report, "the motion by its encoders, the load, and why it stopped early, if it did")
-      .out("figures", &Result::figures, "load at the end; largest load since the robot gripped the fragment");
+      .out("figures", &Result::figures, "load at the end; largest load since the robot gripped the fragment")
+      .figures({"force_n", "torque_nm", "largest_force_n", "largest_torque_nm", "warned", "stopped"});
 }

@@ -134,6 +134,7 @@ MARROW_PLUGIN(plugin) {
            "error of "
            "them moves the platform in the worst direction as in the best one",
            over("position"))
+      .figures({"leg1", "leg2", "leg3", "leg4", "leg5", "leg6", "condition"})
       .option("fragment", &Options::fragment, "name of the fragment on the platform")
       .option("base_radius_mm", &Options::base_radius_mm, "radius of the circle of the base's joints", at_least(1))
       .option("platform_radius_mm", &Options::platform_radius_mm, "the same of the platform", at_least(1))

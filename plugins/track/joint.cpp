@@ -85,6 +85,8 @@ MARROW_PLUGIN(plugin) {
           "of the lower bone to the right, to the front and apart; turn about and shift along the helical axis since "
           "the first frame",
           over("frame"))
+      .figures({"flexion_deg", "adduction_deg", "internal_rotation_deg", "right_mm", "front_mm", "distraction_mm",
+                "helical_deg", "helical_shift_mm"})
       .option("centre_mm", &Options::centre_mm, "point of the joint in the CT, whose shift is given")
       .option("right", &Options::right, "direction to the patient's right in the CT", unit(""))
       .option("up", &Options::up, "direction to the patient's head in the CT", unit(""));
