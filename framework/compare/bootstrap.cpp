@@ -6,6 +6,7 @@
 #include <functional>
 #include <thread>
 
+#include "beta.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/quantile.hpp"
 #include "marrow/domain/random.hpp"
@@ -16,7 +17,7 @@ namespace marrow::compare {
 namespace {
 
 ValuesOfCases checked_and_sorted(ValuesOfCases cases, const BootstrapSettings& settings) {
-  if (cases.empty()) throw Error("there are no cases; give at least one");
+  if (cases.size() < 2) throw Error("an interval over cases needs at least two, got " + std::to_string(cases.size()));
   for (std::vector<double>& values : cases) {
     if (values.empty()) throw Error("a case has no values; leave it out");
     check_finite(values, "value");
@@ -50,10 +51,9 @@ std::vector<double> of_resamples(const BootstrapSettings& settings,
   return results;
 }
 
-Interval interval_of(std::vector<double> medians, double confidence) {
-  std::sort(medians.begin(), medians.end());
-  return {quantile_of_sorted(medians, (1 - confidence) / 2), quantile_of_sorted(medians, (1 + confidence) / 2),
-          confidence};
+/// The share of resamples that lies beyond each bound of the expanded percentile interval.
+double expanded_tail(double confidence, double cases) {
+  return upper_tail(std::sqrt(cases / (cases - 1)) * student_quantile(1 - confidence, cases - 1));
 }
 
 /// Counts how often each value was drawn. The values are known by their ranks, so a median is found by counting up to
@@ -108,41 +108,18 @@ Interval median_of_runs_interval(const ValuesOfCases& given, const BootstrapSett
   for (std::size_t c = 0; c < cases.size(); ++c)
     for (const double value : cases[c])
       ranks[c].push_back(std::uint32_t(std::lower_bound(sorted.begin(), sorted.end(), value) - sorted.begin()));
-  return interval_of(of_resamples(settings,
-                                  [&]() -> std::function<double(Random&)> {
-                                    return [&, drawn = DrawnRanks(sorted.size())](Random& random) mutable {
-                                      for (std::size_t i = 0; i < ranks.size(); ++i) {
-                                        const std::vector<std::uint32_t>& own = ranks[random.index(ranks.size())];
-                                        for (std::size_t k = 0; k < own.size(); ++k)
-                                          drawn.add(own[random.index(own.size())]);
-                                      }
-                                      return drawn.take_median(sorted);
-                                    };
-                                  }),
-                     settings.confidence);
-}
-
-Interval median_of_case_means_interval(const ValuesOfCases& given, const BootstrapSettings& settings) {
-  const ValuesOfCases cases = checked_and_sorted(given, settings);
-  if (std::all_of(cases.begin(), cases.end(), [](const auto& values) { return values.size() == 1; })) {
-    std::vector<double> values;
-    for (const std::vector<double>& one : cases) values.push_back(one[0]);
-    return median_interval(values, settings.seed, settings.confidence, settings.resamples);
-  }
-  return interval_of(of_resamples(settings,
-                                  [&]() -> std::function<double(Random&)> {
-                                    return [&, means = std::vector<double>(cases.size())](Random& random) mutable {
-                                      for (double& mean : means) {
-                                        const std::vector<double>& own = cases[random.index(cases.size())];
-                                        double sum = 0;
-                                        for (std::size_t k = 0; k < own.size(); ++k)
-                                          sum += own[random.index(own.size())];
-                                        mean = sum / double(own.size());
-                                      }
-                                      return quantile_in_place(means, 0.5);
-                                    };
-                                  }),
-                     settings.confidence);
+  std::vector<double> medians = of_resamples(settings, [&]() -> std::function<double(Random&)> {
+    return [&, drawn = DrawnRanks(sorted.size())](Random& random) mutable {
+      for (std::size_t i = 0; i < ranks.size(); ++i) {
+        const std::vector<std::uint32_t>& own = ranks[random.index(ranks.size())];
+        for (std::size_t k = 0; k < own.size(); ++k) drawn.add(own[random.index(own.size())]);
+      }
+      return drawn.take_median(sorted);
+    };
+  });
+  std::sort(medians.begin(), medians.end());
+  const double tail = expanded_tail(settings.confidence, double(cases.size()));
+  return {quantile_of_sorted(medians, tail), quantile_of_sorted(medians, 1 - tail), settings.confidence};
 }
 
 }  // namespace marrow::compare

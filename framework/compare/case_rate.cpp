@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "beta.hpp"
 #include "marrow/domain/error.hpp"
 #include "normal.hpp"
 
@@ -42,6 +43,14 @@ double CaseRate::effective_runs() const {
 Interval CaseRate::interval(double confidence) const {
   check_confidence(confidence);
   return score_interval(double(successes_) / double(runs_ ? runs_ : 1), effective_runs(), confidence);
+}
+
+Interval CaseRate::exact_interval(double confidence) const {
+  check_confidence(confidence);
+  const double runs = effective_runs(), tail = (1 - confidence) / 2;
+  const double successes = runs * double(successes_) / double(runs_), others = runs - successes;
+  return {successes_ == 0 ? 0 : beta_quantile(tail, successes, others + 1),
+          successes_ == runs_ ? 1 : beta_quantile(1 - tail, successes + 1, others), confidence};
 }
 
 }  // namespace marrow::compare

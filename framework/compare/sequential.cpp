@@ -3,13 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/number_text.hpp"
 #include "normal.hpp"
-#include "value_checks.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -97,25 +95,6 @@ std::vector<double> levels_of_looks(const std::vector<double>& information, doub
     before = share;
   }
   return levels;
-}
-
-Interval order_statistic_interval(std::vector<double> values, double level) {
-  check_finite(values, "value");
-  if (!(level > 0 && level < 1))
-    throw Error("the level is " + formatted("%f", level) + "; give a fraction between 0 and 1, such as 0.05");
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  // Twice the probability that fewer than j of n values are below the median; its terms are those of a fair coin.
-  double tail = 0, log_term = -double(n) * std::numbers::ln2;
-  std::size_t j = 0;
-  while (j < n && tail + 2 * std::exp(log_term) <= level) {
-    tail += 2 * std::exp(log_term);
-    log_term += std::log(double(n - j) / double(j + 1));
-    ++j;
-  }
-  const double infinite = std::numeric_limits<double>::infinity();
-  if (!j) return {-infinite, infinite, 1 - level};
-  return {values[j - 1], values[n - j], 1 - level};
 }
 
 std::vector<std::size_t> looks_at(std::size_t first, std::size_t every, std::size_t most) {

@@ -3,17 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "infinite.hpp"
 #include "marrow/compare/sequential.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/number_text.hpp"
-#include "marrow/domain/quantile.hpp"
 
 namespace marrow::compare {
 namespace {
-
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 Look begin_look(const StopPlan& plan, std::size_t cases) {
   Look look;
@@ -91,14 +88,15 @@ Look look_at_widths(const StopPlan& plan, std::size_t cases, const std::vector<s
   return look;
 }
 
-Look look_at_difference(const StopPlan& plan, std::size_t cases, const std::vector<Pair>& pairs) {
+Look look_at_difference(const StopPlan& plan, std::size_t cases, const std::vector<Pair>& pairs,
+                        bool larger_is_better) {
   Look look = begin_look(plan, cases);
-  if (pairs.empty()) return look;
-  const std::vector<double> differences = case_differences(pairs);
-  look.p = signed_rank_test(differences).p;
-  look.is_met = look.p < look.level;
-  look.difference = quantile_of_sorted(differences, 0.5);
-  if (look.level > 0) look.interval = order_statistic_interval(differences, look.level);
+  if (look.level <= 0) return look;
+  const Comparison comparison = compare_pairs(pairs, larger_is_better, 1 - look.level);
+  look.p = comparison.test.p;
+  look.is_met = difference_shown(comparison, look.p, look.level);
+  look.difference = comparison.median_difference;
+  look.interval = comparison.interval;
   return look;
 }
 

@@ -9,6 +9,8 @@ namespace marrow::compare {
 
 /// Throws Error for no values, or for one that is not finite. `what` names one of them in the message.
 void check_finite(const std::vector<double>& values, const std::string& what);
+/// The same, but values may be infinite.
+void check_numbers(const std::vector<double>& values, const std::string& what);
 /// Throws Error if there are too few for bounds.
 void check_resamples(std::size_t resamples);
 

@@ -126,37 +126,42 @@ def all_signs(values):
     return min(1.0, test.pvalue)
 
 
-def split_mix(seed):
-    mask = (1 << 64) - 1
-    while True:
-        seed = (seed + 0x9E3779B97F4A7C15) & mask
-        bits = ((seed ^ (seed >> 30)) * 0xBF58476D1CE4E5B9) & mask
-        bits = ((bits ^ (bits >> 27)) * 0x94D049BB133111EB) & mask
-        yield bits ^ (bits >> 31)
+def check_units():
+    """Differences of 0.1 mm in other units: scipy gets whole numbers, in which ties and zeros are exact."""
+    random = numpy.random.default_rng(2)
+    for unit in (1, 0.1, 0.01, 1e-3, 1 / 3, 25.4):
+        data = [random.integers(-3, 6, n) for n in (6, 8, 12, 20, 60, 200)]
+        for values, got in zip(data, answers([line("normal", values * unit) for values in data])):
+            compare("signed rank in other units: p", got[2], normal(values.astype(float)), 1e-12, values)
 
 
-def check_bootstrap(random):
-    # split_mix itself, on the first outputs of seed 1234567 that are published with the algorithm's implementations
-    outputs = split_mix(1234567)
-    assert [next(outputs) for _ in range(3)] == [6457827717110365317, 3203168211198807973, 9817491932198370423]
-    ten_cases = numpy.array([0.3, -0.1, 0.25, 0.4, 0.05, 0.2, 0.15, 0.6, -0.2, 0.35])
-    data = [(ten_cases, 1, 0.95), (numpy.array([0.7]), 1, 0.95), (numpy.full(9, 0.7), 3, 0.95)]
-    settings = [(6, 5, 0.95), (13, 2**40 + 1, 0.9), (20, 0, 0.95), (40, 9, 0.5)]
-    data += [(random.standard_t(3, n), seed, confidence) for n, seed, confidence in settings]
-    got = answers([line("median_interval", values, seed, c) for values, seed, c in data])
-    for (values, seed, confidence), interval in zip(data, got):
-        outputs, n = split_mix(seed), len(values)
-        drawn = numpy.array([((next(outputs) >> 32) * n) >> 32 for _ in range(10000 * n)]).reshape(10000, n)
-        medians = numpy.median(numpy.sort(values)[drawn], axis=1)
-        tails = [50 * (1 - confidence), 50 * (1 + confidence)]
-        compare("bootstrap, same resamples", interval, numpy.percentile(medians, tails), 1e-13, values)
-        if numpy.ptp(values) == 0:
-            continue  # scipy refuses one value
-        theirs = stats.bootstrap(
-            (values,), numpy.median, confidence_level=confidence, n_resamples=10000, method="percentile", random_state=1
-        ).confidence_interval
-        of_width = (numpy.array(interval) - theirs.low) / (theirs.high - theirs.low)
-        compare("bootstrap, scipy's own resamples (of the width)", 1 + of_width, [1, 2], 0.1, values)
+def check_medians(random):
+    """The order statistics by scipy's binomial distribution; the bootstrap, with the same share of other resamples."""
+    for n in (1, 2, 5, 6, 7, 8, 9, 20, 51, 400):
+        for level in (0.05, 0.01, 0.2):
+            values = random.standard_t(3, n)
+            below = [j for j in range(1, n + 1) if 2 * stats.binom.cdf(j - 1, n, 0.5) <= level]
+            ordered = numpy.sort(values)
+            expected = (ordered[below[-1] - 1], ordered[n - below[-1]]) if below else (-numpy.inf, numpy.inf)
+            got = answers([line("order_statistics", values, level)])[0]
+            if tuple(got) != expected:
+                failures.append(f"order statistics: got {got}, scipy {expected}, on {n} values at {level}")
+    for cases, runs, confidence in ((6, 3, 0.95), (12, 5, 0.95), (20, 2, 0.9)):
+        values = random.normal(size=(cases, 1)) + random.normal(size=(cases, runs))
+        drawn = values[random.integers(cases, size=(20000, cases))]
+        drawn = numpy.take_along_axis(drawn, random.integers(runs, size=drawn.shape), axis=2)
+        tail = stats.norm.sf(numpy.sqrt(cases / (cases - 1)) * stats.t.isf((1 - confidence) / 2, cases - 1))
+        theirs = numpy.quantile(numpy.median(drawn, axis=(1, 2)), [tail, 1 - tail])
+        got = numpy.array(answers([line("median_of_runs", values.ravel(), runs, confidence)])[0])
+        of_width = (got - theirs[0]) / (theirs[1] - theirs[0])
+        compare("bootstrap, numpy's own resamples (of the width)", 1 + of_width, [1, 2], 0.1, values)
+
+
+def check_exact_rates():
+    settings = [(k, n, c) for n in (1, 2, 3, 20, 500) for k in sorted({0, 1, n // 2, n}) for c in (0.95, 0.999)]
+    for (k, n, c), got in zip(settings, answers([f"exact_rate {k} {n} {c}" for k, n, c in settings])):
+        theirs = stats.binomtest(k, n).proportion_ci(c, method="exact")
+        compare("exact interval of a rate", 1 + numpy.array(got), 1 + numpy.array(tuple(theirs)), 1e-12, (k, n, c))
 
 
 def check_holm():
@@ -173,7 +178,9 @@ check_wilson()
 check_summary(random)
 check_without_ties(random)
 check_ties_and_zeros(random)
-check_bootstrap(random)
+check_units()
+check_medians(random)
+check_exact_rates()
 check_holm()
 for what, (count, deviation) in largest.items():
     print(f"{what}: {count} compared, largest deviation {deviation:.2g}")

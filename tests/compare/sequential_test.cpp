@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <marrow/compare/sequential.hpp>
 
 #include "domain/message_of.hpp"
@@ -58,25 +57,6 @@ TEST(Looks, AreAtTheFirstCasesAndEveryFew) {
   EXPECT_EQ(looks_at(7, 20, 30), (std::vector<std::size_t>{7, 27, 30}));
   EXPECT_EQ(looks_at(5, 1, 5), (std::vector<std::size_t>{5}));
   EXPECT_NE(message_of([] { looks_at(5, 1, 4); }).find("begin at 5 cases and end at 4"), std::string::npos);
-}
-
-TEST(OrderStatisticInterval, IsThatOfTheBinomialDistribution) {
-  // 2 P(fewer than 2 of 9 below) = 2 (1 + 9) / 512 = 0.0390625; with 3 it is 2 (1 + 9 + 36) / 512 = 0.18.
-  const std::vector<double> values{9, 1, 8, 2, 7, 3, 6, 4, 5};
-  for (const double level : {0.0390625, 0.05, 0.17}) {
-    const Interval interval = order_statistic_interval(values, level + 1e-12);
-    EXPECT_EQ(interval.lower, 2) << level;
-    EXPECT_EQ(interval.upper, 8) << level;
-    EXPECT_NEAR(interval.confidence, 1 - level, 1e-9);
-  }
-  EXPECT_EQ(order_statistic_interval(values, 0.039).lower, 1) << "2 / 512 = 0.0039";
-  EXPECT_EQ(order_statistic_interval(values, 0.003).lower, -std::numeric_limits<double>::infinity());
-  EXPECT_EQ(order_statistic_interval(values, 0.003).upper, std::numeric_limits<double>::infinity());
-}
-
-TEST(OrderStatisticInterval, RefusesWhatHasNoMedian) {
-  EXPECT_EQ(message_of([] { order_statistic_interval({}, 0.05); }), "there are no values; give at least one");
-  EXPECT_NE(message_of([] { order_statistic_interval({1}, 0); }).find("between 0 and 1"), std::string::npos);
 }
 
 }  // namespace sequential_test

@@ -2,7 +2,9 @@
 // Reads one computation per line from standard input and prints its numbers on one line, for scipy_test.py.
 #include <cstdio>
 #include <iostream>
-#include <marrow/compare/statistics.hpp>
+#include <marrow/compare/case_rate.hpp>
+#include <marrow/compare/median_interval.hpp>
+#include <marrow/compare/paired.hpp>
 #include <marrow/domain/error.hpp>
 #include <sstream>
 
@@ -14,8 +16,8 @@ std::vector<double> answer(std::istringstream& line) {
   std::string command;
   line >> command;
   double first = 0, second = 0;
-  const bool two_settings = command == "wilson" || command == "median_interval";
-  if (two_settings) line >> first >> second;
+  if (command == "order_statistics") line >> first;
+  if (command == "wilson" || command == "median_of_runs" || command == "exact_rate") line >> first >> second;
   std::vector<double> values;
   for (double value; line >> value;) values.push_back(value);
 
@@ -24,8 +26,22 @@ std::vector<double> answer(std::istringstream& line) {
         wilson_interval(static_cast<std::size_t>(first), static_cast<std::size_t>(second), values.at(0));
     return {interval.lower, interval.upper};
   }
-  if (command == "median_interval") {
-    const Interval interval = median_interval(values, static_cast<std::uint64_t>(first), second);
+  if (command == "order_statistics") {
+    const Interval interval = order_statistic_interval(values, first);
+    return {interval.lower, interval.upper};
+  }
+  if (command == "median_of_runs") {  // cases of equally many runs, one after the other
+    const auto runs = static_cast<std::ptrdiff_t>(first);
+    ValuesOfCases cases;
+    for (auto from = values.begin(); from < values.end(); from += runs) cases.emplace_back(from, from + runs);
+    const Interval interval = median_of_runs_interval(cases, {1, second});
+    return {interval.lower, interval.upper};
+  }
+  if (command == "exact_rate") {  // one run in each case
+    CaseRate rate;
+    for (std::size_t run = 0; run < static_cast<std::size_t>(second); ++run)
+      rate.add(std::to_string(run), run < static_cast<std::size_t>(first));
+    const Interval interval = rate.exact_interval(values.at(0));
     return {interval.lower, interval.upper};
   }
   if (command == "summary") {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <marrow/compare/statistics.hpp>
 
@@ -157,116 +155,6 @@ TEST(Summarise, RefusesWhatIsNotFinite) {
   EXPECT_NE(message_of([] { summarise({1, nan, 3}); }).find("value 2 of 3 is nan"), std::string::npos);
   EXPECT_NE(message_of([] { summarise({infinite}); }).find("value 1 of 1 is inf"), std::string::npos);
   EXPECT_NE(message_of([] { summarise({}); }).find("no values"), std::string::npos);
-}
-
-TEST(CaseDifferences, CountACaseOnceHoweverManyStartsItHas) {
-  const std::vector<Pair> pairs = {{"b", 1, 1.5}, {"a", 1, 3}, {"a", 2, 6}, {"a", 0, 0}};
-  EXPECT_EQ(case_differences(pairs), (std::vector<double>{0.5, 2}));
-}
-
-TEST(CaseDifferences, DoNotDependOnTheOrderOfThePairs) {
-  std::vector<Pair> pairs;
-  for (int i = 0; i < 60; ++i) pairs.push_back({"case " + std::to_string(i % 7), 0.1 * i, std::sin(i) * 1e3});
-  const Comparison comparison = compare_pairs(pairs, 5);
-  std::reverse(pairs.begin(), pairs.end());
-  const Comparison reversed = compare_pairs(pairs, 5);
-  EXPECT_EQ(comparison.cases, 7u);
-  EXPECT_EQ(comparison.pairs, 60u);
-  EXPECT_EQ(comparison.median_difference, reversed.median_difference);
-  EXPECT_EQ(comparison.interval.lower, reversed.interval.lower);
-  EXPECT_EQ(comparison.interval.upper, reversed.interval.upper);
-  EXPECT_EQ(comparison.test.p, reversed.test.p);
-}
-
-TEST(CaseDifferences, NameTheCaseThatIsNotFinite) {
-  const std::string message = message_of([] { case_differences({{"left", 1, 2}, {"right", 1, nan}}); });
-  EXPECT_NE(message.find("case 'right': got 1.000000 for the reference and nan for the variant"), std::string::npos)
-      << message;
-  EXPECT_NE(message_of([] { case_differences({}); }).find("no pairs"), std::string::npos);
-}
-
-TEST(MedianInterval, IsTheSameOnAnyMachine) {
-  // As scipy_test.py finds them with its own SplitMix64.
-  const Interval interval = median_interval({0.3, -0.1, 0.25, 0.4, 0.05, 0.2, 0.15, 0.6, -0.2, 0.35}, 1);
-  EXPECT_EQ(interval.lower, 0.5 * (-0.1 + 0.15));
-  EXPECT_EQ(interval.upper, 0.35);
-  EXPECT_EQ(interval.confidence, 0.95);
-}
-
-TEST(MedianInterval, OfOneValueOrEqualOnesHasNoWidth) {
-  for (const std::vector<double>& differences : {std::vector<double>{0.7}, std::vector<double>(9, 0.7)}) {
-    const Interval interval = median_interval(differences, 3);
-    EXPECT_EQ(interval.lower, 0.7);
-    EXPECT_EQ(interval.upper, 0.7);
-  }
-}
-
-TEST(MedianInterval, IsNotMovedByOneLostCase) {
-  const Interval with = median_interval({0.1, 0.2, 0.2, 0.3, 0.3, 0.3, 0.4, 0.4, 0.5, 0.6}, 1);
-  const Interval lost = median_interval({0.1, 0.2, 0.2, 0.3, 0.3, 0.3, 0.4, 0.4, 0.5, 30}, 1);
-  EXPECT_EQ(with.lower, lost.lower);
-  EXPECT_EQ(with.upper, lost.upper);
-}
-
-TEST(MedianInterval, RefusesTooFewResamplesAndWhatIsNotFinite) {
-  EXPECT_NE(message_of([] { median_interval({1, 2}, 1, 0.95, 999); }).find("999 resamples"), std::string::npos);
-  EXPECT_NE(message_of([] {
-              median_interval({1, -infinite}, 1);
-            }).find("difference 2 of 2 is -inf"),
-            std::string::npos);
-  EXPECT_NE(message_of([] { median_interval({}, 1); }).find("no differences"), std::string::npos);
-}
-
-TEST(SignedRank, IsTheTable) {
-  // Of the 2^6 = 64 signs, one gives W = 0 and one W = 1: p = 2/64 and 4/64. W = 2 is {2} only, W = 3 is {3} and {1,
-  // 2}.
-  EXPECT_DOUBLE_EQ(signed_rank_test({1, 2, 3, 4, 5, 6}).p, 2.0 / 64);
-  EXPECT_DOUBLE_EQ(signed_rank_test({-1, 2, 3, 4, 5, 6}).p, 4.0 / 64);
-  EXPECT_DOUBLE_EQ(signed_rank_test({1, 2, -3, 4, 5, 6}).p, 10.0 / 64);
-  const SignedRank test = signed_rank_test({1, -2, -3, -4, -5, -6});
-  EXPECT_EQ(test.positive_ranks, 1);
-  EXPECT_EQ(test.negative_ranks, 20);
-  EXPECT_DOUBLE_EQ(test.p, 4.0 / 64);
-  EXPECT_TRUE(test.exact);
-}
-
-TEST(SignedRank, OfOneCaseSaysNothing) { EXPECT_EQ(signed_rank_test({5}).p, 1); }
-
-TEST(SignedRank, TiesKeepTheExactDistribution) {
-  // Five equal differences: all ranks 3, so only the signs count: 2/32, where the approximation has 0.0369.
-  EXPECT_DOUBLE_EQ(signed_rank_test({2, 2, 2, 2, 2}).p, 2.0 / 32);
-  EXPECT_NEAR(signed_rank_test({2, 2, 2, 2, 2}, SignedRankMethod::normal).p, 0.0369, 1e-4);
-  // Ranks 1.5 1.5 3 4, negative 1.5: sums up to 1.5 are {}, {first}, {second}: 2 * 3/16.
-  EXPECT_DOUBLE_EQ(signed_rank_test({-1, 1, 2, 3}).p, 6.0 / 16);
-}
-
-TEST(SignedRank, ZerosAreRankedAndThenLeftOut) {
-  // |d| = 0 1 2 3, ranks 1 2 3 4; the negative one has rank 2 of {2, 3, 4}: sums up to 2 are {} and {2}: 2 * 2/8.
-  const SignedRank test = signed_rank_test({0, -1, 2, 3});
-  EXPECT_EQ(test.cases, 4u);
-  EXPECT_EQ(test.zeros, 1u);
-  EXPECT_EQ(test.negative_ranks, 2);
-  EXPECT_EQ(test.positive_ranks, 7);
-  EXPECT_DOUBLE_EQ(test.p, 4.0 / 8);
-  EXPECT_EQ(signed_rank_test({0, 0, 0}).p, 1);
-  EXPECT_EQ(signed_rank_test({0, 0, 0}, SignedRankMethod::normal).p, 1);
-}
-
-TEST(SignedRank, ManyCasesUseTheApproximation) {
-  std::vector<double> differences;
-  for (int i = 1; i <= 51; ++i) differences.push_back(i % 3 ? i : -i);
-  const SignedRank test = signed_rank_test(differences);
-  // Multiples of 3 up to 51 add up to 459; mean 663, variance 51 * 52 * 103 / 24 = 11381.5: z = 203.5 / 106.684.
-  EXPECT_FALSE(test.exact);
-  EXPECT_EQ(test.negative_ranks, 459);
-  EXPECT_NEAR(test.p, 0.05646, 1e-4);
-  EXPECT_NE(message_of([&] { signed_rank_test(differences, SignedRankMethod::exact); }).find("at most 50"),
-            std::string::npos);
-}
-
-TEST(SignedRank, RefusesWhatIsNotFinite) {
-  EXPECT_NE(message_of([] { signed_rank_test({1, nan}); }).find("difference 2 of 2 is nan"), std::string::npos);
-  EXPECT_NE(message_of([] { signed_rank_test({}); }).find("no differences"), std::string::npos);
 }
 
 TEST(Holm, StepsDownAndKeepsTheOrder) {

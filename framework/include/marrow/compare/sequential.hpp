@@ -3,8 +3,6 @@
 #include <cstddef>
 #include <vector>
 
-#include "marrow/compare/statistics.hpp"
-
 // Tests that are made again and again while cases are added. Whoever looks twenty times at p < 0.05 finds a difference
 // in a quarter of the experiments in which there is none. Here all looks together find one in at most alpha of them.
 namespace marrow::compare {
@@ -30,14 +28,6 @@ enum class Spending {
 /// for no looks, shares that do not rise from above 0 to at most 1, or an alpha not within 0.001 to 0.5.
 std::vector<double> levels_of_looks(const std::vector<double>& information, double alpha = 0.05,
                                     Spending spending = Spending::late);
-
-/// Interval of a median with a confidence of at least 1 - level, whatever the distribution (David and Nagaraja 2003,
-/// Order Statistics, section 7.1): from the j-th smallest to the j-th largest value, with the largest j that has this
-/// confidence. If all looks take the levels of levels_of_looks(), their intervals hold the median at all looks together
-/// with a confidence of about 1 - alpha (repeated intervals: Jennison and Turnbull 1989, J R Stat Soc B 51:305). So
-/// they may be read after any look. With too few values, the bounds are infinite. Throws Error for no values, one that
-/// is not finite, or a level not between 0 and 1.
-Interval order_statistic_interval(std::vector<double> values, double level);
 
 /// The numbers of cases at which one looks: `first`, then `every` more each time, and `most` at the end. Throws Error
 /// if one of them is 0, or `most` is below `first`.

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "marrow/compare/statistics.hpp"
+#include "marrow/compare/paired.hpp"
 
 namespace marrow::compare {
 
@@ -73,9 +73,11 @@ struct Look {
 /// Throws Error as level_at() does, or for no variants.
 Look look_at_widths(const StopPlan& plan, std::size_t cases, const std::vector<std::optional<Interval>>& intervals);
 
-/// Looks at the differences of pairs. A difference is shown if Wilcoxon's p is below the level; the interval is
-/// order_statistic_interval(). Without pairs, nothing is shown. Throws Error as level_at() and case_differences() do.
-Look look_at_difference(const StopPlan& plan, std::size_t cases, const std::vector<Pair>& pairs);
+/// Looks at the differences of pairs, with the answer's own definition: difference_shown() at the level of the look, on
+/// compare_pairs() with the confidence 1 - level. So neither skewed differences with a median of 0 nor too few cases
+/// end a comparison. At a level that is 0 as a double, nothing is shown. Throws Error as level_at()
+/// and case_differences() do.
+Look look_at_difference(const StopPlan& plan, std::size_t cases, const std::vector<Pair>& pairs, bool larger_is_better);
 
 /// What a look is about, in words.
 struct LookNames {
