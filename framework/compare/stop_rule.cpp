@@ -32,10 +32,18 @@ std::string end(const StopRule& rule, const Look& look) {
   return "; --more-cases goes on, with " + std::to_string(rule.look_every) + " cases a look";
 }
 
+/// A number, or the failure that an infinite one stands for.
+std::string value_text(double value) { return std::isfinite(value) ? short_text(value) : "a failure"; }
+
+std::string holds(const StopRule& rule) {
+  return ", which holds with " + short_text(100 * (1 - rule.alpha)) + " % confidence over all looks";
+}
+
 /// What holds after any look.
 std::string meaning(const StopRule& rule, const Look& look, const std::string& unit) {
-  if (!std::isfinite(look.width())) return "";
-  return short_text(look.interval.lower) + " to " + short_text(look.interval.upper) + unit + ", which holds with " +
+  const bool ends_in_failure = std::isinf(look.interval.upper);
+  return value_text(look.interval.lower) + (ends_in_failure && std::isfinite(look.interval.lower) ? unit : "") +
+         " to " + value_text(look.interval.upper) + (ends_in_failure ? "" : unit) + ", which holds with " +
          short_text(100 * (1 - rule.alpha)) + " % confidence over all looks";
 }
 
@@ -47,14 +55,24 @@ std::string text_of_width(const StopRule& rule, const Look& look, const LookName
          ". It is " + names.variant + "'s, " + meaning(rule, look, unit);
 }
 
+/// Why a difference is not shown although p is below the level; empty if it is not, or is shown.
+std::string doubt(const Look& look) {
+  if (look.is_met || look.p >= look.level) return "";
+  const bool contains_zero = look.interval.lower <= 0 && look.interval.upper >= 0;
+  return contains_zero ? ", but the interval contains 0" : ", but the ranks and the median do not agree";
+}
+
 std::string text_of_difference(const StopRule& rule, const Look& look, const LookNames& names,
                                const std::string& unit) {
   const std::string text = names.variant + (look.is_met ? " differs from " : " is not shown to differ from ") +
                            names.baseline + " in " + names.figure + ": p = " + short_text(look.p) +
-                           (look.is_met ? ", below " : ", not below ") + short_text(look.level) + end(rule, look);
-  if (!std::isfinite(look.width())) return text;
-  return text + ". The median difference is " + short_text(look.difference) + unit + ", within " +
-         meaning(rule, look, unit);
+                           (look.p < look.level ? ", below " : ", not below ") + short_text(look.level) + doubt(look) +
+                           end(rule, look);
+  if (std::isinf(look.interval.lower) && look.interval.upper == -look.interval.lower) return text;  // too few cases
+  if (std::isinf(look.interval.lower) && look.interval.upper == look.interval.lower)
+    return text + ". The median difference is a failure" + holds(rule);
+  return text + ". The median difference is " + value_text(look.difference) +
+         (std::isfinite(look.difference) ? unit : "") + ", within " + meaning(rule, look, unit);
 }
 
 }  // namespace

@@ -152,8 +152,23 @@ TEST(StopRule, SaysWhatItFoundAndWhatThatMeans) {
       sentence(rule, look, names),
       "look 10 of 10, 200 cases: canny differs from sobel in mTRE: p = 0.001, below 0.04; the rule says stop. The "
       "median difference is 0.12 mm, within 0.05 to 0.2 mm, which holds with 95 % confidence over all looks");
+  look.difference = look.interval.upper = std::numeric_limits<double>::infinity();
+  EXPECT_NE(sentence(rule, look, names).find("The median difference is a failure, within 0.05 mm to a failure, which"),
+            std::string::npos);
+  look.interval.lower = look.interval.upper;
+  EXPECT_NE(sentence(rule, look, names).find("The median difference is a failure, which holds with 95 %"),
+            std::string::npos);
+  look.difference = 0.12;
+  look.interval = {0.05, 0.2, 0.96};
   look.is_met = false;
   EXPECT_NE(sentence(rule, look, names).find("; this was the last look. The median"), std::string::npos);
+  look.interval.lower = -0.05;
+  EXPECT_NE(sentence(rule, look, names).find(": p = 0.001, below 0.04, but the interval contains 0; this was"),
+            std::string::npos);
+  look.interval.lower = 0.05;
+  EXPECT_NE(
+      sentence(rule, look, names).find(": p = 0.001, below 0.04, but the ranks and the median do not agree; this"),
+      std::string::npos);
   rule.goal = StopRule::Goal::width;
   rule.width = 0.1;
   EXPECT_EQ(

@@ -58,7 +58,7 @@ struct Look {
   /// and Turnbull 1989, J R Stat Soc B 51:305). So it may be read after any look. Infinite if there is too little.
   Interval interval;
   double p = 1;           ///< goal difference: Wilcoxon's, two-sided
-  double difference = 0;  ///< goal difference: median over cases
+  double difference = 0;  ///< goal difference: median over cases; infinite if it is a failure
 
   double width() const { return interval.upper - interval.lower; }
   bool is_last() const { return number == looks; }
@@ -68,7 +68,9 @@ struct Look {
 /// widest one decides. A variant without an interval is not narrow enough.
 ///
 /// Whoever stops as soon as the usual 95 % interval is narrow chooses one that is narrow by chance. In simulations with
-/// a look at every 20 of up to 400 cases, such an interval of a median held the true one in 90 to 92 % of the trials.
+/// a look at every 20 of up to 400 cases, such an interval of a median held the true one in 94 to 95 % of the trials,
+/// and in 96 % at a fixed number of cases. An interval at the look's own confidence is wider; it comes from
+/// median_interval_of() or CaseRate::exact_interval().
 ///
 /// Throws Error as level_at() does, or for no variants.
 Look look_at_widths(const StopPlan& plan, std::size_t cases, const std::vector<std::optional<Interval>>& intervals);
