@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "marrow/domain/error.hpp"
-#include "marrow/domain/number_text.hpp"
 #include "marrow/runtime/types.hpp"
+#include "runtime/percent_text.hpp"
 
 namespace marrow {
 namespace {
@@ -45,7 +45,7 @@ Verdict worst_of(const std::vector<NamedVerdict>& verdicts) {
 
 std::string probability_text(double failure_probability) {
   if (std::isnan(failure_probability)) return "not known";
-  return formatted(failure_probability < 0.0995 ? "%.1f %%" : "%.0f %%", 100 * failure_probability);
+  return percent_text(failure_probability, failure_probability < 0.0995 ? 1 : 0) + " %";
 }
 
 }  // namespace marrow

@@ -15,8 +15,9 @@ __all__ = ["Comparison", "compare"]
 class Comparison:
     """The answer of a comparison, as tables.
 
-    cells: one row for each run. variants: one row for each variant and figure. differences: one row for each variant
-    and figure, compared with the baseline.
+    cells: one row for each run. variants: one row for each variant and figure; count of `of` runs have the figure.
+    differences: one row for each variant and figure, compared with the baseline. What is not known is None, such as the
+    success rate of an experiment without limits, or an interval of too few cases.
     """
 
     def __init__(self, folder: Union[str, "os.PathLike[str]"]) -> None:
@@ -24,7 +25,7 @@ class Comparison:
         with open(self.folder / "cells.jsonl", encoding="utf-8") as file:
             self.cells = Table(_cell(json.loads(line)) for line in file)
         answer = json.loads((self.folder / "comparison.json").read_text(encoding="utf-8"))
-        self.variants = Table(_variants(answer["variants"]))
+        self.variants = Table(_variants(answer))
         self.differences = Table(answer["comparisons"])
 
     @property
@@ -79,11 +80,19 @@ def _cell(row: Dict[str, Any]) -> Dict[str, Any]:
     return {name: value for name, value in row.items() if not isinstance(value, (dict, list))}
 
 
-def _variants(variants: List[Dict[str, Any]]) -> List[Dict[str, Any]]:
+# Of a figure where higher is better, p5 is the value that 95 % of the runs reach; of the others, p95.
+_FIGURES = ("count", "of", "median", "median_low", "median_high", "q1", "q3", "p95", "p5", "worst", "mean")
+
+
+def _variants(answer: Dict[str, Any]) -> List[Dict[str, Any]]:
     rows = []
-    for variant in variants:
-        for metric, figures in variant["metrics"].items():
-            success = {"success_" + name: variant["success"][name] for name in ("rate", "low", "high")}
-            start = {"variant": variant["name"], "metric": metric, "runs": variant["runs"], "failed": variant["failed"]}
-            rows.append({**start, **success, **figures})
+    for variant in answer["variants"]:
+        success = variant["success"] or {}
+        for metric in answer["metrics"]:
+            figures = variant["metrics"][metric["name"]]
+            row = {"variant": variant["name"], "metric": metric["name"], "unit": metric["unit"]}
+            row.update({name: variant[name] for name in ("runs", "failed", "incomplete")})
+            row.update({"success_" + name: success.get(name) for name in ("rate", "low", "high")})
+            row.update({name: figures.get(name) for name in _FIGURES})
+            rows.append(row)
     return rows

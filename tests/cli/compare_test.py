@@ -76,12 +76,12 @@ class Compare(Case):
         self.assertEqual(
             rows[:6],
             [
-                "Capture range: success over number.value, with 95 % intervals".split(),
+                "Capture range: success over number.value, in bins of 2, with 95 % intervals".split(),
                 ["start", "near", "far"],
                 "0 to 2 3/3 (44 to 100 %) -".split(),
                 "2 to 4 - -".split(),
                 "4 to 6 - 0/3 (0 to 56 %)".split(),
-                "95 % or more to at least 1.5 0.0".split(),
+                "95 % or more to at least 1.5 0".split(),
             ],
         )
         near, far = (

@@ -55,7 +55,7 @@ class ReportTest(PageTest):
             self.assertEqual(name, variant["name"])
             self.assertEqual(value.startswith("at least "), item["capture"]["is_open"])
             self.assertAlmostEqual(
-                float(value.removeprefix("at least ").removesuffix(" mm")), item["capture"]["range"], delta=0.05
+                float(value.removeprefix("at least ").removesuffix("\u00a0mm")), item["capture"]["range"], delta=0.05
             )
         ours = self.browser.js("return Data.wilson(7, 20)")
         for key, value in synthetic.wilson(7, 20).items():

@@ -100,7 +100,7 @@ def make_cell(chance, variant, case, start, far_mm, hardness):
         "status": "done",
         "tries": 1,
         "success": False,
-        "initial_mtre_mm": far_mm,
+        "initial_error": far_mm,
         "seconds": seconds * math.exp(chance.gauss(0, 0.15)),
         "evaluations": int(evaluations * math.exp(chance.gauss(0, 0.12))),
         "cached_nodes": 4 if start else 0,
@@ -127,10 +127,10 @@ def make_cell(chance, variant, case, start, far_mm, hardness):
 
 def capture_of(cells):
     """Success in bins of 2 mm, and up to where it is 95 % or more in each."""
-    farthest = max(cell["initial_mtre_mm"] for cell in cells)
+    farthest = max(cell["initial_error"] for cell in cells)
     bins = []
     for low in range(0, int(farthest) + 1, 2):
-        inside = [cell for cell in cells if low <= cell["initial_mtre_mm"] < low + 2]
+        inside = [cell for cell in cells if low <= cell["initial_error"] < low + 2]
         success = (
             wilson(sum(cell["success"] for cell in inside), len(inside))
             if inside
@@ -145,6 +145,7 @@ def summary_of(cells):
     done = [cell for cell in cells if cell["status"] == "done"]
     column = lambda values: {
         "count": len(values),
+        "of": len(cells),
         "median": quantile(values, 0.5),
         "q1": quantile(values, 0.25),
         "q3": quantile(values, 0.75),
@@ -155,6 +156,7 @@ def summary_of(cells):
     return {
         "runs": len(cells),
         "failed": len(cells) - len(done),
+        "incomplete": 0,
         "success": wilson(sum(cell["success"] for cell in cells), len(cells)),
         "metrics": {metric["name"]: column([cell["values"][i] for cell in done]) for i, metric in enumerate(METRICS)},
         "seconds": column([cell["seconds"] for cell in done]),
@@ -172,6 +174,14 @@ def comparison_of(cells, variant, metric):
     }
     base, other = of(0), of(variant)
     differences = sorted(other[key] - base[key] for key in other if key in base)
+    counts = {
+        "cases": len({case for case, _ in base} | {case for case, _ in other}),
+        "of_cases": len({cell["case"] for cell in cells}),
+        "runs": len({(cell["case"], cell["start"]) for cell in cells}),
+        "pairs": len(differences),
+        "runs_variant_lost": len(set(base) - set(other)),
+        "runs_baseline_lost": len(set(other) - set(base)),
+    }
     count, spread = len(differences), 0.98 * math.sqrt(len(differences))
     worse = sum(value > 0 for value in differences)
     p = math.erfc(abs(worse - count / 2) / math.sqrt(count / 4) / math.sqrt(2))
@@ -182,8 +192,9 @@ def comparison_of(cells, variant, metric):
     return {
         "variant": name,
         "metric": what["name"],
-        "pairs": count,
+        **counts,
         "difference": middle,
+        "fails_more": None,
         "low": low,
         "high": high,
         "p": p,
@@ -323,6 +334,7 @@ def comparison(cases=12, starts=5, variants=4, looked_at=3):
         "kind": "comparison",
         "experiment": experiment("comparison"),
         "metrics": METRICS,
+        "initial_error": {"name": "start.mtre_mm", "unit": "mm"},
         "variants": [
             {"name": name, "is_baseline": i == 0, "options": options}
             for i, (name, options, *_) in enumerate(VARIANTS[:variants])
@@ -378,7 +390,7 @@ def run(with_cube=True):
     return data
 
 
-FIELDS = ["variant", "case", "start", "status", "success", "tries", "initial_mtre_mm", "seconds", "evaluations"]
+FIELDS = ["variant", "case", "start", "status", "success", "tries", "initial_error", "seconds", "evaluations"]
 FIELDS += ["cached_nodes", "reason", "absent", "verdict", "failure_probability"]
 MATERIAL = ["pictures", "convergence", "landscape", "scene", "verdicts", "poses"]
 

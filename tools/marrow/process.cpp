@@ -17,7 +17,7 @@
 namespace marrow::cli {
 namespace {
 
-std::atomic<bool> stopped{false};
+std::atomic<bool> is_stopped{false};
 std::atomic<int> stopped_by{0};
 std::atomic<const char*> stop_text{""};
 
@@ -45,7 +45,7 @@ void say(const char* text) {
 }
 
 extern "C" void on_stop(int signal) {
-  if (stopped.exchange(true)) {  // the second signal: do not wait for the nodes
+  if (is_stopped.exchange(true)) {  // the second signal: do not wait for the nodes
     say("\nmarrow: stopped at once; what was being done is lost\n");
     end_process(130);
   }
@@ -85,7 +85,7 @@ const std::atomic<bool>& stop_on_signals() {
   std::signal(SIGINT, on_stop);
   std::signal(SIGTERM, on_stop);
   if (std::signal(SIGHUP, on_stop) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);  // started by nohup
-  return stopped;
+  return is_stopped;
 }
 
 void say_when_stopped(const std::string& line) {

@@ -41,7 +41,7 @@ const Cells = (() => {
                 {...figure('Failure', probability), cell: (c) => Dom.percent(probability(c))}
               ] :
               []),
-      figure('Start’s mTRE', (c) => c.initial_mtre_mm, 'mm'),
+      ...(data.initial_error ? [figure('Start’s error', (c) => c.initial_error, data.initial_error.unit)] : []),
       ...data.metrics.map((metric, i) => figure(metric.label, (c) => c.values[i], metric.unit)),
       figure('Time', (c) => c.seconds, 's'), figure('Evaluations', (c) => c.evaluations),
       {title: 'Kept', key: contents, cell: (c) => el('small', {}, contents(c)), width: 18}
@@ -59,15 +59,14 @@ const Cells = (() => {
       return /[",\r\n]/.test(text) ? '"' + text.replaceAll('"', '""') + '"' : text;
     };
     const head = [
-      'id', 'variant', 'case', 'start', 'outcome', 'verdict', 'failure_probability', 'reason', 'initial_mtre_mm',
+      'id', 'variant', 'case', 'start', 'outcome', 'verdict', 'failure_probability', 'reason', 'initial_error',
       ...data.metrics.map((metric) => metric.name), 'seconds', 'evaluations', 'folder'
     ];
     const rows = cells.map(
         (cell) =>
             [cell.id, data.variants[cell.variant].name, data.cases[cell.case], data.starts[cell.start],
-             Data.outcome(cell), cell.verdict, cell.failure_probability, cell.reason || cell.absent,
-             cell.initial_mtre_mm, ...data.metrics.map((_, i) => cell.values[i]), cell.seconds, cell.evaluations,
-             cell.folder]);
+             Data.outcome(cell), cell.verdict, cell.failure_probability, cell.reason || cell.absent, cell.initial_error,
+             ...data.metrics.map((_, i) => cell.values[i]), cell.seconds, cell.evaluations, cell.folder]);
     return [head, ...rows].map((row) => row.map(quoted).join(',')).join('\n') + '\n';
   }
 

@@ -9,17 +9,14 @@
 //   variants: [{name, is_baseline, options: {"NODE.uses": "KIND.NAME", "NODE.OPTION": value}}]
 //   figures: [{name, columns: [name], rows: [{name, unit, values: [number | null per column]}]}]     of a run
 //   passes: [{node, end, passes: [{name, status, seconds, reason}]}]     of a run whose nodes have bodies
-//   metrics: [{name, label, unit, success_below: number | null, higher_is_better}]      of those with it,
-//   success_above; the first is the main one cases: ["case-01", ...], starts: ["0", ...] summary: [per variant {runs,
-//   failed, success: {count, of, rate, low, high},
-//     metrics: {name: {count, median, q1, q3, p95, worst, mean}}, seconds: {median, q1, q3}, evaluations: {median},
-//     capture: {range, is_open (no bin fails), unknown_starts (runs left out), bins: [{from, to, count, of, low,
-//     high}]}}]       mm; may be missing, as may be
-//     verdicts: {cells, caught, silent_failures, false_alarms: {count, of, low, high}}
-//   comparisons: [{variant, metric, pairs, difference, low, high, p, p_holm, sentence}]   variant: name or index
-//   cells: [{id, variant, case, start (indices), status: "done" | "failed", reason, tries, success: bool | null,
-//     absent (why values are missing: a node failed that may fail; may be missing itself), initial_mtre_mm, seconds,
-//     evaluations, cached_nodes, values: [number | null per metric],
+//   metrics, comparisons, curves, tuning, initial_error: as in comparison.json, whose keys docs/comparing.md lists; the
+//     first metric is the main one, and the variant of a comparison may be a name or an index
+//   summary: its "variants"
+//   cases: ["case-01", ...], starts: ["0", ...]
+//   cells: [{id, variant, case, start (indices), status: "done" | "failed", reason, tries,
+//     success: bool | null (no limits),
+//     absent (why values are missing: a node failed that may fail; may be missing itself),
+//     initial_error, seconds, evaluations, cached_nodes, values: [number | null per metric],
 //     verdict (the worst), failure_probability, verdicts: [{item, judgement: "trusted" | "doubtful" | "wrong",
 //     failure_probability: number | null, reasons: [text], remedies: [text]}],          may be missing, as may be
 //     poses: [{name, target, source, matrix: [16], deviations: [6: degrees, mm] | null,
@@ -158,6 +155,9 @@ const Data = (() => {
   const limitText = (metric) =>
       (metric.higher_is_better ? 'above ' : 'below ') + Dom.withUnit(limit(metric), metric.unit);
 
+  // Up to which value 95 % of the runs are as good or better.
+  const worseEnd = (metric, item) => (metric.higher_is_better ? item.p5 : item.p95);
+
   const isBetter = (metric, value, base) => (metric.higher_is_better ? value > base : value < base);
 
   // Wilson's 95 % interval of a proportion.
@@ -204,6 +204,7 @@ const Data = (() => {
     limit,
     limitText,
     isBetter,
+    worseEnd,
     wilson,
     quantile,
     valuesOf,

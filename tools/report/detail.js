@@ -14,6 +14,11 @@ const Detail = (() => {
                entries.filter((entry) => entry[1] !== null && entry[1] !== undefined && entry[1] !== '')
                    .map(([name, value]) => el('tr', {}, el('th', {scope: 'row'}, name), el('td', {}, value))))));
 
+  const startError = (data, cell) =>
+      (data.initial_error && Number.isFinite(cell.initial_error) ?
+           [withUnit(cell.initial_error, data.initial_error.unit), el('small', {}, '  ' + data.initial_error.name)] :
+           null);
+
   function values(data, cell) {
     return rows([
       ['Outcome', Cells.badge(cell)],
@@ -25,7 +30,7 @@ const Detail = (() => {
                  withUnit(cell.values[i], metric.unit),
                  Data.limit(metric) !== null && el('small', {}, '  success ' + Data.limitText(metric))
                ].filter(Boolean)]),
-      ['mTRE of the start', Number.isFinite(cell.initial_mtre_mm) ? withUnit(cell.initial_mtre_mm, 'mm') : null],
+      ['Error of the start', startError(data, cell)],
       ['Time', Number.isFinite(cell.seconds) ? withUnit(cell.seconds, 's') : null],
       ['Evaluations', Number.isFinite(cell.evaluations) ? number(cell.evaluations) : null],
       ['Nodes from the cache', Number.isFinite(cell.cached_nodes) ? String(cell.cached_nodes) : null],

@@ -33,8 +33,15 @@ const Dom = (() => {
     return size >= 10000 ? text.replace(/\B(?=(\d{3})+$)/g, '\u202f') : text;
   }
 
-  const percent = (fraction) =>
-      (Number.isFinite(fraction) ? (100 * fraction).toFixed(fraction > 0.995 && fraction < 1 ? 1 : 0) + ' %' : '–');
+  // A share in percent; one that is neither 0 nor 1 is never shown as 0 % or 100 %.
+  function percent(share, decimals) {
+    if (!Number.isFinite(share)) return '–';
+    const is_between = share > 0 && share < 1, text = (digits) => (100 * share).toFixed(digits);
+    const hides = (digits) => is_between && [0, 100].includes(Number(text(digits)));
+    let digits = decimals || 0;
+    while (hides(digits) && digits < 14) ++digits;
+    return (hides(digits) ? (100 * share).toExponential(1) : text(digits)) + ' %';
+  }
   const probability = (p) => (!Number.isFinite(p) ? '–' : p < 0.0001 ? '< 0.0001' : p.toFixed(p < 0.01 ? 4 : 3));
   const withUnit = (value, unit) => number(value) + (unit && Number.isFinite(value) ? '\u00a0' + unit : '');
 

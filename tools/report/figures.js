@@ -65,9 +65,9 @@ const Figures = (() => {
       }));
     }
     rows.forEach((row, variant) => {
-      const top = area.top + variant * ROW_HEIGHT, middle = top + 40,
-            failed = data.cellsOf[variant].filter((cell) => cell.status === 'failed').length;
-      rowTitle(root, data, variant, top, failed ? failed + ' failed, not drawn' : '');
+      const top = area.top + variant * ROW_HEIGHT, middle = top + 40, all_runs = data.cellsOf[variant].length,
+            lacking = all_runs - row.length;
+      rowTitle(root, data, variant, top, lacking ? lacking + ' of ' + all_runs + ' runs without it, not drawn' : '');
       thinned(row).forEach(
           (item, i) => root.append(Plots.marker(
               variant, x(item.value), middle + 13 * Plots.spread(i), 3.2,
@@ -78,7 +78,7 @@ const Figures = (() => {
       const sorted = row.map((item) => item.value),
             given = ((data.summary[variant] || {}).metrics || {})[metric.name] || {};
       const five = [
-        Data.quantile(sorted, 0.05), given.q1 ?? Data.quantile(sorted, 0.25),
+        given.p5 ?? Data.quantile(sorted, 0.05), given.q1 ?? Data.quantile(sorted, 0.25),
         given.median ?? Data.quantile(sorted, 0.5), given.q3 ?? Data.quantile(sorted, 0.75),
         given.p95 ?? Data.quantile(sorted, 0.95)
       ];
@@ -93,6 +93,12 @@ const Figures = (() => {
   const compared = (data) => data.variants.map((_, i) => i).filter((i) => i !== data.baseline);
   const comparison = (data, variant, metric) =>
       data.comparisons.find((item) => data.variantIndex(item.variant) === variant && item.metric === metric.name);
+
+  // Pairs that cannot be drawn, because only one of both has a value.
+  function lostText(item) {
+    const {runs_variant_lost: own, runs_baseline_lost: others} = item || {};
+    return own || others ? '; it alone lost ' + own + ', the baseline alone ' + others : '';
+  }
 
   // Every pair's difference, and the estimated one with its interval.
   function drawDifferences(data, metricIndex, kind, width) {
@@ -122,7 +128,7 @@ const Figures = (() => {
       rowTitle(
           root, data, variant, top,
           row.length + ' pairs, better in ' +
-              row.filter((item) => Data.isBetter(metric, item.value, item.base)).length);
+              row.filter((item) => Data.isBetter(metric, item.value, item.base)).length + lostText(found[i]));
       thinned(row.sort((a, b) => a.difference - b.difference))
           .forEach(
               (item, k) => root.append(Plots.marker(
@@ -133,10 +139,12 @@ const Figures = (() => {
                           data.variants[variant].name + ' ' + withUnit(item.value, metric.unit)))));
       const {low, high, difference, sentence} = found[i] || {};
       if (!Number.isFinite(difference)) return;
+      const has_interval = Number.isFinite(low) || Number.isFinite(high);
+      const ends = [[low, area.left], [high, area.right]].map(
+          ([bound, edge]) => (Number.isFinite(bound) ? x(bound) : edge));  // a failure lies beyond the edge
       root.append(
           svg('g', {class: 'estimate', 'data-tip': sentence || ''},
-              Number.isFinite(low) && Number.isFinite(high) &&
-                  svg('line', {x1: x(low), x2: x(high), y1: middle, y2: middle, 'stroke-width': 4}),
+              has_interval && svg('line', {x1: ends[0], x2: ends[1], y1: middle, y2: middle, 'stroke-width': 4}),
               svg('circle', {cx: x(difference), cy: middle, r: 5})));
     });
     return root;
@@ -183,7 +191,7 @@ const Figures = (() => {
         }));
   }
 
-  // Success in bins of the start's mTRE: a row a variant, all of equal length.
+  // Success in bins of the start's error: a row a variant, all of equal length.
   function captureBins(data) {
     const rows = data.variants.map((_, variant) => ((data.summary[variant] || {}).capture || {}).bins || []),
           longest = rows.reduce((a, b) => (b.length > a.length ? b : a), []);
@@ -199,16 +207,22 @@ const Figures = (() => {
 
   function captureRange(data, variant) {
     const capture = (data.summary[variant] || {}).capture;
-    return capture ? (capture.is_open ? 'at least ' : '') + number(capture.range) + ' mm' : '–';
+    return capture && Number.isFinite(capture.range) ?
+        (capture.is_open ? 'at least ' : '') + withUnit(capture.range, data.initial_error.unit) :
+        '–';
   }
 
   function drawCapture(data, bins, width) {
     const farthest = Math.max(...bins[0].map((item) => item.to)), wide = bins[0][0].to - bins[0][0].from;
+    const {name, unit} = data.initial_error;
     const {root, x, y} = Plots.frame({
       width,
       height: 340,
-      label: 'Success rate against the mTRE of the start; the numbers are in the table below',
-      x: {domain: [0, farthest], title: 'mTRE of the start (mm), bins of ' + wide + ' mm'},
+      label: 'Success rate against the error of the start; the numbers are in the table below',
+      x: {
+        domain: [0, farthest],
+        title: name + (unit ? ' (' + unit + ')' : '') + ', bins of ' + wide + (unit ? ' ' + unit : '')
+      },
       y: {domain: [0, 1], title: 'success rate (95 % interval)', format: percent}
     });
     const shift = Math.min(7, 0.7 * (x(wide) - x(0)) / bins.length);
@@ -218,9 +232,9 @@ const Figures = (() => {
       root.append(Plots.polyline(
           full.map((item) => [place(item), y(item.rate)]), variant, {'stroke-width': 1.5, opacity: 0.8}));
       for (const item of full) {
-        const tip = data.variants[variant].name + ', start ' + item.from + ' to ' + item.to + ' mm\n' + item.count +
-            ' of ' + item.of + ' = ' + percent(item.rate) + ', 95 % interval ' + percent(item.low) + ' to ' +
-            percent(item.high);
+        const tip = data.variants[variant].name + ', start ' + item.from + ' to ' + item.to + (unit ? ' ' + unit : '') +
+            '\n' + item.count + ' of ' + item.of + ' = ' + percent(item.rate) + ', 95 % interval ' + percent(item.low) +
+            ' to ' + percent(item.high);
         root.append(
             svg('g', {'data-tip': tip}, svg('line', {
                   x1: place(item),
@@ -243,7 +257,8 @@ const Figures = (() => {
         'div', {class: 'scroll'},
         el('table', {},
            el('thead', {},
-              el('tr', {}, el('th', {scope: 'col'}, 'Start, mm'),
+              el('tr', {},
+                 el('th', {scope: 'col'}, 'Start' + (data.initial_error.unit ? ', ' + data.initial_error.unit : '')),
                  data.variants.map((variant) => el('th', {scope: 'col', class: 'number'}, variant.name)))),
            el('tbody', {},
               used.map(

@@ -77,7 +77,7 @@ const Page = (() => {
                    'li', {style: '--mark: ' + Plots.colour(i)}, variant.name + ': ' + Figures.captureRange(data, i))));
     return section(
         'capture', 'Capture range',
-        'How far from the truth a start may lie: up to the given mTRE, each bin of starts ' +
+        'How far from the truth a start may lie: up to the given error, each bin of starts ' +
             'has a success rate of 95 % or more. ' +
             'Bars are 95 % intervals, which know that the starts of a case are not independent. ' +
             'Failed runs count as no success.',

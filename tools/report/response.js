@@ -11,6 +11,12 @@ const Response = (() => {
     return metric ? metric.label + (metric.unit ? ' [' + metric.unit + ']' : '') : figure;
   };
 
+  // What the mark of a point says, such as of how many runs it is.
+  const pointText = (data, curve, point) => curve.option + ' = ' + Dom.number(point.value) + '\n' +
+      labelOf(data, curve.figure) + ': ' + (curve.figure === 'success' ? Dom.percent : Dom.number)(point.middle) +
+      (Number.isFinite(point.low) ? ', 95 % interval ' + Dom.number(point.low) + ' to ' + Dom.number(point.high) : '') +
+      '\n' + point.runs + ' of ' + point.of + ' runs';
+
   function draw(data, curves, width) {
     const points = curves.flatMap((curve) => curve.points.filter((point) => point.runs));
     const kind = curves[0].scale, ends = points.flatMap((point) => [point.middle, point.low, point.high]);
@@ -34,9 +40,19 @@ const Response = (() => {
             points: outline.map(([x, y]) => x.toFixed(1) + ',' + y.toFixed(1)).join(' ')
           }),
           Plots.polyline(known.map((point) => [plot.x(point.value), plot.y(point.middle)]), i));
-      for (const point of known) plot.root.append(Plots.marker(i, plot.x(point.value), plot.y(point.middle), 4));
+      for (const point of known)
+        plot.root.append(
+            Plots.marker(i, plot.x(point.value), plot.y(point.middle), 4, {'data-tip': pointText(data, curve, point)}));
     });
     return plot.root;
+  }
+
+  // Of how many runs the points are, and that some lack the figure.
+  function runsText(curves) {
+    const points = curves.flatMap((curve) => curve.points), lacking = points.filter((point) => point.runs < point.of);
+    const sum = (list, key) => list.reduce((all, point) => all + point[key], 0);
+    return sum(points, 'runs') + ' of ' + sum(points, 'of') + ' runs have this figure' +
+        (lacking.length ? '; points without some of theirs are not of the same cases as the others' : '') + '.';
   }
 
   // One plot for each option and figure, chosen by two lists; null without a sweep.
@@ -47,7 +63,11 @@ const Response = (() => {
     const names = distinct('variant').map((name) => ({name: name || 'the pipeline as it is'}));
     const chosen = {option: distinct('option')[0], figure: distinct('figure')[0]};
     const shown = () => all.filter((curve) => curve.option === chosen.option && curve.figure === chosen.figure);
-    const place = Plots.responsive((width) => draw(data, shown(), width));
+    const note = el('p', {class: 'note'});
+    const place = Plots.responsive((width) => {
+      note.textContent = runsText(shown());
+      return draw(data, shown(), width);
+    });
     const change = (key) => (value) => {
       chosen[key] = value;
       place.redraw();
@@ -59,7 +79,7 @@ const Response = (() => {
            Dom.select(
                'Figure', distinct('figure').map((name) => [name, labelOf(data, name)]), chosen.figure,
                change('figure'))),
-        names.length > 1 && Plots.legend(names), place);
+        names.length > 1 && Plots.legend(names), place, note);
   }
 
   return {figure};

@@ -5,15 +5,21 @@
 const Summary = (() => {
   const {el, number, percent, probability, withUnit} = Dom;
 
+  const OTHER_RUNS =
+      'The variants have this figure in different runs, so these numbers are not of the same cases and starts.';
+
   const plural = (count, word) => count + ' ' + word + (count === 1 ? '' : 's');
 
   function facts(data) {
     const failed = data.cells.filter((cell) => cell.status === 'failed').length;
+    const incomplete =
+        data.cells.filter((cell) => cell.status !== 'failed' && !cell.values.every(Number.isFinite)).length;
     const parts = [
       plural(data.variants.length, 'variant'), plural(data.cases.length, 'case'), plural(data.starts.length, 'start')
     ];
     return parts.join(' × ') + ': ' + plural(data.cells.length, 'run') +
-        (failed ? ', ' + failed + ' failed' : ', none failed') + '.';
+        (failed ? ', ' + failed + ' failed' : ', none failed') + (incomplete ? ', ' + incomplete + ' incomplete' : '') +
+        '.';
   }
 
   // The main metric's sentences; where it has none, all.
@@ -49,6 +55,15 @@ const Summary = (() => {
            [number(item.median), ' ', el('small', {}, '[' + number(item.q1) + ', ' + number(item.q3) + ']')] :
            '–');
 
+  // Where bounds are known, the median's.
+  const median = (item) =>
+      (item && Number.isFinite(item.median_low) ?
+           el('span', {'data-tip': '95 % interval ' + number(item.median_low) + ' to ' + number(item.median_high)},
+              spread(item)) :
+           spread(item));
+
+  const countOf = (item) => (item && Number.isFinite(item.of) ? item.count + ' of ' + item.of : '–');
+
   function variantName(data, i) {
     const variant = data.variants[i], options = Object.entries(variant.options);
     return el(
@@ -69,14 +84,14 @@ const Summary = (() => {
         title: 'Median [quartiles]',
         unit: metric.unit,
         key: (i) => found(i).median,
-        cell: (i) => spread(found(i)),
+        cell: (i) => median(found(i)),
         number: true
       },
       {
-        title: '95th percentile',
+        title: metric.higher_is_better ? '5th percentile' : '95th percentile',
         unit: metric.unit,
-        key: (i) => found(i).p95,
-        cell: (i) => number(found(i).p95),
+        key: (i) => Data.worseEnd(metric, found(i)),
+        cell: (i) => number(Data.worseEnd(metric, found(i))),
         number: true
       },
       {
@@ -86,7 +101,20 @@ const Summary = (() => {
         cell: (i) => number(found(i).worst),
         number: true
       },
+      {
+        title: 'Of runs',
+        key: (i) => found(i).count,
+        cell: (i) => el('span', {'data-tip': 'runs that have the figure, of all'}, countOf(found(i))),
+        number: true
+      },
       {title: 'Failed', key: (i) => of(i).failed, cell: (i) => String(of(i).failed ?? '–'), number: true},
+      {
+        title: 'Incomplete',
+        key: (i) => of(i).incomplete,
+        cell: (i) =>
+            el('span', {'data-tip': 'done, but without a figure whose node may fail'}, String(of(i).incomplete ?? '–')),
+        number: true
+      },
       {
         title: 'Time [quartiles]',
         unit: 's',
@@ -141,9 +169,11 @@ const Summary = (() => {
 
   function table(data) {
     const place = el('div'), state = {};
-    const show = (metric) => place.replaceChildren(sortable(
-        data.variants.map((_, i) => i), columns(data, data.metrics[metric]), state,
-        'Variants: ' + data.metrics[metric].label));
+    const show = (metric) => place.replaceChildren(
+        sortable(
+            data.variants.map((_, i) => i), columns(data, data.metrics[metric]), state,
+            'Variants: ' + data.metrics[metric].label),
+        ...(data.metrics[metric].same_runs === false ? [el('p', {class: 'note'}, OTHER_RUNS)] : []));
     if (!data.metrics.length) return null;
     show(0);
     return el(
@@ -154,7 +184,8 @@ const Summary = (() => {
         place);
   }
 
-  // Which cases are hard: each case's median and successes, a column a variant.
+  // Which cases are hard: each case's median and successes, a column a variant. Without limits of success, how many
+  // starts have the figure.
   function caseTable(data, metric) {
     const cells = data.variants.map(() => data.cases.map(() => []));
     for (const cell of data.cells) cells[cell.variant][cell.case].push(cell);
@@ -164,10 +195,14 @@ const Summary = (() => {
             .filter(Number.isFinite)
             .sort((a, b) => a - b),
         0.5);
-    const good = (list) => list.filter((cell) => Data.outcome(cell) === 'success').length;
+    const has_limits = data.metrics.some((item) => Data.limit(item) !== null);
+    const is_good = (cell) => (has_limits ? cell.success === true : Number.isFinite(cell.values[metric]));
+    const good = (list) => list.filter(is_good).length;
+    const tip = (list) =>
+        good(list) + ' of ' + list.length + ' starts ' + (has_limits ? 'end in success' : 'have the figure');
     const of = (list) =>
         (list.length ?
-             el('span', {'data-tip': good(list) + ' of ' + list.length + ' starts end in success'},
+             el('span', {'data-tip': tip(list)},
                 el('span', {class: 'share', style: '--part: ' + Math.round(100 * good(list) / list.length) + '%'}),
                 number(median(list)), ' ', el('small', {}, good(list) + '/' + list.length)) :
              '–');
@@ -185,10 +220,26 @@ const Summary = (() => {
         data.cases.map((_, i) => i), all, {}, 'Medians and successes of each case: ' + data.metrics[metric].label);
   }
 
+  // The median difference, or who fails more often where that decides.
+  function difference(item, unit) {
+    if (Number.isFinite(item.difference)) return withUnit(item.difference, unit);
+    return {variant: 'fails more often', baseline: 'the baseline fails more often'}[item.fails_more] || '–';
+  }
+
+  // Without a number, a bound is a failure of one of both; without two, there are too few cases.
+  function interval(item, metric) {
+    if (!Number.isFinite(item.low) && !Number.isFinite(item.high)) return '–';
+    const failure = (is_high) =>
+        (is_high !== Boolean(metric.higher_is_better) ? 'a failure' : 'the baseline’s failure');
+    const bound = (value, is_high) => (Number.isFinite(value) ? number(value) : failure(is_high));
+    return '[' + bound(item.low, false) + ', ' + bound(item.high, true) + ']';
+  }
+
   // Every comparison with its interval and p: the numbers behind the figure of the pairs.
   function comparisonTable(data) {
-    const label = (item) => (data.metrics.find((metric) => metric.name === item.metric) || {label: item.metric}).label;
-    const unit = (item) => (data.metrics.find((metric) => metric.name === item.metric) || {}).unit;
+    const metric = (item) => data.metrics.find((one) => one.name === item.metric) || {label: item.metric};
+    const label = (item) => metric(item).label,
+          lost = (item) => item.runs_variant_lost + ' / ' + item.runs_baseline_lost;
     const list = data.comparisons,
           name = (item) => (data.variants[data.variantIndex(item.variant)] || {name: item.variant}).name;
     const all = [
@@ -197,18 +248,30 @@ const Summary = (() => {
       {
         title: 'Difference',
         key: (i) => list[i].difference,
-        cell: (i) => withUnit(list[i].difference, unit(list[i])),
+        cell: (i) => difference(list[i], metric(list[i]).unit),
+        number: true
+      },
+      {title: '95 % interval', key: (i) => list[i].low, cell: (i) => interval(list[i], metric(list[i])), number: true},
+      {title: 'p', key: (i) => list[i].p, cell: (i) => probability(list[i].p), number: true},
+      {title: 'p (Holm)', key: (i) => list[i].p_holm, cell: (i) => probability(list[i].p_holm), number: true},
+      {
+        title: 'Cases',
+        key: (i) => list[i].cases,
+        cell: (i) => countOf({count: list[i].cases, of: list[i].of_cases}),
         number: true
       },
       {
-        title: '95 % interval',
-        key: (i) => list[i].low,
-        cell: (i) => '[' + number(list[i].low) + ', ' + number(list[i].high) + ']',
+        title: 'Pairs',
+        key: (i) => list[i].pairs,
+        cell: (i) => countOf({count: list[i].pairs, of: list[i].runs}),
         number: true
       },
-      {title: 'p', key: (i) => list[i].p, cell: (i) => probability(list[i].p), number: true},
-      {title: 'p (Holm)', key: (i) => list[i].p_holm, cell: (i) => probability(list[i].p_holm), number: true},
-      {title: 'Pairs', key: (i) => list[i].pairs, cell: (i) => String(list[i].pairs ?? '–'), number: true},
+      {
+        title: 'Lost by it / by the baseline',
+        key: (i) => list[i].runs_variant_lost,
+        cell: (i) => (Number.isFinite(list[i].runs_variant_lost) ? lost(list[i]) : '–'),
+        number: true
+      },
       {
         title: 'In words',
         key: (i) => list[i].sentence || '',

@@ -7,7 +7,7 @@ const Verdict = (() => {
   const CLASSES = {trusted: 'success', doubtful: 'doubtful', wrong: 'failed'};
 
   const failure = (probability) => 'failure ' +
-      (Number.isFinite(probability) ? (100 * probability).toFixed(probability < 0.0995 ? 1 : 0) + ' %' : 'not known');
+      (Number.isFinite(probability) ? Dom.percent(probability, probability < 0.0995 ? 1 : 0) : 'not known');
 
   // The judgement as a mark and a word.
   const badge = (judgement) =>
@@ -69,13 +69,13 @@ const Verdict = (() => {
       (cell.verdicts.length ? el('div', {}, cell.verdicts.map((verdict) => one(data, cell, verdict))) : null);
 
   // Rates of a variant, as a bar with its interval.
-  const rate = (item) => (item && item.of ? Summary.rateBar({...item, rate: item.count / item.of}) : '–');
+  const rate = (item) => (item && item.of ? Summary.rateBar(item) : '–');
 
   // How the verdicts of each variant fared; null if none has any.
   function table(data) {
     const of = (i) => (data.summary[i] || {}).verdicts || {};
     if (!data.summary.some((item) => item.verdicts)) return null;
-    const share = (item) => (item && item.of ? item.count / item.of : NaN);
+    const share = (item) => (item && item.of ? item.rate : NaN);
     return el(
         'div', {}, el('h3', {}, 'Verdicts'),
         el('p', {class: 'note'},

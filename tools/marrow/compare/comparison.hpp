@@ -9,9 +9,11 @@
 #include <vector>
 
 #include "compare/tuning.hpp"
+#include "marrow/compare/bootstrap.hpp"
 #include "marrow/compare/case_rate.hpp"
 #include "marrow/compare/cell.hpp"
 #include "marrow/compare/experiment.hpp"
+#include "marrow/compare/paired.hpp"
 #include "marrow/compare/statistics.hpp"
 
 namespace CLI {
@@ -19,6 +21,13 @@ class App;
 }
 
 namespace marrow::cli {
+
+/// Calls of nodes by cells that a command ran, not by those that were there already.
+struct CallCounts {
+  long made = 0, cached = 0;
+  void add(const compare::CellRow& row);
+  void add(const CallCounts& others);
+};
 
 struct CompareRequest {
   std::filesystem::path file;
@@ -33,6 +42,7 @@ struct CompareRequest {
   bool gather = false;           ///< run no cell: those without a row have failed
   std::size_t more_cases = 0;    ///< further seeds; for `compare` at most so many, for other commands exactly
   std::size_t made_before = 0;   ///< rows that the same command made at earlier looks
+  CallCounts calls_before;       ///< for these rows
   std::string tuned;             ///< name of the tuned variant that the experiment has; empty without one
   std::optional<Tuning> tuning;  ///< how it was found
   std::map<std::string, compare::CellRow> failed_before;  ///< of these the failed ones, by their names; not tried again
@@ -41,13 +51,22 @@ struct CompareRequest {
 
 /// Adds the arguments that all commands with an experiment share.
 void add_experiment_arguments(CLI::App* command, CompareRequest& request);
-/// Why cells have no row, by their number in cells_of().
-using LostCells = std::map<std::size_t, std::string>;
 /// Runs all cells that are not done yet, here or by tasks of a cluster. Then writes times, tables, pictures and the
-/// report. The folder belongs to this experiment. With request.gather, cells that are not done have failed, for the
-/// reason in `lost`.
+/// report. The folder belongs to this experiment. Returns the exit code.
 int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment,
-                   const std::filesystem::path& folder, const LostCells& lost = {});
+                   const std::filesystem::path& folder);
+
+/// Why cells may have no row, by their number in cells_of().
+using LostCells = std::map<std::size_t, std::string>;
+struct Gathered {
+  int code = 0;      ///< 1 if cells are lost, 130 if it was interrupted
+  std::string lost;  ///< how many cells no task left a row of, and the first ones with their reasons; empty if none
+};
+/// Does the same from the rows that are there; no cell is run. With request.gather. Cells without a row are lost: they
+/// have failed, for the reason in `reasons`.
+Gathered gather_comparison(const CompareRequest& request, const Catalogue& catalogue,
+                           const compare::Experiment& experiment, const std::filesystem::path& folder,
+                           const LostCells& reasons);
 
 /// Says why a comparison was stopped, and how it goes on. Returns the exit code, 130.
 int stopped();
@@ -55,6 +74,8 @@ int stopped();
 struct CellRows {
   std::vector<compare::CellRow> rows;
   std::size_t made = 0;  ///< those that were not there already
+  CallCounts calls;      ///< for these
+  compare::Dependencies dependencies;
 };
 /// Runs the cells that are not done yet and returns all rows. Nothing if it was interrupted.
 std::optional<CellRows> run_cells(const CompareRequest& request, const Catalogue& catalogue,
@@ -75,7 +96,7 @@ compare::Experiment largest_experiment(const CompareRequest& request, const Cata
 
 /// Cells whose pictures go into the report: all variants of at most `most` pairs of case and start, the most important
 /// pair first. In turn come one where a variant was worst in the first metric, one where it was nearest to its median,
-/// one where it failed, and one where it was best; of the failed ones first one for each reason. Then come the others,
+/// one where it has no value, and one where it was best; of those without, first one for each reason. Then the others,
 /// in their order.
 std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experiment,
                                               const std::vector<compare::CellRow>& rows, std::size_t most);
@@ -92,36 +113,36 @@ struct WorkEstimate {
 WorkEstimate estimate_of(const compare::Experiment& experiment, const Catalogue& catalogue, const Store* store,
                          const std::filesystem::path& folder);
 
-/// A figure of merit of one variant, over its completed cells.
+/// A figure of merit of one variant, over those of its runs that have it.
 struct VariantFigure {
-  std::size_t count = 0;
-  compare::Summary summary;
-  bool has_interval = false;       ///< of metrics only, from two cases on
-  compare::Interval median{0, 0};  ///< median_of_runs_interval
+  std::size_t count = 0, of = 0;            ///< runs that have it, and all
+  compare::Summary summary;                 ///< of no meaning if no run has it
+  std::optional<compare::Interval> median;  ///< of metrics only: FigureOfCases::median_interval
 };
-/// What the verdicts of a variant are worth, over its completed cells that have one.
+/// What the verdicts of a variant are worth, over its completed cells that have one. Without limits under 'success', no
+/// cell is a success or a miss, and only `cells` counts.
 struct VerdictCounts {
   std::size_t cells = 0;
-  std::size_t misses = 0;        ///< cells that are no success
+  std::size_t successes = 0, misses = 0;
   std::size_t silent = 0;        ///< silent failures: misses whose verdict is trusted. The other misses are caught.
   std::size_t false_alarms = 0;  ///< successes whose verdict is doubtful or wrong
   /// CaseRate::interval of the rates silent / misses and false_alarms / successes; 0 to 1 if there are none.
   compare::Interval silent_rate{0, 1}, false_alarm_rate{0, 1};
   std::size_t caught() const { return misses - silent; }
-  std::size_t successes() const { return cells - misses; }
 };
 struct VariantSummary {
-  std::size_t runs = 0, failed = 0, successes = 0;
-  compare::Interval success;           ///< CaseRate::interval
-  double effective_runs = 0;           ///< CaseRate::effective_runs
-  std::vector<VariantFigure> figures;  ///< in the order of the experiment's metrics
-  compare::CaptureRange capture;       ///< without bins if the experiment names no initial_error
-  std::size_t unknown_starts =
-      0;  ///< failed runs whose start has no known error from any variant; they are not in `capture`
+  std::size_t runs = 0, failed = 0;
+  std::size_t incomplete = 0;  ///< runs that are done without one of the figures, because a node failed that may fail
+  std::optional<compare::CaseRate> success;      ///< nothing without limits under 'success'
+  std::vector<VariantFigure> figures;            ///< in the order of the experiment's metrics
+  std::optional<compare::CaptureRange> capture;  ///< nothing without an initial_error, or without limits
+  /// Runs whose start has no known error from any variant. They are not in `capture`.
+  std::size_t unknown_starts = 0;
   VariantFigure seconds, evaluations;
   VerdictCounts verdicts;
 };
-/// Comparison of a variant with the baseline in one figure.
+/// Comparison of a variant with the baseline in one figure. There is one for each variant and metric, also where no
+/// case can be compared: how many Holm's correction counts does not depend on what came out.
 struct Finding {
   std::size_t variant = 0, metric = 0;
   compare::Comparison comparison;
@@ -130,10 +151,10 @@ struct Finding {
 };
 /// A figure at one value of a swept option, or at those in one bin.
 struct CurvePoint {
-  double value = 0;  ///< mean of the values
-  std::size_t runs = 0;
+  double value = 0;                           ///< mean of the values
+  std::size_t runs = 0, of = 0;               ///< those that have the figure, and all
   double middle = 0;                          ///< median of the figure, or success rate; 0 without runs
-  std::optional<compare::Interval> interval;  ///< median_of_runs_interval, from two cases on, or CaseRate::interval
+  std::optional<compare::Interval> interval;  ///< FigureOfCases::median_interval, or CaseRate::interval
 };
 /// A figure over a swept option. All variants with the same value count, whatever their other options.
 struct Curve {
@@ -146,9 +167,12 @@ struct Curve {
 struct Answer {
   std::vector<Curve> curves;     ///< none without a sweep
   std::optional<Tuning> tuning;  ///< as in CompareRequest
+  std::string times;             ///< TimedCells::sentence
   std::vector<VariantSummary> variants;
   std::vector<Finding> findings;
-  std::vector<std::string> units;     ///< units of the metrics; empty if no cell is done
+  std::vector<std::string> units;  ///< FigureUnits::of_metrics
+  std::string initial_error_unit;
+  std::vector<bool> same_runs;        ///< for each metric, whether all variants have it in the same cases and starts
   std::optional<compare::Look> look;  ///< what the experiment's rule says of its cases
   std::string look_sentence;
 };
@@ -157,13 +181,20 @@ using RowsOfVariant = std::vector<const compare::CellRow*>;
 /// The rows of each variant, in the order of the experiment.
 std::vector<RowsOfVariant> rows_by_variant(const compare::Experiment& experiment,
                                            const std::vector<compare::CellRow>& rows);
-/// The values of one figure in the cells that both variants completed.
+/// The values of a figure in the rows that have it.
+struct FigureOfCases {
+  std::vector<double> all;
+  compare::ValuesOfCases cases;
+  /// The interval of the median of all values; nothing if there are too few cases for this confidence.
+  std::optional<compare::Interval> median_interval(double confidence = 0.95) const;
+};
+FigureOfCases figure_of_cases(const RowsOfVariant& rows, std::size_t metric);
+/// A pair of values for each case and start; empty for a run without the figure.
 std::vector<compare::Pair> cell_pairs(const RowsOfVariant& baseline, const RowsOfVariant& variant, std::size_t metric);
 /// Applies the rule 'stop' of the experiment, if it has one, to its cases. The units are known.
 void add_look(const compare::Experiment& experiment, const std::vector<RowsOfVariant>& rows, Answer& answer);
 
-/// `rows` may come from an unfinished comparison. Failed cells have no figures. The pairs of a finding are the cells
-/// that both variants completed.
+/// `rows` are those of all cells; failed ones have no figures. Throws Error as FigureUnits::add() does.
 Answer answer_of(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
 /// The response curves of all swept options: on a grid a point for each value, else in eight bins of the range.
 std::vector<Curve> curves_of(const compare::Experiment& experiment, const std::vector<RowsOfVariant>& rows);
@@ -175,7 +206,7 @@ std::string verdict_table(const compare::Experiment& experiment, const Answer& a
 
 /// The answer as a table for the terminal.
 std::string table_text(const compare::Experiment& experiment, const Answer& answer);
-/// The complete answer: {experiment, variants, comparisons}.
+/// The complete answer; docs/comparing.md lists its keys.
 nlohmann::json answer_json(const compare::Experiment& experiment, const Answer& answer);
 /// Writes cells.csv, cells.jsonl and comparison.json.
 void write_tables(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows,

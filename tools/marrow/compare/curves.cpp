@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 
 #include "compare/comparison.hpp"
-#include "marrow/compare/bootstrap.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -33,32 +32,19 @@ struct Group {
 CurvePoint point_of(const Experiment& experiment, const Group& group, std::optional<std::size_t> metric) {
   CurvePoint point;
   for (const double value : group.values) point.value += value / double(group.values.size());
-  std::map<std::string, std::vector<double>> by_case;
-  compare::CaseRate rate;
-  for (const compare::CellRow* row : group.rows) {
-    if (!metric) rate.add(row->case_name, row->is_success(experiment));
-    if (metric && row->failed.empty() && row->values[*metric]) {
-      by_case[row->case_name].push_back(*row->values[*metric]);
-      ++point.runs;
-    }
-  }
-  if (!metric) {
-    point.runs = rate.runs();
-    if (point.runs) point.middle = double(rate.successes()) / double(rate.runs());
-    if (point.runs) point.interval = rate.interval();
+  point.of = group.rows.size();
+  if (metric) {
+    const FigureOfCases figure = figure_of_cases(group.rows, *metric);
+    point.runs = figure.all.size();
+    if (point.runs) point.middle = compare::summarise(figure.all).median;
+    point.interval = figure.median_interval();
     return point;
   }
-  if (!point.runs) return point;
-  compare::ValuesOfCases cases;
-  std::vector<double> all;
-  for (auto& [name, values] : by_case) {
-    all.insert(all.end(), values.begin(), values.end());
-    cases.push_back(std::move(values));
-  }
-  point.middle = compare::summarise(all).median;
-  compare::BootstrapSettings settings;
-  settings.resamples = compare::resamples_for(all.size());
-  if (cases.size() > 1) point.interval = compare::median_of_runs_interval(cases, settings);
+  compare::CaseRate rate;
+  for (const compare::CellRow* row : group.rows) rate.add(row->case_name, row->is_success(experiment));
+  point.runs = rate.runs();
+  if (point.runs) point.middle = double(rate.successes()) / double(rate.runs());
+  if (point.runs) point.interval = rate.interval();
   return point;
 }
 
@@ -69,9 +55,8 @@ std::vector<Curve> curves_of(const Experiment& experiment, const std::vector<Row
   for (const compare::Variant& variant : experiment.variants)
     if (std::find(bases.begin(), bases.end(), variant.swept_from) == bases.end()) bases.push_back(variant.swept_from);
   std::vector<std::optional<std::size_t>> figures;
-  const auto has_limit = [](const compare::MetricChoice& metric) { return metric.limit.has_value(); };
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) figures.emplace_back(m);
-  if (std::any_of(experiment.metrics.begin(), experiment.metrics.end(), has_limit)) figures.emplace_back();
+  if (experiment.defines_success()) figures.emplace_back();
   std::vector<Curve> curves;
   for (const std::string& base : bases)
     for (std::size_t option = 0; option < experiment.swept.size(); ++option) {
@@ -97,7 +82,7 @@ json curves_json(const Experiment& experiment, const std::vector<Curve>& curves)
     const compare::SweptOption& option = experiment.swept[curve.option];
     json points = json::array();
     for (const CurvePoint& point : curve.points) {
-      points.push_back({{"value", point.value}, {"runs", point.runs}});
+      points.push_back({{"value", point.value}, {"runs", point.runs}, {"of", point.of}});
       if (point.runs) points.back()["middle"] = point.middle;
       if (point.interval) points.back().update({{"low", point.interval->lower}, {"high", point.interval->upper}});
     }

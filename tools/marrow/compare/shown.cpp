@@ -34,12 +34,12 @@ class Chooser {
   std::set<Place> taken_;
 };
 
-/// The failed rows, the first one with each reason before all others.
+/// The rows without the first figure, the first one with each reason before all others.
 std::vector<std::size_t> failed_rows(const std::vector<compare::CellRow>& rows) {
   std::vector<std::size_t> first, others;
   std::set<std::string> reasons;
   for (std::size_t i = 0; i < rows.size(); ++i)
-    if (!rows[i].failed.empty()) (reasons.insert(rows[i].failed).second ? first : others).push_back(i);
+    if (!rows[i].values.at(0)) (reasons.insert(rows[i].failed + rows[i].absent).second ? first : others).push_back(i);
   first.insert(first.end(), others.begin(), others.end());
   return first;
 }
@@ -52,7 +52,7 @@ std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experim
   const auto place_of = [&](std::size_t row) { return Place{row / variants / starts, row / variants % starts}; };
   std::vector<std::vector<std::size_t>> by_value(variants);  // for each variant, its rows with a value, the best first
   for (std::size_t i = 0; i < rows.size(); ++i)
-    if (rows[i].failed.empty() && rows[i].values.at(0)) by_value[i % variants].push_back(i);
+    if (rows[i].values.at(0)) by_value[i % variants].push_back(i);
   for (auto& order : by_value)
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
       return experiment.metrics[0].higher_is_better() ? *rows[a].values[0] > *rows[b].values[0]

@@ -77,8 +77,11 @@ std::string csv(const Experiment& experiment, const std::vector<CellRow>& rows) 
   for (const CellRow& row : rows) {
     text += field(row.id) + "," + field(row.variant) + "," + field(row.case_name) + "," + field(row.start) + "," +
             (row.failed.empty() ? "done" : "failed") + "," + field(row.failed + row.absent) + "," +
-            (row.is_success(experiment) ? "1" : "0") + "," + std::to_string(row.tries) + "," +
-            (row.verdict ? name_of(*row.verdict) : "") + "," + number_text(row.failure_probability);
+            (!experiment.defines_success() ? ""
+             : row.is_success(experiment)  ? "1"
+                                           : "0") +
+            "," + std::to_string(row.tries) + "," + (row.verdict ? name_of(*row.verdict) : "") + "," +
+            number_text(row.failure_probability);
     for (const std::string& value : values_of.at(row.variant)) text += "," + field(value);
     for (const auto& value : row.values) text += "," + number_text(value);
     text += "," + number_text(row.initial_error) + "," + number_text(row.seconds) + "," +
@@ -93,7 +96,7 @@ std::string jsonl(const Experiment& experiment, const std::vector<CellRow>& rows
   std::string text;
   for (const CellRow& row : rows) {
     json j = json::parse(compare::to_json(row));
-    j["success"] = row.is_success(experiment);
+    j["success"] = experiment.defines_success() ? json(row.is_success(experiment)) : json();
     j["options"] = json::object();
     for (std::size_t i = 0; i < options.size(); ++i) j["options"][options[i]] = values_of.at(row.variant)[i];
     for (std::size_t i = 0; i < experiment.metrics.size(); ++i)
@@ -103,45 +106,107 @@ std::string jsonl(const Experiment& experiment, const std::vector<CellRow>& rows
   return text;
 }
 
-json of(const VariantFigure& figure) {
-  if (!figure.count) return {{"count", 0}};
-  json result{{"count", figure.count},
-              {"median", figure.summary.median},
-              {"q1", figure.summary.lower_quartile},
-              {"q3", figure.summary.upper_quartile},
-              {"p95", figure.summary.percentile_95},
-              {"worst", figure.summary.worst},
-              {"mean", figure.summary.mean}};
-  if (figure.has_interval) result.update({{"median_low", figure.median.lower}, {"median_high", figure.median.upper}});
+json of(const VariantFigure& figure, bool higher_is_better = false) {
+  json result{{"count", figure.count}, {"of", figure.of}};
+  if (!figure.count) return result;
+  result.update({{"median", figure.summary.median},
+                 {"q1", figure.summary.lower_quartile},
+                 {"q3", figure.summary.upper_quartile},
+                 {higher_is_better ? "p5" : "p95", figure.summary.percentile_95},
+                 {"worst", figure.summary.worst},
+                 {"mean", figure.summary.mean}});
+  if (figure.median) result.update({{"median_low", figure.median->lower}, {"median_high", figure.median->upper}});
   return result;
 }
 
+/// A rate of nothing has no bounds.
 json of(std::size_t count, std::size_t total, const compare::Interval& rate) {
-  return {{"count", count}, {"of", total}, {"low", rate.lower}, {"high", rate.upper}};
+  json result{{"count", count}, {"of", total}, {"rate", nullptr}, {"low", nullptr}, {"high", nullptr}};
+  if (total) result.update({{"rate", double(count) / double(total)}, {"low", rate.lower}, {"high", rate.upper}});
+  return result;
 }
 
-json of(const VerdictCounts& counts) {
-  return {{"cells", counts.cells},
-          {"silent_failures", of(counts.silent, counts.misses, counts.silent_rate)},
-          {"caught", counts.caught()},
-          {"false_alarms", of(counts.false_alarms, counts.successes(), counts.false_alarm_rate)}};
+json of(const std::optional<compare::CaseRate>& success) {
+  if (!success || !success->runs()) return {};
+  json result = of(success->successes(), success->runs(), success->interval());
+  result["effective_runs"] = success->effective_runs();
+  return result;
 }
 
-json of(const compare::CaptureRange& capture, std::size_t unknown_starts) {
+json of(const VerdictCounts& counts, bool has_success) {
+  json result{{"cells", counts.cells}, {"silent_failures", nullptr}, {"caught", nullptr}, {"false_alarms", nullptr}};
+  if (has_success)
+    result.update({{"silent_failures", of(counts.silent, counts.misses, counts.silent_rate)},
+                   {"caught", counts.caught()},
+                   {"false_alarms", of(counts.false_alarms, counts.successes, counts.false_alarm_rate)}});
+  return result;
+}
+
+json of(const std::optional<compare::CaptureRange>& capture, std::size_t unknown_starts) {
+  if (!capture) return {};
   json bins = json::array();
-  for (const compare::CaptureRange::Bin& bin : capture.bins)
-    bins.push_back({{"from", bin.from},
-                    {"to", bin.to},
-                    {"count", bin.successes},
-                    {"of", bin.runs},
-                    {"low", bin.success.lower},
-                    {"high", bin.success.upper}});
-  return {{"range", capture.range}, {"is_open", capture.is_open}, {"unknown_starts", unknown_starts}, {"bins", bins}};
+  for (const compare::CaptureRange::Bin& bin : capture->bins) {
+    bins.push_back(of(bin.successes, bin.runs, bin.success));
+    bins.back().update({{"from", bin.from}, {"to", bin.to}});
+  }
+  return {{"range", capture->bins.empty() ? json() : json(capture->range)},
+          {"is_open", capture->is_open},
+          {"unknown_starts", unknown_starts},
+          {"bins", bins}};
+}
+
+/// Null for a bound that is no number.
+json bound(double value) { return std::isfinite(value) ? json(value) : json(); }
+
+/// Who of a comparison lost runs: "variant", "baseline", or null if the median is one of values.
+json who_fails_more(const compare::Comparison& comparison, bool higher_is_better) {
+  if (!comparison.compared() || std::isfinite(comparison.median_difference)) return {};
+  return (comparison.median_difference > 0) != higher_is_better ? "variant" : "baseline";
+}
+
+json of(const Finding& finding, const Experiment& experiment, const Answer& answer) {
+  const compare::Comparison& comparison = finding.comparison;
+  const compare::MetricChoice& metric = experiment.metrics[finding.metric];
+  return {{"variant", experiment.variants[finding.variant].name},
+          {"metric", metric.path},
+          {"unit", answer.units[finding.metric]},
+          {"cases", comparison.compared()},
+          {"of_cases", comparison.cases.all()},
+          {"cases_variant_lost", comparison.cases.variant_lost},
+          {"cases_baseline_lost", comparison.cases.reference_lost},
+          {"runs", comparison.runs.all()},
+          {"pairs", comparison.runs.both},
+          {"runs_variant_lost", comparison.runs.variant_lost},
+          {"runs_baseline_lost", comparison.runs.reference_lost},
+          {"runs_both_lost", comparison.runs.neither},
+          {"difference", comparison.compared() ? bound(comparison.median_difference) : json()},
+          {"fails_more", who_fails_more(comparison, metric.higher_is_better())},
+          {"difference_of_pairs", comparison.median_of_both ? json(*comparison.median_of_both) : json()},
+          {"low", bound(comparison.interval.lower)},
+          {"high", bound(comparison.interval.upper)},
+          {"p", comparison.test.p},
+          {"p_holm", finding.p_holm},
+          {"is_shown", compare::difference_shown(comparison, finding.p_holm)},
+          {"sentence", finding.sentence}};
+}
+
+json metrics_of(const Experiment& experiment, const Answer& answer) {
+  json metrics = json::array();
+  for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
+    const compare::MetricChoice& metric = experiment.metrics[m];
+    metrics.push_back(
+        {{"name", metric.path},
+         {"label", metric.label},
+         {"unit", answer.units[m]},
+         {metric.higher_is_better() ? "success_above" : "success_below", metric.limit ? json(*metric.limit) : json()},
+         {"higher_is_better", metric.higher_is_better()},
+         {"same_runs", bool(answer.same_runs[m])}});
+  }
+  return metrics;
 }
 
 json of(const compare::StopRule& rule, const compare::Look& look, const Experiment& experiment,
         const std::string& sentence) {
-  const auto bound = [](double value) { return std::isfinite(value) ? json(value) : json(); };
   json result{{"look", look.number},
               {"looks", look.looks},
               {"cases", look.cases},
@@ -154,7 +219,7 @@ json of(const compare::StopRule& rule, const compare::Look& look, const Experime
               {"high", bound(look.interval.upper)},
               {"sentence", sentence}};
   if (rule.goal == compare::StopRule::Goal::difference)
-    result.update({{"p", look.p}, {"difference", look.difference}, {"alpha", rule.alpha}});
+    result.update({{"p", look.p}, {"difference", bound(look.difference)}, {"alpha", rule.alpha}});
   else
     result["width"] = rule.width;
   return result;
@@ -168,37 +233,28 @@ json answer_json(const Experiment& experiment, const Answer& answer) {
     const VariantSummary& summary = answer.variants[v];
     json figures = json::object();
     for (std::size_t m = 0; m < experiment.metrics.size(); ++m)
-      figures[experiment.metrics[m].path] = of(summary.figures[m]);
+      figures[experiment.metrics[m].path] = of(summary.figures[m], experiment.metrics[m].higher_is_better());
     variants.push_back({{"name", experiment.variants[v].name},
                         {"is_baseline", v == experiment.baseline},
                         {"runs", summary.runs},
                         {"failed", summary.failed},
-                        {"success",
-                         {{"count", summary.successes},
-                          {"of", summary.runs},
-                          {"rate", summary.runs ? double(summary.successes) / double(summary.runs) : 0.0},
-                          {"low", summary.success.lower},
-                          {"high", summary.success.upper},
-                          {"effective_runs", summary.effective_runs}}},
+                        {"incomplete", summary.incomplete},
+                        {"success", of(summary.success)},
                         {"metrics", figures},
                         {"seconds", of(summary.seconds)},
                         {"evaluations", of(summary.evaluations)}});
-    if (summary.verdicts.cells) variants.back()["verdicts"] = of(summary.verdicts);
+    if (summary.verdicts.cells) variants.back()["verdicts"] = of(summary.verdicts, experiment.defines_success());
     if (!experiment.initial_error.empty()) variants.back()["capture"] = of(summary.capture, summary.unknown_starts);
   }
-  for (const Finding& finding : answer.findings)
-    findings.push_back({{"variant", experiment.variants[finding.variant].name},
-                        {"metric", experiment.metrics[finding.metric].path},
-                        {"pairs", finding.comparison.pairs},
-                        {"cases", finding.comparison.cases},
-                        {"difference", finding.comparison.median_difference},
-                        {"low", finding.comparison.interval.lower},
-                        {"high", finding.comparison.interval.upper},
-                        {"p", finding.comparison.test.p},
-                        {"p_holm", finding.p_holm},
-                        {"sentence", finding.sentence}});
-  json result{{"experiment", experiment.name}, {"variants", variants}, {"comparisons", findings}};
+  for (const Finding& finding : answer.findings) findings.push_back(of(finding, experiment, answer));
+  json result{{"experiment", experiment.name},
+              {"metrics", metrics_of(experiment, answer)},
+              {"variants", variants},
+              {"comparisons", findings}};
+  if (!experiment.initial_error.empty())
+    result["initial_error"] = {{"name", experiment.initial_error}, {"unit", answer.initial_error_unit}};
   if (!answer.curves.empty()) result["curves"] = curves_json(experiment, answer.curves);
+  result["times"] = answer.times;
   if (answer.tuning) {
     result["tuning"] = tuning_json(*answer.tuning);
     result["curves"] = json::parse(answer.tuning->curves);

@@ -42,7 +42,7 @@ json row_of(const compare::Experiment& experiment, const compare::CellIndex& ind
                  index.case_index,
                  index.start,
                  texts.place_of(is_done ? "done" : "failed"),
-                 row.is_success(experiment),
+                 experiment.defines_success() ? json(row.is_success(experiment)) : json(),
                  row.tries,
                  rounded(row.initial_error),
                  rounded(row.seconds),
@@ -65,7 +65,7 @@ json cell_table(const compare::Experiment& experiment, const std::vector<CellRow
   for (std::size_t i = 0; i < rows.size(); ++i)  // in the order of the cells: by case, by start, by variant
     table.push_back(row_of(experiment, {i % variants, i / variants / starts, i / variants % starts}, rows[i], texts));
   return {{"fields",
-           {"variant", "case", "start", "status", "success", "tries", "initial_mtre_mm", "seconds", "evaluations",
+           {"variant", "case", "start", "status", "success", "tries", "initial_error", "seconds", "evaluations",
             "cached_nodes", "reason", "absent", "verdict", "failure_probability"}},
           {"rows", std::move(table)},
           {"texts", texts.all()}};

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <thread>
-
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/number_text.hpp"
 #include "report/cell_material.hpp"
@@ -46,30 +44,8 @@ std::string success_sentence(const Experiment& experiment, const std::vector<std
       const std::string limit = formatted(metric.higher_is_better() ? " above %g" : " below %g", *metric.limit);
       limits += (limits.empty() ? "" : " and ") + metric.label + limit + (units[m].empty() ? "" : " " + units[m]);
     }
-  return limits.empty() ? "A run that ends without a fault is a success."
+  return limits.empty() ? "The experiment sets no limits, so no run is a success or a miss."
                         : "A run is a success with " + limits + "; a failed run is none.";
-}
-
-std::string time_sentence(const Experiment& experiment) {
-  if (!experiment.timed_cells) return "Times were not measured.";
-  return "Times: up to " + std::to_string(experiment.timed_cells) +
-         " runs of each variant, the same cases for all, one at a time on " +
-         std::to_string(std::thread::hardware_concurrency()) +
-         " threads with nothing else running; what all variants share is read back and does not count.";
-}
-
-json metrics_of(const Experiment& experiment, const std::vector<std::string>& units) {
-  json metrics = json::array();
-  for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
-    const compare::MetricChoice& metric = experiment.metrics[m];
-    metrics.push_back(
-        {{"name", metric.path},
-         {"label", metric.label},
-         {"unit", units[m]},
-         {metric.higher_is_better() ? "success_above" : "success_below", metric.limit ? json(*metric.limit) : json()},
-         {"higher_is_better", metric.higher_is_better()}});
-  }
-  return metrics;
 }
 
 json pipeline_graph(const Experiment& experiment, const compare::CellRunner& runner) {
@@ -94,7 +70,8 @@ std::string command_of(const Experiment& experiment, const CompareRequest& reque
 void write_report(const Experiment& experiment, const std::vector<CellRow>& rows, const Answer& answer,
                   const compare::CellRunner& runner, const std::vector<compare::CellIndex>& shown,
                   const CompareRequest& request, const fs::path& folder) {
-  json data = {{"format", 1}, {"kind", "comparison"}, {"metrics", metrics_of(experiment, answer.units)}};
+  const json answers = answer_json(experiment, answer);
+  json data = {{"format", 1}, {"kind", "comparison"}, {"metrics", answers["metrics"]}};
   data["experiment"] = {{"name", experiment.name},
                         {"help", experiment.help},
                         {"file", experiment.file.string()},
@@ -105,7 +82,7 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
                         {"folder", folder.string()},
                         {"starts_protocol", starts_sentence(experiment)},
                         {"success_rule", success_sentence(experiment, answer.units)},
-                        {"time_rule", time_sentence(experiment)}};
+                        {"time_rule", answer.times}};
   if (!request.folder.empty()) data["experiment"]["out"] = request.folder.string();
   for (std::size_t v = 0; v < experiment.variants.size(); ++v) {
     json options = json::object();
@@ -115,10 +92,9 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
   }
   for (const auto& one : experiment.cases) data["cases"].push_back(one.name);
   for (const auto& start : experiment.starts) data["starts"].push_back(start.name);
-  const json answers = answer_json(experiment, answer);
   data["summary"] = answers["variants"];
   data["comparisons"] = answers["comparisons"];
-  for (const char* part : {"curves", "tuning"})
+  for (const char* part : {"curves", "tuning", "initial_error"})
     if (answers.contains(part)) data[part] = answers[part];
 
   data["cell_table"] = cell_table(experiment, rows);

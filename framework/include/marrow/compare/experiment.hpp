@@ -81,8 +81,19 @@ struct MetricChoice {
   enum class Better { lower, higher, nearest_zero };  ///< for nearest_zero, the magnitude is compared
   Better better = Better::lower;
   std::optional<double> limit;  ///< limit of success: below it, or above it if higher is better
+  Place place = {};
 
   bool higher_is_better() const { return better == Better::higher; }
+};
+
+/// An item that the path of a figure names, and the node from which the items along its axis have their names. Which
+/// items there are is known from a case only (CellRunner::items_of).
+struct NamedItem {
+  std::string path, item, axis;
+  Place place;
+  std::size_t variant = 0;  ///< the first variant that has this node as it is
+  std::string node;         ///< in its pipeline
+  int output = 0;           ///< of the node
 };
 
 /// Limits of an experiment: more is a fault of its file. Each variant's pipeline is read whenever the experiment is
@@ -111,14 +122,22 @@ struct Experiment {
   std::optional<StartProtocol> protocol;
   std::vector<Start> starts;  ///< one without displacement if there is no protocol
   std::vector<MetricChoice> metrics;
-  std::string initial_error;          ///< path of the figure over which the capture range is drawn; may be empty
-  std::vector<std::string> pictures;  ///< outputs to show side by side
-  std::optional<StopRule> stop;       ///< when a comparison with more and more cases ends
-  std::optional<TuneRule> tune;       ///< how a further variant is found
-  std::size_t timed_cells = 3;        ///< cells per variant that are run again, one at a time, to measure their time
-  std::vector<std::string> notes;     ///< remarks for people that hold for the pipelines of all variants
+  std::string initial_error;  ///< path of the figure over which the capture range is drawn; may be empty
+  Place initial_error_place;
+  std::vector<NamedItem> named_items;  ///< of the metrics and the initial error; without those only a search can know
+  std::vector<std::string> pictures;   ///< outputs to show side by side
+  std::optional<StopRule> stop;        ///< when a comparison with more and more cases ends
+  std::optional<TuneRule> tune;        ///< how a further variant is found
+  std::size_t timed_cells = 3;         ///< cells per variant that are run again, one at a time, to measure their time
+  std::vector<std::string> notes;      ///< remarks for people that hold for the pipelines of all variants
 
   std::size_t cell_count() const { return variants.size() * cases.size() * starts.size(); }
+  /// Whether a figure has a limit under 'success'. Without one, no run is a success, and none is a miss.
+  bool defines_success() const {
+    for (const MetricChoice& metric : metrics)
+      if (metric.limit) return true;
+    return false;
+  }
 };
 
 /// One cell of a comparison: a variant, a case and a start.

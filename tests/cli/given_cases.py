@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Comparisons of figures that a test plugin reads from tables, so that their values are known."""
+import json
+import re
+
+from marrow_cli import BUILD, Case, marrow
+
+GIVEN_PLUGINS = BUILD / "tests" / "given_plugins"
+PIPELINE = """marrow: 1
+inputs: {case: {type: path}}
+nodes:
+  s: {uses: test.given_start}
+  n: {uses: test.given_figures, in: {start: s}, with: {table: $case, column: a, names: [%s]}, may_fail: true}
+outputs: {figures: n}
+"""
+
+
+class GivenCase(Case):
+    """values: for each variant and case a text such as "1.25 mm", or "fail"; or one for each figure's name."""
+
+    plugins = [GIVEN_PLUGINS]
+
+    def write_cases(self, values, start="0"):
+        """A folder for each case, with the texts of all variants."""
+        lines = {}
+        for variant, texts in values.items():
+            for number, text in enumerate(texts):
+                named = text if isinstance(text, dict) else {"err": text}
+                lines.setdefault(number, []).extend("0,%s,%s,%s,%s" % (variant, start, *item) for item in named.items())
+        for number, own in lines.items():
+            folder = self.scratch / "cases" / ("%03d" % number)
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / "figures.csv").write_text("\n".join(own) + "\n")
+
+    def experiment(self, variants, more="", metrics="[figures.err]", pipeline=PIPELINE % "err"):
+        self.write("p.yaml", pipeline)
+        text = "experiment: 1\nname: e\npipeline: p.yaml\ncases: {folders: [cases/*]}\nmetrics: %s\n" % metrics
+        text += "variants:\n" + "".join("  %s: {n.column: %s}\n" % (name, name) for name in variants)
+        return self.write("e.yaml", text + ("" if "timed_cells" in more else "timed_cells: 0\n") + more)
+
+    def marrow(self, *arguments):
+        return marrow(
+            *arguments,
+            plugins=self.plugins,
+            extra_environment={"MARROW_CACHE": str(self.scratch / "cache")},
+            cwd=self.scratch
+        )
+
+    def compare(self, values, more="", code=0, **others):
+        """What the terminal shows."""
+        self.write_cases(values)
+        file = self.experiment(list(values), more, **others)
+        self.result = self.marrow("compare", file, "--out", "out", "--quiet")
+        self.assertEqual(self.result.returncode, code, self.result.stdout + self.result.stderr)
+        return self.result.stdout
+
+    def answer(self):
+        return json.loads((self.scratch / "out" / "comparison.json").read_text())
+
+    def page_data(self):
+        page = (self.scratch / "out" / "report.html").read_text()
+        return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.S).group(1))
