@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
-#include <sstream>
 
 #include "cell_fault.hpp"
 #include "cell_key.hpp"
+#include "figure_path.hpp"
 #include "marrow/domain/number_text.hpp"
 #include "marrow/domain/pose.hpp"
 #include "marrow/runtime/run_folder.hpp"
@@ -27,14 +27,11 @@ namespace fs = std::filesystem;
 /// a cell in all.
 constexpr long kSharedFilesOfCell = 1;
 
-const std::string kChanged = "a file that the cell needs was changed while it ran; run it again";
-
-std::vector<std::string> split(const std::string& text) {
-  std::vector<std::string> parts;
-  std::istringstream stream(text);
-  for (std::string part; std::getline(stream, part, '.');) parts.push_back(part);
-  return parts;
-}
+/// A path names something that is not there. It may be the name of an item along an axis.
+struct UnknownName : Error {
+  UnknownName(const std::string& message, std::string along) : Error(message), axis(std::move(along)) {}
+  std::string axis;  ///< empty if it is the name of a figure
+};
 
 Pipeline checked(const fs::path& file, const PipelineArguments& arguments, const Catalogue& catalogue) {
   Diagnostics diagnostics;
@@ -47,7 +44,7 @@ Pipeline checked(const fs::path& file, const PipelineArguments& arguments, const
 /// Error if it is missing for another reason or is not a finite number.
 std::optional<marrow::Metric> figure(const Pipeline& pipeline, const RunResult& result, const std::string& path,
                                      std::string& absent) {
-  const std::vector<std::string> parts = split(path);
+  const std::vector<std::string> parts = parts_of_path(path);
   const auto output = std::find_if(pipeline.outputs.begin(), pipeline.outputs.end(),
                                    [&](const PipelineOutput& one) { return one.name == parts[0]; });
   Value value = value_of(result, output->source);
@@ -58,7 +55,8 @@ std::optional<marrow::Metric> figure(const Pipeline& pipeline, const RunResult& 
     if (item == value.names.end()) {
       std::string names;
       for (const std::string& name : value.names) names += (names.empty() ? "" : ", ") + name;
-      throw Error("'" + path + "': there are " + names + " along '" + value.axis + "', name one of them");
+      throw UnknownName("'" + path + "': there are " + names + " along '" + value.axis + "', name one of them",
+                        value.axis);
     }
     const Value picked = value.items[std::size_t(item - value.names.begin())];
     value = picked;
@@ -70,8 +68,7 @@ std::optional<marrow::Metric> figure(const Pipeline& pipeline, const RunResult& 
   if (value.is_absent())
     throw Error("'" + path + "' was not made" +
                 (value.missing.empty() ? ": its case has no truth, or an item is absent" : ": " + value.missing));
-  std::string name;
-  for (; used < parts.size(); ++used) name += (name.empty() ? "" : ".") + parts[used];
+  const std::string name = figure_from(parts, used);
   std::vector<std::string> known;
   for (const marrow::Metric& metric : value.as<Metrics>().items) {
     known.push_back(metric.name);
@@ -80,7 +77,21 @@ std::optional<marrow::Metric> figure(const Pipeline& pipeline, const RunResult& 
       throw Error("'" + path + "' is " + formatted("%f", metric.value) + ", not a finite number");
     return metric;
   }
-  throw Error("'" + path + "': there is no figure '" + name + "'; " + suggestion(name, known));
+  throw UnknownName("'" + path + "': there is no figure '" + name + "'; " + suggestion(name, known), "");
+}
+
+/// As a metric's path begins: "verdict.distal".
+std::string verdict_place(const NamedVerdict& one) {
+  std::string item = one.item;
+  std::replace(item.begin(), item.end(), '/', '.');
+  return one.output + (item.empty() ? "" : "." + item);
+}
+
+CellRow::Figures verdict_figures_of(const Verdict& verdict) {
+  CellRow::Figures figures;
+  for (const marrow::Metric& one : verdict.figures)
+    figures[one.name] = std::isfinite(one.value) ? std::optional(one.value) : std::nullopt;
+  return figures;
 }
 
 int evaluations_in(const Value& value) {
@@ -97,19 +108,6 @@ bool has_text(const fs::path& file, const std::string& text) {
   } catch (const Error&) {
     return false;
   }
-}
-
-/// The time that a cell took, if the store has it.
-std::optional<double> kept_seconds(const Store& store, const Digest& key) {
-  try {
-    const auto kept = store.find(key);
-    if (!kept) return std::nullopt;
-    const Value& value = kept->outputs.at(0);
-    if (value.source && !value.is_list()) return value.as<Metrics>().items.at(0).value;
-  } catch (const std::exception&) {  // the entry is not valid: the time is measured again
-  }
-  store.drop(key);
-  return std::nullopt;
 }
 
 }  // namespace
@@ -178,6 +176,17 @@ std::optional<CellRow> CellRunner::finished(const CellIndex& cell, const std::st
   }
 }
 
+std::string CellRunner::fault_of_row(const CellIndex& cell) const {
+  const fs::path file = folder_of(cell) / "cell.json";
+  std::error_code error;
+  if (!fs::exists(file, error)) return "";
+  try {
+    return fault_of_written_row(read_text_file(file, kMostSourceBytes));
+  } catch (const Error& fault) {
+    return fault.what();
+  }
+}
+
 CellRunner::Done CellRunner::run_into(const fs::path& folder, const Pipeline& pipeline, const CellIndex& cell,
                                       const std::function<void(const RunEvent&)>& observer) {
   remove_tree(folder);
@@ -211,14 +220,21 @@ CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const Ru
     const Done done = run_into(folder_of(cell), pipeline, cell, observer);
     fill(row, pipeline, done);
     if (row.failed.empty() && watched(cell, pipeline) != before) row.failed = kChanged;
+  } catch (const UnknownName& error) {
+    row.failed = error.what();
+    // Items that were known before the comparison may be missing in this case only.
+    row.lacks_figure = std::none_of(experiment_.named_items.begin(), experiment_.named_items.end(),
+                                    [&](const NamedItem& one) { return one.axis == error.axis; });
   } catch (const std::exception& error) {
     row.failed = error.what();
   }
   if (!row.failed.empty()) {
     row.values.clear();
+    row.units.clear();
     row.absent.clear();
     row.verdict.reset();
     row.failure_probability.reset();
+    row.verdict_figures.clear();
   }
   row.values.resize(experiment_.metrics.size());
   row.units.resize(experiment_.metrics.size());
@@ -241,6 +257,7 @@ void CellRunner::fill(CellRow& row, const Pipeline& pipeline, const Done& done) 
     const Verdict worst = worst_of(verdicts);
     row.verdict = worst.judgement;
     if (std::isfinite(worst.failure_probability)) row.failure_probability = worst.failure_probability;
+    for (const NamedVerdict& one : verdicts) row.verdict_figures[verdict_place(one)] = verdict_figures_of(one.verdict);
   }
   for (const MetricChoice& metric : experiment_.metrics) {
     const auto found = figure(pipeline, done.result, metric.path, row.absent);
@@ -250,8 +267,10 @@ void CellRunner::fill(CellRow& row, const Pipeline& pipeline, const Done& done) 
       row.values.back() = metric.better == MetricChoice::Better::nearest_zero ? std::abs(found->value) : found->value;
   }
   if (experiment_.initial_error.empty()) return;
-  if (const auto found = figure(pipeline, done.result, experiment_.initial_error, row.absent))
+  if (const auto found = figure(pipeline, done.result, experiment_.initial_error, row.absent)) {
     row.initial_error = found->value;
+    row.initial_error_unit = found->unit;
+  }
 }
 
 fs::path CellRunner::pictures_of(const CellIndex& cell) const {
@@ -270,28 +289,6 @@ bool CellRunner::draw(const CellIndex& cell, const std::function<void(const RunE
   return true;
 }
 
-std::vector<std::size_t> CellRunner::variants_with_nodes(const CellIndex& cell, const Pipeline& pipeline) {
-  const std::string& case_name = experiment_.cases[cell.case_index].name;
-  std::map<Digest, std::size_t> variants_with;
-  for (std::size_t v = 0; v < experiment_.variants.size(); ++v) {
-    const auto others = histories(
-        pipeline_of({v, cell.case_index, cell.start}, case_folder(cell.case_index), Depth::figures), case_name);
-    for (const Digest& one : std::set<Digest>(others.begin(), others.end())) ++variants_with[one];
-  }
-  std::vector<std::size_t> counts;
-  for (const Digest& one : histories(pipeline, case_name)) counts.push_back(variants_with[one]);
-  return counts;
-}
-
-std::set<std::string> CellRunner::own_nodes(const CellIndex& cell, const Pipeline& pipeline) {
-  const std::vector<std::size_t> variants_with = variants_with_nodes(cell, pipeline);
-  std::set<std::string> ids;
-  for (std::size_t i = 0; i < variants_with.size(); ++i)
-    if (experiment_.variants.size() == 1 || variants_with[i] < experiment_.variants.size())
-      ids.insert(pipeline.nodes[i].id);
-  return ids;
-}
-
 const std::set<std::string>& CellRunner::wanted_by_others(const CellIndex& cell, const Pipeline& pipeline) {
   const auto [known, is_new] = wanted_.try_emplace(cell.variant);
   std::set<std::string>& wanted = known->second;
@@ -303,36 +300,6 @@ const std::set<std::string>& CellRunner::wanted_by_others(const CellIndex& cell,
         (experiment_.cases.size() > 1 && !depends[i].on_case))
       wanted.insert(pipeline.nodes[i].id);
   return wanted;
-}
-
-double CellRunner::time(const CellIndex& cell) {
-  const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::figures);
-  RunSettings settings;
-  settings.threads = threads_;
-  settings.file_limits = file_limits_;
-  settings.seed = seed_of(cell.case_index);
-  settings.store = store_;
-  settings.remember = false;
-  settings.made_anew = own_nodes(cell, pipeline);
-  settings.wanted_by_others = wanted_by_others(cell, pipeline);
-  Hasher hasher;
-  const Watched before = watched(cell, pipeline);
-  hasher.add(std::string("seconds"));
-  hasher.add(before.key);
-  hasher.add(std::int64_t(threads_));
-  // In another experiment, the variants may share more or fewer nodes.
-  for (const std::string& id : settings.made_anew) hasher.add(id);
-  const Digest key = hasher.digest();
-  if (const auto known = store_ ? kept_seconds(*store_, key) : std::nullopt) return *known;
-
-  const RunResult result = run_pipeline(pipeline, catalogue_, settings);
-  if (result.failed()) throw Error(reason_of(pipeline, result));
-  if (watched(cell, pipeline) != before) throw Error(kChanged);
-  Value seconds = Value::of(std::make_shared<const Metrics>(Metrics{{{"seconds", result.seconds, "s"}}}));
-  seconds.key = seconds.type.content->hash(seconds.data.get());
-  if (store_)
-    store_->save(key, {seconds}, {"time of " + cell_id(experiment_, cell), {}, {}, {}, false, 0, result.seconds, {}});
-  return result.seconds;
 }
 
 void CellRunner::write(const CellIndex& cell, CellRow& row) const {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "marrow/compare/cell.hpp"
+#include "marrow/runtime/hash.hpp"
 #include "runtime/json_text.hpp"
 
 namespace marrow::compare {
@@ -28,6 +29,20 @@ const json& list_of(const json& row, const char* key, std::size_t size) {
   return list;
 }
 
+std::string json_line(const json& j) { return j.dump(-1, ' ', false, json::error_handler_t::replace); }
+
+/// Reads a row that has its own digest. The digest is left out of the result.
+json written_row(const std::string& text) {
+  json j = parse_json(text, "a cell's row");
+  if (!j.is_object() || !j.contains("digest")) throw Error("it has no digest of itself");
+  const json digest = std::move(j["digest"]);
+  j.erase("digest");
+  const std::string line = json_line(j);
+  if (digest != hash_of_bytes(line.data(), line.size()).hex())
+    throw Error("it is not what its digest is of: it was changed or damaged");
+  return j;
+}
+
 void read_verdict(const json& j, CellRow& row) {
   const std::string name = j.at("verdict");
   row.verdict = judgement_named(name);
@@ -35,6 +50,11 @@ void read_verdict(const json& j, CellRow& row) {
   row.failure_probability = number(j.at("failure_probability"), "'failure_probability'");
   if (row.failure_probability && !(*row.failure_probability >= 0 && *row.failure_probability <= 1))
     throw Error("'failure_probability' is not from 0 to 1");
+  for (const auto& [place, figures] : j.at("verdict_figures").items()) {
+    CellRow::Figures& read = row.verdict_figures[place];
+    for (const auto& [name, value] : figures.items())
+      read[name] = number(value, "'" + name + "' of 'verdict_figures'");
+  }
 }
 
 }  // namespace
@@ -58,26 +78,45 @@ std::string to_json(const CellRow& row) {
             {"values", json::array()},
             {"units", row.units},
             {"initial_error", of(row.initial_error)},
+            {"initial_error_unit", row.initial_error_unit},
             {"seconds", of(row.seconds)},
             {"evaluations", row.evaluations},
             {"nodes", json::object()},
             {"key", row.key}};
   if (!row.failed.empty()) j["reason"] = row.failed;
+  if (row.lacks_figure) j["lacks_figure"] = true;
   if (!row.absent.empty()) j["absent"] = row.absent;
   if (row.verdict) j["verdict"] = name_of(*row.verdict);
   if (row.verdict) j["failure_probability"] = of(row.failure_probability);
+  if (row.verdict) j["verdict_figures"] = json::object();
+  for (const auto& [place, figures] : row.verdict_figures) {
+    json& written = j["verdict_figures"][place] = json::object();
+    for (const auto& [name, value] : figures) written[name] = of(value);
+  }
   for (const auto& value : row.values) j["values"].push_back(of(value));
   for (const auto& [name, calls] : row.nodes)
     j["nodes"][name] = {{"made", calls.made}, {"cached", calls.cached}, {"seconds", calls.seconds}};
-  return j.dump(-1, ' ', false, json::error_handler_t::replace);
+  const std::string line = json_line(j);
+  j["digest"] = hash_of_bytes(line.data(), line.size()).hex();
+  return json_line(j);
+}
+
+std::string fault_of_written_row(const std::string& text) {
+  try {
+    written_row(text);
+    return "";
+  } catch (const std::exception& error) {
+    return error.what();
+  }
 }
 
 CellRow row_from_json(const std::string& text, const Experiment& experiment) {
   try {
-    const json j = parse_json(text, "a cell's row");
+    const json j = written_row(text);
     const std::size_t metrics = experiment.metrics.size();
     CellRow row;
     if (j.contains("reason")) row.failed = j.at("reason");
+    if (j.contains("lacks_figure")) row.lacks_figure = j.at("lacks_figure");
     if (j.contains("absent")) row.absent = j.at("absent");
     if (row.failed.empty() != (j.at("status") == "done")) throw Error("'status' and 'reason' do not agree");
     row.tries = count(j.at("tries"), "'tries'");
@@ -91,6 +130,7 @@ CellRow row_from_json(const std::string& text, const Experiment& experiment) {
     const bool is_as_wanted = row.initial_error.has_value() != experiment.initial_error.empty();
     if (row.failed.empty() && !is_as_wanted && (row.initial_error || row.absent.empty()))
       throw Error("'initial_error' is there where the experiment has none, or is not there");
+    row.initial_error_unit = j.at("initial_error_unit");
     row.seconds = number(j.at("seconds"), "'seconds'");
     row.evaluations = count(j.at("evaluations"), "'evaluations'");
     for (const auto& [name, calls] : j.at("nodes").items())

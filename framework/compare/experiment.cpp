@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/compare/experiment.hpp"
 
-#include <yaml-cpp/emitter.h>
-
 #include <algorithm>
 
+#include "domain/exact_number.hpp"
 #include "draw.hpp"
 #include "experiment_check.hpp"
 
@@ -14,11 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string list_text(const std::array<double, 3>& values) {
-  YAML::Emitter out;
-  out << YAML::Flow << YAML::BeginSeq;
-  for (const double value : values) out << number_text(value);
-  out << YAML::EndSeq;
-  return out.c_str();
+  return "[" + exact_number(values[0]) + ", " + exact_number(values[1]) + ", " + exact_number(values[2]) + "]";
 }
 
 template <class Named>
@@ -75,7 +70,7 @@ PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& ce
   arguments.overrides.push_back({protocol.node + ".rotation_deg", list_text(start.rotation_deg), protocol.place});
   arguments.overrides.push_back({protocol.node + ".translation_mm", list_text(start.translation_mm), protocol.place});
   if (protocol.distance_mm > 0)
-    arguments.overrides.push_back({protocol.node + ".distance_mm", number_text(start.distance_mm), protocol.place});
+    arguments.overrides.push_back({protocol.node + ".distance_mm", exact_number(start.distance_mm), protocol.place});
   return arguments;
 }
 
@@ -89,8 +84,12 @@ PipelineArguments simulation_arguments_of(const Experiment& experiment, std::siz
 Experiment read_experiment(const fs::path& file, const Catalogue& catalogue, Diagnostics& diagnostics,
                            std::size_t more_cases) {
   WrittenExperiment written = read_written_experiment(file, diagnostics, more_cases);
-  if (diagnostics.empty()) written.experiment.notes = check_pipelines(written, catalogue, diagnostics);
-  return std::move(written.experiment);
+  if (!diagnostics.empty()) return std::move(written.experiment);
+  const CheckedPipelines checked = check_pipelines(written, catalogue, diagnostics);
+  Experiment& experiment = written.experiment;
+  experiment.named_items = checked.items;
+  experiment.notes = checked.notes;
+  return std::move(experiment);
 }
 
 }  // namespace marrow::compare

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "experiment_check.hpp"
 
-#include <set>
-
+#include "experiment_figures.hpp"
+#include "marrow/runtime/types.hpp"
 #include "runtime/one_node.hpp"
 #include "runtime/pipeline_names.hpp"
 
@@ -12,11 +12,14 @@ namespace {
 class Checker {
  public:
   Checker(const WrittenExperiment& written, const Catalogue& catalogue, Diagnostics& diagnostics)
-      : written_(written), experiment_(written.experiment), catalogue_(catalogue), diagnostics_(diagnostics) {}
+      : written_(written),
+        experiment_(written.experiment),
+        catalogue_(catalogue),
+        diagnostics_(diagnostics),
+        figures_(written.experiment, diagnostics) {}
 
-  /// Returns the notes that all variants have.
-  std::vector<std::string> check() {
-    std::vector<std::string> notes;
+  CheckedPipelines check() {
+    CheckedPipelines checked;
     check_simulation();
     for (std::size_t v = 0; v < experiment_.variants.size(); ++v) {
       Diagnostics faults;
@@ -24,15 +27,14 @@ class Checker {
           read_pipeline(experiment_.pipeline, arguments_of(experiment_, {v, 0, 0}, "case"), catalogue_, faults, true);
       diagnostics_.add_all(faults);  // a fault of every variant is reported once
       if (!faults.empty()) continue;
-      if (v == 0) notes = pipeline.notes;
-      std::erase_if(notes, [&](const std::string& note) { return !contains(pipeline.notes, note); });
-      if (v == 0)
-        check_names(pipeline);
-      else
-        check_figures_of(experiment_.variants[v], pipeline);
+      if (v == 0) checked.notes = pipeline.notes;
+      std::erase_if(checked.notes, [&](const std::string& note) { return !contains(pipeline.notes, note); });
+      figures_.check(v, pipeline);
+      if (v == 0) check_pictures(pipeline);
     }
     if (experiment_.tune) check_tuning(*experiment_.tune);
-    return notes;
+    checked.items = figures_.items();
+    return checked;
   }
 
  private:
@@ -43,7 +45,7 @@ class Checker {
       const Pipeline pipeline = read_pipeline(experiment_.simulation.pipeline, simulation_arguments_of(experiment_, c),
                                               catalogue_, faults, true);
       diagnostics_.add_all(faults);
-      if (faults.empty()) find_output(pipeline, experiment_.simulation.output, written_.simulation_place);
+      if (faults.empty()) find_output(pipeline, experiment_.simulation.output, written_.simulation_place, diagnostics_);
       return;  // the other cases differ only in numbers
     }
   }
@@ -66,64 +68,32 @@ class Checker {
     }
   }
 
-  void check_names(const Pipeline& pipeline) {
-    for (std::size_t i = 0; i < experiment_.metrics.size(); ++i)
-      check_figure(pipeline, experiment_.metrics[i].path, written_.metric_places[i]);
-    if (!experiment_.initial_error.empty())
-      check_figure(pipeline, experiment_.initial_error, written_.initial_error_place);
-    for (std::size_t i = 0; i < experiment_.pictures.size(); ++i)
-      find_output(pipeline, experiment_.pictures[i], written_.picture_places[i]);
-  }
-
-  /// A variant may use a node whose output has another type. The names of the outputs are the same in all variants.
-  void check_figures_of(const Variant& variant, const Pipeline& pipeline) {
-    for (const PipelineOutput& output : pipeline.outputs)
-      if (const PortInfo& port = port_of(pipeline, output); figures_.contains(output.name) && port.type.id != "metrics")
-        diagnostics_.add(variant.place,
-                         "in variant '" + variant.name + "' output '" + output.name + "' is " + port.type.id +
-                             ", not figures of merit",
-                         "name an output of an evaluate node");
-  }
-
-  static const PortInfo& port_of(const Pipeline& pipeline, const PipelineOutput& output) {
-    return pipeline.nodes[std::size_t(output.source.node)].info.outputs[std::size_t(output.source.output)];
-  }
-
-  void check_figure(const Pipeline& pipeline, const std::string& path, const Place& place) {
-    const std::string output = path.substr(0, path.find('.'));
-    const PipelineOutput* found = find_output(pipeline, output, place);
-    if (!found) return;
-    const PortInfo& port = port_of(pipeline, *found);
-    if (port.type.id != "metrics")
-      return diagnostics_.add(place, "output '" + output + "' is " + port.type.id + ", not figures of merit",
-                              "name an output of an evaluate node");
-    figures_.insert(output);
-    if (path.find('.') == std::string::npos)
-      diagnostics_.add(place, "'" + path + "' does not say which figure",
-                       "write it as  " + path + ".mtre_mm, with the items of its lists between");
-  }
-
-  const PipelineOutput* find_output(const Pipeline& pipeline, const std::string& name, const Place& place) {
-    std::vector<std::string> names;
-    for (const PipelineOutput& output : pipeline.outputs) {
-      names.push_back(output.name);
-      if (output.name == name) return &output;
+  /// Scenes and landscapes belong to a report without being named, but may be.
+  void check_pictures(const Pipeline& pipeline) {
+    for (std::size_t i = 0; i < experiment_.pictures.size(); ++i) {
+      const PipelineOutput* output =
+          find_output(pipeline, experiment_.pictures[i], written_.picture_places[i], diagnostics_);
+      if (!output) continue;
+      const TypeInfo& type = port_of(pipeline, *output).type;
+      const WriterInfo* writer = catalogue_.find_writer(type);
+      if (!writer || writer->extension == ".png" || type == TypeInfo::of<Scene>() || type == TypeInfo::of<Landscape>())
+        continue;
+      diagnostics_.add(written_.picture_places[i], "output '" + output->name + "' is " + type.id + ", not a picture",
+                       "name an output of a render node");
     }
-    diagnostics_.add(place, "the pipeline " + pipeline.name + " has no output '" + name + "'", suggestion(name, names));
-    return nullptr;
   }
 
   const WrittenExperiment& written_;
   const Experiment& experiment_;
   const Catalogue& catalogue_;
   Diagnostics& diagnostics_;
-  std::set<std::string> figures_;  ///< outputs that metrics and the initial error are taken from
+  FigureChecker figures_;
 };
 
 }  // namespace
 
-std::vector<std::string> check_pipelines(const WrittenExperiment& written, const Catalogue& catalogue,
-                                         Diagnostics& diagnostics) {
+CheckedPipelines check_pipelines(const WrittenExperiment& written, const Catalogue& catalogue,
+                                 Diagnostics& diagnostics) {
   return Checker(written, catalogue, diagnostics).check();
 }
 

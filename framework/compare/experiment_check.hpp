@@ -4,10 +4,14 @@
 
 namespace marrow::compare {
 
+struct CheckedPipelines {
+  std::vector<std::string> notes;  ///< that all variants have: what one alone does not use may be what another needs
+  std::vector<NamedItem> items;    ///< Experiment::named_items
+};
+
 /// Reads the pipelines with the inputs of the cells and the changes of each variant. Checks that they have everything
-/// that the experiment names. Returns the notes that the pipelines of all variants have: what one variant alone does
-/// not use may be what another needs.
-std::vector<std::string> check_pipelines(const WrittenExperiment& written, const Catalogue& catalogue,
-                                         Diagnostics& diagnostics);
+/// that the experiment names.
+CheckedPipelines check_pipelines(const WrittenExperiment& written, const Catalogue& catalogue,
+                                 Diagnostics& diagnostics);
 
 }  // namespace marrow::compare

@@ -82,6 +82,9 @@ void StopReader::find_figure(const Experiment& experiment, StopRule& rule) {
   if (rule.metric || asked.name.empty()) return;
   if (!figure_ || asked.name != kSuccess)
     return yaml_.fault(asked.place, "'" + asked.name + "' is not among the metrics", suggestion(asked.name, names));
+  if (!experiment.defines_success())
+    return yaml_.fault(asked.place, "there is no success rate to wait for: no figure has a limit under 'success'",
+                       "add  success: {" + (names.size() > 1 ? names[0] : "FIGURE") + ": 2}");
   if (rule.width > 1)
     yaml_.fault(width_ ? width_->place : asked.place,
                 "the interval of a success rate is never wider than 1, got " + number_text(rule.width));

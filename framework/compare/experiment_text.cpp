@@ -5,7 +5,9 @@
 #include <map>
 #include <set>
 
+#include "domain/characters.hpp"
 #include "draw.hpp"
+#include "experiment_replaced.hpp"
 #include "experiment_stop.hpp"
 #include "experiment_sweep.hpp"
 #include "experiment_tune.hpp"
@@ -69,6 +71,7 @@ class Reader {
     if (experiment_.cases.empty() && diagnostics_.empty())
       yaml_.fault(experiment_.cases_place, "there are no cases",
                   "name folders, as  folders: [data/*]  or a simulation");
+    refuse_replaced_values();
     apply_matrix();
     sweep_.apply(experiment_);
     tune_.add_variant(experiment_);
@@ -145,7 +148,7 @@ class Reader {
           success_.emplace_back(limit.key, *value, limit.place);
     if (entry.key == "initial_error") {
       experiment_.initial_error = text();
-      written_.initial_error_place = entry.place;
+      experiment_.initial_error_place = entry.place;
     }
     if (entry.key == "baseline") baseline_ = {text(), entry.place};
     if (entry.key == "pictures")
@@ -184,9 +187,38 @@ class Reader {
         continue;
       }
       std::vector<Override> column;
-      for (const YAML::Node& value : entry.value) column.push_back({entry.key, patch_value(value), yaml_.place(value)});
+      for (const YAML::Node& value : entry.value) {
+        const Place place = yaml_.place(value);
+        column.push_back({entry.key, changed_value(yaml_, entry.key, value, place), place});
+      }
       matrix_.push_back(std::move(column));
     }
+  }
+
+  /// The sections are applied in this order: 'set', the variants, 'matrix', 'sweep', 'starts'. A variant is there to
+  /// change what 'set' says. Anything else that is replaced has no effect in any cell.
+  void refuse_replaced_values() {
+    std::vector<SetBySection> later;
+    std::vector<Override> columns;
+    for (const std::vector<Override>& column : matrix_) columns.push_back(column.front());
+    later.push_back(options_set_by("'matrix'", columns));
+    later.push_back({"'sweep'", sweep_.names()});
+    if (experiment_.protocol) later.push_back(options_set_by(*experiment_.protocol));
+    for (const Variant& variant : experiment_.variants)
+      for (const SetBySection& section : later)
+        refuse_replaced(yaml_, "the option", options_set_by("variant '" + variant.name + "'", variant.overrides),
+                        section);
+    for (std::size_t i = 0; i < later.size(); ++i)
+      for (std::size_t k = i + 1; k < later.size(); ++k) refuse_replaced(yaml_, "the option", later[i], later[k]);
+    if (experiment_.protocol) {
+      refuse_replaced(yaml_, "the option", options_set_by("'set'", experiment_.common), later.back());
+      refuse_replaced(yaml_, "the option", {"'tune'", tune_.names()}, later.back());
+    }
+    const bool has_folders = std::any_of(experiment_.cases.begin(), experiment_.cases.end(),
+                                         [](const auto& one) { return one.is_simulated || !one.folder.empty(); });
+    refuse_replaced_inputs(yaml_, experiment_.inputs, experiment_.seeded,
+                           {has_folders ? experiment_.case_input : "", experiment_.cases_place});
+    refuse_replaced_inputs(yaml_, experiment_.simulation.inputs, experiment_.simulation.seeded, {});
   }
 
   /// Combines every variant with every combination of the matrix.
@@ -304,7 +336,6 @@ class Reader {
       if (std::any_of(experiment_.metrics.begin(), experiment_.metrics.end(), is_same))
         yaml_.fault(place, "'" + metric.path + "' is given twice in 'metrics'");
       experiment_.metrics.push_back(metric);
-      written_.metric_places.push_back(place);
     }
   }
 
@@ -312,6 +343,7 @@ class Reader {
   MetricChoice read_metric(const YAML::Node& item, const Place& place) {
     static const std::vector<std::string> kKeys{"figure", "label", "better"};
     MetricChoice metric;
+    metric.place = place;
     if (item.IsMap()) {
       bool has_figure = false;
       for (const YamlEntry& part : yaml_.map(item, place, "a metric", &kKeys)) {
@@ -328,6 +360,8 @@ class Reader {
     } else {
       metric.path = yaml_.text(item, place, "an item of 'metrics'").value_or("");
     }
+    if (const std::string odd = odd_character_in(metric.label); !odd.empty())
+      yaml_.fault(place, "the label " + in_quotes(metric.label) + " holds " + odd, "write it without");
     if (metric.label.empty()) metric.label = metric.path;
     return metric;
   }
@@ -345,6 +379,9 @@ class Reader {
       paths.push_back(metric.path);
       if (metric.path != path) continue;
       metric.limit = value;
+      if (metric.better == MetricChoice::Better::nearest_zero && value <= 0)
+        yaml_.fault(place, "the limit of '" + path + "' is " + number_text(value) +
+                               ", but its magnitude counts, which is never below 0");
       return;
     }
     yaml_.fault(place, "'" + path + "' is not among the metrics", suggestion(path, paths));

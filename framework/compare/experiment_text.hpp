@@ -11,8 +11,8 @@ namespace marrow::compare {
 /// checked against the pipelines.
 struct WrittenExperiment {
   Experiment experiment;
-  Place simulation_place, initial_error_place;
-  std::vector<Place> metric_places, picture_places;
+  Place simulation_place;
+  std::vector<Place> picture_places;
 };
 
 WrittenExperiment read_written_experiment(const std::filesystem::path& file, Diagnostics& diagnostics,

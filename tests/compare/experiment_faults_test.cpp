@@ -251,8 +251,7 @@ TEST_F(ExperimentFaults, Metrics) {
   expect_fault(metrics("[nubmer.value]"), 7, "the pipeline p has no output 'nubmer'", "did you mean 'number'?");
   expect_fault(metrics("[truth.value]"), 7, "output 'truth' is truth, not figures of merit",
                "name an output of an evaluate node");
-  expect_fault(metrics("[number]"), 7, "'number' does not say which figure",
-               "write it as  number.mtre_mm, with the items of its lists between");
+  expect_fault(metrics("[number]"), 7, "'number' does not say which figure", "write it as  number.FIGURE");
 }
 
 TEST_F(ExperimentFaults, SuccessBaselineAndPictures) {
@@ -265,8 +264,7 @@ TEST_F(ExperimentFaults, SuccessBaselineAndPictures) {
   expect_fault_of("initial_error: nubmer.value", "the pipeline p has no output 'nubmer'", "did you mean 'number'?");
   expect_fault_of("initial_error: truth.value", "output 'truth' is truth, not figures of merit",
                   "name an output of an evaluate node");
-  expect_fault_of("initial_error: number", "'number' does not say which figure",
-                  "write it as  number.mtre_mm, with the items of its lists between");
+  expect_fault_of("initial_error: number", "'number' does not say which figure", "write it as  number.FIGURE");
   expect_fault_of("initial_error: []", "initial_error: expected a text, got a list of 0");
   expect_fault_of("pictures: number", "'pictures' must be a list", "write it as  pictures: [a, b]");
   expect_fault_of("pictures: [nubmer]", "the pipeline p has no output 'nubmer'", "did you mean 'number'?");

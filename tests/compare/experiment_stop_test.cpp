@@ -68,7 +68,7 @@ TEST_F(ExperimentStop, IsReadWithItsDefaults) {
   EXPECT_EQ(width.goal, StopRule::Goal::width);
   EXPECT_EQ(width.metric, 0u);
   EXPECT_EQ(width.width, 0.25);
-  EXPECT_EQ(rule("figure: success, width: 1" + kRest).metric, std::nullopt);
+  EXPECT_EQ(rule("figure: success, width: 1" + kRest + "}\nsuccess: {number.value: 1").metric, std::nullopt);
   EXPECT_EQ(rule("difference: number.value, variant: two, alpha: 0.01" + kRest).alpha, 0.01);
 }
 
@@ -86,7 +86,7 @@ TEST_F(ExperimentStop, FaultsOfKeys) {
           "write it as  stop: {figure: errors.distal.final.mtre_mm, width: 0.05, most_cases: 300, "
           "look_every: 20}  or  {difference: errors.distal.final.mtre_mm, most_cases: 300, look_every: 20}";
   expect_fault(kGood + "stop: early\n", "'stop' must be a map, got 'early'", "write it as  key: value  lines");
-  expect_stop_fault("figur: number.value, figure: success, width: 1" + kRest, "unknown key 'figur' in 'stop'",
+  expect_stop_fault("figur: number.value, figure: number.value, width: 1" + kRest, "unknown key 'figur' in 'stop'",
                     "did you mean 'figure'?");
   expect_stop_fault("most_cases: 40, look_every: 10", either, example);
   expect_stop_fault("figure: number.value, difference: number.value, width: 1" + kRest, either, example);
@@ -106,7 +106,11 @@ TEST_F(ExperimentStop, FaultsOfKeys) {
 TEST_F(ExperimentStop, FaultsOfValues) {
   expect_stop_fault("figure: number.value, width: 0" + kRest, "'width' must be above 0, got 0");
   expect_stop_fault("figure: number.value, width: narrow" + kRest, "width: expected a number, got 'narrow'");
-  expect_stop_fault("figure: success, width: 2" + kRest, "the interval of a success rate is never wider than 1, got 2");
+  expect_stop_fault("figure: success, width: 1" + kRest,
+                    "there is no success rate to wait for: no figure has a limit under 'success'",
+                    "add  success: {number.value: 2}");
+  expect_stop_fault("figure: success, width: 2" + kRest + "}\nsuccess: {number.value: 1",
+                    "the interval of a success rate is never wider than 1, got 2");
   expect_stop_fault("difference: number.value, alpha: 5" + kRest, "'alpha' must be 0.001 to 0.5, got 5");
   expect_stop_fault("difference: number.value, most_cases: 40, look_every: 0",
                     "'look_every' must be 1 to 100000, got 0");

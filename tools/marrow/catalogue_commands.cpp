@@ -13,6 +13,7 @@
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/diagnostics.hpp"
 #include "marrow/runtime/library.hpp"
+#include "runtime/pipeline_names.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -22,9 +23,11 @@ using nlohmann::json;
 void print_ports(const char* title, const std::vector<PortInfo>& ports, bool inputs) {
   if (ports.empty()) return;
   std::printf("\n%s\n", title);
-  for (const PortInfo& port : ports)
+  for (const PortInfo& port : ports) {
     std::printf("  %-14s %-28s %s%s\n", printable(port.name).c_str(), printable(port_text(port)).c_str(),
                 inputs && port.optional ? "(optional) " : "", printable(port.help).c_str());
+    if (!port.figures.empty()) std::printf("  %-14s figures: %s\n", "", printable(joined(port.figures, ", ")).c_str());
+  }
 }
 
 void print_snippet(const NodeInfo& node) {

@@ -7,7 +7,9 @@
 #include "commands.hpp"
 #include "compare/comparison.hpp"
 #include "compare/comparison_folder.hpp"
+#include "compare/item_check.hpp"
 #include "given_path.hpp"
+#include "marrow/compare/experiment_notes.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "process.hpp"
@@ -79,12 +81,28 @@ std::string fault_of_id(const Experiment& experiment, const std::string& id) {
   return "there is " + fault;
 }
 
-/// The plan that follows counts each variant of the file on each case.
+void say(const std::vector<std::string>& notes) {
+  for (const std::string& note : notes) std::fprintf(stderr, "marrow: note: %s\n", printable(note).c_str());
+}
+
+/// Returns 0 if the comparison can run, else the exit code. Looks at the cases of the file.
+int check_before_it_runs(CompareRequest request, const ClusterRequest& cluster, const Catalogue& catalogue,
+                         const Experiment& experiment) {
+  if (request.gather || cluster.status || cluster.cancel) return 0;
+  request.more_cases = 0;
+  const Store store;
+  const bool is_kept = !request.no_cache && store.fault().empty();
+  return check_items(request, catalogue, experiment, folder_of(request, experiment), is_kept ? &store : nullptr,
+                     is_kept && !cluster.is_given());
+}
+
 void say_what_is_tuned(const Experiment& experiment) {
   const compare::TuneRule& rule = *experiment.tune;
-  std::printf("tuning: at most %zu points of %zu options on %zu training cases, which are at most %zu further cells\n",
-              rule.points, rule.options.size(), rule.training_cases,
-              rule.points * rule.training_cases * experiment.starts.size());
+  std::printf(
+      "tuning: at most %zu points of %zu options on %zu training cases, which are at most %zu further cells; the "
+      "following counts each variant of the file on each case, and no tuned one\n",
+      rule.points, rule.options.size(), rule.training_cases,
+      rule.points * rule.training_cases * experiment.starts.size());
 }
 
 int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster) {
@@ -93,35 +111,37 @@ int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster)
   const Catalogue catalogue;
   Experiment experiment;
   if (!load_experiment(request, catalogue, experiment, 0)) return 2;
-  if (!request.quiet)
-    for (const std::string& note : experiment.notes)
-      std::fprintf(stderr, "marrow: note: %s\n", printable(note).c_str());
-  if (request.more_cases && cluster.is_given())
+  if (!request.quiet) say(experiment.notes);
+  const bool by_tasks = cluster.is_given() || request.gather;
+  if (request.more_cases && by_tasks)
     throw Error(
         "--more-cases looks at each batch of cases before the next one, so it runs here; leave the options for a "
         "cluster out");
   if (experiment.tune && request.more_cases)
     throw Error("--more-cases goes with a rule under 'stop', not with 'tune'; name more cases in the file");
-  if (experiment.tune && cluster.is_given())
+  if (experiment.tune && by_tasks)
     throw Error(
         "'tune' looks at each point before it chooses the next one, so it runs here; leave the options for a cluster "
         "out");
+  const fs::path folder = folder_of(request, experiment);
+  if (!request.dry_run) expect_outside_cases(experiment, folder, request.no_cache);
+  if (const int code = check_before_it_runs(request, cluster, catalogue, experiment)) return code;
   if (request.dry_run) {
     if (request.more_cases) experiment = largest_experiment(request, catalogue, experiment);
     const Store store;
     can_keep_results(store.fault(), request.no_cache);
     say_if_not_shared(store, request.no_cache);
+    say(compare::notes_of(experiment));
     if (experiment.tune) say_what_is_tuned(experiment);
-    print_plan(experiment, catalogue, request.no_cache ? nullptr : &store, folder_of(request, experiment));
+    print_plan(experiment, catalogue, request.no_cache ? nullptr : &store, folder);
     return 0;
   }
-  const fs::path folder = folder_of(request, experiment);
-  expect_outside_cases(experiment, folder, request.no_cache);
-  if (cluster.is_given()) return compare_on_cluster(request, cluster, catalogue, experiment, folder);
+  if (by_tasks) return compare_on_cluster(request, cluster, catalogue, experiment, folder);
   const ComparisonFolder kept(folder, experiment, ComparisonFolder::Use::alone);
   const Store store;
   request.no_cache = request.no_cache || !can_keep_results(store.prepare(), request.quiet);
   say_if_not_shared(store, request.no_cache || request.quiet);
+  if (!request.quiet) say(compare::notes_of(experiment));
   if (experiment.tune) return run_tuning(request, catalogue, experiment, folder);
   return request.more_cases ? run_more_cases(request, catalogue, experiment, folder)
                             : run_comparison(request, catalogue, experiment, folder);

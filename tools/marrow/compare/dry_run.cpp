@@ -5,6 +5,7 @@
 #include <set>
 
 #include "compare/comparison.hpp"
+#include "marrow/compare/experiment_notes.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -142,14 +143,19 @@ void Plan::print() const {
   const bool is_sample = cases.taken < cases.all || starts.taken < starts.all;
   std::printf("%zu cells: %zu variants, %zu cases, %zu starts\n", experiment_.cell_count(), experiment_.variants.size(),
               cases.all, starts.all);
+  if (const auto counts = compare::comparison_counts(experiment_); counts.comparisons)
+    std::printf("%zu comparisons with the baseline: at least %zu cases can show a difference\n", counts.comparisons,
+                counts.fewest_cases);
   if (is_sample)
     std::printf("looked at: %zu cases and %zu starts, evenly spread; by them there are about\n", cases.taken,
                 starts.taken);
   if (cases_to_make_ > 0) std::printf("%.0f cases to simulate\n", cases_to_make_);
   std::printf("%.0f evaluations of nodes: %.0f shared, %.0f cached, %.0f to make\n", counts_.all, counts_.shared,
               counts_.cached, to_make);
-  if (to_make > 0) std::printf("estimate from earlier runs: %.1f s of work", seconds);
-  if (unknown > 0) std::printf(", without %.0f evaluations of nodes that never ran", unknown);
+  if (to_make > 0)
+    std::printf("estimate from earlier runs: %.1f s of work, without cases to simulate, timed runs and pictures",
+                seconds);
+  if (unknown > 0) std::printf(", and without %.0f evaluations of nodes that never ran", unknown);
   if (to_make > 0) std::printf("\n");
 }
 

@@ -6,10 +6,12 @@
 #include <numeric>
 #include <thread>
 
-#include "cluster/chunk_rows.hpp"
 #include "cluster/plan.hpp"
 #include "compare/cell_jobs.hpp"
+#include "compare/first_cells.hpp"
+#include "compare/known_rows.hpp"
 #include "compare/progress.hpp"
+#include "compare/times.hpp"
 #include "compare/unchanged.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
@@ -26,12 +28,14 @@ using compare::CellRow;
 using compare::CellRunner;
 using compare::Experiment;
 
+constexpr std::size_t kMostNamed = 20;  // cells with a reason
+
 class Comparison {
  public:
   Comparison(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment,
-             const fs::path& folder, const LostCells& lost)
+             const fs::path& folder, const LostCells& reasons)
       : request_(request),
-        lost_(lost),
+        reasons_(reasons),
         experiment_(experiment),
         folder_(folder),
         runner_(experiment, catalogue, request.no_cache ? nullptr : &store_, folder_, request.threads),
@@ -41,6 +45,7 @@ class Comparison {
   }
 
   std::size_t found() const { return found_; }
+  const CallCounts& calls() const { return calls_; }
   const compare::Dependencies& dependencies() const { return runner_.dependencies(); }
 
   /// The rows of all cells; nothing if it was interrupted.
@@ -55,9 +60,11 @@ class Comparison {
     std::optional<std::vector<CellRow>> made = make_rows();
     if (!made) return stopped();
     std::vector<CellRow>& rows = *made;
-    if (!measure_times(rows)) return stopped();
+    TimedCells timed(experiment_, rows);
+    if (!measure_times(timed, rows)) return stopped();
     Answer answer = answer_of(experiment_, rows);
     answer.tuning = request_.tuning;
+    answer.times = timed.sentence(!request_.no_cache);
     write_tables(experiment_, rows, answer, folder_);
     const std::vector<CellIndex> shown = cells_to_show(experiment_, rows, request_.shown);
     if (!draw(shown)) return stopped();
@@ -66,12 +73,16 @@ class Comparison {
     write_report(experiment_, rows, answer, runner_, shown, request_, folder_);
     print_counts(rows);
     std::printf("\n%s", table_text(experiment_, answer).c_str());
+    if (experiment_.timed_cells) std::printf("\n%s\n", printable(answer.times).c_str());
     print_failures(rows);
     std::printf("\ntables in %s: cells.csv, cells.jsonl, comparison.json\nreport: %s\n",
                 printable(folder_.string()).c_str(),
                 printable(fs::absolute(folder_ / "report.html").lexically_normal().string()).c_str());
-    return 0;
+    return lost_.empty() ? 0 : 1;
   }
+
+  /// As Gathered::lost.
+  const std::string& lost_text() const { return lost_text_; }
 
  private:
   std::string tidy() const { return request_.no_cache ? "" : store_.tidy(&stop_on_signals()); }
@@ -90,17 +101,22 @@ class Comparison {
   }
 
   bool make_cells() {
-    const RowsOfChunks chunks(folder_, experiment_, request_.gather ? latest_plan(folder_).id : "");
+    KnownRows known(experiment_, runner_, folder_, request_.gather ? latest_plan(folder_).id : "");
     std::vector<Job> jobs;
+    FirstCells first(experiment_);
     for (std::size_t i = 0; i < cells_.count(); ++i) {
-      rows_[i] = row_there_is(i, chunks);
+      rows_[i] = row_there_is(i, known);
+      if (rows_[i]) first.add(cells_.cell(i), *rows_[i]);
       if (!rows_[i]) jobs.push_back(cells_.job_of("cell", i, experiment_.cases[cells_.cell(i).case_index].name));
     }
+    known.say_doubts();
     Progress progress(jobs.size(), request_.quiet);
     std::size_t done = 0;
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
       CellRow row = cells_.row_of(job, end);
+      calls_.add(row);
       runner_.write(cells_.cell(job.number), row);
+      first.add(cells_.cell(job.number), row);
       tidy();  // thousands of cells would fill the disk before the end; a fault is said there
       progress.done(++done, row.id + (row.failed.empty() ? "" : " failed: " + row.failed) +
                                 (row.absent.empty() ? "" : ": " + row.absent));
@@ -109,43 +125,40 @@ class Comparison {
   }
 
   /// A row that was made before, here or by a task of a cluster, or one that says why there will be none.
-  std::optional<CellRow> row_there_is(std::size_t number, const RowsOfChunks& chunks) {
+  std::optional<CellRow> row_there_is(std::size_t number, KnownRows& known) {
     const CellIndex& cell = cells_.cell(number);
     if (const auto fault = case_faults_.find(cell.case_index); fault != case_faults_.end())
       return compare::failed_row(experiment_, cell, fault->second, 1);
     const std::string& key = cells_.take_key(number);
-    std::optional<CellRow> row = runner_.finished(cell, key);
-    if (!row) row = chunks.done(cell, key);
+    std::optional<CellRow> row = known.done(cell, key);
     if (const auto failed = request_.failed_before.find(compare::cell_id(experiment_, cell));
         !row && failed != request_.failed_before.end())
       row = failed->second;
     found_ += row.has_value();
     if (row || !request_.gather) return row;
-    if ((row = chunks.failed(cell))) return row;
-    const auto lost = lost_.find(number);
-    return compare::failed_row(experiment_, cell, lost == lost_.end() ? "no task left its row" : lost->second, 1);
+    if ((row = known.failed(cell))) return row;
+    const auto reason = reasons_.find(number);
+    lost_.insert(number);
+    return compare::failed_row(experiment_, cell, reason == reasons_.end() ? "no task left its row" : reason->second,
+                               1);
   }
 
-  /// Measures times on the same cases and starts for all variants. They are spread evenly over all cases and starts.
   /// One run at a time uses all threads.
-  bool measure_times(std::vector<CellRow>& rows) {
-    const std::size_t variants = experiment_.variants.size(), places = rows.size() / variants,
-                      count = std::min(places, experiment_.timed_cells);
+  bool measure_times(TimedCells& timed, std::vector<CellRow>& rows) {
     std::vector<Job> jobs;
-    for (std::size_t i = 0; i < count; ++i)
-      for (std::size_t v = 0; v < variants; ++v) {
-        const std::size_t row = i * places / count * variants + v;
-        if (rows[row].failed.empty()) jobs.push_back(cells_.job_of("time", row, "times"));
-      }
+    for (const std::size_t number : timed.numbers()) jobs.push_back(cells_.job_of("time", number, "times"));
     PoolSettings alone = pool_of(request_, folder_, int(std::thread::hardware_concurrency()));
     alone.workers = 1;
+    alone.time_limit_s *= 2;  // the cell runs twice
     Progress progress(jobs.size(), request_.quiet);
     std::size_t done = 0;
-    return run_jobs(jobs, alone, [&](const Job& job, const JobEnd& end) {
+    const bool is_whole = run_jobs(jobs, alone, [&](const Job& job, const JobEnd& end) {
       CellRow& row = rows[job.number];
       if (end.answer.is_number()) row.seconds = end.answer.get<double>();
-      progress.done(++done, "time of " + row.id);
+      progress.done(++done, "time of " + row.id + (end.failed.empty() ? "" : " failed: " + end.failed));
     });
+    timed.keep_complete(rows);
+    return is_whole;
   }
 
   bool draw(const std::vector<CellIndex>& cells) {
@@ -175,34 +188,41 @@ class Comparison {
   }
 
   void print_counts(const std::vector<CellRow>& rows) const {
-    long made = 0, cached = 0;
-    for (const CellRow& row : rows)
-      for (const auto& [name, calls] : row.nodes) {
-        made += calls.made;
-        cached += calls.cached;
-      }
     std::printf("\n%zu cells: %zu variants, %zu cases, %zu starts; %zu were there already\n", rows.size(),
                 experiment_.variants.size(), experiment_.cases.size(), experiment_.starts.size(),
                 found_ - std::min(found_, request_.made_before));
-    std::printf("calls of nodes: %ld made, %ld shared or read back\n", made, cached);
+    CallCounts calls = request_.calls_before;
+    calls.add(calls_);
+    std::printf("calls of nodes: %ld made, %ld shared or read back\n", calls.made, calls.cached);
   }
 
-  static void print_failures(const std::vector<CellRow>& rows) {
-    print_reasons(rows, "failed cells", &CellRow::failed);
-    print_reasons(rows, "cells in which a node failed that may fail", &CellRow::absent);
+  void print_failures(const std::vector<CellRow>& rows) {
+    std::vector<const CellRow*> tried, lost;
+    for (std::size_t i = 0; i < rows.size(); ++i) (lost_.contains(i) ? lost : tried).push_back(&rows[i]);
+    if (const std::string text = reasons_text(tried, &CellRow::failed); !text.empty())
+      std::printf("\nfailed cells\n%s", text.c_str());
+    if (const std::string text = reasons_text(tried, &CellRow::absent); !text.empty())
+      std::printf("\ncells in which a node failed that may fail\n%s", text.c_str());
+    if (lost.empty()) return;
+    lost_text_ = std::to_string(lost.size()) + " of " + std::to_string(rows.size()) +
+                 " cells are lost: no task left a row of them, and they count as failed. The command that made the "
+                 "plan goes on with them.\n" +
+                 reasons_text(lost, &CellRow::failed);
   }
 
-  static void print_reasons(const std::vector<CellRow>& rows, const char* title, std::string CellRow::*reason) {
+  /// The first of the rows that have a reason, one on each line.
+  static std::string reasons_text(const std::vector<const CellRow*>& rows, std::string CellRow::*reason) {
     std::size_t count = 0;
-    for (const CellRow& row : rows)
-      if (!(row.*reason).empty() && ++count <= 20)
-        std::printf("%s%s%s  %s: %s\n", count == 1 ? "\n" : "", count == 1 ? title : "", count == 1 ? "\n" : "",
-                    printable(row.id).c_str(), printable(row.*reason).c_str());
-    if (count > 20) std::printf("  and %zu more, in cells.csv\n", count - 20);
+    std::string text;
+    for (const CellRow* row : rows)
+      if (!(row->*reason).empty() && ++count <= kMostNamed)
+        text += "  " + printable(row->id) + ": " + printable(row->*reason) + "\n";
+    if (count > kMostNamed) text += "  and " + std::to_string(count - kMostNamed) + " more, in cells.csv\n";
+    return text;
   }
 
   const CompareRequest& request_;
-  const LostCells& lost_;
+  const LostCells& reasons_;
   const Experiment& experiment_;
   fs::path folder_;
   Store store_;
@@ -210,23 +230,43 @@ class Comparison {
   CellJobs cells_;
   std::vector<std::optional<CellRow>> rows_;
   std::map<std::size_t, std::string> case_faults_;
+  std::set<std::size_t> lost_;  ///< cells without a row
+  std::string lost_text_;
   std::size_t found_ = 0;
+  CallCounts calls_;
 };
 
 }  // namespace
+
+void CallCounts::add(const CellRow& row) {
+  for (const auto& [name, calls] : row.nodes) {
+    made += calls.made;
+    cached += calls.cached;
+  }
+}
+
+void CallCounts::add(const CallCounts& others) {
+  made += others.made;
+  cached += others.cached;
+}
 
 int stopped() {
   std::fprintf(stderr, "marrow: %s; the same command goes on from here\n", stopped_text().c_str());
   return 130;
 }
 
-int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment,
-                   const fs::path& folder, const LostCells& lost) {
+Gathered gather_comparison(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment,
+                           const fs::path& folder, const LostCells& reasons) {
   const Unchanged unchanged(experiment);
-  Comparison comparison(request, catalogue, experiment, folder, lost);
+  Comparison comparison(request, catalogue, experiment, folder, reasons);
   const int code = comparison.run();
   unchanged.check(comparison.dependencies());
-  return code;
+  return {code, comparison.lost_text()};
+}
+
+int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment,
+                   const fs::path& folder) {
+  return gather_comparison(request, catalogue, experiment, folder, {}).code;
 }
 
 std::optional<CellRows> run_cells(const CompareRequest& request, const Catalogue& catalogue,
@@ -236,7 +276,7 @@ std::optional<CellRows> run_cells(const CompareRequest& request, const Catalogue
   std::optional<std::vector<CellRow>> rows = comparison.make_rows();
   if (!rows) return std::nullopt;
   const std::size_t made = rows->size() - comparison.found();
-  return CellRows{std::move(*rows), made};
+  return CellRows{std::move(*rows), made, comparison.calls(), comparison.dependencies()};
 }
 
 }  // namespace marrow::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A worker process of a comparison. It makes cases, and it runs, times and draws cells.
+// A worker process of a comparison. It makes cases, says what is in them, and runs, times and draws cells.
 #include <algorithm>
 
 #include "command_options.hpp"
@@ -66,6 +66,18 @@ json with_processes(const std::function<json()>& task) {
   }
 }
 
+/// The names of the items along an axis, before there are cells with keys.
+json items_of(CellRunner& runner, const json& asked) {
+  const std::string id = asked.at("cell");
+  const auto cell = compare::cell_of(runner.experiment(), id);
+  if (!cell) refuse_job("what cell " + id + " depends on");
+  compare::NamedItem item;
+  item.node = asked.at("node");
+  item.output = asked.at("output");
+  item.axis = asked.at("axis");
+  return runner.items_of(*cell, item);
+}
+
 json run_cell(CellRunner& runner, const Store& store, const json& asked, WorkerReports& reports) {
   const long before = calls_without_process();
   const compare::CellRow row = runner.run(cell_in(runner, asked), observer_of(reports));
@@ -91,6 +103,8 @@ int worker(const CompareRequest& request) {
            return json(true);
          });
        }},
+      {"items",
+       [&](const json& asked, WorkerReports&) { return with_processes([&] { return items_of(runner, asked); }); }},
       {"cell",
        [&](const json& asked, WorkerReports& reports) {
          return with_processes([&] { return run_cell(runner, store, asked, reports); });

@@ -23,15 +23,20 @@ struct CellRow {
   std::string id, variant, case_name, start;
   std::string failed;  ///< why it failed; empty for a cell that is done
   std::string absent;  ///< why figures are missing in a cell that is done: a node failed that may fail
+  /// It failed because the experiment names a figure, or an item of a list that a search makes, that is not there.
+  bool lacks_figure = false;
   int tries = 1;
   std::vector<std::optional<double>> values;  ///< values of the experiment's metrics, in their order
+  std::vector<std::string> units;             ///< units of the metrics
   std::optional<double> initial_error;
-  std::vector<std::string> units;  ///< units of the metrics
+  std::string initial_error_unit;
   std::optional<double> seconds;   ///< measured with nothing else running, without what all variants share
   int evaluations = 0;             ///< number of cost evaluations, for all poses of the cell
   /// The worst of the judgements that its pipeline's outputs have; nothing if there is no verdict among them.
   std::optional<Judgement> verdict;
   std::optional<double> failure_probability;  ///< the largest of the verdicts' that is known
+  using Figures = std::map<std::string, std::optional<double>>;  ///< nothing for a figure that is no finite number
+  std::map<std::string, Figures> verdict_figures;  ///< what each verdict rests on, by its place: "verdict.distal"
   struct Calls {
     int made = 0, cached = 0;
     double seconds = 0;
@@ -43,9 +48,13 @@ struct CellRow {
   bool is_success(const Experiment& experiment) const;
 };
 
+/// The row as one line of JSON. Its key "digest" is a digest of all the others, so that a row that was cut or changed
+/// since is not taken for a result.
 std::string to_json(const CellRow& row);
-/// Parses a row of the experiment. Throws Error if the text is not a row. The names of the cell in the text are not
-/// trusted: call name_row() with the cell that was asked for.
+/// Why a text is not a row as to_json() wrote it; empty if it is. It may be a row of any experiment.
+std::string fault_of_written_row(const std::string& text);
+/// Parses a row of the experiment. Throws Error if the text is not a row as to_json() wrote it. The names of the cell in
+/// the text are not trusted: call name_row() with the cell that was asked for.
 CellRow row_from_json(const std::string& text, const Experiment& experiment);
 /// Writes the names of the cell into its row.
 void name_row(CellRow& row, const Experiment& experiment, const CellIndex& cell);
@@ -93,6 +102,8 @@ class CellRunner {
   std::string key_of(const CellIndex& cell);
   /// The existing row of the cell, if it is whole, did not fail and has this key.
   std::optional<CellRow> finished(const CellIndex& cell, const std::string& key) const;
+  /// Why the cell's file is not a row as it was written; empty if it is one, or if there is none.
+  std::string fault_of_row(const CellIndex& cell) const;
   /// Runs the cell. Does not throw if a node fails: the row then has the reason.
   CellRow run(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer = {});
   /// Runs the cell again for its pictures, landscape and scene; its other nodes are read back from the store. Returns
@@ -100,10 +111,13 @@ class CellRunner {
   /// if the folder cannot be written.
   bool draw(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer = {});
   /// Seconds that a run of the cell takes if the results that all variants share are read back and all others are made
-  /// anew. It is measured once: later calls with the same number of threads find it in the store. Throws Error if the
-  /// run fails.
+  /// anew; without a store, everything is made anew. The cell runs once before, which does not count. It is measured
+  /// once: later calls with the same variants and number of threads find it in the store. Throws Error if the run fails.
   double time(const CellIndex& cell);
   std::filesystem::path pictures_of(const CellIndex& cell) const;
+  /// The names of the items along an axis, in the case of a cell. Runs only the node from which they have their names,
+  /// and what this node needs. Empty if the case has no such list. Throws Error if a node fails.
+  std::vector<std::string> items_of(const CellIndex& cell, const NamedItem& asked);
   /// Writes the row to where finished() finds it. If it cannot be written, the row becomes a failed one, so that only
   /// this cell is lost.
   void write(const CellIndex& cell, CellRow& row) const;
@@ -137,6 +151,14 @@ class CellRunner {
                 const std::function<void(const RunEvent&)>& observer);
   void fill(CellRow& row, const Pipeline& pipeline, const Done& done) const;
   Pipeline simulation_of(std::size_t case_index) const;
+  /// What the variants are on one case from one start.
+  struct OfAllVariants {
+    std::optional<std::pair<std::size_t, std::size_t>> place;  ///< case and start
+    std::map<Digest, std::size_t> variants_with;               ///< how many have a node, by its history
+    Digest keys;                                               ///< of the keys of all their cells
+  };
+  /// Kept until another case or start is asked for.
+  const OfAllVariants& of_all_variants(const CellIndex& cell);
   /// For each node of the cell, how many variants have it with the same result.
   std::vector<std::size_t> variants_with_nodes(const CellIndex& cell, const Pipeline& pipeline);
   /// The nodes of the cell that are not common to all variants. If there is only one variant, all nodes.
@@ -165,6 +187,7 @@ class CellRunner {
   };
   std::map<std::size_t, FoundCase> simulated_;
   std::map<std::size_t, std::set<std::string>> wanted_;  ///< by variant
+  OfAllVariants of_all_variants_;
 };
 
 }  // namespace marrow::compare

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// Nodes whose figures and items have names that are declared, that the case decides, or that a search decides.
+#include <cstdlib>
+#include <fstream>
+
+#include <marrow/plugin.hpp>
+
+namespace figures {
+/// Stands for what a search needs.
+struct Way {};
+}  // namespace figures
+MARROW_FUNCTION_TYPE(figures::Way, "way", 1)
+
+namespace {
+using marrow::List;
+using marrow::Metrics;
+
+struct Options {
+  std::filesystem::path path;
+  std::string also;
+};
+
+/// A number for each fragment that the case's file names, a word a line.
+List<Metrics> fragments(const Options& options) {
+  std::ifstream file(options.path / "fragments.txt");
+  List<Metrics> list;
+  for (std::string name; file >> name;) {
+    if (name == "crash") std::abort();
+    if (name == "fail") throw marrow::Error("the file says so");
+    list.add(name, Metrics{{{"value", double(name.size()), ""}}});
+  }
+  return list;
+}
+
+Metrics figures_of(const Metrics& of, const std::string& also) {
+  Metrics made{{{"mtre_mm", of.items.at(0).value, "mm"}, {"frontal.median_px", 2, "px"}}};
+  if (!also.empty()) made.items.push_back({also, 3, ""});
+  return made;
+}
+Metrics measured(const Metrics& of, const Options& options) { return figures_of(of, options.also); }
+
+std::shared_ptr<const figures::Way> way() { return std::make_shared<const figures::Way>(); }
+List<Metrics> stages(const Metrics& of, const figures::Way&) {
+  List<Metrics> list;
+  for (const char* name : {"start", "final"}) list.add(name, of);
+  return list;
+}
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("test.fragments", fragments)
+      .summary("A number for each fragment of a case")
+      .out("numbers", "the length of its name", marrow::over("fragment"))
+      .figures({"value"})
+      .option("path", &Options::path, "folder of the case");
+  plugin.node("test.declared", measured)
+      .summary("Figures that are declared")
+      .in("of", "number")
+      .out("metrics", "figures")
+      .figures({"mtre_mm", "*.median_px"})
+      .option("also", &Options::also, "name of a further figure");
+  plugin.node("test.undeclared", measured)
+      .summary("The same figures, without a declaration")
+      .in("of", "number")
+      .out("metrics", "figures")
+      .option("also", &Options::also, "name of a further figure");
+  plugin.node("test.way", way).summary("A function").out("way", "what a search needs");
+  plugin.node("test.stages", stages)
+      .summary("Stages of a search")
+      .in("of", "number")
+      .in("way", "function")
+      .out("stages", "the same for the start and the end", marrow::over("stage"));
+}
