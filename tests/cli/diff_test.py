@@ -174,13 +174,13 @@ class Diff(Runs):
             (
                 "First difference: node 'sum' (test.fail_above)\n"
                 "  why: it uses test.fail_above, used test.add\n"
-                "  why: input 'a' is wired to other, was wired to first (there is no node 'first')\n"
+                "  why: input 'a' is wired to other, was wired to first (node 'first' is not needed)\n"
                 "  why: input 'b' is not wired, was wired to other\n"
                 "  number  value                    4, was 7 (-3)\n"
             ),
             text,
         )
-        self.assertIn("Only in the first run: first\n", text)
+        self.assertIn("Not needed in the second run: first\n", text)
 
     def test_only_a_node_more(self):
         self.run_into("a", CHAIN)

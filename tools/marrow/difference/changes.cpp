@@ -5,6 +5,9 @@
 #include <charconv>
 #include <set>
 
+#include "marrow/domain/error.hpp"
+#include "runtime/keys.hpp"
+
 namespace marrow::cli {
 namespace {
 
@@ -50,6 +53,44 @@ const typename Map::mapped_type* find_in(const Map& map, const std::string& name
 std::string file_or_folder(const std::string& path) {
   std::error_code error;
   return (fs::is_directory(path, error) ? "the folder " : fs::exists(path, error) ? "the file " : "") + path;
+}
+
+/// What an option of paths named: its text, a path or "[path, path]", and the digest of all names and contents.
+struct NamedContent {
+  std::string text, digest;
+};
+
+std::vector<std::string> paths_in(const std::string& text) {
+  if (!text.starts_with("[") || !text.ends_with("]")) return {text};
+  std::vector<std::string> paths;
+  for (std::size_t begin = 1, end = 0; begin < text.size(); begin = end + 2) {
+    end = std::min(text.find(", ", begin), text.size() - 1);
+    if (end > begin) paths.push_back(text.substr(begin, end - begin));
+  }
+  return paths;
+}
+
+/// The contents of the files that an option named, without their names. Nothing if they are not what they were.
+std::optional<std::multiset<std::string>> contents_of(const NamedContent& named) {
+  std::multiset<std::string> contents;
+  Hasher hasher;  // as contents_of_options() makes the digest
+  try {
+    for (const std::string& path : paths_in(named.text)) {
+      const PathContent content = content_of(path);
+      hasher.add(content.digest);
+      for (const auto& [file, digest] : content.files) contents.insert(digest.hex());
+    }
+  } catch (const Error&) {  // it can no longer be read
+    return std::nullopt;
+  }
+  return hasher.digest().hex() == named.digest ? std::optional(contents) : std::nullopt;
+}
+
+/// How two paths differ whose names and contents have different digests.
+std::string other_content(const NamedContent& before, const NamedContent& now) {
+  const auto old_contents = contents_of(before), contents = contents_of(now);
+  if (!old_contents || !contents) return "and the contents differ, or the names";
+  return *old_contents == *contents ? "another name for the same content" : "and the contents differ";
 }
 
 constexpr std::size_t kMostFunctions = 1000;  // most functions of a node to look at; only a forged record has more
@@ -243,7 +284,8 @@ class Comparer {
       if (!*old_content)
         return *old_text + " (" + option + ") was not there" + (*old_text == *text ? " yet" : ", is " + *text);
       if (*old_text == *text) return "the content of " + file_or_folder(*text) + " (" + option + ") differs";
-      return option + " is " + *text + ", was " + *old_text + ", and the contents differ";
+      return option + " is " + *text + ", was " + *old_text + ", " +
+             other_content({*old_text, **old_content}, {*text, **content});
     }
     const std::string old_short = old_text ? shortened(*old_text) : "", now_short = text ? shortened(*text) : "";
     if (old_text && text && old_short == now_short) return "";
@@ -267,9 +309,12 @@ class Comparer {
   }
 
   std::string did_not_run(const RecordedWire& wire, const RunRecord& in) const {
-    for (const std::string& id : wire.from)
-      if (!in.find(id))
-        return std::string(" (") + (&in == &before_ ? "there was" : "there is") + " no node '" + id + "')";
+    const bool is_before = &in == &before_;
+    for (const std::string& id : wire.from) {
+      if (in.find(id)) continue;
+      if (in.not_needed.contains(id)) return " (node '" + id + (is_before ? "' was" : "' is") + " not needed)";
+      return std::string(" (") + (is_before ? "there was" : "there is") + " no node '" + id + "')";
+    }
     return "";
   }
 

@@ -107,11 +107,19 @@ void print_roots(const Findings& findings, std::set<std::pair<std::string, std::
   }
 }
 
+/// The nodes that ran in one of the runs only. The other one may have had them, too, without need for them.
+void print_only(const std::vector<std::string>& names, const char* which, const RunRecord& other,
+                const char* other_one) {
+  std::vector<std::string> missing, not_needed;
+  for (const std::string& name : names) (other.not_needed.contains(name) ? not_needed : missing).push_back(name);
+  if (!missing.empty()) std::printf("Only in the %s run: %s\n", which, joined(missing).c_str());
+  if (!not_needed.empty()) std::printf("Not needed in the %s run: %s\n", other_one, joined(not_needed).c_str());
+}
+
 void print_other_changes(const Findings& findings) {
   const RunDifference& difference = findings.difference;
-  if (!difference.only_before.empty())
-    std::printf("Only in the first run: %s\n", joined(difference.only_before).c_str());
-  if (!difference.only_now.empty()) std::printf("Only in the second run: %s\n", joined(difference.only_now).c_str());
+  print_only(difference.only_before, "first", findings.now, "second");
+  print_only(difference.only_now, "second", findings.before, "first");
   for (const Change& change : difference.others) {
     const RecordedNode* node = findings.now.find(change.node);
     const bool differs = std::find(difference.in_consequence.begin(), difference.in_consequence.end(), change.node) !=

@@ -185,7 +185,10 @@ void read_graph(const YAML::Node& graph, const std::string& path, const GivenToB
     RecordedNode node;
     node.id = path + entry.first.Scalar();
     const auto found = recorded.find(node.id);
-    if (found == recorded.end()) continue;
+    if (found == recorded.end()) {
+      run.not_needed.insert(node.id);
+      continue;
+    }
     for (const auto& wire : written["in"]) node.wires[wire.first.Scalar()] = wire_of(wire.second, path, given);
     for (const auto& option : written["with"]) node.options[option.first.Scalar()] = text_of(option.second);
     const bool has_body = written["repeat"].IsDefined();

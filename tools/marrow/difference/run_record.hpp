@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -71,6 +72,7 @@ struct RunRecord {
   std::map<std::string, std::string> plugins;  ///< file name -> build id
   std::vector<RecordedNode> nodes;             ///< nodes of the run, in the pipeline's order
   std::map<std::string, std::size_t> places;   ///< index in `nodes`, by the node's id
+  std::set<std::string> not_needed;            ///< ids of the nodes that did not run, because no output needs them
   std::vector<RecordedResult> results;
 
   const RecordedNode* find(const std::string& id) const;
