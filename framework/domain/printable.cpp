@@ -3,49 +3,24 @@
 
 #include <cstdio>
 
+#include "domain/characters.hpp"
+
 namespace marrow {
 namespace {
-
-struct Character {
-  std::size_t size = 1;  ///< bytes
-  char32_t code = 0;
-  bool is_valid = false;  ///< well-formed UTF-8: no overlong form, no surrogate, nothing above U+10FFFF
-};
-
-Character first_of(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  if (byte(0) < 0x80) return {1, byte(0), true};
-  const std::size_t size = byte(0) >= 0xF0 ? 4 : byte(0) >= 0xE0 ? 3 : 2;
-  if (byte(0) < 0xC2 || byte(0) > 0xF4 || text.size() < size) return {};
-  char32_t code = byte(0) & (0xFF >> (size + 1));
-  for (std::size_t i = 1; i < size; ++i) {
-    if ((byte(i) & 0xC0) != 0x80) return {};
-    code = (code << 6) | (byte(i) & 0x3F);
-  }
-  static constexpr char32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};
-  if (code < kLeast[size] || code > 0x10FFFF || (code >= 0xD800 && code <= 0xDFFF)) return {};
-  return {size, code, true};
-}
-
-bool is_control(char32_t code) {
-  const auto within = [&](char32_t first, char32_t last) { return code >= first && code <= last; };
-  return code < 0x20 || within(0x7F, 0x9F) || code == 0x061C || within(0x200E, 0x200F) || within(0x2028, 0x202E) ||
-         within(0x2066, 0x2069);
-}
 
 std::string printable(std::string_view text, const char* after_line_break) {
   std::string result;
   result.reserve(text.size());
   while (!text.empty()) {
-    const Character character = first_of(text);
+    const Character character = first_character(text);
     char written[16] = "";
     if (text[0] == '\n' && after_line_break) {
       result += '\n';
       if (text.size() > 1) result += after_line_break;
     } else if (!character.is_valid || (is_control(character.code) && character.size == 1)) {
       std::snprintf(written, sizeof written, "\\x%02x", static_cast<unsigned char>(text[0]));
-    } else if (is_control(character.code)) {
-      std::snprintf(written, sizeof written, "\\u%04x", unsigned(character.code));
+    } else if (is_control(character.code) || is_unseen(character.code)) {
+      std::snprintf(written, sizeof written, character.code > 0xFFFF ? "\\U%08x" : "\\u%04x", unsigned(character.code));
     } else {
       result += text.substr(0, character.size);
     }

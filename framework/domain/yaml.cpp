@@ -9,6 +9,7 @@
 #include <map>
 #include <sstream>
 
+#include "domain/characters.hpp"
 #include "marrow/domain/printable.hpp"
 
 namespace marrow {
@@ -20,32 +21,43 @@ constexpr std::size_t kMostRepeated = 100'000;  // values that aliases may repea
 [[noreturn]] void refuse(const YAML::Mark& mark, const std::string& why) { throw YAML::Exception(mark, why); }
 
 /// Counts values and levels of nesting as if every alias were written out. It runs before a tree is built.
+/// It also refuses what YAML would take away from a text without a word: a tag ("! b", "!!str 5"), and the name of an
+/// anchor ("&a b") that no alias names.
 class Survey : public YAML::EventHandler {
  public:
-  explicit Survey(const YamlLimits& limits) : limits_(limits) {}
+  Survey(const std::string& text, const YamlLimits& limits) : text_(text), limits_(limits) {}
   void OnDocumentStart(const YAML::Mark& mark) override {
     if (documents_++) refuse(mark, "the file goes on after the end of its first document; keep one document a file");
   }
-  void OnDocumentEnd() override {}
+  void OnDocumentEnd() override {
+    if (!unnamed_.empty())
+      refuse(unnamed_.begin()->second,
+             "this begins with an anchor (&name) that no alias (*name) names; put quotes around a text that begins so");
+  }
   void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override { add(mark, anchor); }
-  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, const std::string& text) override {
+  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                const std::string& text) override {
+    expect_no_tag(mark, tag);
     if (text.find('\0') != std::string::npos)  // file names and messages would end there
       refuse(mark, "a text holds the character NUL (\\0); take it out");
     add(mark, anchor);
   }
-  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+  void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                        YAML::EmitterStyle::value) override {
+    expect_no_tag(mark, tag);
     open(mark, anchor);
   }
   void OnSequenceEnd() override { close(); }
-  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+  void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                   YAML::EmitterStyle::value) override {
+    expect_no_tag(mark, tag);
     open(mark, anchor);
   }
   void OnMapEnd() override { close(); }
 
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     expect_no_anchor(mark, anchor);
+    unnamed_.erase(anchor);
     const auto found = anchored_.find(anchor);
     if (found == anchored_.end()) refuse(mark, "an alias names a list or map that it is in itself");
     repeated_ += found->second.values;
@@ -68,8 +80,15 @@ class Survey : public YAML::EventHandler {
     if (anchor && !limits_.aliases)
       refuse(mark, "anchors and aliases (&name, *name) are not read; write the value out");
   }
+  /// A quoted text has the tag "!", too.
+  void expect_no_tag(const YAML::Mark& mark, const std::string& tag) const {
+    const std::size_t at = std::size_t(mark.pos);
+    const bool is_written = tag == "!" ? at < text_.size() && text_[at] == '!' : !tag.empty() && tag != "?";
+    if (is_written) refuse(mark, "tags (! or !!name) are not read; put quotes around a text that begins so");
+  }
   void enter(const YAML::Mark& mark, YAML::anchor_t anchor) {
     expect_no_anchor(mark, anchor);
+    if (anchor) unnamed_.emplace(anchor, mark);
     if (++values_ > limits_.most_values)
       refuse(mark, "it has more than " + std::to_string(limits_.most_values) + " values");
   }
@@ -103,7 +122,9 @@ class Survey : public YAML::EventHandler {
       refuse(mark, "lists and maps are nested more than " + std::to_string(kMostLevels) + " deep");
   }
 
+  const std::string& text_;
   const YamlLimits limits_;
+  std::map<YAML::anchor_t, YAML::Mark> unnamed_;  ///< anchors that no alias has named yet
   std::vector<Open> open_;
   std::map<YAML::anchor_t, Extent> anchored_;
   std::size_t values_ = 0, repeated_ = 0;
@@ -129,7 +150,7 @@ bool is_plain(const YAML::Node& node) { return node.IsScalar() && node.Tag() != 
 YAML::Node parse_yaml(const std::string& text, const YamlLimits& limits) {
   std::istringstream stream(text);
   YAML::Parser parser(stream);
-  Survey survey(limits);
+  Survey survey(text, limits);
   bool is_empty = true;
   try {
     while (parser.HandleNextDocument(survey)) is_empty = false;
@@ -199,8 +220,8 @@ std::vector<YamlKey> yaml_keys(const YAML::Node& map, const std::string& what, s
     else if (!is_new)
       faults.push_back(
           {mark, shown + " is given twice in " + what, "the first is at line " + std::to_string(twin->second)});
-    else if (printable(name) != name)
-      faults.push_back({mark, "the key " + shown + " in " + what + " holds a control character", "write it without"});
+    else if (const std::string odd = odd_character_in(name); !odd.empty())
+      faults.push_back({mark, "the key " + shown + " in " + what + " holds " + odd, "write it without"});
     else
       keys.push_back({name, mark, item.second});
   }

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "domain/characters.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/hash.hpp"
 
@@ -32,7 +33,7 @@ std::string fault_of_name(const std::string& name) {
   if (name.size() > kMostNameBytes) return "it has " + std::to_string(name.size()) + " bytes";
   if (name.find('/') != std::string::npos) return "it holds '/'";
   if (name.find('\\') != std::string::npos) return "it holds '\\'";
-  if (printable(name) != name) return "it holds a control character or bytes that are no UTF-8";
+  if (const std::string odd = odd_character_in(name); !odd.empty()) return "it holds " + odd;
   if (name.front() == '.') return "it begins with a dot";
   if (name.front() == ' ') return "it begins with a space";
   if (name.back() == ' ') return "it ends with a space";
@@ -52,9 +53,9 @@ std::string file_name_of(const std::string& text) {
     next = i + 1;
     while (next < text.size() && (static_cast<unsigned char>(text[next]) & 0xC0) == 0x80) ++next;  // one character
     const std::string character = text.substr(i, next - i);
-    const bool is_special = std::string("/\\%~").find(character) != std::string::npos ||
-                            printable(character) != character || (i == 0 && (character == "." || character == " ")) ||
-                            (next == text.size() && character == " ");
+    const bool is_special =
+        std::string("/\\%~").find(character) != std::string::npos || !odd_character_in(character).empty() ||
+        (i == 0 && (character == "." || character == " ")) || (next == text.size() && character == " ");
     result += is_special ? percent_encoded(character) : character;
   }
   if (result.size() <= kMostInFileName) return result;

@@ -12,8 +12,8 @@ inline constexpr const char* kNameHint =
     "use at most 100 letters, digits, '-', '_', '.' and spaces, and begin with neither a dot nor a space";
 
 /// Why a text cannot be the name of a file or folder on every machine, as "it holds '/'"; empty if it can. A good name
-/// has 1 to 100 bytes of UTF-8 without '/', '\' and control characters. It does not begin with a dot or a space and
-/// does not end with a space.
+/// has 1 to 100 bytes of UTF-8 without '/', '\' and what odd_character_in() finds. It does not begin with a dot or a
+/// space and does not end with a space.
 std::string fault_of_name(const std::string& name);
 
 /// Reports a fault at `place` if a text cannot be the name of a file. `what` says what is named ("a pipeline's name").

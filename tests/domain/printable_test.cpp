@@ -23,6 +23,11 @@ TEST(Printable, ControlCharactersAreWrittenOut) {
             "\\u202egnp.exe\\u202c \\u2066x\\u2069 \\u200f \\u061c \\u2028");
 }
 
+TEST(Printable, WhatIsNotDrawnIsWrittenOut) {
+  EXPECT_EQ(printable("a\u200bb\u200dc\u2060d\ufeffe\u00adf\U000e0001"),
+            "a\\u200bb\\u200dc\\u2060d\\ufeffe\\u00adf\\U000e0001");
+}
+
 TEST(Printable, BytesThatAreNoUtf8AreWrittenOut) {
   EXPECT_EQ(printable("\x9b"
                       "31m"),

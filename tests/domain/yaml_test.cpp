@@ -77,6 +77,33 @@ TEST(Yaml, TabsThatIndentAreNamed) {
   EXPECT_EQ(refusal("a:\t1\nb: [1\n").find("tab"), std::string::npos) << "the fault is another";
 }
 
+/// YAML would read "b" and 5 without a word.
+TEST(Yaml, TagsAndAnchorsThatNobodyNamesAreRefused) {
+  const std::string tag = "tags (! or !!name) are not read; put quotes around a text that begins so",
+                    anchor =
+                        "this begins with an anchor (&name) that no alias (*name) names; put quotes around a text that "
+                        "begins so";
+  for (const char* text : {"a: ! b\n", "a: !!str 5\n", "a: !mine b\n", "a: ! 'b'\n", "a: !!map {}\n", "a: !!seq []\n",
+                           "! a: b\n", "[\"é\", ! b]\n"})
+    EXPECT_EQ(refusal(text), "1: " + tag) << text;
+  for (const char* text : {"a: &a b\n", "a: &a {}\n", "&a a: b\n", "[&a b, &a c, *a]\n"})
+    EXPECT_EQ(refusal(text), "1: " + anchor) << text;
+  for (const char* text : {"a: '! b'\n", "a: \"&a b\"\n", "a: b ! c & d\n", "a: &a b\nc: *a\n", "a: |\n  ! b\n"})
+    EXPECT_EQ(refusal(text), "") << text;
+}
+
+TEST(Yaml, KeysThatLookTheSameAreRefused) {
+  std::vector<marrow::YamlFault> faults;
+  marrow::yaml_keys(parse_yaml("\"a\\u200b\": 1\n\"a\\u00a0b\": 1\n\"e\\u0301\": 1\né: 1\n"), "it", faults);
+  ASSERT_EQ(faults.size(), 3u);
+  EXPECT_EQ(faults[0].text, "the key 'a\u200b' in it holds U+200B, which cannot be seen");
+  EXPECT_EQ(faults[1].text, "the key 'a\u00a0b' in it holds U+00A0, a blank that is no space");
+  EXPECT_EQ(
+      faults[2].text,
+      "the key 'e\u0301' in it holds U+0301, a mark of the letter before it; type the letter with its mark as one "
+      "character");
+}
+
 TEST(Yaml, Limits) {
   EXPECT_EQ(parse_yaml("").Type(), YAML::NodeType::Null);
   EXPECT_EQ(refusal("a: &x 1\nb: *x\n"), "");

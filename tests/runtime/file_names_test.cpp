@@ -33,8 +33,32 @@ TEST(FileNames, BadOnesAndWhy) {
   EXPECT_EQ(fault_of_name(std::string(101, 'x')), "it has 101 bytes");
   for (const std::string& name :
        {std::string("a\nb"), std::string("a\tb"), std::string("\x1b[2J"), std::string("a\0b", 3), std::string("a\x7f"),
-        std::string("\xff"), std::string("\u202e"), std::string("\u009b")})
-    EXPECT_EQ(fault_of_name(name), "it holds a control character or bytes that are no UTF-8") << name;
+        std::string("\u202e"), std::string("\u009b")})
+    EXPECT_EQ(fault_of_name(name), "it holds a control character") << name;
+  EXPECT_EQ(fault_of_name("\xff"), "it holds bytes that are no UTF-8");
+}
+
+/// Names that look like "ab" or "é". The code points are those of the Unicode standard.
+TEST(FileNames, ThatLookLikeOthersAndWhy) {
+  for (const auto& [name, code] : std::vector<std::pair<std::string, std::string>>{{"a\u200bb", "U+200B"},
+                                                                                   {"a\u200cb", "U+200C"},
+                                                                                   {"a\u200db", "U+200D"},
+                                                                                   {"ab\u2060", "U+2060"},
+                                                                                   {"\ufeffab", "U+FEFF"},
+                                                                                   {"a\u00adb", "U+00AD"},
+                                                                                   {"ab\ufe0f", "U+FE0F"},
+                                                                                   {"ab\U000e0041", "U+E0041"}})
+    EXPECT_EQ(fault_of_name(name), "it holds " + code + ", which cannot be seen");
+  for (const auto& [name, code] : std::vector<std::pair<std::string, std::string>>{
+           {"a\u00a0b", "U+00A0"}, {"a\u2009b", "U+2009"}, {"a\u3000b", "U+3000"}, {"a\u202fb", "U+202F"}})
+    EXPECT_EQ(fault_of_name(name), "it holds " + code + ", a blank that is no space");
+  EXPECT_EQ(fault_of_name("e\u0301"),
+            "it holds U+0301, a mark of the letter before it; type the letter with its mark as one character");
+  EXPECT_EQ(fault_of_name("\u1112\u1161").substr(0, 16), "it holds U+1161,") << "Hangul, taken apart";
+  EXPECT_EQ(fault_of_name("\u00e9\ud558"), "") << "the same letters, each as one character";
+  EXPECT_EQ(file_name_of("a\u200bb"), "a%E2%80%8Bb");
+  EXPECT_EQ(file_name_of("a\u00a0b"), "a%C2%A0b");
+  EXPECT_EQ(file_name_of("e\u0301"), "e%CC%81");
 }
 
 TEST(FileNames, OfAnyTextAreNamesOfFiles) {
