@@ -6,9 +6,9 @@
 #include <cstdio>
 #include <numbers>
 
-#include "marrow/domain/random.hpp"
-
+#include "domain/exact_number.hpp"
 #include "marrow/domain/number_text.hpp"
+#include "marrow/domain/random.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -30,7 +30,7 @@ std::vector<InputValue> draw_inputs(const std::vector<DrawnInput>& inputs, std::
   std::vector<InputValue> values;
   for (const DrawnInput& input : inputs) {
     const auto& [low, high] = input.range;
-    values.push_back({input.name, number_text(low + (high - low) * random.uniform()), input.place});
+    values.push_back({input.name, exact_number(low + (high - low) * random.uniform()), input.place});
   }
   return values;
 }

@@ -8,7 +8,7 @@
 
 namespace marrow::compare {
 
-/// A number as it is written on the command line.
+/// A number as people read it, with six digits. Where it is read again, exact_number() keeps all of them.
 std::string number_text(double value);
 
 /// The values of the drawn inputs, in their order.

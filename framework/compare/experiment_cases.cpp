@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -63,7 +65,7 @@ class CaseReader {
   /// Returns false and reports a fault if the case cannot be added. The other cases of the same list are then not
   /// looked at.
   bool add(ExperimentCase one, const Place& place) {
-    if (!check_name(yaml_, one.name, place, "a case's name")) return false;
+    if (!check_name(yaml_, one.name, place, "a case's name") || !is_new_folder(one, place)) return false;
     const auto [known, is_new] = known_.emplace(in_small_letters(one.name), experiment_.cases.size());
     if (is_new) {
       experiment_.cases.push_back(std::move(one));
@@ -81,6 +83,20 @@ class CaseReader {
     return false;
   }
 
+  /// Two names may lead to one folder, by a link for example. Each of its runs would then count twice.
+  bool is_new_folder(const ExperimentCase& one, const Place& place) {
+    struct stat info {};
+    if (one.folder.empty() || stat(one.folder.c_str(), &info) != 0) return true;
+    const auto [known, is_new] = known_folders_.emplace(std::pair(info.st_dev, info.st_ino), one);
+    const ExperimentCase& other = known->second;
+    if (is_new || other.name == one.name) return true;  // two cases of one name are refused anyway
+    yaml_.fault(place,
+                "the cases '" + other.name + "' and '" + one.name + "' are one folder, " +
+                    printable(other.folder.string()) + ", to which " + printable(one.folder.string()) + " leads",
+                "leave one of them out, or its runs count twice");
+    return false;
+  }
+
   void add_seeds(std::vector<std::uint64_t> seeds, bool are_simulated, const Place& place) {
     for (std::size_t i = 0; !seeds.empty() && i < experiment_.more_cases; ++i) {
       seeds.push_back(i ? seeds.back() + 1 : *std::max_element(seeds.begin(), seeds.end()) + 1);
@@ -91,9 +107,11 @@ class CaseReader {
   }
 
   void add_folders(const std::string& pattern, const Place& place) {
+    if (pattern.empty())
+      return yaml_.fault(place, "a folder of 'folders' is empty", "name a folder; that of the experiment's file is  .");
     std::vector<fs::path> found;
     try {
-      found = search_.matches(plain_path(folder_ / pattern));
+      found = search_.matches(folder_, pattern);
       // With '..' after a '*', the same folder is found many times.
       std::transform(found.begin(), found.end(), found.begin(), plain_path);
       std::sort(found.begin(), found.end());
@@ -198,6 +216,7 @@ class CaseReader {
   WrittenExperiment& written_;
   Experiment& experiment_;
   std::map<std::string, std::size_t> known_;  ///< cases by their names in small letters
+  std::map<std::pair<dev_t, ino_t>, ExperimentCase> known_folders_;
   FolderSearch search_;
   bool has_more_ = false;
 };

@@ -5,13 +5,14 @@
 #include <cmath>
 #include <set>
 
+#include "domain/exact_number.hpp"
 #include "draw.hpp"
 #include "sobol.hpp"
 
 namespace marrow::compare {
 namespace {
 
-constexpr const char* kExample = "write it as  sweep: {options: {edges.high: [60, 90]}, grid: 5}";
+constexpr const char* kSweepExample = "write it as  sweep: {options: {edges.high: [60, 90]}, grid: 5}";
 
 /// The fractions of all combinations of `count` values of each option. The last option changes fastest.
 std::vector<std::vector<double>> grid_of(std::size_t options, std::size_t count) {
@@ -81,8 +82,14 @@ void SweepReader::read(const YamlEntry& section) {
   if (section.value.IsMap()) check(section);
 }
 
+std::vector<Named> SweepReader::names() const {
+  std::vector<Named> names;
+  for (const SweptOption& option : options_) names.push_back({option.key, option.place});
+  return names;
+}
+
 void SweepReader::check(const YamlEntry& section) {
-  if (options_.empty()) return yaml_.fault(section.place, "'sweep' names no option", kExample);
+  if (options_.empty()) return yaml_.fault(section.place, "'sweep' names no option", kSweepExample);
   if (!grid_ == !sobol_)
     return yaml_.fault(section.place,
                        "'sweep' must say either how fine its grid is or how many of Sobol's points it takes",
@@ -137,7 +144,7 @@ void SweepReader::apply(Experiment& experiment) {
       for (std::size_t o = 0; o < options_.size(); ++o) {
         if (!more.name.empty()) more.name += '+';
         more.name += number_text(point[o]);
-        more.overrides.push_back({options_[o].key, number_text(point[o]), options_[o].place});
+        more.overrides.push_back({options_[o].key, exact_number(point[o]), options_[o].place});
       }
       if (!check_name(yaml_, more.name, variant.place, "a variant's name")) return;
       if (!names.insert(in_small_letters(more.name)).second)

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "domain/exact_number.hpp"
 #include "draw.hpp"
+#include "experiment_replaced.hpp"
 #include "experiment_sweep.hpp"
 #include "marrow/domain/number_text.hpp"
 
@@ -14,7 +16,7 @@ namespace marrow::compare {
 namespace {
 
 constexpr std::size_t kMostOptions = 6, kMostPoints = 10000;
-constexpr const char* kExample =
+constexpr const char* kTuneExample =
     "write it as  tune: {options: {edges.high: [60, 90]}, optimizer: {uses: NAME}, points: 40, training_cases: 20}";
 constexpr const char* kOptimizerHint = "add  optimizer: {uses: NAME};  marrow list optimizer  shows which there are";
 constexpr const char* kTuned = "tuned";
@@ -22,7 +24,7 @@ constexpr const char* kTuned = "tuned";
 /// Rounded to a power of ten that is at most a thousandth of `range`.
 double rounded(double value, double range) {
   const double step = std::pow(10, std::floor(std::log10(range / 1000)));
-  return parsed_number(number_text(std::round(value / step) * step)).value();
+  return parsed_number(formatted("%.15g", std::round(value / step) * step)).value();
 }
 
 }  // namespace
@@ -44,8 +46,8 @@ std::string add_tuned(Experiment& experiment, const std::vector<double>& values)
   variant.name = kTuned;
   variant.swept = values;
   for (std::size_t o = 0; o < values.size(); ++o) {
-    variant.name += "+" + number_text(values[o]);
-    variant.overrides.push_back({rule.options[o].key, number_text(values[o]), rule.options[o].place});
+    variant.name += "+" + exact_number(values[o]);
+    variant.overrides.push_back({rule.options[o].key, exact_number(values[o]), rule.options[o].place});
   }
   experiment.variants.push_back(variant);
   return variant.name;
@@ -89,7 +91,10 @@ void TuneReader::read(const YamlEntry& section) {
         rule_.options.push_back(swept_option_of(yaml_, option));
     if (entry.key == "figure") figure_ = named();
     if (entry.key == "variant") variant_ = named();
-    if (entry.key == "failed_as") failed_as_ = yaml_.number(entry.value, entry.place, entry.key).value_or(0);
+    if (entry.key == "failed_as") {
+      failed_as_ = yaml_.number(entry.value, entry.place, entry.key).value_or(std::nan(""));  // was said
+      failed_as_place_ = entry.place;
+    }
     if (entry.key == "points") rule_.points = count_of(yaml_, entry, 1, kMostPoints);
     if (entry.key == "training_cases") {
       cases_place_ = entry.place;
@@ -111,7 +116,7 @@ void TuneReader::read_optimizer(const YamlEntry& section) {
     if (entry.key == "uses") rule_.optimizer = yaml_.text(entry.value, entry.place, "uses").value_or(rule_.optimizer);
     if (entry.key == "with")
       for (const YamlEntry& option : yaml_.map(entry.value, entry.place, "'with'"))
-        rule_.optimizer_options.emplace_back(option.key, patch_value(option.value));
+        rule_.optimizer_options.emplace_back(option.key, changed_value(yaml_, option.key, option.value, option.place));
   }
   if (section.value.IsMap() && !has_uses)
     yaml_.fault(section.place, "'optimizer' does not name its node", kOptimizerHint);
@@ -119,7 +124,7 @@ void TuneReader::read_optimizer(const YamlEntry& section) {
 
 void TuneReader::check_keys(const YamlEntry& section) {
   is_given_ = true;
-  if (rule_.options.empty()) return yaml_.fault(section.place, "'tune' names no option", kExample);
+  if (rule_.options.empty()) return yaml_.fault(section.place, "'tune' names no option", kTuneExample);
   if (rule_.options.size() > kMostOptions)
     return yaml_.fault(section.place, "'tune' has " + std::to_string(rule_.options.size()) + " options, at most " +
                                           std::to_string(kMostOptions) + " are possible");
@@ -129,6 +134,22 @@ void TuneReader::check_keys(const YamlEntry& section) {
   if (!rule_.training_cases)
     return yaml_.fault(section.place, "'tune' does not say how many cases are for training", "add  training_cases: 20");
   is_good_ = true;
+}
+
+std::vector<Named> TuneReader::names() const {
+  std::vector<Named> names;
+  for (const SweptOption& option : rule_.options) names.push_back({option.key, option.place});
+  return names;
+}
+
+/// The tuned variant is named after its values, and variants are told apart by their names.
+void TuneReader::check_names(const Experiment& experiment) {
+  for (const Variant& variant : experiment.variants)
+    if (in_small_letters(variant.name).starts_with(std::string(kTuned) + "+"))
+      yaml_.fault(
+          variant.place,
+          "variant '" + variant.name + "' is named as the points of 'tune' are, so its runs would count as theirs",
+          "rename it");
 }
 
 void TuneReader::add_variant(Experiment& experiment) const {
@@ -147,6 +168,10 @@ void TuneReader::apply(Experiment& experiment, std::size_t starts) {
   rule.variant = experiment.baseline;
   if (variant_) find_variant(yaml_, experiment, *variant_, rule.variant);
   check_cases(experiment, rule, starts);
+  check_names(experiment);
+  const Variant& tuned = experiment.variants[rule.variant];
+  refuse_replaced(yaml_, "the option", options_set_by("variant '" + tuned.name + "'", tuned.overrides),
+                  {"'tune'", names()});
   experiment.tune = rule;
 }
 
@@ -162,15 +187,23 @@ void TuneReader::find_figure(const Experiment& experiment, TuneRule& rule) {
   if (!is_found)
     return yaml_.fault(figure_->place, "'" + figure_->name + "' is not among the metrics",
                        suggestion(figure_->name, names));
-  const MetricChoice& metric = experiment.metrics[rule.metric];
-  if (failed_as_)
-    rule.failed_as = *failed_as_;
-  else if (metric.limit && !metric.higher_is_better())
-    rule.failed_as = 10 * *metric.limit;
-  else
-    yaml_.fault(place_, "'tune' does not say what a failed run counts as",
-                "add  failed_as:  with a bad value of " + metric.path +
-                    (metric.higher_is_better() ? "" : "; with a limit under 'success' it is ten times that limit"));
+  find_failed_as(experiment.metrics[rule.metric], rule);
+}
+
+void TuneReader::find_failed_as(const MetricChoice& metric, TuneRule& rule) {
+  const bool higher = metric.higher_is_better();
+  if (!failed_as_ && (higher || !(metric.limit > 0.0)))
+    return yaml_.fault(place_, "'tune' does not say what a failed run counts as",
+                       "add  failed_as:  with a bad value of " + metric.path +
+                           (higher ? "" : "; with a limit above 0 under 'success' it is ten times that limit"));
+  rule.failed_as = failed_as_ ? *failed_as_ : 10 * *metric.limit;
+  if (metric.better == MetricChoice::Better::nearest_zero) rule.failed_as = std::abs(rule.failed_as);
+  const bool is_success = metric.limit && (higher ? rule.failed_as > *metric.limit : rule.failed_as < *metric.limit);
+  if (is_success)
+    yaml_.fault(failed_as_place_,
+                "a failed run would count as " + number_text(rule.failed_as) + ", which is a success: the limit of " +
+                    metric.path + " is " + number_text(*metric.limit),
+                "let  failed_as  be a value that is no success");
 }
 
 void TuneReader::check_cases(const Experiment& experiment, const TuneRule& rule, std::size_t starts) {

@@ -6,6 +6,7 @@
 #include "draw.hpp"
 #include "marrow/domain/printable.hpp"
 #include "runtime/file_names.hpp"
+#include "runtime/given_value.hpp"
 #include "runtime/plain_path.hpp"
 
 namespace marrow::compare {
@@ -35,10 +36,10 @@ std::vector<InputValue> inputs_of(StrictYaml& yaml, const YamlEntry& section) {
   return result;
 }
 
-std::string patch_value(const YAML::Node& value) {
-  YAML::Emitter out;
-  out << YAML::Flow << value;
-  return out.c_str();
+std::string changed_value(StrictYaml& yaml, const std::string& key, const YAML::Node& value, const Place& place) {
+  if (!value.IsNull()) return text_to_give(value);
+  yaml.fault(place, "'" + key + "' has no value", "an empty text is written as ''");
+  return "";
 }
 
 void put_uses_first(std::vector<Override>& patches) {
@@ -49,7 +50,7 @@ std::vector<Override> patches_of(StrictYaml& yaml, const YamlEntry& section, con
   std::vector<Override> result;
   if (section.value.IsNull()) return result;
   for (const YamlEntry& entry : yaml.map(section.value, section.place, what))
-    result.push_back({entry.key, patch_value(entry.value), entry.place});
+    result.push_back({entry.key, changed_value(yaml, entry.key, entry.value, entry.place), entry.place});
   put_uses_first(result);
   return result;
 }
@@ -96,6 +97,10 @@ void find_variant(StrictYaml& yaml, const Experiment& experiment, const Named& a
 fs::path file_of(StrictYaml& yaml, const YamlEntry& entry, const fs::path& folder) {
   const auto text = yaml.text(entry.value, entry.place, entry.key);
   if (!text) return {};
+  if (text->empty()) {
+    yaml.fault(entry.place, "'" + entry.key + "' is empty", "name a file; the path starts at the experiment's file");
+    return {};
+  }
   fs::path file = plain_path(folder / *text);
   std::error_code error;
   if (fs::is_regular_file(file, error)) return file;

@@ -24,8 +24,8 @@ PlacedTexts texts_of(StrictYaml& yaml, const YamlEntry& entry);
 std::vector<InputValue> inputs_of(StrictYaml& yaml, const YamlEntry& section);
 /// Reads changes of a pipeline, written as node.option: value and so on. `what` names the section in messages.
 std::vector<Override> patches_of(StrictYaml& yaml, const YamlEntry& section, const std::string& what);
-/// The value of a change, as it is written on the command line.
-std::string patch_value(const YAML::Node& value);
+/// The value of a change, as it is written on the command line. No value is a fault.
+std::string changed_value(StrictYaml& yaml, const std::string& key, const YAML::Node& value, const Place& place);
 /// Moves changes of `uses` to the front, because such a change drops the options that the file gives to the replaced
 /// node.
 void put_uses_first(std::vector<Override>& patches);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "given_value.hpp"
 #include "marrow/domain/printable.hpp"
 #include "pipeline_axes.hpp"
 #include "pipeline_names.hpp"
@@ -27,8 +28,8 @@ class CallBuilder {
 
   void add_option(const std::string& name, const std::string& text) {
     const Place place = place_of(name);
-    written_.options.emplace_back(
-        name, WrittenValue{place, StrictYaml(place, diagnostics_).parse(text), std::filesystem::current_path(), true});
+    if (const auto value = given_value(text, place, diagnostics_))
+      written_.options.emplace_back(name, WrittenValue{place, *value, std::filesystem::current_path(), true});
   }
 
   void add_input(const std::string& name, const Value& value) {

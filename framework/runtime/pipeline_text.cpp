@@ -5,6 +5,7 @@
 #include <set>
 
 #include "file_names.hpp"
+#include "given_value.hpp"
 #include "marrow/domain/printable.hpp"
 #include "plain_path.hpp"
 
@@ -106,7 +107,7 @@ class PipelineReader {
       OptionInfo info;
       info.type = OptionType::text;
       WrittenValue value;
-      bool given = false;
+      bool given = false, may_be_empty = false;
       const auto give = [&](const Place& place, const YAML::Node& node, const fs::path& folder) {
         given = true;
         value.place = place;
@@ -115,7 +116,10 @@ class PipelineReader {
       };
       for (const YamlEntry& entry : yaml_.map(input.value, input.place, "input " + in_quotes(input.key), &kKeys)) {
         if (entry.key == "help") yaml_.text(entry.value, entry.place, "help");
-        if (entry.key == "default") give(entry.place, entry.value, folder_);
+        if (entry.key == "default") {
+          give(entry.place, entry.value, folder_);
+          may_be_empty = entry.value.IsScalar() && entry.value.Scalar().empty();
+        }
         if (entry.key != "type") continue;
         const auto type = yaml_.text(entry.value, entry.place, "type");
         if (!type) continue;
@@ -129,11 +133,12 @@ class PipelineReader {
       }
       for (const InputValue& one : arguments_.inputs)
         if (one.name == input.key) give(place_of(one), YAML::Node(one.value), folder_of(one.place));
-      set_input(input, info, given ? &value : nullptr);
+      set_input(input, info, given ? &value : nullptr, may_be_empty);
     }
   }
 
-  void set_input(const YamlEntry& input, const OptionInfo& info, const WrittenValue* value) {
+  /// `may_be_empty`: its default is empty, so it is of use without a value.
+  void set_input(const YamlEntry& input, const OptionInfo& info, const WrittenValue* value, bool may_be_empty) {
     if (!value) {
       pipeline_.missing_inputs.push_back(input.key);
       if (inputs_required_)
@@ -144,6 +149,9 @@ class PipelineReader {
     const auto no_names = [](const std::string& text, const Place&) { return std::optional(text); };
     if (!yaml_.option(value->value, value->place, info, "input " + in_quotes(input.key), no_names)) return;
     std::string text = value->value.Scalar();
+    if (info.type == OptionType::path && text.empty() && !may_be_empty)
+      yaml_.fault(value->place, "input " + in_quotes(input.key) + " is an empty path",
+                  "name a file or a folder; the folder in which you are is  .");
     if (info.type == OptionType::path && !text.empty()) text = plain_path(value->folder / text).string();
     pipeline_.inputs[input.key] = text;
   }
@@ -258,7 +266,7 @@ class PipelineReader {
 
   void apply_override(const std::string& key, const std::string& text, const Place& written) {
     const Place place = written.file.empty() ? Place{"--set " + key + "=" + text} : written;
-    StrictYaml yaml(place.file, diagnostics_);
+    StrictYaml yaml(place, diagnostics_);
     const std::size_t dot = key.find('.');
     std::vector<std::string> ids;
     for (const WrittenNode& node : pipeline_.nodes) ids.push_back(node.id);
@@ -282,27 +290,14 @@ class PipelineReader {
                        "a node of the body is changed by  " + node->id + ".body.NODE.uses=kind.name");
       return;
     }
-    const WrittenValue value{place, yaml.parse(text), folder_of(written), true};
-    if (what == "uses" && text.empty()) {
-      diagnostics_.add(place, "node " + in_quotes(node->id) + " does not say what it uses",
-                       "write it as  " + key + "=kind.name");
-      return;
-    }
-    if (what == "uses") {
-      // The options under `with` were written for the node that is replaced, so they mean nothing to another node.
-      // Overrides are meant for this run, so they are kept, in any order.
-      const auto of_file = [](const auto& option) { return !option.second.is_override; };
-      if (text != node->uses && std::erase_if(node->options, of_file) > 0)
-        pipeline_.notes.push_back("node " + in_quotes(node->id) + ": the options written for " + node->uses +
-                                  " are not used by " + text);
-      node->uses = text;
-      node->uses_place = place;
-      return;
-    }
+    const auto given = given_value(text, place, diagnostics_);
+    if (!given) return;
+    if (what == "uses") return set_uses(*node, key, yaml.text(*given, place, "uses"), place);
     if (what == "may_fail") {
-      node->may_fail = yaml.boolean(value.value, place, may_fail_of(node->id)).value_or(false);
+      node->may_fail = yaml.boolean(*given, place, may_fail_of(node->id)).value_or(false);
       return;
     }
+    const WrittenValue value{place, *given, folder_of(written), true};
     auto& target = what.starts_with("in.") ? node->wires : node->options;
     const std::string name = what.starts_with("in.") ? what.substr(3) : what;
     const auto old = std::find_if(target.begin(), target.end(), [&](const auto& item) { return item.first == name; });
@@ -312,24 +307,43 @@ class PipelineReader {
       target.emplace_back(name, value);
   }
 
+  void set_uses(WrittenNode& node, const std::string& key, const std::optional<std::string>& name, const Place& place) {
+    if (!name) return;
+    if (name->empty()) {
+      diagnostics_.add(place, "node " + in_quotes(node.id) + " does not say what it uses",
+                       "write it as  " + key + "=kind.name");
+      return;
+    }
+    // The options under `with` were written for the node that is replaced, so they mean nothing to another node.
+    // Overrides are meant for this run, so they are kept, in any order.
+    const auto of_file = [](const auto& option) { return !option.second.is_override; };
+    if (*name != node.uses && std::erase_if(node.options, of_file) > 0)
+      pipeline_.notes.push_back("node " + in_quotes(node.id) + ": the options written for " + node.uses +
+                                " are not used by " + *name);
+    node.uses = *name;
+    node.uses_place = place;
+  }
+
   /// Whether the override is one of the repetition; then it is done.
   bool set_repetition(WrittenNode& node, const std::string& what, const std::string& text, const Place& place,
                       const Place& written) {
     WrittenRepetition& repetition = *node.repetition;
-    StrictYaml yaml(place, diagnostics_);
-    const YAML::Node value(text);
     if (what.starts_with("body.")) {
       repetition.overrides.push_back({what.substr(5), text, written.file.empty() ? Place{} : place});
-    } else if (what == "at_most") {
+      return true;
+    }
+    if (what != "at_most" && what != "until" && what != "if_pass_fails") return false;
+    const auto value = given_value(text, place, diagnostics_);
+    if (!value) return true;
+    StrictYaml yaml(place, diagnostics_);
+    if (what == "at_most") {
       repetition.at_most_place = place;
-      set_at_most(repetition, yaml.integer(value, place, "'at_most'"));
+      set_at_most(repetition, yaml.integer(*value, place, "'at_most'"));
     } else if (what == "until") {
       repetition.until_place = place;
-      repetition.until = text;
-    } else if (what == "if_pass_fails") {
-      set_if_pass_fails(repetition, place, text);
+      repetition.until = yaml.text(*value, place, "'until'").value_or("");
     } else {
-      return false;
+      set_if_pass_fails(repetition, place, yaml.text(*value, place, "'if_pass_fails'"));
     }
     return true;
   }

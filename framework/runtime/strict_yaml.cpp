@@ -2,9 +2,8 @@
 #include "strict_yaml.hpp"
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 
+#include "domain/exact_number.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/plain_text.hpp"
 #include "marrow/domain/printable.hpp"
@@ -13,17 +12,6 @@
 #include "unclosed.hpp"
 
 namespace marrow {
-namespace {
-
-/// A number as a text. Whole numbers below 1e15 have all their digits.
-std::string show(double value) {
-  char text[32];
-  const bool is_whole = value == std::trunc(value) && std::abs(value) < 1e15;
-  return {text, is_whole ? std::to_chars(text, text + sizeof text, value, std::chars_format::fixed).ptr
-                         : std::to_chars(text, text + sizeof text, value).ptr};
-}
-
-}  // namespace
 
 YAML::Node StrictYaml::parse(const std::string& written) {
   const std::string text = plain_text(written);
@@ -93,11 +81,13 @@ std::optional<double> StrictYaml::number(const YAML::Node& node, const Place& wh
 bool StrictYaml::check_range(double value, const Place& where, const OptionInfo& info, const std::string& what) {
   const std::string unit = info.unit.empty() ? "" : " " + info.unit;
   if (info.minimum && value < *info.minimum) {
-    fault(where, what + ": " + show(value) + " is below the least allowed, " + show(*info.minimum) + unit);
+    fault(where,
+          what + ": " + exact_number(value) + " is below the least allowed, " + exact_number(*info.minimum) + unit);
     return false;
   }
   if (info.maximum && value > *info.maximum) {
-    fault(where, what + ": " + show(value) + " is above the most allowed, " + show(*info.maximum) + unit);
+    fault(where,
+          what + ": " + exact_number(value) + " is above the most allowed, " + exact_number(*info.maximum) + unit);
     return false;
   }
   return true;

@@ -21,7 +21,7 @@ def of_change(key: str, value: Any) -> str:
     what = key.split(".")[1:]
     is_name = what[-1:] and (what[-1] in _PLAIN or "in" in what[:-1])
     if is_name and isinstance(value, (list, tuple)):
-        return "[%s]" % ", ".join(map(str, value))
+        return of_value(key, list(map(str, value)))
     return str(value) if is_name else of_value(key, value)
 
 
@@ -42,6 +42,6 @@ def _plain(value: Any) -> Any:
         return value.tolist()
     if isinstance(value, (list, tuple)):
         return [_plain(item) for item in value]
-    if isinstance(value, dict):
+    if value is None or isinstance(value, dict):
         raise TypeError
     return value

@@ -3,6 +3,7 @@
 import os
 import shutil
 
+import yaml
 from package import FEMUR, Case, main, marrow, small_case
 
 FAULTY = """marrow: 1
@@ -90,6 +91,17 @@ class Errors(Case):
             pipeline.set("edges.in.view", "cas.views")
         self.assertEqual((caught.exception.node, caught.exception.port), ("edges", "view"))
         self.assertEqual(pipeline.resolved(), before)
+
+    def test_a_text_stays_what_it_is(self):
+        for text in ("a #b", "&a b", "! b", "~", "null", "[a", '"a', "- a", "a: b", " a ", "a\nb", "größe"):
+            self.assertEqual(self.path_after("case.path", text), os.path.join(os.getcwd(), text))
+        with self.assertRaisesRegex(marrow.Error, "case.path: expected a bool, number, text, path, .* got 'NoneType'"):
+            marrow.Pipeline(FEMUR, case=".").set("case.path", None)
+
+    def path_after(self, key, text):
+        return yaml.safe_load(marrow.Pipeline(FEMUR, case=".").set(key, text).resolved())["nodes"]["case"]["with"][
+            "path"
+        ]
 
     def test_changes_that_must_fit_each_other_are_made_together(self):
         pipeline = marrow.Pipeline(FEMUR, case=".")
