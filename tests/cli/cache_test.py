@@ -63,7 +63,7 @@ class Cache(Case):
         text = self.marrow("cache", "why", "")
         self.assertEqual((text.returncode, text.stdout), (2, ""))
         self.assertIn(
-            "the key is empty; give that of a result or of one of its outputs, or its first digits", text.stderr
+            "a word after 'why' is empty, and nothing has an empty name; a variable may have no value", text.stderr
         )
         entries = sorted(
             path.name for path in self.cache.rglob("*") if len(path.name) == 32 and path.parent.name == path.name[:2]

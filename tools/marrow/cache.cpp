@@ -105,8 +105,6 @@ int cache_info() {
 }
 
 int cache_why(const std::string& key) {
-  if (key.empty())
-    return code_after("the key is empty; give that of a result or of one of its outputs, or its first digits");
   const Store store;
   if (const int code = code_after(store.fault())) return code;
   std::vector<Store::Entry> meant;

@@ -9,10 +9,11 @@ void add_pipeline_arguments(CLI::App* command, PipelineRequest& request) {
   command->add_option("pipeline", request.file, "pipeline file (YAML)")->required();
   command->add_option("inputs", request.inputs, "values of the pipeline's inputs, as name=value");
   command
-      ->add_option("--set", request.overrides,
-                   "override, as node.option=value, node.uses=kind.name, node.may_fail=true or node.in.port=reference")
-      ->take_all()
-      ->expected(1)
+      ->add_option(
+          "--set", request.overrides,
+          "override, as node.option=value, node.uses=kind.name, node.may_fail=true or node.in.port=reference. A "
+          "value is a text as it stands; one that begins with [, {, \" or ' is YAML")
+      ->allow_extra_args(false)  // so that an input may stand after it
       ->type_name("NODE.OPTION=VALUE");
 }
 

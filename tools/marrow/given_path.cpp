@@ -8,6 +8,7 @@
 #include "compare/comparison_folder.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
+#include "report/report.hpp"
 #include "runtime/text_file.hpp"
 
 namespace marrow::cli {
@@ -28,7 +29,7 @@ std::string name_of(Wanted wanted) {
 
 std::optional<Thing> thing_in_folder(const fs::path& folder) {
   std::error_code error;
-  const std::string name = printable(folder.string());
+  const std::string name = shell_path(folder);
   if (is_comparison(folder))
     return Thing{{},
                  "the folder of a comparison",
@@ -40,12 +41,13 @@ std::optional<Thing> thing_in_folder(const fs::path& folder) {
     return Thing{Wanted::run, name_of(Wanted::run),
                  "look at it by: marrow show " + name + "; repeat it by: marrow rerun " + name};
   if (fs::exists(folder / "case.yaml", error))
-    return Thing{{}, "the folder of a case", "give it to a pipeline: marrow run PIPELINE case=" + name};
+    return Thing{
+        {}, "the folder of a case", "give it to a pipeline: marrow run PIPELINE case=" + shell_word(folder.string())};
   return std::nullopt;
 }
 
 /// By the first of the keys that only one kind of file has at its top level. Everything in the expression is bounded:
-/// it is matched by recursion.
+/// it is matched by recursion. `name`: the file as a word of a shell.
 std::optional<Thing> thing_in_text(const std::string& text, const std::string& name) {
   static const std::regex kKey("(?:^|[\\n\\r]|\xEF\xBB\xBF)(experiment|variants|marrow|nodes|marrow-[a-z-]{1,40}) ?:");
   std::smatch key;
@@ -65,7 +67,7 @@ std::optional<Thing> thing_at(const fs::path& given, Wanted wanted) {
   if (wanted == Wanted::run && fs::exists(folder / "run.json", error) && fs::exists(given, error))
     return Thing{{}, "a file of a run", "give the folder: " + printable(folder.string())};
   try {
-    return thing_in_text(read_text_file(given, kMostSourceBytes), printable(given.string()));
+    return thing_in_text(read_text_file(given, kMostSourceBytes), shell_path(given));
   } catch (const Error&) {
     return std::nullopt;
   }
@@ -74,6 +76,7 @@ std::optional<Thing> thing_at(const fs::path& given, Wanted wanted) {
 }  // namespace
 
 void expect_given(const fs::path& given, Wanted wanted) {
+  if (given.empty()) throw Error("the path of " + name_of(wanted) + " is empty; a variable may have no value");
   const std::optional<Thing> thing = thing_at(given, wanted);
   if (thing && thing->kind != wanted)
     throw Error(given.string() + ": this is " + thing->what + ", not " + name_of(wanted) + "; " + thing->advice);

@@ -31,6 +31,7 @@ int run_program(int argc, char** argv) {
         add_check,  add_plan,        add_cache,        add_list,     add_inspect, add_new,   add_graph, add_schema,
         add_doctor, add_conformance, add_check_worker, add_describe, add_watch,   add_open})
     add(app, code);
+  expect_no_empty_word({argv + std::min(argc, 1), argv + argc});
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

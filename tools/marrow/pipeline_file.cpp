@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "command_options.hpp"
@@ -38,7 +39,13 @@ std::vector<std::pair<std::string, std::string>> pairs_of(const std::vector<std:
 
 PipelineArguments arguments_of(const PipelineRequest& request) {
   PipelineArguments arguments;
-  for (auto& [name, value] : pairs_of(request.inputs, "name=value")) arguments.inputs.push_back({name, value});
+  for (auto& [name, value] : pairs_of(request.inputs, "name=value")) {
+    for (const InputValue& before : arguments.inputs)
+      if (before.name == name)
+        throw Error("the input '" + name + "' is given twice, as '" + before.value + "' and as '" + value +
+                    "'; a run has one value of each input");
+    arguments.inputs.push_back({name, value});
+  }
   for (auto& [key, value] : pairs_of(request.overrides, "node.option=value"))
     arguments.overrides.push_back({key, value});
   return arguments;
@@ -49,11 +56,31 @@ void print_faults(const Diagnostics& diagnostics) {
                diagnostics.size() == 1 ? "" : "s");
 }
 
+namespace {
+
+/// A program that calls marrow may add to what its user gave, so the last one counts.
+std::vector<std::string> notes_on_repeated(const std::vector<Override>& overrides) {
+  std::vector<std::string> notes;
+  std::map<std::string, std::string> given;
+  for (const Override& one : overrides) {
+    const auto [before, is_new] = given.try_emplace(one.key, one.value);
+    if (!is_new)
+      notes.push_back("--set " + one.key + " is given twice: " + in_quotes(one.value) + " counts, " +
+                      in_quotes(before->second) + " does not");
+    before->second = one.value;
+  }
+  return notes;
+}
+
+}  // namespace
+
 bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required,
           bool json) {
   expect_given(request.file, Wanted::pipeline);
   Diagnostics diagnostics;
-  pipeline = read_pipeline(request.file, arguments_of(request), catalogue, diagnostics, inputs_required);
+  const PipelineArguments arguments = arguments_of(request);
+  pipeline = read_pipeline(request.file, arguments, catalogue, diagnostics, inputs_required);
+  for (std::string& note : notes_on_repeated(arguments.overrides)) pipeline.notes.push_back(std::move(note));
   check_writers(pipeline, catalogue, diagnostics);
   if (json) print_json(diagnostics);
   if (diagnostics.empty()) return true;

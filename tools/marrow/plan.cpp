@@ -36,6 +36,7 @@ int plan(const PipelineRequest& request, std::uint64_t seed) {
   const Catalogue catalogue;
   Pipeline pipeline;
   if (!load(request, catalogue, pipeline, true)) return 2;
+  for (const std::string& note : pipeline.notes) std::fprintf(stderr, "marrow: note: %s\n", printable(note).c_str());
   const Store store;
   can_keep_results(store.fault(), false);
   say_if_not_shared(store, false);

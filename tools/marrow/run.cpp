@@ -315,8 +315,7 @@ void add_run(CLI::App& app, int& code) {
   command
       ->add_option("--only", request->only,
                    "compute and write only this output, and the verdicts on its poses; may be given several times")
-      ->take_all()
-      ->expected(1)
+      ->allow_extra_args(false)
       ->type_name("OUTPUT");
   show_default(add_whole_number(command, "--seed", request->seed, "seed of all randomness"), request->seed);
   add_whole_number(command, "--threads", request->threads, "threads to use (default: all)", 1, 1024);

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
+#include "marrow/domain/error.hpp"
 #include "marrow/domain/names.hpp"
 #include "marrow/domain/printable.hpp"
 
@@ -33,6 +34,17 @@ std::string advice_for_option(const CLI::App& command, const std::string& word) 
 }
 
 }  // namespace
+
+void expect_no_empty_word(const std::vector<std::string>& words) {
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string& word = words[i];
+    const bool is_option = word.starts_with("--") && word.size() > 2 && word.find('=') == word.size() - 1;
+    if (!word.empty() && !is_option) continue;
+    const std::string before = is_option ? word.substr(0, word.size() - 1) : i ? words[i - 1] : "";
+    throw Error("a word " + (before.empty() ? "of the command" : "after " + in_quotes(before)) +
+                " is empty, and nothing has an empty name; a variable may have no value");
+  }
+}
 
 std::string unknown_command(const CLI::App& app, const std::vector<std::string>& arguments) {
   const CLI::App* at = &app;

@@ -9,6 +9,9 @@ class App;
 
 namespace marrow::cli {
 
+/// Throws Error if a word of the command line is empty, or an option has an empty value ("--out="): it would be taken
+/// for one that was not given.
+void expect_no_empty_word(const std::vector<std::string>& words);
 /// The first word of the command line that stands where a command is expected and is none, with the nearest one. Empty
 /// if there is no such word.
 std::string unknown_command(const CLI::App& app, const std::vector<std::string>& arguments);
