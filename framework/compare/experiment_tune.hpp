@@ -13,6 +13,7 @@ class TuneReader {
  public:
   explicit TuneReader(StrictYaml& yaml) : yaml_(yaml) {}
   void read(const YamlEntry& section);
+  std::vector<Named> names() const;  ///< of the tuned options
   /// Adds the pipeline as it is, if the experiment has no variant.
   void add_variant(Experiment& experiment) const;
   /// Puts the rule into the experiment if there is one. Its metrics, variants and cases are read before, and `starts`
@@ -23,6 +24,8 @@ class TuneReader {
   void read_optimizer(const YamlEntry& section);
   void check_keys(const YamlEntry& section);
   void find_figure(const Experiment& experiment, TuneRule& rule);
+  void find_failed_as(const MetricChoice& metric, TuneRule& rule);
+  void check_names(const Experiment& experiment);
   void check_cases(const Experiment& experiment, const TuneRule& rule, std::size_t starts);
 
   StrictYaml& yaml_;
@@ -31,6 +34,7 @@ class TuneReader {
   Place place_, cases_place_;
   std::optional<Named> figure_, variant_;
   std::optional<double> failed_as_;
+  Place failed_as_place_;
 };
 
 }  // namespace marrow::compare

@@ -30,6 +30,22 @@ LIMITS = PIPELINE.replace("number: noisy", "number: all").replace(
 SLOW = PIPELINE.replace("b: drawn", "b: slow").replace(
     "outputs", "  slow: {uses: test.work, with: {value: 0.2}, in: {after: sum}}\noutputs"
 )
+VALUES = """marrow: 1
+inputs: {case: {type: path}}
+nodes:
+  r: {uses: test.case_value, with: {path: $case}}
+  s: {uses: test.shifted, in: {of: r}}
+outputs: {number: s}
+"""
+VALUES_EXPERIMENT = """experiment: 1
+name: e
+pipeline: p.yaml
+cases: {folders: [cases/*]}
+metrics: [{figure: number.value, label: error}]
+timed_cells: 0
+tune: {options: {s.shift: [0, 8]}, optimizer: {uses: optimizer.nelder_mead}, points: 2, failed_as: 20,
+  training_cases: %d}
+"""
 EXPERIMENT = """experiment: 1
 name: e
 pipeline: p.yaml
@@ -50,7 +66,7 @@ class Tuning(Case):
     def marrow(self, *arguments):
         return marrow(
             *arguments,
-            plugins=[TEST_PLUGINS, TEST_PLUGINS.parent / "relation_plugins"],
+            plugins=[TEST_PLUGINS, TEST_PLUGINS.parent / "relation_plugins", TEST_PLUGINS.parent / "timed_plugins"],
             extra_environment={"MARROW_CACHE": str(self.scratch / "cache")},
             cwd=self.scratch
         )
@@ -77,13 +93,14 @@ class Tuning(Case):
         draws = self.draws(1, 6)
         mean = lambda x: sum(min(abs(x - 3 + draw), 7) for draw in draws) / 6
         for point in tuning["points"]:
-            self.assertAlmostEqual(point["figure"], mean(point["values"][0]), 5)
-            self.assertEqual(point["runs"], 6)
-        self.assertAlmostEqual(tuning["untuned"]["figure"], mean(1), 5)
+            self.assertAlmostEqual(point["score"], mean(point["values"][0]), 5)
+            self.assertEqual((point["runs"], point["failed"], point["capped"]), (6, 0, 0))
+            self.assertAlmostEqual(point["mean"], point["score"], 12, "no run is worse than 7")
+        self.assertAlmostEqual(tuning["untuned"]["score"], mean(1), 5)
         best = tuning["points"][tuning["best"]]
-        self.assertEqual(best["figure"], min(point["figure"] for point in tuning["points"]))
+        self.assertEqual(best["score"], min(point["score"] for point in tuning["points"]))
         least = min(mean(i / 100) for i in range(801))
-        self.assertLess(best["figure"] - least, 0.05)
+        self.assertLess(best["score"] - least, 0.05)
         self.assertEqual(tuning["points"][0]["values"], [1], "it begins at the pipeline's own value")
         name = "tuned+%g" % best["values"][0]
         variants = {one["name"]: one for one in self.answer()["variants"]}
@@ -114,7 +131,7 @@ class Tuning(Case):
         tuning = self.answer()["tuning"]
         self.assertEqual(tuning["optimizer"], "optimizer.direct")
         self.assertLessEqual(len(tuning["points"]), 30)
-        self.assertLess(tuning["points"][tuning["best"]]["figure"], tuning["untuned"]["figure"])
+        self.assertLess(tuning["points"][tuning["best"]]["score"], tuning["untuned"]["score"])
 
     def test_a_point_that_the_pipeline_refuses_counts_as_a_bad_one(self):
         self.write("p.yaml", LIMITS)
@@ -126,17 +143,118 @@ class Tuning(Case):
         refused = [point for point in tuning["points"] if point["values"][0] > point["values"][1]]
         self.assertIn([3, 2], [point["values"] for point in refused], "the first step")
         for point in refused:
-            self.assertEqual((point["figure"], point["runs"]), (7, 0))
+            self.assertEqual((point["score"], point["mean"], point["runs"]), (7, None, 0))
             self.assertIn("'low'", point["refused"])
         self.assertNotIn("refused", tuning["points"][tuning["best"]])
+        self.assertIn(
+            ", %d points, %d of them refused by the pipeline; " % (len(tuning["points"]), len(refused)),
+            tuning["sentence"],
+        )
 
     def test_a_failed_run_counts_as_a_bad_one(self):
         self.write("p.yaml", FAILING)
         result = self.compare("--quiet")
         tuning = self.answer()["tuning"]
-        self.assertEqual(tuning["untuned"], {"values": [], "figure": 7, "runs": 6, "failed": 6})
-        self.assertIn("which is no better", tuning["sentence"])
+        nothing = {"score": 7, "mean": None, "runs": 6, "failed": 6, "capped": 0}
+        self.assertEqual(tuning["untuned"], {"values": [], **nothing})
+        for point in tuning["points"]:
+            self.assertEqual({**point, "values": []}, {"values": [], **nothing})
+        self.assertIsNone(tuning["best"])
+        self.assertRegex(
+            tuning["sentence"],
+            r"points; score: mean distance with failed and worse runs counted as 7; untuned: 7 \(no figure in any of 6 "
+            r"runs\); no point is better than failed runs, so none is compared on the cases that are held out$",
+        )
+        self.assertEqual([one["name"] for one in self.answer()["variants"]], ["untuned"], "none was tuned")
         self.assertIn("failed cells", result.stdout)
+
+    def with_values(self, *values):
+        """An experiment whose runs of the pipeline as it is have these values; None for a run that fails. A run is the
+        number of a case's file, and a tuned point adds 'shift'."""
+        for i, value in enumerate(values):
+            folder = self.scratch / "cases" / str(i)
+            folder.mkdir(parents=True)
+            (folder / "value").write_text("" if value is None else str(value))
+        self.write("p.yaml", VALUES)
+        return VALUES_EXPERIMENT % (len(values) - 1)
+
+    def test_a_score_is_not_called_a_mean(self):
+        """By hand: of 1, 5, 30, 140 mm and two that fail, the mean is 176 / 4 = 44, and the score, with all above 20 mm
+        and the failed ones counted as 20, is (1 + 5 + 4 * 20) / 6 = 14.33."""
+        self.file = self.write("e.yaml", self.with_values(1, 5, 30, 140, None, None, 2))
+        said = self.compare().stderr
+        tuning = self.answer()["tuning"]
+        untuned = tuning["untuned"]
+        self.assertAlmostEqual(untuned["score"], 86 / 6, 12)
+        self.assertAlmostEqual(untuned["mean"], 44, 12)
+        self.assertEqual((untuned["runs"], untuned["failed"], untuned["capped"]), (6, 2, 2))
+        rule = "score: mean error with failed and worse runs counted as 20 mm"
+        text = "14.33 mm (mean 44 mm of 4 of 6 runs, 2 failed or without the figure, 2 worse than 20 mm)"
+        self.assertIn("marrow: %s\nmarrow: untuned as it is: %s\n" % (rule, text), said)
+        self.assertIn("; %s; untuned: %s; " % (rule, text), tuning["sentence"])
+        self.assertEqual(tuning["score_rule"], rule[len("score: ") :])
+        # The second of two points, 2 mm lower: (0 + 3 + 4 * 20) / 6 = 13.83, and (0 + 3 + 28 + 138) / 4 = 42.25.
+        best = tuning["points"][tuning["best"]]
+        self.assertAlmostEqual(best["score"], 83 / 6, 12)
+        self.assertAlmostEqual(best["mean"], 42.25, 12)
+        self.assertIn("marrow: point 2 of at most 2, s.shift 2: score 13.83 mm (mean 42.25 mm of 4 of 6 runs, ", said)
+        self.assertIn("; best so far 13.83 mm (mean 42.25 mm ", said)
+
+    def test_points_whose_runs_are_all_worse_are_none_to_choose_from(self):
+        self.file = self.write("e.yaml", self.with_values(30, 140, 50, 2))
+        self.compare("--quiet")
+        tuning = self.answer()["tuning"]
+        self.assertEqual([point["capped"] for point in tuning["points"]], [3, 3])
+        self.assertEqual((tuning["untuned"]["score"], tuning["best"]), (20, None))
+        self.assertAlmostEqual(tuning["untuned"]["mean"], 220 / 3, 12)
+        self.assertIn("untuned: 20 mm (mean 73.33 mm of 3 runs, 3 worse than 20 mm); no point", tuning["sentence"])
+
+    def test_higher_may_be_better(self):
+        """Of 1, 5, 30 and one that fails, each below 4 counts as 4: (4 + 5 + 30 + 4) / 4 = 10.75, the mean is 12."""
+        text = self.with_values(1, 5, 30, None, 2).replace("label: error", "label: score, better: higher")
+        self.file = self.write("e.yaml", text.replace("failed_as: 20", "failed_as: 4"))
+        self.compare("--quiet")
+        tuning = self.answer()["tuning"]
+        self.assertAlmostEqual(tuning["untuned"]["score"], 10.75, 12)
+        self.assertAlmostEqual(tuning["untuned"]["mean"], 12, 12)
+        self.assertEqual((tuning["untuned"]["failed"], tuning["untuned"]["capped"]), (1, 1))
+        self.assertEqual(tuning["best"], 0, "a shift makes them lower")
+
+    def test_a_run_without_the_figure_counts_as_failed(self):
+        """The cell is done, but the node of the figure failed, which it may."""
+        text = self.with_values(1, None, 3)
+        may_fail = VALUES.replace("{path: $case}}", "{path: $case}, may_fail: true}")
+        self.write("p.yaml", may_fail.replace("{of: r}}", "{of: r}, may_fail: true}"))
+        self.file = self.write("e.yaml", text)
+        self.compare("--quiet")
+        untuned = self.answer()["tuning"]["untuned"]
+        self.assertEqual((untuned["mean"], untuned["score"], untuned["failed"]), (1, 10.5, 1))
+
+    def test_points_of_different_units_are_refused(self):
+        text = self.with_values(1, 2, 3).replace("s.shift: [0, 8]", "s.shift: [0, 8], s.scale: [0, 1]")
+        text = text.replace("points: 2", "points: 6")
+        self.file = self.write("e.yaml", text)
+        said = self.compare("--quiet", code=2).stderr
+        self.assertIn("has the unit 'mm' in the cell untuned/0/0 and the unit 'm' in the cell tuned+", said)
+
+    def test_a_pipeline_that_changes_between_two_points(self):
+        self.write("p.yaml", SLOW)
+        process = subprocess.Popen(
+            [MARROW, "compare", self.file, "--out", "out"],
+            cwd=self.scratch,
+            env=dict(os.environ, MARROW_CACHE=str(self.scratch / "cache"), MARROW_PLUGIN_PATH=str(TEST_PLUGINS)),
+            stderr=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            text=True,
+        )
+        for line in process.stderr:
+            if "point 2 of" in line:
+                self.write("p.yaml", PIPELINE)
+                break
+        rest = process.stderr.read()
+        process.stderr.close()
+        self.assertEqual(process.wait(), 2, rest)
+        self.assertRegex(rest, r"p\.yaml was changed while the comparison ran: its tables may mix the old with the new")
 
     def test_interrupted_it_goes_on(self):
         self.write("p.yaml", SLOW)

@@ -54,12 +54,12 @@ TEST_F(ExperimentTune, ThePipelineAsItIsIsTheVariant) {
 TEST_F(ExperimentTune, ATunedVariantIsNamedAfterItsValues) {
   Experiment experiment =
       good("options: {c.value: [10, 20], c.count: {range: [1, 3], whole: true}}, variant: two, " + kRest,
-           std::string(kVariants));
+           "variants:\n  one: {}\n  two: {c.word: two}\n");
   EXPECT_EQ(add_tuned(experiment, std::vector<double>{12.34, 2}), "tuned+12.34+2");
   const marrow::compare::Variant tuned = experiment.variants.back();
   ASSERT_EQ(tuned.overrides.size(), 3u);
-  EXPECT_EQ(tuned.overrides[0].key, "c.value") << "those of the variant come first";
-  EXPECT_EQ(tuned.overrides[0].value, "2");
+  EXPECT_EQ(tuned.overrides[0].key, "c.word") << "those of the variant come first";
+  EXPECT_EQ(tuned.overrides[0].value, "two");
   EXPECT_EQ(tuned.overrides[1].value, "12.34");
   EXPECT_EQ(tuned.overrides[2].value, "2");
   experiment.variants.pop_back();
@@ -94,6 +94,34 @@ TEST_F(ExperimentTune, AFailedRunCountsAsTenTimesTheLimit) {
   EXPECT_DOUBLE_EQ(experiment.tune->failed_as, 3);
 }
 
+TEST_F(ExperimentTune, AFailedRunCountsAsNoSuccess) {
+  const std::string by = "options: {c.value: [10, 20]}, " + kBy + "points: 9, training_cases: 1";
+  const auto says_nothing = [&](const std::string& limit) {
+    expect_fault(
+        by, "'tune' does not say what a failed run counts as",
+        "add  failed_as:  with a bad value of number.value; with a limit above 0 under 'success' it is ten times "
+        "that limit",
+        "success: {number.value: " + limit + "}\n");
+  };
+  says_nothing("0");   // ten times 0 would make a failed run as good as the best
+  says_nothing("-5");  // -50 would be better than any
+  const std::string hint = "let  failed_as  be a value that is no success", limit = "success: {number.value: 0.3}\n";
+  expect_fault(by + ", failed_as: 0.2",
+               "a failed run would count as 0.2, which is a success: the limit of number.value is 0.3", hint, limit);
+  EXPECT_EQ(good(by + ", failed_as: 0.3", limit).tune->failed_as, 0.3) << "success is below the limit";
+  const auto better = [&](const std::string& direction, const std::string& failed_as) {
+    return kGood.substr(0, kGood.find("metrics")) + "metrics: [{figure: number.value, better: " + direction + "}]\n" +
+           limit + "tune: {" + by + failed_as + "}\n";
+  };
+  EXPECT_EQ(read(better("nearest_zero", ", failed_as: -4")).tune->failed_as, 4) << "values are magnitudes";
+  EXPECT_EQ(read(better("higher", ", failed_as: 0.1")).tune->failed_as, 0.1);
+  read(better("higher", ", failed_as: 0.4"));
+  EXPECT_EQ(diagnostics.sorted()[0].message,
+            "a failed run would count as 0.4, which is a success: the limit of number.value is 0.3");
+  read(better("higher", ""));
+  EXPECT_EQ(diagnostics.sorted()[0].hint, "add  failed_as:  with a bad value of number.value");
+}
+
 TEST_F(ExperimentTune, EachFaultIsSaid) {
   const std::string options = "options: {c.value: [10, 20]}, ", by = options + kBy;
   const std::string example =
@@ -104,9 +132,10 @@ TEST_F(ExperimentTune, EachFaultIsSaid) {
   expect_fault(by + "points: 9, failed_as: 5", "'tune' does not say how many cases are for training",
                "add  training_cases: 20");
   expect_fault(by + "points: 9, failed_as: 5, training_cases: 2", "2 training cases of 2 leave none that is held out");
-  expect_fault(by + "points: 9, training_cases: 1", "'tune' does not say what a failed run counts as",
-               "add  failed_as:  with a bad value of number.value; with a limit under 'success' it is ten times that "
-               "limit");
+  expect_fault(
+      by + "points: 9, training_cases: 1", "'tune' does not say what a failed run counts as",
+      "add  failed_as:  with a bad value of number.value; with a limit above 0 under 'success' it is ten times "
+      "that limit");
   expect_fault(options + kRest + ", figure: number.valeu", "'number.valeu' is not among the metrics",
                "did you mean 'number.value'?");
   expect_fault(options + kRest + ", variant: untune", "there is no variant 'untune'", "did you mean 'untuned'?");

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Chooses numbers of options by an optimizer on the training cases. Then compares on the cases that are held out.
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <map>
 
 #include "compare/comparison.hpp"
+#include "compare/figure_units.hpp"
+#include "compare/unchanged.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/functions.hpp"
 #include "marrow/domain/printable.hpp"
@@ -47,7 +47,12 @@ class Tuner {
  public:
   Tuner(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment,
         const std::filesystem::path& folder)
-      : request_(request), catalogue_(catalogue), experiment_(experiment), rule_(*experiment.tune), folder_(folder) {
+      : request_(request),
+        catalogue_(catalogue),
+        experiment_(experiment),
+        rule_(*experiment.tune),
+        folder_(folder),
+        units_(experiment) {
     request_.quiet = true;  // a line for each point says enough
     const MetricChoice& metric = experiment.metrics[rule_.metric];
     made_.rule = rule_;
@@ -64,8 +69,8 @@ class Tuner {
     Experiment untuned = experiment_;
     untuned.variants = {experiment_.variants[rule_.variant]};
     made_.untuned = point_of(untuned, {});
-    if (!is_quiet_)
-      std::fprintf(stderr, "marrow: %s as it is: %.4g\n", printable(made_.variant).c_str(), made_.untuned.figure);
+    say("score: " + score_rule(made_));
+    say(made_.variant + " as it is: " + score_text(made_, made_.untuned));
     MinimisationProblem problem;
     problem.function = [&](const Eigen::VectorXd& x) { return badness_at({x.data(), x.data() + x.size()}); };
     problem.start = fractions_now(experiment_, catalogue_);
@@ -78,6 +83,9 @@ class Tuner {
     made_.curves = curves_json(tried_, curves_of(tried_, rows_by_variant(tried_, rows_))).dump();
     return made_;
   }
+
+  /// What the cells of all points depend on, as it was for the first that needed it.
+  const compare::Dependencies& dependencies() const { return dependencies_; }
 
  private:
   const Optimizer& optimizer() {
@@ -96,25 +104,26 @@ class Tuner {
   double badness_at(const std::vector<double>& fractions) {
     const std::vector<double> values = rule_.values_at(fractions);
     if (const auto known = known_.find(values); known != known_.end())
-      return sign() * made_.points[known->second].figure;
+      return sign() * made_.points[known->second].score;
     Experiment at_point = experiment_;
     request_.tuned = add_tuned(at_point, values);
     at_point.variants = {at_point.variants.back()};
     if (const std::string fault = fault_of(at_point); fault.empty()) {
       tried_.variants.push_back(at_point.variants[0]);
-      made_.points.push_back(point_of(at_point, values));
+      made_.add(point_of(at_point, values));
     } else {
-      made_.points.push_back({values, rule_.failed_as, 0, 0, fault});
+      made_.add({values, rule_.failed_as, std::nullopt, 0, 0, 0, fault});
     }
-    const std::size_t number = made_.points.size() - 1;
-    known_[values] = number;
-    if (sign() * made_.points[number].figure < sign() * made_.points[made_.best].figure) made_.best = number;
-    if (!is_quiet_)
-      std::fprintf(stderr, "marrow: point %zu of at most %zu: %.4g at %s%s; best so far %.4g\n", number + 1,
-                   rule_.points, made_.points[number].figure, printable(values_text(rule_, values)).c_str(),
-                   made_.points[number].refused.empty() ? "" : ", which the pipeline does not take",
-                   made_.points[made_.best].figure);
-    return sign() * made_.points[number].figure;
+    known_[values] = made_.points.size() - 1;
+    const TuningPoint& point = made_.points.back();
+    say("point " + std::to_string(made_.points.size()) + " of at most " + std::to_string(rule_.points) + ", " +
+        values_text(rule_, values) + ": score " + score_text(made_, point) +
+        (made_.best ? "; best so far " + score_text(made_, made_.points[*made_.best]) : ""));
+    return sign() * point.score;
+  }
+
+  void say(const std::string& text) const {
+    if (!is_quiet_) std::fprintf(stderr, "marrow: %s\n", printable(text).c_str());
   }
 
   /// Why the pipeline does not take the values of the only variant; empty if it does. Each value alone may be good,
@@ -131,29 +140,12 @@ class Tuner {
     keep_training_cases(experiment);
     const auto cells = run_cells(request_, catalogue_, experiment, folder_);
     if (!cells) throw Interrupted();
-    TuningPoint point{values, 0, cells->rows.size(), 0};
-    for (const CellRow& row : cells->rows) {
-      point.failed += !row.failed.empty();
-      point.figure += figure_of(row);
-      if (made_.unit.empty()) made_.unit = row.units[rule_.metric];
-      if (!values.empty()) rows_.push_back(row);
-    }
-    point.figure /= double(point.runs);
-    return point;
-  }
-
-  /// A figure, no worse than that of a failed run.
-  double figure_of(const CellRow& row) const {
-    if (!row.failed.empty() || !row.values[rule_.metric]) return rule_.failed_as;
-    const double value = *row.values[rule_.metric];
-    switch (experiment_.metrics[rule_.metric].better) {
-      case MetricChoice::Better::higher:
-        return std::max(value, rule_.failed_as);
-      case MetricChoice::Better::nearest_zero:
-        return std::min(std::abs(value), std::abs(rule_.failed_as));
-      default:
-        return std::min(value, rule_.failed_as);
-    }
+    dependencies_.contents.insert(cells->dependencies.contents.begin(), cells->dependencies.contents.end());
+    dependencies_.builds.insert(cells->dependencies.builds.begin(), cells->dependencies.builds.end());
+    units_.add(cells->rows);
+    made_.unit = units_.of_metrics()[rule_.metric];
+    if (!values.empty()) rows_.insert(rows_.end(), cells->rows.begin(), cells->rows.end());
+    return cli::point_of(experiment_, values, cells->rows);
   }
 
   CompareRequest request_;
@@ -169,6 +161,8 @@ class Tuner {
   std::map<std::vector<double>, std::size_t> known_;
   Experiment tried_;
   std::vector<CellRow> rows_;  ///< of all points
+  FigureUnits units_;
+  compare::Dependencies dependencies_;
 };
 
 }  // namespace
@@ -176,16 +170,20 @@ class Tuner {
 int run_tuning(const CompareRequest& asked, const Catalogue& catalogue, const Experiment& experiment,
                const std::filesystem::path& folder) {
   CompareRequest request = asked;
+  const Unchanged unchanged(experiment, Unchanged::Cases::all);
+  Tuner tuner(asked, catalogue, experiment, folder);
   try {
-    request.tuning = Tuner(asked, catalogue, experiment, folder).run();
+    request.tuning = tuner.run();
   } catch (const Interrupted&) {
     return stopped();
   }
   if (!request.quiet) std::fprintf(stderr, "marrow: %s\n", printable(sentence(*request.tuning)).c_str());
   Experiment held_out = experiment;
-  request.tuned = add_tuned(held_out, request.tuning->points[request.tuning->best].values);
+  if (const auto best = request.tuning->best) request.tuned = add_tuned(held_out, request.tuning->points[*best].values);
   keep_held_out_cases(held_out);
-  return run_comparison(request, catalogue, held_out, folder);
+  const int code = run_comparison(request, catalogue, held_out, folder);
+  unchanged.check(tuner.dependencies());
+  return code;
 }
 
 }  // namespace marrow::cli

@@ -36,8 +36,8 @@ std::string difference(const compare::Experiment& before, const compare::Experim
 
 }  // namespace
 
-Unchanged::Unchanged(const compare::Experiment& experiment)
-    : experiment_(experiment), texts_{{experiment.file, experiment.text}} {
+Unchanged::Unchanged(const compare::Experiment& experiment, Cases cases)
+    : experiment_(experiment), cases_(cases), texts_{{experiment.file, experiment.text}} {
   for (const fs::path& file : {experiment.pipeline, experiment.simulation.pipeline})
     if (!file.empty()) texts_[file] = read_text_file(file, kMostSourceBytes);
 }
@@ -51,7 +51,7 @@ void Unchanged::check(const compare::Dependencies& dependencies) const {
   Diagnostics diagnostics;
   compare::Experiment now = compare::read_experiment(experiment_.file, catalogue, diagnostics, experiment_.more_cases);
   if (!diagnostics.empty()) refuse("what " + experiment_.file.string() + " names (" + diagnostics.text() + ")");
-  if (now.tune) keep_held_out_cases(now);
+  if (now.tune && cases_ == Cases::held_out) keep_held_out_cases(now);
   if (const std::string other = difference(experiment_, now); !other.empty())
     refuse("the list of cases (" + other + ")");
 }

@@ -12,13 +12,16 @@ namespace marrow::cli {
 /// file changes meanwhile, the processes do not all use the same content.
 class Unchanged {
  public:
-  /// Reads the files that define the comparison.
-  explicit Unchanged(const compare::Experiment& experiment);
+  enum class Cases { all, held_out };
+  /// Reads the files that define the comparison. If the experiment tunes options, it may have all of its cases, or only
+  /// those that are held out.
+  explicit Unchanged(const compare::Experiment& experiment, Cases cases = Cases::held_out);
   /// Throws Error if something changed, and names it.
   void check(const compare::Dependencies& dependencies) const;
 
  private:
   const compare::Experiment& experiment_;
+  Cases cases_;
   std::map<std::filesystem::path, std::string> texts_;
 };
 

@@ -15,7 +15,7 @@ struct TuneRule {
   std::vector<SweptOption> options;
   std::size_t variant = 0;  ///< the one whose options are tuned
   std::size_t metric = 0;   ///< the figure whose mean over the training cases and starts is made as good as possible
-  double failed_as = 0;     ///< the figure that a failed run counts as; a worse one counts as this too
+  double failed_as = 0;     ///< what a failed run counts as in that mean, and a worse one; a magnitude for nearest_zero
   std::string optimizer;    ///< name of the node that chooses the points
   std::vector<std::pair<std::string, std::string>> optimizer_options;  ///< as texts in YAML
   Place optimizer_place;
