@@ -52,6 +52,7 @@ int run_more_cases(const CompareRequest& asked, const Catalogue& catalogue, cons
     if (!cells) return stopped();
     const Answer answer = answer_of(larger, cells->rows);
     request.made_before += cells->made;
+    request.calls_before.add(cells->calls);
     for (const compare::CellRow& row : cells->rows)
       if (!row.failed.empty()) request.failed_before.emplace(row.id, row);
     if (answer.look->is_met) return run_comparison(request, catalogue, larger, folder);
