@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every figure that marrow compare says of random experiments is the one that follows from their cells."""
+import collections
+import time
+
+from recomputing import BUILD  # it finds the modules below
+from marrow_cli import Case, main, sample
+from sample import ALL
+
+import files
+import ranks
+import recompute_compare
+from checks import Checks
+from experiment import Experiment, Metric, Variant
+from generator import displacements, generate
+
+SECONDS = 60  # after which no further experiment begins, unless all are asked for
+
+
+class Recomputed(Case):
+    def test_random_experiments(self):
+        checks, begin, done = Checks(), time.monotonic(), collections.Counter()
+        seeds = range(1, 401) if ALL else sample(range(1, 401), 40)
+        for seed in seeds:
+            if time.monotonic() - begin > SECONDS and not ALL:
+                break
+            one = recompute_compare.run_and_check(checks, seed, self.scratch / str(seed), BUILD)
+            done["stop" if one.stop else "tune" if one.tune else "sweep" if one.sweep else "plain"] += 1
+        print("experiments: %s\n%s" % (dict(done), checks.report()))
+        self.assertEqual(checks.differences, [])
+        self.assertGreater(sum(checks.counts.values()), 1000)
+
+
+def differences(numbers, unit="mm", factor=1):
+    """An experiment with one start, in which the variants differ by these numbers."""
+    cases = ["case %02d" % i for i in range(len(numbers))]
+    table = {}
+    for i, (case, number) in enumerate(zip(cases, numbers)):
+        for column, value in (("a", 10 + 0.1 * (i % 7)), ("b", 10 + 0.1 * (i % 7) + number)):
+            text = "%s %s" % (repr(round(value * factor, 6)), unit if column == "a" else unit)
+            table[case, column, 0] = {"a": text, "evaluations": "1", "start_error": "1 mm", "verdict": "trusted"}
+    metrics = [Metric("main", "a", "mTRE", "lower", unit)]
+    return Experiment("ties", metrics, [Variant("a", "a"), Variant("b", "b")], cases, displacements(1), table)
+
+
+class Told(Case):
+    def run_it(self, experiment, name):
+        files.write(experiment, self.scratch / name)
+        return files.run(experiment, self.scratch / name, BUILD)
+
+    def checked(self, experiment, name):
+        ended, checks = self.run_it(experiment, name), Checks()
+        self.assertEqual(ended.returncode, 0, ended.stderr)
+        recompute_compare.check(checks, experiment, self.scratch / name / "out", ended.stdout)
+        self.assertEqual(checks.differences, [])
+        return ended.stdout
+
+    def test_ties_do_not_depend_on_the_unit(self):
+        # 0.1 and 0.3 - 0.2 differ in the last bit, and other bits when all is multiplied by ten.
+        numbers = [0.1, 0.2, -0.1, 0.3, 0.2, 0.1, -0.2, 0.4, 0, 0.3]
+        p = [ranks.signed_rank_p([ranks.Fraction(str(one)) * ten for one in numbers])[0] for ten in (1, 10)]
+        self.assertEqual(p[0], p[1])
+        said = [self.checked(differences(numbers, factor=ten), str(ten)).split("cases, ")[1] for ten in (1, 10)]
+        self.assertEqual(said[0].split("\n")[0], said[1].split("\n")[0])
+
+    def test_metres_and_millimetres_are_refused(self):
+        experiment = differences([0.1] * 6)
+        for case in experiment.cases:
+            experiment.table[case, "b", 0]["a"] = "0.0101 m"
+        ended = self.run_it(experiment, "units")
+        self.assertEqual(ended.returncode, 2, ended.stdout)
+        self.assertIn("the figure 'main.a' has the unit 'mm' in the cell a/case 00/0", ended.stderr)
+        self.assertIn("and the unit 'm' in the cell b/case 00/0", ended.stderr)
+
+    def test_all_sizes_of_experiments(self):
+        # One case up to six, at which 95 % can be reached; and 40, which no enumeration of all signs reaches.
+        for count in (1, 2, 5, 6, 40):
+            said = self.checked(differences([0.5 + 0.01 * i for i in range(count)]), "n%d" % count)
+            self.assertEqual("no difference shown" in said, count < 6)
+            self.assertEqual("fewer than 6 cases cannot reach p < 0.05" in said, count < 6)
+
+
+if __name__ == "__main__":
+    main()
