@@ -12,8 +12,8 @@ from page import PageTest, run_tests
 
 def curve(variant, option, figure, scale="linear"):
     """Five points, of which the last has no runs and the one before has no interval."""
-    points = [{"value": 10 + 10 * i, "runs": 8, "middle": i, "low": i - 1, "high": i + 1} for i in range(3)]
-    points += [{"value": 40, "runs": 2, "middle": 3}, {"value": 50, "runs": 0}]
+    points = [{"value": 10 + 10 * i, "runs": 8, "of": 8, "middle": i, "low": i - 1, "high": i + 1} for i in range(3)]
+    points += [{"value": 40, "runs": 2, "of": 8, "middle": 3}, {"value": 50, "runs": 0, "of": 8}]
     return {"variant": variant, "option": option, "figure": figure, "scale": scale, "points": points}
 
 

@@ -62,6 +62,13 @@ const Summary = (() => {
               spread(item)) :
            spread(item));
 
+  // Runs that failed, and those that are done without a figure whose node may fail.
+  const lost = ({failed, incomplete}) =>
+      [String(failed ?? '–'),
+       incomplete > 0 &&
+           el('small', {'data-tip': 'done, but without a figure whose node may fail'},
+              ' + ' + incomplete + ' incomplete')];
+
   const countOf = (item) => (item && Number.isFinite(item.of) ? item.count + ' of ' + item.of : '–');
 
   function variantName(data, i) {
@@ -107,14 +114,7 @@ const Summary = (() => {
         cell: (i) => el('span', {'data-tip': 'runs that have the figure, of all'}, countOf(found(i))),
         number: true
       },
-      {title: 'Failed', key: (i) => of(i).failed, cell: (i) => String(of(i).failed ?? '–'), number: true},
-      {
-        title: 'Incomplete',
-        key: (i) => of(i).incomplete,
-        cell: (i) =>
-            el('span', {'data-tip': 'done, but without a figure whose node may fail'}, String(of(i).incomplete ?? '–')),
-        number: true
-      },
+      {title: 'Failed', key: (i) => of(i).failed + of(i).incomplete, cell: (i) => lost(of(i)), number: true},
       {
         title: 'Time [quartiles]',
         unit: 's',
@@ -238,8 +238,11 @@ const Summary = (() => {
   // Every comparison with its interval and p: the numbers behind the figure of the pairs.
   function comparisonTable(data) {
     const metric = (item) => data.metrics.find((one) => one.name === item.metric) || {label: item.metric};
-    const label = (item) => metric(item).label,
-          lost = (item) => item.runs_variant_lost + ' / ' + item.runs_baseline_lost;
+    const label = (item) => metric(item).label;
+    const lostRuns = ({runs_variant_lost: own, runs_baseline_lost: others}) =>
+        (own || others ?
+             el('small', {'data-tip': 'lost by it alone, and by the baseline alone'}, ' lost ' + own + ' / ' + others) :
+             null);
     const list = data.comparisons,
           name = (item) => (data.variants[data.variantIndex(item.variant)] || {name: item.variant}).name;
     const all = [
@@ -263,13 +266,7 @@ const Summary = (() => {
       {
         title: 'Pairs',
         key: (i) => list[i].pairs,
-        cell: (i) => countOf({count: list[i].pairs, of: list[i].runs}),
-        number: true
-      },
-      {
-        title: 'Lost by it / by the baseline',
-        key: (i) => list[i].runs_variant_lost,
-        cell: (i) => (Number.isFinite(list[i].runs_variant_lost) ? lost(list[i]) : '–'),
+        cell: (i) => [countOf({count: list[i].pairs, of: list[i].runs}), lostRuns(list[i])],
         number: true
       },
       {
