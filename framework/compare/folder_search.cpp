@@ -23,21 +23,21 @@ void FolderSearch::look() {
                 " files and folders; do links lead in a circle?");
 }
 
-std::vector<fs::path> FolderSearch::matches(const fs::path& pattern) {
-  if (pattern.native().size() >= PATH_MAX)
-    throw Error("the path has " + std::to_string(pattern.native().size()) + " bytes, more than any path may have");
-  std::vector<fs::path> found{pattern.root_path()};
+std::vector<fs::path> FolderSearch::matches(const fs::path& folder, const fs::path& pattern) {
+  if (const std::size_t size = (folder / pattern).native().size(); size >= PATH_MAX)
+    throw Error("the path has " + std::to_string(size) + " bytes, more than any path may have");
+  std::vector<fs::path> found{pattern.is_absolute() ? pattern.root_path() : folder};
   for (const fs::path& part : pattern.relative_path()) {
     if (part.empty()) continue;  // the part after a slash at the end
     std::vector<fs::path> next;
-    for (const fs::path& folder : found) {
+    for (const fs::path& one : found) {
       if (is_pattern(part.string())) {
-        for (fs::path& one : inside(folder, part.string())) next.push_back(std::move(one));
+        for (fs::path& match : inside(one, part.string())) next.push_back(std::move(match));
         continue;
       }
       look();
       std::error_code error;
-      if (fs::symlink_status(folder / part, error).type() != fs::file_type::not_found) next.push_back(folder / part);
+      if (fs::symlink_status(one / part, error).type() != fs::file_type::not_found) next.push_back(one / part);
     }
     found = std::move(next);
   }

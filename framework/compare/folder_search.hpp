@@ -11,10 +11,11 @@ namespace marrow::compare {
 /// even if links form a circle.
 class FolderSearch {
  public:
-  /// The existing paths that match `pattern`, sorted. A name that begins with a dot is matched only by a pattern that
-  /// begins with a dot. Throws Error if a folder cannot be read, if the pattern is longer than any path may be, or if
-  /// all calls together have looked at more than kMostLookedAt files and folders.
-  std::vector<std::filesystem::path> matches(const std::filesystem::path& pattern);
+  /// The existing paths that match `pattern`, sorted. It starts at `folder`, whose name is no pattern, whatever is in
+  /// it. A name that begins with a dot is matched only by a pattern that begins with a dot. Throws Error if a folder
+  /// cannot be read, if the path is longer than any may be, or if all calls together have looked at more than
+  /// kMostLookedAt files and folders.
+  std::vector<std::filesystem::path> matches(const std::filesystem::path& folder, const std::filesystem::path& pattern);
 
   static constexpr std::size_t kMostLookedAt = 300000;
 

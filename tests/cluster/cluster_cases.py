@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A comparison of 18 cheap cells, for tests of chunks and clusters."""
+"""A comparison of 18 cheap cells, for tests of chunks and clusters, and the Slurm cluster in which some of them run."""
 import csv
 import json
 import os
@@ -7,10 +7,13 @@ import pathlib
 import shutil
 import subprocess
 import sys
+import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "cli"))
 from marrow_cli import MARROW, SOURCE, TEST_PLUGINS, Case, another_run_makes_all, main, wait_until  # noqa: E402, F401
 
+IN_A_CLUSTER = "CLUSTER_FOLDER" in os.environ
+CAN_START_CLUSTER = os.geteuid() == 0 and shutil.which("sbatch") is not None
 CASES, VARIANTS = 3, 6
 PIPELINE = """marrow: 1
 inputs: {case: {type: path}}
@@ -19,6 +22,23 @@ nodes:
   m: {uses: test.misbehave, in: {a: shared}}
 outputs: {number: m}
 """
+
+
+def run_in_cluster():
+    """Runs this test again inside a cluster of one host. Returns its exit code."""
+    if all(pathlib.Path("/sys/fs/cgroup", one, "tasks").exists() for one in ("memory", "freezer")):
+        os.environ["CLUSTER_MEMORY"] = "1"
+    folder = tempfile.mkdtemp(prefix="marrow-cluster-")
+    try:
+        return subprocess.run([SOURCE / "tools" / "cluster_test", folder, sys.executable, *sys.argv]).returncode
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def is_idle():
+    """Whether no job waits, runs or ends."""
+    listed = subprocess.run(["squeue", "-h"], capture_output=True, text=True)
+    return listed.returncode == 0 and not listed.stdout
 
 
 class Cluster(Case):

@@ -7,10 +7,20 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 
-from cluster_cases import CASES, MARROW, SOURCE, VARIANTS, Cluster, main, wait_until
+from cluster_cases import (
+    CAN_START_CLUSTER,
+    CASES,
+    IN_A_CLUSTER,
+    MARROW,
+    VARIANTS,
+    Cluster,
+    is_idle,
+    main,
+    run_in_cluster,
+    wait_until,
+)
 
 PROFILE = "marrow-cluster: 1\nprocessors: 1\ntries: 3\nask_every_s: 2\n"
 ONE_TRY = PROFILE.replace("tries: 3", "tries: 1")
@@ -28,12 +38,6 @@ def tasks():
         if len(words) > 2 and words[1] == b"chunk" and words[2].startswith(bytes(tasks.folder)):
             found.append(int(process.name))
     return found
-
-
-def is_idle():
-    """Whether no job waits, runs or ends."""
-    listed = subprocess.run(["squeue", "-h"], capture_output=True, text=True)
-    return listed.returncode == 0 and not listed.stdout
 
 
 class OnSlurm(Cluster):
@@ -140,14 +144,14 @@ class OnSlurm(Cluster):
         for reason in reasons:
             self.assertIn(words + "; see log/", reason)
 
-    def give_place_away(self):
+    def give_place_away(self, code=0):
         process = self.start()
         wait_until(lambda: len(tasks()) == 2, "no two tasks came")
         subprocess.run(
             ["sbatch", "--quiet", "-p", "urgent", "-c", "2", "-o", "/dev/null", "--wrap", "sleep 1"], check=True
         )
         said, _ = process.communicate(timeout=600)
-        self.assertEqual(process.returncode, 0, said)
+        self.assertEqual(process.returncode, code, said)
 
     def test_place_given_to_another_job(self):
         self.only_with_all()
@@ -159,7 +163,7 @@ class OnSlurm(Cluster):
         shutil.rmtree(self.out)
         shutil.rmtree(self.scratch / "cache")
         self.profile = self.write("profile.yaml", ONE_TRY + "partition: cheap\n")
-        self.give_place_away()
+        self.give_place_away(code=1)
         self.expect_reasons("the cluster gave its place to another job (PREEMPTED)")
 
     def test_memory_of_the_cluster(self):
@@ -179,7 +183,7 @@ class OnSlurm(Cluster):
         for task in tasks():  # now it kills the task itself, but not its processes that run cells
             pathlib.Path("/proc/%d/oom_score_adj" % task).write_text("1000")
         said, _ = process.communicate(timeout=600)
-        self.assertEqual(process.returncode, 0, said)
+        self.assertEqual(process.returncode, 1, said)
         self.expect_reasons("it took more memory than the cluster allows (OUT_OF_MEMORY)")
         self.assertEqual(sum(row["status"] == "done" for row in self.figures("out").values()), 2 * VARIANTS)
 
@@ -233,27 +237,17 @@ class OnSlurm(Cluster):
         self.only_with_all()
         self.experiment(more=", hang: {m.how: hang}", cases=2)
         self.profile = self.write("profile.yaml", ONE_TRY + "minutes: 1\n")
-        self.submit("--wait")
+        self.submit("--wait", code=1)
         self.expect_reasons("the cluster's time limit was reached (TIMEOUT)")
         done = [cell for cell, row in self.figures("out").items() if row["status"] == "done"]
         self.assertEqual(len(done), 2 * VARIANTS)  # the rows that the tasks had made count
 
 
-def inside_a_cluster():
-    if "CLUSTER_FOLDER" in os.environ:
-        return True
-    if all(pathlib.Path("/sys/fs/cgroup", one, "tasks").exists() for one in ("memory", "freezer")):
-        os.environ["CLUSTER_MEMORY"] = "1"
-    folder = tempfile.mkdtemp(prefix="marrow-cluster-")
-    try:
-        if os.geteuid() != 0 or not shutil.which("sbatch"):
-            print("skipped: a Slurm cluster needs root, and the packages slurmctld, slurmd, slurm-client, munge")
-            sys.exit(77)
-        ended = subprocess.run([SOURCE / "tools" / "cluster_test", folder, sys.executable, *sys.argv])
-        sys.exit(ended.returncode)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-if __name__ == "__main__" and inside_a_cluster():
-    main()
+if __name__ == "__main__":
+    if IN_A_CLUSTER:
+        main()
+    elif not CAN_START_CLUSTER:
+        print("skipped: a Slurm cluster needs root, and the packages slurmctld, slurmd, slurm-client, munge")
+        sys.exit(77)
+    else:
+        sys.exit(run_in_cluster())

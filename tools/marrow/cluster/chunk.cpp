@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <set>
 
+#include "cluster/chunk_fault.hpp"
 #include "cluster/chunk_rows.hpp"
 #include "cluster/plan.hpp"
 #include "command_options.hpp"
@@ -161,6 +162,23 @@ const Chunk* chunk_named(const std::vector<Chunk>& chunks, const std::string& na
   return nullptr;
 }
 
+/// Returns false if it was stopped.
+bool do_chunk(const ClusterPlan& plan, const Chunk& chunk, bool is_of_cases, const ChunkRequest& asked) {
+  const Catalogue catalogue;
+  Diagnostics diagnostics;
+  const Experiment experiment = compare::read_experiment(plan.file, catalogue, diagnostics);
+  if (!diagnostics.empty()) {
+    print_faults(diagnostics);
+    const Diagnostic first = diagnostics.sorted().front();
+    throw Error("the experiment has faults here; the first: " + first.place.file + ":" +
+                std::to_string(first.place.line) + ": " + first.message);
+  }
+  expect_as_planned(plan, catalogue, experiment);
+  Task task{plan, experiment, catalogue, request_of(plan, asked)};
+  task.request.no_cache = plan.no_cache || !can_keep_results(Store().prepare(), asked.quiet);
+  return is_of_cases ? make_cases_only(task, chunk) : make_rows(task, chunk);
+}
+
 int run_chunk(const ChunkRequest& asked) {
   stop_on_signals();
   const ClusterPlan plan = read_plan(asked.plan);
@@ -169,17 +187,15 @@ int run_chunk(const ChunkRequest& asked) {
   if (!chunk)
     throw Error("the plan has no chunk '" + asked.name + "'; its chunks are " + plan.cells.front().name + " to " +
                 plan.cells.back().name);
-  const Catalogue catalogue;
-  Diagnostics diagnostics;
-  const Experiment experiment = compare::read_experiment(plan.file, catalogue, diagnostics);
-  if (!diagnostics.empty()) {
-    print_faults(diagnostics);
-    return 2;
+  try {
+    if (do_chunk(plan, *chunk, chunk == of_cases, asked)) {
+      remove_fault_of_chunk(plan.folder, chunk->name);
+      return 0;
+    }
+  } catch (const std::exception& error) {
+    leave_fault_of_chunk(plan.folder, chunk->name, error.what());
+    throw;
   }
-  expect_as_planned(plan, catalogue, experiment);
-  Task task{plan, experiment, catalogue, request_of(plan, asked)};
-  task.request.no_cache = plan.no_cache || !can_keep_results(Store().prepare(), asked.quiet);
-  if (of_cases ? make_cases_only(task, *chunk) : make_rows(task, *chunk)) return 0;
   std::fprintf(stderr, "marrow: %s; the same command goes on from here\n", stopped_text().c_str());
   return 130;
 }

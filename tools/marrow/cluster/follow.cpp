@@ -38,7 +38,10 @@ class Follower {
     const auto between_looks = std::min(kBetweenLooks, between_questions);
     for (Clock::time_point next = Clock::now(); !stop; std::this_thread::sleep_for(between_looks)) {
       read();
-      if (submission_.is_gathered) return 0;
+      if (submission_.is_gathered) {
+        say_lost(submission_.lost);
+        return submission_.lost.empty() ? 0 : 1;
+      }
       if (Clock::now() < next) continue;
       check(queue_of(submission_), stop);
       next = Clock::now() + between_questions;
@@ -145,6 +148,10 @@ class Follower {
 };
 
 }  // namespace
+
+void say_lost(const std::string& lost) {
+  if (!lost.empty()) std::fprintf(stderr, "marrow: error: %s", lost.c_str());
+}
 
 Made made_of(const std::vector<Chunk>& chunks, const std::map<std::string, bool>& files) {
   Made made;

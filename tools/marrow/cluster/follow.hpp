@@ -19,10 +19,13 @@ std::size_t cells_of_plan(const ClusterPlan& plan);
 /// "120 of 200 cells in 12 of 20 chunks"
 std::string progress_of(const ClusterPlan& plan);
 
+/// Prints Gathered::lost as an error. Nothing if it is empty.
+void say_lost(const std::string& lost);
+
 /// Follows what was submitted until its report is made. Ctrl-C ends it on the cluster, too. Tasks that the cluster
 /// takes for running, although their rows have long been there, are ended. Throws Error if the report will not be made:
 /// the job that makes it has ended or is forgotten, tasks are held back, or the cluster does not answer for
-/// `silence_s`.
+/// `silence_s`. Returns the exit code: 1 if cells are lost, 130 after Ctrl-C.
 int follow(const ClusterPlan& plan, const ClusterProfile& profile, bool quiet);
 
 }  // namespace marrow::cli

@@ -3,6 +3,7 @@
 
 #include <cstdio>
 
+#include "cluster/chunk_fault.hpp"
 #include "cluster/chunk_rows.hpp"
 #include "cluster/follow.hpp"
 #include "cluster/scripts.hpp"
@@ -32,6 +33,7 @@ int print_status(const fs::path& folder) {
   for (const auto& [state, count] : counts) std::printf("  %zu tasks %s\n", count, printable(state).c_str());
   std::printf("%s; submitted %lld times\n", submission->is_gathered ? "tables and report are made" : "not gathered yet",
               static_cast<long long>(submission->tries));
+  if (!submission->lost.empty()) std::printf("%s", submission->lost.c_str());
   return 0;
 }
 
@@ -43,12 +45,26 @@ bool load_profile(const ClusterRequest& cluster, ClusterProfile& profile) {
   return diagnostics.empty();
 }
 
-/// Cells of the chunks that left no rows, with the reason.
-LostCells lost_cells(const ClusterPlan& plan, const std::map<std::string, std::string>& reasons) {
+/// Why a chunk has no good row of a cell, where the cluster does not say it.
+std::string reason_of(const ClusterPlan& plan, const std::string& chunk, const std::map<std::string, bool>& files) {
+  const auto file = files.find(chunk);
+  if (file != files.end() && file->second)
+    return "rows/" + chunk + ".jsonl has no undamaged row of it with its case and plugins as they are now";
+  const std::string fault = fault_of_chunk(plan.folder, chunk);
+  if (!fault.empty()) return "no task left its row: " + fault;
+  return file == files.end() ? "no task left its row" : "its task ended before it left its row, or it runs still";
+}
+
+/// Why cells of the plan may have no row. `of_cluster`: by the chunk's name.
+LostCells lost_cells(const ClusterPlan& plan, const std::map<std::string, std::string>& of_cluster) {
+  const std::map<std::string, bool> files = chunk_files(plan.folder);
   LostCells lost;
-  for (const Chunk& chunk : plan.cells)
-    if (const auto reason = reasons.find(chunk.name); reason != reasons.end())
-      for (const std::size_t number : chunk.numbers) lost[number] = reason->second;
+  for (const Chunk& chunk : plan.cells) {
+    const auto file = files.find(chunk.name);
+    const auto reason = file == files.end() || !file->second ? of_cluster.find(chunk.name) : of_cluster.end();
+    const std::string words = reason == of_cluster.end() ? reason_of(plan, chunk.name, files) : reason->second;
+    for (const std::size_t number : chunk.numbers) lost[number] = words;
+  }
   return lost;
 }
 
@@ -65,18 +81,23 @@ int gather_on_slurm(const CompareRequest& request, const ClusterRequest& cluster
                 static_cast<long long>(again.tries), static_cast<long long>(profile.tries));
     return 0;
   }
-  const LostCells lost = is_whole ? LostCells{} : lost_cells(plan, reasons_of(*submission));
-  const int code = run_comparison(request, catalogue, experiment, folder, lost);
-  submission->is_gathered = code == 0;
+  const auto of_cluster = is_whole ? std::map<std::string, std::string>() : reasons_of(plan, *submission);
+  const Gathered gathered = gather_comparison(request, catalogue, experiment, folder, lost_cells(plan, of_cluster));
+  submission->is_gathered = gathered.code == 0 || !gathered.lost.empty();
+  submission->lost = gathered.lost;
   write_submission(folder, *submission);
-  return code;
+  say_lost(gathered.lost);
+  return gathered.code;
 }
 
 int gather(const CompareRequest& request, const ClusterRequest& cluster, const ClusterProfile& profile,
            const Catalogue& catalogue, const Experiment& experiment, const fs::path& folder) {
   const ComparisonFolder kept(folder, experiment, ComparisonFolder::Use::alone);
   if (cluster.on == "slurm") return gather_on_slurm(request, cluster, profile, catalogue, experiment, folder);
-  return run_comparison(request, catalogue, experiment, folder);
+  const Gathered gathered =
+      gather_comparison(request, catalogue, experiment, folder, lost_cells(latest_plan(folder), {}));
+  say_lost(gathered.lost);
+  return gathered.code;
 }
 
 void expect_ended(const Submission& before, const fs::path& folder) {

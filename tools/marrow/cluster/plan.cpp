@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
 constexpr std::size_t kMostCaseTasks = 100;
 
 /// Numbers in rising order, as a list of [first, behind the last].
@@ -48,12 +48,19 @@ json of(const std::vector<Chunk>& chunks) {
   return list;
 }
 
+/// A list of [path, digest]: a path need not be UTF-8, as keys of JSON must be.
+json of(const std::map<std::string, std::string>& digests) {
+  json list = json::array();
+  for (const auto& [path, digest] : digests) list.push_back({json_of_bytes(path), digest});
+  return list;
+}
+
 /// Everything but the id, which is the digest of this.
 json content_of(const ClusterPlan& plan) {
   return {{"marrow-plan", kVersion},
           {"experiment", json_of_bytes(plan.file.string())},
           {"folder", json_of_bytes(plan.folder.string())},
-          {"texts", plan.texts},
+          {"texts", of(plan.texts)},
           {"builds", plan.builds},
           {"case digests", plan.case_digests},
           {"threads", plan.threads},
@@ -169,7 +176,7 @@ ClusterPlan read_plan(const fs::path& file) {
     ClusterPlan plan;
     plan.file = bytes_of_json(j.at("experiment"));
     plan.folder = bytes_of_json(j.at("folder"));
-    plan.texts = j.at("texts");
+    for (const json& text : j.at("texts")) plan.texts[bytes_of_json(text.at(0))] = text.at(1);
     plan.builds = j.at("builds");
     plan.case_digests = j.at("case digests");
     plan.threads = int(integer_of(j.at("threads"), 1, 1024, "'threads'"));

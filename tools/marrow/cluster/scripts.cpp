@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cluster/scripts.hpp"
 
-#include <sys/stat.h>
-
 #include <algorithm>
-#include <nlohmann/json.hpp>
+#include <cctype>
 
 #include "process.hpp"
 #include "report/report.hpp"
@@ -27,18 +25,53 @@ fs::path write_script(const fs::path& file, const std::string& text) {
   return file;
 }
 
-/// The settings of marrow in this process's environment, as lines of shell.
+bool is_name_of_setting(const std::string& name) {
+  return name.starts_with("MARROW_") && std::all_of(name.begin(), name.end(), [](unsigned char c) {
+           return c == '_' || (c < 128 && std::isalnum(c));
+         });
+}
+
+/// The settings of marrow in this process's environment, as lines of shell. Paths in them may start at the folder in
+/// which this process runs.
 std::string settings_of_marrow() {
   std::vector<std::string> lines;
   for (char** one = environ; *one; ++one)
-    if (const std::string text = *one; text.starts_with("MARROW_"))
-      if (const std::size_t end = text.find('='); end != std::string::npos)
-        lines.push_back("export " + text.substr(0, end) + "=" + shell_word(text.substr(end + 1)) + "\n");
+    if (const std::string text = *one, name = text.substr(0, text.find('=')); is_name_of_setting(name))
+      lines.push_back("export " + name + "=" + script_word(text.substr(std::min(text.size(), name.size() + 1))) + "\n");
   std::sort(lines.begin(), lines.end());
-  std::string text;
+  std::error_code error;
+  const std::string here = script_word(fs::current_path(error).string());
+  std::string text = error ? "" : "if [ -d " + here + " ]; then cd " + here + "; fi\n";
   for (const std::string& line : lines) text += line;
   return text;
 }
+
+/// A list in Python. Names of chunks have letters, digits and hyphens only.
+std::string python_list(const std::vector<Chunk>& chunks) {
+  std::string list;
+  for (const Chunk& chunk : chunks) list += (list.empty() ? "\"" : ", \"") + chunk.name + "\"";
+  return "[" + list + "]";
+}
+
+/// What a Snakefile does before its rules. Its executors put the names of folders into commands without quoting them
+/// for the shell.
+const std::string kStartOfSnakefile = R"(import os, re
+
+if not getattr(workflow, "run_local", True):
+    for folder, advice in (
+        (os.getcwd(), "start it in another folder"),
+        (os.path.dirname(workflow.basedir), "choose another folder with --out"),
+    ):
+        if not re.fullmatch("[A-Za-z0-9_.,:/+@-]+", folder):
+            raise WorkflowError(
+                "Snakemake gives the name of the folder %r to a shell when it submits jobs, and does not quote it. So "
+                "it may hold letters, digits and _ . , : / + @ - only; %s, or let Snakemake run on this machine, by "
+                "--cores" % (folder, advice)
+            )
+
+workdir: os.path.dirname(workflow.basedir)
+
+)";
 
 }  // namespace
 
@@ -53,75 +86,84 @@ fs::path write_chunk_script(const ClusterPlan& plan, const ClusterProfile& profi
   for (const std::string& module : profile.modules) text += "module load " + module + "\n";
   text += settings_of_marrow();
   for (const std::string& line : profile.setup) text += line + "\n";
-  text += "exec " + shell_word(this_program().string()) + " chunk " + shell_word(plan.place().string()) + " \"$@\"\n";
+  text += "exec " + script_word(this_program().string()) + " chunk " + script_word(plan.place().string()) + " \"$@\"\n";
   return write_script(beside(plan, "chunk.sh"), text);
 }
 
-std::string gather_command(const ClusterPlan& plan) {
-  return shell_word(this_program().string()) + " compare " + shell_word(plan.file.string()) + " --out " +
-         shell_word(plan.folder.string()) + " --gather";
+fs::path write_gather_script(const ClusterPlan& plan, const std::vector<std::string>& more) {
+  std::string text = "#!/bin/sh\n# Makes tables and report of a comparison from the rows that are there.\nset -e\n" +
+                     settings_of_marrow() + "exec " + script_word(this_program().string()) + " compare " +
+                     script_word(plan.file.string()) + " --out " + script_word(plan.folder.string()) + " --gather";
+  for (const std::string& word : more) text += " " + script_word(word);
+  return write_script(beside(plan, "gather.sh"), text + "\n");
 }
 
 std::string emit_parallel(const ClusterPlan& plan) {
-  const fs::path script = write_chunk_script(plan, {}), cases = beside(plan, "cases.txt"),
-                 cells = beside(plan, "chunks.txt");
-  write_list(cases, plan.cases);
-  write_list(cells, plan.cells);
+  write_chunk_script(plan, {});
+  write_gather_script(plan);
   std::string text =
       "#!/bin/sh\n"
-      "# Runs the chunks of a comparison by GNU parallel, one at a time on each host, and makes the report. Arguments "
-      "go\n"
-      "# to parallel, such as -S host1,host2. The same command goes on after an interruption.\n";
-  for (const auto& [list, chunks] : {std::pair(cases, &plan.cases), std::pair(cells, &plan.cells)})
-    if (!chunks->empty())
-      text += "parallel --jobs 1 --retries 2 --resume-failed --joblog " +
-              shell_word(beside(plan, list.stem().native().substr(plan.id.size() + 1) + "-log.txt").string()) +
-              " \"$@\" " + shell_word(script.string()) + " {} --quiet :::: " + shell_word(list.string()) + "\n";
-  text += "exec " + gather_command(plan) + "\n";
+      "# Runs the chunks of a comparison by GNU parallel, one at a time on each host, and makes the report. Arguments\n"
+      "# go to parallel, such as -S host1,host2. The same command goes on after an interruption.\n"
+      "case ${TMPDIR-} in *[!A-Za-z0-9_.,:/+@-]*)\n"
+      "  echo \"GNU parallel gives TMPDIR, $TMPDIR, to a shell and does not quote it. Set it to a folder whose name "
+      "has\" "
+      "\\\n"
+      "    \"letters, digits and _ . , : / + @ - only.\" >&2\n"
+      "  exit 2 ;;\n"
+      "esac\n"
+      "MARROW_COMPARISON=" +
+      script_word(plan.folder.string()) +
+      "\n"
+      "export MARROW_COMPARISON\n"
+      "plan=$MARROW_COMPARISON/plans/" +
+      plan.id + "\n";
+  for (const auto& [name, chunks] : {std::pair("cases", &plan.cases), std::pair("chunks", &plan.cells)}) {
+    if (chunks->empty()) continue;
+    const std::string list = std::string("-") + name;
+    write_list(beside(plan, std::string(name) + ".txt"), *chunks);
+    text += "parallel --env MARROW_COMPARISON --jobs 1 --retries 2 --resume-failed --joblog \"$plan" + list +
+            "-log.txt\" \\\n  \"$@\" 'cd \"$MARROW_COMPARISON\" && exec plans/" + plan.id +
+            "-chunk.sh' {} --quiet :::: \"$plan" + list + ".txt\"\n";
+  }
+  text += "exec \"$plan-gather.sh\"\n";
   return shell_word(write_script(beside(plan, "parallel.sh"), text).string());
 }
 
 std::string emit_snakemake(const ClusterPlan& plan, const ClusterProfile& profile) {
-  const fs::path script = write_chunk_script(plan, profile);
-  const auto names = [](const std::vector<Chunk>& chunks) {
-    std::string list = "[";
-    for (const Chunk& chunk : chunks) list += (list.size() > 1 ? ", " : "") + ("\"" + chunk.name + "\"");
-    return list + "]";
-  };
-  // Braces have a meaning in `shell`, so commands come in as parameters.
-  const auto text_of = [](const std::string& text) { return nlohmann::json(text).dump(); };
+  write_chunk_script(plan, profile);
+  write_gather_script(plan);
+  const std::string script = "plans/" + plan.id;
   const std::string text =
-      "# Runs the chunks of a comparison by Snakemake, and makes the report. Cases are made first.\n"
-      "CASES = " +
-      names(plan.cases) + "\nCHUNKS = " + names(plan.cells) +
-      "\n\n"
-      "workdir: " +
-      text_of(plan.folder.string()) +
+      "# Runs the chunks of a comparison by Snakemake, and makes the report. Cases are made first.\n" +
+      kStartOfSnakefile + "CASES = " + python_list(plan.cases) + "\nCHUNKS = " + python_list(plan.cells) +
       "\n\n"
       "localrules: gather\n\n"
       "rule gather:\n"
       "    input: [f\"rows/{chunk}.jsonl\" for chunk in CHUNKS]\n"
-      "    output: \"report.html\"\n"
-      "    params: command=" +
-      text_of(gather_command(plan)) +
-      "\n"
-      "    shell: \"{params.command}\"\n\n"
+      "    shell: \"" +
+      script +
+      "-gather.sh\"\n\n"
       "rule chunk:\n"
       "    input: lambda wildcards: [] if wildcards.chunk in CASES else [f\"rows/{one}.jsonl\" for one in CASES]\n"
       "    output: \"rows/{chunk}.jsonl\"\n"
       "    wildcard_constraints: chunk=\"" +
       plan.id +
       "-[a-z0-9-]+\"\n"
-      "    params: script=" +
-      text_of(shell_word(script.string())) +
-      "\n"
       "    threads: " +
       std::to_string(std::max<std::int64_t>(1, profile.processors)) +
       "\n"
       "    retries: " +
       std::to_string(profile.tries - 1) +
       "\n"
-      "    shell: \"{params.script} {wildcards.chunk} --quiet --jobs {threads}\"\n";
+      "    shell: \"" +
+      script +
+      "-chunk.sh {wildcards.chunk} --quiet --jobs {threads}\"\n\n"
+      "# If chunks failed, the rule gather does not run.\n"
+      "onerror:\n"
+      "    if not all(os.path.exists(f\"rows/{chunk}.jsonl\") for chunk in CHUNKS):\n"
+      "        shell(\"" +
+      script + "-gather.sh || true\")\n";
   const fs::path file = beside(plan, "Snakefile");
   write_text_file(file, text);
   return "snakemake --snakefile " + shell_word(file.string()) + " --keep-going --cores all";

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The files beside a plan by which other programs run its chunks.
+// The files beside a plan by which other programs run its chunks. GNU parallel, Snakemake and Slurm give a meaning to
+// characters in what they pass on: they call shells, and replace braces or percent signs. So no path goes through them,
+// only names made of the plan's id. Paths stand in scripts for /bin/sh, in single quotes.
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -16,8 +18,9 @@ void write_list(const std::filesystem::path& file, const std::vector<Chunk>& chu
 /// Writes plans/ID-chunk.sh, which runs the chunk that is its argument with the settings of this process, and returns
 /// its path.
 std::filesystem::path write_chunk_script(const ClusterPlan& plan, const ClusterProfile& profile);
-/// The command that makes tables and report from the rows that are there.
-std::string gather_command(const ClusterPlan& plan);
+/// Writes plans/ID-gather.sh, which makes tables and report from the rows that are there, and returns its path. `more`:
+/// further words of the command.
+std::filesystem::path write_gather_script(const ClusterPlan& plan, const std::vector<std::string>& more = {});
 
 /// Writes a script for GNU parallel, and returns the command that starts it.
 std::string emit_parallel(const ClusterPlan& plan);

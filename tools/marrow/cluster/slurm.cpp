@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "cluster/chunk_fault.hpp"
 #include "cluster/chunk_rows.hpp"
 #include "cluster/scripts.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/printable.hpp"
 #include "process.hpp"
 #include "report/report.hpp"
 #include "runtime/json_text.hpp"
@@ -23,6 +26,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr auto kLongestAnswer = std::chrono::seconds(60);
+constexpr std::size_t kMostSaidBytes = 300;
 
 std::string without_end_of_line(const std::string& text) { return text.substr(0, text.find_last_not_of("\n") + 1); }
 
@@ -53,6 +57,20 @@ std::string jobs_of(const Submission& submission) {
 std::string name_of_arrays(const std::string& plan) { return "marrow-" + plan; }
 std::string name_of_gather(const std::string& plan) { return "marrow-gather-" + plan; }
 
+/// The place of a job's log, in which Slurm replaces %j, %A and %a. Of a path with a backslash it would replace
+/// nothing.
+std::string place_of_log(const ClusterPlan& plan, const std::string& name) {
+  std::string place;
+  for (const char c : plan.folder.string()) place += c == '%' ? "%%" : std::string(1, c);
+  return place + "/log/" + name;
+}
+
+void expect_place_of_logs(const ClusterPlan& plan) {
+  if (plan.folder.native().find('\\') != std::string::npos)
+    throw Error("Slurm writes no logs into a folder with '\\' in its name, " + plan.folder.string() +
+                "; choose another with --out");
+}
+
 std::string first_word(const std::string& text) {
   const std::size_t begin = text.find_first_not_of(" \n");
   return begin == std::string::npos ? "" : text.substr(begin, text.find_first_of(" ;\n", begin) - begin);
@@ -69,7 +87,7 @@ std::vector<std::string> sbatch(const ClusterPlan& plan, const ClusterProfile& p
   add("--cpus-per-task", std::to_string(profile.processors));
   add("--mem", std::to_string(profile.memory_mb));
   add("--time", std::to_string(profile.minutes));
-  add("--output", (plan.folder / "log" / (is_array ? "%A_%a.txt" : "%j.txt")).string());
+  add("--output", place_of_log(plan, is_array ? "%A_%a.txt" : "%j.txt"));
   command.insert(command.end(), profile.options.begin(), profile.options.end());
   return command;
 }
@@ -81,7 +99,7 @@ fs::path write_array_script(const ClusterPlan& plan, const ClusterProfile& profi
                   "#!/bin/sh\n# A task of a Slurm array. The first argument is a list of chunks.\n"
                   "chunk=$(sed -n \"$((SLURM_ARRAY_TASK_ID + 1))p\" \"$1\")\n"
                   "exec " +
-                      shell_word(write_chunk_script(plan, profile).string()) +
+                      script_word(write_chunk_script(plan, profile).string()) +
                       " \"$chunk\" --quiet --jobs \"${SLURM_CPUS_PER_TASK:-${SLURM_CPUS_ON_NODE:-1}}\"\n");
   return file;
 }
@@ -116,11 +134,9 @@ class Submitter {
   }
 
   void add_gather(const fs::path& profile_file) {
-    std::string text = "#!/bin/sh\n# Makes tables and report, or submits again what left no rows.\nexec " +
-                       gather_command(plan_) + " --on slurm";
-    if (!profile_file.empty()) text += " --profile " + shell_word(fs::absolute(profile_file).string());
-    const fs::path file = plan_.folder / "plans" / (plan_.id + "-gather.sh");
-    write_text_file(file, text + "\n");
+    std::vector<std::string> more{"--on", "slurm"};
+    if (!profile_file.empty()) more.insert(more.end(), {"--profile", fs::absolute(profile_file).string()});
+    const fs::path file = write_gather_script(plan_, more);
     std::vector<std::string> command = sbatch(plan_, profile_, false);
     add_dependency(command, jobs());
     command.push_back(file.string());
@@ -181,6 +197,20 @@ std::string in_words(const std::string& state) {
   return "its end is not known";
 }
 
+/// Whether the task may have said why it ended: nobody else ended it.
+bool ended_by_itself(const std::string& state) {
+  return state == "FAILED" || state == "COMPLETED" || state == "UNKNOWN";
+}
+
+/// Why the task could not go on: what marrow left, else the last line that the task printed.
+std::string what_task_said(const fs::path& folder, const std::string& chunk, const fs::path& log) {
+  std::string last = fault_of_chunk(folder, chunk);
+  std::ifstream lines(last.empty() ? log : fs::path());
+  for (std::string line; std::getline(lines, line);)
+    if (line.find_first_not_of(" \t\r") != std::string::npos) last = line;
+  return cut(last, kMostSaidBytes);
+}
+
 }  // namespace
 
 std::optional<Submission> read_submission(const fs::path& folder) {
@@ -188,7 +218,7 @@ std::optional<Submission> read_submission(const fs::path& folder) {
   if (!fs::exists(file)) return std::nullopt;
   try {
     const json j = parse_json(read_text_file(file, kMostRecordBytes), file.string());
-    Submission submission{j.at("plan"), j.at("tries"), {}, j.at("gather"), j.at("gathered")};
+    Submission submission{j.at("plan"), j.at("tries"), {}, j.at("gather"), j.at("gathered"), j.at("lost")};
     for (const json& array : j.at("arrays")) submission.arrays.push_back({array.at("job"), array.at("chunks")});
     return submission;
   } catch (const std::exception& error) {
@@ -197,11 +227,9 @@ std::optional<Submission> read_submission(const fs::path& folder) {
 }
 
 void write_submission(const fs::path& folder, const Submission& submission) {
-  json j = {{"plan", submission.plan},
-            {"tries", submission.tries},
-            {"gather", submission.gather},
-            {"gathered", submission.is_gathered},
-            {"arrays", json::array()}};
+  json j = {{"plan", submission.plan},     {"tries", submission.tries},
+            {"gather", submission.gather}, {"gathered", submission.is_gathered},
+            {"lost", submission.lost},     {"arrays", json::array()}};
   for (const Submission::Array& array : submission.arrays)
     j["arrays"].push_back({{"job", array.job}, {"chunks", array.chunks}});
   write_text_file(folder / "slurm.json", j.dump(1) + "\n");
@@ -209,6 +237,7 @@ void write_submission(const fs::path& folder, const Submission& submission) {
 
 Submission submit(const ClusterPlan& plan, const ClusterProfile& profile, const fs::path& profile_file,
                   std::int64_t tries_before) {
+  expect_place_of_logs(plan);
   const std::map<std::string, bool> files = chunk_files(plan.folder);
   Submitter submitter(plan, profile);
   submitter.done().plan = plan.id;
@@ -236,16 +265,18 @@ std::map<std::string, std::string> states_of(const Submission& submission) {
   return states;
 }
 
-std::map<std::string, std::string> reasons_of(const Submission& submission) {
+std::map<std::string, std::string> reasons_of(const ClusterPlan& plan, const Submission& submission) {
   const std::map<std::string, std::string> states = states_of(submission);
   std::map<std::string, std::string> reasons;
   for (const Submission::Array& array : submission.arrays)
     for (std::size_t i = 0; i < array.chunks.size(); ++i) {
-      const std::string task = array.job + "_" + std::to_string(i);
+      const std::string task = array.job + "_" + std::to_string(i), log = "log/" + task + ".txt";
       const auto state = states.find(task);
       const std::string name = state == states.end() ? "UNKNOWN" : state->second;
-      reasons[array.chunks[i]] = "task " + task + " of the cluster left no row: " + in_words(name) + " (" + name +
-                                 "); see log/" + task + ".txt";
+      const std::string said =
+          ended_by_itself(name) ? what_task_said(plan.folder, array.chunks[i], plan.folder / log) : "";
+      reasons[array.chunks[i]] = "task " + task + " of the cluster left no row: " + in_words(name) + " (" + name + ")" +
+                                 (said.empty() ? "" : ": " + said) + "; see " + log;
     }
   return reasons;
 }

@@ -24,12 +24,13 @@ struct Submission {
   std::vector<Array> arrays;
   std::string gather;        ///< the job that makes tables and report
   bool is_gathered = false;  ///< that job is done
+  std::string lost;          ///< the cells that it found no row of, as Gathered::lost
 };
 std::optional<Submission> read_submission(const std::filesystem::path& folder);
 void write_submission(const std::filesystem::path& folder, const Submission& submission);
 
 /// Submits the chunks that have no rows yet, cases first, and a job that gathers. `profile_file` may be empty. Throws
-/// Error with what sbatch said if it refuses; nothing stays submitted then.
+/// Error with what sbatch said if it refuses, and where Slurm could write no logs; nothing stays submitted then.
 Submission submit(const ClusterPlan& plan, const ClusterProfile& profile, const std::filesystem::path& profile_file,
                   std::int64_t tries_before);
 
@@ -37,7 +38,7 @@ Submission submit(const ClusterPlan& plan, const ClusterProfile& profile, const 
 /// minutes only, or for long if the cluster keeps accounts.
 std::map<std::string, std::string> states_of(const Submission& submission);
 /// Why the chunks without rows have none, in words, by the chunk's name.
-std::map<std::string, std::string> reasons_of(const Submission& submission);
+std::map<std::string, std::string> reasons_of(const ClusterPlan& plan, const Submission& submission);
 
 /// What Slurm says of the jobs that wait or run.
 struct Queue {

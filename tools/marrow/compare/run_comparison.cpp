@@ -8,6 +8,7 @@
 
 #include "cluster/plan.hpp"
 #include "compare/cell_jobs.hpp"
+#include "compare/doubled_cases.hpp"
 #include "compare/first_cells.hpp"
 #include "compare/known_rows.hpp"
 #include "compare/progress.hpp"
@@ -110,6 +111,8 @@ class Comparison {
       if (!rows_[i]) jobs.push_back(cells_.job_of("cell", i, experiment_.cases[cells_.cell(i).case_index].name));
     }
     known.say_doubts();
+    if (const std::string text = doubled_cases_text(experiment_, runner_); !text.empty())
+      std::fprintf(stderr, "marrow: note: %s\n", printable(text).c_str());
     Progress progress(jobs.size(), request_.quiet);
     std::size_t done = 0;
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {

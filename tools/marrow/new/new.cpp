@@ -5,6 +5,7 @@
 #include "commands.hpp"
 #include "marrow/domain/printable.hpp"
 #include "projects.hpp"
+#include "report/report.hpp"
 
 namespace fs = std::filesystem;
 
@@ -17,7 +18,7 @@ struct NewRequest {
   bool in_python = false;
 };
 
-/// What was made, and what to do next. {} stands for its place.
+/// What was made, and what to do next. {} stands for its place, as a word of a shell.
 struct Made {
   fs::path place;
   std::string next;
@@ -43,10 +44,9 @@ NewCommand add_what(CLI::App* command, const std::string& what, const std::strin
   made.app->add_option("--out", made.request->out, "where it is put; by default here, under its name");
   made.app->callback([request = made.request, make, &code] {
     const Made done = make(*request);
-    const std::string place = printable(done.place.string());
-    std::string text = "made " + place + "\n" + done.next;
-    for (std::size_t at; (at = text.find("{}")) != std::string::npos;) text.replace(at, 2, place);
-    std::printf("%s\n", text.c_str());
+    std::string next = done.next;
+    next.replace(next.find("{}"), 2, shell_path(done.place));
+    std::printf("made %s\n%s\n", printable(done.place.string()).c_str(), next.c_str());
     code = 0;
   });
   return made;

@@ -55,10 +55,13 @@ nlohmann::json graph_of(const Pipeline& pipeline, const std::vector<std::pair<st
 /// Processor and number of cores of this machine, and the processor level from the record of a run.
 nlohmann::json machine_of(const nlohmann::json& run_record);
 
-/// Any text as one word of a POSIX shell's command line.
+/// Any text as one word of a command that a person copies into a shell. It holds only characters that terminals and
+/// pages show as they are: a text with others is written as $'...', which bash, zsh, ksh and POSIX of 2024 read.
 std::string shell_word(const std::string& text);
 /// The same for a path. It is never taken for an option.
 std::string shell_path(const std::filesystem::path& path);
+/// Any text as one word of a script for /bin/sh, in single quotes, in which no character has a meaning.
+std::string script_word(const std::string& text);
 
 /// Writes FOLDER/report.html of a comparison. `shown`: the cells whose pictures were made, those of a case and start
 /// together, the most important ones first. What does not fit into the page goes to FOLDER/report.
