@@ -112,7 +112,8 @@ class Times(Case):
         said, calls = self.compare(2, "a: {log.name: a, log.not_for: '20'}, b: {log.name: b, log.not_for: '10'}")
         self.assertEqual(calls, ["b 10", "a 20"], "only the failed cells are tried again")
         self.assertIn(
-            "\nTimes were not measured: there is no case and start in which every variant was done without a failure.\n",
+            "\nTimes were not measured: there is no case and start in which every variant was done without a "
+            "failure.\n",
             said,
         )
         self.assertEqual(self.timed(), [])

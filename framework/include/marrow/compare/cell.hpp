@@ -30,11 +30,11 @@ struct CellRow {
   std::vector<std::string> units;             ///< units of the metrics
   std::optional<double> initial_error;
   std::string initial_error_unit;
-  std::optional<double> seconds;   ///< measured with nothing else running, without what all variants share
-  int evaluations = 0;             ///< number of cost evaluations, for all poses of the cell
+  std::optional<double> seconds;  ///< measured with nothing else running, without what all variants share
+  int evaluations = 0;            ///< number of cost evaluations, for all poses of the cell
   /// The worst of the judgements that its pipeline's outputs have; nothing if there is no verdict among them.
   std::optional<Judgement> verdict;
-  std::optional<double> failure_probability;  ///< the largest of the verdicts' that is known
+  std::optional<double> failure_probability;                     ///< the largest of the verdicts' that is known
   using Figures = std::map<std::string, std::optional<double>>;  ///< nothing for a figure that is no finite number
   std::map<std::string, Figures> verdict_figures;  ///< what each verdict rests on, by its place: "verdict.distal"
   struct Calls {
@@ -53,8 +53,8 @@ struct CellRow {
 std::string to_json(const CellRow& row);
 /// Why a text is not a row as to_json() wrote it; empty if it is. It may be a row of any experiment.
 std::string fault_of_written_row(const std::string& text);
-/// Parses a row of the experiment. Throws Error if the text is not a row as to_json() wrote it. The names of the cell in
-/// the text are not trusted: call name_row() with the cell that was asked for.
+/// Parses a row of the experiment. Throws Error if the text is not a row as to_json() wrote it. The names of the cell
+/// in the text are not trusted: call name_row() with the cell that was asked for.
 CellRow row_from_json(const std::string& text, const Experiment& experiment);
 /// Writes the names of the cell into its row.
 void name_row(CellRow& row, const Experiment& experiment, const CellIndex& cell);
@@ -112,7 +112,7 @@ class CellRunner {
   bool draw(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer = {});
   /// Seconds that a run of the cell takes if the results that all variants share are read back and all others are made
   /// anew; without a store, everything is made anew. The cell runs once before, which does not count. It is measured
-  /// once: later calls with the same variants and number of threads find it in the store. Throws Error if the run fails.
+  /// once: later calls with the same variants and number of threads find it in the store. Throws Error if a run fails.
   double time(const CellIndex& cell);
   std::filesystem::path pictures_of(const CellIndex& cell) const;
   /// The names of the items along an axis, in the case of a cell. Runs only the node from which they have their names,
