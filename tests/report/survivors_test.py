@@ -121,6 +121,32 @@ class SurvivorsTest(PageTest):
             + ["failure 3.0 %", "failure 1.0e-18 %"],
         )
 
+    def test_numbers_of_any_size(self):
+        sizes = [5e-324, 1e-300, 1e-6, 0, 1e6, 1e300, -1e300]
+
+        def change(data):
+            for i, cell in enumerate(cell for cell in data["cells"] if cell["status"] == "done"):
+                cell["values"] = [sizes[(i + m) % len(sizes)] for m in range(3)]
+            data["summary"][0]["metrics"]["mtre_mm"].update(median=1e-300, q1=5e-324, q3=1e300, p95=1.7e300, worst=0)
+            data["comparisons"][0].update(difference=1e-300, low=-1e300, high=1e300)
+
+        self.page(change)
+        self.assertIn("1.0e−300 [4.9e−324, 1.0e+300]", self.row(0))
+        self.assertIn("1.7e+300", self.row(0))
+        self.assertIn("1.0e−300", self.row(0, "paired"))
+        for section in ("distributions", "paired"):
+            for scale in self.browser.js(
+                "return [...document.querySelectorAll('#' + arguments[0] + ' .toolbar button')].map((b) => b.textContent)",
+                section,
+            ):
+                self.press(scale, "#" + section)
+            lost = self.browser.js(
+                "return [...document.querySelectorAll('#' + arguments[0] + ' svg.plot *')].filter((mark) =>"
+                " [...mark.attributes].some((one) => /NaN|Infinity/.test(one.value))).map((mark) => mark.outerHTML)",
+                section,
+            )
+            self.assertEqual(lost[:3], [], "marks without a place in " + section)
+
     def test_points_of_response_curves_say_of_how_many_runs(self):
         def change(data):
             points = [

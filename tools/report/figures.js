@@ -109,7 +109,7 @@ const Figures = (() => {
     const sizes = rows.flat().map((item) => item.difference),
           typical = Data.quantile(sizes.map(Math.abs).sort((a, b) => a - b), 0.5) || 1;
     const found = variants.map((variant) => comparison(data, variant, metric)),
-          unit = 10 ** Math.floor(Math.log10(typical));
+          unit = 10 ** Math.floor(Math.log10(typical)) || typical;  // no power of ten is as small as the least double
     const {root, box: area, x} = Plots.frame({
       width,
       height: ROW_HEIGHT * rows.length + 62,

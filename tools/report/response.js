@@ -12,10 +12,13 @@ const Response = (() => {
   };
 
   // What the mark of a point says, such as of how many runs it is.
-  const pointText = (data, curve, point) => curve.option + ' = ' + Dom.number(point.value) + '\n' +
-      labelOf(data, curve.figure) + ': ' + (curve.figure === 'success' ? Dom.percent : Dom.number)(point.middle) +
-      (Number.isFinite(point.low) ? ', 95 % interval ' + Dom.number(point.low) + ' to ' + Dom.number(point.high) : '') +
-      '\n' + point.runs + ' of ' + point.of + ' runs';
+  function pointText(data, curve, point) {
+    const shown = curve.figure === 'success' ? Dom.percent : Dom.number;
+    const interval =
+        Number.isFinite(point.low) ? ', 95 % interval ' + shown(point.low) + ' to ' + shown(point.high) : '';
+    return curve.option + ' = ' + Dom.number(point.value) + '\n' + labelOf(data, curve.figure) + ': ' +
+        shown(point.middle) + interval + '\n' + point.runs + ' of ' + point.of + ' runs';
+  }
 
   function draw(data, curves, width) {
     const points = curves.flatMap((curve) => curve.points.filter((point) => point.runs));

@@ -24,6 +24,10 @@ VariantFigure figure_of(const std::vector<double>& values, std::size_t of, bool 
   return figure;
 }
 
+bool has_all_figures(const CellRow& row) {
+  return std::find(row.values.begin(), row.values.end(), std::nullopt) == row.values.end();
+}
+
 VariantSummary summary_of(const Experiment& experiment, const Rows& rows,
                           const std::set<std::pair<std::string, std::string>>& done_by_all) {
   VariantSummary summary;
@@ -31,10 +35,9 @@ VariantSummary summary_of(const Experiment& experiment, const Rows& rows,
   if (experiment.defines_success()) summary.success.emplace();
   std::vector<double> seconds, evaluations;
   for (const CellRow* row : rows) {
-    const bool is_done = row->failed.empty(), has_all = std::all_of(row->values.begin(), row->values.end(),
-                                                                    [](const auto&value) { return value.has_value(); });
+    const bool is_done = row->failed.empty();
     summary.failed += !is_done;
-    summary.incomplete += is_done && !has_all;
+    summary.incomplete += is_done && !has_all_figures(*row);
     if (summary.success) summary.success->add(row->case_name, row->is_success(experiment));
     if (row->seconds) seconds.push_back(*row->seconds);
     if (is_done && row->absent.empty() && done_by_all.contains({row->case_name, row->start}))

@@ -31,7 +31,7 @@ void FigureUnits::add(Figure& figure, const std::string& unit, const std::string
   if (unit == figure.unit) return;
   throw Error("the figure '" + figure.path + "' has " + unit_in_words(figure.unit) + " in the cell " + figure.cell +
               " and " + unit_in_words(unit) + " in the cell " + cell +
-              ", so their numbers cannot be compared; let all variants give it in one unit");
+              ", so their numbers cannot be compared; let all cells give it in one unit");
 }
 
 std::vector<std::string> FigureUnits::of_metrics() const {
