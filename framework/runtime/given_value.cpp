@@ -12,8 +12,10 @@ namespace {
 constexpr const char* kOpening = "[{\"'";
 
 /// By the first character.
-const char* form_of(const std::string& text) {
-  return text[0] == '[' ? "a list" : text[0] == '{' ? "a map" : "a quoted text";
+std::string beginning_of(const std::string& text) {
+  return text[0] == '['   ? "the value begins as a list"
+         : text[0] == '{' ? "the value begins as a map"
+                          : "the value begins as a quoted text";
 }
 
 bool is_of_form(const YAML::Node& value, const std::string& text) {
@@ -38,7 +40,7 @@ std::optional<YAML::Node> given_value(const std::string& text, const Place& plac
   const std::string in_it =
       text[0] == '[' || text[0] == '{' ? "a text in it with ' #', ': ', &, ! or * needs quotes; " : "";
   const std::string quoted = nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  diagnostics.add(place, std::string("the value begins as ") + form_of(text) + ", but cannot be read as one: " + why,
+  diagnostics.add(place, beginning_of(text) + ", but cannot be read as one: " + why,
                   in_it + "a text that begins so is given in double quotes, as " + cut(quoted, 200));
   return std::nullopt;
 }

@@ -87,8 +87,8 @@ class OptionTexts(Case):
         for option in (["--out", ""], ["--out="], ["--shared-cache", ""], ["--only", ""]):
             self.assertEqual(self.run_it(2, "run", "p.yaml", *option).stderr, said % option[0].rstrip("="))
         self.assertIn(
-            "data=: error: input 'data' is an empty path\n  hint: name a file or a folder; the folder in which you are is"
-            "  .\n",
+            "data=: error: input 'data' is an empty path\n"
+            "  hint: name a file or a folder; the folder in which you are is  .\n",
             self.run_it(2, "run", "p.yaml", "data=").stderr,
         )
         self.assertEqual([path.name for path in self.scratch.iterdir()], ["p.yaml"], "nothing was made")
