@@ -52,8 +52,7 @@ void read_verdict(const json& j, CellRow& row) {
     throw Error("'failure_probability' is not from 0 to 1");
   for (const auto& [place, figures] : j.at("verdict_figures").items()) {
     CellRow::Figures& read = row.verdict_figures[place];
-    for (const auto& [name, value] : figures.items())
-      read[name] = number(value, "'" + name + "' of 'verdict_figures'");
+    for (const auto& [name, value] : figures.items()) read[name] = number(value, "'" + name + "' of 'verdict_figures'");
   }
 }
 

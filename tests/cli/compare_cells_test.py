@@ -4,7 +4,7 @@ import json
 import shutil
 import signal
 
-from compare_cases import PIPELINE, Comparison
+from compare_cases import DRAWN, PIPELINE, Comparison
 from marrow_cli import IS_SANITIZED, main
 
 
@@ -69,7 +69,7 @@ class Cells(Comparison):
         file = self.scratch / "out" / "cells" / "b" / "1" / "0" / "cell.json"
         good = json.loads(file.read_text())
         forged = {
-            "a name": ({"id": "../../../evil", "variant": "a", "case": "0"}, "4 were there"),
+            "a name": ({"id": "../../../evil", "variant": "a", "case": "0"}, "3 were there"),
             "no values": ({"values": []}, "3 were there"),
             "no number": ({"values": ["x"]}, "3 were there"),
             "counts": ({"evaluations": -1}, "3 were there"),
@@ -91,7 +91,7 @@ class Cells(Comparison):
         self.assertFalse(list(self.scratch.rglob("evil")))
 
     def test_changed_comments_run_and_draw_nothing_again(self):
-        self.write("p.yaml", PIPELINE.replace("number: m", "number: m, picture: shared"))
+        self.write("p.yaml", PIPELINE.replace("outputs: {", DRAWN % "shared" + "outputs: {picture: drawn, "))
         self.write("e.yaml", self.file.read_text() + "pictures: [picture]\n")
         self.marrow(0, "compare", self.file, "--out", "out")
         drawn = {path: path.stat().st_mtime_ns for path in (self.scratch / "out" / "pictures").rglob("key.txt")}

@@ -6,6 +6,7 @@
 
 #include "marrow/compare/cell.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/runtime/hash.hpp"
 
 namespace cell_row_test {
 
@@ -31,6 +32,7 @@ CellRow good_row() {
   row.values = {1.5, -0.25};
   row.units = {"mm", "deg"};
   row.initial_error = 3.5;
+  row.initial_error_unit = "mm";
   row.seconds = 0.125;
   row.evaluations = 70;
   row.nodes["edges"] = {1, 2, 0.5};
@@ -38,9 +40,17 @@ CellRow good_row() {
   return row;
 }
 
+/// The row as a writer that knows the digest would give it: XXH3 of the line without it.
+std::string written(json row) {
+  row.erase("digest");
+  const std::string line = row.dump();
+  row["digest"] = marrow::hash_of_bytes(line.data(), line.size()).hex();
+  return row.dump();
+}
+
 std::string fault_of(const json& row) {
   try {
-    marrow::compare::row_from_json(row.dump(), experiment());
+    marrow::compare::row_from_json(written(row), experiment());
   } catch (const marrow::Error& error) {
     return error.what();
   }
@@ -88,10 +98,39 @@ TEST(CellRowText, MayHaveAVerdict) {
   EXPECT_EQ(fault_of(other), "not a cell's row: 'verdict' is no judgement, or of a cell that failed");
 }
 
+TEST(CellRowText, HasTheFiguresOfItsVerdicts) {
+  CellRow row = good_row();
+  row.verdict = marrow::Judgement::trusted;
+  row.verdict_figures = {{"verdict.distal", {{"doubt", 0.1}, {"unknown", std::nullopt}}}, {"verdict.proximal", {}}};
+  const CellRow again = marrow::compare::row_from_json(to_json(row), experiment());
+  EXPECT_EQ(again.verdict_figures, row.verdict_figures);
+  json other = json::parse(to_json(row));
+  other["verdict_figures"]["verdict.distal"]["doubt"] = "much";
+  EXPECT_EQ(fault_of(other), "not a cell's row: 'doubt' of 'verdict_figures' is no number");
+}
+
+TEST(CellRowText, ChangedByHandIsNotBelieved) {
+  const std::string text = to_json(good_row());
+  EXPECT_EQ(marrow::compare::fault_of_written_row(text), "");
+  EXPECT_EQ(marrow::compare::fault_of_written_row(json::parse(text).dump(2)), "");  // other blanks change nothing
+  const std::string changed = "it is not what its digest is of: it was changed or damaged";
+  for (const auto& [what, by] : {std::pair("1.5", "1.4"), {R"("tries":1)", R"("tries":2)"}, {R"("deg")", R"("mm")"}}) {
+    std::string edited = text;
+    edited.replace(edited.find(what), std::string(what).size(), by);
+    EXPECT_EQ(marrow::compare::fault_of_written_row(edited), changed) << edited;
+    EXPECT_THROW(marrow::compare::row_from_json(edited, experiment()), marrow::Error);
+  }
+  json without = json::parse(text);
+  without["more"] = 1;
+  EXPECT_EQ(marrow::compare::fault_of_written_row(without.dump()), changed);
+  without.erase("digest");
+  EXPECT_EQ(marrow::compare::fault_of_written_row(without.dump()), "it has no digest of itself");
+}
+
 TEST(CellRowText, SaysNotWhichCellItIsOf) {
   json forged = json::parse(to_json(good_row()));
   for (const char* part : {"id", "variant", "case", "start"}) forged[part] = "../../elsewhere";
-  CellRow row = marrow::compare::row_from_json(forged.dump(), experiment());
+  CellRow row = marrow::compare::row_from_json(written(forged), experiment());
   EXPECT_EQ(row.id + row.variant + row.case_name + row.start, "");
   marrow::compare::name_row(row, experiment(), {1, 0, 0});
   EXPECT_EQ(row.id, "two/a/0");
@@ -130,7 +169,7 @@ TEST(CellRowText, ForgedOrDamaged) {
     EXPECT_NE(fault_of(row).find("not a cell's row: "), std::string::npos) << change;
     EXPECT_NE(fault_of(row).find(fault), std::string::npos) << change << fault_of(row);
   }
-  for (const char* key : {"values", "units", "tries", "nodes", "key", "status"}) {
+  for (const char* key : {"values", "units", "initial_error_unit", "tries", "nodes", "key", "status"}) {
     json row = good;
     row.erase(key);
     EXPECT_NE(fault_of(row).find("key '" + std::string(key) + "' not found"), std::string::npos) << fault_of(row);

@@ -17,6 +17,7 @@
 //     success: bool | null (no limits),
 //     absent (why values are missing: a node failed that may fail; may be missing itself),
 //     initial_error, seconds, evaluations, cached_nodes, values: [number | null per metric],
+//     key (first digits of the digest of what the row was made from; null or missing if it is not known),
 //     verdict (the worst), failure_probability, verdicts: [{item, judgement: "trusted" | "doubtful" | "wrong",
 //     failure_probability: number | null, reasons: [text], remedies: [text]}],          may be missing, as may be
 //     poses: [{name, target, source, matrix: [16], deviations: [6: degrees, mm] | null,

@@ -32,9 +32,10 @@ const Detail = (() => {
                ].filter(Boolean)]),
       ['Error of the start', startError(data, cell)],
       ['Time', Number.isFinite(cell.seconds) ? withUnit(cell.seconds, 's') : null],
-      ['Evaluations', Number.isFinite(cell.evaluations) ? number(cell.evaluations) : null],
+      ['Evaluations', Number.isFinite(cell.evaluations) ? String(cell.evaluations) : null],
       ['Nodes from the cache', Number.isFinite(cell.cached_nodes) ? String(cell.cached_nodes) : null],
       ['Tries', Number.isFinite(cell.tries) ? String(cell.tries) : null],
+      ['Key of what it was made from', cell.key ? el('code', {}, cell.key) : null],
       ['Folder', cell.folder ? el('code', {}, cell.folder) : null],
     ]);
   }

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -12,7 +13,6 @@
 #include <utility>
 
 #include "marrow/domain/error.hpp"
-#include "marrow/runtime/hash.hpp"
 #include "runtime/process_identity.hpp"
 
 namespace marrow::cli {
@@ -23,7 +23,14 @@ using compare::CellRow;
 
 fs::path rows_folder(const fs::path& folder) { return folder / "rows"; }
 
-std::string digest_of(const std::string& text) { return hash_of_bytes(text.data(), text.size()).hex(); }
+/// What a row says of its cell, without what differs each time it runs.
+std::string result_of(CellRow row) {
+  row.tries = 1;
+  row.seconds.reset();
+  row.nodes.clear();
+  row.key.clear();
+  return compare::to_json(row);
+}
 
 }  // namespace
 
@@ -45,7 +52,7 @@ void ChunkFile::expect_good(bool is_good) const {
 }
 
 void ChunkFile::add(const CellRow& row) {
-  const std::string text = compare::to_json(row), line = digest_of(text) + " " + text + "\n";
+  const std::string line = compare::to_json(row) + "\n";
   for (std::size_t at = 0; at < line.size();) {
     const ssize_t count = ::write(descriptor_, line.data() + at, line.size() - at);
     if (count < 0 && errno == EINTR) continue;
@@ -98,28 +105,42 @@ bool RowsOfChunks::is_wanted(const std::string& line) const {
   return name.find('\\') != std::string::npos || cells_.contains(name);
 }
 
-/// A line is "DIGEST {...}".
 void RowsOfChunks::add_line(const std::string& line, bool is_of_plan) {
-  const std::size_t space = line.find(' ');
-  const std::string text = space == std::string::npos ? "" : line.substr(space + 1);
-  if (text.empty() || digest_of(text) != line.substr(0, space)) throw Error("a damaged line");
-  CellRow row = compare::row_from_json(text, experiment_);
-  const std::string id = nlohmann::json::parse(text).at("id");
+  CellRow row = compare::row_from_json(line, experiment_);
+  const std::string id = nlohmann::json::parse(line).at("id");
   if (row.failed.empty())
     done_[id].push_back(std::move(row));
   else if (is_of_plan)
-    failed_.insert_or_assign(id, std::move(row));
+    if (const auto [known, is_new] = failed_.emplace(id, row); !is_new && to_json(row) < to_json(known->second))
+      known->second = std::move(row);
+}
+
+/// The rows with this key, except for the machine. Nothing here depends on the order of the files: first those of this
+/// machine, then by their texts.
+std::vector<CellRow> RowsOfChunks::rows_of(const compare::CellIndex& cell, const std::string& key) const {
+  std::vector<CellRow> rows;
+  const auto found = done_.find(compare::cell_id(experiment_, cell));
+  if (found == done_.end() || key.empty()) return rows;
+  for (const CellRow& row : found->second)
+    if (compare::key_without_machine(row.key) == compare::key_without_machine(key)) rows.push_back(row);
+  if (rows.size() > 1)
+    std::sort(rows.begin(), rows.end(), [&](const CellRow& a, const CellRow& b) {
+      if ((a.key == key) != (b.key == key)) return a.key == key;
+      return to_json(a) < to_json(b);
+    });
+  for (CellRow& row : rows) compare::name_row(row, experiment_, cell);
+  return rows;
 }
 
 std::optional<CellRow> RowsOfChunks::done(const compare::CellIndex& cell, const std::string& key) const {
-  const auto found = done_.find(compare::cell_id(experiment_, cell));
-  if (found == done_.end() || key.empty()) return std::nullopt;
-  for (CellRow row : found->second)
-    if (compare::key_without_machine(row.key) == compare::key_without_machine(key)) {
-      compare::name_row(row, experiment_, cell);
-      return row;
-    }
-  return std::nullopt;
+  const std::vector<CellRow> rows = rows_of(cell, key);
+  return rows.empty() ? std::nullopt : std::optional(rows.front());
+}
+
+bool RowsOfChunks::contradicts(const compare::CellIndex& cell, const CellRow& taken) const {
+  const std::vector<CellRow> rows = rows_of(cell, taken.key);
+  return std::any_of(rows.begin(), rows.end(),
+                     [result = result_of(taken)](const CellRow& row) { return result_of(row) != result; });
 }
 
 std::optional<CellRow> RowsOfChunks::failed(const compare::CellIndex& cell) const {

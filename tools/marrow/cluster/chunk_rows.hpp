@@ -2,7 +2,7 @@
 #pragma once
 // The files in which the tasks of a cluster leave the rows of their cells: FOLDER/rows/CHUNK.jsonl. While a task runs,
 // its file is CHUNK.PROCESS.part, by which it is known among the processes of all hosts. It is renamed when all rows
-// are there. Each line has a digest of itself, so the rows of a task that was killed count too.
+// are there. Each row has a digest of itself, so the rows of a task that was killed count too.
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -48,16 +48,19 @@ class RowsOfChunks {
   RowsOfChunks(const std::filesystem::path& folder, const compare::Experiment& experiment, const std::string& plan,
                std::set<std::string> cells = {});
 
-  /// A row of the cell that is done and has this key, except for the machine. The result has the names of the cell.
+  /// A row of the cell that is done and has this key, except for the machine. Of several, one that this machine made
+  /// (its key is the same as a whole), else the first in the order of their texts. It has the names of the cell.
   std::optional<compare::CellRow> done(const compare::CellIndex& cell, const std::string& key) const;
-  /// A row of the cell that says why it failed.
+  /// Whether a row with the key of the one that is taken, except for the machine, has another result.
+  bool contradicts(const compare::CellIndex& cell, const compare::CellRow& taken) const;
+  /// A row of the cell that says why it failed. Of several, the first in the order of their texts.
   std::optional<compare::CellRow> failed(const compare::CellIndex& cell) const;
 
  private:
   void add_file(const std::filesystem::path& file, bool is_of_plan);
   void add_line(const std::string& line, bool is_of_plan);
-
   bool is_wanted(const std::string& line) const;
+  std::vector<compare::CellRow> rows_of(const compare::CellIndex& cell, const std::string& key) const;
 
   const compare::Experiment& experiment_;
   std::set<std::string> cells_;

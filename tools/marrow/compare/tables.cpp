@@ -73,7 +73,7 @@ std::string csv(const Experiment& experiment, const std::vector<CellRow>& rows) 
   std::string text = "cell,variant,case,start,status,reason,success,tries,verdict,failure_probability";
   for (const std::string& option : options) text += "," + field(option);
   for (const compare::MetricChoice& metric : experiment.metrics) text += "," + field(metric.path);
-  text += ",initial_error,seconds,evaluations\n";
+  text += ",initial_error,seconds,evaluations,key\n";
   for (const CellRow& row : rows) {
     text += field(row.id) + "," + field(row.variant) + "," + field(row.case_name) + "," + field(row.start) + "," +
             (row.failed.empty() ? "done" : "failed") + "," + field(row.failed + row.absent) + "," +
@@ -85,7 +85,7 @@ std::string csv(const Experiment& experiment, const std::vector<CellRow>& rows) 
     for (const std::string& value : values_of.at(row.variant)) text += "," + field(value);
     for (const auto& value : row.values) text += "," + number_text(value);
     text += "," + number_text(row.initial_error) + "," + number_text(row.seconds) + "," +
-            std::to_string(row.evaluations) + "\n";
+            std::to_string(row.evaluations) + "," + row.key + "\n";
   }
   return text;
 }
@@ -96,6 +96,7 @@ std::string jsonl(const Experiment& experiment, const std::vector<CellRow>& rows
   std::string text;
   for (const CellRow& row : rows) {
     json j = json::parse(compare::to_json(row));
+    j.erase("digest");  // of a row without what is added here
     j["success"] = experiment.defines_success() ? json(row.is_success(experiment)) : json();
     j["options"] = json::object();
     for (std::size_t i = 0; i < options.size(); ++i) j["options"][options[i]] = values_of.at(row.variant)[i];

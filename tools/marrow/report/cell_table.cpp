@@ -12,6 +12,9 @@ namespace {
 using compare::CellRow;
 using nlohmann::json;
 
+/// As many as tell cells apart; the tables have all of them.
+constexpr std::size_t kKeyDigits = 12;
+
 /// With nine digits: what the tables for other programs have, and half as long as the exact number.
 json rounded(const std::optional<double>& value) {
   if (!value) return {};
@@ -51,7 +54,8 @@ json row_of(const compare::Experiment& experiment, const compare::CellIndex& ind
                  texts.place_of(row.failed),
                  texts.place_of(row.absent),
                  texts.place_of(row.verdict ? name_of(*row.verdict) : ""),
-                 row.verdict ? rounded(row.failure_probability) : json()};
+                 row.verdict ? rounded(row.failure_probability) : json(),
+                 row.key.empty() ? json() : json(row.key.substr(0, kKeyDigits))};
   for (const auto& value : row.values) values.push_back(is_done ? rounded(value) : json());
   return values;
 }
@@ -66,7 +70,7 @@ json cell_table(const compare::Experiment& experiment, const std::vector<CellRow
     table.push_back(row_of(experiment, {i % variants, i / variants / starts, i / variants % starts}, rows[i], texts));
   return {{"fields",
            {"variant", "case", "start", "status", "success", "tries", "initial_error", "seconds", "evaluations",
-            "cached_nodes", "reason", "absent", "verdict", "failure_probability"}},
+            "cached_nodes", "reason", "absent", "verdict", "failure_probability", "key"}},
           {"rows", std::move(table)},
           {"texts", texts.all()}};
 }

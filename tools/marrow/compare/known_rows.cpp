@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "compare/known_rows.hpp"
+
+#include <cstdio>
+
+#include "marrow/domain/printable.hpp"
+#include "runtime/remove_tree.hpp"
+
+namespace marrow::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using compare::CellRow;
+
+/// Removes what an earlier run left of a cell in this folder. If that is not possible, says so.
+void remove_old_outputs(const compare::CellRunner& runner, const compare::CellIndex& cell) {
+  try {
+    const fs::path folder = runner.folder_of(cell);
+    if (fs::exists(folder)) remove_tree(folder);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "marrow: outputs of an earlier run stay: %s\n", printable(error.what()).c_str());
+  }
+}
+
+}  // namespace
+
+void KnownRows::Remark::add(const std::string& what) {
+  if (!cells++) first = what;
+}
+
+std::optional<CellRow> KnownRows::done(const compare::CellIndex& cell, const std::string& key) {
+  std::optional<CellRow> row = runner_.finished(cell, key);
+  if (!row) {
+    if (const std::string fault = runner_.fault_of_row(cell); !fault.empty())
+      changed_.add((runner_.folder_of(cell) / "cell.json").string() + ": " + fault);
+    row = chunks_.done(cell, key);
+    if (row) remove_old_outputs(runner_, cell);
+  }
+  if (row && chunks_.contradicts(cell, *row)) contradicting_.add(row->id);
+  return row;
+}
+
+std::optional<CellRow> KnownRows::failed(const compare::CellIndex& cell) const {
+  remove_old_outputs(runner_, cell);
+  return chunks_.failed(cell);
+}
+
+void KnownRows::say_doubts() const {
+  if (changed_.cells)
+    std::fprintf(stderr, "marrow: note: %zu %s, so %s not count: %s%s\n", changed_.cells,
+                 changed_.cells > 1 ? "rows are not as marrow wrote them" : "row is not as marrow wrote it",
+                 changed_.cells > 1 ? "they do" : "it does", printable(changed_.first).c_str(),
+                 changed_.cells > 1 ? ", and others" : "");
+  if (contradicting_.cells)
+    std::fprintf(
+        stderr,
+        "marrow: note: of %zu cells there are rows whose results differ, made on several hosts or at several times, "
+        "such as %s; one that was made on a machine like this one is taken, else the first in the order of "
+        "their texts\n",
+        contradicting_.cells, printable(contradicting_.first).c_str());
+}
+
+}  // namespace marrow::cli
