@@ -17,6 +17,7 @@ class SweepReader {
  public:
   explicit SweepReader(StrictYaml& yaml) : yaml_(yaml) {}
   void read(const YamlEntry& section);
+  std::vector<Named> names() const;  ///< of the swept options
   /// Puts the swept options into the experiment, and the points into its variants, which are complete otherwise.
   void apply(Experiment& experiment);
 

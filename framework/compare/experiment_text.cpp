@@ -71,7 +71,10 @@ class Reader {
     if (experiment_.cases.empty() && diagnostics_.empty())
       yaml_.fault(experiment_.cases_place, "there are no cases",
                   "name folders, as  folders: [data/*]  or a simulation");
-    refuse_replaced_values();
+    std::vector<Override> columns;
+    for (const std::vector<Override>& column : matrix_) columns.push_back(column.front());
+    refuse_replaced_values(yaml_, experiment_, {options_set_by("'matrix'", columns), {"'sweep'", sweep_.names()}},
+                           {"'tune'", tune_.names()});
     apply_matrix();
     sweep_.apply(experiment_);
     tune_.add_variant(experiment_);
@@ -193,32 +196,6 @@ class Reader {
       }
       matrix_.push_back(std::move(column));
     }
-  }
-
-  /// The sections are applied in this order: 'set', the variants, 'matrix', 'sweep', 'starts'. A variant is there to
-  /// change what 'set' says. Anything else that is replaced has no effect in any cell.
-  void refuse_replaced_values() {
-    std::vector<SetBySection> later;
-    std::vector<Override> columns;
-    for (const std::vector<Override>& column : matrix_) columns.push_back(column.front());
-    later.push_back(options_set_by("'matrix'", columns));
-    later.push_back({"'sweep'", sweep_.names()});
-    if (experiment_.protocol) later.push_back(options_set_by(*experiment_.protocol));
-    for (const Variant& variant : experiment_.variants)
-      for (const SetBySection& section : later)
-        refuse_replaced(yaml_, "the option", options_set_by("variant '" + variant.name + "'", variant.overrides),
-                        section);
-    for (std::size_t i = 0; i < later.size(); ++i)
-      for (std::size_t k = i + 1; k < later.size(); ++k) refuse_replaced(yaml_, "the option", later[i], later[k]);
-    if (experiment_.protocol) {
-      refuse_replaced(yaml_, "the option", options_set_by("'set'", experiment_.common), later.back());
-      refuse_replaced(yaml_, "the option", {"'tune'", tune_.names()}, later.back());
-    }
-    const bool has_folders = std::any_of(experiment_.cases.begin(), experiment_.cases.end(),
-                                         [](const auto& one) { return one.is_simulated || !one.folder.empty(); });
-    refuse_replaced_inputs(yaml_, experiment_.inputs, experiment_.seeded,
-                           {has_folders ? experiment_.case_input : "", experiment_.cases_place});
-    refuse_replaced_inputs(yaml_, experiment_.simulation.inputs, experiment_.simulation.seeded, {});
   }
 
   /// Combines every variant with every combination of the matrix.

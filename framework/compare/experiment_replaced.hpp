@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <string>
+#include <vector>
+
+#include "experiment_yaml.hpp"
+
+namespace marrow::compare {
+
+/// The options, or the inputs, that a section of an experiment's file sets.
+struct SetBySection {
+  std::string section;  ///< "variant 'canny'"
+  std::vector<Named> names;
+};
+
+SetBySection options_set_by(const std::string& section, const std::vector<Override>& changes);
+/// Reports each name of `first` that `later` sets too. Its value would have no effect in any cell.
+void refuse_replaced(StrictYaml& yaml, const std::string& what, const SetBySection& first, const SetBySection& later);
+/// Does so for all sections of an experiment whose variants are as they are written. They are applied in this order:
+/// 'set', the variants, `combined` ('matrix' and 'sweep'), `tuned`, 'starts'. A variant is there to change what 'set'
+/// says, and only one variant is tuned; so neither is reported here. An input for all cases must not be another one for
+/// each case.
+void refuse_replaced_values(StrictYaml& yaml, const Experiment& experiment, std::vector<SetBySection> combined,
+                            const SetBySection& tuned);
+
+}  // namespace marrow::compare
