@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <optional>
 
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
@@ -22,6 +23,37 @@ namespace fs = std::filesystem;
 constexpr const char* kMarker = "marrow-comparison";
 const std::string kHead =
     "This folder is a comparison of marrow, which changes and removes what is in it.\nexperiment: ";
+const std::string kFile = "file: ";
+
+/// What the marker says. An older one has no file.
+struct Owner {
+  std::string name;
+  fs::path file;
+};
+
+std::string marker_text(const Owner& owner) {
+  return kHead + owner.name + "\n" + (owner.file.empty() ? "" : kFile + owner.file.string() + "\n");
+}
+
+/// Nothing if the text is no marker, or one whose writer was killed before it was complete. A name has no line break,
+/// but a path may have one.
+std::optional<Owner> owner_in(const std::string& text) {
+  if (!text.starts_with(kHead) || !text.ends_with('\n')) return std::nullopt;
+  const std::size_t end = text.find('\n', kHead.size());
+  Owner owner{text.substr(kHead.size(), end - kHead.size()), {}};
+  const std::string rest = text.substr(end + 1);
+  if (rest.empty()) return owner;
+  if (!rest.starts_with(kFile)) return std::nullopt;
+  owner.file = rest.substr(kFile.size(), rest.size() - kFile.size() - 1);
+  return owner;
+}
+
+/// Whether the marker's experiment is another one that is still there. One that was moved keeps its folder. On a host
+/// that does not see the old place, that cannot be told from a move.
+bool is_another(const fs::path& before, const fs::path& now) {
+  std::error_code error;
+  return !before.empty() && fs::exists(before, error) && !fs::equivalent(before, now, error);
+}
 
 // Offsets of the bytes of the marker that are locked. One byte for each cell follows. Locked bytes need not exist.
 constexpr long kUse = 0, kText = 1, kCells = 2;
@@ -86,7 +118,7 @@ ComparisonFolder::ComparisonFolder(const fs::path& folder, const compare::Experi
     : folder_(folder) {
   try {
     open_marker();
-    check_marker(experiment.name);
+    check_marker(experiment);
     if (!lock(kUse, use == Use::alone ? F_WRLCK : F_RDLCK, false))
       throw Error("another " + std::string(use == Use::alone ? "comparison or cell" : "comparison") +
                   " is running in " + folder.string() + "; wait for it, or choose another folder with --out");
@@ -137,27 +169,39 @@ void ComparisonFolder::open_marker() {
   if (fstat(marker_, &info) != 0 || !S_ISREG(info.st_mode)) refuse_foreign(folder_);
 }
 
-/// Writes the marker if it is new, or if its writer was killed before it was complete.
-void ComparisonFolder::check_marker(const std::string& name) {
+/// Writes the marker if it is new, if its writer was killed before it was complete, or if the experiment was moved.
+void ComparisonFolder::check_marker(const compare::Experiment& experiment) {
+  std::error_code error;
+  const fs::path file = fs::canonical(experiment.file, error);
+  const Owner owner{experiment.name, error ? fs::absolute(experiment.file) : file};
   lock(kText, F_WRLCK, true);
-  char buffer[1000];
+  const std::string text = read_marker();
+  const std::optional<Owner> before = owner_in(text);
+  const std::string advice = ": choose another folder with --out, or remove it";
+  if (!before && !((kHead.starts_with(text) || text.starts_with(kHead)) && holds_only_the_marker(folder_)))
+    refuse_foreign(folder_);
+  if (before && before->name != owner.name)
+    throw Error("the folder " + folder_.string() + " holds the comparison of another experiment, '" + before->name +
+                "'; this one is '" + owner.name + "'" + advice);
+  if (before && is_another(before->file, owner.file))
+    throw Error("the folder " + folder_.string() + " holds the comparison of another experiment of the same name, '" +
+                owner.name + "', whose file is " + before->file.string() + "; this one is " + owner.file.string() +
+                advice);
+  if (text != marker_text(owner)) write_marker(marker_text(owner));
+  lock(kText, F_UNLCK, true);
+}
+
+std::string ComparisonFolder::read_marker() const {
+  char buffer[20000];  // a name and a path
   const ssize_t count = pread(marker_, buffer, sizeof buffer, 0);
   if (count < 0) throw Error("cannot read " + (folder_ / kMarker).string() + ": " + std::strerror(errno));
-  const std::string text(buffer, std::size_t(count)), expected = kHead + name + "\n";
-  const bool is_begun =
-      kHead.starts_with(text) || (text.starts_with(kHead) && text.find('\n', kHead.size()) == std::string::npos);
-  if (is_begun && holds_only_the_marker(folder_)) {
-    if (pwrite(marker_, expected.data(), expected.size(), 0) != ssize_t(expected.size()) ||
-        ftruncate(marker_, off_t(expected.size())) != 0)
-      throw Error("cannot write " + (folder_ / kMarker).string() + ": " + std::strerror(errno) + "; is the disk full?");
-  } else if (is_begun || !text.starts_with(kHead)) {
-    refuse_foreign(folder_);
-  } else if (text != expected) {
-    throw Error("the folder " + folder_.string() + " holds the comparison of another experiment, '" +
-                text.substr(kHead.size(), text.find('\n', kHead.size()) - kHead.size()) + "'; this one is '" + name +
-                "': choose another folder with --out, or remove it");
-  }
-  lock(kText, F_UNLCK, true);
+  return {buffer, std::size_t(count)};
+}
+
+void ComparisonFolder::write_marker(const std::string& text) {
+  if (pwrite(marker_, text.data(), text.size(), 0) != ssize_t(text.size()) ||
+      ftruncate(marker_, off_t(text.size())) != 0)
+    throw Error("cannot write " + (folder_ / kMarker).string() + ": " + std::strerror(errno) + "; is the disk full?");
 }
 
 /// False if another process holds the lock. The lock belongs to the open file, not to the process. So it stays if

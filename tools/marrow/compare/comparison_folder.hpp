@@ -11,8 +11,9 @@ namespace marrow::cli {
 bool is_comparison(const std::filesystem::path& folder);
 
 /// The folder of a comparison, new or to be continued. A file in it, the marker, says that the folder belongs to marrow
-/// and to which experiment. Nothing is written into a folder with other content. Locks on the marker keep other
-/// processes out. They end with the process, even if it crashes.
+/// and to which experiment: its name and its file. An experiment whose file was moved keeps its folder. Nothing is
+/// written into a folder with other content. Locks on the marker keep other processes out. They end with the process,
+/// even if it crashes.
 class ComparisonFolder {
  public:
   enum class Use { alone, with_others };  ///< with_others: together with processes that run single cells
@@ -27,7 +28,9 @@ class ComparisonFolder {
 
  private:
   void open_marker();
-  void check_marker(const std::string& name);
+  void check_marker(const compare::Experiment& experiment);
+  std::string read_marker() const;
+  void write_marker(const std::string& text);
   bool lock(long byte, short type, bool wait);
 
   std::filesystem::path folder_;
