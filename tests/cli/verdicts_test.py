@@ -239,6 +239,29 @@ class Verdicts(Runs):
         row = json.loads(result.stdout)
         self.assertEqual((row["verdict"], row["failure_probability"]), ("wrong", 0.6))
 
+    def test_a_row_has_the_figures_of_its_verdicts(self):
+        """Of one that is a single file, and of each of a list."""
+        single, many = CELLS, BOTH.replace("nodes:", "inputs: {case: {type: path}}\nnodes:\n  c: {uses: test.constant}")
+        (self.scratch / "cases" / "0").mkdir(parents=True)
+        for number, (text, figures) in enumerate(
+            (
+                (single, {"verdict": {"number": 3}}),
+                (
+                    many.replace("{verdict: v}", "{error: e, verdict: v}").replace(
+                        "  s: {", "  e: {uses: test.constant, with: {path: $case}}\n  s: {"
+                    ),
+                    {"verdict.a": {"number": 10}, "verdict.b": {"number": 20}},
+                ),
+            )
+        ):
+            self.write("p.yaml", text)
+            out = "c%d" % number
+            result = self.marrow("cell", self.write("e.yaml", EXPERIMENT), "sound/0/0", "--out", out)
+            self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+            self.assertEqual(json.loads(result.stdout)["verdict_figures"], figures)
+            kept = json.loads((self.scratch / out / "cells/sound/0/0/cell.json").read_text())
+            self.assertEqual(kept["verdict_figures"], figures)
+
     def test_without_verdicts_nothing_is_said_of_them(self):
         self.write("p.yaml", CELLS.replace(", verdict: v", ""))
         (self.scratch / "cases" / "0").mkdir(parents=True)
