@@ -33,6 +33,7 @@ from .annotations import at_most as at_most
 from .annotations import below as below
 from .annotations import distinct as distinct
 from .annotations import exactly_one as exactly_one
+from .annotations import figures as figures
 from .annotations import length as length
 from .annotations import named as named
 from .annotations import not_above as not_above

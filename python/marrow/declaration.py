@@ -178,6 +178,8 @@ def _port(where: str, name: str, hint: Any, is_output: bool) -> Dict[str, Any]:
         raise Error("%s is a function, which a node in Python cannot take; write the node in C++" % where)
     if not isinstance(getattr(kind, "type", None), str):
         raise Error("%s: expected one of marrow's values, as marrow.View, got %s" % (where, _shown(kind)))
+    if "figures" in notes and not (is_output and getattr(kind, "type") == "metrics"):
+        raise Error("%s: marrow.figures is for an output of marrow.Metrics" % where)
     return {
         "name": name,
         "help": notes.get("help", ""),

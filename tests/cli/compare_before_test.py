@@ -19,7 +19,7 @@ class Before(Case):
     def setUp(self):
         super().setUp()
         self.write("p.yaml", PIPELINE)
-        self.cases({"one": "distal proximal", "two": "distal proximal"})
+        self.cases({"one": "distal proximal", "two": "proximal distal"})
 
     def cases(self, names):
         for name, fragments in names.items():
@@ -107,7 +107,7 @@ class Before(Case):
         self.assertFalse((self.scratch / "out").exists())
 
     def test_what_is_not_declared_ends_after_the_first_cells(self):
-        self.cases({"c%d" % i: "distal" for i in range(6)})
+        self.cases({"c%d" % i: "distal other%d" % i for i in range(6)})
         for figure, message in (
             ("free.distal.mtre_m", "'free.distal.mtre_m': there is no figure 'mtre_m'; did you mean 'mtre_mm'?"),
             (
@@ -130,10 +130,10 @@ class Before(Case):
 
     def test_how_many_cases_it_takes(self):
         # 10 * 2 / 2^8 = 0.078 and 10 * 2 / 2^9 = 0.039: Holm's p of the smallest of ten, where all cases agree.
-        self.cases({"c%d" % i: "distal" for i in range(6)})
+        self.cases({"c%d" % i: "distal other%d" % i for i in range(6)})
         variants = "{%s}" % ", ".join("v%d: {}" % v for v in range(11))
         told = self.compare(0, "each.distal.mtre_mm", "--dry-run", variants=variants)
-        self.assertIn("10 comparisons with the baseline: at least 9 cases can show a difference\n", told.stdout)
+        self.assertIn("10 comparisons with the baseline, for which a difference takes at least 9 cases\n", told.stdout)
         self.assertIn(
             "marrow: note: 8 cases cannot show a difference among 10 comparisons: even if all go the same way, p stays "
             "above 0.05 after Holm's correction; it takes at least 9\n",

@@ -12,6 +12,7 @@ nodes:
   m: {uses: test.misbehave, in: {a: shared}}
 outputs: {number: m}
 """
+DRAWN = "  drawn: {uses: render.curves, in: {metrics: %s}}\n"  # a picture of a node's number
 HEAD = "experiment: 1\npipeline: p.yaml\ncases: {folders: [cases/*]}\nmetrics: [number.value]\ntimed_cells: 0\n"
 
 

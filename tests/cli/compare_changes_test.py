@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 
+from compare_cases import DRAWN
 from marrow_cli import MARROW, TEST_PLUGINS, Case, another_run_makes_all, main, marrow, wait_until
 
 PIPELINE = """marrow: 1
@@ -118,7 +119,7 @@ class Changes(Case):
 
     def test_pictures_of_another_state_do_not_stay(self):
         head = HEAD.replace("timed_cells: 0", "timed_cells: 1")
-        self.write("p.yaml", PIPELINE.replace("work: s}", "work: s, picture: r}"))
+        self.write("p.yaml", PIPELINE.replace("outputs: {", DRAWN % "r" + "outputs: {picture: drawn, "))
         self.write("e.yaml", head + "pictures: [picture]\nvariants: {a: {s.value: 4}}\n")
         self.compare("out")
         key = self.scratch / "out" / "pictures" / "a" / "1" / "0" / "key.txt"

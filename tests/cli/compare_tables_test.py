@@ -151,9 +151,10 @@ class Tables(Case):
         cases = "cases: {simulate: {pipeline: s.yaml, seeds: 1..%d, seed_input: [shape], draw: {x: [0, 1]}}}\n"
         few = self.marrow("compare", self.write("few.yaml", head + cases % 500), "--dry-run")
         self.assertEqual(
-            few.stdout.splitlines()[:3],
+            few.stdout.splitlines()[:4],
             [
                 "1000 cells: 2 variants, 500 cases, 1 starts",
+                "1 comparison with the baseline, for which a difference takes at least 6 cases",
                 "500 cases to simulate",
                 "3000 evaluations of nodes: 999 shared, 0 cached, 2001 to make",
             ],
@@ -161,9 +162,10 @@ class Tables(Case):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         many = self.marrow("compare", self.write("many.yaml", head + cases % 100000), "--dry-run")
         self.assertEqual(
-            many.stdout.splitlines()[:4],
+            many.stdout.splitlines()[:5],
             [
                 "200000 cells: 2 variants, 100000 cases, 1 starts",
+                "1 comparison with the baseline, for which a difference takes at least 6 cases",
                 "looked at: 500 cases and 1 starts, evenly spread; by them there are about",
                 "100000 cases to simulate",
                 "600000 evaluations of nodes: 199999 shared, 0 cached, 400001 to make",

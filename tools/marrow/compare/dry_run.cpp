@@ -144,8 +144,8 @@ void Plan::print() const {
   std::printf("%zu cells: %zu variants, %zu cases, %zu starts\n", experiment_.cell_count(), experiment_.variants.size(),
               cases.all, starts.all);
   if (const auto counts = compare::comparison_counts(experiment_); counts.comparisons)
-    std::printf("%zu comparisons with the baseline: at least %zu cases can show a difference\n", counts.comparisons,
-                counts.fewest_cases);
+    std::printf("%zu comparison%s with the baseline, for which a difference takes at least %zu cases\n",
+                counts.comparisons, counts.comparisons == 1 ? "" : "s", counts.fewest_cases);
   if (is_sample)
     std::printf("looked at: %zu cases and %zu starts, evenly spread; by them there are about\n", cases.taken,
                 starts.taken);
