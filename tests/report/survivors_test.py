@@ -34,7 +34,7 @@ class SurvivorsTest(PageTest):
     def test_runs_that_are_missing(self):
         def change(data):
             data["metrics"] = [dict(metric, same_runs=False) for metric in data["metrics"]]
-            data["summary"][1].update(incomplete=20)
+            data["summary"][1].update(incomplete=20, evaluations={"count": 2, "of": 60, "median": 12.5})
             data["summary"][1]["metrics"]["mtre_mm"].update(count=40, of=60)
             data["comparisons"][0].update(
                 difference=None, fails_more="variant", low=-0.25, high=None, pairs=40, runs=60, cases=10, of_cases=12
@@ -43,6 +43,7 @@ class SurvivorsTest(PageTest):
 
         self.page(change)
         self.assertIn("40 of 60", self.row(1))
+        self.assertTrue(self.row(1).endswith(" 12.5"), "evaluations are counted: " + self.row(1))
         self.assertIn(" + 20 incomplete", self.row(1))
         self.assertIn(
             "The variants have this figure in different runs, so these numbers are not of the same cases and starts.",

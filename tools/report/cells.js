@@ -43,7 +43,8 @@ const Cells = (() => {
               []),
       ...(data.initial_error ? [figure('Start’s error', (c) => c.initial_error, data.initial_error.unit)] : []),
       ...data.metrics.map((metric, i) => figure(metric.label, (c) => c.values[i], metric.unit)),
-      figure('Time', (c) => c.seconds, 's'), figure('Evaluations', (c) => c.evaluations),
+      figure('Time', (c) => c.seconds, 's'),
+      {...figure('Evaluations', (c) => c.evaluations), cell: (c) => String(c.evaluations ?? '–')},
       {title: 'Kept', key: contents, cell: (c) => el('small', {}, contents(c)), width: 18}
     ];
   }

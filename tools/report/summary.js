@@ -125,7 +125,7 @@ const Summary = (() => {
       {
         title: 'Evaluations',
         key: (i) => (of(i).evaluations || {}).median,
-        cell: (i) => number((of(i).evaluations || {}).median),
+        cell: (i) => String((of(i).evaluations || {}).median ?? '–'),
         number: true
       },
     ];

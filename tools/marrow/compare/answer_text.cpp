@@ -41,7 +41,7 @@ std::string overview(const Experiment& experiment, const Answer& answer) {
                std::to_string(summary.failed), std::to_string(summary.incomplete),
                summary.success ? success_text(*summary.success) : kNone,
                summary.seconds.count ? scale.text(summary.seconds.summary.median) : kNone,
-               summary.evaluations.count ? formatted("%.0f", summary.evaluations.summary.median) : kNone});
+               summary.evaluations.count ? formatted("%.10g", summary.evaluations.summary.median) : kNone});
   }
   std::string text = table.text();
   if (!experiment.defines_success())
