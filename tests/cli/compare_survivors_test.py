@@ -19,7 +19,8 @@ SURVIVORS = {
 
 
 def exact_p(negative_rank, negatives, positive_rank, positives):
-    """Two-sided p of the signed ranks of two groups of ties, the smaller sum on the negative side: all signs counted."""
+    """Two-sided p of the signed ranks of two groups of ties, with the smaller sum on the negative side: by counting all
+    signs."""
     observed = negative_rank * negatives
     ways = sum(
         math.comb(negatives, i) * math.comb(positives, j)
@@ -47,7 +48,8 @@ class Survivors(GivenCase):
         self.assertRegex(told, r"\na  30/30  %.4f " % middle)
         self.assertRegex(told, r"\nb  10/30  %.4f " % (statistics.median(EASY) - 0.2))
         self.assertIn(
-            "\nThe variants have this figure in different runs, so these numbers are not of the same cases and starts.\n",
+            "\nThe variants have this figure in different runs, so these numbers are not of the same cases and "
+            "starts.\n",
             told,
         )
         for words in (

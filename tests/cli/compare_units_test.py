@@ -6,8 +6,8 @@ from marrow_cli import main
 
 METRES = {"a": ["2 mm", "3 mm", "4 mm"], "b": ["2 mm", "0.003 m", "0.004 m"]}
 REFUSED = (
-    "marrow: error: the figure 'figures.err' has the unit 'mm' in the cell a/000/0 and %s in the cell b/001/0, so their "
-    "numbers cannot be compared; let all cells give it in one unit\n"
+    "marrow: error: the figure 'figures.err' has the unit 'mm' in the cell a/000/0 and %s in the cell b/001/0, so "
+    "their numbers cannot be compared; let all cells give it in one unit\n"
 )
 STARTS = """starts: {node: s, count: 2}
 initial_error: from.start_deg
@@ -120,7 +120,7 @@ class StartErrors(GivenCase):
         result = self.marrow("compare", file, "--out", "out", "--quiet")
         self.assertEqual(result.returncode, 2, result.stdout)
         self.assertIn(
-            "the figure 'from.start_deg' has the unit 'rad' in the cell a/000/0 and the unit 'deg' in the cell a/002/0, so",
+            "the figure 'from.start_deg' has the unit 'rad' in the cell a/000/0 and the unit 'deg' in the cell a/002/0",
             result.stderr,
         )
 

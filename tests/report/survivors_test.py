@@ -136,11 +136,8 @@ class SurvivorsTest(PageTest):
         self.assertIn("1.7e+300", self.row(0))
         self.assertIn("1.0e−300", self.row(0, "paired"))
         for section in ("distributions", "paired"):
-            for scale in self.browser.js(
-                "return [...document.querySelectorAll('#' + arguments[0] + ' .toolbar button')].map((b) => b.textContent)",
-                section,
-            ):
-                self.press(scale, "#" + section)
+            for text in self.texts("#%s .toolbar button" % section):
+                self.press(text, "#" + section)
             lost = self.browser.js(
                 "return [...document.querySelectorAll('#' + arguments[0] + ' svg.plot *')].filter((mark) =>"
                 " [...mark.attributes].some((one) => /NaN|Infinity/.test(one.value))).map((mark) => mark.outerHTML)",
