@@ -8,6 +8,7 @@ from marrow_cli import Case, main, sample
 from sample import ALL
 
 import files
+import of_words
 import ranks
 import recompute_compare
 from checks import Checks
@@ -74,10 +75,37 @@ class Told(Case):
 
     def test_all_sizes_of_experiments(self):
         # One case up to six, at which 95 % can be reached; and 40, which no enumeration of all signs reaches.
-        for count in (1, 2, 5, 6, 40):
+        # 60 differences are compared by the normal distribution.
+        for count in (1, 2, 5, 6, 40, 60):
             said = self.checked(differences([0.5 + 0.01 * i for i in range(count)]), "n%d" % count)
             self.assertEqual("no difference shown" in said, count < 6)
             self.assertEqual("fewer than 6 cases cannot reach p < 0.05" in said, count < 6)
+
+    def test_how_many_cases_it_takes_is_said_before(self):
+        checks = Checks()
+        for seed in range(1, 13):
+            experiment, folder = generate(seed), self.scratch / str(seed)
+            checks.where = "experiment %d" % seed
+            files.write(experiment, folder)
+            ended = files.run(experiment, folder, BUILD, arguments=["--dry-run"])
+            self.assertEqual(ended.returncode, 0, ended.stderr)
+            of_words.check_dry_run(checks, ended.stdout, experiment)
+        self.assertEqual(checks.differences, [])
+
+    def test_a_rate_that_can_never_be_so_narrow(self):
+        # Clopper and Pearson's interval of 40 of 40 begins at 0.025^(1/40) = 0.9119, so it is 0.0881 wide; Wilson's,
+        # which the rule does not take, is 0.0876 wide.
+        for width, is_possible in ((0.0879, False), (0.089, True)):
+            experiment = differences([0.1] * 40)
+            experiment.cases = ["seed-%d" % (i + 1) for i in range(40)]
+            table = experiment.table
+            experiment.table = {("seed-%d" % (int(c[5:]) + 1), v, s): texts for (c, v, s), texts in table.items()}
+            experiment.metrics[0].limit = 50
+            experiment.stop = {"figure": "success", "width": width, "most_cases": 40, "look_every": 5}
+            files.write(experiment, self.scratch / str(width))
+            ended = files.run(experiment, self.scratch / str(width), BUILD, arguments=["--dry-run"])
+            self.assertEqual("'stop' can never be met" in ended.stderr, not is_possible, ended.stderr)
+            self.assertEqual("is at least 0.088 wide" in ended.stderr, not is_possible, ended.stderr)
 
 
 if __name__ == "__main__":

@@ -88,13 +88,13 @@ def write(experiment, folder):
     (folder / "e.yaml").write_text(experiment_text(experiment))
 
 
-def run(experiment, folder, build, plugins=None):
+def run(experiment, folder, build, plugins=None, arguments=()):
     """The ended process of marrow; the answer is in FOLDER/out."""
     folder, build = pathlib.Path(folder), pathlib.Path(build).resolve()
     environment = dict(os.environ)
     environment["MARROW_PLUGIN_PATH"] = str(plugins or build / "tests/given_plugins")
     environment["MARROW_CACHE"] = str(folder / "cache")
-    command = [build / "bin/marrow", "compare", "e.yaml", "--out", "out", "--quiet", "--shown", "1"]
-    if experiment.stop:
+    command = [build / "bin/marrow", "compare", "e.yaml", "--out", "out", "--quiet", "--shown", "1", *arguments]
+    if experiment.stop and not arguments:
         command += ["--more-cases", "100"]
     return subprocess.run(list(map(str, command)), capture_output=True, text=True, cwd=folder, env=environment)

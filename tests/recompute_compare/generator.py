@@ -156,7 +156,8 @@ def generate(seed, mode=None):
     elif mode == "stop":
         count, starts = max(2, min(count, 12)), min(starts, 2)
     has_seeds = mode in ("stop", "tune")
-    cases = ["seed-%d" % (i + 1) if has_seeds else "case %02d" % i for i in range(count)]
+    name = "seed-%d" if has_seeds else chance.choice(["case %02d", "=case,%02d", "-a%02d", '"%02d"', "c%02d"])
+    cases = [name % (i + 1) for i in range(count)]
     variants = [Variant(column, column) for column in columns]
     experiment = Experiment("e%d" % seed, metrics_of(chance), variants, cases, displacements(starts), {})
     experiment.baseline = chance.randrange(len(variants))

@@ -95,4 +95,7 @@ def check_tuning(checks, kind, got, untuned, points, experiment):
     checks.that(kind + " tuning", "best", got["best"] in ties, (got["best"], best))
     checks.same(kind + " tuning", "higher_is_better", got["higher_is_better"], is_higher)
     checks.close(kind + " tuning", "failed_as", got["failed_as"], bad)
+    checks.same(
+        kind + " tuning", "options", got["options"], [{"option": "main.at", "range": [-1.0, 2.0], "scale": "linear"}]
+    )
     checks.same(kind + " tuning", "training_cases", got["training_cases"], experiment.tune["training_cases"])

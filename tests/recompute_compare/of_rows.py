@@ -30,7 +30,8 @@ def check_csv(checks, folder, experiment, rows, seconds):
         table = list(csv.DictReader(stream))
     checks.same("cells.csv", "rows", len(table), len(rows))
     for got, row in zip(table, rows):
-        names = [got[key] for key in ("cell", "variant", "case", "start")]
+        names = [unquoted(got[key]) for key in ("cell", "variant", "case", "start")]
+        checks.that("cells.csv", row.id + " is a text", got["case"][0] not in "=+-@", got["case"])
         checks.same("cells.csv", row.id + " names", names, [row.id, row.variant, row.case, row.start])
         checks.same("cells.csv", row.id + " status", got["status"], "failed" if row.failed else "done")
         is_good = "" if row.success is None else "1" if row.success else "0"

@@ -23,6 +23,7 @@ import of_json
 import of_rows
 import of_sentences
 import of_terminal
+import of_words
 from checks import Checks
 from experiment import Variant
 from generator import generate
@@ -43,6 +44,9 @@ def check_tuning(checks, experiment, got):
     tried = [Variant("tuned+%.6g" % p["values"][0], base.column, p["values"]) for p in got["tuning"]["points"]]
     points = [answer.tuning_point(experiment, variant, variant.swept) for variant in tried]
     of_json.check_tuning(checks, "comparison.json", got["tuning"], untuned, points, experiment)
+    is_known = any(point["mean"] is not None for point in [untuned, *points])
+    unit = experiment.metrics[0].unit if is_known else ""
+    of_words.check_tuning(checks, got["tuning"], untuned, points, experiment, unit)
     rows = experiment.rows(experiment.cases[: experiment.tune["training_cases"]], tried)
     of_variant = [answer.OfVariant(experiment, [r for r in rows if r.variant == v.name]) for v in tried]
     return answer.curve_trees(experiment, tried, of_variant, {"range": [-1, 2], "is_log": False})
@@ -101,6 +105,12 @@ def check(checks, experiment, folder, printed):
     of_rows.check_report_rows(checks, data, experiment, rows, seconds)
     of_rows.check_timed(checks, experiment, rows, seconds, answer.places_of_all(experiment, rows))
     of_terminal.check_tables(checks, printed, expected)
+    of_words.check_counts(checks, printed, experiment, rows)
+    of_words.check_times(checks, got["times"], seconds, rows)
+    of_words.check_success_rule(
+        checks, data["experiment"]["success_rule"], experiment, answer.units_of(experiment, rows)
+    )
+    checks.same("words: times", "in the report", data["experiment"]["time_rule"], got["times"])
     number = of_terminal.number_of_comparisons(printed)
     checks.same("terminal counts", "comparisons", number, len(expected["comparisons"]) if number else None)
     check_sentences(checks, experiment, rows, got, of_terminal.sentences(printed))

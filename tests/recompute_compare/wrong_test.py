@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """A figure of a comparison that is changed is found, wherever it stands."""
 import json
+import pathlib
 import random
 import re
+import shutil
+import tempfile
 
 from recomputing import BUILD  # it finds the modules below
 from marrow_cli import Case, main
@@ -12,7 +15,8 @@ import recompute_compare
 from checks import Checks
 from generator import generate
 
-SEEDS = (3, 17)  # with failures, missing figures, limits, verdicts, capture ranges and a rule to stop
+# With failures, missing figures, limits, verdicts, capture ranges and times; a sweep; tuning; a rule to stop.
+SEEDS = (54, 65, 5, 17)
 NOT_FIGURES = re.compile(r"seed-\d+|e\d+\b|95 %|25 %|75 %|\b5 %|p < 0\.05|p < 0\.001|with Holm")
 
 
@@ -43,22 +47,33 @@ def changed(tree, path):
     for key in path[:-1]:
         parent = parent[key]
     value = parent[path[-1]]
-    parent[path[-1]] = not value if isinstance(value, bool) else value * 1.001 + 0.001
+    parent[path[-1]] = not value if isinstance(value, bool) else value + 0.001 * (1 + abs(value))
     return tree
 
 
 class Wrong(Case):
+    @classmethod
+    def setUpClass(cls):
+        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-wrong-"))
+        cls.made = {}
+        for seed in SEEDS:
+            experiment, folder = generate(seed), cls.shared / str(seed)
+            files.write(experiment, folder)
+            ended = files.run(experiment, folder, BUILD)
+            assert ended.returncode == 0, ended.stderr
+            cls.made[seed] = ended.stdout
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.shared, ignore_errors=True)
+
     def setUp(self):
         super().setUp()
         self.chance = random.Random(1)
-        self.made = {}
-        for seed in SEEDS:
-            experiment, folder = generate(seed), self.scratch / str(seed)
-            files.write(experiment, folder)
-            ended = files.run(experiment, folder, BUILD)
-            self.assertEqual(ended.returncode, 0, ended.stderr)
-            self.assertEqual(self.differences(seed, folder / "out", ended.stdout), [])
-            self.made[seed] = ended.stdout
+
+    def test_nothing_is_found_where_nothing_was_changed(self):
+        for seed, printed in self.made.items():
+            self.assertEqual(self.differences(seed, self.shared / str(seed) / "out", printed), [])
 
     def differences(self, seed, folder, printed):
         checks = Checks()
@@ -69,10 +84,10 @@ class Wrong(Case):
         missed, count = [], 0
         for seed, printed in self.made.items():
             begin, end = printed.index("\nvariant"), printed.index("\n* the baseline")
-            for start, stop in self.chance.sample([s for s in numbers_in(printed) if begin < s[0] < end], 25):
+            for start, stop in self.chance.sample([s for s in numbers_in(printed) if begin < s[0] < end], 15):
                 other = printed[:start] + str(float(printed[start:stop]) + 1) + printed[stop:]
                 count += 1
-                if not self.differences(seed, self.scratch / str(seed) / "out", other):
+                if not self.differences(seed, self.shared / str(seed) / "out", other):
                     missed.append(printed[max(0, start - 40) : stop + 20])
         print("%d printed numbers were changed" % count)
         self.assertEqual(missed, [])
@@ -81,7 +96,7 @@ class Wrong(Case):
         """Changes `count` numbers of a file, one at a time; those that nobody noticed."""
         missed = []
         for seed, printed in self.made.items():
-            out = self.scratch / str(seed) / "out"
+            out = self.shared / str(seed) / "out"
             text = (out / name).read_text()
             tree = tree_of(text)
             for path in self.chance.sample(sorted(leaves(tree), key=str), count):
@@ -92,13 +107,13 @@ class Wrong(Case):
         return missed
 
     def test_each_number_of_comparison_json(self):
-        missed = self.changed_file("comparison.json", 40, json.loads, lambda _, tree: json.dumps(tree))
+        missed = self.changed_file("comparison.json", 25, json.loads, lambda _, tree: json.dumps(tree))
         self.assertEqual(missed, [])
 
     def test_numbers_in_sentences(self):
         missed = []
         for seed, printed in self.made.items():
-            file = self.scratch / str(seed) / "out/comparison.json"
+            file = self.shared / str(seed) / "out/comparison.json"
             text = file.read_text()
             for i in range(len(json.loads(text)["comparisons"])):
                 tree = json.loads(text)
@@ -124,18 +139,18 @@ class Wrong(Case):
             data, _, tail = rest.partition(end)
             return head + begin + json.dumps({**json.loads(data), **tree}) + end + tail
 
-        self.assertEqual(self.changed_file("report.html", 15, data_of, with_data), [])
+        self.assertEqual(self.changed_file("report.html", 10, data_of, with_data), [])
 
     def test_figures_of_cells(self):
         missed = []
         for seed, printed in self.made.items():
-            out = self.scratch / str(seed) / "out"
+            out = self.shared / str(seed) / "out"
             for name in ("cells.csv", "cells.jsonl"):
                 text = (out / name).read_text()
                 places = [s for s in re.finditer(r"(?<=[,:\[])\d+\.\d+(?=[,}\]\n])", text)]
                 # seconds and what a node's calls took are the clock's
                 places = [s for s in places if '"seconds"' not in text[s.start() - 12 : s.start()]]
-                for found in self.chance.sample(places, min(10, len(places))):
+                for found in self.chance.sample(places, min(6, len(places))):
                     other = repr(float(found[0]) * 1.01 + 0.01)
                     (out / name).write_text(text[: found.start()] + other + text[found.end() :])
                     if not self.differences(seed, out, printed):
