@@ -3,10 +3,10 @@
 
 #include <cmath>
 
+#include "marrow/compare/case_rate.hpp"
 #include "marrow/compare/median_interval.hpp"
 #include "marrow/compare/paired.hpp"
 #include "marrow/domain/number_text.hpp"
-#include "normal.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -38,7 +38,9 @@ std::string fault_of_last_look(const StopRule& rule, std::size_t starts) {
                ? ""
                : "there is no interval of a median with its confidence, which takes at least " + fewest + " cases";
   }
-  const Interval narrowest = score_interval(1, double(rule.most_cases * starts), 1 - level);
+  CaseRate best;  // all runs independent
+  for (std::size_t run = 0; run < rule.most_cases * starts; ++run) best.add(std::to_string(run), true);
+  const Interval narrowest = best.exact_interval(1 - level);
   const double width = narrowest.upper - narrowest.lower;
   return width > rule.width ? "the interval of a success rate is at least " + formatted("%.2g", width) +
                                   " wide, even if every run is a success"
