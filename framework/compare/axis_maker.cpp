@@ -30,7 +30,7 @@ class MakerSearch {
     }
   }
 
-  const std::optional<AxisMaker>& best() const { return best_; }
+  const std::vector<AxisMaker>& best() const { return best_; }
 
  private:
   void consider(const AxisMaker& maker) {
@@ -43,21 +43,22 @@ class MakerSearch {
         for (const Reference& source : wire.sources)
           if (needed.insert(source.node).second) open.insert(source.node);
     }
-    if (best_ && needed.size() >= fewest_) return;
-    best_ = maker;
+    if (!best_.empty() && needed.size() > fewest_) return;
+    if (!best_.empty() && needed.size() < fewest_) best_.clear();
+    best_.push_back(maker);
     fewest_ = needed.size();
   }
 
   const Pipeline& pipeline_;
   const std::string& axis_;
   std::set<int> seen_;
-  std::optional<AxisMaker> best_;
+  std::vector<AxisMaker> best_;
   std::size_t fewest_ = 0;
 };
 
 }  // namespace
 
-std::optional<AxisMaker> quick_maker(const Pipeline& pipeline, const Reference& value, const std::string& axis) {
+std::vector<AxisMaker> quick_makers(const Pipeline& pipeline, const Reference& value, const std::string& axis) {
   MakerSearch search(pipeline, axis);
   search.look_at(value);
   return search.best();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <optional>
 #include <string>
+#include <vector>
 
 #include "marrow/runtime/pipeline.hpp"
 
@@ -12,9 +12,10 @@ struct AxisMaker {
   int node = -1, output = -1;
 };
 
-/// The node from which the items along one axis of a value have their names. All inputs of a node go in step along an
-/// axis, so there may be several; it is the one that needs the fewest other nodes. Nothing if each of them needs a
-/// cost, a projector, an optimizer or a body that is repeated: to run these takes as long as a registration.
-std::optional<AxisMaker> quick_maker(const Pipeline& pipeline, const Reference& value, const std::string& axis);
+/// The outputs from which the items along one axis of a value have their names. All inputs of a node go in step along
+/// an axis, so there may be several; they are those that need the fewest other nodes. One of them may be absent in a
+/// case. Empty if each needs a cost, a projector, an optimizer or a body that is repeated: to run these takes as long
+/// as a registration.
+std::vector<AxisMaker> quick_makers(const Pipeline& pipeline, const Reference& value, const std::string& axis);
 
 }  // namespace marrow::compare

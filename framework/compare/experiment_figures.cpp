@@ -87,19 +87,18 @@ void FigureChecker::add_items(std::size_t variant, const Pipeline& pipeline, con
                               const std::vector<std::string>& parts, NamedItem item) {
   const std::vector<std::string> axes = pipeline.axes_of(output.source);
   std::vector<Digest> alike;  // nodes with equal digests give equal results
-  for (std::size_t i = 0; i < axes.size(); ++i) {
-    const auto maker = quick_maker(pipeline, output.source, axes[i]);
-    if (!maker) continue;
-    if (alike.empty()) alike = histories(pipeline, "");
-    const std::string made_from = alike[std::size_t(maker->node)].hex() + std::to_string(maker->output);
-    if (!known_items_.insert(item.path + "\n" + axes[i] + "\n" + made_from).second) continue;
-    item.item = parts[i + 1];
-    item.axis = axes[i];
-    item.variant = variant;
-    item.node = pipeline.nodes[std::size_t(maker->node)].id;
-    item.output = maker->output;
-    items_.push_back(item);
-  }
+  for (std::size_t i = 0; i < axes.size(); ++i)
+    for (const AxisMaker& maker : quick_makers(pipeline, output.source, axes[i])) {
+      if (alike.empty()) alike = histories(pipeline, "");
+      const std::string made_from = alike[std::size_t(maker.node)].hex() + std::to_string(maker.output);
+      if (!known_items_.insert(item.path + "\n" + axes[i] + "\n" + made_from).second) continue;
+      item.item = parts[i + 1];
+      item.axis = axes[i];
+      item.variant = variant;
+      item.node = pipeline.nodes[std::size_t(maker.node)].id;
+      item.output = maker.output;
+      items_.push_back(item);
+    }
 }
 
 }  // namespace marrow::compare

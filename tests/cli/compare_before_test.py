@@ -11,7 +11,9 @@ nodes:
   way: {uses: test.way}
   search: {uses: test.stages, in: {of: f, way: way}}
   staged: {uses: test.declared, in: {of: search}}
-outputs: {each: each, free: free, staged: staged}
+  c: {uses: test.case, with: {path: $case}}
+  errors: {uses: test.between, in: {start: c.starts, truth: c.truths}}
+outputs: {each: each, free: free, staged: staged, errors: errors}
 """
 
 
@@ -68,6 +70,11 @@ class Before(Case):
             "'each.dital.mtre_mm': there is no fragment 'dital' in the cases 'one' and 'two'", "each.dital.mtre_mm"
         )
         self.assertIn("  hint: did you mean 'distal'?", told)
+
+    def test_one_of_several_lists_may_be_absent(self):
+        self.refused(
+            "'errors.dital.mtre_mm': there is no fragment 'dital' in the cases 'one' and 'two'", "errors.dital.mtre_mm"
+        )
 
     def test_one_case(self):
         self.refused(

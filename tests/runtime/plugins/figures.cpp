@@ -32,6 +32,15 @@ List<Metrics> fragments(const Options& options) {
   return list;
 }
 
+struct Case {
+  List<Metrics> starts, truths;
+};
+/// As a case has them: no starts, but truths.
+Case absent_and_not(const Options& options) { return {{}, fragments(options)}; }
+Metrics between(const Metrics& start, const Metrics& truth) {
+  return {{{"mtre_mm", start.items.at(0).value - truth.items.at(0).value, "mm"}}};
+}
+
 Metrics figures_of(const Metrics& of, const std::string& also) {
   Metrics made{{{"mtre_mm", of.items.at(0).value, "mm"}, {"frontal.median_px", 2, "px"}}};
   if (!also.empty()) made.items.push_back({also, 3, ""});
@@ -53,6 +62,17 @@ MARROW_PLUGIN(plugin) {
       .out("numbers", "the length of its name", marrow::over("fragment"))
       .figures({"value"})
       .option("path", &Options::path, "folder of the case");
+  plugin.node("test.case", absent_and_not)
+      .summary("Two lists over the fragments, of which one is absent")
+      .out("starts", &Case::starts, "none", marrow::over("fragment"))
+      .out("truths", &Case::truths, "a number for each", marrow::over("fragment"))
+      .option("path", &Options::path, "folder of the case");
+  plugin.node("test.between", between)
+      .summary("A figure of both")
+      .in("start", "number")
+      .in("truth", "number")
+      .out("metrics", "their difference")
+      .figures({"mtre_mm"});
   plugin.node("test.declared", measured)
       .summary("Figures that are declared")
       .in("of", "number")
