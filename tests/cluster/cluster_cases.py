@@ -82,12 +82,13 @@ class Cluster(Case):
         )
 
     def figures(self, out):
-        """Everything that the tables say of each cell, but for times and tries."""
+        """Everything that the tables say of each cell, but for times, tries and keys, which depend on paths."""
         with open(self.scratch / out / "cells.csv", newline="") as stream:
             rows = list(csv.DictReader(stream))
         cells = [row["cell"] for row in rows]
         self.assertEqual(len(cells), len(set(cells)), "a cell is counted twice")
-        return {row.pop("cell"): {k: v for k, v in row.items() if k not in ("seconds", "tries")} for row in rows}
+        left_out = ("seconds", "tries", "key")
+        return {row.pop("cell"): {k: v for k, v in row.items() if k not in left_out} for row in rows}
 
     def answers(self, out):
         """The statistics in comparison.json without times."""

@@ -81,11 +81,10 @@ class Quoting(Cluster):
             "experiment: 1\nname: x\npipeline: %s\ncases: {folders: [cases*/*]}\nmetrics: [number.value]\n"
             "timed_cells: 0\nsuccess: {number.value: 4}\nvariants: {%s}\n" % (json.dumps(name + ".yaml"), variants)
         )
-        # the program, too, has a place of this name
-        program = self.folder / ("programs" + name) / "bin" / "marrow"
-        program.parent.mkdir()
-        program.symlink_to(MARROW)
-        self.program = program
+        self.program = MARROW
+        if name == EVERYTHING:  # the program, too, has a place of this name
+            self.program = self.folder / ("programs" + name) / "marrow"
+            shutil.copy(MARROW, self.program)
         self.environment = {
             **os.environ,
             "HOME": str(home),

@@ -53,6 +53,16 @@ std::string python_list(const std::vector<Chunk>& chunks) {
   return "[" + list + "]";
 }
 
+const std::string kStartOfParallel = R"(#!/bin/sh
+# Runs the chunks of a comparison by GNU parallel, one at a time on each host, and makes the report. Arguments go to
+# parallel, such as -S host1,host2. The same command goes on after an interruption.
+case ${TMPDIR-} in *[!A-Za-z0-9_.,:/+@-]*)
+  echo "GNU parallel gives TMPDIR, $TMPDIR, to a shell and does not quote it. Set it to a folder whose name" \
+    "has letters, digits and _ . , : / + @ - only." >&2
+  exit 2 ;;
+esac
+)";
+
 /// What a Snakefile does before its rules. Its executors put the names of folders into commands without quoting them
 /// for the shell.
 const std::string kStartOfSnakefile = R"(import os, re
@@ -101,23 +111,8 @@ fs::path write_gather_script(const ClusterPlan& plan, const std::vector<std::str
 std::string emit_parallel(const ClusterPlan& plan) {
   write_chunk_script(plan, {});
   write_gather_script(plan);
-  std::string text =
-      "#!/bin/sh\n"
-      "# Runs the chunks of a comparison by GNU parallel, one at a time on each host, and makes the report. Arguments\n"
-      "# go to parallel, such as -S host1,host2. The same command goes on after an interruption.\n"
-      "case ${TMPDIR-} in *[!A-Za-z0-9_.,:/+@-]*)\n"
-      "  echo \"GNU parallel gives TMPDIR, $TMPDIR, to a shell and does not quote it. Set it to a folder whose name "
-      "has\" "
-      "\\\n"
-      "    \"letters, digits and _ . , : / + @ - only.\" >&2\n"
-      "  exit 2 ;;\n"
-      "esac\n"
-      "MARROW_COMPARISON=" +
-      script_word(plan.folder.string()) +
-      "\n"
-      "export MARROW_COMPARISON\n"
-      "plan=$MARROW_COMPARISON/plans/" +
-      plan.id + "\n";
+  std::string text = kStartOfParallel + "MARROW_COMPARISON=" + script_word(plan.folder.string()) +
+                     "\nexport MARROW_COMPARISON\nplan=$MARROW_COMPARISON/plans/" + plan.id + "\n";
   for (const auto& [name, chunks] : {std::pair("cases", &plan.cases), std::pair("chunks", &plan.cells)}) {
     if (chunks->empty()) continue;
     const std::string list = std::string("-") + name;
