@@ -185,8 +185,8 @@ void ComparisonFolder::check_marker(const compare::Experiment& experiment) {
                 "'; this one is '" + owner.name + "'" + advice);
   if (before && is_another(before->file, owner.file))
     throw Error("the folder " + folder_.string() + " holds the comparison of another experiment of the same name, '" +
-                owner.name + "', whose file is " + before->file.string() + "; this one is " + owner.file.string() +
-                advice);
+                owner.name + "', whose file is " + printable(before->file.string()) + "; this one is " +
+                printable(owner.file.string()) + advice);
   if (text != marker_text(owner)) write_marker(marker_text(owner));
   lock(kText, F_UNLCK, true);
 }
