@@ -140,6 +140,27 @@ double median_of_differences(const std::vector<double>& sorted) {
   return below == -above ? 0 : below + above;
 }
 
+namespace {
+
+/// Two-sided p of a sign test: whether the rarer of two outcomes, which are equally likely, is as rare as this or
+/// rarer.
+double sign_test_p(std::size_t rarer, std::size_t all) {
+  double chance = std::pow(0.5, double(all)), sum = 0;
+  for (std::size_t k = 0; k <= rarer; ++k) {
+    sum += chance;
+    chance *= double(all - k) / double(k + 1);
+  }
+  return std::min(1.0, 2 * sum);
+}
+
+int side_of_failures(const Tally& cases, bool larger_is_better, double alpha) {
+  const std::size_t rarer = std::min(cases.variant_lost, cases.reference_lost);
+  if (sign_test_p(rarer, cases.variant_lost + cases.reference_lost) >= alpha) return 0;
+  return (cases.variant_lost > cases.reference_lost) == larger_is_better ? -1 : 1;
+}
+
+}  // namespace
+
 Comparison compare_pairs(const std::vector<Pair>& pairs, bool larger_is_better, double confidence) {
   check_confidence(confidence);
   const CaseDifferences differences = case_differences(pairs, larger_is_better);
@@ -154,6 +175,7 @@ Comparison compare_pairs(const std::vector<Pair>& pairs, bool larger_is_better, 
   comparison.interval = order_statistic_interval(differences.values, 1 - confidence);
   comparison.interval.confidence = confidence;
   comparison.test = signed_rank_test(differences.values);
+  comparison.side_of_failures = side_of_failures(comparison.cases, larger_is_better, 1 - confidence);
   return comparison;
 }
 

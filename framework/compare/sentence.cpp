@@ -168,6 +168,7 @@ bool difference_shown(const Comparison& comparison, double p_after_holm, double 
     throw Error("p is " + plain(p_after_holm) + "; expected a number from 0 to 1");
   if (p_after_holm >= alpha) return false;
   const bool ranks_positive = comparison.test.positive_ranks > comparison.test.negative_ranks;
+  if (comparison.side_of_failures == (ranks_positive ? 1 : -1)) return true;
   return ranks_positive ? comparison.interval.lower > 0 : comparison.interval.upper < 0;
 }
 

@@ -100,13 +100,34 @@ TEST(ComparePairs, CountsAVariantThatLosesTheHardCasesAsWorse) {
   EXPECT_DOUBLE_EQ(*comparison.median_of_both, -0.2);
 }
 
-TEST(ComparePairs, SaysBetterInNoCaseWhereTheOthersAreLost) {
-  // 10 better and 20 lost: the 10th value is still one of those that are better.
+TEST(ComparePairs, ShowsByFailuresWhatTheMedianLeavesOpen) {
+  // 10 better and 20 lost: the 10th value is still one of those that are better, so the interval contains 0. But in all
+  // 20 cases in which one lost more, it was the variant: p = 2^-19 by a sign test.
   const Comparison comparison = failing_in(20);
   EXPECT_EQ(comparison.median_difference, infinite);
   EXPECT_DOUBLE_EQ(comparison.interval.lower, -0.2);
   EXPECT_LT(comparison.test.p, 0.001);
-  EXPECT_FALSE(difference_shown(comparison, comparison.test.p));
+  EXPECT_EQ(comparison.side_of_failures, 1);
+  EXPECT_TRUE(difference_shown(comparison, comparison.test.p));
+}
+
+TEST(ComparePairs, FailuresShowASideWhereASignTestDoes) {
+  // Two-sided p of k against n, by hand: 5 against 0 is 2 / 2^5 = 0.0625, 6 against 0 is 2 / 2^6 = 0.03125; 1 against 8
+  // is 2 * (1 + 9) / 2^9 = 0.0391, 1 against 7 is 2 * (1 + 8) / 2^8 = 0.0703.
+  const auto side = [](int variant, int baseline, bool larger_is_better) {
+    std::vector<Pair> pairs;
+    for (int c = 0; c < variant; ++c) pairs.push_back({"v" + std::to_string(c), 1.0, failed});
+    for (int c = 0; c < baseline; ++c) pairs.push_back({"b" + std::to_string(c), failed, 1.0});
+    for (int c = 0; c < 20; ++c) pairs.push_back({"both " + std::to_string(c), 1.0, 1.0});
+    return compare_pairs(pairs, larger_is_better).side_of_failures;
+  };
+  EXPECT_EQ(side(5, 0, false), 0);
+  EXPECT_EQ(side(6, 0, false), 1);
+  EXPECT_EQ(side(6, 0, true), -1);
+  EXPECT_EQ(side(8, 1, false), 1);
+  EXPECT_EQ(side(1, 8, false), -1);
+  EXPECT_EQ(side(7, 1, false), 0);
+  EXPECT_EQ(side(0, 0, false), 0);
 }
 
 TEST(ComparePairs, OfNothingSaysNothing) {

@@ -2,6 +2,8 @@
 """The answer of an experiment, recomputed from what its plugin was given, with the keys of comparison.json."""
 import math
 
+from scipy import stats
+
 import looks
 import medians
 import ranks
@@ -154,9 +156,14 @@ class Compared:
         self.has_interval = bounds is not None
         self.low, self.high = map(float, bounds or (-math.inf, math.inf))
         self.median_of_both = ranks.median(self.of_both) if self.of_both else None
+        variant_lost, baseline_lost = self.cases["variant_lost"], self.cases["reference_lost"]
+        lost = variant_lost + baseline_lost
+        self.failures_differ = lost > 0 and stats.binomtest(variant_lost, lost).pvalue < level
+        self.failures_are_positive = (variant_lost > baseline_lost) != higher_is_better
 
     def is_shown(self, p, level=ALPHA):
-        return bool(p < level and (self.low > 0 if self.is_positive else self.high < 0))
+        by_failures = self.failures_differ and self.failures_are_positive == self.is_positive
+        return bool(p < level and (by_failures or (self.low > 0 if self.is_positive else self.high < 0)))
 
 
 def comparisons(experiment, of_variant):

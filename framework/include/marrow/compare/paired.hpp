@@ -88,6 +88,10 @@ struct Comparison {
   std::size_t cases_of_both = 0;  ///< cases with runs that both have, whoever lost others
   std::optional<double> median_of_both;  ///< median over these; nothing without any
   SignedRank test;
+  /// The side on which failures alone put the difference: that of the one that lost more runs in more cases, if a sign
+  /// test over the cases in which one lost more shows it at 1 - confidence. 1: variant - reference is positive. 0: no
+  /// side is shown.
+  int side_of_failures = 0;
   /// Cases with a difference. 0: nothing is known, so p is 1 and the interval infinite.
   std::size_t compared() const { return cases.all() - cases.neither; }
 };
@@ -96,10 +100,11 @@ struct Comparison {
 Comparison compare_pairs(const std::vector<Pair>& pairs, bool larger_is_better, double confidence = 0.95);
 
 /// Whether a difference counts as shown: p (after Holm) < alpha, and the median's interval does not contain 0 and lies
-/// on the side to which the ranks point. The test judges ranks, but the sentence reports the median. If the two
-/// contradict each other (many cases slightly better, some much worse), there is no finding; nor is there one if the
-/// differences are skewed with a median of 0, which the test alone would take for a difference. The comparison's
-/// confidence is 1 - alpha. Throws Error for a p that is not within 0 to 1.
+/// on the side to which the ranks point, or the failures are on this side (side_of_failures): a variant that loses 20
+/// of 30 cases is worse, although the 10 others leave the median open. The test judges ranks, but the sentence reports
+/// the median. If the two contradict each other (many cases slightly better, some much worse), there is no finding; nor
+/// is there one if the differences are skewed with a median of 0, which the test alone would take for a difference. The
+/// comparison's confidence is 1 - alpha. Throws Error for a p that is not within 0 to 1.
 bool difference_shown(const Comparison& comparison, double p_after_holm, double alpha = 0.05);
 
 /// The fewest cases with which one of so many comparisons can reach p < alpha after Holm, all having as many cases: the
