@@ -30,7 +30,8 @@ std::vector<InputValue> draw_inputs(const std::vector<DrawnInput>& inputs, std::
   std::vector<InputValue> values;
   for (const DrawnInput& input : inputs) {
     const auto& [low, high] = input.range;
-    values.push_back({input.name, exact_number(low + (high - low) * random.uniform()), input.place});
+    const double value = low + (high - low) * random.uniform();
+    values.push_back({input.name, exact_number(input.is_whole ? std::round(value) : value), input.place});
   }
   return values;
 }

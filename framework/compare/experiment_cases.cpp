@@ -170,7 +170,7 @@ class CaseReader {
   bool read_seeded(const YamlEntry& entry, SeededInputs& seeded) {
     if (entry.key == "draw")
       for (const YamlEntry& range : yaml_.map(entry.value, entry.place, "'draw'"))
-        seeded.drawn.push_back({range.key, read_range(range), range.place});
+        seeded.drawn.push_back(read_drawn(range));
     if (entry.key == "seed_input") seeded.taking_seed = texts_of(yaml_, entry);
     return entry.key == "draw" || entry.key == "seed_input";
   }
@@ -194,6 +194,25 @@ class CaseReader {
     }
     yaml_.fault(entry.place, "'seeds' must be a range such as 1..20, of at most 100000, or a list of integers");
     return seeds;
+  }
+
+  /// The two ends of a range, or {range: [...], whole: true}.
+  DrawnInput read_drawn(const YamlEntry& entry) {
+    static const std::vector<std::string> kKeys{"range", "whole"};
+    DrawnInput input{entry.key, {}, entry.place};
+    if (!entry.value.IsMap()) {
+      input.range = read_range(entry);
+      return input;
+    }
+    bool has_range = false;
+    for (const YamlEntry& part : yaml_.map(entry.value, entry.place, "'" + entry.key + "'", &kKeys)) {
+      if (part.key == "whole") input.is_whole = yaml_.boolean(part.value, part.place, "whole").value_or(false);
+      if (part.key != "range") continue;
+      has_range = true;
+      input.range = read_range({entry.key, part.place, part.value});
+    }
+    if (!has_range) yaml_.fault(entry.place, "'" + entry.key + "' has no range", "add  range: [-10, 10]");
+    return input;
   }
 
   std::array<double, 2> read_range(const YamlEntry& entry) {

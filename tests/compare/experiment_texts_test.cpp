@@ -98,6 +98,24 @@ TEST_F(ExperimentTexts, DrawnNumbersKeepAllDigits) {
   EXPECT_EQ(texts.size(), 40u);
 }
 
+/// An input of type integer takes no other number, however many digits it has.
+TEST_F(ExperimentTexts, WholeNumbersAreDrawnForIntegers) {
+  const auto with = [](const std::string& range) {
+    return kHead + ("cases: {simulate: {pipeline: s.yaml, seeds: 1..40, draw: {shape: " + range + "}}}\n") + kVariants +
+           kMetrics;
+  };
+  const Experiment experiment = read(with("{range: [1000000, 9000000], whole: true}"));
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  std::set<std::string> texts;
+  for (std::size_t i = 0; i < 40; ++i) {
+    texts.insert(marrow::compare::simulation_arguments_of(experiment, i).inputs.at(0).value);
+    EXPECT_EQ(texts.rbegin()->size(), 7u);
+    EXPECT_EQ(texts.rbegin()->find_first_not_of("0123456789"), std::string::npos);
+  }
+  EXPECT_EQ(texts.size(), 40u);
+  expect_fault(with("{whole: true}"), 3, "'shape' has no range", "add  range: [-10, 10]");
+}
+
 TEST_F(ExperimentTexts, StartsAndSweptValuesAreThoseOfTheRecord) {
   const Experiment swept = read(kGood + "sweep: {options: {c.value: {range: [0.1, 700], scale: log}}, grid: 7}\n");
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();

@@ -37,6 +37,7 @@ struct DrawnInput {
   std::string name;
   std::array<double, 2> range{};
   Place place;
+  bool is_whole = false;  ///< rounded to a whole number
 };
 
 /// Inputs of a pipeline that differ between cases with seeds.
