@@ -84,7 +84,7 @@ class Survivors(GivenCase):
                 # Order statistics: 1 - 2 P(X < 10) with X of 30 fair coins is 95.7 %: from the 10th to the 21st
                 "low": one["low"],
                 "high": None,
-                "is_shown": False,
+                "is_shown": True,
             },
         )
         self.assertAlmostEqual(one["low"], -0.2, 9)
