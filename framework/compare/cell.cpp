@@ -187,16 +187,21 @@ std::string CellRunner::fault_of_row(const CellIndex& cell) const {
   }
 }
 
-CellRunner::Done CellRunner::run_into(const fs::path& folder, const Pipeline& pipeline, const CellIndex& cell,
-                                      const std::function<void(const RunEvent&)>& observer) {
-  remove_tree(folder);
-  RunFolder written(folder, pipeline);
+RunSettings CellRunner::settings_of(const CellIndex& cell) const {
   RunSettings settings;
   settings.threads = threads_;
   settings.file_limits = file_limits_;
   settings.seed = seed_of(cell.case_index);
   settings.store = store_;
   settings.remember = false;
+  return settings;
+}
+
+CellRunner::Done CellRunner::run_into(const fs::path& folder, const Pipeline& pipeline, const CellIndex& cell,
+                                      const std::function<void(const RunEvent&)>& observer) {
+  remove_tree(folder);
+  RunFolder written(folder, pipeline);
+  RunSettings settings = settings_of(cell);
   settings.wanted_by_others = wanted_by_others(cell, pipeline);
   settings.observer = observer;
   Done done{run_pipeline(pipeline, catalogue_, settings), ""};

@@ -27,13 +27,7 @@ std::vector<std::string> CellRunner::items_of(const CellIndex& cell, const Named
     throw Error("the pipeline has no such node '" + asked.node + "' any more");
   const Reference list{asked.node, {}, int(node - pipeline.nodes.begin()), asked.output, {}};
   pipeline.outputs = {{"items", list}};
-  RunSettings settings;
-  settings.threads = threads_;
-  settings.file_limits = file_limits_;
-  settings.seed = seed_of(cell.case_index);
-  settings.store = store_;
-  settings.remember = false;
-  const RunResult result = run_pipeline(pipeline, catalogue_, settings);
+  const RunResult result = run_pipeline(pipeline, catalogue_, settings_of(cell));
   if (result.failed()) throw Error(reason_of(pipeline, result));
   std::vector<std::string> names;
   add_names_along(value_of(result, list), asked.axis, names);

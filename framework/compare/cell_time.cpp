@@ -62,12 +62,7 @@ std::set<std::string> CellRunner::own_nodes(const CellIndex& cell, const Pipelin
 
 double CellRunner::time(const CellIndex& cell) {
   const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::figures);
-  RunSettings settings;
-  settings.threads = threads_;
-  settings.file_limits = file_limits_;
-  settings.seed = seed_of(cell.case_index);
-  settings.store = store_;
-  settings.remember = false;
+  RunSettings settings = settings_of(cell);
   settings.made_anew = own_nodes(cell, pipeline);
   settings.wanted_by_others = wanted_by_others(cell, pipeline);
   Hasher hasher;

@@ -147,6 +147,7 @@ class CellRunner {
     RunResult result;
     std::string fault;  ///< fault of the first node that failed, or of an output that could not be written
   };
+  RunSettings settings_of(const CellIndex& cell) const;
   Done run_into(const std::filesystem::path& folder, const Pipeline& pipeline, const CellIndex& cell,
                 const std::function<void(const RunEvent&)>& observer);
   void fill(CellRow& row, const Pipeline& pipeline, const Done& done) const;
