@@ -105,7 +105,7 @@ class New(Case):
                 if kind in compared:
                     self.with_one_coarse_case(folder)
                     row = self.run_in(folder, MARROW, "compare", "compare.yaml", **paths)
-                    self.assertRegex(row, r"\nmine +1 +0 +100.0 %", "it takes its place in a whole registration")
+                    self.assertRegex(row, r"\nmine +1 +0 +0 +100.0 %", "it takes its place in a whole registration")
                 self.assertTrue(os.access(folder / "ci", os.X_OK))
                 self.assertIn("%s.mine" % kind, (folder / "ci").read_text())
                 self.assertFalse(any(path.suffix in (".cpp", ".txt") for path in folder.iterdir()))
