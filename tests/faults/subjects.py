@@ -258,10 +258,10 @@ class Compare:
     second_command = command
 
     def rows(self, out):
-        """All of each cell but times and tries."""
+        """All of each cell but times, tries and the key, which has the library in it that injects the faults."""
         with open(out / "cells.csv", newline="") as stream:
             return {
-                row["cell"]: {key: value for key, value in row.items() if key not in ("seconds", "tries")}
+                row["cell"]: {key: value for key, value in row.items() if key not in ("seconds", "tries", "key")}
                 for row in csv.DictReader(stream)
             }
 
