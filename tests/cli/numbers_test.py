@@ -25,6 +25,7 @@ NO_WHOLE_NUMBERS = (
 )
 NO_AMOUNTS = ("nan", "inf", "-inf", "1e30", "1e400", "-5", "0", "1e-9", "0x10", "0,5", "5 MB", "+5", "abc", "")
 AMOUNT = "but must be a number of %s from 0.001 to 1000000000"
+EMPTY = "a word after '%s' is empty"
 
 
 class Numbers(Case):
@@ -42,7 +43,9 @@ class Numbers(Case):
         for command in ("run", "plan"):
             for wrong in NO_WHOLE_NUMBERS:
                 self.refuse(
-                    "--seed is '%s', but must be a whole number from 0 to %d" % (wrong, LARGEST_SEED),
+                    EMPTY % "--seed"
+                    if not wrong
+                    else "--seed is '%s', but must be a whole number from 0 to %d" % (wrong, LARGEST_SEED),
                     command,
                     "p.yaml",
                     "--seed",
@@ -81,7 +84,8 @@ class Numbers(Case):
             ("compare", "--memory-limit", "megabytes"),
         ):
             for wrong in NO_AMOUNTS:
-                self.refuse("%s is '%s', %s" % (option, wrong, AMOUNT % unit), command, "p.yaml", option, wrong)
+                sentence = "%s is '%s', %s" % (option, wrong, AMOUNT % unit) if wrong else EMPTY % option
+                self.refuse(sentence, command, "p.yaml", option, wrong)
         self.assertEqual(
             self.marrow(
                 "run", "p.yaml", "--file-memory", "1e3", "--file-seconds", "2.5", "--out", "out", "--quiet"
