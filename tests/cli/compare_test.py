@@ -150,7 +150,7 @@ class Compare(Case):
             self.assertEqual(row["success"], "1" if variant == "good" else "0")
         self.assertIn("crash/0/0: crashed in node 'm'", result.stdout)
         self.assertRegex(result.stdout, r"good \*\s+1\s+0\s+0\s+100.0 %")
-        self.assertRegex(result.stdout, r"crash\s+1\s+1\s+0.0 %")
+        self.assertRegex(result.stdout, r"crash\s+1\s+1\s+0\s+0.0 %")
 
     def test_a_cell_that_hangs_is_ended(self):
         path = self.experiment({"good": "{}", "hang": "{m.how: hang}"}, cases=1)
