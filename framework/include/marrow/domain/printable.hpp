@@ -7,9 +7,9 @@
 
 namespace marrow {
 
-/// The text in one line. Each control character (C0, DEL, C1, line separators, overrides of the writing direction), each
-/// character that is not drawn (such as a zero width space) and each byte that is not UTF-8 is written as an escape such
-/// as \x1b or \u202e. Everything else stays as it is.
+/// The text in one line. Each control character (C0, DEL, C1, line separators, overrides of the writing direction),
+/// each character that is not drawn (such as a zero width space) and each byte that is not UTF-8 is written as an
+/// escape such as \x1b or \u202e. Everything else stays as it is.
 std::string printable(std::string_view text);
 
 /// The same, but line breaks stay. The text after a line break is indented, so that it cannot look like a line of its
