@@ -23,14 +23,14 @@ double beta_fraction(double a, double b, double x) {
   return value;
 }
 
+}  // namespace
+
 double incomplete_beta(double a, double b, double x) {
   if (x <= 0 || x >= 1) return x <= 0 ? 0 : 1;
   if (x > (a + 1) / (a + b + 2)) return 1 - incomplete_beta(b, a, 1 - x);
   const double log_factor = a * std::log(x) + b * std::log1p(-x) + std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b);
   return std::exp(log_factor) / (a * beta_fraction(a, b, x));
 }
-
-}  // namespace
 
 double beta_quantile(double p, double a, double b) {
   double below = 0, above = 1;

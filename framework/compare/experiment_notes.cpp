@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "counted.hpp"
 #include "marrow/compare/case_rate.hpp"
 #include "marrow/compare/median_interval.hpp"
 #include "marrow/compare/paired.hpp"
@@ -11,14 +12,10 @@
 namespace marrow::compare {
 namespace {
 
-std::string plural(std::size_t count, const std::string& thing) {
-  return std::to_string(count) + " " + thing + (count == 1 ? "" : "s");
-}
-
 std::string note_of_comparisons(const Experiment& experiment) {
   const auto [comparisons, cases, fewest] = comparison_counts(experiment);
   if (cases >= fewest) return "";
-  return plural(cases, experiment.tune ? "held-out case" : "case") + " cannot show a difference" +
+  return counted(cases, experiment.tune ? "held-out case" : "case") + " cannot show a difference" +
          (comparisons == 1 ? "" : " among " + std::to_string(comparisons) + " comparisons") +
          ": even if all go the same way, p stays above 0.05" + (comparisons == 1 ? "" : " after Holm's correction") +
          "; it takes at least " + std::to_string(fewest);
@@ -63,7 +60,7 @@ std::vector<std::string> notes_of(const Experiment& experiment) {
   if (experiment.stop)
     if (const std::string fault = fault_of_last_look(*experiment.stop, experiment.starts.size()); !fault.empty())
       notes.push_back("the rule under 'stop' can never be met: at its last look, at " +
-                      plural(experiment.stop->most_cases, "case") + ", " + fault);
+                      counted(experiment.stop->most_cases, "case") + ", " + fault);
   if (!experiment.initial_error.empty() && !experiment.defines_success())
     notes.push_back("there is no capture range over '" + experiment.initial_error +
                     "': without limits under 'success', no run is a success or a miss");

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <set>
 
+#include "beta.hpp"
 #include "infinite.hpp"
 #include "marrow/compare/median_interval.hpp"
 #include "marrow/domain/error.hpp"
@@ -103,6 +104,13 @@ std::vector<double> without_noise(const std::vector<NoisyDifference>& difference
   return values;
 }
 
+/// By a sign test: twice the probability that the rarer of two equally likely outcomes is as rare as here or rarer.
+int side_of_failures(const Tally& cases, bool larger_is_better, double alpha) {
+  const auto [rarer, other] = std::minmax(cases.variant_lost, cases.reference_lost);
+  if (rarer == other || 2 * incomplete_beta(double(other), double(rarer + 1), 0.5) >= alpha) return 0;
+  return (cases.variant_lost > cases.reference_lost) == larger_is_better ? -1 : 1;
+}
+
 }  // namespace
 
 CaseDifferences case_differences(const std::vector<Pair>& pairs, bool larger_is_better) {
@@ -139,27 +147,6 @@ double median_of_differences(const std::vector<double>& sorted) {
   if (std::isfinite(below) && std::isfinite(above)) return std::lerp(below, above, place.part);
   return below == -above ? 0 : below + above;
 }
-
-namespace {
-
-/// Two-sided p of a sign test: whether the rarer of two outcomes, which are equally likely, is as rare as this or
-/// rarer.
-double sign_test_p(std::size_t rarer, std::size_t all) {
-  double chance = std::pow(0.5, double(all)), sum = 0;
-  for (std::size_t k = 0; k <= rarer; ++k) {
-    sum += chance;
-    chance *= double(all - k) / double(k + 1);
-  }
-  return std::min(1.0, 2 * sum);
-}
-
-int side_of_failures(const Tally& cases, bool larger_is_better, double alpha) {
-  const std::size_t rarer = std::min(cases.variant_lost, cases.reference_lost);
-  if (sign_test_p(rarer, cases.variant_lost + cases.reference_lost) >= alpha) return 0;
-  return (cases.variant_lost > cases.reference_lost) == larger_is_better ? -1 : 1;
-}
-
-}  // namespace
 
 Comparison compare_pairs(const std::vector<Pair>& pairs, bool larger_is_better, double confidence) {
   check_confidence(confidence);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "counted.hpp"
 #include "infinite.hpp"
 #include "marrow/compare/paired.hpp"
 #include "marrow/domain/error.hpp"
@@ -74,10 +75,6 @@ int decimals_of(double difference, const Interval& interval) {
   if (!without_zero) return decimals;
   const double nearest = std::min(std::abs(interval.lower), std::abs(interval.upper));
   return std::max(decimals, std::min(decimals_for(nearest), decimals + 2));
-}
-
-std::string counted(std::size_t count, const std::string& what) {
-  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 
 /// A comparison in the direction that its sentence names: a positive difference is in that direction.

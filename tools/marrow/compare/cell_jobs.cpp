@@ -1,27 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "compare/cell_jobs.hpp"
 
-#include <charconv>
 #include <cstdio>
 #include <thread>
 
+#include "domain/exact_number.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/worker.hpp"
 #include "process.hpp"
 
 namespace marrow::cli {
-namespace {
 
 namespace fs = std::filesystem;
-
-/// The shortest text that gives exactly this number when it is read.
-std::string exact_text(double value) {
-  char text[40];
-  return {text, std::to_chars(text, text + sizeof text, value).ptr};
-}
-
-}  // namespace
 
 PoolSettings pool_of(const CompareRequest& request, const fs::path& folder, int threads) {
   PoolSettings pool;
@@ -41,7 +32,7 @@ PoolSettings pool_of(const CompareRequest& request, const fs::path& folder, int 
   if (request.more_cases) pool.command.insert(pool.command.end(), {"--more-cases", std::to_string(request.more_cases)});
   for (const auto& [name, value] :
        {std::pair("--file-memory", request.file_limits.memory_mb), {"--file-seconds", request.file_limits.seconds}})
-    if (value > 0) pool.command.insert(pool.command.end(), {name, exact_text(value)});
+    if (value > 0) pool.command.insert(pool.command.end(), {name, exact_number(value)});
   return pool;
 }
 
