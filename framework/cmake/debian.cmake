@@ -109,7 +109,7 @@ set(CPACK_DEBIAN_MARROW-CGAL_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_MARROW_PACKAGE_RECOMMENDS "libjs-three")
 set(CPACK_DEBIAN_MARROW-CGAL_PACKAGE_DEPENDS "marrow (= ${PROJECT_VERSION})")
 set(CPACK_DEBIAN_MARROW-DEV_PACKAGE_DEPENDS
-  "marrow (= ${PROJECT_VERSION}), g++, cmake, libeigen3-dev, libopencv-dev, libtbb-dev")
+  "marrow (= ${PROJECT_VERSION}), g++, cmake, libeigen3-dev, libfmt-dev, libopencv-dev, libtbb-dev")
 set(CPACK_DEBIAN_MARROW-DEV_PACKAGE_RECOMMENDS
   libcgal-dev libexpat1-dev libgtest-dev libhdf5-dev libinsighttoolkit5-dev libjpeg-dev libnlopt-cxx-dev libnlopt-dev
   libpcl-dev libpng-dev libvtk9-dev libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev)

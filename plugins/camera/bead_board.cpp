@@ -4,10 +4,10 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/camera/determined.hpp"
 #include "marrow/domain/quantile.hpp"
 #include "marrow/toolbox/calibration/correspondence.hpp"
-#include "marrow/toolbox/calibration/determined.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
@@ -143,7 +143,7 @@ Picture picture_of(const Image& image, const ViewPoints& points, const calibrati
   }
   for (const auto& at : outliers) draw_dot(panel.pixels, panel.at(at.x(), at.y()), 4, kYellow);
   draw_title(panel, points.name);
-  const std::string scale = formatted("residual x %g", options.residual_scale);
+  const std::string scale = formatted("residual x {:g}", options.residual_scale);
   return {with_legend(panel.pixels, {{"bead", kGreen}, {scale, kVermilion}, {"left out", kYellow}})};
 }
 

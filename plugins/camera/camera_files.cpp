@@ -3,8 +3,8 @@
 
 #include <random>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/conformance.hpp"
-#include "marrow/domain/number_text.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 
@@ -98,7 +98,7 @@ std::filesystem::path points_file(const Camera& a, const Camera& b, bool mirrore
 
 std::filesystem::path xray_file(const std::string& name, double primary_deg, double secondary_deg) {
   const auto us = [](std::uint32_t tag, std::uint32_t value) { return element(tag, "US", little(value, 2)); };
-  const auto ds = [](std::uint32_t tag, double value) { return element(tag, "DS", formatted("%f", value)); };
+  const auto ds = [](std::uint32_t tag, double value) { return element(tag, "DS", formatted("{:f}", value)); };
   const std::string meta =
       element(0x00020001, "OB", std::string("\0\1", 2)) + element(0x00020010, "UI", "1.2.840.10008.1.2.1");
   const std::string header = element(0x00080016, "UI", "1.2.840.10008.5.1.4.1.1.12.1") +

@@ -8,10 +8,10 @@
 #include <marrow/plugin.hpp>
 
 #include <marrow/domain/decompositions.hpp>
-#include "marrow/domain/number_text.hpp"
-#include "marrow/toolbox/calibration/plausibility.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/camera/plausibility.hpp"
+#include "marrow/camera/points_file.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"
-#include "marrow/toolbox/files/points_file.hpp"
 
 namespace {
 
@@ -120,7 +120,7 @@ Picture draw(const View& view, const SeenPoints& points, const Mesh* mesh, const
     }
     legend.push_back({"object", kSkyBlue});
   }
-  const std::string scale = formatted("difference x %g", options.residual_scale);
+  const std::string scale = formatted("difference x {:g}", options.residual_scale);
   for (std::size_t i = 0; i < points.pixels.size(); ++i) {
     const Eigen::Vector2d seen = points.pixels[i], expected = project(view.camera, points.world_mm[i]);
     const cv::Point2d at = panel.at(seen.x(), seen.y());
@@ -139,7 +139,7 @@ Picture draw(const View& view, const SeenPoints& points, const Mesh* mesh, const
   return {with_legend(panel.pixels, legend)};
 }
 
-std::string text(double value) { return formatted("%.3g", value); }
+std::string text(double value) { return formatted("{:.3g}", value); }
 
 /// The warnings about one view, the most probable first. `mistake`: the sentence that explains its points, if any.
 std::vector<std::string> warnings_of(const View& view, const InView& points, const Mesh* mesh, const Options& options,

@@ -2,7 +2,7 @@
 // Cameras from the angles and distances that a C-arm writes to the headers of X-ray images.
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/names.hpp"
+#include "marrow/base/names.hpp"
 #include "marrow/toolbox/files/escaped_name.hpp"
 #include "marrow/toolbox/files/xray_header.hpp"
 

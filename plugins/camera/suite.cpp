@@ -10,7 +10,7 @@
 #include <random>
 
 #include "camera_files.hpp"
-#include "marrow/runtime/types.hpp"
+#include "marrow/runtime/node/types.hpp"
 
 namespace marrow::conformance {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Predicted deviations that were compared with real errors. The residuals that a covariance is predicted from do not
 // show every error, such as that of the segmentation, and they count some twice. So the deviations about and along each
-// axis are multiplied by a factor, which was fitted to bones whose true pose is known (tools/deviations --fit).
+// axis are multiplied by a factor, which was fitted to bones whose true pose is known (tools/studies/deviations --fit).
 #include <array>
 #include <marrow/plugin.hpp>
 

@@ -8,9 +8,9 @@
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "marrow/toolbox/image/gradient.hpp"
-#include "marrow/toolbox/image/refine.hpp"
-#include "marrow/toolbox/image/window.hpp"
+#include "marrow/edges/gradient.hpp"
+#include "marrow/edges/refine.hpp"
+#include "marrow/edges/window.hpp"
 
 namespace {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "marrow/toolbox/image/threshold.hpp"
+#include "marrow/edges/threshold.hpp"
 
 namespace {
 

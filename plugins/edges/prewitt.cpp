@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Prewitt's mask (in: Picture Processing and Psychopictorics, 1970): central differences over 3 x 3 pixels, averaged
 // across their direction.
-#include "marrow/toolbox/image/threshold.hpp"
+#include "marrow/edges/threshold.hpp"
 
 namespace {
 

@@ -2,7 +2,7 @@
 // Roberts' cross (in: Optical and Electro-Optical Information Processing, 1965). Roberts takes the differences along
 // the two diagonals of 2 x 2 pixels. Rotated by 45 degrees, these are the differences between the means of opposite
 // sides.
-#include "marrow/toolbox/image/threshold.hpp"
+#include "marrow/edges/threshold.hpp"
 
 namespace {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sobel's mask (Stanford Artificial Intelligence Project, 1968): central differences over 3 x 3 pixels, averaged across
 // their direction with double weight in the middle.
-#include "marrow/toolbox/image/threshold.hpp"
+#include "marrow/edges/threshold.hpp"
 
 namespace {
 

@@ -8,7 +8,7 @@
 #include <random>
 
 #include "marrow/domain/quantile.hpp"
-#include "marrow/runtime/types.hpp"
+#include "marrow/runtime/node/types.hpp"
 
 namespace marrow::conformance {
 namespace {

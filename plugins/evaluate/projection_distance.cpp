@@ -5,7 +5,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/geometry/targets.hpp"
 
 namespace {
@@ -30,7 +30,7 @@ double source_to_detector_mm(const Options& options, std::size_t view, std::size
                 std::to_string(views) + " views; give one for all, or one for each");
   const double distance = given[given.size() == 1 ? 0 : view];
   if (!(distance > 0))
-    throw Error("source_to_detector_mm: each number must be positive, got " + formatted("%f", distance));
+    throw Error("source_to_detector_mm: each number must be positive, got " + formatted("{:f}", distance));
   return distance;
 }
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace {
 
@@ -38,7 +38,7 @@ std::vector<Possible> possible_diameters(const Options& options) {
 std::string range(const std::vector<Possible>& possible) {
   double least = possible[0].least_mm, most = possible[0].most_mm;
   for (const Possible& one : possible) least = std::min(least, one.least_mm), most = std::max(most, one.most_mm);
-  return marrow::formatted("%.1f to %.1f mm", least, most);
+  return marrow::formatted("{:.1f} to {:.1f} mm", least, most);
 }
 
 /// The pair of borders of one view, in world coordinates.
@@ -79,7 +79,7 @@ void check_sides(const std::vector<Sight>& sights) {
       const Eigen::Vector3d one = a.left - a.right, other = b.left - b.right;
       widest_deg = std::max(widest_deg, marrow::degrees(std::atan2(one.cross(other).norm(), std::abs(one.dot(other)))));
     }
-  const std::string angle = marrow::formatted("%.1f", widest_deg);
+  const std::string angle = marrow::formatted("{:.1f}", widest_deg);
   if (widest_deg < 10)
     throw marrow::Error("the " + std::to_string(sights.size()) +
                         " views see the shaft from nearly the same side: the planes of its axis meet at " + angle +

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
-#include "marrow/toolbox/geometry/fracture_site.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/fracture/fracture_site.hpp"
 #include "marrow/toolbox/geometry/fragments.hpp"
 
 namespace {
@@ -57,8 +57,8 @@ Eigen::Vector3d shaft_of(const FragmentFrame& distal, const FragmentFrame& proxi
   if (apart_deg <= kMostApart_deg) return one;
   const bool takes_distal = std::abs(one.dot(options.up)) > std::abs(other.dot(options.up));
   context.warn(
-      formatted("the long axes of the two fragments differ by %.0f degrees in the CT, so one is too short to "
-                "show the bone's; that of the %s fragment is taken, which is nearer to 'up'",
+      formatted("the long axes of the two fragments differ by {:.0f} degrees in the CT, so one is too short to "
+                "show the bone's; that of the {} fragment is taken, which is nearer to 'up'",
                 apart_deg, takes_distal ? "distal" : "proximal"));
   return takes_distal ? one : other;
 }
@@ -110,7 +110,7 @@ std::string in_words(const std::vector<Figure>& figures) {
   std::string text;
   for (const Figure& figure : figures)
     if (std::abs(figure.value) >= 0.05)
-      text += (text.empty() ? "" : ", ") + formatted("%.1f %s %s", std::abs(figure.value), figure.unit,
+      text += (text.empty() ? "" : ", ") + formatted("{:.1f} {} {}", std::abs(figure.value), figure.unit,
                                                      figure.value < 0 ? figure.negative : figure.positive);
   return "the distal fragment beside the proximal one: " + (text.empty() ? "in place" : text);
 }

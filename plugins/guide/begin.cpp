@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/robot/guide_state.hpp"
+#include "marrow/toolbox/robotics/guide_state.hpp"
 
 namespace {
 

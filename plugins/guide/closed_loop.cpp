@@ -5,13 +5,13 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/guide/approach.hpp"
+#include "marrow/guide/relative_pose.hpp"
+#include "marrow/guide/servo.hpp"
 #include "marrow/toolbox/geometry/fragments.hpp"
-#include "marrow/toolbox/robot/approach.hpp"
-#include "marrow/toolbox/robot/guide_state.hpp"
-#include "marrow/toolbox/robot/relative_pose.hpp"
-#include "marrow/toolbox/robot/robot_state.hpp"
-#include "marrow/toolbox/robot/servo.hpp"
+#include "marrow/toolbox/robotics/guide_state.hpp"
+#include "marrow/toolbox/robotics/robot_state.hpp"
 
 namespace {
 
@@ -39,7 +39,7 @@ struct Result {
   Metrics figures;
 };
 
-std::string shown(double value, const char* unit) { return formatted("%.2f %s", value, unit); }
+std::string shown(double value, const char* unit) { return formatted("{:.2f} {}", value, unit); }
 
 /// The way that remains to the fragment's place in the restored bone.
 struct Remaining {

@@ -2,10 +2,10 @@
 // One move that reduces the fracture. The robot's place in the images is calibrated before, with a target on its hand.
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/guide/relative_pose.hpp"
 #include "marrow/toolbox/geometry/fragments.hpp"
-#include "marrow/toolbox/robot/hand_eye.hpp"
-#include "marrow/toolbox/robot/relative_pose.hpp"
+#include "marrow/toolbox/robotics/hand_eye.hpp"
 
 namespace {
 
@@ -68,7 +68,7 @@ void check_left(double left_deg, double left_mm, const Options& options) {
   if (left_deg <= options.most_deviation_deg && left_mm <= options.most_deviation_mm) return;
   throw Error(
       formatted("the stations do not tell well enough where the robot is: this move would leave the fragment "
-                "%.2f degrees and %.2f mm from its place (one standard deviation), at most %g degrees and %g "
+                "{:.2f} degrees and {:.2f} mm from its place (one standard deviation), at most {:g} degrees and {:g} "
                 "mm are allowed; turn the robot further between stations, about axes that are at least 30 "
                 "degrees apart, or raise most_deviation_deg and most_deviation_mm",
                 left_deg, left_mm, options.most_deviation_deg, options.most_deviation_mm));
@@ -95,8 +95,8 @@ Result open_loop(const List<Pose>& poses, const List<Pose>& hands, const List<Po
                           {"stations", double(hands.size()), ""},
                           {"images", double(hands.size()) + 2, ""}};
   context.info(
-      formatted("one move of %.2f degrees and %.2f mm; the robot's place is known so well that it leaves %.2f "
-                "degrees and %.2f mm (one standard deviation)",
+      formatted("one move of {:.2f} degrees and {:.2f} mm; the robot's place is known so well that it leaves {:.2f} "
+                "degrees and {:.2f} mm (one standard deviation)",
                 turn, shift, left_deg, left_mm));
   return result;
 }

@@ -2,8 +2,8 @@
 // The pose of a robot's target with beads, from one image of a calibrated C-arm.
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
-#include "marrow/toolbox/calibration/board_pose.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/guide/board_pose.hpp"
 #include "marrow/toolbox/calibration/correspondence.hpp"
 
 namespace {
@@ -27,10 +27,10 @@ Pose target(const View& view, const Options& options, Context& context) {
   const calibration::ViewPoints points =
       calibration::match_board(board, discs, view.camera.width_px, view.camera.height_px, view.name);
   const calibration::BoardPose found = calibration::board_pose(points, view.camera);
-  context.info(formatted("%zu beads, residual %.3f px", points.pixels.size(), found.residual_px));
+  context.info(formatted("{} beads, residual {:.3f} px", points.pixels.size(), found.residual_px));
   if (found.residual_px > options.most_residual_px)
     throw Error("the target does not fit view '" + view.name +
-                formatted("': its beads are %.2f px off where its pose shows them, at most %.2f px are allowed",
+                formatted("': its beads are {:.2f} px off where its pose shows them, at most {:.2f} px are allowed",
                           found.residual_px, options.most_residual_px) +
                 "; is it this target, and the camera of this image?");
   Pose pose;

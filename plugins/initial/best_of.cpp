@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/geometry/start_axes.hpp"
 #include "marrow/toolbox/search/compared.hpp"
 #include "marrow/toolbox/search/search.hpp"
@@ -37,7 +37,7 @@ Pose refined(const Pose& start, const marrow::Cost& cost, const marrow::Optimize
 
 /// "second is the best start, with a cost of 0.21; first 0.4, third 0.9".
 std::string comparison_of(const std::vector<Way>& ways, const Way& best) {
-  const auto cost_text = [](const Way& way) { return marrow::formatted("%.6g", way.pose.cost); };
+  const auto cost_text = [](const Way& way) { return marrow::formatted("{:.6g}", way.pose.cost); };
   std::string text = best.name + " is the best start, with a cost of " + cost_text(best), separator = "; ";
   for (const Way& way : ways) {
     if (way.name == best.name) continue;

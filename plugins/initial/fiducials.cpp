@@ -12,7 +12,6 @@
 namespace {
 
 using namespace marrow;
-using geometry::short_number;
 
 struct Options {
   double noise_mm = 0;

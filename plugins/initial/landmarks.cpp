@@ -8,13 +8,13 @@
 #include <marrow/plugin.hpp>
 
 #include <marrow/domain/decompositions.hpp>
-#include "marrow/toolbox/geometry/pose_starts.hpp"
+#include "marrow/initial/pose_starts.hpp"
 #include "marrow/toolbox/geometry/rigid_fit.hpp"
 
 namespace {
 
 using namespace marrow;
-using geometry::Sight, geometry::short_number;
+using geometry::Sight;
 
 struct Options {
   double noise_px = 1;

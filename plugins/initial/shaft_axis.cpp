@@ -13,9 +13,9 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
-#include "marrow/toolbox/shaft/axis.hpp"
-#include "marrow/toolbox/shaft/model_borders.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/initial/axis.hpp"
+#include "marrow/initial/model_borders.hpp"
 
 namespace {
 
@@ -32,7 +32,7 @@ struct Options {
 constexpr double kWidthTolerance = 0.15;  // a pair is not the model's if the widths differ by a larger fraction
 constexpr double kLeastLength_mm = 25;    // at the bone
 
-std::string number(double value) { return marrow::formatted("%.1f", value); }
+std::string number(double value) { return marrow::formatted("{:.1f}", value); }
 
 /// Information from one view: the pair of borders, and the plane that contains the axis.
 struct Sight {

@@ -15,7 +15,6 @@
 namespace {
 
 using namespace marrow;
-using geometry::short_number;
 
 struct Options {
   std::vector<double> noise_mm{2};

@@ -4,7 +4,7 @@
 #include <marrow/plugin.hpp>
 
 #include "delaunay_refinement.hpp"
-#include "marrow/toolbox/surface/signs.hpp"
+#include "marrow/mesh/signs.hpp"
 
 namespace {
 

@@ -7,7 +7,7 @@
 
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/surface/surface.hpp"
+#include "marrow/mesh/surface.hpp"
 
 namespace {
 

@@ -2,8 +2,8 @@
 #include <marrow/domain/manifold.hpp>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/surface/poisson.hpp"
-#include "marrow/toolbox/surface/signs.hpp"
+#include "marrow/mesh/poisson.hpp"
+#include "marrow/mesh/signs.hpp"
 
 namespace {
 

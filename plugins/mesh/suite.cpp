@@ -12,7 +12,7 @@
 
 #include "marrow/domain/manifold.hpp"
 #include "marrow/domain/quantile.hpp"
-#include "marrow/runtime/types.hpp"
+#include "marrow/runtime/node/types.hpp"
 
 namespace marrow::conformance {
 namespace {

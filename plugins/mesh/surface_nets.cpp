@@ -12,8 +12,8 @@
 
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/surface/cells.hpp"
-#include "marrow/toolbox/surface/signs.hpp"
+#include "marrow/mesh/cells.hpp"
+#include "marrow/mesh/signs.hpp"
 
 namespace {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/search/nlopt_run.hpp"
+#include "marrow/optimizer/nlopt_run.hpp"
 
 namespace {
 
@@ -12,8 +12,8 @@ void check_bounds(const marrow::MinimisationProblem& problem) {
     const double range = problem.upper[i] - problem.lower[i], step = problem.initial_step[i];
     if (range > 0 && range < 2 * step)
       throw marrow::Error("BOBYQA needs bounds that are two initial steps apart: those of coordinate " +
-                          std::to_string(i + 1) + " are " + marrow::formatted("%g", range) +
-                          " apart, and its step is " + marrow::formatted("%g", step) +
+                          std::to_string(i + 1) + " are " + marrow::formatted("{:g}", range) +
+                          " apart, and its step is " + marrow::formatted("{:g}", step) +
                           "; use smaller steps or another optimizer");
   }
 }

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include <marrow/domain/decompositions.hpp>
-#include "marrow/toolbox/search/evaluations.hpp"
+#include "marrow/optimizer/evaluations.hpp"
 
 namespace {
 

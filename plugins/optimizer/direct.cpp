@@ -3,7 +3,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/search/nlopt_run.hpp"
+#include "marrow/optimizer/nlopt_run.hpp"
 
 namespace {
 

@@ -3,7 +3,7 @@
 #include <marrow/plugin.hpp>
 #include <string>
 
-#include "marrow/toolbox/search/evaluations.hpp"
+#include "marrow/optimizer/evaluations.hpp"
 
 namespace {
 

@@ -3,7 +3,7 @@
 #include <string>
 
 #include <marrow/domain/decompositions.hpp>
-#include "marrow/toolbox/search/evaluations.hpp"
+#include "marrow/optimizer/evaluations.hpp"
 
 namespace {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/search/nlopt_run.hpp"
+#include "marrow/optimizer/nlopt_run.hpp"
 
 namespace {
 

@@ -2,7 +2,7 @@
 #include <marrow/plugin.hpp>
 #include <vector>
 
-#include "marrow/toolbox/search/evaluations.hpp"
+#include "marrow/optimizer/evaluations.hpp"
 
 namespace {
 

@@ -9,7 +9,7 @@
 #include <random>
 #include <thread>
 
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
 #include "marrow/domain/functions.hpp"
 
 namespace marrow::conformance {

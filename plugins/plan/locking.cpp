@@ -6,9 +6,9 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/plan/length_quantile.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
-#include "marrow/toolbox/geometry/length_quantile.hpp"
 #include "marrow/toolbox/geometry/locking_plan.hpp"
 
 namespace {
@@ -36,7 +36,7 @@ struct Result {
   Verdict verdict;
 };
 
-std::string shown(double value) { return formatted("%.2f", value); }
+std::string shown(double value) { return formatted("{:.2f}", value); }
 
 /// [v] with [v] w = v x w.
 Matrix3d cross(const Vector3d& v) {

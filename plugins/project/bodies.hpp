@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "marrow/conformance.hpp"
-#include "marrow/runtime/types.hpp"
+#include "marrow/runtime/node/types.hpp"
 #include "marrow/toolbox/analytic/body.hpp"
 
 namespace marrow::conformance {

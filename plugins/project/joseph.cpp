@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/rays/bricks.hpp"
-#include "marrow/toolbox/rays/slices.hpp"
+#include "marrow/project/bricks.hpp"
+#include "marrow/project/slices.hpp"
 
 namespace {
 

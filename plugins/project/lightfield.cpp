@@ -7,8 +7,8 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/rays/bricks.hpp"
-#include "marrow/toolbox/rays/rays.hpp"
+#include "marrow/project/bricks.hpp"
+#include "marrow/project/rays.hpp"
 
 namespace {
 

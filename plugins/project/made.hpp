@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "marrow/conformance.hpp"
-#include "marrow/runtime/types.hpp"
+#include "marrow/runtime/node/types.hpp"
 
 namespace marrow::conformance {
 

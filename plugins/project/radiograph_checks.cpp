@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "made.hpp"
-#include "marrow/toolbox/analytic/plane_solid.hpp"
+#include "marrow/project/plane_solid.hpp"
 
 namespace marrow::conformance {
 namespace {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/rays/rays.hpp"
+#include "marrow/project/rays.hpp"
 
 namespace {
 

@@ -4,7 +4,7 @@
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "marrow/toolbox/rays/volume_border.hpp"
+#include "marrow/project/volume_border.hpp"
 
 namespace {
 

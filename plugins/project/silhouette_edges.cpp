@@ -3,10 +3,10 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/dispatch.hpp"
-#include "marrow/toolbox/rays/volume_border.hpp"
-#include "marrow/toolbox/surface/coarse_surface.hpp"
-#include "marrow/toolbox/surface/surface_patches.hpp"
+#include "marrow/base/dispatch.hpp"
+#include "marrow/project/coarse_surface.hpp"
+#include "marrow/project/surface_patches.hpp"
+#include "marrow/project/volume_border.hpp"
 
 namespace {
 

@@ -2,7 +2,7 @@
 // A camera in marrow's format or in that of another program. What such a program's file leaves open comes from options.
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/exchange/camera_file.hpp"
+#include "marrow/read/camera_file.hpp"
 
 namespace {
 

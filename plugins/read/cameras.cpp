@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The cameras of all views from one file of RTK or xReg.
 #include <algorithm>
-#include <marrow/domain/names.hpp>
+#include <marrow/base/names.hpp>
 #include <marrow/plugin.hpp>
 #include <numeric>
 
-#include "marrow/toolbox/exchange/camera_file.hpp"
-#include "marrow/toolbox/exchange/projections.hpp"
+#include "marrow/read/camera_file.hpp"
+#include "marrow/read/projections.hpp"
 
 namespace {
 

@@ -3,10 +3,10 @@
 #include <map>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/names.hpp"
-#include "marrow/toolbox/exchange/camera_file.hpp"
+#include "marrow/base/names.hpp"
+#include "marrow/read/camera_file.hpp"
+#include "marrow/read/image_doubts.hpp"
 #include "marrow/toolbox/files/escaped_name.hpp"
-#include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/image_sides.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/names.hpp"
+#include "marrow/base/names.hpp"
+#include "marrow/read/image_doubts.hpp"
 #include "marrow/toolbox/files/escaped_name.hpp"
-#include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 
 namespace {

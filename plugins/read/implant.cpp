@@ -2,7 +2,7 @@
 #include <marrow/plugin.hpp>
 #include <tuple>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
@@ -33,7 +33,7 @@ Hole hole_from(const YamlMap& map, const std::string& name) {
   if (const auto diameter = map.number("diameter_mm")) {
     hole.diameter_mm = *diameter;
     if (!(*diameter > 0))
-      map.fault("diameter_mm", "diameter_mm: expected more than 0, got " + formatted("%f", *diameter));
+      map.fault("diameter_mm", "diameter_mm: expected more than 0, got " + formatted("{:f}", *diameter));
   }
   return hole;
 }

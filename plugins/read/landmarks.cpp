@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/names.hpp"
+#include "marrow/base/names.hpp"
 #include "marrow/toolbox/exchange/marked_values.hpp"
 #include "marrow/toolbox/exchange/xreg_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"

@@ -2,9 +2,9 @@
 // A sequence of X-ray images: of each view a folder of images, a file with several frames, or a video.
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/names.hpp"
-#include "marrow/toolbox/exchange/view_file.hpp"
-#include "marrow/toolbox/files/image_doubts.hpp"
+#include "marrow/base/names.hpp"
+#include "marrow/read/image_doubts.hpp"
+#include "marrow/read/view_file.hpp"
 #include "marrow/toolbox/files/sequence_files.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/track/sequence.hpp"

@@ -8,7 +8,7 @@
 #include <cstdio>
 #include <memory>
 
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "video_picture.hpp"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 
 namespace marrow::read_sequence {

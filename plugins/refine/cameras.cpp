@@ -3,10 +3,10 @@
 // refinement.hpp.
 #include <array>
 #include <cstdio>
-#include <marrow/domain/names.hpp>
+#include <marrow/base/names.hpp>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/search/compared.hpp"
 #include "marrow/toolbox/search/search.hpp"
 #include "refinement.hpp"
@@ -61,7 +61,7 @@ Metrics metrics_of(const Vector6d& motion, const Vector6d& deviation) {
 void warn_of_large(const std::string& view, const Vector6d& in_deviations, Context& context) {
   const double most = in_deviations.cwiseAbs().maxCoeff();
   if (most <= 3) return;
-  const std::string text = formatted("%.1f", most);
+  const std::string text = formatted("{:.1f}", most);
   context.warn("view '" + view + "': its camera is off by " + text +
                " times what the options expect; is it the camera of this image, and are the poses right?");
 }
@@ -87,7 +87,7 @@ Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose
   if (!refinement.converged())
     context.warn("the cameras still moved after " + std::to_string(options.max_rounds) + " rounds; raise max_rounds");
   const std::string text = formatted(
-      "the cameras are off against each other by about %.3g times what the options expect", refinement.scale());
+      "the cameras are off against each other by about {:.3g} times what the options expect", refinement.scale());
   context.info(text);
   Result result;
   for (std::size_t v = 0; v < views.size(); ++v) {

@@ -23,7 +23,7 @@
 #include "camera_prior.hpp"
 #include "sight.hpp"
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::refine {
 
@@ -141,8 +141,9 @@ class Refinement {
       const bool converged = descend(scale == 1, context, at_given);
       expand(scale == 1);
       all.push_back({scale, converged, evidence(), state_, models_, root_of_inverse(equations().first)});
-      const std::string text = formatted(
-          "cameras off against each other by %g times what is expected: log evidence %.4g", scale, all.back().evidence);
+      const std::string text =
+          formatted("cameras off against each other by {:g} times what is expected: log evidence {:.4g}", scale,
+                    all.back().evidence);
       context.debug(text);
     }
     const auto by_evidence = [](const Found& a, const Found& b) { return a.evidence < b.evidence; };

@@ -6,8 +6,8 @@
 #include <marrow/plugin.hpp>
 
 #include <marrow/domain/decompositions.hpp>
-#include "marrow/domain/number_text.hpp"
-#include "marrow/toolbox/match/closest_points.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/register/closest_points.hpp"
 
 namespace {
 
@@ -38,7 +38,7 @@ void check_frames(const Pose& initial, const Mesh& model, const Mesh& target) {
 }
 
 std::string percent(std::size_t part, std::size_t whole) {
-  return formatted("%.0f %%", 100 * double(part) / double(whole));
+  return formatted("{:.0f} %", 100 * double(part) / double(whole));
 }
 
 void add_warnings(const marrow::match::Result& found, const Options& options, Pose& pose, const Context& context) {

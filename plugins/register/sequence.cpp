@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/geometry/start_axes.hpp"
 #include "marrow/toolbox/search/search.hpp"
 
@@ -51,7 +51,8 @@ std::string disagreement(const marrow::Pose& first, const marrow::Pose& second, 
   const double apart_deg = marrow::degrees(motion.head<3>().norm()), apart_mm = motion.tail<3>().norm();
   if (apart_deg <= options.most_apart_deg && apart_mm <= options.most_apart_mm) return "";
   return marrow::formatted(
-      "the two costs lead to poses %.3g degrees and %.3g mm apart: one of them is wrong; look at the overlays of both",
+      "the two costs lead to poses {:.3g} degrees and {:.3g} mm apart: one of them is wrong; look at the overlays of "
+      "both",
       apart_deg, apart_mm);
 }
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "marrow/runtime/types.hpp"
+#include "marrow/runtime/node/types.hpp"
 #include "marrow/toolbox/analytic/body.hpp"
 
 namespace marrow::conformance {

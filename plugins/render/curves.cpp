@@ -4,8 +4,8 @@
 #include <limits>
 #include <marrow/plugin.hpp>
 
+#include "marrow/render/plot.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"
-#include "marrow/toolbox/draw/plot.hpp"
 
 namespace {
 

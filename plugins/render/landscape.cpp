@@ -3,9 +3,9 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/render/plot.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"
-#include "marrow/toolbox/draw/plot.hpp"
 
 namespace {
 
@@ -24,7 +24,7 @@ std::optional<cv::Point2d> least_of(const Profile& profile) {
 std::string title(const Profile& profile) {
   const auto least = least_of(profile);
   if (!least) return profile.axis + ": no finite cost";
-  const std::string text = marrow::formatted(": least at %+.2f ", least->x);
+  const std::string text = marrow::formatted(": least at {:+.2f} ", least->x);
   return profile.axis + text + profile.unit;
 }
 

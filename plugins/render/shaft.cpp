@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"
 
 namespace {
@@ -18,7 +18,7 @@ struct Options {
 };
 
 std::string describe(const marrow::ShaftLines& lines) {
-  return marrow::formatted("chosen: %.1f +- %.1f mm wide, log likelihood %.2f", lines.width_mm,
+  return marrow::formatted("chosen: {:.1f} +- {:.1f} mm wide, log likelihood {:.2f}", lines.width_mm,
                            lines.width_deviation_mm, lines.log_likelihood);
 }
 

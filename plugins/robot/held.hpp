@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The fragment that a robot holds, and the load on it.
-#include "marrow/toolbox/phantom/contact.hpp"
-#include "marrow/toolbox/robot/robot_state.hpp"
+#include "marrow/robot/contact.hpp"
+#include "marrow/toolbox/robotics/robot_state.hpp"
 
 namespace marrow::robot {
 

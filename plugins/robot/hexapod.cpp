@@ -4,7 +4,7 @@
 
 #include "held.hpp"
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace {
 
@@ -68,7 +68,7 @@ Result hexapod(const phantom::Phantom& phantom, const Options& options, Context&
   state.world_from_ct = fragment.world_from_ct;
   state.load_at_grip = held.load_at(fragment.world_from_ct);
   if (state.load_at_grip.force_n > options.stop_n) {
-    const std::string text = formatted("%.0f N, its limit is %.0f N", state.load_at_grip.force_n, options.stop_n);
+    const std::string text = formatted("{:.0f} N, its limit is {:.0f} N", state.load_at_grip.force_n, options.stop_n);
     throw Error(what + ": the force on the fragment is already " + text +
                 "; does its bone stick in the other fragment? Begin with the fragments apart");
   }

@@ -5,7 +5,7 @@
 #include <marrow/plugin.hpp>
 
 #include "held.hpp"
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 
 namespace {
@@ -23,7 +23,7 @@ struct Result {
   Metrics figures;
 };
 
-std::string with_unit(double value, const char* unit) { return formatted("%.0f %s", value, unit); }
+std::string with_unit(double value, const char* unit) { return formatted("{:.0f} {}", value, unit); }
 
 /// Where the held fragment is while the encoders say `base_from_platform`.
 class Robot {

@@ -2,7 +2,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/phantom/phantom.hpp"
-#include "marrow/toolbox/robot/robot_state.hpp"
+#include "marrow/toolbox/robotics/robot_state.hpp"
 
 namespace {
 

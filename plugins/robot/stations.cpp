@@ -6,7 +6,7 @@
 
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/board_views.hpp"
-#include "marrow/toolbox/robot/robot_state.hpp"
+#include "marrow/toolbox/robotics/robot_state.hpp"
 
 namespace {
 

@@ -9,12 +9,12 @@
 #include <marrow/plugin.hpp>
 
 #include <marrow/domain/decompositions.hpp>
-#include "marrow/domain/number_text.hpp"
-#include "marrow/toolbox/field/expansion.hpp"
-#include "marrow/toolbox/field/fragments.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/segment/expansion.hpp"
+#include "marrow/segment/fragments.hpp"
+#include "marrow/segment/seed_points.hpp"
 #include "marrow/toolbox/field/interior.hpp"
 #include "marrow/toolbox/field/mesh_field.hpp"
-#include "marrow/toolbox/field/seed_points.hpp"
 
 namespace {
 
@@ -246,7 +246,7 @@ List<SignedField> atlas(const Volume& volume, const List<Seeds>& seeds, const Me
     if (distance_mm < least_mm) least_mm = distance_mm, best = map;
   }
   least_mm = fit(target, vertices, options.keep_part, true, options.affine, options.iterations, best);
-  const std::string line = marrow::formatted("the template lies %.2f mm from the bone on average, scaled by %.3f",
+  const std::string line = marrow::formatted("the template lies {:.2f} mm from the bone on average, scaled by {:.3f}",
                                              least_mm, std::cbrt(best.linear().determinant()));
   context.debug(line);
   Mesh moved = whole;

@@ -11,10 +11,10 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/field/expansion.hpp"
-#include "marrow/toolbox/field/fragments.hpp"
+#include "marrow/segment/expansion.hpp"
+#include "marrow/segment/fragments.hpp"
+#include "marrow/segment/seed_points.hpp"
 #include "marrow/toolbox/field/interior.hpp"
-#include "marrow/toolbox/field/seed_points.hpp"
 
 namespace {
 

@@ -4,11 +4,11 @@
 // (expansion.hpp), with everything inside filled. They come to rest on the edges in the CT.
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
-#include "marrow/toolbox/field/expansion.hpp"
-#include "marrow/toolbox/field/fragments.hpp"
-#include "marrow/toolbox/field/front.hpp"
-#include "marrow/toolbox/field/seed_points.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/segment/expansion.hpp"
+#include "marrow/segment/fragments.hpp"
+#include "marrow/segment/front.hpp"
+#include "marrow/segment/seed_points.hpp"
 
 namespace {
 
@@ -67,9 +67,9 @@ std::vector<Front> begin(const Volume& volume, const List<Seeds>& seeds, const O
 void log_fronts(const std::vector<Front>& fronts, const List<Seeds>& seeds, int step, double step_mm,
                 Context& context) {
   for (std::size_t f = 0; f < fronts.size(); ++f) {
-    const std::string line = marrow::formatted(
-        "step %d, %s: mean speed %.3f of F0, %zu voxels in the moving band", step, seeds.name(f).c_str(),
-        fronts[f].mean_motion_mm() / (kStepsPerCycle * step_mm), fronts[f].band_voxels());
+    const std::string line =
+        marrow::formatted("step {}, {}: mean speed {:.3f} of F0, {} voxels in the moving band", step, seeds.name(f),
+                          fronts[f].mean_motion_mm() / (kStepsPerCycle * step_mm), fronts[f].band_voxels());
     context.debug(line);
   }
 }

@@ -6,8 +6,8 @@
 #include <deque>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/field/fragments.hpp"
-#include "marrow/toolbox/field/seed_points.hpp"
+#include "marrow/segment/fragments.hpp"
+#include "marrow/segment/seed_points.hpp"
 
 namespace {
 

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
-#include "marrow/toolbox/field/expansion.hpp"
-#include "marrow/toolbox/field/fragments.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/segment/expansion.hpp"
+#include "marrow/segment/fragments.hpp"
+#include "marrow/segment/itk_contour.hpp"
+#include "marrow/segment/seed_points.hpp"
 #include "marrow/toolbox/field/interior.hpp"
-#include "marrow/toolbox/field/itk_contour.hpp"
-#include "marrow/toolbox/field/seed_points.hpp"
 
 namespace {
 
@@ -47,7 +47,7 @@ SignedField field_of(const Volume& volume, const marrow::field::Mask& mask, cons
   marrow::field::Contour contour = marrow::field::geodesic(marrow::field::cut_out(volume, mask), std::move(start),
                                                            box.size, {s.x(), s.y(), s.z()}, settings);
   const std::string line =
-      marrow::formatted("%s: %d iterations, last change %.4f", name.c_str(), contour.iterations, contour.rms);
+      marrow::formatted("{}: {} iterations, last change {:.4f}", name, contour.iterations, contour.rms);
   context.debug(line);
   for (int z = 0; z < box.size[2]; ++z)
     for (int y = 0; y < box.size[1]; ++y)

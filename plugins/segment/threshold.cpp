@@ -2,8 +2,8 @@
 #include <marrow/plugin.hpp>
 #include <queue>
 
-#include "marrow/toolbox/field/fragments.hpp"
-#include "marrow/toolbox/field/seed_points.hpp"
+#include "marrow/segment/fragments.hpp"
+#include "marrow/segment/seed_points.hpp"
 
 namespace {
 

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "marrow/toolbox/shaft/pairs.hpp"
+#include "marrow/shaft/pairs.hpp"
 
 namespace {
 

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "marrow/shaft/pairs.hpp"
 #include "marrow/toolbox/image/grey_range.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
-#include "marrow/toolbox/shaft/pairs.hpp"
 
 namespace {
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <random>
 
-#include "marrow/toolbox/shaft/pairs.hpp"
+#include "marrow/shaft/pairs.hpp"
 
 namespace {
 

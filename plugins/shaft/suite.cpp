@@ -9,7 +9,7 @@
 #include <cmath>
 #include <random>
 
-#include "marrow/runtime/types.hpp"
+#include "marrow/runtime/node/types.hpp"
 
 namespace marrow::conformance {
 namespace {

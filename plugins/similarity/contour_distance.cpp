@@ -2,12 +2,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <marrow/domain/number_text.hpp>
+#include <marrow/base/number_text.hpp>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/image/blur.hpp"
-#include "marrow/toolbox/match/block_expansions.hpp"
-#include "marrow/toolbox/match/edge_loss.hpp"
+#include "marrow/similarity/block_expansions.hpp"
+#include "marrow/similarity/blur.hpp"
+#include "marrow/similarity/edge_loss.hpp"
 #include "marrow/toolbox/match/nearest_edges.hpp"
 #include "marrow/toolbox/match/nearest_outline.hpp"
 #include "marrow/toolbox/match/views_cost.hpp"
@@ -161,7 +161,7 @@ class ContourDistance : public marrow::match::ViewsCost {
     if (std::any_of(matches.residuals.begin(), matches.residuals.end(), matters) ||
         std::any_of(matches.of_edges.begin(), matches.of_edges.end(), matters))
       return {};
-    return marrow::formatted("no edge lies within %.3g px of the model's outline", level_.reach_px);
+    return marrow::formatted("no edge lies within {:.3g} px of the model's outline", level_.reach_px);
   }
 
   /// If a view has fewer points than this, the missing ones count as unmatched.

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "marrow/domain/number_text.hpp"
-#include "marrow/toolbox/match/edge_loss.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/similarity/edge_loss.hpp"
 #include "marrow/toolbox/match/nearest_edges.hpp"
 #include "marrow/toolbox/match/views_cost.hpp"
 
@@ -108,7 +108,7 @@ class DrrEdges : public marrow::match::ViewsCost {
                  : "no edge of the radiograph lies inside image and mask";
     const double gain = loss_.worst() - found.values / found.weights;
     if (gain > 1e-9 * loss_.worst()) return {};
-    return marrow::formatted("no edge lies within %.3g px of the radiograph's edges", reach_px_);
+    return marrow::formatted("no edge lies within {:.3g} px of the radiograph's edges", reach_px_);
   }
 
   /// A view that shows very few edges of the radiograph is no evidence.

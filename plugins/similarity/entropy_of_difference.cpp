@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/match/histogram.hpp"
+#include "marrow/similarity/histogram.hpp"
 
 namespace {
 

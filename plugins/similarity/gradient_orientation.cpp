@@ -4,7 +4,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/quantile.hpp"
-#include "marrow/toolbox/match/intensity.hpp"
+#include "marrow/similarity/intensity.hpp"
 
 namespace {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "marrow/toolbox/match/patches.hpp"
+#include "marrow/similarity/patches.hpp"
 
 namespace {
 

@@ -2,7 +2,7 @@
 #include <marrow/plugin.hpp>
 #include <numeric>
 
-#include "marrow/toolbox/match/histogram.hpp"
+#include "marrow/similarity/histogram.hpp"
 
 namespace {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/toolbox/match/patches.hpp"
+#include "marrow/similarity/patches.hpp"
 
 namespace {
 

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/match/intensity.hpp"
+#include "marrow/similarity/intensity.hpp"
 
 namespace {
 

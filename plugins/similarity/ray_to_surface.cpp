@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/central_rays.hpp"
-#include "marrow/domain/number_text.hpp"
-#include "marrow/toolbox/match/block_expansions.hpp"
+#include "marrow/similarity/block_expansions.hpp"
 #include "marrow/toolbox/match/views_cost.hpp"
 
 namespace {
@@ -223,7 +223,7 @@ class RayToSurface : public marrow::match::ViewsCost {
     if (scene_->rays[view].empty()) return "it has no edge that is inside the mask and belongs to this bone";
     const auto touches = touches_of(view, world_from_model);
     if (std::any_of(touches.begin(), touches.end(), [](const auto& touch) { return touch.has_value(); })) return {};
-    return marrow::formatted("no ray through an edge passes within %.3g mm of the model's surface", loss_.reach);
+    return marrow::formatted("no ray through an edge passes within {:.3g} mm of the model's surface", loss_.reach);
   }
 
   /// How the distance changes with a small motion of the model: by (r, t) the ray moves relative to the model by

@@ -3,7 +3,7 @@
 
 #include <Eigen/Geometry>
 
-#include "marrow/toolbox/analytic/x_ray_view.hpp"
+#include "marrow/similarity/x_ray_view.hpp"
 #include "sample_cost.hpp"
 
 namespace marrow::conformance {

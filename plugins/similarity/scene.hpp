@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "marrow/conformance.hpp"
-#include "marrow/runtime/types.hpp"
+#include "marrow/runtime/node/types.hpp"
 #include "marrow/toolbox/analytic/body.hpp"
 
 namespace marrow::conformance {

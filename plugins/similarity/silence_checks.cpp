@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "marrow/toolbox/analytic/invisible.hpp"
+#include "marrow/similarity/invisible.hpp"
 #include "marrow/toolbox/search/compared.hpp"
 #include "scene.hpp"
 

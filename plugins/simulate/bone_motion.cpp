@@ -4,7 +4,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/phantom/posture.hpp"
+#include "marrow/simulate/posture.hpp"
 #include "marrow/toolbox/track/sequence.hpp"
 
 namespace {

@@ -4,7 +4,7 @@
 #include <marrow/plugin.hpp>
 #include <sstream>
 
-#include "marrow/toolbox/phantom/posture.hpp"
+#include "marrow/simulate/posture.hpp"
 
 namespace {
 

@@ -3,7 +3,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/random.hpp"
-#include "marrow/toolbox/phantom/photograph.hpp"
+#include "marrow/simulate/photograph.hpp"
 
 namespace {
 

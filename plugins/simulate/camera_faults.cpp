@@ -7,7 +7,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/names.hpp"
+#include "marrow/base/names.hpp"
 #include "marrow/domain/random.hpp"
 
 namespace {

@@ -5,9 +5,9 @@
 #include <optional>
 
 #include "marrow/domain/random.hpp"
-#include "marrow/toolbox/phantom/knee.hpp"
-#include "marrow/toolbox/phantom/surgery.hpp"
-#include "marrow/toolbox/phantom/thigh.hpp"
+#include "marrow/simulate/knee.hpp"
+#include "marrow/simulate/surgery.hpp"
+#include "marrow/simulate/thigh.hpp"
 
 namespace {
 

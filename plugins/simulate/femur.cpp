@@ -4,11 +4,11 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
-#include "marrow/toolbox/phantom/femur_shape.hpp"
+#include "marrow/simulate/femur_shape.hpp"
+#include "marrow/simulate/polygonise.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
-#include "marrow/toolbox/phantom/polygonise.hpp"
 
 namespace {
 
@@ -64,9 +64,9 @@ phantom::FemurShape drawn(const FemurOptions& options) {
 
 Bone femur(const FemurOptions& options, Context& context) {
   if (options.canal_diameter_mm + 4 > std::min(options.shaft_ml_mm, options.shaft_ap_mm))
-    throw Error("simulate.femur: a canal of " + formatted("%f", options.canal_diameter_mm) +
+    throw Error("simulate.femur: a canal of " + formatted("{:f}", options.canal_diameter_mm) +
                 " mm leaves less than 2 mm of cortex in a shaft of " +
-                formatted("%f", std::min(options.shaft_ml_mm, options.shaft_ap_mm)) + " mm; make the canal narrower");
+                formatted("{:f}", std::min(options.shaft_ml_mm, options.shaft_ap_mm)) + " mm; make the canal narrower");
   const phantom::FemurShape shape = drawn(options);
   const phantom::FemurField field(shape);
   constexpr double kSteepest = 2;

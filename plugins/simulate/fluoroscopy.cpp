@@ -10,11 +10,11 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
+#include "marrow/simulate/posture.hpp"
+#include "marrow/simulate/solid.hpp"
 #include "marrow/toolbox/phantom/materials.hpp"
-#include "marrow/toolbox/phantom/posture.hpp"
-#include "marrow/toolbox/phantom/solid.hpp"
 
 namespace {
 
@@ -203,7 +203,7 @@ class XRay {
     return [this, camera_from_body, name, place](const Eigen::Vector3d& point) {
       const Eigen::Vector3d x = camera_from_body * point;
       if (!(x.z() >= kNearestMm))
-        throw Error("simulate.fluoroscopy: " + name + " reaches to " + formatted("%f", x.z()) +
+        throw Error("simulate.fluoroscopy: " + name + " reaches to " + formatted("{:f}", x.z()) +
                     " mm from the X-ray source; it must lie in front of the source, so check the camera's distances "
                     "and " +
                     place);

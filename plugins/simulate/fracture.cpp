@@ -5,10 +5,10 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
+#include "marrow/simulate/solid.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
-#include "marrow/toolbox/phantom/solid.hpp"
 
 namespace {
 
@@ -210,7 +210,7 @@ Vector6d motion(const std::array<double, 3>& rotation_deg, const std::array<doub
 Phantom fracture(const Bone& bone, const FractureOptions& options) {
   phantom::check_bone(bone, "simulate.fracture");
   if (!(options.level >= 0.1 && options.level <= 0.9))
-    throw Error("simulate.fracture: the level " + formatted("%f", options.level) +
+    throw Error("simulate.fracture: the level " + formatted("{:f}", options.level) +
                 " must lie in 0.1 to 0.9 of the bone's length");
   const Box box = bounds(bone.outer);
   const double z = box.low.z() + options.level * (box.high.z() - box.low.z());

@@ -6,7 +6,7 @@
 
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
-#include "marrow/toolbox/robot/hexapod.hpp"
+#include "marrow/toolbox/robotics/hexapod.hpp"
 
 namespace {
 

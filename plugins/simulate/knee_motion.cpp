@@ -5,8 +5,8 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/phantom/knee.hpp"
-#include "marrow/toolbox/phantom/posture.hpp"
+#include "marrow/simulate/knee.hpp"
+#include "marrow/simulate/posture.hpp"
 #include "marrow/toolbox/track/sequence.hpp"
 
 namespace {

@@ -7,7 +7,7 @@
 #include <marrow/plugin.hpp>
 #include <optional>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
 #include "marrow/toolbox/phantom/loft.hpp"
@@ -159,7 +159,7 @@ RigidTransform in_canal(const MiddleLine& line, const BoneAt& bone, double turn_
   return pose;
 }
 
-std::string shown(double value) { return formatted("%.1f", value); }
+std::string shown(double value) { return formatted("{:.1f}", value); }
 
 void check_fit(const MiddleLine& line, const RigidTransform& pose, const BoneAt& bone, const NailingOptions& options) {
   const double wide = line.radius_mm + 0.5 * options.reaming_mm, lowest = bone.lowest_z();

@@ -4,8 +4,8 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/random.hpp"
+#include "marrow/simulate/photograph.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
-#include "marrow/toolbox/phantom/photograph.hpp"
 
 namespace {
 

@@ -5,12 +5,12 @@
 #include <filesystem>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/simulate/polygonise.hpp"
+#include "marrow/simulate/shape_functions.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/field/mesh_field.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
-#include "marrow/toolbox/phantom/polygonise.hpp"
-#include "marrow/toolbox/phantom/shape_functions.hpp"
 
 namespace {
 
@@ -77,8 +77,8 @@ Bone surface(const SurfaceOptions& options, Context& context) {
   const Eigen::Vector3d extent = high - low;
   if (options.long_bone && extent.z() < std::max(extent.x(), extent.y()))
     throw Error("simulate.surface: the bone's long axis must lie along z with the distal end low, but it extends " +
-                formatted("%f", extent.x()) + " x " + formatted("%f", extent.y()) + " x " +
-                formatted("%f", extent.z()) + " mm; turn it with rotation_deg");
+                formatted("{:f}", extent.x()) + " x " + formatted("{:f}", extent.y()) + " x " +
+                formatted("{:f}", extent.z()) + " mm; turn it with rotation_deg");
   if (!options.cortex_mm.empty()) {
     if (!options.inner.empty())
       throw Error("simulate.surface: the inner surface is given by a file and by cortex_mm; give one of them");

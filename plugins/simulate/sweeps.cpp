@@ -3,7 +3,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace {
 
@@ -41,7 +41,7 @@ List<Pose> sweeps(const Options& options) {
   commands.add("neutral", turned(0, 0, options.pivot_mm));
   for (const std::string& axis : options.axes) {
     const auto add = [&](int step) {
-      const std::string name = formatted("r%s%+0*.*f", axis.c_str(), 4 + digits, digits, step * options.step_deg);
+      const std::string name = formatted("r{}{:+0{}.{}f}", axis, step * options.step_deg, 4 + digits, digits);
       commands.add(name, turned(axis[0] - 'x', step * options.step_deg, options.pivot_mm));
     };
     // From neutral to one side, then from neutral to the other. So each motion begins near a known one.

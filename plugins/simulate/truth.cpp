@@ -2,7 +2,7 @@
 // The exact surfaces and poses of a phantom's fragments, for studies whose images are not those of a case.
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/phantom/posture.hpp"
+#include "marrow/simulate/posture.hpp"
 
 namespace {
 

@@ -4,9 +4,9 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/random.hpp"
+#include "marrow/simulate/polygonise.hpp"
+#include "marrow/simulate/vertebra_shape.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
-#include "marrow/toolbox/phantom/polygonise.hpp"
-#include "marrow/toolbox/phantom/vertebra_shape.hpp"
 
 namespace {
 

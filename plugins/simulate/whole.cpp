@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <marrow/plugin.hpp>
 
+#include "marrow/simulate/solid.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
-#include "marrow/toolbox/phantom/solid.hpp"
 
 namespace {
 

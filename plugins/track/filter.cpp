@@ -3,7 +3,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/track/motion_model.hpp"
 
 namespace {
@@ -44,9 +44,10 @@ std::string why_lost(const TrackState& state, const Pose* pose, const Verdict* v
   if (verdict && verdict->judgement == Judgement::wrong)
     return "its verdict is wrong" + (verdict->reasons.empty() ? "" : ": " + verdict->reasons[0]);
   if (pose->cost > options.most_cost_ratio * state.usual_cost)
-    return formatted("its cost is %.3g, where %.3g is usual", pose->cost, state.usual_cost);
+    return formatted("its cost is {:.3g}, where {:.3g} is usual", pose->cost, state.usual_cost);
   if (!(surprise <= options.gate))
-    return formatted("it is not where the motion leads: squared distance %.3g, at most %.3g", surprise, options.gate);
+    return formatted("it is not where the motion leads: squared distance {:.3g}, at most {:.3g}", surprise,
+                     options.gate);
   return "";
 }
 

@@ -2,7 +2,7 @@
 // The way of a bone as one value, and as a table (CSV) that other programs read.
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 
@@ -44,7 +44,7 @@ void write_csv(const Trajectory& trajectory, const std::string& path) {
     for (const char* axis : kAxes) text += std::string(prefix) + axis;
   text += ",verdict,failure_probability,note\n";
   const auto add = [&](double value) {
-    const std::string number = formatted(",%.10g", value);
+    const std::string number = formatted(",{:.10g}", value);
     text += number;
   };
   const auto add_degrees_and_mm = [&](const Vector6d& values) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Judges a pose by evidence of many kinds: its cost against that of other poses, other minima, what each view alone
 // would have, where the outline lies on the images' edges, whether contour and grey values agree, and the predicted
-// deviations. The failure model, which tools/fit_verdict fits to poses whose errors are known, turns these figures into
-// the probability that the pose is off.
+// deviations. The failure model, which tools/studies/fit_verdict fits to poses whose errors are known, turns these
+// figures into the probability that the pose is off.
 #include <tbb/parallel_invoke.h>
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 #include "failure_model.hpp"
 #include "judged.hpp"
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/geometry/targets.hpp"
 #include "marrow/toolbox/search/compared.hpp"
 #include "spread.hpp"
@@ -44,33 +44,33 @@ constexpr const char* kKnownCameras =
     "focal_percent and centre_px";
 constexpr const char* kCameras = "a check of the cameras' calibration (camera.check), or refine.cameras";
 constexpr Words kWords[] = {
-    {"decoys_scatter", "the cost of random poses scatters by %.2f of what they lie above this pose", kStart},
-    {"contour_decoys_scatter", "by contour, random poses scatter by %.2f of what they lie above this pose", kStart},
-    {"best_decoy", "a random pose nearby explains the images %.2f times as well", kStart},
-    {"contour_best_decoy", "by contour, a random pose nearby explains the images %.2f times as well", kStart},
-    {"best_turned", "turned about its long axis, the bone explains the images %.2f times as well", kAxial},
-    {"contour_best_turned", "turned about its long axis, the bone's contour fits %.2f times as well", kAxial},
-    {"other_minimum", "a search from elsewhere ends at another pose that is %.2f times as good", kView},
-    {"better_minimum", "a search from elsewhere ends at a pose that is better, by %.2f of the cost's rise", kStart},
-    {"apart_mm", "the cost leads to a pose %.2f mm away", kStart},
-    {"apart_deg", "the cost leads to a pose that is turned by %.1f degrees about the long axis", kStart},
-    {"restarts_mm", "searches from starts nearby end %.2f mm apart", kView},
-    {"restarts_deg", "searches from starts nearby end %.1f degrees apart about the long axis", kAxial},
-    {"contour_apart_mm", "contour and grey values lead to poses %.2f mm apart", kLook},
-    {"contour_apart_deg", "contour and grey values lead to poses %.1f degrees apart about the long axis", kAxial},
-    {"view_pull_mm", "a view alone would move the bone by %.2f mm in its image", kCameras},
-    {"view_pull_deg", "a view alone would turn the bone by %.1f degrees about its long axis", kCameras},
-    {"contour_view_pull_mm", "the contour in a view alone would move the bone by %.2f mm in its image", kCameras},
-    {"contour_view_pull_deg", "the contour in a view alone would turn the bone by %.1f degrees", kCameras},
-    {"unexplained", "a share of %.2f of the outline has no edge in the worst view", kLook},
-    {"outline_part_mm", "a part of the outline lies %.2f mm off its edges", kLook},
-    {"outline_spread_mm", "the edges scatter by %.2f mm about the outline", kLook},
-    {"predicted_mtre_mm", "the bone's surface is known to %.2f mm", kView},
-    {"predicted_axial_deg", "the rotation about the long axis is known to %.2f degrees", kAxial},
-    {"warnings", "warnings of the registration: %.0f", kLook},
+    {"decoys_scatter", "the cost of random poses scatters by {:.2f} of what they lie above this pose", kStart},
+    {"contour_decoys_scatter", "by contour, random poses scatter by {:.2f} of what they lie above this pose", kStart},
+    {"best_decoy", "a random pose nearby explains the images {:.2f} times as well", kStart},
+    {"contour_best_decoy", "by contour, a random pose nearby explains the images {:.2f} times as well", kStart},
+    {"best_turned", "turned about its long axis, the bone explains the images {:.2f} times as well", kAxial},
+    {"contour_best_turned", "turned about its long axis, the bone's contour fits {:.2f} times as well", kAxial},
+    {"other_minimum", "a search from elsewhere ends at another pose that is {:.2f} times as good", kView},
+    {"better_minimum", "a search from elsewhere ends at a pose that is better, by {:.2f} of the cost's rise", kStart},
+    {"apart_mm", "the cost leads to a pose {:.2f} mm away", kStart},
+    {"apart_deg", "the cost leads to a pose that is turned by {:.1f} degrees about the long axis", kStart},
+    {"restarts_mm", "searches from starts nearby end {:.2f} mm apart", kView},
+    {"restarts_deg", "searches from starts nearby end {:.1f} degrees apart about the long axis", kAxial},
+    {"contour_apart_mm", "contour and grey values lead to poses {:.2f} mm apart", kLook},
+    {"contour_apart_deg", "contour and grey values lead to poses {:.1f} degrees apart about the long axis", kAxial},
+    {"view_pull_mm", "a view alone would move the bone by {:.2f} mm in its image", kCameras},
+    {"view_pull_deg", "a view alone would turn the bone by {:.1f} degrees about its long axis", kCameras},
+    {"contour_view_pull_mm", "the contour in a view alone would move the bone by {:.2f} mm in its image", kCameras},
+    {"contour_view_pull_deg", "the contour in a view alone would turn the bone by {:.1f} degrees", kCameras},
+    {"unexplained", "a share of {:.2f} of the outline has no edge in the worst view", kLook},
+    {"outline_part_mm", "a part of the outline lies {:.2f} mm off its edges", kLook},
+    {"outline_spread_mm", "the edges scatter by {:.2f} mm about the outline", kLook},
+    {"predicted_mtre_mm", "the bone's surface is known to {:.2f} mm", kView},
+    {"predicted_axial_deg", "the rotation about the long axis is known to {:.2f} degrees", kAxial},
+    {"warnings", "warnings of the registration: {:.0f}", kLook},
 };
 
-std::string filled(const char* text, double value) { return formatted(text, value); }
+std::string filled(const char* text, double value) { return formatted(fmt::runtime(text), value); }
 
 void add(Evidence& all, const Evidence& more) { all.insert(all.end(), more.begin(), more.end()); }
 
@@ -95,11 +95,12 @@ double predicted_failure(const Pose& pose, const verdicts::Spread& spread) {
 void explain_predicted(const verdicts::Spread& spread, double predicted, bool is_refined, Verdict& verdict) {
   if (is_refined) {
     verdict.reasons.push_back("with what is not known about the cameras, the bone's surface is known to " +
-                              filled("%.1f mm, and the rotation about the long axis to ", spread.mtre_mm) +
-                              filled("%.1f degrees", spread.axial_deg));
+                              filled("{:.1f} mm, and the rotation about the long axis to ", spread.mtre_mm) +
+                              filled("{:.1f} degrees", spread.axial_deg));
     verdict.remedies.emplace_back(kKnownCameras);
   } else {
-    verdict.reasons.push_back(filled("the predicted deviations allow a failure with a probability of %.2f", predicted));
+    verdict.reasons.push_back(
+        filled("the predicted deviations allow a failure with a probability of {:.2f}", predicted));
     verdict.remedies.emplace_back(kCameras);
   }
 }
@@ -201,7 +202,7 @@ void check_figures(const FailureModel& model, const std::filesystem::path& path)
   for (const FailureModel::Term& term : model.terms)
     if (!words_of(term.figure))
       throw Error(path.string() + ": there is no figure '" + term.figure +
-                  "'; fit the model again with tools/fit_verdict");
+                  "'; fit the model again with tools/studies/fit_verdict");
 }
 
 /// Another pose of the bone, found by another cost; null if there is none. It is only for pipelines without this cost:
@@ -251,7 +252,7 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
                                                                            : Judgement::trusted;
   if (inside_mm > options.most_intersection_mm && verdict.judgement == Judgement::trusted) {
     verdict.judgement = Judgement::doubtful;
-    verdict.reasons.push_back(filled("the bone reaches %.1f mm into another bone", inside_mm));
+    verdict.reasons.push_back(filled("the bone reaches {:.1f} mm into another bone", inside_mm));
   }
   doubt_what_a_cost_denies(verdict.figures, verdict);
   if (verdict.judgement == Judgement::wrong) verdict.remedies.emplace_back(kGiven);
@@ -285,7 +286,7 @@ MARROW_PLUGIN(plugin) {
       .in("other_bones", "the bones of these poses", over("fragment"))
       .out("verdict", "the judgement, the probability that the pose is off, and all figures of the evidence")
       .option("failure_model", &Options::failure_model,
-              "file of tools/fit_verdict; none: the figures alone, to fit one, and the pose is doubtful")
+              "file of tools/studies/fit_verdict; none: the figures alone, to fit one, and the pose is doubtful")
       .option("pixel_step", &Options::pixel_step,
               "for costs of grey values: only every n-th pixel is compared, and half as many far from the pose",
               at_least(1), at_most(32), replaces({"cost.pixel_step"}))

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 
 namespace marrow::verdicts {
@@ -17,7 +17,7 @@ double number_within(const YamlMap& map, const std::string& key, double least, d
   const auto value = map.number(key);
   if (!value) return least;
   if (!(*value >= least && *value <= most)) {
-    const std::string text = formatted(": expected a number from %g to %g, got %g", least, most, *value);
+    const std::string text = formatted(": expected a number from {:g} to {:g}, got {:g}", least, most, *value);
     map.fault(key, key + text);
   }
   return *value;

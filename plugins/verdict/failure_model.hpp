@@ -30,7 +30,7 @@ struct FailureModel {
   double probability(const std::vector<Contribution>& contributions) const;
 };
 
-/// Reads a file of tools/fit_verdict. Throws Error with all of its faults.
+/// Reads a file of tools/studies/fit_verdict. Throws Error with all of its faults.
 FailureModel read_failure_model(const std::filesystem::path& path);
 
 }  // namespace marrow::verdicts

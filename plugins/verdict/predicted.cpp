@@ -7,7 +7,7 @@
 
 #include "spread.hpp"
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace {
 
@@ -22,7 +22,7 @@ struct Options {
 };
 
 /// With one decimal.
-std::string shown(double value) { return marrow::formatted("%.1f", value); }
+std::string shown(double value) { return marrow::formatted("{:.1f}", value); }
 
 /// What makes the pose uncertain, the weightier first, each with what would settle it.
 void explain(const Spread& spread, Verdict& verdict) {

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/quantile.hpp"
 
 namespace {
@@ -94,7 +94,7 @@ void bridge(Volume& ct, int below, int above) {
 
 std::string range(const Grid& grid, int below, int above) {
   const auto height = [&](int z) { return (grid.origin_mm + grid.direction.col(2) * (z * grid.spacing_mm.z())).z(); };
-  return marrow::formatted("slices %d to %d (z = %.1f to %.1f mm)", below + 1, above - 1, height(below + 1),
+  return marrow::formatted("slices {} to {} (z = {:.1f} to {:.1f} mm)", below + 1, above - 1, height(below + 1),
                            height(above - 1));
 }
 

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/field/mesh_field.hpp"
 
 namespace {
@@ -41,8 +41,8 @@ Grid grid_around(const marrow::Mesh& mesh, double spacing) {
     grid.size[std::size_t(k)] = int(std::min(size, 1e6));
   }
   if (voxels > double(kMostVoxels))
-    throw marrow::Error("volume.filled_surface: with spacing_mm " + marrow::formatted("%f", spacing) +
-                        " the volume has " + marrow::formatted("%f", voxels / 1e6) +
+    throw marrow::Error("volume.filled_surface: with spacing_mm " + marrow::formatted("{:f}", spacing) +
+                        " the volume has " + marrow::formatted("{:f}", voxels / 1e6) +
                         " million voxels, and at most 100 are allowed; take a larger "
                         "spacing_mm");
   grid.origin_mm = grid.direction * low;

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cctype>
 #include <map>
-#include <marrow/domain/names.hpp>
-#include <marrow/domain/printable.hpp>
+#include <marrow/base/names.hpp>
+#include <marrow/base/printable.hpp>
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/files/atomic_write.hpp"
-#include "marrow/toolbox/files/picture_out.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
+#include "marrow/write/picture_out.hpp"
 
 namespace {
 

@@ -3,7 +3,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/files/atomic_write.hpp"
-#include "marrow/toolbox/files/picture_out.hpp"
+#include "marrow/write/picture_out.hpp"
 
 namespace {
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the data of a report's interactive parts as JSON. tools/report/data.js reads it and describes it.
+// Writes the data of a report's interactive parts as JSON. tools/report/page/data.js reads it and describes it.
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <marrow/domain/base64.hpp>
+#include <marrow/base/base64.hpp>
 #include <marrow/plugin.hpp>
 #include <nlohmann/json.hpp>
 

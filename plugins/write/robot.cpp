@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "marrow/toolbox/files/atomic_write.hpp"
-#include "marrow/toolbox/robot/guide_state.hpp"
-#include "marrow/toolbox/robot/robot_state.hpp"
+#include "marrow/toolbox/robotics/guide_state.hpp"
+#include "marrow/toolbox/robotics/robot_state.hpp"
 
 namespace {
 

@@ -3,9 +3,9 @@
 // be turned upside down for it, and their origin is minus half of their size.
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/exchange/named_cameras.hpp"
 #include "marrow/toolbox/exchange/rtk_geometry.hpp"
 #include "marrow/toolbox/exchange/written_files.hpp"
+#include "marrow/write/named_cameras.hpp"
 
 namespace {
 

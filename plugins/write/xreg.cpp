@@ -5,9 +5,9 @@
 #include <marrow/domain/landmarks.hpp>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/exchange/named_cameras.hpp"
 #include "marrow/toolbox/exchange/written_files.hpp"
 #include "marrow/toolbox/exchange/xreg_file.hpp"
+#include "marrow/write/named_cameras.hpp"
 
 namespace {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
 
 namespace marrow::python {
 namespace {

@@ -3,9 +3,10 @@
 
 #include <mutex>
 
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/names.hpp"
-#include "marrow/runtime/library.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/framework_file.hpp"
+#include "marrow/base/names.hpp"
+#include "marrow/runtime/plugins/library.hpp"
 #include "pipelines.hpp"
 
 namespace marrow::python {

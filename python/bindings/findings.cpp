@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "values.hpp"
 
 namespace marrow::python {
@@ -52,8 +52,8 @@ EdgeMap edge_map_of(const py::handle& pixels, int width_px, int height_px) {
     const double* at = numbers.data() + i;
     const bool is_inside = at[0] >= -0.5 && at[1] >= -0.5 && at[0] <= width_px - 0.5 && at[1] <= height_px - 0.5;
     if (!is_inside || !std::isfinite(at[2] + at[3] + at[4]))
-      throw Error("EdgeMap: pixel " + std::to_string(i / 5) + " is at (" + formatted("%f", at[0]) + ", " +
-                  formatted("%f", at[1]) + ") px, outside of the image of " + std::to_string(width_px) + " x " +
+      throw Error("EdgeMap: pixel " + std::to_string(i / 5) + " is at (" + formatted("{:f}", at[0]) + ", " +
+                  formatted("{:f}", at[1]) + ") px, outside of the image of " + std::to_string(width_px) + " x " +
                   std::to_string(height_px) + " px, or a number of it is not finite");
     edges.pixels.push_back({float(at[0]), float(at[1]), float(at[2]), float(at[3]), float(at[4])});
   }

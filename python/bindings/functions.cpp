@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "interruptible.hpp"
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
 #include "values.hpp"
 
 namespace marrow::python {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <pybind11/stl.h>
 
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
 #include "values.hpp"
 
 namespace marrow::python {

@@ -2,7 +2,7 @@
 #include <pybind11/stl.h>
 
 #include "mapped.hpp"
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
 #include "values.hpp"
 
 namespace marrow::python {

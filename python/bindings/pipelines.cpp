@@ -3,10 +3,10 @@
 
 #include <pybind11/stl.h>
 
-#include "marrow/domain/error.hpp"
-#include "marrow/runtime/run_folder.hpp"
-#include "runtime/judged_poses.hpp"
-#include "runtime/one_node.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/runtime/pipeline/judged_poses.hpp"
+#include "marrow/runtime/pipeline/one_node.hpp"
+#include "marrow/runtime/run/run_folder.hpp"
 #include "values.hpp"
 
 namespace marrow::python {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "marrow/runtime/catalogue.hpp"
-#include "marrow/runtime/pipeline.hpp"
+#include "marrow/runtime/pipeline/pipeline.hpp"
+#include "marrow/runtime/plugins/catalogue.hpp"
 
 namespace marrow::python {
 

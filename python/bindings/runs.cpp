@@ -6,13 +6,13 @@
 #include <exception>
 
 #include "interruptible.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/number_text.hpp"
-#include "marrow/runtime/executor.hpp"
-#include "marrow/runtime/run_folder.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/runtime/pipeline/judged_poses.hpp"
+#include "marrow/runtime/run/executor.hpp"
+#include "marrow/runtime/run/place_of_results.hpp"
+#include "marrow/runtime/run/run_folder.hpp"
 #include "pipelines.hpp"
-#include "runtime/judged_poses.hpp"
-#include "runtime/place_of_results.hpp"
 #include "values.hpp"
 
 namespace marrow::python {
@@ -76,7 +76,7 @@ class Observer {
   void keep_in_log(const RunEvent& event) {
     if (!log_) return;
     if (event.kind == RunEvent::Kind::finished) {
-      const std::string seconds = formatted("%.3f s", event.seconds);
+      const std::string seconds = formatted("{:.3f} s", event.seconds);
       log_->keep(LogLevel::info, place_of(event), seconds);
     } else if (event.kind == RunEvent::Kind::failed) {
       log_->keep(event.level, "", event.text);

@@ -3,8 +3,8 @@
 
 #include <pybind11/stl.h>
 
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/names.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/names.hpp"
 
 namespace marrow::python {
 namespace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "arrays.hpp"
-#include "marrow/runtime/types.hpp"
+#include "marrow/runtime/node/types.hpp"
 
 namespace marrow::python {
 

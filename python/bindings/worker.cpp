@@ -14,15 +14,16 @@
 #include <thread>
 
 #include "mapped.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/runtime/library.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/framework_file.hpp"
+#include "marrow/base/process_state.hpp"
+#include "marrow/base/process_tree.hpp"
+#include "marrow/base/thread_state.hpp"
+#include "marrow/runtime/plugins/library.hpp"
+#include "marrow/runtime/plugins/linked_libraries.hpp"
+#include "marrow/runtime/plugins/trust.hpp"
+#include "marrow/runtime/process/packed_values.hpp"
 #include "pipelines.hpp"
-#include "runtime/linked_libraries.hpp"
-#include "runtime/packed_values.hpp"
-#include "runtime/process_state.hpp"
-#include "runtime/process_tree.hpp"
-#include "runtime/thread_state.hpp"
-#include "runtime/trust.hpp"
 #include "values.hpp"
 
 namespace marrow::python {

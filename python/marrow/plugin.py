@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The process that holds the nodes of one Python file. marrow starts it (node_process.py), and asks it for one thing at
-a time. It reads requests and writes reports and answers as marrow/runtime/worker.hpp says.
+a time. It reads requests and writes reports and answers as marrow/runtime/process/worker.hpp says.
 """
 import json
 import os

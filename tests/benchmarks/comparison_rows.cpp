@@ -10,10 +10,10 @@
 #include <fstream>
 #include <random>
 
+#include "marrow/base/diagnostics.hpp"
 #include "marrow/compare/cell.hpp"
 #include "marrow/compare/experiment.hpp"
-#include "marrow/runtime/catalogue.hpp"
-#include "marrow/runtime/diagnostics.hpp"
+#include "marrow/runtime/plugins/catalogue.hpp"
 
 namespace {
 

@@ -15,7 +15,7 @@
 
 #include "marrow/domain/c_arm.hpp"
 #include "marrow/plugin.hpp"
-#include "marrow/runtime/catalogue.hpp"
+#include "marrow/runtime/plugins/catalogue.hpp"
 
 namespace {
 

@@ -9,9 +9,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <iostream>
-#include <marrow/domain/error.hpp>
-#include <marrow/runtime/catalogue.hpp>
-#include <marrow/runtime/types.hpp>
+#include <marrow/base/error.hpp>
+#include <marrow/runtime/node/types.hpp>
+#include <marrow/runtime/plugins/catalogue.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "edges/radiograph.hpp"

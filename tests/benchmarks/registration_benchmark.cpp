@@ -11,9 +11,9 @@
 #include <cstdio>
 #include <iostream>
 #include <map>
-#include <marrow/domain/error.hpp>
-#include <marrow/runtime/executor.hpp>
-#include <marrow/runtime/types.hpp>
+#include <marrow/base/error.hpp>
+#include <marrow/runtime/node/types.hpp>
+#include <marrow/runtime/run/executor.hpp>
 #include <random>
 #include <set>
 

@@ -5,9 +5,9 @@
 
 #include <filesystem>
 
-#include "framework/runtime/shared_store.hpp"
-#include "marrow/runtime/store.hpp"
-#include "marrow/runtime/types.hpp"
+#include "marrow/runtime/node/types.hpp"
+#include "marrow/runtime/store/shared_store.hpp"
+#include "marrow/runtime/store/store.hpp"
 
 namespace {
 

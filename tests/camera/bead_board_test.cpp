@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "camera/boards.hpp"
-#include "marrow/toolbox/files/calibration_file.hpp"
+#include "marrow/read/calibration_file.hpp"
 #include "read/files.hpp"
 #include "shipped.hpp"
 #include "write/writing.hpp"

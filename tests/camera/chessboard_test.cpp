@@ -2,8 +2,8 @@
 // Calibration by a chessboard, against the simulated camera that photographed it; and photographs as views.
 #include <gtest/gtest.h>
 
+#include "marrow/simulate/photograph.hpp"
 #include "marrow/toolbox/calibration/chessboard.hpp"
-#include "marrow/toolbox/phantom/photograph.hpp"
 #include "shipped.hpp"
 
 namespace chessboard_test {

@@ -2,8 +2,8 @@
 // A calibration that knows its focal length, hardly knows it, or does not.
 #include <gtest/gtest.h>
 
-#include "marrow/domain/error.hpp"
-#include "marrow/toolbox/calibration/determined.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/camera/determined.hpp"
 
 namespace determined_test {
 

@@ -5,8 +5,8 @@
 
 #include <limits>
 
-#include "marrow/domain/yaml.hpp"
-#include "marrow/runtime/attributes.hpp"
+#include "marrow/base/yaml.hpp"
+#include "marrow/runtime/node/attributes.hpp"
 
 namespace {
 

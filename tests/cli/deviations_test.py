@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/deviations on errors that are drawn here: how it counts them, and the factors that it fits."""
+"""tools/studies/deviations on errors that are drawn here: how it counts them, and the factors that it fits."""
 import contextlib
 import importlib.machinery
 import importlib.util
@@ -14,7 +14,7 @@ ROOT = pathlib.Path(sys.argv[1])
 
 
 def tool():
-    loader = importlib.machinery.SourceFileLoader("deviations", str(ROOT / "tools/deviations"))
+    loader = importlib.machinery.SourceFileLoader("deviations", str(ROOT / "tools/studies/deviations"))
     module = importlib.util.module_from_spec(importlib.util.spec_from_loader("deviations", loader))
     loader.exec_module(module)
     return module

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/fit_verdict on comparisons that are made here, whose probabilities are known."""
+"""tools/studies/fit_verdict on comparisons that are made here, whose probabilities are known."""
 import json
 import math
 import pathlib
@@ -60,7 +60,7 @@ class FitVerdict(unittest.TestCase):
         cls.temporary.cleanup()
 
     def run_tool(self, *arguments):
-        return subprocess.run([str(ROOT / "tools/fit_verdict"), *map(str, arguments)], capture_output=True, text=True)
+        return subprocess.run([str(ROOT / "tools/studies/fit_verdict"), *map(str, arguments)], capture_output=True, text=True)
 
     def test_fits_what_the_poses_were_drawn_from(self):
         model_file = self.folder / "model.yaml"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A comparison on a Slurm cluster of one host, which tools/cluster_test starts: the same figures as on one machine,
+"""A comparison on a Slurm cluster of one host, which tools/checks/cluster_test starts: the same figures as on one machine,
 also after tasks and the controller were killed."""
 import os
 import pathlib

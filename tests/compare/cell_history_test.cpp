@@ -6,8 +6,8 @@
 #include <numbers>
 #include <set>
 
-#include "framework/compare/draw.hpp"
 #include "marrow/compare/cell.hpp"
+#include "marrow/compare/draw.hpp"
 
 namespace cell_history_test {
 

@@ -4,9 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "marrow/base/error.hpp"
+#include "marrow/base/hash.hpp"
 #include "marrow/compare/cell.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/runtime/hash.hpp"
 
 namespace cell_row_test {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every fault of an experiment file, with its text and its line.
 #include "experiment_files.hpp"
-#include "framework/runtime/file_names.hpp"
+#include "marrow/base/file_names.hpp"
 
 namespace experiment_faults_test {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The section 'sweep' of an experiment.
 #include "experiment_files.hpp"
-#include "framework/compare/sobol.hpp"
+#include "marrow/compare/sobol.hpp"
 
 #include <set>
 

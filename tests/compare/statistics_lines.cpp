@@ -2,10 +2,10 @@
 // Reads one computation per line from standard input and prints its numbers on one line, for scipy_test.py.
 #include <cstdio>
 #include <iostream>
+#include <marrow/base/error.hpp>
 #include <marrow/compare/case_rate.hpp>
 #include <marrow/compare/median_interval.hpp>
 #include <marrow/compare/paired.hpp>
-#include <marrow/domain/error.hpp>
 #include <sstream>
 
 using namespace marrow::compare;

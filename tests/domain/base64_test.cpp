@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <marrow/domain/base64.hpp>
+#include <marrow/base/base64.hpp>
 
 namespace base64_test {
 

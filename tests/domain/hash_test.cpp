@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <marrow/runtime/types.hpp>
+#include <marrow/runtime/node/types.hpp>
 #include <set>
 
 #include "domain/shapes.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <marrow/domain/error.hpp>
+#include <marrow/base/error.hpp>
 #include <string>
 
 namespace marrow::test {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Texts of numbers under any locale. What is expected is what printf gives in the "C" locale, and strtod there.
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 
 #include <gtest/gtest.h>
 
@@ -22,8 +22,8 @@ TEST(NumberText, IsThatOfPrintf) {
       std::snprintf(expected, sizeof expected, format, value);
       EXPECT_EQ(formatted(format, value), expected) << format;
     }
-  EXPECT_EQ(formatted("%s: %d of %zu", "a", 3, std::size_t(4)), "a: 3 of 4");
-  EXPECT_EQ(formatted("%s", std::string(5000, 'x').c_str()), std::string(5000, 'x'));
+  EXPECT_EQ(formatted("{}: {} of {}", "a", 3, std::size_t(4)), "a: 3 of 4");
+  EXPECT_EQ(formatted("{}", std::string(5000, 'x').c_str()), std::string(5000, 'x'));
 }
 
 TEST(NumberText, IsReadWhole) {
@@ -36,7 +36,7 @@ TEST(NumberText, IsReadWhole) {
 
 TEST(NumberText, DoesNotDependOnTheLocale) {
   MARROW_NEED_COMMA_LOCALE(german);
-  EXPECT_EQ(formatted("%.2f %g", 1.5, 0.25), "1.50 0.25");
+  EXPECT_EQ(formatted("{:.2f} {:g}", 1.5, 0.25), "1.50 0.25");
   EXPECT_EQ(parsed_number("1.5"), 1.5);
   EXPECT_FALSE(parsed_number("1,5"));
   char text[8];

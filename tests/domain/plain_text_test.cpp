@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Texts of other systems. The bytes of UTF-16 are those of Python's encode("utf-16-le") and its like.
-#include "marrow/domain/plain_text.hpp"
+#include "marrow/base/plain_text.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Texts from files on their way to a terminal.
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/printable.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The rules by which all YAML is read.
-#include "marrow/domain/yaml.hpp"
+#include "marrow/base/yaml.hpp"
 
 #include <gtest/gtest.h>
 

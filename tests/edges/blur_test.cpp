@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/toolbox/image/blur.hpp"
+#include "marrow/similarity/blur.hpp"
 
 #include <gtest/gtest.h>
 

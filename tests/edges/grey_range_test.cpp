@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "edges/drawn.hpp"
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
 #include "shipped.hpp"
 
@@ -102,7 +102,7 @@ TEST(GreyRange, EdgesAreTheSameWithABadPixel) {
     ASSERT_EQ(found.lines.size(), 1u) << node;
     EXPECT_EQ(found.lines[0],
               "view 'frontal': 1 of 40000 pixels is far beyond all others (65535, the others reach from 0 to " +
-                  marrow::formatted("%g", grey_range(clean.image.pixels).greatest) +
+                  marrow::formatted("{:g}", grey_range(clean.image.pixels).greatest) +
                   "), as defects of a detector and letters are; it counts as the nearest of the others");
     EXPECT_LT(farthest_px(right.edges, found.edges), 0.02) << node;
     EXPECT_LT(farthest_px(found.edges, right.edges), 0.02) << node;

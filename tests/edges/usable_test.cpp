@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/toolbox/image/usable.hpp"
+#include "marrow/edges/usable.hpp"
 
 #include <gtest/gtest.h>
 

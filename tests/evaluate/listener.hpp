@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <marrow/runtime/context.hpp>
+#include <marrow/runtime/node/context.hpp>
 #include <string>
 #include <string_view>
 #include <vector>

@@ -5,7 +5,7 @@
 
 #include "comma_locale.hpp"
 #include "exchange/values.hpp"
-#include "marrow/runtime/hash.hpp"
+#include "marrow/base/hash.hpp"
 #include "marrow/toolbox/exchange/written_files.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/track/track_state.hpp"

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "fracture/fragments.hpp"
-#include "marrow/toolbox/geometry/fracture_site.hpp"
+#include "marrow/fracture/fracture_site.hpp"
 
 namespace misalignment_test {
 

@@ -7,10 +7,10 @@
 
 #include "implant_node.hpp"
 #include "landmarks_node.hpp"
+#include "marrow/camera/points_file.hpp"
+#include "marrow/read/calibration_file.hpp"
 #include "marrow/toolbox/calibration/board.hpp"
-#include "marrow/toolbox/files/calibration_file.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
-#include "marrow/toolbox/files/points_file.hpp"
 #include "target.hpp"
 
 namespace {

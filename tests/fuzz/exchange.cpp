@@ -2,10 +2,10 @@
 // Formats of other programs: points, transforms, surfaces and cameras. HDF5 and VTK read .h5 and .vtp themselves, and
 // reserve what a damaged file claims to hold, which the limits of the nodes' own process stop. So those two are not
 // tried here.
+#include "marrow/read/projections.hpp"
 #include "marrow/toolbox/exchange/itk_transform.hpp"
 #include "marrow/toolbox/exchange/marked_values.hpp"
 #include "marrow/toolbox/exchange/plastimatch_camera.hpp"
-#include "marrow/toolbox/exchange/projections.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
 #include "target.hpp"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Manifests: as they are, and with the checksum that belongs to them, behind which all else is.
-#include "framework/runtime/manifest.hpp"
+#include "marrow/runtime/plugins/manifest.hpp"
 
-#include "marrow/runtime/hash.hpp"
+#include "marrow/base/hash.hpp"
 #include "target.hpp"
 
 namespace {

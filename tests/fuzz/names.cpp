@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Names that become names of files: what is accepted stays in its folder, and different names give different files.
-#include "framework/runtime/file_names.hpp"
+#include "marrow/base/file_names.hpp"
 
 #include <algorithm>
 #include <set>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include "marrow/runtime/catalogue.hpp"
+#include "marrow/runtime/plugins/catalogue.hpp"
 
 namespace marrow::fuzz {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pipelines, with what the command line adds to them behind the first zero byte: key=value, one a line.
-#include "marrow/runtime/pipeline.hpp"
+#include "marrow/runtime/pipeline/pipeline.hpp"
 #include "nodes.hpp"
 #include "target.hpp"
 

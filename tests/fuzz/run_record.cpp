@@ -2,10 +2,10 @@
 // What a run has left: run.json, the pipeline.yaml beside it, the row of a cell, and a picture.
 #include "difference/run_record.hpp"
 
+#include "marrow/base/hash.hpp"
+#include "marrow/base/json_text.hpp"
 #include "marrow/compare/cell.hpp"
-#include "marrow/runtime/hash.hpp"
 #include "run_files.hpp"
-#include "runtime/json_text.hpp"
 #include "target.hpp"
 
 namespace {

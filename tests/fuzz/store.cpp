@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Entries of the store: as they lie there, with a description whose hash is right, and the packed values by themselves.
-#include "marrow/runtime/store.hpp"
+#include "marrow/runtime/store/store.hpp"
 
 #include <cstring>
 
-#include "marrow/runtime/types.hpp"
+#include "marrow/runtime/node/types.hpp"
 #include "target.hpp"
 
 namespace {

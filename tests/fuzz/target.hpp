@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 

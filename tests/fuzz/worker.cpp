@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a worker that went wrong may send: lines of its protocol, and values in shared memory. (Compiled without access
 // control: a worker's lines are understood by a private function.)
-#include "marrow/runtime/worker.hpp"
+#include "marrow/runtime/process/worker.hpp"
 
 #include <unistd.h>
 
-#include "framework/runtime/json_text.hpp"
-#include "framework/runtime/packed_values.hpp"
-#include "marrow/runtime/types.hpp"
+#include "marrow/base/json_text.hpp"
+#include "marrow/runtime/node/types.hpp"
+#include "marrow/runtime/process/packed_values.hpp"
 #include "target.hpp"
 
 namespace {

@@ -3,9 +3,9 @@
 #include <gtest/gtest.h>
 
 #include "marrow/domain/random.hpp"
-#include "marrow/toolbox/robot/guide_state.hpp"
-#include "marrow/toolbox/robot/robot_state.hpp"
-#include "marrow/toolbox/robot/servo.hpp"
+#include "marrow/guide/servo.hpp"
+#include "marrow/toolbox/robotics/guide_state.hpp"
+#include "marrow/toolbox/robotics/robot_state.hpp"
 #include "shipped.hpp"
 
 namespace closed_loop_test {

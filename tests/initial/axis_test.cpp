@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/toolbox/shaft/axis.hpp"
+#include "marrow/initial/axis.hpp"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <marrow/domain/error.hpp>
+#include <marrow/base/error.hpp>
 #include <random>
 
 #include "edges/radiograph.hpp"

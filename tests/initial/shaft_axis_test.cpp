@@ -5,7 +5,7 @@
 
 #include "edges/radiograph.hpp"
 #include "initial/tube.hpp"
-#include "marrow/toolbox/shaft/model_borders.hpp"
+#include "marrow/initial/model_borders.hpp"
 #include "shipped.hpp"
 
 namespace shaft_axis_test {

@@ -8,7 +8,7 @@
 #include <array>
 #include <set>
 
-#include "marrow/toolbox/surface/signs.hpp"
+#include "marrow/mesh/signs.hpp"
 #include "mesh/shapes.hpp"
 
 namespace delaunay_refinement_test {

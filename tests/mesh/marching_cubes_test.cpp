@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "marrow/toolbox/surface/cells.hpp"
+#include "marrow/mesh/cells.hpp"
 #include "mesh/shapes.hpp"
 
 namespace marching_cubes_test {

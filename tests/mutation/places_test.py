@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What tools/mutate takes for a place to change, and that what tests/mutants.txt explains still stands in the
+"""What tools/checks/mutate takes for a place to change, and that what tests/mutants.txt explains still stands in the
 sources."""
 import pathlib
 import subprocess

@@ -5,7 +5,7 @@
 
 #include <cmath>
 #include <limits>
-#include <marrow/domain/error.hpp>
+#include <marrow/base/error.hpp>
 #include <marrow/domain/functions.hpp>
 #include <memory>
 #include <string>

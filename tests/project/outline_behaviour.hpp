@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <marrow/domain/error.hpp>
+#include <marrow/base/error.hpp>
 #include <marrow/domain/functions.hpp>
 #include <marrow/domain/volume.hpp>
 #include <memory>

@@ -6,8 +6,8 @@
 
 #include "marrow/toolbox/geometry/locking_plan.hpp"
 #include "marrow/toolbox/phantom/loft.hpp"
-#include "marrow/toolbox/robot/guide_state.hpp"
-#include "marrow/toolbox/robot/robot_state.hpp"
+#include "marrow/toolbox/robotics/guide_state.hpp"
+#include "marrow/toolbox/robotics/robot_state.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 #include "properties/mirrored_values.hpp"
 

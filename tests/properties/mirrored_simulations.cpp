@@ -3,7 +3,7 @@
 #include <marrow/domain/functions.hpp>
 #include <opencv2/core.hpp>
 
-#include "marrow/toolbox/phantom/posture.hpp"
+#include "marrow/simulate/posture.hpp"
 #include "properties/mirrored_values.hpp"
 
 namespace mirrored_patient {

@@ -2,7 +2,7 @@
 // A left and a right limb are mirror images. Each node of these kinds gives for the mirrored patient the mirrored
 // answer, and the same medial, varus or internal. A new node is tested, or is named here with the reason.
 #include <algorithm>
-#include <marrow/runtime/catalogue.hpp>
+#include <marrow/runtime/plugins/catalogue.hpp>
 #include <set>
 
 #include "properties/mirrored_values.hpp"

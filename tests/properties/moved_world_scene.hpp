@@ -2,7 +2,7 @@
 #pragma once
 // A bone in two X-ray views, for any node that takes ordinary values.
 #include <map>
-#include <marrow/runtime/catalogue.hpp>
+#include <marrow/runtime/plugins/catalogue.hpp>
 #include <string>
 #include <vector>
 

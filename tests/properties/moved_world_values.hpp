@@ -5,7 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <marrow/runtime/types.hpp>
+#include <marrow/runtime/node/types.hpp>
 #include <marrow/toolbox/track/sequence.hpp>
 #include <marrow/toolbox/track/track_state.hpp>
 #include <opencv2/core.hpp>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The distortion of an image is removed once, when its view is read.
-#include "marrow/toolbox/files/calibration_file.hpp"
+#include "marrow/read/calibration_file.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,10 +2,10 @@
 // Damaged texts, and texts that grow without end: cameras, boards, points, poses, seeds and whole cases.
 #include <gtest/gtest.h>
 
+#include "marrow/camera/points_file.hpp"
+#include "marrow/read/calibration_file.hpp"
 #include "marrow/toolbox/calibration/board.hpp"
-#include "marrow/toolbox/files/calibration_file.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
-#include "marrow/toolbox/files/points_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 #include "read/damaged.hpp"
 #include "read/reading.hpp"

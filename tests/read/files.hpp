@@ -8,7 +8,7 @@
 #include <fstream>
 #include <string>
 
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
 
 #include "domain/message_of.hpp"
 

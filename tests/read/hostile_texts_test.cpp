@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <ctime>
 
-#include "marrow/runtime/abi.hpp"
+#include "marrow/runtime/node/abi.hpp"
 #include "marrow/toolbox/files/mesh_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 #include "read/files.hpp"

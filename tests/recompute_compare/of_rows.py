@@ -90,7 +90,7 @@ def check_timed(checks, experiment, rows, seconds, places):
 
 
 def check_report_rows(checks, data, experiment, rows, seconds):
-    """The page's table, as tools/report/data.js describes it."""
+    """The page's table, as tools/report/page/data.js describes it."""
     table = data["cell_table"]
     fields, texts = table["fields"], table["texts"]
     checks.same("report cells", "rows", len(table["rows"]), len(rows))

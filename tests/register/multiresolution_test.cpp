@@ -5,9 +5,9 @@
 #include <atomic>
 #include <cmath>
 
-#include "framework/toolbox/search/predicted_covariance.hpp"
-#include "framework/toolbox/search/scan.hpp"
 #include "ideal_edges.hpp"
+#include "marrow/toolbox/search/predicted_covariance.hpp"
+#include "marrow/toolbox/search/scan.hpp"
 #include "shipped.hpp"
 
 namespace multiresolution_test {

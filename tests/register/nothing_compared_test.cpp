@@ -6,9 +6,9 @@
 
 #include <set>
 
+#include "marrow/similarity/invisible.hpp"
+#include "marrow/similarity/x_ray_view.hpp"
 #include "marrow/toolbox/analytic/body.hpp"
-#include "marrow/toolbox/analytic/invisible.hpp"
-#include "marrow/toolbox/analytic/x_ray_view.hpp"
 #include "shipped.hpp"
 
 namespace nothing_compared_test {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/toolbox/search/predicted_covariance.hpp"
+#include "marrow/toolbox/search/predicted_covariance.hpp"
 
 #include <gtest/gtest.h>
 

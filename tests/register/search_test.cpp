@@ -6,10 +6,10 @@
 #include <gtest/gtest.h>
 
 #include "bowl.hpp"
-#include "framework/toolbox/search/derivatives.hpp"
-#include "framework/toolbox/search/predicted_covariance.hpp"
-#include "framework/toolbox/search/scan.hpp"
 #include "marrow/toolbox/search/compared.hpp"
+#include "marrow/toolbox/search/derivatives.hpp"
+#include "marrow/toolbox/search/predicted_covariance.hpp"
+#include "marrow/toolbox/search/scan.hpp"
 
 namespace search_test {
 

@@ -4,8 +4,8 @@
 
 #include <marrow/domain/verdict.hpp>
 
-#include "framework/toolbox/search/predicted_covariance.hpp"
 #include "ideal_edges.hpp"
+#include "marrow/toolbox/search/predicted_covariance.hpp"
 #include "shipped.hpp"
 
 namespace undetermined_test {

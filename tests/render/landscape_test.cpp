@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "marrow/toolbox/draw/plot.hpp"
+#include "marrow/render/plot.hpp"
 #include "render/pictures.hpp"
 #include "shipped.hpp"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "domain/message_of.hpp"
-#include "marrow/toolbox/robot/hexapod.hpp"
+#include "marrow/toolbox/robotics/hexapod.hpp"
 #include "tests/simulate/nodes.hpp"
 
 namespace condition_test {

@@ -11,7 +11,7 @@
 #include "domain/message_of.hpp"
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/random.hpp"
-#include "marrow/toolbox/robot/hand_eye.hpp"
+#include "marrow/toolbox/robotics/hand_eye.hpp"
 
 namespace hand_eye_noise_test {
 

@@ -4,8 +4,8 @@
 
 #include "domain/message_of.hpp"
 #include "marrow/domain/random.hpp"
-#include "marrow/toolbox/robot/hand_eye.hpp"
-#include "marrow/toolbox/robot/servo.hpp"
+#include "marrow/guide/servo.hpp"
+#include "marrow/toolbox/robotics/hand_eye.hpp"
 
 namespace hand_eye_test {
 

@@ -4,7 +4,7 @@
 
 #include "domain/message_of.hpp"
 #include "marrow/domain/random.hpp"
-#include "marrow/toolbox/robot/hexapod.hpp"
+#include "marrow/toolbox/robotics/hexapod.hpp"
 
 namespace hexapod_test {
 

@@ -2,9 +2,9 @@
 // A simulated robot that holds the distal fragment of a fractured femur.
 #include <gtest/gtest.h>
 
-#include "marrow/toolbox/phantom/contact.hpp"
-#include "marrow/toolbox/robot/relative_pose.hpp"
-#include "marrow/toolbox/robot/robot_state.hpp"
+#include "marrow/guide/relative_pose.hpp"
+#include "marrow/robot/contact.hpp"
+#include "marrow/toolbox/robotics/robot_state.hpp"
 #include "tests/simulate/nodes.hpp"
 
 namespace robot_test {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "marrow/domain/random.hpp"
-#include "marrow/toolbox/robot/servo.hpp"
+#include "marrow/guide/servo.hpp"
 
 namespace servo_test {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Readers run apart: whatever a file makes them do is one node's error.
-#include "framework/runtime/apart.hpp"
+#include "marrow/runtime/run/apart.hpp"
 
 #include <signal.h>
 #include <unistd.h>
@@ -8,7 +8,7 @@
 #include <chrono>
 #include <thread>
 
-#include "marrow/runtime/worker.hpp"
+#include "marrow/runtime/process/worker.hpp"
 #include "runtime/fixture.hpp"
 
 namespace apart_test {

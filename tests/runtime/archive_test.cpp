@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bytes that no archive ever took: refused with a sentence, without undefined behaviour and without much memory.
-#include "marrow/runtime/archive.hpp"
+#include "marrow/base/archive.hpp"
 
 #include <sys/resource.h>
 
 #include <random>
 
-#include "marrow/runtime/types.hpp"
+#include "marrow/runtime/node/types.hpp"
 
 namespace archive_test {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The build id of an ELF file, in files made by hand.
-#include "framework/runtime/build_note.hpp"
+#include "marrow/runtime/plugins/build_note.hpp"
 
 #include <elf.h>
 

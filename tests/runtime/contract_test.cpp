@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Nodes against the contract of their kind.
-#include "framework/runtime/contract.hpp"
+#include "marrow/runtime/plugins/contract.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // How faults are shown, however many and however long.
-#include "marrow/runtime/diagnostics.hpp"
+#include "marrow/base/diagnostics.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <ctime>
 
-#include "marrow/runtime/abi.hpp"
+#include "marrow/runtime/node/abi.hpp"
 
 namespace diagnostics_test {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Digests of large files are kept between processes.
-#include "framework/runtime/digest_memory.hpp"
+#include "marrow/runtime/store/digest_memory.hpp"
 
 #include <chrono>
 #include <thread>

@@ -5,7 +5,7 @@
 #include <functional>
 #include <utility>
 
-#include "marrow/runtime/run_folder.hpp"
+#include "marrow/runtime/run/run_folder.hpp"
 #include "runtime/fixture.hpp"
 
 namespace executor_test {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The names of figures that a node declares: the declaration, the manifest, and a node that makes another figure.
 #include "fixture.hpp"
-#include "framework/runtime/output_faults.hpp"
+#include "marrow/runtime/run/output_faults.hpp"
 
 namespace figure_names_test {
 

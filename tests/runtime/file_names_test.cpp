@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Names that become names of files.
-#include "framework/runtime/file_names.hpp"
+#include "marrow/base/file_names.hpp"
 
 #include <gtest/gtest.h>
 

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "marrow/plugin.hpp"
-#include "marrow/runtime/executor.hpp"
-#include "marrow/runtime/pipeline.hpp"
+#include "marrow/runtime/pipeline/pipeline.hpp"
+#include "marrow/runtime/run/executor.hpp"
 
 namespace runtime_fixture {
 

@@ -12,9 +12,9 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
-#include "framework/runtime/process_state.hpp"
-#include "framework/runtime/thread_state.hpp"
-#include "marrow/runtime/store.hpp"
+#include "marrow/base/process_state.hpp"
+#include "marrow/base/thread_state.hpp"
+#include "marrow/runtime/store/store.hpp"
 #include "runtime/fixture.hpp"
 
 namespace hostile_nodes_test {

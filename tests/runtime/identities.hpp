@@ -3,7 +3,7 @@
 // Identities of other processes, as they stand in names of temporary files and in claims.
 #include <string>
 
-#include "framework/runtime/process_identity.hpp"
+#include "marrow/base/process_identity.hpp"
 
 namespace runtime_fixture {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // JSON that nobody vouches for.
-#include "framework/runtime/json_text.hpp"
+#include "marrow/base/json_text.hpp"
 
 #include <gtest/gtest.h>
 
 #include <functional>
 
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
 
 namespace json_text_test {
 

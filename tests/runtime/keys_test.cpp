@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Each thing that may change a result changes its key, on its own; nothing else does.
-#include "framework/runtime/keys.hpp"
+#include "marrow/runtime/run/keys.hpp"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@
 #include <set>
 #include <thread>
 
-#include "framework/runtime/mapping.hpp"
+#include "marrow/runtime/node/mapping.hpp"
 
 namespace keys_test {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/runtime/known_keys.hpp"
+#include "marrow/runtime/store/known_keys.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <functional>
 #include <new>
 
-#include "framework/runtime/manifest.hpp"
+#include "marrow/runtime/plugins/manifest.hpp"
 #include "runtime/fixture.hpp"
 
 namespace {

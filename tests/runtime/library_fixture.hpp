@@ -2,7 +2,9 @@
 #pragma once
 #include <nlohmann/json.hpp>
 
-#include "marrow/runtime/library.hpp"
+#include "marrow/base/framework_file.hpp"
+#include "marrow/base/regular_file.hpp"
+#include "marrow/runtime/plugins/library.hpp"
 #include "runtime/fixture.hpp"
 
 namespace library_fixture {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Manifests whose checksum is right, because anyone can compute it, but whose content no library can have registered.
-#include "framework/runtime/manifest.hpp"
+#include "marrow/runtime/plugins/manifest.hpp"
 
 #include <functional>
 #include <random>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A node that may fail costs only itself and what cannot do without it.
-#include "framework/runtime/node_calls.hpp"
+#include "marrow/runtime/run/node_calls.hpp"
 #include "runtime/pipeline_fixture.hpp"
 #include "runtime/store_fixture.hpp"
 

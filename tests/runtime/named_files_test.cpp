@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/runtime/named_files.hpp"
+#include "marrow/runtime/pipeline/named_files.hpp"
 
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "framework/runtime/keys.hpp"
+#include "marrow/runtime/run/keys.hpp"
 #include "runtime/fixture.hpp"
 
 namespace named_files_test {

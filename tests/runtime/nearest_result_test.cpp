@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which kept result a plan compares with. The differences are counted by hand.
-#include "framework/runtime/nearest_result.hpp"
+#include "marrow/runtime/run/nearest_result.hpp"
 
 #include <gtest/gtest.h>
 
-#include "framework/runtime/keys.hpp"
+#include "marrow/runtime/run/keys.hpp"
 
 namespace nearest_result_test {
 

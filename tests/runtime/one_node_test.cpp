@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The call of one node with values that a program has.
-#include "runtime/one_node.hpp"
+#include "marrow/runtime/pipeline/one_node.hpp"
 
 #include "runtime/fixture.hpp"
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Values that one process hands to another, read back from files that are not as they should be.
-#include "framework/runtime/packed_values.hpp"
+#include "marrow/runtime/process/packed_values.hpp"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "marrow/runtime/types.hpp"
+#include "marrow/runtime/node/types.hpp"
 #include "runtime/fixture.hpp"
 
 namespace packed_values_test {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a good pipeline file is resolved to, and what overrides make of it.
-#include "framework/runtime/file_names.hpp"
+#include "marrow/base/file_names.hpp"
 #include "runtime/pipeline_fixture.hpp"
 
 namespace pipeline_test {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Paths without '.' and '..' that name what the system finds under the path as it was written.
-#include "framework/runtime/plain_path.hpp"
+#include "marrow/base/plain_path.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/runtime/process_identity.hpp"
+#include "marrow/base/process_identity.hpp"
 
 #include <sys/wait.h>
 #include <unistd.h>

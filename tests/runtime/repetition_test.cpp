@@ -2,7 +2,7 @@
 // Nodes with a body: what the passes are given, what they carry, how they end.
 #include <algorithm>
 
-#include "marrow/runtime/run_folder.hpp"
+#include "marrow/runtime/run/run_folder.hpp"
 #include "runtime/store_fixture.hpp"
 
 namespace repetition_test {

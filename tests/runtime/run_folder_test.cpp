@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The folder of a run: one run each, one file each output, nothing half.
-#include "marrow/runtime/run_folder.hpp"
+#include "marrow/runtime/run/run_folder.hpp"
 
 #include <sys/wait.h>
 #include <unistd.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Claims between hosts: who gets them, and when they are taken over.
-#include "framework/runtime/shared_claim.hpp"
+#include "marrow/runtime/store/shared_claim.hpp"
 
 #include <sys/wait.h>
 #include <unistd.h>

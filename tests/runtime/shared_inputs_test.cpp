@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/runtime/shared_inputs.hpp"
+#include "marrow/runtime/process/shared_inputs.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "marrow/runtime/types.hpp"
+#include "marrow/runtime/node/types.hpp"
 
 namespace {
 

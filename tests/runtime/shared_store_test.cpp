@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The store that hosts share: what is kept there, who may read it, and what its faults do.
-#include "framework/runtime/shared_store.hpp"
+#include "marrow/runtime/store/shared_store.hpp"
 
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -10,8 +10,8 @@
 #include <chrono>
 #include <thread>
 
-#include "framework/runtime/store_entry.hpp"
-#include "framework/runtime/store_folder.hpp"
+#include "marrow/runtime/store/store_entry.hpp"
+#include "marrow/runtime/store/store_folder.hpp"
 #include "runtime/environment.hpp"
 #include "runtime/identities.hpp"
 #include "runtime/store_fixture.hpp"

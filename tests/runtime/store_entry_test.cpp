@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Entries that are not what their names say, or that no run ever wrote.
-#include "framework/runtime/store_entry.hpp"
+#include "marrow/runtime/store/store_entry.hpp"
 
 #include <sys/stat.h>
 #include <unistd.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What the tests of the store share: values to be kept, and runs with a store of their own.
-#include "marrow/runtime/store.hpp"
+#include "marrow/runtime/store/store.hpp"
 #include "runtime/fixture.hpp"
 
 namespace store_fixture {

@@ -12,8 +12,8 @@
 #include <set>
 #include <thread>
 
-#include "framework/runtime/folder_use.hpp"
-#include "marrow/runtime/store.hpp"
+#include "marrow/base/folder_use.hpp"
+#include "marrow/runtime/store/store.hpp"
 #include "runtime/environment.hpp"
 #include "runtime/fixture.hpp"
 #include "runtime/identities.hpp"

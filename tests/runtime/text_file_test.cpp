@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whole files: what is not read, and that no half one stands under its name.
-#include "framework/runtime/text_file.hpp"
+#include "marrow/base/text_file.hpp"
 
 #include <sched.h>
 #include <sys/stat.h>
@@ -9,7 +9,7 @@
 
 #include <thread>
 
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
 #include "runtime/fixture.hpp"
 #include "write/full_disk.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/runtime/unclosed.hpp"
+#include "marrow/base/unclosed.hpp"
 
 #include <gtest/gtest.h>
 

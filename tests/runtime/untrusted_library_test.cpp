@@ -12,7 +12,8 @@
 #include <chrono>
 #include <thread>
 
-#include "framework/runtime/trust.hpp"
+#include "marrow/base/regular_file.hpp"
+#include "marrow/runtime/plugins/trust.hpp"
 #include "runtime/library_fixture.hpp"
 
 namespace untrusted_library_test {

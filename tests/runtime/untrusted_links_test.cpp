@@ -3,8 +3,9 @@
 #include <pwd.h>
 #include <unistd.h>
 
-#include "framework/runtime/libraries_to_load.hpp"
-#include "framework/runtime/trust.hpp"
+#include "marrow/base/framework_file.hpp"
+#include "marrow/runtime/plugins/libraries_to_load.hpp"
+#include "marrow/runtime/plugins/trust.hpp"
 #include "runtime/environment.hpp"
 #include "runtime/library_fixture.hpp"
 

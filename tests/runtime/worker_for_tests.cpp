@@ -7,8 +7,8 @@
 #include <cstdlib>
 #include <thread>
 
-#include "marrow/domain/error.hpp"
-#include "marrow/runtime/worker.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/runtime/process/worker.hpp"
 
 namespace {
 using nlohmann::json;

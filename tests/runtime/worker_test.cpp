@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/runtime/worker.hpp"
+#include "marrow/runtime/process/worker.hpp"
 
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -12,7 +12,7 @@
 #include <fstream>
 #include <thread>
 
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
 
 namespace worker_test {
 

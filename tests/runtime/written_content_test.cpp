@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // By what a file or folder that a run wrote is known again.
-#include "framework/runtime/written_content.hpp"
+#include "marrow/runtime/pipeline/written_content.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/toolbox/shaft/outline.hpp"
+#include "marrow/shaft/outline.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/toolbox/shaft/widths.hpp"
+#include "marrow/shaft/widths.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The parts of which the measures are made, on patches of a few pixels, against values computed by hand.
-#include "marrow/toolbox/match/intensity.hpp"
+#include "marrow/similarity/intensity.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "marrow/toolbox/match/patches.hpp"
+#include "marrow/similarity/patches.hpp"
 
 namespace intensity_test {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/toolbox/match/smoothed_at_bone.hpp"
+#include "marrow/similarity/smoothed_at_bone.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "marrow/toolbox/match/block_expansions.hpp"
+#include "marrow/similarity/block_expansions.hpp"
 #include "project/shapes.hpp"
 
 namespace views_cost_test {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "marrow/toolbox/phantom/posture.hpp"
+#include "marrow/simulate/posture.hpp"
 #include "nodes.hpp"
 
 namespace bone_motion_test {

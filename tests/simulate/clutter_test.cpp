@@ -5,12 +5,12 @@
 
 #include <marrow/domain/random.hpp>
 
-#include "marrow/toolbox/phantom/knee.hpp"
+#include "marrow/simulate/knee.hpp"
+#include "marrow/simulate/solid.hpp"
+#include "marrow/simulate/surgery.hpp"
+#include "marrow/simulate/thigh.hpp"
 #include "marrow/toolbox/phantom/loft.hpp"
 #include "marrow/toolbox/phantom/materials.hpp"
-#include "marrow/toolbox/phantom/solid.hpp"
-#include "marrow/toolbox/phantom/surgery.hpp"
-#include "marrow/toolbox/phantom/thigh.hpp"
 #include "nodes.hpp"
 #include "shapes.hpp"
 

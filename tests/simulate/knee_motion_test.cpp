@@ -2,8 +2,8 @@
 // A knee that bends, and the bones in it.
 #include <gtest/gtest.h>
 
-#include "marrow/toolbox/phantom/knee.hpp"
-#include "marrow/toolbox/phantom/posture.hpp"
+#include "marrow/simulate/knee.hpp"
+#include "marrow/simulate/posture.hpp"
 #include "nodes.hpp"
 
 namespace knee_motion_test {

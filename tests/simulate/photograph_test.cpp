@@ -2,7 +2,7 @@
 // Photographs of bodies whose colours and borders can be computed by hand.
 #include <gtest/gtest.h>
 
-#include "marrow/toolbox/phantom/photograph.hpp"
+#include "marrow/simulate/photograph.hpp"
 #include "nodes.hpp"
 
 namespace photograph_test {

@@ -4,9 +4,9 @@
 
 #include <Eigen/Geometry>
 
+#include "marrow/base/error.hpp"
 #include "marrow/domain/camera.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/toolbox/phantom/solid.hpp"
+#include "marrow/simulate/solid.hpp"
 #include "shapes.hpp"
 
 namespace rays_test {

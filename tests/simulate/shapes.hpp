@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "domain/message_of.hpp"
+#include "marrow/simulate/polygonise.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
-#include "marrow/toolbox/phantom/polygonise.hpp"
 
 namespace marrow::phantom::test {
 

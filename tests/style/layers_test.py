@@ -93,7 +93,7 @@ class Layers(unittest.TestCase):
             fault(path("python/bindings/a.cpp"), path("framework/include/marrow/toolbox/image/b.hpp")),
         )
         self.assertIsNone(fault(path("framework/toolbox/files/a.cpp"), path("framework/toolbox/files/b.hpp")))
-        self.assertIsNone(fault(path("plugins/camera/a.cpp"), path("framework/include/marrow/plugin.hpp")))
+        self.assertIsNone(fault(path("plugins/camera/a.cpp"), path("framework/marrow/plugin.hpp")))
 
 
 if __name__ == "__main__":

@@ -258,7 +258,7 @@ TEST(VerdictEvidence, SaysWhatIsWrongWithAModel) {
                 .find("weight: expected a number from 0 to 1e+06, got -2"),
             std::string::npos);
   EXPECT_NE(refusal(model_of(0, "  - {figure: luck, scale: 1, weight: 1, absent: 0}\n"))
-                .find("there is no figure 'luck'; fit the model again with tools/fit_verdict"),
+                .find("there is no figure 'luck'; fit the model again with tools/studies/fit_verdict"),
             std::string::npos);
   EXPECT_NE(
       refusal("marrow-failure-model: 2\nrecord: x\nbias: 0\ndoubtful_above: 0.6\nwrong_above: 0.5\nterms:\n" + good)

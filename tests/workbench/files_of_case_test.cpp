@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Saving a case while others do the same.
-#include "tools/marrow/workbench/files_of_case.cpp"
+#include "tools/workbench/files_of_case.cpp"
 
 #include <gtest/gtest.h>
 

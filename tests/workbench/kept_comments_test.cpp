@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A case that is saved again: comments stay with what did not change, and what is lost is told.
-#include "tools/marrow/workbench/kept_comments.cpp"
+#include "tools/workbench/kept_comments.cpp"
 
 #include <gtest/gtest.h>
 
-#include "tools/marrow/workbench/yaml_text.cpp"
+#include "tools/workbench/yaml_text.cpp"
 
 namespace {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The editor of pipeline files: each change is the one that is wanted, and all else stays as it is written.
-#include "tools/marrow/workbench/pipeline_edit.cpp"
+#include "tools/workbench/pipeline_edit.cpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "runtime/fixture.hpp"
-#include "tools/marrow/workbench/yaml_text.cpp"
+#include "tools/workbench/yaml_text.cpp"
 
 namespace {
 

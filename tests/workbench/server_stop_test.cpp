@@ -4,8 +4,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "tools/marrow/workbench/access.cpp"
-#include "tools/marrow/workbench/server.cpp"
+#include "tools/workbench/access.cpp"
+#include "tools/workbench/server.cpp"
 
 namespace {
 

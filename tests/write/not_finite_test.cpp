@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "marrow/domain/scene.hpp"
-#include "marrow/toolbox/files/picture_out.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
+#include "marrow/write/picture_out.hpp"
 #include "shipped.hpp"
 #include "write/full_disk.hpp"
 #include "write/writing.hpp"

@@ -3,8 +3,8 @@
 
 #include <opencv2/core.hpp>
 
-#include "marrow/toolbox/files/picture_out.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
+#include "marrow/write/picture_out.hpp"
 #include "write/full_disk.hpp"
 #include "write/writing.hpp"
 

@@ -2,8 +2,8 @@
 #pragma once
 // Writes values by the shipped writers of their types, as a run does with the outputs of its pipeline.
 #include <filesystem>
-#include <marrow/runtime/catalogue.hpp>
-#include <marrow/runtime/types.hpp>
+#include <marrow/runtime/node/types.hpp>
+#include <marrow/runtime/plugins/catalogue.hpp>
 
 namespace writing {
 

@@ -6,7 +6,7 @@
 
 #include <limits>
 
-#include "marrow/domain/yaml.hpp"
+#include "marrow/base/yaml.hpp"
 
 namespace yaml_text_test {
 

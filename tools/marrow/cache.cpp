@@ -5,8 +5,8 @@
 
 #include "command_options.hpp"
 #include "commands.hpp"
-#include "marrow/domain/printable.hpp"
-#include "runtime/shared_store.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/runtime/store/shared_store.hpp"
 
 namespace marrow::cli {
 namespace {

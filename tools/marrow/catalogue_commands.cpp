@@ -8,12 +8,12 @@
 #include "catalogue_text.hpp"
 #include "command_options.hpp"
 #include "commands.hpp"
+#include "marrow/base/diagnostics.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/printable.hpp"
 #include "marrow/conformance.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
-#include "marrow/runtime/diagnostics.hpp"
-#include "marrow/runtime/library.hpp"
-#include "runtime/pipeline_names.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
+#include "marrow/runtime/plugins/library.hpp"
 
 namespace marrow::cli {
 namespace {

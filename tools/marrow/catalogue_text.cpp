@@ -8,7 +8,7 @@
 #include <optional>
 #include <sstream>
 
-#include "runtime/contract.hpp"
+#include "marrow/runtime/plugins/contract.hpp"
 
 namespace marrow::cli {
 namespace {

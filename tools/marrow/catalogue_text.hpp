@@ -4,8 +4,8 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "marrow/runtime/kind.hpp"
-#include "marrow/runtime/node.hpp"
+#include "marrow/runtime/node/kind.hpp"
+#include "marrow/runtime/node/node.hpp"
 
 namespace marrow::cli {
 

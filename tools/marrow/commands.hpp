@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "marrow/runtime/executor.hpp"
-#include "marrow/runtime/pipeline.hpp"
-#include "marrow/runtime/run_folder.hpp"
-#include "marrow/runtime/verdicts.hpp"
+#include "marrow/runtime/pipeline/pipeline.hpp"
+#include "marrow/runtime/run/executor.hpp"
+#include "marrow/runtime/run/run_folder.hpp"
+#include "marrow/runtime/run/verdicts.hpp"
 
 namespace CLI {
 class App;

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "marrow/runtime/pipeline.hpp"
+#include "marrow/runtime/pipeline/pipeline.hpp"
 
 namespace marrow::cli {
 

@@ -4,7 +4,7 @@
 #include <unistd.h>
 #include <cstdlib>
 
-#include "runtime/plugin_code.hpp"
+#include "marrow/runtime/process/plugin_code.hpp"
 
 extern "C" {
 

@@ -6,10 +6,10 @@
 #include <string>
 
 #include "compare/comparison_folder.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/text_file.hpp"
 #include "report/report.hpp"
-#include "runtime/text_file.hpp"
 
 namespace marrow::cli {
 namespace {

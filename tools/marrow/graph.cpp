@@ -4,7 +4,7 @@
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "drawn_graph.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/printable.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -8,8 +8,8 @@
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "given_path.hpp"
-#include "marrow/domain/printable.hpp"
-#include "marrow/runtime/fits.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/fits.hpp"
 
 namespace marrow::cli {
 namespace {

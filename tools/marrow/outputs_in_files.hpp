@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include "marrow/runtime/catalogue.hpp"
-#include "marrow/runtime/pipeline.hpp"
+#include "marrow/runtime/pipeline/pipeline.hpp"
+#include "marrow/runtime/plugins/catalogue.hpp"
 
 namespace marrow::cli {
 

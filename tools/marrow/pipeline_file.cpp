@@ -7,9 +7,9 @@
 #include "commands.hpp"
 #include "drawn_graph.hpp"
 #include "given_path.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
-#include "marrow/runtime/run_folder.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/runtime/run/run_folder.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -12,7 +12,7 @@
 #include <exception>
 #include <new>
 
-#include "runtime/plugin_code.hpp"
+#include "marrow/runtime/process/plugin_code.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -6,8 +6,8 @@
 #include <cstdio>
 
 #include "commands.hpp"
-#include "marrow/domain/printable.hpp"
-#include "marrow/runtime/types.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/runtime/node/types.hpp"
 
 namespace marrow::cli {
 namespace {

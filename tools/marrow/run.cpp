@@ -10,17 +10,17 @@
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "fruitless_run.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/number_text.hpp"
-#include "marrow/domain/printable.hpp"
-#include "marrow/runtime/run_folder.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/judged_poses.hpp"
+#include "marrow/runtime/run/place_of_results.hpp"
+#include "marrow/runtime/run/run_folder.hpp"
+#include "marrow/runtime/run/verdict_json.hpp"
+#include "marrow/runtime/store/shared_store.hpp"
 #include "outputs_in_files.hpp"
 #include "process.hpp"
 #include "run_event.hpp"
-#include "runtime/judged_poses.hpp"
-#include "runtime/place_of_results.hpp"
-#include "runtime/shared_store.hpp"
-#include "runtime/verdict_json.hpp"
 #include "stop_notice.hpp"
 
 namespace marrow::cli {
@@ -82,7 +82,7 @@ class RunProgress {
     return event.node.find('/') != std::string::npos && event.seconds < kShort_s;
   }
 
-  static std::string seconds_text(double seconds) { return formatted("%.3f s", seconds); }
+  static std::string seconds_text(double seconds) { return formatted("{:.3f} s", seconds); }
 
   void line(LogLevel level, const std::string& where, const std::string& text) {
     if (log_.shows(level)) clear();
@@ -114,8 +114,8 @@ class RunProgress {
 
 std::string status_text(const NodeRecord& record) {
   if (record.status != NodeRecord::Status::done || !record.cached) return status_name(record.status);
-  return record.calls ? formatted("done, %d cached", record.cached)
-                      : formatted("cached (took %.3f s)", record.cached_seconds);
+  return record.calls ? formatted("done, {} cached", record.cached)
+                      : formatted("cached (took {:.3f} s)", record.cached_seconds);
 }
 
 /// One line for each node, then those of its body. `path`: "", or the node and a slash.

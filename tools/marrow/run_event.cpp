@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_event.hpp"
 
-#include "marrow/runtime/run_log.hpp"
+#include "marrow/runtime/run/run_log.hpp"
 
 namespace marrow::cli {
 

@@ -2,7 +2,7 @@
 #pragma once
 #include <nlohmann/json.hpp>
 
-#include "marrow/runtime/executor.hpp"
+#include "marrow/runtime/run/executor.hpp"
 
 namespace marrow::cli {
 

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
-#include "marrow/domain/error.hpp"
-#include "runtime/json_text.hpp"
-#include "runtime/text_file.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/json_text.hpp"
+#include "marrow/base/text_file.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -6,7 +6,7 @@
 #include "catalogue_text.hpp"
 #include "command_options.hpp"
 #include "commands.hpp"
-#include "runtime/text_file.hpp"
+#include "marrow/base/text_file.hpp"
 
 namespace marrow::cli {
 namespace {

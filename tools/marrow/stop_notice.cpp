@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "stop_notice.hpp"
 
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/printable.hpp"
 #include "process.hpp"
 
 namespace marrow::cli {

@@ -4,7 +4,7 @@
 #include <set>
 #include <string>
 
-#include "marrow/runtime/executor.hpp"
+#include "marrow/runtime/run/executor.hpp"
 
 namespace marrow::cli {
 

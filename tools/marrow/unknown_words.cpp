@@ -4,9 +4,9 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/names.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/names.hpp"
+#include "marrow/base/printable.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "marrow/toolbox/shaft/pairs.hpp"
+#include "marrow/shaft/pairs.hpp"
 
 namespace {
 

@@ -11,7 +11,7 @@
 #include <thread>
 
 #include <marrow/plugin.hpp>
-#include <marrow/runtime/reading.hpp>
+#include <marrow/runtime/node/reading.hpp>
 
 namespace {
 using marrow::Metrics;

@@ -12,11 +12,11 @@
 #include "commands.hpp"
 #include "compare/cell_jobs.hpp"
 #include "compare/progress.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/remove_tree.hpp"
+#include "marrow/runtime/run/keys.hpp"
 #include "process.hpp"
-#include "runtime/keys.hpp"
-#include "runtime/remove_tree.hpp"
 
 namespace marrow::cli {
 namespace {

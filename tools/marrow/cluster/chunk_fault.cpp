@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cluster/chunk_fault.hpp"
 
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
-#include "runtime/text_file.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/text_file.hpp"
 
 namespace marrow::cli {
 namespace {

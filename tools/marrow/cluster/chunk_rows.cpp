@@ -12,8 +12,8 @@
 #include <string_view>
 #include <utility>
 
-#include "marrow/domain/error.hpp"
-#include "runtime/process_identity.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/process_identity.hpp"
 
 namespace marrow::cli {
 namespace {

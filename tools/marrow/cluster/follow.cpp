@@ -12,8 +12,8 @@
 #include "cluster/chunk_rows.hpp"
 #include "cluster/slurm.hpp"
 #include "compare/progress.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/printable.hpp"
 #include "process.hpp"
 
 namespace marrow::cli {

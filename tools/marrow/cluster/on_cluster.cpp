@@ -11,8 +11,8 @@
 #include "command_options.hpp"
 #include "compare/comparison_folder.hpp"
 #include "compare/progress.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/printable.hpp"
 
 namespace marrow::cli {
 namespace {

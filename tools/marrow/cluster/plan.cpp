@@ -5,11 +5,11 @@
 
 #include "cluster/chunk_rows.hpp"
 #include "compare/cell_jobs.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/runtime/worker.hpp"
-#include "runtime/json_text.hpp"
-#include "runtime/keys.hpp"
-#include "runtime/text_file.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/json_text.hpp"
+#include "marrow/base/text_file.hpp"
+#include "marrow/runtime/process/worker.hpp"
+#include "marrow/runtime/run/keys.hpp"
 
 namespace marrow::cli {
 namespace {

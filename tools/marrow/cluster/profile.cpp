@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cluster/profile.hpp"
 
-#include "runtime/strict_yaml.hpp"
+#include "marrow/base/strict_yaml.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "marrow/runtime/diagnostics.hpp"
+#include "marrow/base/diagnostics.hpp"
 
 namespace marrow::cli {
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cctype>
 
+#include "marrow/base/text_file.hpp"
 #include "process.hpp"
 #include "report/report.hpp"
-#include "runtime/text_file.hpp"
 
 extern char** environ;
 

@@ -11,12 +11,12 @@
 #include "cluster/chunk_fault.hpp"
 #include "cluster/chunk_rows.hpp"
 #include "cluster/scripts.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/json_text.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/text_file.hpp"
 #include "process.hpp"
 #include "report/report.hpp"
-#include "runtime/json_text.hpp"
-#include "runtime/text_file.hpp"
 #include "watch/child.hpp"
 
 namespace marrow::cli {

@@ -3,9 +3,8 @@
 #include "compare/comparison.hpp"
 #include "compare/figure_text.hpp"
 #include "compare/text_table.hpp"
-#include "marrow/domain/number_text.hpp"
-#include "marrow/domain/printable.hpp"
-#include "runtime/percent_text.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/base/printable.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -41,7 +40,7 @@ std::string overview(const Experiment& experiment, const Answer& answer) {
                std::to_string(summary.failed), std::to_string(summary.incomplete),
                summary.success ? success_text(*summary.success) : kNone,
                summary.seconds.count ? scale.text(summary.seconds.summary.median) : kNone,
-               summary.evaluations.count ? formatted("%.10g", summary.evaluations.summary.median) : kNone});
+               summary.evaluations.count ? formatted("{:.10g}", summary.evaluations.summary.median) : kNone});
   }
   std::string text = table.text();
   if (!experiment.defines_success())
@@ -107,18 +106,19 @@ std::string capture_text(const Experiment& experiment, const Answer& answer) {
   };
   add("start", [&](std::size_t v) { return experiment.variants[v].name; });
   for (std::size_t b = 0; b < longest.size(); ++b)
-    add(formatted("%g to %g", longest[b].from, longest[b].to), [&](std::size_t v) {
+    add(formatted("{:g} to {:g}", longest[b].from, longest[b].to), [&](std::size_t v) {
       const auto& bins = answer.variants[v].capture->bins;
       return b < bins.size() ? rate_text(bins[b].successes, bins[b].runs, bins[b].success, 0) : kNone;
     });
   add("95 % or more to", [&](std::size_t v) {
-    return formatted(answer.variants[v].capture->is_open ? "at least %.4g" : "%.4g", answer.variants[v].capture->range);
+    return (answer.variants[v].capture->is_open ? "at least " : "") +
+           short_number(answer.variants[v].capture->range, 4);
   });
   std::size_t unknown = 0;
   for (const VariantSummary& summary : answer.variants) unknown += summary.unknown_starts;
   std::string text = "\nCapture range: success over " +
                      printable(with_unit(experiment.initial_error, answer.initial_error_unit)) + ", in bins of " +
-                     formatted("%g", longest[0].to - longest[0].from) +
+                     formatted("{:g}", longest[0].to - longest[0].from) +
                      (answer.initial_error_unit.empty() ? "" : " " + printable(answer.initial_error_unit)) +
                      ", with 95 % intervals\n" + table.text();
   if (unknown)

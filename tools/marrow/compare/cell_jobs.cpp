@@ -4,10 +4,10 @@
 #include <cstdio>
 #include <thread>
 
-#include "domain/exact_number.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
-#include "marrow/runtime/worker.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/runtime/process/worker.hpp"
 #include "process.hpp"
 
 namespace marrow::cli {

@@ -9,14 +9,14 @@
 #include "compare/comparison_folder.hpp"
 #include "compare/item_check.hpp"
 #include "given_path.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/no_process.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/text_file.hpp"
 #include "marrow/compare/experiment_notes.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/runtime/run/place_of_results.hpp"
+#include "marrow/runtime/store/shared_store.hpp"
 #include "process.hpp"
-#include "runtime/no_process.hpp"
-#include "runtime/place_of_results.hpp"
-#include "runtime/shared_store.hpp"
-#include "runtime/text_file.hpp"
 
 namespace marrow::cli {
 namespace {

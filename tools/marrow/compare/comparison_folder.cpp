@@ -10,10 +10,10 @@
 #include <cstring>
 #include <optional>
 
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
-#include "marrow/runtime/hash.hpp"
-#include "runtime/text_file.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/hash.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/text_file.hpp"
 
 namespace marrow::cli {
 namespace {

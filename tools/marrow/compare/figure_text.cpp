@@ -5,8 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "marrow/domain/number_text.hpp"
-#include "runtime/percent_text.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -34,15 +33,15 @@ NumberScale::NumberScale(const std::vector<double>& values) {
 }
 
 std::string NumberScale::text(double value) const {
-  if (value == 0) return formatted("%.*f", has_exponents_ ? 0 : decimals_, 0.0);
+  if (value == 0) return fixed_number(0, has_exponents_ ? 0 : decimals_);
   const bool is_too_small = std::abs(value) < 10 * std::pow(10.0, -decimals_);
-  return has_exponents_ || is_too_small ? formatted("%.3e", value) : formatted("%.*f", decimals_, value);
+  return has_exponents_ || is_too_small ? formatted("{:.3e}", value) : formatted("{:.{}f}", value, decimals_);
 }
 
 std::string rate_text(std::size_t count, std::size_t of, const compare::Interval& interval, int decimals) {
   if (!of) return "-";
-  return formatted("%zu/%zu (%s to %s %%)", count, of, percent_text(interval.lower, decimals).c_str(),
-                   percent_text(interval.upper, decimals).c_str());
+  return formatted("{}/{} ({} to {} %)", count, of, percent_text(interval.lower, decimals),
+                   percent_text(interval.upper, decimals));
 }
 
 }  // namespace marrow::cli

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "compare/figure_units.hpp"
 
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
 
 namespace marrow::cli {
 

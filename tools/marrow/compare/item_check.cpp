@@ -8,9 +8,9 @@
 
 #include "command_options.hpp"
 #include "compare/cell_jobs.hpp"
-#include "marrow/domain/plain_text.hpp"
-#include "marrow/domain/printable.hpp"
-#include "runtime/pipeline_names.hpp"
+#include "marrow/base/plain_text.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow::cli {
 namespace {

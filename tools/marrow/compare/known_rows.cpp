@@ -3,8 +3,8 @@
 
 #include <cstdio>
 
-#include "marrow/domain/printable.hpp"
-#include "runtime/remove_tree.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/remove_tree.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -3,8 +3,8 @@
 #include <cstdio>
 
 #include "compare/comparison.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/printable.hpp"
 
 namespace marrow::cli {
 namespace {

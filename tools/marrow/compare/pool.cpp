@@ -11,8 +11,8 @@
 #include <set>
 #include <utility>
 
-#include "marrow/runtime/worker.hpp"
-#include "runtime/no_process.hpp"
+#include "marrow/base/no_process.hpp"
+#include "marrow/runtime/process/worker.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <cstdio>
 
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/printable.hpp"
 
 namespace marrow::cli {
 

@@ -14,11 +14,11 @@
 #include "compare/progress.hpp"
 #include "compare/times.hpp"
 #include "compare/unchanged.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/remove_tree.hpp"
 #include "process.hpp"
 #include "report/report.hpp"
-#include "runtime/remove_tree.hpp"
 
 namespace marrow::cli {
 namespace {

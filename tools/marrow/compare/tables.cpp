@@ -6,9 +6,9 @@
 #include <set>
 
 #include "compare/comparison.hpp"
-#include "marrow/domain/number_text.hpp"
-#include "marrow/domain/printable.hpp"
-#include "runtime/text_file.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/text_file.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -43,7 +43,7 @@ std::string field(const std::string& raw) {
 
 std::string number_text(const std::optional<double>& value) {
   if (!value) return "";
-  return formatted("%.9g", *value);
+  return formatted("{:.9g}", *value);
 }
 
 /// The options that any variant changes.

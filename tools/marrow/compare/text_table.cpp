@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/printable.hpp"
 
 namespace marrow::cli {
 namespace {

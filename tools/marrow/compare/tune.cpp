@@ -6,12 +6,12 @@
 #include "compare/comparison.hpp"
 #include "compare/figure_units.hpp"
 #include "compare/unchanged.hpp"
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/printable.hpp"
 #include "marrow/domain/functions.hpp"
-#include "marrow/domain/printable.hpp"
-#include "marrow/runtime/executor.hpp"
-#include "marrow/runtime/types.hpp"
-#include "runtime/one_node.hpp"
+#include "marrow/runtime/node/types.hpp"
+#include "marrow/runtime/pipeline/one_node.hpp"
+#include "marrow/runtime/run/executor.hpp"
 
 namespace marrow::cli {
 namespace {

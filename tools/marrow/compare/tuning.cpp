@@ -4,14 +4,14 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "marrow/domain/number_text.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::cli {
 namespace {
 
 using nlohmann::json;
 
-std::string text(double value) { return formatted("%.4g", value); }
+std::string text(double value) { return formatted("{:.4g}", value); }
 std::string text(const Tuning& tuning, double value) {
   return text(value) + (tuning.unit.empty() ? "" : " " + tuning.unit);
 }

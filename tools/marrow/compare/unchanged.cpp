@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "compare/unchanged.hpp"
 
-#include "marrow/domain/error.hpp"
-#include "runtime/text_file.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/text_file.hpp"
 
 namespace marrow::cli {
 namespace {

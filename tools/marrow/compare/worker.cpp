@@ -5,10 +5,10 @@
 #include "command_options.hpp"
 #include "compare/comparison.hpp"
 #include "compare/pool.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/runtime/worker.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/no_process.hpp"
+#include "marrow/runtime/process/worker.hpp"
 #include "report/report.hpp"
-#include "runtime/no_process.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -14,11 +14,11 @@
 
 #include "command_options.hpp"
 #include "commands.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/reason_of_exception.hpp"
 #include "marrow/plugin.hpp"
-#include "marrow/runtime/worker.hpp"
+#include "marrow/runtime/process/worker.hpp"
 #include "process.hpp"
-#include "runtime/reason_of_exception.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -7,9 +7,9 @@
 #include <map>
 
 #include "difference/numbers.hpp"
-#include "marrow/domain/number_text.hpp"
-#include "marrow/runtime/types.hpp"
-#include "marrow/runtime/verdicts.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/runtime/node/types.hpp"
+#include "marrow/runtime/run/verdicts.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -52,8 +52,8 @@ void compare_numbers(const T& a, const T& b, Amount& amount) {
                   {"same_shape", numbers.same_shape}};
   if (numbers.differ)
     amount.lines.push_back(
-        formatted("%zu of %zu numbers differ, by at most %.4g", numbers.differ, numbers.count, numbers.largest));
-  if (numbers.texts) amount.lines.push_back(formatted("%zu texts differ", numbers.texts));
+        formatted("{} of {} numbers differ, by at most {:.4g}", numbers.differ, numbers.count, numbers.largest));
+  if (numbers.texts) amount.lines.push_back(formatted("{} texts differ", numbers.texts));
   if (!numbers.same_shape) amount.lines.push_back("lists in it are of other lengths");
 }
 
@@ -68,12 +68,12 @@ void compare_placement(const RigidTransform& a, const RigidTransform& b, const F
                distance_mm = (b * point - a * point).norm();
   amount.facts = {{"rotation_deg", angle_deg}, {"displacement_mm", distance_mm}};
   const std::string where = frame ? "the fragment's centroid" : "the origin of '" + a.source + "'";
-  std::string line = formatted("%.4g deg and %.4g mm apart at %s", angle_deg, distance_mm, where.c_str());
+  std::string line = formatted("{:.4g} deg and {:.4g} mm apart at {}", angle_deg, distance_mm, where);
   if (frame) {
     const Vector6d motion = motion_between(a, b, *frame);
     amount.facts["axial_rotation_deg"] = degrees(motion[2]);
     amount.facts["axial_displacement_mm"] = motion[5];
-    line += formatted(" (%+.4g deg about and %+.4g mm along its long axis)", degrees(motion[2]), motion[5]);
+    line += formatted(" ({:+.4g} deg about and {:+.4g} mm along its long axis)", degrees(motion[2]), motion[5]);
   }
   amount.lines.push_back(angle_deg == 0 && distance_mm == 0 ? "at the same place" : line);
 }
@@ -94,7 +94,7 @@ void compare_poses(const Pose& a, const Pose& b, Amount& amount) {
   compare_placement(a.world_from_model, b.world_from_model, a.frame.is_anatomical ? &a.frame : nullptr, amount);
   if (a.cost != b.cost || a.evaluations != b.evaluations)
     amount.lines.push_back(
-        formatted("cost %.6g, was %.6g; %d evaluations, were %d", b.cost, a.cost, b.evaluations, a.evaluations));
+        formatted("cost {:.6g}, was {:.6g}; {} evaluations, were {}", b.cost, a.cost, b.evaluations, a.evaluations));
   else if (hash_of(a.world_from_model) == hash_of(b.world_from_model) && a.warnings == b.warnings)
     amount.lines.push_back("its predicted deviations or the way of the search differ");
   amount.facts["cost"] = {a.cost, b.cost};
@@ -116,12 +116,12 @@ void compare_metrics(const Metrics& a, const Metrics& b, Amount& amount) {
     const Metric* before = find(a, now.name);
     const std::string unit = now.unit.empty() ? "" : " " + now.unit;
     if (!before) {
-      amount.lines.push_back(formatted("%-24s %.5g%s, was not there", now.name.c_str(), now.value, unit.c_str()));
+      amount.lines.push_back(formatted("{:<24} {:.5g}{}, was not there", now.name, now.value, unit));
     } else if (now.value == before->value || (std::isnan(now.value) && std::isnan(before->value))) {
       ++same;
       continue;
     } else {
-      amount.lines.push_back(formatted("%-24s %.5g%s, was %.5g (%+.3g)", now.name.c_str(), now.value, unit.c_str(),
+      amount.lines.push_back(formatted("{:<24} {:.5g}{}, was {:.5g} ({:+.3g})", now.name, now.value, unit,
                                        before->value, now.value - before->value));
     }
     amount.facts[now.name] = {
@@ -130,11 +130,11 @@ void compare_metrics(const Metrics& a, const Metrics& b, Amount& amount) {
   }
   for (const Metric& before : a.items) {
     if (find(b, before.name)) continue;
-    amount.lines.push_back(formatted("%-24s is not there, was %.5g%s", before.name.c_str(), before.value,
-                                     (before.unit.empty() ? "" : " " + before.unit).c_str()));
+    amount.lines.push_back(formatted("{:<24} is not there, was {:.5g}{}", before.name, before.value,
+                                     (before.unit.empty() ? "" : " " + before.unit)));
     amount.facts[before.name] = {{"before", before.value}, {"now", nullptr}, {"unit", before.unit}};
   }
-  if (same) amount.lines.push_back(formatted("%zu other figure%s the same", same, same == 1 ? " is" : "s are"));
+  if (same) amount.lines.push_back(formatted("{} other figure{} the same", same, same == 1 ? " is" : "s are"));
 }
 
 void compare_verdicts(const Verdict& a, const Verdict& b, Amount& amount) {
@@ -158,7 +158,7 @@ void compare_meshes(const Mesh& a, const Mesh& b, Amount& amount) {
   if (before != now || a.triangles.size() != b.triangles.size()) {
     const double area_before = surface_area_mm2(a), area_now = surface_area_mm2(b);
     amount.facts["area_mm2"] = {area_before, area_now};
-    amount.lines.push_back(formatted("%zu vertices, were %zu; %zu triangles, were %zu; surface %.6g mm2, was %.6g", now,
+    amount.lines.push_back(formatted("{} vertices, were {}; {} triangles, were {}; surface {:.6g} mm2, was {:.6g}", now,
                                      before, b.triangles.size(), a.triangles.size(), area_now, area_before));
   }
   if (before != now) return;
@@ -171,14 +171,14 @@ void compare_meshes(const Mesh& a, const Mesh& b, Amount& amount) {
   }
   amount.facts["moved"] = moved;
   amount.facts["largest_displacement_mm"] = largest_mm;
-  amount.lines.push_back(formatted("%zu of %zu vertices lie elsewhere, by at most %.4g mm", moved, now, largest_mm));
+  amount.lines.push_back(formatted("{} of {} vertices lie elsewhere, by at most {:.4g} mm", moved, now, largest_mm));
   if (a.triangles.size() == b.triangles.size() && a.triangles != b.triangles)
     amount.lines.push_back("its triangles join other vertices");
 }
 
 void add_samples(const NumberDifference& numbers, const char* what, const char* unit, Amount& amount) {
   amount.facts.update({{"samples", numbers.count}, {"differ", numbers.differ}, {"largest", numbers.largest}});
-  amount.lines.push_back(formatted("%zu of %zu %s differ (%.3g %%), by at most %.4g %s", numbers.differ, numbers.count,
+  amount.lines.push_back(formatted("{} of {} {} differ ({:.3g} %), by at most {:.4g} {}", numbers.differ, numbers.count,
                                    what, percent(numbers.differ, numbers.count), numbers.largest, unit));
 }
 
@@ -187,7 +187,7 @@ void compare_grids(const Grid& a, const Grid& b, const std::vector<float>& value
                    const char* unit, Amount& amount) {
   amount.facts["size"] = {a.size, b.size};
   if (a.size != b.size || values_a.size() != values_b.size()) {
-    amount.lines.push_back(formatted("%d x %d x %d samples, were %d x %d x %d", b.size[0], b.size[1], b.size[2],
+    amount.lines.push_back(formatted("{} x {} x {} samples, were {} x {} x {}", b.size[0], b.size[1], b.size[2],
                                      a.size[0], a.size[1], a.size[2]));
     return;
   }
@@ -207,13 +207,13 @@ void compare_fields(const SignedField& a, const SignedField& b, Amount& amount) 
   }
   amount.facts["voxels_now_inside"] = in;
   amount.facts["voxels_now_outside"] = out;
-  amount.lines.push_back(formatted("%zu voxels are inside now, %zu are outside now", in, out));
+  amount.lines.push_back(formatted("{} voxels are inside now, {} are outside now", in, out));
 }
 
 void compare_pixels(const cv::Mat& a, const cv::Mat& b, Amount& amount) {
   amount.facts["size"] = {{a.cols, a.rows}, {b.cols, b.rows}};
   if (a.size() != b.size() || a.type() != b.type()) {
-    amount.lines.push_back(formatted("%d x %d pixels of %d bits, were %d x %d of %d", b.cols, b.rows,
+    amount.lines.push_back(formatted("{} x {} pixels of {} bits, were {} x {} of {}", b.cols, b.rows,
                                      8 * int(b.elemSize()), a.cols, a.rows, 8 * int(a.elemSize())));
     return;
   }
@@ -248,10 +248,10 @@ void compare_edges(const EdgeMap& a, const EdgeMap& b, Amount& amount) {
                   {"changed", changed},
                   {"largest_px", largest_px}};
   amount.lines.push_back(
-      formatted("%zu edge pixels, were %zu: %zu gone, %zu new", b.pixels.size(), a.pixels.size(), gone, added));
+      formatted("{} edge pixels, were {}: {} gone, {} new", b.pixels.size(), a.pixels.size(), gone, added));
   if (changed)
     amount.lines.push_back(
-        formatted("%zu of the %zu common ones differ, their places by at most %.4g px", changed, common, largest_px));
+        formatted("{} of the {} common ones differ, their places by at most {:.4g} px", changed, common, largest_px));
 }
 
 /// Compares two lines: the largest distance of an end from the other line, and the angle between them.
@@ -264,16 +264,17 @@ void compare_lines(const std::string& name, const LineSegment& a, const LineSegm
   amount.facts[name] = {{"distance_px", distance_px}, {"angle_deg", angle_deg}};
   if (hash_of(a) != hash_of(b))
     amount.lines.push_back(
-        formatted("%s border: %.4g deg and at most %.4g px from where it was", name.c_str(), angle_deg, distance_px));
+        formatted("{} border: {:.4g} deg and at most {:.4g} px from where it was", name, angle_deg, distance_px));
 }
 
 void compare_shafts(const ShaftLines& a, const ShaftLines& b, Amount& amount) {
   compare_lines("left", a.left, b.left, amount);
   compare_lines("right", a.right, b.right, amount);
   amount.facts["width_mm"] = {a.width_mm, b.width_mm};
-  if (a.width_mm != b.width_mm) amount.lines.push_back(formatted("width %.6g mm, was %.6g", b.width_mm, a.width_mm));
+  if (a.width_mm != b.width_mm)
+    amount.lines.push_back(formatted("width {:.6g} mm, was {:.6g}", b.width_mm, a.width_mm));
   if (a.log_likelihood != b.log_likelihood)
-    amount.lines.push_back(formatted("log likelihood %.6g, was %.6g", b.log_likelihood, a.log_likelihood));
+    amount.lines.push_back(formatted("log likelihood {:.6g}, was {:.6g}", b.log_likelihood, a.log_likelihood));
   if (amount.lines.empty()) amount.lines.push_back("the same borders; the rejected candidates differ");
 }
 
@@ -324,9 +325,9 @@ Amount amount_of_counts(std::uintmax_t before, std::uintmax_t now, std::uintmax_
   Amount amount;
   amount.facts = {{"bytes", {before, now}}, {"bytes_differ", differ}};
   if (before == now)
-    amount.lines.push_back(formatted("%ju of %ju bytes of %s differ", differ, now, what.c_str()));
+    amount.lines.push_back(formatted("{} of {} bytes of {} differ", differ, now, what));
   else
-    amount.lines.push_back(formatted("%s of %ju bytes, were %ju", what.c_str(), now, before));
+    amount.lines.push_back(formatted("{} of {} bytes, were {}", what, now, before));
   return amount;
 }
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "marrow/runtime/value.hpp"
+#include "marrow/runtime/node/value.hpp"
 
 namespace marrow::cli {
 

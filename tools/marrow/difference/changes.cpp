@@ -5,8 +5,8 @@
 #include <charconv>
 #include <set>
 
-#include "marrow/domain/error.hpp"
-#include "runtime/keys.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/runtime/run/keys.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -5,7 +5,7 @@
 #include <set>
 
 #include "difference/findings.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/printable.hpp"
 
 namespace marrow::cli {
 namespace {

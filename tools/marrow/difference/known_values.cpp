@@ -3,11 +3,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "marrow/runtime/types.hpp"
+#include "marrow/base/json_text.hpp"
+#include "marrow/base/text_file.hpp"
+#include "marrow/runtime/node/types.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 #include "run_files.hpp"
-#include "runtime/json_text.hpp"
-#include "runtime/text_file.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "difference/amounts.hpp"
-#include "marrow/runtime/catalogue.hpp"
-#include "marrow/runtime/store.hpp"
+#include "marrow/runtime/plugins/catalogue.hpp"
+#include "marrow/runtime/store/store.hpp"
 
 namespace marrow::cli {
 

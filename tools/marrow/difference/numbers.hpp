@@ -4,7 +4,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "marrow/runtime/archive.hpp"
+#include "marrow/base/archive.hpp"
 
 namespace marrow::cli {
 

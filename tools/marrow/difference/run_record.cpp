@@ -8,12 +8,12 @@
 
 #include "amount_bounds.hpp"
 #include "given_path.hpp"
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/json_text.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/strict_yaml.hpp"
+#include "marrow/runtime/pipeline/written_content.hpp"
 #include "run_files.hpp"
-#include "runtime/json_text.hpp"
-#include "runtime/strict_yaml.hpp"
-#include "runtime/written_content.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "marrow/runtime/executor.hpp"
-#include "marrow/runtime/pipeline.hpp"
+#include "marrow/runtime/pipeline/pipeline.hpp"
+#include "marrow/runtime/run/executor.hpp"
 
 namespace marrow::cli {
 

@@ -2,11 +2,11 @@
 // New pipelines, experiments and cases.
 #include <algorithm>
 
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/names.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/names.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/text_file.hpp"
 #include "projects.hpp"
-#include "runtime/text_file.hpp"
 #include "templates.hpp"
 
 namespace fs = std::filesystem;

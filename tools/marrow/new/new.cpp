@@ -3,7 +3,7 @@
 
 #include "command_options.hpp"
 #include "commands.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/printable.hpp"
 #include "projects.hpp"
 #include "report/report.hpp"
 

@@ -2,12 +2,12 @@
 // New nodes and kinds: a folder with source, test, pipeline and comparison, from the templates of the kind.
 #include <algorithm>
 
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/names.hpp"
-#include "marrow/domain/yaml.hpp"
-#include "marrow/runtime/catalogue.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/names.hpp"
+#include "marrow/base/text_file.hpp"
+#include "marrow/base/yaml.hpp"
+#include "marrow/runtime/plugins/catalogue.hpp"
 #include "projects.hpp"
-#include "runtime/text_file.hpp"
 #include "templates.hpp"
 
 namespace fs = std::filesystem;

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <regex>
 
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/text_file.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "process.hpp"
-#include "runtime/text_file.hpp"
 
 namespace fs = std::filesystem;
 

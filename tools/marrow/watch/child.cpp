@@ -11,7 +11,7 @@
 #include <csignal>
 #include <cstring>
 
-#include "marrow/domain/error.hpp"
+#include "marrow/base/error.hpp"
 
 extern char** environ;
 

@@ -3,10 +3,10 @@
 
 #include <fstream>
 
-#include "marrow/domain/error.hpp"
-#include "marrow/domain/printable.hpp"
-#include "marrow/runtime/catalogue.hpp"
-#include "runtime/named_files.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/named_files.hpp"
+#include "marrow/runtime/plugins/catalogue.hpp"
 
 namespace fs = std::filesystem;
 

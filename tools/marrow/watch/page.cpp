@@ -6,7 +6,7 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
-#include "runtime/text_file.hpp"
+#include "marrow/base/text_file.hpp"
 
 namespace marrow::cli {
 namespace {

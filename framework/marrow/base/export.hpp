@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What the libraries of the framework export: what public headers declare. All else is hidden, so that no other code
+// can come to depend on it. Plugins see no mark: what they compile of these headers stays their own.
+#ifdef MARROW_BUILDS_FRAMEWORK
+#define MARROW_EXPORT [[gnu::visibility("default")]]
+#else
+#define MARROW_EXPORT
+#endif
+// What a private header declares and marrow's own tests call: exported only from builds that have the tests.
+#if defined(MARROW_BUILDS_FRAMEWORK) && defined(MARROW_HAS_TESTS)
+#define MARROW_EXPORT_TO_TESTS [[gnu::visibility("default")]]
+#else
+#define MARROW_EXPORT_TO_TESTS
+#endif

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/base/file_names.hpp"
+
+#include <cstdio>
+#include <map>
+#include <set>
+
+#include "marrow/base/characters.hpp"
+#include "marrow/base/hash.hpp"
+#include "marrow/base/printable.hpp"
+
+namespace marrow {
+namespace {
+
+constexpr std::size_t kMostNameBytes = 100;   // bytes
+constexpr std::size_t kMostInFileName = 200;  // with an extension and a temporary's prefix it is below the usual 255
+
+/// As in URLs. `text` may have several bytes.
+std::string percent_encoded(std::string_view text) {
+  std::string result;
+  for (const unsigned char byte : text) {
+    char code[4];
+    std::snprintf(code, sizeof code, "%%%02X", byte);
+    result += code;
+  }
+  return result;
+}
+
+}  // namespace
+
+std::string fault_of_name(const std::string& name) {
+  if (name.empty()) return "it is empty";
+  if (name.size() > kMostNameBytes) return "it has " + std::to_string(name.size()) + " bytes";
+  if (name.find('/') != std::string::npos) return "it holds '/'";
+  if (name.find('\\') != std::string::npos) return "it holds '\\'";
+  if (const std::string odd = odd_character_in(name); !odd.empty()) return "it holds " + odd;
+  if (name.front() == '.') return "it begins with a dot";
+  if (name.front() == ' ') return "it begins with a space";
+  if (name.back() == ' ') return "it ends with a space";
+  return "";
+}
+
+void check_file_name(Diagnostics& diagnostics, const Place& place, const std::string& name, const std::string& what) {
+  const std::string fault = fault_of_name(name);
+  if (!fault.empty())
+    diagnostics.add(place, what + " becomes a file name: " + in_quotes(name) + " cannot be one, " + fault, kNameHint);
+}
+
+std::string file_name_of(const std::string& text) {
+  if (text.empty()) return "%";  // no other text becomes a percent sign alone
+  std::string result;
+  for (std::size_t i = 0, next = 0; i < text.size(); i = next) {
+    next = i + 1;
+    while (next < text.size() && (static_cast<unsigned char>(text[next]) & 0xC0) == 0x80) ++next;  // one character
+    const std::string character = text.substr(i, next - i);
+    const bool is_special =
+        std::string("/\\%~").find(character) != std::string::npos || !odd_character_in(character).empty() ||
+        (i == 0 && (character == "." || character == " ")) || (next == text.size() && character == " ");
+    result += is_special ? percent_encoded(character) : character;
+  }
+  if (result.size() <= kMostInFileName) return result;
+  Hasher hasher;
+  hasher.add(text);
+  const std::string hash = "~" + hasher.digest().hex();
+  std::size_t end = kMostInFileName - hash.size();
+  while ((static_cast<unsigned char>(result[end]) & 0xC0) == 0x80) --end;
+  return result.substr(0, end) + hash;
+}
+
+std::vector<std::string> distinct_names(const std::vector<std::string>& names) {
+  std::vector<std::string> result;
+  std::set<std::string> given(names.begin(), names.end()), seen;
+  std::map<std::string, int> last;
+  for (const std::string& name : names) {
+    std::string distinct = name;
+    if (!seen.insert(name).second) {
+      int& number = last.try_emplace(name, 1).first->second;
+      do distinct = name + " (" + std::to_string(++number) + ")";
+      while (!given.insert(distinct).second);
+    }
+    result.push_back(distinct);
+  }
+  return result;
+}
+
+}  // namespace marrow

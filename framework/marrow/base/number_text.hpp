@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Numbers as texts, and texts as numbers: the one place that knows how. All of it is the same in every locale.
+// std::snprintf, std::to_string and std::strtod use the decimal sign of the locale that the process has set, as a
+// script with `locale.setlocale` does: "0,5" in Germany. Such a text is another number, or several cells, to whoever
+// reads it.
+#include <fmt/core.h>
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "marrow/base/export.hpp"
+
+namespace MARROW_EXPORT marrow {
+
+namespace detail {
+std::string formatted(fmt::string_view format, fmt::format_args values);
+}
+
+/// A text with values in the places of the {}: {:.2f}, {:>8}. The syntax is that of the library fmt, and the compiler
+/// checks it.
+template <class... Values>
+std::string formatted(fmt::format_string<Values...> format, Values&&... values) {
+  return detail::formatted(format, fmt::make_format_args(values...));
+}
+
+/// With so many significant digits at most, and no trailing zeros: 0.125, 1.5e-07, 95.
+std::string short_number(double value, int digits = 3);
+
+/// With so many decimals. Zero has no minus sign, and neither has what is rounded to zero.
+std::string fixed_number(double value, int decimals);
+
+/// The shortest text from which the same number is read again. Whole numbers below 1e15 have all their digits, so that
+/// they can also be read as integers.
+std::string exact_number(double value);
+
+/// A share, from 0 to 1, as a number of percent, with at least so many decimals. More are shown where the share would
+/// else read as 0 or 100 and is neither: 1 of 3000 is 0.03, with one decimal.
+std::string percent_text(double share, int decimals);
+
+/// "1 case", "2 cases". The plural of `what` is formed with an s.
+std::string counted(std::size_t count, std::string_view what);
+
+/// The number that all of the text stands for, such as 1, -0.5, +2e-3, inf or nan. Nothing if the text is empty, has a
+/// blank or any other character besides, or if the number is too large.
+std::optional<double> parsed_number(std::string_view text);
+
+}  // namespace marrow

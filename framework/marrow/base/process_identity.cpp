@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/base/process_identity.hpp"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <charconv>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <mutex>
+#include <optional>
+#include <sstream>
+
+#include "marrow/base/hash.hpp"
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kDigits = 16;      // of the digest
+constexpr std::size_t kMostOfName = 24;  // characters of the host's name that are shown; the digest has all of it
+
+/// What /proc says about a process of this namespace.
+struct Stat {
+  char state = '?';
+  unsigned long long start = 0;  ///< clock ticks after the boot
+};
+
+/// Nothing if /proc is not there, or shows another namespace's processes: then its numbers mean other processes.
+std::optional<Stat> stat_of(pid_t process) {
+  std::error_code error;
+  if (fs::read_symlink("/proc/self", error) != std::to_string(getpid()) || error) return std::nullopt;
+  std::ifstream file("/proc/" + std::to_string(process) + "/stat");
+  std::string text;
+  std::getline(file, text);
+  const std::size_t name_end = text.rfind(')');  // the program's name may have spaces
+  if (name_end == std::string::npos) return std::nullopt;
+  std::istringstream fields(text.substr(name_end + 1));
+  Stat stat;
+  fields >> stat.state;
+  std::string skipped;
+  for (int field = 4; field < 22; ++field) fields >> skipped;  // proc(5): the start is the 22nd
+  if (!(fields >> stat.start)) return std::nullopt;
+  return stat;
+}
+
+std::string first_line(const char* file) {
+  std::ifstream in(file);
+  std::string line;
+  std::getline(in, line);
+  return line;
+}
+
+/// Names the host, its boot and the namespaces of this process.
+std::string place_of_processes() {
+  std::array<char, 256> host{};
+  if (gethostname(host.data(), host.size() - 1) != 0) host.fill('\0');
+  Hasher hasher;
+  hasher.add(std::string(host.data()));
+  hasher.add(first_line("/proc/sys/kernel/random/boot_id"));
+  for (const char* space : {"/proc/self/ns/pid", "/proc/self/ns/time"}) {
+    std::error_code error;
+    hasher.add(fs::read_symlink(space, error).string());
+  }
+  std::string name;
+  for (const char* at = host.data(); *at && *at != '.' && name.size() < kMostOfName; ++at)
+    if (std::isalnum(static_cast<unsigned char>(*at))) name += *at;
+  return (name.empty() ? "host" : name) + "." + hasher.digest().hex().substr(0, kDigits);
+}
+
+std::string make_identity() {
+  std::array<char, 48> numbers{};
+  const std::optional<Stat> stat = stat_of(getpid());
+  std::snprintf(numbers.data(), numbers.size(), ".%08d.%012llu", int(getpid()), stat ? stat->start : 0ull);
+  return place_of_processes() + numbers.data();
+}
+
+/// The parts of an identity.
+struct Parts {
+  std::string_view place;
+  int process = 0;
+  unsigned long long start = 0;
+};
+
+template <class Number>
+bool parse(std::string_view text, Number& number) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+std::optional<Parts> parts_of(std::string_view identity) {
+  const std::size_t last = identity.rfind('.');
+  const std::size_t middle = last == std::string_view::npos || last == 0 ? last : identity.rfind('.', last - 1);
+  if (last == std::string_view::npos || middle == std::string_view::npos || middle == last) return std::nullopt;
+  Parts parts{identity.substr(0, middle)};
+  if (!parse(identity.substr(middle + 1, last - middle - 1), parts.process) || parts.process <= 0 ||
+      !parse(identity.substr(last + 1), parts.start))
+    return std::nullopt;
+  const std::size_t dot = parts.place.find('.');
+  if (dot == 0 || dot == std::string_view::npos) return std::nullopt;
+  for (const char one : parts.place.substr(0, dot))
+    if (!std::isalnum(static_cast<unsigned char>(one))) return std::nullopt;
+  const std::string_view digest = parts.place.substr(dot + 1);
+  if (digest.size() != kDigits || digest.find_first_not_of("0123456789abcdef") != std::string_view::npos)
+    return std::nullopt;
+  return parts;
+}
+
+}  // namespace
+
+const std::string& this_process() {
+  static std::mutex mutex;
+  static pid_t process = 0;
+  static const std::string* identity = nullptr;  // an older one stays: somebody may still use it
+  const std::scoped_lock lock(mutex);
+  if (process != getpid()) {  // at first, and after a fork
+    process = getpid();
+    identity = new std::string(make_identity());
+  }
+  return *identity;
+}
+
+bool is_identity(std::string_view text) { return parts_of(text).has_value(); }
+
+Life life_of(std::string_view identity) {
+  const std::string& own = this_process();
+  if (identity == own) return Life::lives;
+  const std::optional<Parts> parts = parts_of(identity), here = parts_of(own);
+  if (!parts || !here || parts->place != here->place) return Life::unknown;
+  if (kill(parts->process, 0) != 0 && errno == ESRCH) return Life::ended;
+  const std::optional<Stat> stat = stat_of(parts->process);
+  if (!stat || parts->start == 0) return Life::unknown;
+  return stat->start != parts->start || stat->state == 'Z' ? Life::ended : Life::lives;
+}
+
+}  // namespace marrow

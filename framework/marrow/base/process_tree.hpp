@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// A process and all that it started.
+#include <sys/types.h>
+
+#include <vector>
+
+#include "marrow/base/export.hpp"
+
+namespace MARROW_EXPORT marrow {
+
+/// From now on, a process whose parent ends becomes a child of this process, if it comes from it. So whatever this
+/// process starts stays in its tree.
+void keep_descendants();
+
+/// What a process started, directly or through others, and what of it has not ended.
+std::vector<pid_t> descendants_of(pid_t process);
+
+/// Kills a process, its group, and what it started, also what left the group. Must be called before the process is
+/// waited for: until then, no other process or group has its number.
+void kill_tree(pid_t process);
+
+/// Resident memory of a process and its descendants. Memory that they share counts once, where the system tells, and is
+/// counted so only if the plain sum exceeds `enough_mb`: it takes longer.
+double memory_of_tree_mb(pid_t process, double enough_mb);
+
+}  // namespace marrow

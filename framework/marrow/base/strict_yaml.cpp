@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/base/strict_yaml.hpp"
+
+#include <algorithm>
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/base/plain_text.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/text_file.hpp"
+#include "marrow/base/unclosed.hpp"
+#include "marrow/base/yaml.hpp"
+
+namespace marrow {
+
+YAML::Node StrictYaml::parse(const std::string& written) {
+  const std::string text = plain_text(written);
+  try {
+    return parse_yaml(text);
+  } catch (const YAML::ParserException& error) {
+    fault({file_, error.mark.line + 1, error.mark.column + 1}, "not valid YAML: " + error.msg);
+    // The parser reports the place where the text ends or goes on strangely. The typing error is where something was
+    // left open.
+    if (const auto opened = last_unclosed(text))
+      fault({file_, opened->line, opened->column}, std::string("this ") + opened->mark + " is not closed");
+  } catch (const YAML::Exception& error) {
+    fault({file_, error.mark.line + 1, error.mark.column + 1}, "cannot be read as YAML: " + error.msg);
+  }
+  return {};
+}
+
+Place StrictYaml::place_of(const YAML::Mark& mark) const {
+  return only_ ? *only_ : Place{file_, mark.line + 1, mark.column + 1};
+}
+
+std::vector<YamlEntry> StrictYaml::map(const YAML::Node& node, const Place& where, const std::string& what,
+                                       const std::vector<std::string>* known) {
+  std::vector<YamlEntry> entries;
+  if (!node.IsMap()) {
+    fault(where, what + " must be a map, got " + yaml_described(node), "write it as  key: value  lines");
+    return entries;
+  }
+  std::vector<YamlFault> faults;
+  for (const YamlKey& key : yaml_keys(node, what, faults)) {
+    const Place key_place = place_of(key.mark);
+    if (known && std::find(known->begin(), known->end(), key.name) == known->end())
+      fault(key_place, "unknown key " + in_quotes(key.name) + " in " + what, suggestion(key.name, *known));
+    else
+      entries.push_back({key.name, key_place, key.value});
+  }
+  for (const YamlFault& one : faults) fault(place_of(one.mark), one.text, one.hint);
+  return entries;
+}
+
+std::optional<std::string> StrictYaml::text(const YAML::Node& node, const Place& where, const std::string& what) {
+  if (node.IsScalar()) return node.Scalar();
+  fault(where, what + ": expected a text, got " + yaml_described(node));
+  return std::nullopt;
+}
+
+std::optional<bool> StrictYaml::boolean(const YAML::Node& node, const Place& where, const std::string& what) {
+  const std::optional<bool> value = yaml_boolean(node);
+  if (!value) fault(where, what + ": expected true or false, got " + yaml_described(node));
+  return value;
+}
+
+std::optional<std::int64_t> StrictYaml::integer(const YAML::Node& node, const Place& where, const std::string& what) {
+  const std::optional<std::int64_t> value = yaml_integer(node);
+  if (!value)
+    fault(where, what + ": expected an integer, got " + yaml_described(node),
+          has_leading_zeros(node) ? "write it without leading zeros" : "");
+  return value;
+}
+
+std::optional<double> StrictYaml::number(const YAML::Node& node, const Place& where, const std::string& what) {
+  const std::optional<double> value = yaml_number(node);
+  if (!value) fault(where, what + ": expected a number, got " + yaml_described(node));
+  return value;
+}
+
+std::optional<std::string> read_source(const std::filesystem::path& file, const std::string& what,
+                                       Diagnostics& diagnostics) {
+  try {
+    std::string text = read_text_file(file, kMostSourceBytes);
+    diagnostics.remember(file.string(), plain_text(text));
+    return text;
+  } catch (const Error& error) {
+    const std::string fault = error.what();  // begins with the file's name, which the place has already
+    const auto says = [&](const char* part) { return fault.find(part, file.string().size()) != std::string::npos; };
+    const char* hint = says(" is longer than ")  ? ""
+                       : says("no regular file") ? "write the text to a file and give that"
+                                                 : "check the path";
+    diagnostics.add({file.string()}, what + fault.substr(file.string().size()), hint);
+    return std::nullopt;
+  }
+}
+
+}  // namespace marrow

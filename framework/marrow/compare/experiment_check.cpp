@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "experiment_check.hpp"
+
+#include "experiment_figures.hpp"
+#include "marrow/runtime/node/types.hpp"
+#include "marrow/runtime/pipeline/one_node.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
+
+namespace marrow::compare {
+namespace {
+
+class Checker {
+ public:
+  Checker(const WrittenExperiment& written, const Catalogue& catalogue, Diagnostics& diagnostics)
+      : written_(written),
+        experiment_(written.experiment),
+        catalogue_(catalogue),
+        diagnostics_(diagnostics),
+        figures_(written.experiment, diagnostics) {}
+
+  CheckedPipelines check() {
+    CheckedPipelines checked;
+    check_simulation();
+    for (std::size_t v = 0; v < experiment_.variants.size(); ++v) {
+      Diagnostics faults;
+      const Pipeline pipeline =
+          read_pipeline(experiment_.pipeline, arguments_of(experiment_, {v, 0, 0}, "case"), catalogue_, faults, true);
+      diagnostics_.add_all(faults);  // a fault of every variant is reported once
+      if (!faults.empty()) continue;
+      if (v == 0) checked.notes = pipeline.notes;
+      std::erase_if(checked.notes, [&](const std::string& note) { return !contains(pipeline.notes, note); });
+      figures_.check(v, pipeline);
+      if (v == 0) check_pictures(pipeline);
+    }
+    if (experiment_.tune) check_tuning(*experiment_.tune);
+    checked.items = figures_.items();
+    return checked;
+  }
+
+ private:
+  void check_simulation() {
+    for (std::size_t c = 0; c < experiment_.cases.size(); ++c) {
+      if (!experiment_.cases[c].is_simulated) continue;
+      Diagnostics faults;
+      const Pipeline pipeline = read_pipeline(experiment_.simulation.pipeline, simulation_arguments_of(experiment_, c),
+                                              catalogue_, faults, true);
+      diagnostics_.add_all(faults);
+      if (faults.empty()) find_output(pipeline, experiment_.simulation.output, written_.simulation_place, diagnostics_);
+      return;  // the other cases differ only in numbers
+    }
+  }
+
+  /// The optimizer, and the tuned options at both ends of their ranges.
+  void check_tuning(const TuneRule& rule) {
+    Diagnostics faults;
+    pipeline_of_node(rule.optimizer, {}, rule.optimizer_options, catalogue_, faults);
+    for (const Diagnostic& fault : faults.sorted()) diagnostics_.add(rule.optimizer_place, fault.message, fault.hint);
+    if (const NodeInfo* info = catalogue_.find(rule.optimizer); info && info->kind() != "optimizer")
+      diagnostics_.add(rule.optimizer_place, "'" + rule.optimizer + "' is no optimizer",
+                       "marrow list optimizer  shows which there are");
+    for (const double end : {0.0, 1.0}) {
+      Experiment tuned = experiment_;
+      add_tuned(tuned, rule.values_at(std::vector<double>(rule.options.size(), end)));
+      Diagnostics at_end;
+      read_pipeline(tuned.pipeline, arguments_of(tuned, {tuned.variants.size() - 1, 0, 0}, "case"), catalogue_, at_end,
+                    true);
+      diagnostics_.add_all(at_end);
+    }
+  }
+
+  /// Scenes and landscapes belong to a report without being named, but may be.
+  void check_pictures(const Pipeline& pipeline) {
+    for (std::size_t i = 0; i < experiment_.pictures.size(); ++i) {
+      const PipelineOutput* output =
+          find_output(pipeline, experiment_.pictures[i], written_.picture_places[i], diagnostics_);
+      if (!output) continue;
+      const TypeInfo& type = port_of(pipeline, *output).type;
+      const WriterInfo* writer = catalogue_.find_writer(type);
+      if (!writer || writer->extension == ".png" || type == TypeInfo::of<Scene>() || type == TypeInfo::of<Landscape>())
+        continue;
+      diagnostics_.add(written_.picture_places[i], "output '" + output->name + "' is " + type.id + ", not a picture",
+                       "name an output of a render node");
+    }
+  }
+
+  const WrittenExperiment& written_;
+  const Experiment& experiment_;
+  const Catalogue& catalogue_;
+  Diagnostics& diagnostics_;
+  FigureChecker figures_;
+};
+
+}  // namespace
+
+CheckedPipelines check_pipelines(const WrittenExperiment& written, const Catalogue& catalogue,
+                                 Diagnostics& diagnostics) {
+  return Checker(written, catalogue, diagnostics).check();
+}
+
+}  // namespace marrow::compare

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "experiment_sweep.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "draw.hpp"
+#include "marrow/base/number_text.hpp"
+#include "sobol.hpp"
+
+namespace marrow::compare {
+namespace {
+
+constexpr const char* kSweepExample = "write it as  sweep: {options: {edges.high: [60, 90]}, grid: 5}";
+
+/// The fractions of all combinations of `count` values of each option. The last option changes fastest.
+std::vector<std::vector<double>> grid_of(std::size_t options, std::size_t count) {
+  std::vector<std::vector<double>> all{{}};
+  for (std::size_t o = 0; o < options; ++o) {
+    std::vector<std::vector<double>> next;
+    for (const std::vector<double>& point : all)
+      for (std::size_t i = 0; i < count; ++i) {
+        next.push_back(point);
+        next.back().push_back(double(i) / double(count - 1));
+      }
+    all = std::move(next);
+  }
+  return all;
+}
+
+void read_ends(StrictYaml& yaml, const YAML::Node& node, const Place& place, SweptOption& option) {
+  option.range = {1, 2};
+  if (!node.IsSequence() || node.size() != 2)
+    return yaml.fault(place, "'" + option.key + "' must have a range of two ends",
+                      "write it as  " + option.key + ": [60, 90]");
+  for (std::size_t i = 0; i < 2; ++i)
+    option.range[i] = yaml.number(node[i], yaml.place(node[i]), option.key).value_or(option.range[i]);
+  if (!(option.range[0] < option.range[1]) || !std::isfinite(option.range[1] - option.range[0]))
+    yaml.fault(place, "the range of '" + option.key + "' must end above its beginning, got " +
+                          number_text(option.range[0]) + " to " + number_text(option.range[1]));
+}
+
+}  // namespace
+
+SweptOption swept_option_of(StrictYaml& yaml, const YamlEntry& entry) {
+  static const std::vector<std::string> kKeys{"range", "scale", "whole"};
+  SweptOption option;
+  option.key = entry.key;
+  option.place = entry.place;
+  if (entry.value.IsMap()) {
+    bool has_range = false;
+    for (const YamlEntry& part : yaml.map(entry.value, entry.place, "'" + entry.key + "'", &kKeys)) {
+      has_range |= part.key == "range";
+      if (part.key == "range") read_ends(yaml, part.value, part.place, option);
+      if (part.key == "whole") option.is_whole = yaml.boolean(part.value, part.place, "whole").value_or(false);
+      if (part.key != "scale") continue;
+      const std::string scale = yaml.text(part.value, part.place, "scale").value_or("linear");
+      option.is_log = scale == "log";
+      if (scale != "log" && scale != "linear")
+        yaml.fault(part.place, "'" + scale + "' is no scale", suggestion(scale, {"linear", "log"}));
+    }
+    if (!has_range) yaml.fault(entry.place, "'" + entry.key + "' has no range", "add  range: [60, 90]");
+  } else {
+    read_ends(yaml, entry.value, entry.place, option);
+  }
+  if (option.is_log && !(option.range[0] > 0))
+    yaml.fault(entry.place, "a range with a log scale must begin above 0, got " + number_text(option.range[0]));
+  return option;
+}
+
+void SweepReader::read(const YamlEntry& section) {
+  static const std::vector<std::string> kKeys{"options", "grid", "sobol"};
+  place_ = section.place;
+  for (const YamlEntry& entry : yaml_.map(section.value, section.place, "'sweep'", &kKeys)) {
+    if (entry.key == "grid") grid_ = count_of(yaml_, entry, 2, kMostVariants);
+    if (entry.key == "sobol") sobol_ = count_of(yaml_, entry, 2, kMostVariants);
+    if (entry.key == "options")
+      for (const YamlEntry& option : yaml_.map(entry.value, entry.place, "'options'"))
+        options_.push_back(swept_option_of(yaml_, option));
+  }
+  if (section.value.IsMap()) check(section);
+}
+
+std::vector<Named> SweepReader::names() const {
+  std::vector<Named> names;
+  for (const SweptOption& option : options_) names.push_back({option.key, option.place});
+  return names;
+}
+
+void SweepReader::check(const YamlEntry& section) {
+  if (options_.empty()) return yaml_.fault(section.place, "'sweep' names no option", kSweepExample);
+  if (!grid_ == !sobol_)
+    return yaml_.fault(section.place,
+                       "'sweep' must say either how fine its grid is or how many of Sobol's points it takes",
+                       "add  grid: 5  for 5 values of each option, or  sobol: 32");
+  if (options_.size() > kMostSobolDimensions)
+    return yaml_.fault(section.place, "'sweep' has " + std::to_string(options_.size()) + " options, at most " +
+                                          std::to_string(kMostSobolDimensions) + " are possible");
+  if (grid_ && std::pow(double(grid_), double(options_.size())) > double(kMostVariants))
+    return yaml_.fault(section.place,
+                       "a grid of " + std::to_string(grid_) + " values of " + std::to_string(options_.size()) +
+                           " options makes more than the " + std::to_string(kMostVariants) +
+                           " variants that can be compared",
+                       "take fewer values, or Sobol's points, as  sobol: 64");
+  is_good_ = true;
+}
+
+std::vector<std::vector<double>> SweepReader::points() const {
+  std::vector<std::vector<double>> points;
+  if (grid_) points = grid_of(options_.size(), grid_);
+  for (std::size_t i = 0; i < sobol_; ++i) {
+    const auto point = sobol_point(i);
+    points.emplace_back(point.begin(), point.begin() + std::ptrdiff_t(options_.size()));
+  }
+  std::set<std::vector<double>> known;
+  std::vector<std::vector<double>> values;
+  for (std::vector<double>& point : points) {
+    for (std::size_t o = 0; o < options_.size(); ++o) point[o] = options_[o].value_at(point[o]);
+    if (known.insert(point).second) values.push_back(std::move(point));  // whole numbers may be equal
+  }
+  return values;
+}
+
+void SweepReader::apply(Experiment& experiment) {
+  if (!is_good_) return;
+  const std::vector<std::vector<double>> all = points();
+  std::vector<Variant> before = std::move(experiment.variants), after;
+  if (before.empty()) before.push_back({"", place_, {}});
+  if (before.size() * all.size() > kMostVariants) {
+    yaml_.fault(place_,
+                std::to_string(before.size()) + " variants at " + std::to_string(all.size()) + " points are " +
+                    std::to_string(before.size() * all.size()) + ", at most " + std::to_string(kMostVariants) +
+                    " can be compared",
+                "take fewer points");
+    return;
+  }
+  std::set<std::string> names;
+  for (const Variant& variant : before)
+    for (const std::vector<double>& point : all) {
+      Variant more = variant;
+      more.swept = point;
+      more.swept_from = variant.name;
+      for (std::size_t o = 0; o < options_.size(); ++o) {
+        if (!more.name.empty()) more.name += '+';
+        more.name += number_text(point[o]);
+        more.overrides.push_back({options_[o].key, exact_number(point[o]), options_[o].place});
+      }
+      if (!check_name(yaml_, more.name, variant.place, "a variant's name")) return;
+      if (!names.insert(in_small_letters(more.name)).second)
+        return yaml_.fault(place_, "two points of the sweep are written alike, as '" + more.name + "'",
+                           "take a wider range, or fewer points");
+      after.push_back(std::move(more));
+    }
+  experiment.variants = std::move(after);
+  experiment.swept = options_;
+  experiment.sweep_is_grid = grid_ > 0;
+}
+
+}  // namespace marrow::compare

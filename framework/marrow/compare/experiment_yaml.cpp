@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "experiment_yaml.hpp"
+
+#include <algorithm>
+
+#include "draw.hpp"
+#include "marrow/base/file_names.hpp"
+#include "marrow/base/plain_path.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/given_value.hpp"
+
+namespace marrow::compare {
+
+namespace fs = std::filesystem;
+
+PlacedTexts texts_of(StrictYaml& yaml, const YamlEntry& entry) {
+  PlacedTexts result;
+  if (!entry.value.IsSequence()) {
+    yaml.fault(entry.place, "'" + entry.key + "' must be a list", "write it as  " + entry.key + ": [a, b]");
+    return result;
+  }
+  for (const YAML::Node& item : entry.value)
+    if (const auto text = yaml.text(item, yaml.place(item), "an item of '" + entry.key + "'"))
+      result.emplace_back(*text, yaml.place(item));
+  return result;
+}
+
+std::vector<InputValue> inputs_of(StrictYaml& yaml, const YamlEntry& section) {
+  std::vector<InputValue> result;
+  for (const YamlEntry& entry : yaml.map(section.value, section.place, "'" + section.key + "'")) {
+    if (entry.value.IsScalar())
+      result.push_back({entry.key, entry.value.Scalar(), entry.place});
+    else
+      yaml.fault(entry.place, "'" + entry.key + "' must be one value");
+  }
+  return result;
+}
+
+std::string changed_value(StrictYaml& yaml, const std::string& key, const YAML::Node& value, const Place& place) {
+  if (!value.IsNull()) return text_to_give(value);
+  yaml.fault(place, "'" + key + "' has no value", "an empty text is written as ''");
+  return "";
+}
+
+void put_uses_first(std::vector<Override>& patches) {
+  std::stable_partition(patches.begin(), patches.end(), [](const Override& one) { return one.key.ends_with(".uses"); });
+}
+
+std::vector<Override> patches_of(StrictYaml& yaml, const YamlEntry& section, const std::string& what) {
+  std::vector<Override> result;
+  if (section.value.IsNull()) return result;
+  for (const YamlEntry& entry : yaml.map(section.value, section.place, what))
+    result.push_back({entry.key, changed_value(yaml, entry.key, entry.value, entry.place), entry.place});
+  put_uses_first(result);
+  return result;
+}
+
+std::uint64_t count_of(StrictYaml& yaml, const YamlEntry& entry, std::int64_t least, std::int64_t most) {
+  const auto value = yaml.integer(entry.value, entry.place, entry.key);
+  if (!value) return std::uint64_t(least);
+  if (*value >= least && *value <= most) return std::uint64_t(*value);
+  yaml.fault(entry.place, "'" + entry.key + "' must be " + std::to_string(least) + " to " + std::to_string(most) +
+                              ", got " + std::to_string(*value));
+  return std::uint64_t(least);
+}
+
+double limit_of(StrictYaml& yaml, const YamlEntry& entry, double most) {
+  const auto value = yaml.number(entry.value, entry.place, entry.key);
+  if (!value) return 0;
+  if (*value >= 0 && *value <= most) return *value;
+  yaml.fault(entry.place, "'" + entry.key + "' must be 0 to " + number_text(most) + ", got " + number_text(*value));
+  return 0;
+}
+
+bool check_name(StrictYaml& yaml, const std::string& name, const Place& place, const std::string& what) {
+  const std::string fault = fault_of_name(name);
+  if (!fault.empty())
+    yaml.fault(place, what + " becomes a file name: " + in_quotes(name) + " cannot be one, " + fault, kNameHint);
+  return fault.empty();
+}
+
+std::string in_small_letters(std::string name) {
+  for (char& c : name)
+    if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
+  return name;
+}
+
+void find_variant(StrictYaml& yaml, const Experiment& experiment, const Named& asked, std::size_t& number) {
+  std::vector<std::string> names;
+  for (const Variant& variant : experiment.variants) names.push_back(variant.name);
+  const auto found = std::find(names.begin(), names.end(), asked.name);
+  if (found == names.end())
+    return yaml.fault(asked.place, "there is no variant '" + asked.name + "'", suggestion(asked.name, names));
+  number = std::size_t(found - names.begin());
+}
+
+fs::path file_of(StrictYaml& yaml, const YamlEntry& entry, const fs::path& folder) {
+  const auto text = yaml.text(entry.value, entry.place, entry.key);
+  if (!text) return {};
+  if (text->empty()) {
+    yaml.fault(entry.place, "'" + entry.key + "' is empty", "name a file; the path starts at the experiment's file");
+    return {};
+  }
+  fs::path file = plain_path(folder / *text);
+  std::error_code error;
+  if (fs::is_regular_file(file, error)) return file;
+  yaml.fault(entry.place, "there is no file '" + *text + "'", "the path starts at the experiment's file");
+  return {};
+}
+
+}  // namespace marrow::compare

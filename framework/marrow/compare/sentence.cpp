@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+
+#include "infinite.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/compare/paired.hpp"
+
+namespace marrow::compare {
+namespace {
+
+bool shows_zero(const std::string& number) { return number.find_first_of("123456789") == std::string::npos; }
+
+/// The number with a decimal point in every locale, and without a minus sign before zero.
+std::string fixed(double value, int decimals) {
+  char text[400];  // the largest double has 309 digits before the point
+  const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::fixed, decimals).ptr;
+  const std::string result(text, end);
+  return result[0] == '-' && shows_zero(result) ? result.substr(1) : result;
+}
+
+/// A number with as few digits as it needs: "95", "99.9", "0.05".
+std::string plain(double value) {
+  char text[40];
+  return {text, std::to_chars(text, text + sizeof text, value, std::chars_format::general, 6).ptr};
+}
+
+/// The number of decimals with which one unit of the last place is at most `largest_unit`.
+int decimals_for(double largest_unit) {
+  int decimals = 0;
+  for (double unit = 1; decimals < 15 && unit > largest_unit * (1 + 1e-9); unit /= 10) ++decimals;
+  return decimals;
+}
+
+/// p with two digits, or with more if rounding would move it across alpha. It is never shown as 0.
+std::string p_text(double p, double alpha) {
+  if (p < 0.001) return "p < 0.001";
+  if (p >= 0.995) return "p = 1";
+  int decimals = p >= 0.0995 ? 2 : p >= 0.00995 ? 3 : 4;
+  const auto shown = [&] {
+    const std::string text = fixed(p, decimals);
+    double value = 0;
+    std::from_chars(text.data(), text.data() + text.size(), value);
+    return value;
+  };
+  while (decimals < 6 && p != alpha && (shown() == alpha || (shown() < alpha) != (p < alpha))) ++decimals;
+  return "p = " + fixed(p, decimals);
+}
+
+/// What decides how many decimals are shown: the interval's width; if one bound is infinite, twice the other side's;
+/// without any, nothing.
+std::optional<double> width_of(double difference, const Interval& interval) {
+  if (std::isinf(difference)) return std::nullopt;
+  const double below = difference - interval.lower, above = interval.upper - difference;
+  if (std::isfinite(below) && std::isfinite(above)) return interval.upper - interval.lower;
+  if (std::isfinite(below)) return 2 * below;
+  if (std::isfinite(above)) return 2 * above;
+  return std::nullopt;
+}
+
+/// A bound near 0 must not be rounded to 0, because this would read as no difference. Up to two more decimals are used
+/// to avoid it.
+int decimals_of(double difference, const Interval& interval) {
+  const std::optional<double> width = width_of(difference, interval);
+  if (!width || *width <= 1e-9 * std::abs(difference)) {  // no wider than numbers are rounded
+    for (const double value : {difference, interval.lower, interval.upper})
+      if (std::isfinite(value)) return value == 0 ? 0 : decimals_for(std::abs(value) / 10);
+    return 0;
+  }
+  const int decimals = decimals_for(*width / 4);
+  const bool without_zero = interval.lower > 0 || interval.upper < 0;
+  if (!without_zero) return decimals;
+  const double nearest = std::min(std::abs(interval.lower), std::abs(interval.upper));
+  return std::max(decimals, std::min(decimals_for(nearest), decimals + 2));
+}
+
+/// A comparison in the direction that its sentence names: a positive difference is in that direction.
+struct Directed {
+  const std::string& variant;
+  const Metric& metric;
+  double difference = 0;
+  Interval interval;
+  bool is_worse = false;  ///< the direction
+
+  Directed(const std::string& name, const Metric& of, double from, const Interval& within)
+      : variant(name), metric(of), difference(from), interval(within), is_worse((from >= 0) != of.larger_is_better) {
+    if (from >= 0) return;
+    difference = -from;
+    interval = {-within.upper, -within.lower, within.confidence};
+  }
+
+  std::string amount(int decimals) const {
+    const std::string number = fixed(difference, decimals);
+    const std::string text = number + (metric.unit.empty() ? "" : " " + metric.unit);
+    return shows_zero(number) ? text : text + (is_worse ? " worse" : " better");
+  }
+  std::string bound(double value, int decimals) const {
+    if (std::isfinite(value)) return fixed(value, decimals);
+    return "a failure of " + ((value > 0) == is_worse ? variant : std::string("the baseline"));
+  }
+  std::string range(int decimals) const {
+    const bool has_failure = std::isinf(interval.lower) || std::isinf(interval.upper);
+    const std::string unit = has_failure && !metric.unit.empty() ? " " + metric.unit : "";
+    const auto with_unit = [&](double value) {
+      return bound(value, decimals) + (std::isfinite(value) ? unit : std::string());
+    };
+    return plain(100 * interval.confidence) + " % interval " + with_unit(interval.lower) + " to " +
+           with_unit(interval.upper);
+  }
+};
+
+/// Whose runs failed; empty if none did.
+std::string failures_text(const std::string& variant, const Tally& runs) {
+  if (runs.all() == runs.both) return "";
+  return "; of " + counted(runs.all(), "run") + ", only " + variant + " failed in " +
+         std::to_string(runs.variant_lost) + ", only the baseline in " + std::to_string(runs.reference_lost) +
+         ", both in " + std::to_string(runs.neither);
+}
+
+/// What a sentence says first if the median itself is a failure: who fails more, and in how many cases.
+std::string more_failures(const Comparison& comparison, bool variant_fails) {
+  return (variant_fails ? "fails more often than the baseline, in " : "the baseline fails more often, in ") +
+         std::to_string(variant_fails ? comparison.cases.variant_lost : comparison.cases.reference_lost) + " of " +
+         counted(comparison.compared(), "case");
+}
+
+std::string of_both(const std::string& variant, const Metric& metric, const Comparison& comparison) {
+  if (!comparison.median_of_both) return "";
+  const Directed directed(variant, metric, *comparison.median_of_both, {});
+  const int decimals = directed.difference == 0 ? 0 : decimals_for(directed.difference / 10);
+  return "; where both have a value, in " + counted(comparison.cases_of_both, "case") + ", the median is " +
+         directed.amount(decimals);
+}
+
+/// Why nothing can be shown, or nothing is; empty if there is nothing to add.
+std::string doubts(const Comparison& comparison, const CorrectedP& corrected, double alpha, bool has_interval,
+                   bool is_shown) {
+  const std::size_t fewest = fewest_cases(alpha, corrected.comparisons);
+  if (!is_shown && comparison.compared() < fewest)
+    return "; fewer than " + std::to_string(fewest) + " cases cannot reach p < " + plain(alpha) +
+           (corrected.comparisons > 1 ? " with " + std::to_string(corrected.comparisons) + " comparisons" : "") +
+           (has_interval ? "" : ", and no interval is given");
+  if (is_shown || corrected.p >= alpha) return "";
+  const bool contains_zero = comparison.interval.lower <= 0 && comparison.interval.upper >= 0;
+  return std::string(contains_zero ? "; the interval contains 0" : "; the ranks and the median do not agree") +
+         ", look at the single cases";
+}
+
+}  // namespace
+
+std::size_t fewest_cases(double alpha, std::size_t comparisons) {
+  if (!(alpha > 0 && alpha < 1))
+    throw Error("alpha is " + plain(alpha) + "; give a fraction between 0 and 1, such as 0.05");
+  if (!comparisons) throw Error("there are no comparisons; give at least one");
+  std::size_t cases = 1;
+  for (double least_p = double(comparisons); least_p >= alpha; least_p /= 2) ++cases;
+  return cases;
+}
+
+bool difference_shown(const Comparison& comparison, double p_after_holm, double alpha) {
+  if (!(p_after_holm >= 0 && p_after_holm <= 1))
+    throw Error("p is " + plain(p_after_holm) + "; expected a number from 0 to 1");
+  if (p_after_holm >= alpha) return false;
+  const bool ranks_positive = comparison.test.positive_ranks > comparison.test.negative_ranks;
+  if (comparison.side_of_failures == (ranks_positive ? 1 : -1)) return true;
+  return ranks_positive ? comparison.interval.lower > 0 : comparison.interval.upper < 0;
+}
+
+std::string sentence(const std::string& variant, const Metric& metric, const Comparison& comparison,
+                     const CorrectedP& corrected, double alpha) {
+  const bool is_shown = difference_shown(comparison, corrected.p, alpha);
+  std::string text = metric.label.empty() ? variant : variant + ", " + metric.label;
+  if (!comparison.compared()) return text + ": no case can be compared" + failures_text(variant, comparison.runs);
+  const Directed directed(variant, metric, comparison.median_difference, comparison.interval);
+  const Interval& interval = directed.interval;
+  const bool has_interval = comparison.compared() >= fewest_cases(1 - interval.confidence);
+  const bool is_failure = std::isinf(directed.difference);
+  const int decimals = decimals_of(directed.difference, has_interval ? interval : Interval{-kInfinite, kInfinite});
+
+  text += is_shown ? ": " : ": no difference shown: ";
+  text += is_failure ? more_failures(comparison, directed.is_worse) : directed.amount(decimals);
+  if (has_interval && interval.lower < kInfinite) {
+    text += ", " + directed.range(decimals);
+    if (is_failure || shows_zero(fixed(directed.difference, decimals)))
+      text += directed.is_worse ? " (positive is worse)" : " (positive is better)";
+  }
+  const std::size_t all = comparison.cases.all();
+  if (!is_failure || comparison.cases.neither)
+    text += ", " + (comparison.cases.neither ? std::to_string(comparison.compared()) + " of " : std::string()) +
+            counted(all, "case");
+  text += ", " + p_text(corrected.p, alpha) + failures_text(variant, comparison.runs);
+  if (is_failure) text += of_both(variant, metric, comparison);
+  return text + doubts(comparison, corrected, alpha, has_interval, is_shown);
+}
+
+}  // namespace marrow::compare

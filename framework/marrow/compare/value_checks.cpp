@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "value_checks.hpp"
+
+#include <cmath>
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+
+namespace marrow::compare {
+namespace {
+
+void check_each(const std::vector<double>& values, const std::string& what, bool may_be_infinite) {
+  if (values.empty()) throw Error("there are no " + what + "s; give at least one");
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (std::isnan(values[i]) || (std::isinf(values[i]) && !may_be_infinite))
+      throw Error(what + " " + std::to_string(i + 1) + " of " + std::to_string(values.size()) + " is " +
+                  formatted("{:f}", values[i]) +
+                  ", which is no number to compare; count its run as failed, and give the rest");
+}
+
+}  // namespace
+
+void check_finite(const std::vector<double>& values, const std::string& what) { check_each(values, what, false); }
+
+void check_numbers(const std::vector<double>& values, const std::string& what) { check_each(values, what, true); }
+
+void check_resamples(std::size_t resamples) {
+  if (resamples < 1000)
+    throw Error("got " + std::to_string(resamples) +
+                " resamples; the bounds need at least 1000 (10000 is the default)");
+}
+
+}  // namespace marrow::compare

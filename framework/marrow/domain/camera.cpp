@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/domain/camera.hpp"
+
+#include <Eigen/LU>
+#include <cmath>
+#include <limits>
+
+#include "marrow/base/error.hpp"
+
+namespace marrow {
+namespace {
+
+constexpr int kLargestSide_px = 65536;
+
+}  // namespace
+
+Eigen::Vector2d project(const Camera& camera, const Eigen::Vector3d& world_mm) {
+  const Eigen::Vector3d x = camera.camera_from_world * world_mm;
+  if (!(x.z() > 0)) return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  return (camera.intrinsics * x).hnormalized();
+}
+
+Eigen::Vector3d source_position_mm(const Camera& camera) {
+  return -(camera.camera_from_world.rotation.transpose() * camera.camera_from_world.translation_mm);
+}
+
+Eigen::Vector3d ray_direction(const Camera& camera, const Eigen::Vector2d& pixel) {
+  const Eigen::Vector3d in_camera = camera.intrinsics.inverse() * pixel.homogeneous();
+  return (camera.camera_from_world.rotation.transpose() * in_camera).normalized();
+}
+
+Plane back_project_line(const Camera& camera, const Eigen::Vector3d& line) {
+  const Eigen::Vector3d in_camera = camera.intrinsics.transpose() * line;
+  Plane plane;
+  plane.normal = (camera.camera_from_world.rotation.transpose() * in_camera).normalized();
+  plane.offset_mm = plane.normal.dot(source_position_mm(camera));
+  return plane;
+}
+
+Eigen::Vector2d offset_at_mm(const Camera& camera, const Eigen::Vector3d& world_mm, const Eigen::Vector2d& offset_px) {
+  const double depth = (camera.camera_from_world * world_mm).z();
+  const Eigen::Matrix3d& k = camera.intrinsics;
+  const double y = offset_px.y() / k(1, 1), x = (offset_px.x() - k(0, 1) * y) / k(0, 0);
+  return {depth * x, depth * y};
+}
+
+double pixel_size_at_mm(const Camera& camera, const Eigen::Vector3d& world_mm) {
+  const double depth = (camera.camera_from_world * world_mm).z();
+  return depth / std::sqrt(camera.intrinsics(0, 0) * camera.intrinsics(1, 1));
+}
+
+void check_camera(const Camera& camera, const std::string& what) {
+  if (camera.width_px <= 0 || camera.height_px <= 0)
+    throw Error(what + ": image size " + std::to_string(camera.width_px) + " x " + std::to_string(camera.height_px) +
+                " pixels is not positive");
+  if (camera.width_px > kLargestSide_px || camera.height_px > kLargestSide_px)
+    throw Error(what + ": image size " + std::to_string(camera.width_px) + " x " + std::to_string(camera.height_px) +
+                " pixels; expected at most " + std::to_string(kLargestSide_px) + " each way");
+  if (!camera.intrinsics.allFinite() || !(camera.intrinsics(0, 0) > 0) || !(camera.intrinsics(1, 1) > 0))
+    throw Error(what + ": the camera matrix needs positive focal lengths in its first two diagonal places");
+  if (camera.intrinsics(1, 0) != 0 || camera.intrinsics.row(2) != Eigen::RowVector3d(0, 0, 1))
+    throw Error(what + ": the camera matrix is not [f_u s u_0; 0 f_v v_0; 0 0 1], row by row" +
+                (camera.intrinsics(2, 0) != 0 || camera.intrinsics(2, 1) != 0 ? "; it looks transposed" : ""));
+  check_rigid(camera.camera_from_world, what);
+}
+
+void check_view(const View& view) {
+  const auto size = [](int width, int height) { return std::to_string(width) + " x " + std::to_string(height); };
+  const std::string what = "view '" + view.name + "'";
+  if (view.image.pixels.empty()) throw Error(what + ": the image is empty");
+  check_camera(view.camera, what);
+  if (view.image.width() != view.camera.width_px || view.image.height() != view.camera.height_px)
+    throw Error(what + ": the image has " + size(view.image.width(), view.image.height()) +
+                " pixels, but its camera is for " + size(view.camera.width_px, view.camera.height_px) +
+                "; give the camera that belongs to this image");
+  if (!view.mask.empty() && (view.mask.cols != view.image.width() || view.mask.rows != view.image.height()))
+    throw Error(what + ": the mask has " + size(view.mask.cols, view.mask.rows) + " pixels, the image " +
+                size(view.image.width(), view.image.height()));
+}
+
+}  // namespace marrow

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "marrow/base/export.hpp"
+#include "marrow/base/fields.hpp"
+#include "marrow/domain/image.hpp"
+#include "marrow/domain/transform.hpp"
+
+namespace MARROW_EXPORT marrow {
+
+/// Pinhole model of an X-ray view in OpenCV's convention (Eq 1-3 of the chapter, as corrected in docs/method.md). The
+/// X-ray source is the camera's origin, +z points to the detector, u to the right and v down. pixel = intrinsics *
+/// (camera_from_world * X), divided by the third coordinate. intrinsics = [f/pix_u s u0; 0 f/pix_v v0; 0 0 1], where f
+/// is the source-to-detector distance.
+struct Camera {
+  int width_px = 0;
+  int height_px = 0;
+  Eigen::Matrix3d intrinsics = Eigen::Matrix3d::Identity();
+  RigidTransform camera_from_world{"camera", "world"};
+
+  using fields = Fields<&Camera::width_px, &Camera::height_px, &Camera::intrinsics, &Camera::camera_from_world>;
+};
+
+/// Pixel onto which a world point projects. NaN unless the point is in front of the source (z > 0 in the camera's
+/// frame).
+Eigen::Vector2d project(const Camera& camera, const Eigen::Vector3d& world_mm);
+
+/// The X-ray source in world coordinates.
+Eigen::Vector3d source_position_mm(const Camera& camera);
+
+/// Unit direction, in world coordinates, of the ray from the source through a pixel.
+Eigen::Vector3d ray_direction(const Camera& camera, const Eigen::Vector2d& pixel);
+
+/// Plane {X : normal . X = offset_mm} in world coordinates.
+struct Plane {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+  double offset_mm = 0;
+};
+/// The plane through the source and the image line a u + b v + c = 0. This is the exact back-projection M^T l (Hartley
+/// and Zisserman 2004, 8.1); Eq 7 of the chapter uses an orthogonal projection instead.
+Plane back_project_line(const Camera& camera, const Eigen::Vector3d& line);
+
+/// How far, along the camera's x and y axes, a world point must move for its image to move by a small offset: the
+/// inverse of the projection's derivative. It holds for pixels of any shape.
+Eigen::Vector2d offset_at_mm(const Camera& camera, const Eigen::Vector3d& world_mm, const Eigen::Vector2d& offset_px);
+
+/// Size of a pixel at a world point, in mm: the square root of its area there, parallel to the detector. Only for what
+/// is the same in all directions, such as a blur; a distance in the image is turned into mm by offset_at_mm().
+double pixel_size_at_mm(const Camera& camera, const Eigen::Vector3d& world_mm);
+
+/// Throws Error if the image size is not positive or a side has more than 65536 pixels, if the camera matrix does not
+/// have the form given at Camera or its focal lengths are not positive, and as check_rigid() does. `what` names the
+/// camera in the message.
+void check_camera(const Camera& camera, const std::string& what);
+
+/// One X-ray view: an image and its camera. `mask` is CV_8U and non-zero where the image may be used; empty means
+/// everywhere.
+struct View {
+  std::string name;
+  Image image;
+  Camera camera;
+  cv::Mat mask;
+  using fields = Fields<&View::name, &View::image, &View::camera, &View::mask>;
+};
+
+/// Throws Error if the image is empty, if the sizes of image, camera and mask differ, and as check_camera() does. The
+/// message names the view and both sizes.
+void check_view(const View& view);
+
+}  // namespace marrow

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "marrow/base/export.hpp"
+#include "marrow/base/fields.hpp"
+
+namespace MARROW_EXPORT marrow {
+
+/// One edge pixel: its sub-pixel position, the unit direction of the gradient (towards brighter pixels), and the
+/// gradient's magnitude in grey values per pixel.
+struct EdgePixel {
+  float u_px = 0, v_px = 0;
+  float direction_u = 0, direction_v = 0;
+  float magnitude = 0;
+  using fields = Fields<&EdgePixel::u_px, &EdgePixel::v_px, &EdgePixel::direction_u, &EdgePixel::direction_v,
+                        &EdgePixel::magnitude>;
+};
+
+/// The edge pixels of one image, in row-major order of the pixels (round(v), round(u)) to which they belong.
+struct EdgeMap {
+  int width_px = 0;
+  int height_px = 0;
+  std::vector<EdgePixel> pixels;
+  using fields = Fields<&EdgeMap::width_px, &EdgeMap::height_px, &EdgeMap::pixels>;
+};
+
+/// A straight piece of outline in an image. Both ends are pixel positions on the line.
+struct LineSegment {
+  Eigen::Vector2d from_px = Eigen::Vector2d::Zero();
+  Eigen::Vector2d to_px = Eigen::Vector2d::Zero();
+  using fields = Fields<&LineSegment::from_px, &LineSegment::to_px>;
+};
+
+/// The two outer borders of the shaft in one view. Both run in the same direction. `left` is on the left when looking
+/// from `from` to `to` in the image (v down).
+struct ShaftLines {
+  LineSegment left;
+  LineSegment right;
+  /// The outer diameter of the shaft, if it lies at the depth of the isocentre (world origin). Then its standard
+  /// deviation, which includes the error of the fit and the unknown depth of the shaft. Then the score of the pair.
+  double width_mm = 0;
+  double width_deviation_mm = 0;
+  double log_likelihood = 0;
+  /// A rejected pair of borders, with the reason in words. `rejected` has the best ones first.
+  struct Rejected {
+    LineSegment left, right;
+    std::string reason;
+    using fields = Fields<&Rejected::left, &Rejected::right, &Rejected::reason>;
+  };
+  std::vector<Rejected> rejected;
+  using fields = Fields<&ShaftLines::left, &ShaftLines::right, &ShaftLines::width_mm, &ShaftLines::width_deviation_mm,
+                        &ShaftLines::log_likelihood, &ShaftLines::rejected>;
+};
+
+}  // namespace marrow

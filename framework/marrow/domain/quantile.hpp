@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The one definition of quantiles in marrow, medians among them (fraction 0.5): numpy's default, "linear", which is
+// type 7 of Hyndman and Fan (Sample quantiles in statistical packages, The American Statistician 50(4), 1996).
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "marrow/base/export.hpp"
+
+namespace MARROW_EXPORT marrow {
+
+/// Where a quantile lies among values in rising order: `part` of the way from the one at `below` to the one at `above`.
+struct QuantilePlace {
+  std::size_t below = 0, above = 0;
+  double part = 0;
+};
+
+/// `count` is at least 1, `fraction` between 0 and 1.
+inline QuantilePlace quantile_place(std::size_t count, double fraction) {
+  const double position = fraction * double(count - 1);
+  const std::size_t below = std::min(std::size_t(position), count - 1);
+  const double part = position - double(below);
+  return {below, part > 0 ? below + 1 : below, part};
+}
+
+/// The quantile of values in rising order, of which there is at least one and none is NaN.
+template <class Number>
+double quantile_of_sorted(const std::vector<Number>& sorted, double fraction) {
+  const QuantilePlace place = quantile_place(sorted.size(), fraction);
+  return std::lerp(double(sorted[place.below]), double(sorted[place.above]), place.part);
+}
+
+/// The same of values in any order, in a time in proportion to their number. Changes their order.
+template <class Number>
+double quantile_in_place(std::vector<Number>& values, double fraction) {
+  const QuantilePlace place = quantile_place(values.size(), fraction);
+  const auto below = values.begin() + std::ptrdiff_t(place.below);
+  std::nth_element(values.begin(), below, values.end());
+  if (place.above == place.below) return double(*below);
+  return std::lerp(double(*below), double(*std::min_element(below + 1, values.end())), place.part);
+}
+
+/// The same, of a copy.
+template <class Number>
+double quantile(std::vector<Number> values, double fraction) {
+  return quantile_in_place(values, fraction);
+}
+
+}  // namespace marrow

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "marrow/base/export.hpp"
+#include "marrow/base/fields.hpp"
+#include "marrow/domain/pose.hpp"
+
+namespace MARROW_EXPORT marrow {
+
+/// Whether a pose can be relied on. A larger value is worse.
+enum class Judgement : std::uint8_t {
+  trusted,
+  doubtful,  ///< something else must settle it, such as a further view
+  wrong,
+};
+constexpr bool is_valid(Judgement judgement) { return judgement <= Judgement::wrong; }
+
+/// "trusted", "doubtful" or "wrong".
+constexpr const char* name_of(Judgement judgement) {
+  constexpr const char* kNames[] = {"trusted", "doubtful", "wrong"};
+  return kNames[int(judgement)];
+}
+/// The judgement of this name; nothing for any other text.
+inline std::optional<Judgement> judgement_named(std::string_view name) {
+  for (const Judgement one : {Judgement::trusted, Judgement::doubtful, Judgement::wrong})
+    if (name == name_of(one)) return one;
+  return std::nullopt;
+}
+
+/// A pose is off if its mTRE over the fragment's surface is above this length, or if it is rotated about the fragment's
+/// long axis by more than this angle.
+inline constexpr double kMostError_mm = 2;
+inline constexpr double kMostAxialError_deg = 5;
+
+/// What is to be thought of a pose, without knowledge of the true one.
+struct Verdict {
+  Judgement judgement = Judgement::doubtful;
+  /// Probability (0 to 1) that the pose is off, as defined at kMostError_mm. NaN if it is not known.
+  double failure_probability = std::numeric_limits<double>::quiet_NaN();
+  std::vector<std::string> reasons;   ///< in words, the weightiest first
+  std::vector<std::string> remedies;  ///< in words: what would settle it; empty for a trusted pose
+  std::vector<Metric> figures;        ///< what the reasons rest on
+
+  using fields = Fields<&Verdict::judgement, &Verdict::failure_probability, &Verdict::reasons, &Verdict::remedies,
+                        &Verdict::figures>;
+};
+
+}  // namespace marrow

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/runtime/pipeline/named_files.hpp"
+
+#include <algorithm>
+
+#include "marrow/base/error.hpp"
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_below(const fs::path& folder, const fs::path& file) {
+  const fs::path from_folder = file.lexically_relative(folder);
+  return !from_folder.empty() && *from_folder.begin() != "..";
+}
+
+/// A link inside a folder that leads to a file of the folder, or to nothing. Throws Error for any other link.
+NamedFile linked_file(const fs::path& root, const fs::directory_entry& entry) {
+  std::error_code error;
+  const fs::path target = fs::canonical(entry.path(), error);
+  NamedFile file{entry.path(), "", !error};
+  if (error) return file;
+  if (!is_below(root, target))
+    throw Error(entry.path().string() + ": is a link to a place outside " + root.string() +
+                "; copy it into the folder");
+  if (fs::is_directory(target, error))
+    throw Error(entry.path().string() + ": is a link to a folder; put the folder itself there");
+  file.is_there = fs::is_regular_file(target, error);
+  return file;
+}
+
+void add_folder(const fs::path& root, const fs::path& folder, std::vector<NamedFile>& files) {
+  std::error_code error;
+  const auto fail = [&](const fs::path& path) {
+    throw Error(path.string() + ": cannot be read: " + error.message() + "; all files of a folder count");
+  };
+  fs::directory_iterator at(folder, error);
+  if (error) fail(folder);
+  for (const fs::directory_iterator end; at != end; at.increment(error)) {
+    if (error) fail(folder);
+    const fs::file_status status = at->symlink_status(error);
+    if (error) fail(at->path());
+    if (fs::is_symlink(status))
+      files.push_back(linked_file(root, *at));
+    else if (fs::is_directory(status))
+      add_folder(root, at->path(), files);
+    else if (fs::is_regular_file(status))
+      files.push_back({at->path(), ""});
+  }
+  if (error) fail(folder);
+}
+
+}  // namespace
+
+std::vector<NamedFile> files_named_by(const fs::path& path) {
+  std::error_code error;
+  if (path.empty() || !fs::exists(path, error)) return {};
+  if (!fs::is_directory(path, error)) return {{path, ".", fs::is_regular_file(path, error)}};
+  const fs::path root = fs::canonical(path, error);
+  if (error) throw Error(path.string() + ": cannot be read: " + error.message());
+  std::vector<NamedFile> files;
+  add_folder(root, root, files);
+  for (NamedFile& file : files) file.name = file.file.lexically_relative(root).generic_string();
+  std::sort(files.begin(), files.end(), [](const NamedFile& a, const NamedFile& b) { return a.name < b.name; });
+  return files;
+}
+
+std::vector<std::string> paths_of(const PipelineNode& node, std::size_t option) {
+  std::vector<std::string> paths;
+  const OptionType type = node.info.options[option].type;
+  if (type == OptionType::path) paths = {std::get<std::string>(node.options[option])};
+  if (type == OptionType::paths) paths = std::get<std::vector<std::string>>(node.options[option]);
+  return paths;
+}
+
+std::vector<std::string> paths_of(const PipelineNode& node) {
+  std::vector<std::string> all;
+  for (std::size_t i = 0; i < node.options.size(); ++i)
+    for (std::string& path : paths_of(node, i))
+      if (!path.empty()) all.push_back(std::move(path));
+  return all;
+}
+
+}  // namespace marrow

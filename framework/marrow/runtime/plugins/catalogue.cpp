@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/runtime/plugins/catalogue.hpp"
+#include "marrow/base/framework_file.hpp"
+#include "marrow/base/regular_file.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <set>
+#include <sstream>
+
+#include "marrow/plugin.hpp"
+#include "marrow/runtime/plugins/contract.hpp"
+#include "marrow/runtime/plugins/python_file.hpp"
+
+namespace marrow {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> Catalogue::default_folders() {
+  std::vector<fs::path> folders;
+  if (const char* path = std::getenv("MARROW_PLUGIN_PATH")) {
+    std::istringstream stream(path);
+    for (std::string folder; std::getline(stream, folder, ':');)
+      if (!folder.empty()) folders.emplace_back(folder);
+  }
+  folders.push_back(framework_file().parent_path() / "marrow");
+  return folders;
+}
+
+Catalogue::Catalogue(std::vector<fs::path> folders) : folders_(std::move(folders)) {
+  find_libraries();
+  do {
+    enter_names();
+  } while (refuse_broken_contracts());
+}
+
+void Catalogue::find_libraries() {
+  const Digest framework = file_digest(framework_file());
+  const auto refuse = [&](const fs::path& file, const std::string& reason) {
+    libraries_.push_back({});
+    libraries_.back().file = file;
+    libraries_.back().refused = reason;
+  };
+  for (const fs::path& folder : folders_) {
+    std::vector<fs::path> files;
+    std::error_code error;
+    for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
+      if (at->path().extension() == ".so" || is_python_plugin(at->path())) files.push_back(at->path());
+    if (error && error != std::errc::no_such_file_or_directory)
+      refuse(folder, "cannot be searched for libraries: " + error.message());
+    std::sort(files.begin(), files.end());
+    for (const fs::path& file : files) {
+      try {
+        libraries_.push_back(library_info(file, framework));
+      } catch (const Error& error) {
+        refuse(file, error.what());
+      }
+    }
+  }
+}
+
+void Catalogue::enter_names() {
+  kinds_.clear();
+  nodes_.clear();
+  writers_.clear();
+  for (std::size_t l = 0; l < libraries_.size(); ++l) {
+    for (std::size_t i = 0; i < libraries_[l].kinds.size(); ++i)
+      kinds_.try_emplace(libraries_[l].kinds[i].name, Entry{l, i});
+    for (std::size_t i = 0; i < libraries_[l].nodes.size(); ++i)
+      nodes_.try_emplace(libraries_[l].nodes[i].name, Entry{l, i});
+    for (std::size_t i = 0; i < libraries_[l].writers.size(); ++i)
+      writers_.try_emplace(libraries_[l].writers[i].type.id, Entry{l, i});
+  }
+}
+
+bool Catalogue::refuse_broken_contracts() {
+  std::vector<std::string> reasons;
+  bool any = false;
+  for (const LibraryInfo& library : libraries_) {
+    std::string faults;
+    for (const NodeInfo& node : library.nodes)
+      for (const std::string& fault : contract_faults(node, find_kind(node.kind())))
+        faults += (faults.empty() ? "" : "; ") + node.name + ": " + fault;
+    any = any || !faults.empty();
+    reasons.push_back(std::move(faults));
+  }
+  for (std::size_t l = 0; l < libraries_.size(); ++l) {
+    if (reasons[l].empty()) continue;
+    LibraryInfo& library = libraries_[l];
+    library.refused = "declares its nodes wrongly: " + reasons[l];
+    library.kinds.clear();
+    library.nodes.clear();
+    library.writers.clear();
+  }
+  return any;
+}
+
+Catalogue::~Catalogue() = default;
+
+std::vector<std::string> Catalogue::node_names() const {
+  std::vector<std::string> names;
+  for (const auto& [name, entry] : nodes_) names.push_back(name);
+  return names;
+}
+
+const NodeInfo* Catalogue::find(const std::string& name) const {
+  const auto found = nodes_.find(name);
+  return found == nodes_.end() ? nullptr : &libraries_[found->second.library].nodes[found->second.index];
+}
+
+const LibraryInfo* Catalogue::library_of(const std::string& name) const {
+  const auto found = nodes_.find(name);
+  return found == nodes_.end() ? nullptr : &libraries_[found->second.library];
+}
+
+std::vector<std::string> Catalogue::kind_names() const {
+  std::set<std::string> names;
+  for (const auto& [name, entry] : kinds_) names.insert(name);
+  for (const auto& [name, entry] : nodes_) names.insert(name.substr(0, name.find('.')));
+  return {names.begin(), names.end()};
+}
+
+const KindInfo* Catalogue::find_kind(const std::string& name) const {
+  const auto found = kinds_.find(name);
+  return found == kinds_.end() ? nullptr : &libraries_[found->second.library].kinds[found->second.index];
+}
+
+const LibraryInfo* Catalogue::library_of_kind(const std::string& name) const {
+  const auto found = kinds_.find(name);
+  return found == kinds_.end() ? nullptr : &libraries_[found->second.library];
+}
+
+std::vector<KindPort> Catalogue::ports_of_kind(const std::string& kind) const {
+  std::vector<KindPort> ports;
+  if (const KindInfo* contract = find_kind(kind)) ports = contract->inputs;
+  for (const auto& [name, entry] : nodes_) {
+    const NodeInfo& node = libraries_[entry.library].nodes[entry.index];
+    if (node.kind() != kind) continue;
+    for (const PortInfo& port : node.inputs) {
+      const auto known =
+          std::find_if(ports.begin(), ports.end(), [&](const KindPort& one) { return one.name == port.name; });
+      if (known == ports.end())
+        ports.push_back({port.name, port.help, {port.type}, port.axis});
+      else if (std::find(known->types.begin(), known->types.end(), port.type) == known->types.end())
+        known->types.push_back(port.type);
+    }
+  }
+  return ports;
+}
+
+const WriterInfo* Catalogue::find_writer(const TypeInfo& type) const {
+  const auto found = writers_.find(type.id);
+  if (found == writers_.end()) return nullptr;
+  const WriterInfo& writer = libraries_[found->second.library].writers[found->second.index];
+  return writer.type == type ? &writer : nullptr;
+}
+
+const Plugin& Catalogue::load_plugin(std::size_t library) const {
+  const std::scoped_lock lock(mutex_);
+  std::unique_ptr<Plugin>& plugin = loaded_[library];
+  if (!plugin) plugin = load_library(libraries_[library]);
+  return *plugin;
+}
+
+const NodeDefinition& Catalogue::load(const std::string& name) const {
+  const Entry& entry = nodes_.at(name);
+  return load_plugin(entry.library).nodes.at(entry.index);
+}
+
+const KindDefinition& Catalogue::load_kind(const std::string& name) const {
+  const Entry& entry = kinds_.at(name);
+  return load_plugin(entry.library).kinds.at(entry.index);
+}
+
+const WriterDefinition& Catalogue::load_writer(const TypeInfo& type) const {
+  const Entry& entry = writers_.at(type.id);
+  return load_plugin(entry.library).writers.at(entry.index);
+}
+
+}  // namespace marrow

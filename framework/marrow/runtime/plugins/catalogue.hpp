@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "marrow/base/export.hpp"
+#include "marrow/runtime/plugins/library.hpp"
+
+namespace MARROW_EXPORT marrow {
+
+struct KindDefinition;
+
+/// All kinds and nodes that can be used. They are known from manifests; a library is loaded when its code is first
+/// needed. A constructed catalogue is safe to use from several threads.
+class Catalogue {
+ public:
+  /// Searches the folders in their order. If several libraries offer the same name, the first library counts. A library
+  /// is refused if one of its nodes breaks the contract of its kind, even if the kind is declared by another library.
+  explicit Catalogue(std::vector<std::filesystem::path> folders = default_folders());
+  ~Catalogue();
+
+  /// The folders named in MARROW_PLUGIN_PATH (separated by ':'), then the folder `marrow` next to the framework's
+  /// library.
+  static std::vector<std::filesystem::path> default_folders();
+
+  const std::vector<std::filesystem::path>& folders() const { return folders_; }
+  const std::vector<LibraryInfo>& libraries() const { return libraries_; }
+  /// Sorted.
+  std::vector<std::string> node_names() const;
+  /// nullptr if no library offers it.
+  const NodeInfo* find(const std::string& name) const;
+  const LibraryInfo* library_of(const std::string& name) const;
+  /// The kinds that libraries declare, and the kinds of nodes whose kind no library declares. Sorted.
+  std::vector<std::string> kind_names() const;
+  /// nullptr if no library declares it.
+  const KindInfo* find_kind(const std::string& name) const;
+  const LibraryInfo* library_of_kind(const std::string& name) const;
+  /// The inputs that a pipeline may wire for a node of the kind: those of the kind's contract and those of all its
+  /// known nodes.
+  std::vector<KindPort> ports_of_kind(const std::string& kind) const;
+  const WriterInfo* find_writer(const TypeInfo& type) const;
+
+  /// Loads the node's library. Throws Error if that fails.
+  const NodeDefinition& load(const std::string& name) const;
+  /// Loads the library that declares the kind. Throws Error if that fails.
+  const KindDefinition& load_kind(const std::string& name) const;
+  const WriterDefinition& load_writer(const TypeInfo& type) const;
+
+ private:
+  void find_libraries();
+  void enter_names();
+  /// Returns whether it refused a library. If so, the names must be entered again.
+  bool refuse_broken_contracts();
+  const Plugin& load_plugin(std::size_t library) const;
+
+  std::vector<std::filesystem::path> folders_;
+  std::vector<LibraryInfo> libraries_;
+  struct Entry {
+    std::size_t library = 0, index = 0;
+  };
+  std::map<std::string, Entry> nodes_;
+  std::map<std::string, Entry> kinds_;
+  std::map<std::string, Entry> writers_;
+  mutable std::mutex mutex_;
+  mutable std::map<std::size_t, std::unique_ptr<Plugin>> loaded_;
+};
+
+}  // namespace marrow

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+// Descriptions of libraries that are not loaded: the manifests next to them, and a cache of descriptions in the user's
+// own folder.
+#include "marrow/runtime/plugins/descriptions.hpp"
+#include "marrow/base/framework_file.hpp"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdlib>
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/json_text.hpp"
+#include "marrow/base/regular_file.hpp"
+#include "marrow/base/text_file.hpp"
+#include "marrow/runtime/plugins/linked_libraries.hpp"
+#include "marrow/runtime/plugins/manifest.hpp"
+#include "marrow/runtime/plugins/python_file.hpp"
+#include "marrow/runtime/plugins/searched_folders.hpp"
+#include "marrow/runtime/plugins/trust.hpp"
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path manifest_beside(const fs::path& library) { return fs::path(library).replace_extension(".json"); }
+
+/// The folder that an environment variable names. Empty if the variable is not set, is empty or is a relative path,
+/// which would depend on where the program happens to run.
+fs::path folder_of(const char* variable) {
+  const char* text = std::getenv(variable);
+  return text && text[0] == '/' ? fs::path(text) : fs::path();
+}
+
+/// Empty if there is none: without a home folder nothing is kept.
+fs::path cache_folder() {
+  if (const fs::path cache = folder_of("XDG_CACHE_HOME"); !cache.empty()) return cache / "marrow" / "libraries";
+  if (const fs::path home = folder_of("HOME"); !home.empty()) return home / ".cache" / "marrow" / "libraries";
+  return {};
+}
+
+/// Whether a folder belongs to the user alone. A folder that an older version made readable for all is made private.
+bool is_own(const fs::path& folder) {
+  struct stat status {};
+  if (stat(folder.c_str(), &status) != 0 || !S_ISDIR(status.st_mode) || status.st_uid != geteuid()) return false;
+  if ((status.st_mode & 077) && chmod(folder.c_str(), 0700) != 0) return false;
+  return changeable_by_others(folder).empty();
+}
+
+/// Makes the folder for the user alone. Nobody else may be able to change the folders above it.
+bool make_own(const fs::path& folder) {
+  std::error_code error;
+  if (fs::exists(folder, error)) return is_own(folder);
+  const fs::path parent = folder.parent_path();
+  if (!fs::exists(parent, error) && !make_own(parent)) return false;
+  if (!changeable_by_others(parent).empty()) return false;
+  return (mkdir(folder.c_str(), 0700) == 0 || errno == EEXIST) && is_own(folder);
+}
+
+/// The file of a library's description in the cache. Its name depends on the framework too, because a newer framework
+/// may accept what an older one refused. Empty if nothing can be kept.
+fs::path cached_file(const Digest& library, const Digest& framework, bool make) {
+  const fs::path folder = cache_folder();
+  if (folder.empty() || !(make ? make_own(folder) : is_own(folder))) return {};
+  Hasher name;
+  name.add(library);
+  name.add(framework);
+  name.add(search_digest());
+  return folder / (name.digest().hex() + ".json");
+}
+
+/// Why a description does not belong to this very library and to the linked libraries that are here now; empty if it
+/// does.
+std::string stale(const LibraryInfo& info, const Digest& digest) {
+  if (info.digest != digest) return "it belongs to another build of the library";
+  for (const LinkedLibrary& library : info.linked) {
+    struct stat status {};
+    if (stat(library.path.c_str(), &status) != 0 || !S_ISREG(status.st_mode) ||
+        std::uint64_t(status.st_size) != library.size)
+      return fs::path(library.path).filename().string() + " has changed";
+  }
+  for (const SearchedFolder& folder : info.searched)
+    if (const std::vector<fs::path> files = files_with_names(folder); !files.empty())
+      return files[0].string() + " has appeared, in a folder that is searched earlier";
+  return "";
+}
+
+/// The text of a manifest. Throws Error, with a text that begins with "it".
+std::string manifest_text_of(const fs::path& file) try {
+  return read_text(RegularFile(trusted_path(file)), kMostManifest_bytes);
+} catch (const Error& error) {
+  throw Error(std::string("it ") + error.what());
+}
+
+/// The description of a library from the manifest next to it. If the manifest cannot be used, returns nothing, and
+/// `note` says why.
+std::optional<LibraryInfo> from_manifest(const fs::path& library, const Digest& digest, std::string& note) {
+  const fs::path manifest = manifest_beside(library);
+  std::error_code error;
+  if (!fs::exists(fs::symlink_status(manifest, error))) return std::nullopt;
+  try {
+    LibraryInfo info = manifest_from_text(manifest_text_of(manifest));
+    if (!info.refused.empty()) throw Error("it is of a library that was refused");
+    std::string reason = stale(info, digest);
+    for (const LinkedLibrary& linked : info.linked)
+      if (reason.empty() && !found_before(linked).empty()) reason = "LD_LIBRARY_PATH leads to " + found_before(linked);
+    if (reason.empty()) return info;
+    note = "its manifest is stale (" + reason + "), so it was described anew";
+  } catch (const Error& fault) {
+    note = std::string("its manifest is not used (") + fault.what() + "), so it was described anew";
+  }
+  return std::nullopt;
+}
+
+/// The description of a library from the cache; nothing if the cache has none that can be used.
+std::optional<LibraryInfo> from_cache(const Digest& digest, const Digest& framework) {
+  std::optional<LibraryInfo> info = kept_description(digest, framework);
+  return info && stale(*info, digest).empty() ? info : std::nullopt;
+}
+
+LibraryInfo describe_anew(const fs::path& file, const Digest& digest, const Digest& framework) {
+  LibraryInfo info = describe_library(file);
+  if (info.refused.empty() && info.digest != digest) throw Error("was changed while it was described; start again");
+  if (info.digest == digest) keep_description(info, digest, framework);
+  return info;
+}
+
+/// Whether marrow wrote the file. It may be stale or of another version.
+bool is_manifest(const fs::path& file) {
+  try {
+    return parse_json(read_text_file(file, kMostManifest_bytes), file.string()).contains("marrow_manifest");
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+}  // namespace
+
+std::optional<LibraryInfo> kept_description(const Digest& name, const Digest& framework) {
+  const fs::path file = cached_file(name, framework, false);
+  if (file.empty()) return std::nullopt;
+  try {
+    const RegularFile source(file);
+    if (source.status().st_uid != geteuid()) return std::nullopt;
+    return manifest_from_text(read_text(source, kMostManifest_bytes));
+  } catch (const Error&) {
+    // This is only a cache: the library is described anew, and that description is kept instead.
+    return std::nullopt;
+  }
+}
+
+void keep_description(const LibraryInfo& info, const Digest& name, const Digest& framework) {
+  // The reason may be outside of the library, such as another library that it needs, and may be gone next time.
+  if (info.refused.starts_with("cannot be")) return;
+  try {
+    if (const fs::path file = cached_file(name, framework, true); !file.empty())
+      write_text(file, manifest_text(info), 0600);
+  } catch (const Error&) {
+    // This is only a cache: the library is described again next time.
+  }
+}
+
+LibraryInfo library_info(const fs::path& file, const Digest& framework) {
+  if (is_python_plugin(file)) return python_file_info(file, framework);
+  const Digest digest = digest_of(RegularFile(trusted_path(file)));
+  std::string note;
+  std::optional<LibraryInfo> known = from_manifest(file, digest, note);
+  if (!known) known = from_cache(digest, framework);
+  LibraryInfo info = known ? std::move(*known) : describe_anew(file, digest, framework);
+  if (const std::string fault = untrusted_among(paths_of(info.linked)); !fault.empty()) throw Error(fault);
+  info.file = file;
+  info.note = note;
+  Hasher build_id;
+  build_id.add(digest);
+  build_id.add(framework);
+  for (const Digest& identity : framework_identities()) build_id.add(identity);
+  for (const LinkedLibrary& library : std::as_const(info.linked)) build_id.add(identity_of(library));
+  info.build_id = build_id.digest();
+  return info;
+}
+
+void forget_description(const LibraryInfo& library) {
+  const fs::path file = cached_file(library.digest, file_digest(framework_file()), false);
+  std::error_code error;
+  if (!file.empty()) fs::remove(file, error);
+}
+
+std::string cure_of_description(const fs::path& library) {
+  std::error_code error;
+  const fs::path manifest = manifest_beside(library);
+  if (!fs::exists(fs::symlink_status(manifest, error))) return "start again: it is then described anew";
+  return "run 'marrow describe " + library.string() + " --write', or remove " + manifest.string();
+}
+
+void write_manifest(const LibraryInfo& info) {
+  const fs::path manifest = manifest_beside(info.file);
+  if (info.file.extension() != ".so")
+    throw Error("a manifest is written only beside a library whose name ends in .so, got " + info.file.string() +
+                "; rename it");
+  std::error_code error;
+  if (fs::exists(fs::symlink_status(manifest, error)) && !is_manifest(manifest))
+    throw Error(manifest.string() + " is there already and is no manifest that marrow wrote; move it away, or rename " +
+                info.file.string());
+  write_text(manifest, manifest_text(info), 0644);
+}
+
+}  // namespace marrow

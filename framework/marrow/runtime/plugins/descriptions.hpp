@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <optional>
+
+#include "marrow/runtime/plugins/library.hpp"
+
+namespace marrow {
+
+/// Removes the kept description of a library that turned out to be different, so that the library is described anew.
+void forget_description(const LibraryInfo& library);
+
+/// A description in the user's cache, by the name that keep_description() gave it; nothing if there is none. The caller
+/// checks that it is not stale.
+std::optional<LibraryInfo> kept_description(const Digest& name, const Digest& framework);
+/// Keeps a description in the user's cache, unless it is a refusal whose reason may be gone next time.
+void keep_description(const LibraryInfo& info, const Digest& name, const Digest& framework);
+
+/// What a person can do about a wrong description.
+std::string cure_of_description(const std::filesystem::path& library);
+
+}  // namespace marrow

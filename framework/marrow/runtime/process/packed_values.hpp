@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Hands values from one process to another. A file has the packed data of the values one after the other, then their
+// description, then the place of the description. Small pieces are in memory that both processes share. Large pieces
+// are copied once, from the memory of one process to that of the other.
+#include <sys/types.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/export.hpp"
+#include "marrow/runtime/node/value.hpp"
+
+namespace MARROW_EXPORT marrow {
+
+/// Memory without a name, as an open file. Throws Error if it cannot be made.
+class SharedMemory {
+ public:
+  SharedMemory();
+  ~SharedMemory();
+  SharedMemory(const SharedMemory&) = delete;
+  SharedMemory& operator=(const SharedMemory&) = delete;
+  int descriptor() const { return descriptor_; }
+  /// From now on nobody can write to it, also no other process that opens it through /proc. Throws Error if the system
+  /// does not allow this.
+  void seal() const;
+
+ private:
+  int descriptor_;
+};
+
+/// Writes values to an open file. With `in_place`, large pieces stay where they are and only their addresses are
+/// written; the values must then stay until they are read. Throws Error for functions, and if the file cannot be
+/// written.
+void write_values(int descriptor, const std::vector<Value>& values, bool in_place);
+
+/// How many bytes the file holds.
+std::uint64_t bytes_in(int descriptor);
+
+/// Returns the Content that unpacks data of a type; nullptr for a type that is not known.
+using ContentOf = std::function<const Content*(const TypeInfo&)>;
+
+/// Thrown if the memory of the other process cannot be read: the system does not allow it, or the process is gone.
+class NoAccess : public Error {
+ public:
+  using Error::Error;
+};
+
+/// Reads values back. Pieces that stayed in place are read from the memory of `process`. Throws Error for any bytes
+/// that write_values() did not write, and NoAccess if that memory cannot be read.
+std::vector<Value> read_values(int descriptor, pid_t process, const ContentOf& content_of);
+
+/// The Content of marrow's own types; nullptr for other types.
+const Content* content_of_own(const TypeInfo& type);
+
+}  // namespace marrow

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <string>
+#include <vector>
+
+#include "marrow/base/export.hpp"
+#include "marrow/runtime/run/evaluation.hpp"
+
+namespace MARROW_EXPORT_TO_TESTS marrow {
+
+/// The calls of one node.
+struct NodeCalls {
+  std::vector<Call> calls;
+  std::vector<std::vector<std::string>> names;  ///< along each mapped axis
+};
+
+/// Collects the node's inputs and makes a call for each item along the mapped axes. Throws Error if two lists have
+/// different names along an axis.
+void make_calls(const Pipeline& pipeline, const RunResult& result, std::size_t index, NodeCalls& made);
+
+/// Why a call cannot be made, or an empty text. If it cannot be made, `status` is set: skipped if an input simply does
+/// not exist, not_run if it could not be made, failed if the node that was to make it may fail and did. Takes out such
+/// inputs where the call can do without them.
+std::string obstacle(const PipelineNode& node, Call& call, NodeRecord::Status& status);
+
+/// Sets the status of the node from its calls, with the reason if it is not done.
+void set_status(const std::vector<Call>& calls, NodeRecord& record);
+
+/// One output of the node: nested lists along the mapped axes.
+Value output_of(const PipelineNode& node, const NodeCalls& made, std::size_t output);
+
+}  // namespace marrow

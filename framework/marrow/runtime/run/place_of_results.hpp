@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "marrow/base/export.hpp"
+#include "marrow/runtime/pipeline/pipeline.hpp"
+
+namespace MARROW_EXPORT marrow {
+
+/// Throws Error if `place`, to which a run writes, is in a folder that a node of the run reads. All files of that
+/// folder count, so its content would not be the same before and after. `what` and `advice` are parts of the message.
+void expect_nothing_reads(const Pipeline& pipeline, const std::filesystem::path& place, const std::string& what,
+                          const std::string& advice);
+
+/// The first of the folders that contains `place`, with all links followed; nothing if none does.
+std::optional<std::filesystem::path> folder_that_holds(const std::vector<std::filesystem::path>& folders,
+                                                       const std::filesystem::path& place);
+
+}  // namespace marrow

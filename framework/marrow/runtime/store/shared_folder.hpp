@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The folder of a shared store: who may use it, and how its files are read although hosts see each other's files late.
+//   marrow-store   says that this is a shared store
+//   01/01...HEX    entries: results, and simulated cases as one file each
+//   claims/HEX     who makes a result (shared_claim.hpp)
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "marrow/runtime/store/store_file.hpp"
+
+namespace marrow {
+
+struct SharedFolderState {
+  bool is_store = false;
+  bool may_write = false;
+  std::string fault;  ///< why it cannot be used
+  Permissions permissions;
+};
+/// A shared store may belong to another user. It must exist, so that a folder that is not mounted on this host is not
+/// mistaken for it. What is written to it may be read and written by its group if the folder may, and by nobody else.
+SharedFolderState examine_shared(const std::filesystem::path& folder);
+/// Makes a store of an empty folder. Returns what examine_shared() then says.
+SharedFolderState make_shared(const std::filesystem::path& folder);
+
+/// Whether the file's name is in its folder. Listing asks the server again. The folder itself may be new to this host.
+bool is_listed(const std::filesystem::path& file);
+
+/// How far what this host remembers about a folder is relied on. `listed`: it lists the folder first, so that it learns
+/// of new files.
+enum class SharedLook { quick, listed };
+
+/// Opens a file and calls use(file). If it returns false, because the file cannot be read or is not whole, or if a file
+/// that is listed cannot be opened, tries again with pauses, about a second in all. Returns whether use() returned
+/// true. `fault` is set if the folder cannot be read at all.
+bool read_shared(const std::filesystem::path& file, SharedLook look, const std::function<bool(const StoreFile&)>& use,
+                 std::string& fault);
+
+}  // namespace marrow

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/runtime/store/store.hpp"
+
+#include <unistd.h>
+
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <new>
+
+#include "marrow/base/plain_path.hpp"
+#include "marrow/base/reason_of_exception.hpp"
+#include "marrow/base/user_folder.hpp"
+#include "marrow/runtime/store/shared_store.hpp"
+#include "marrow/runtime/store/store_entry.hpp"
+#include "marrow/runtime/store/store_folder.hpp"
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What a file in `last` holds. It includes the place, so that a file that was renamed to another place's name is
+/// noticed.
+struct Remembered {
+  std::string place;
+  Store::LastResults results;
+  using fields = Fields<&Remembered::place, &Remembered::results>;
+};
+
+constexpr std::uint64_t kMostRemembered = 16 << 20;  // bytes
+
+}  // namespace
+
+Store::Store() : Store(default_folder(), SharedStore::of_environment()) {}
+Store::Store(const fs::path& folder) : Store(folder, nullptr) {}
+Store::Store(const fs::path& folder, std::shared_ptr<SharedStore> shared)
+    : folder_(folder.empty() ? folder : plain_path(fs::absolute(folder))), shared_(std::move(shared)) {}
+
+fs::path Store::default_folder() {
+  const char* folder = std::getenv("MARROW_CACHE");
+  if (folder && *folder) return folder;
+  const fs::path cache = user_cache_folder();
+  return cache.empty() ? cache : cache / "marrow" / "store";
+}
+
+fs::path Store::file_of(const Digest& key) const {
+  const std::string name = key.hex();
+  return folder_ / name.substr(0, 2) / name;
+}
+
+std::string Store::fault() const { return examine_store(folder_).fault; }
+
+bool Store::is_there() const {
+  if (!is_checked_) is_checked_ = examine_store(folder_).is_store;
+  return is_checked_;
+}
+
+std::string Store::prepare() const {
+  if (is_checked_ && access((folder_ / kStoreMarker).c_str(), F_OK) == 0) return "";
+  std::string fault = make_store(folder_);
+  is_checked_ = fault.empty();
+  return fault;
+}
+
+std::optional<StoredResult> Store::find(const Digest& key) const { return find(key, Where::anywhere); }
+
+std::optional<StoredResult> Store::find(const Digest& key, Where where) const {
+  std::optional<StoredResult> found = find_here(key);
+  if (found || where == Where::here || !shared_ || !prepare().empty()) return found;
+  std::optional<StoredResult> in_place;
+  if (!shared_->fetch(key, file_of(key), where == Where::anew ? SharedLook::listed : SharedLook::quick, in_place))
+    return found;
+  return in_place ? std::move(in_place) : find_here(key);
+}
+
+std::optional<StoredResult> Store::find_here(const Digest& key) const {
+  if (!is_there()) return std::nullopt;
+  const fs::path path = file_of(key);
+  const StoreFile file(path);
+  if (!file.is_open()) return std::nullopt;
+  try {
+    ReadEntry entry = read_entry(file, key);
+    StoredResult result{{}, outputs_of(entry, path)};
+    result.provenance = std::move(entry.description.provenance);
+    file.mark_as_used();
+    return result;
+  } catch (const std::bad_alloc&) {
+    return std::nullopt;
+  } catch (const Error&) {  // damaged, of another layout, or of another key
+  }
+  drop(key);
+  return std::nullopt;
+}
+
+void Store::drop(const Digest& key) const {
+  if (is_there()) unlink(file_of(key).c_str());
+}
+
+std::string Store::save(const Digest& key, const std::vector<Value>& outputs, const Provenance& provenance) const {
+  if (std::string fault = prepare(); !fault.empty()) return fault;
+  try {
+    const EntryDescription description = describe_entry(key, outputs, provenance);
+    return write_whole(file_of(key), [&](Archive& out) { write_entry(out, description, outputs); });
+  } catch (const std::bad_alloc&) {
+    return "out of memory";
+  } catch (...) {  // a value of a plugin's own type
+    return reason_of_exception();
+  }
+}
+
+void Store::remember(const std::string& place, const LastResults& results) const {
+  if (results.empty() || !prepare().empty()) return;
+  LastResults all = results;
+  all.merge(last(place));
+  Packer packed;
+  packed.add(Remembered{place, std::move(all)});
+  if (packed.packed.size() <= kMostRemembered) write_checked(folder_ / "last" / hash_of(place).hex(), packed.packed);
+}
+
+Store::LastResults Store::last(const std::string& place) const {
+  if (!is_there()) return {};
+  const auto text = read_checked(folder_ / "last" / hash_of(place).hex(), kMostRemembered);
+  if (!text) return {};
+  try {
+    Remembered remembered = Unpacker(*text).get<Remembered>();
+    if (remembered.place == place) return std::move(remembered.results);
+  } catch (const Error&) {  // of another layout
+  }
+  return {};
+}
+
+std::optional<std::uint64_t> bytes_of_gigabytes(std::string_view text) {
+  constexpr double kMost_GB = 1e6;
+  double number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size() || !(number >= 0 && number <= kMost_GB))
+    return std::nullopt;
+  return std::uint64_t(number * 1e9);
+}
+
+}  // namespace marrow

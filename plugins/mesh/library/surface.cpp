@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/mesh/surface.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <numeric>
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/domain/transform.hpp"
+
+namespace marrow::surface {
+
+using marrow::Error;
+using marrow::Mesh;
+
+void check_grid(const marrow::SignedField& field) {
+  const auto& size = field.grid.size;
+  if (size[0] <= 0 || size[1] <= 0 || size[2] <= 0 || field.values_mm.size() != field.grid.count())
+    throw Error("field: " + std::to_string(field.values_mm.size()) + " values do not fill a grid of " +
+                std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " + std::to_string(size[2]) +
+                " voxels; wire the output of a segment node");
+  marrow::check_rigid({field.grid.frame, "grid", field.grid.direction, field.grid.origin_mm}, "field");
+}
+
+void check_values(bool all_finite, bool any_inside, bool any_outside) {
+  if (!all_finite) throw Error("field: some values are not finite numbers; a signed distance in mm was expected");
+  if (!any_inside)
+    throw Error(
+        "field: there is no surface, as no value is negative (inside); the segmentation found nothing: check its "
+        "seeds and thresholds");
+  if (!any_outside)
+    throw Error(
+        "field: there is no surface, as every value is negative (inside); the segmentation ran over the whole "
+        "volume: raise its threshold");
+}
+
+void check_vertex_count(std::size_t count) {
+  if (count > 0x7fffffff)
+    throw Error("field: its surface has " + std::to_string(count) +
+                " vertices, more than a mesh can index; the field is noise or the grid far too fine");
+}
+
+void check_field(const marrow::SignedField& field) {
+  check_grid(field);
+  bool finite = true, inside = false, outside = false;
+  for (float value : field.values_mm) {
+    finite &= std::isfinite(value);
+    inside |= value < 0;
+    outside |= value >= 0;
+  }
+  check_values(finite, inside, outside);
+}
+
+namespace {
+
+/// Connected components (union-find). Each vertex points to an earlier vertex of its component, the first vertex to
+/// itself. Several threads may join at once: only a first vertex gets a new target, by compare-exchange.
+class Parts {
+ public:
+  explicit Parts(const Mesh& mesh) : before_(mesh.vertices_mm.size()) {
+    std::iota(before_.begin(), before_.end(), 0u);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+        join(mesh.triangles[i][0], mesh.triangles[i][1]);
+        join(mesh.triangles[i][0], mesh.triangles[i][2]);
+      }
+    });
+  }
+
+  /// The component of each vertex, numbered from 0 in the order of their first vertices.
+  std::vector<std::uint32_t> numbers(std::uint32_t& count) && {
+    count = 0;
+    for (std::uint32_t v = 0; v < before_.size(); ++v) before_[v] = before_[v] == v ? count++ : before_[before_[v]];
+    return std::move(before_);
+  }
+
+ private:
+  std::atomic_ref<std::uint32_t> before(std::uint32_t v) { return std::atomic_ref(before_[v]); }
+
+  std::uint32_t first_of(std::uint32_t v) {
+    for (;;) {
+      const std::uint32_t parent = before(v).load(std::memory_order_relaxed);
+      if (parent == v) return v;
+      const std::uint32_t next = before(parent).load(std::memory_order_relaxed);
+      if (next != parent) before(v).store(next, std::memory_order_relaxed);
+      v = next;
+    }
+  }
+  void join(std::uint32_t a, std::uint32_t b) {
+    for (;;) {
+      a = first_of(a), b = first_of(b);
+      if (a == b) return;
+      std::uint32_t last = std::max(a, b);
+      if (before(last).compare_exchange_strong(last, std::min(a, b), std::memory_order_relaxed)) return;
+    }
+  }
+
+  std::vector<std::uint32_t> before_;
+};
+
+/// Six times the volume that each component encloses. The order of summation does not depend on the threads.
+std::vector<double> six_volumes(const Mesh& mesh, const std::vector<std::uint32_t>& part, std::uint32_t count) {
+  constexpr std::size_t kChunks = 8;
+  const Eigen::Vector3d origin = mesh.vertices_mm[mesh.triangles.front()[0]];
+  std::vector<std::vector<double>> sums(kChunks, std::vector<double>(count, 0));
+  tbb::parallel_for(std::size_t(0), kChunks, [&](std::size_t chunk) {
+    for (std::size_t i = mesh.triangles.size() * chunk / kChunks; i < mesh.triangles.size() * (chunk + 1) / kChunks;
+         ++i) {
+      const auto& t = mesh.triangles[i];
+      const Eigen::Vector3d a = mesh.vertices_mm[t[0]] - origin, b = mesh.vertices_mm[t[1]] - origin,
+                            c = mesh.vertices_mm[t[2]] - origin;
+      sums[chunk][part[t[0]]] += a.dot(b.cross(c));
+    }
+  });
+  for (std::size_t chunk = 1; chunk < kChunks; ++chunk)
+    for (std::uint32_t k = 0; k < count; ++k) sums[0][k] += sums[chunk][k];
+  return sums[0];
+}
+
+}  // namespace
+
+Mesh largest_component(Mesh mesh) {
+  if (mesh.triangles.empty()) return mesh;
+  std::uint32_t count = 0;
+  std::vector<std::uint32_t> part = Parts(mesh).numbers(count);
+  if (count == 1) return mesh;
+  const std::vector<double> volumes = six_volumes(mesh, part, count);
+  const auto best = std::uint32_t(std::max_element(volumes.begin(), volumes.end()) - volumes.begin());
+
+  constexpr std::uint32_t kDropped = 0xffffffff;
+  std::uint32_t vertices = 0;  // from here on, part[v] is the vertex's new index
+  for (std::uint32_t v = 0; v < part.size(); ++v) {
+    if (part[v] == best) mesh.vertices_mm[vertices] = mesh.vertices_mm[v];
+    part[v] = part[v] == best ? vertices++ : kDropped;
+  }
+  mesh.vertices_mm.resize(vertices);
+  std::size_t triangles = 0;
+  for (const auto& t : mesh.triangles)
+    if (part[t[0]] != kDropped) mesh.triangles[triangles++] = {part[t[0]], part[t[1]], part[t[2]]};
+  mesh.triangles.resize(triangles);
+  return mesh;
+}
+
+void check_stable(const Taubin& taubin, const std::string& what) {
+  const double band = taubin.pass_band, lambda = taubin.lambda;
+  // A pair of steps multiplies a wave of the frequency k by 1 + lambda |mu| k (pass_band - k), with k up to 2. The
+  // factor of k = 2 is at least -1 as long as (2 - pass_band) lambda^2 + pass_band lambda <= 1.
+  const double most_lambda = (std::sqrt(band * band + 4 * (2 - band)) - band) / (2 * (2 - band));
+  if (!(lambda <= most_lambda))
+    throw Error(what + ": with lambda " + formatted("{:g}", lambda) + " and pass_band " + formatted("{:g}", band) +
+                " the shortest waves grow with each step, and tear the surface apart; give a lambda of at most " +
+                formatted("{:.3f}", std::floor(1000 * most_lambda) / 1000));
+  // The factor is largest at k = pass_band / 2.
+  constexpr double kMostGrowth = 1.15;
+  const double growth = 1 + lambda * lambda / (1 - lambda * band) * band * band / 4;
+  const double most_iterations = std::floor(std::log(kMostGrowth) / std::log(growth));
+  if (taubin.iterations > most_iterations)
+    throw Error(what + ": " + std::to_string(taubin.iterations) +
+                " iterations inflate waves of the surface by more than 15 %; give at most " +
+                formatted("{:.0f}", most_iterations) + ", or a smaller pass_band or lambda");
+}
+
+void smooth(Mesh& mesh, const Taubin& taubin) {
+  const double mu = 1 / (taubin.pass_band - 1 / taubin.lambda);
+  // On a closed surface each edge occurs once in each direction, so each neighbour is counted exactly once here.
+  std::vector<std::uint32_t> degree(mesh.vertices_mm.size(), 0);
+  for (const auto& t : mesh.triangles)
+    for (std::uint32_t v : t) ++degree[v];
+  std::vector<Eigen::Vector3d> sum(mesh.vertices_mm.size());
+  for (int step = 0; step < 2 * taubin.iterations; ++step) {
+    std::fill(sum.begin(), sum.end(), Eigen::Vector3d::Zero());
+    for (const auto& t : mesh.triangles)
+      for (int k = 0; k < 3; ++k) sum[t[k]] += mesh.vertices_mm[t[(k + 1) % 3]];
+    const double weight = step % 2 ? mu : taubin.lambda;
+    for (std::size_t v = 0; v < sum.size(); ++v)
+      if (degree[v]) mesh.vertices_mm[v] += weight * (sum[v] / degree[v] - mesh.vertices_mm[v]);
+  }
+}
+
+Mesh finish(Mesh mesh, const Finish& options) {
+  if (options.largest_only) mesh = largest_component(std::move(mesh));
+  smooth(mesh, {.iterations = options.smoothing});
+  return mesh;
+}
+
+}  // namespace marrow::surface

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/project/attenuation.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "marrow/base/error.hpp"
+#include "marrow/domain/same_place.hpp"
+
+namespace marrow::rays {
+namespace {
+
+void find_box(Attenuation& attenuation) {
+  const Grid& grid = attenuation.grid;
+  std::array<int, 3> first = grid.size, last{-1, -1, -1};
+  for (int z = 0; z < grid.size[2]; ++z)
+    for (int y = 0; y < grid.size[1]; ++y) {
+      const std::int16_t* row = attenuation.thousandths.data() + grid.offset(0, y, z);
+      int a = 0, b = grid.size[0] - 1;
+      while (a <= b && row[a] == 0) ++a;
+      while (b > a && row[b] == 0) --b;
+      if (a > b) continue;
+      const std::array<int, 3> low{a, y, z}, high{b, y, z};
+      for (std::size_t k = 0; k < 3; ++k) {
+        first[k] = std::min(first[k], low[k]);
+        last[k] = std::max(last[k], high[k]);
+      }
+    }
+  attenuation.first = first;
+  attenuation.last = last;
+}
+
+/// Weights of a sampled Gaussian from -reach to reach. Their sum is 1.
+std::vector<float> gaussian(double sigma, int reach) {
+  std::vector<float> weights;
+  double sum = 0;
+  for (int i = -reach; i <= reach; ++i) sum += std::exp(-0.5 * i * i / (sigma * sigma));
+  for (int i = -reach; i <= reach; ++i) weights.push_back(float(std::exp(-0.5 * i * i / (sigma * sigma)) / sum));
+  return weights;
+}
+
+/// The part of the volume that attenuates, with a border of `reach` voxels.
+std::vector<float> padded(const Attenuation& attenuation, const std::array<int, 3>& reach,
+                          const std::array<int, 3>& size) {
+  std::vector<float> values(std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]), 0.0f);
+  const auto& [first, last] = std::pair(attenuation.first, attenuation.last);
+  for (int z = first[2]; z <= last[2]; ++z)
+    for (int y = first[1]; y <= last[1]; ++y) {
+      const std::int16_t* from = attenuation.thousandths.data() + attenuation.grid.offset(first[0], y, z);
+      const int row = (z - first[2] + reach[2]) * size[1] + y - first[1] + reach[1];
+      std::copy_n(from, last[0] - first[0] + 1, values.begin() + std::ptrdiff_t(row) * size[0] + reach[0]);
+    }
+  return values;
+}
+
+/// Smooths along one axis. Values beyond the ends are 0. Whole rows of voxels are added at a time; along the rows
+/// themselves single voxels.
+void smooth(std::vector<float>& values, const std::array<int, 3>& size, std::size_t axis,
+            const std::vector<float>& weights) {
+  const std::array<std::size_t, 3> count{std::size_t(size[0]), std::size_t(size[1]), std::size_t(size[2])};
+  const std::array<std::size_t, 3> strides{1, count[0], count[0] * count[1]};
+  const std::size_t width = axis == 0 ? 1 : count[0], border = weights.size() / 2 * width, length = count[axis] * width;
+  const std::size_t outer = axis == 2 ? 1 : 2, lines = axis == 0 ? count[1] : 1;
+  tbb::parallel_for(std::size_t(0), count[outer], [&](std::size_t i) {
+    std::vector<float> line(length + 2 * border, 0.0f), sums(length);
+    for (std::size_t j = 0; j < lines; ++j) {
+      float* at = values.data() + i * strides[outer] + j * strides[1];
+      for (std::size_t k = 0; k < count[axis]; ++k)
+        std::copy_n(at + k * strides[axis], width, line.data() + border + k * width);
+      std::fill(sums.begin(), sums.end(), 0.0f);
+      for (std::size_t w = 0; w < weights.size(); ++w)
+        for (std::size_t k = 0; k < length; ++k) sums[k] += weights[w] * line[k + w * width];
+      for (std::size_t k = 0; k < count[axis]; ++k) std::copy_n(sums.data() + k * width, width, at + k * strides[axis]);
+    }
+  });
+}
+
+}  // namespace
+
+Attenuation smoothed(const Attenuation& attenuation, double sigma_mm) {
+  // A Gaussian leaves 3e-6 of the waves that are as long as this distance, so a sum sees none of them.
+  constexpr double kSafeSpacing = 1.25;  // in standard deviations
+  constexpr double kTie = 1e-9;          // the last digits of a depth in another world must not decide
+  if (attenuation.is_empty() || !(sigma_mm > 0)) return attenuation;
+  Attenuation result;
+  result.grid = attenuation.grid;
+  std::array<int, 3> reach;
+  Eigen::Vector3d first;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double sigma = sigma_mm / attenuation.grid.spacing_mm[int(k)];
+    reach[k] = int(std::ceil(3 * sigma - kTie));
+    result.enough[k] = std::max(1, int(kSafeSpacing * sigma + kTie));
+    result.grid.size[k] = attenuation.last[k] - attenuation.first[k] + 1 + 2 * reach[k];
+    first[int(k)] = attenuation.first[k] - reach[k];
+  }
+  result.grid.origin_mm = attenuation.grid.point_from_index(first);
+  std::vector<float> values = padded(attenuation, reach, result.grid.size);
+  for (std::size_t k = 0; k < 3; ++k)
+    smooth(values, result.grid.size, k, gaussian(sigma_mm / attenuation.grid.spacing_mm[int(k)], reach[k]));
+  result.thousandths.resize(values.size());
+  std::transform(values.begin(), values.end(), result.thousandths.begin(),
+                 [](float value) { return std::int16_t(std::lround(value)); });
+  find_box(result);
+  return result;
+}
+
+Attenuation attenuation_of(const Volume& volume, const SignedField* field, const AttenuationOptions& options) {
+  check_volume(volume, "the volume to project");
+  if (field) {
+    check_same_grid(field->grid, volume.grid);
+    if (field->values_mm.size() != field->grid.count())
+      throw Error("the field has " + std::to_string(field->values_mm.size()) + " values for " +
+                  std::to_string(field->grid.count()) + " voxels");
+  }
+  Attenuation attenuation;
+  attenuation.grid = volume.grid;
+  attenuation.thousandths.resize(volume.grid.count());
+  const std::size_t row = std::size_t(volume.grid.size[0]);
+  tbb::parallel_for(std::size_t(0), volume.grid.count() / row, [&](std::size_t r) {
+    for (std::size_t i = r * row; i < (r + 1) * row; ++i) {
+      const double hu = volume.values[i];
+      const bool is_out = hu < options.below_hu || (field && field->values_mm[i] > options.margin_mm);
+      attenuation.thousandths[i] =
+          is_out ? 0 : std::int16_t(std::lround(std::clamp(hu - options.background_hu, 0.0, 32767.0)));
+    }
+  });
+  find_box(attenuation);
+  return attenuation;
+}
+
+}  // namespace marrow::rays

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The attenuation of a volume relative to water. A radiograph (DRR) is its line integral.
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "marrow/plugin.hpp"
+#include "marrow/project/large_pages.hpp"
+
+namespace marrow::rays {
+
+/// Which voxels attenuate, and how much.
+struct AttenuationOptions {
+  double below_hu = -1000;       ///< voxels below this attenuate nothing
+  double background_hu = -1000;  ///< value that attenuates nothing: air, or the tissue around the bone
+  double margin_mm = 1;          ///< voxels farther outside the fragment than this attenuate nothing
+};
+
+/// Attenuation of each voxel in thousandths of water's, x fastest, then y, then z.
+struct Attenuation {
+  Grid grid;
+  std::vector<std::int16_t, LargePages<std::int16_t>> thousandths;
+  std::array<int, 3> first{0, 0, 0}, last{-1, -1, -1};  ///< box of the voxels that attenuate; last < first if none does
+  /// Along each axis, a sum over every n-th voxel is n times less than that over all; more than 1 in a smooth volume.
+  std::array<int, 3> enough{1, 1, 1};
+
+  bool is_empty() const { return last[0] < first[0]; }
+};
+
+/// Attenuation of a voxel: (HU - background_hu) / 1000, between 0 and 32.767. With a field, only the voxels of that
+/// fragment attenuate. `field` may be null. Throws Error if check_volume() refuses the volume, or if the sizes of field
+/// and volume differ.
+Attenuation attenuation_of(const Volume& volume, const SignedField* field, const AttenuationOptions& options);
+
+/// The same attenuation smoothed by a Gaussian, on a grid that holds all voxels that then attenuate.
+Attenuation smoothed(const Attenuation& attenuation, double sigma_mm);
+
+/// Declares the inputs, the output and the options that all projectors of radiographs share.
+template <class Options, class Node>
+Node& declare(Node&& node) {
+  return node.in("volume", "CT")
+      .in("field", "signed field of one fragment: only its voxels attenuate")
+      .out("projector", "draws the radiograph for any camera and pose")
+      .option("below_hu", &Options::below_hu, "voxels below this attenuate nothing", unit("HU"))
+      .option("background_hu", &Options::background_hu,
+              "value that attenuates nothing: air, or the tissue around the bone", unit("HU"))
+      .option("margin_mm", &Options::margin_mm, "voxels farther outside the fragment than this attenuate nothing",
+              at_least(0));
+}
+
+}  // namespace marrow::rays

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The rays of a view in the volume's voxel coordinates, and projectors that follow them one by one.
+#include <Eigen/Core>
+#include <functional>
+
+#include "marrow/domain/functions.hpp"
+#include "marrow/project/attenuation.hpp"
+
+namespace marrow::rays {
+
+/// Rays of a camera in fractional voxel indices: point = source + t * (direction_from_pixel * (u, v, 1)).
+struct Rays {
+  Eigen::Vector3d source;
+  Eigen::Matrix3d direction_from_pixel;
+  Eigen::Vector3d spacing_mm;
+
+  Eigen::Vector3d direction(double u, double v) const { return direction_from_pixel * Eigen::Vector3d(u, v, 1); }
+};
+/// The grid is in the model's frame. Throws Error if check_camera() refuses the camera or the frames do not match.
+Rays rays_of(const Camera& camera, const RigidTransform& world_from_model, const Grid& grid);
+
+/// The part [from, to] of a ray, in multiples of its direction vector. Empty if from >= to.
+struct Span {
+  double from = 0, to = 0;
+};
+/// The part of a ray that lies in front of the source and inside the box of the voxels `first` to `last`, widened by
+/// `margin` voxels. A margin of 1 includes all points that interpolation from these voxels reaches. `source` and
+/// `direction` are in fractional voxel indices.
+Span span_in_box(const std::array<int, 3>& first, const std::array<int, 3>& last, const Eigen::Vector3d& source,
+                 const Eigen::Vector3d& direction, double margin);
+
+/// A projector that integrates ray by ray, for many rays at once in several threads.
+class RayProjector : public RadiographProjector {
+ public:
+  explicit RayProjector(Attenuation attenuation) : attenuation_(std::move(attenuation)) {}
+  std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model, const PixelGrid&) const override;
+  std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model,
+                                const std::vector<Eigen::Vector2f>& pixels) const override;
+  PixelGrid region(const Camera&, const RigidTransform& world_from_model) const override;
+  std::shared_ptr<const RadiographProjector> smoothed(double sigma_mm) const override {
+    return of(rays::smoothed(attenuation_, sigma_mm));
+  }
+
+ protected:
+  /// A projector of the same kind for another model; null, the default, if there is none.
+  virtual std::shared_ptr<const RadiographProjector> of(Attenuation) const { return nullptr; }
+  /// The line integral along a ray, in mm of water. Source and direction are in fractional voxel indices. Must be safe
+  /// to call from several threads at once.
+  virtual float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const = 0;
+  const Attenuation attenuation_;
+};
+
+}  // namespace marrow::rays

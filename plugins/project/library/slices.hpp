@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Computes a whole radiograph slice by slice, for all rays from one point. The factorisation of Lacroute and Levoy
+// (SIGGRAPH 1994) turns Joseph's sums (IEEE Transactions on Medical Imaging 1982) into runs along rows of voxels.
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "marrow/project/rays.hpp"
+
+namespace marrow::rays {
+
+/// A volume laid out for sums over slices across each of its axes. Refers to `attenuation`, which must outlive it. Safe
+/// to use from several threads at once.
+class Slices {
+ public:
+  explicit Slices(const Attenuation& attenuation);
+
+  /// The radiograph at a grid of pixels, in mm of water, row by row. std::nullopt if the directions of the rays differ
+  /// too much or the source lies within the volume's slices. Such a view must be computed ray by ray (see Bricks).
+  std::optional<std::vector<float>> radiograph(const Rays& rays, const PixelGrid& grid) const;
+
+  /// The first and last voxel of a row that attenuate. None does if last < first.
+  struct Extent {
+    std::int16_t first = INT16_MAX, last = -1;
+  };
+  /// The volume as slices across one axis. A slice has `rows` rows of `length` voxels.
+  struct Stack {
+    std::array<int, 3> axes;  ///< axes of the grid: along a row, from slice to slice, from row to row
+    const std::int16_t* values = nullptr;
+    int length = 0, slices = 0, rows = 0;
+    std::size_t slice_stride = 0, row_stride = 0;
+    std::vector<Extent> extents;  ///< of each row, slice by slice
+    int first_slice = 0, last_slice = -1, slice_step = 1;
+
+    const Extent& extent(int slice, int row) const {
+      return extents[std::size_t(slice) * std::size_t(rows) + std::size_t(row)];
+    }
+    const std::int16_t* row(int slice, int row) const {
+      return values + std::size_t(slice) * slice_stride + std::size_t(row) * row_stride;
+    }
+  };
+
+ private:
+  const Attenuation& attenuation_;
+  std::vector<std::int16_t, LargePages<std::int16_t>> turned_;  ///< y fastest, then x, then z
+  std::array<Stack, 3> stacks_;                                 ///< one for each axis from slice to slice
+};
+
+}  // namespace marrow::rays

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/read/camera_file.hpp"
+
+#include "marrow/base/error.hpp"
+#include "marrow/read/projections.hpp"
+#include "marrow/toolbox/exchange/plastimatch_camera.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
+#include "marrow/toolbox/files/length_units.hpp"
+
+namespace marrow::exchange {
+namespace {
+
+void check_needed(const std::filesystem::path& path, const CameraReading& reading, CameraFormat format) {
+  const bool is_rtk = format == CameraFormat::rtk, has_projections = is_rtk || format == CameraFormat::xreg;
+  const auto check = [&](bool is_given, bool is_needed, const char* name) {
+    if (is_given && !is_needed)
+      throw Error(path.string() + ": " + name + " is not for this format of cameras; leave it out");
+  };
+  check(reading.projection >= 0, has_projections, "projection");
+  check(!reading.size.pixel_mm.empty(), is_rtk, "pixel_mm");
+  check(!reading.size.corner_mm.empty(), is_rtk, "corner_mm");
+  check(reading.mirror != Mirror::none, has_projections, "mirror");
+  if (reading.scale != 1 && format == CameraFormat::own)
+    throw Error(path.string() + ": scale is not for marrow's cameras, whose lengths are in mm; leave it out");
+}
+
+int only_projection(const std::filesystem::path& path) {
+  const std::size_t count = count_projections(path);
+  if (count == 1) return 0;
+  throw Error(path.string() + ": has " + std::to_string(count) +
+              " projections; say by its number, counted from 0, which one is meant (projection)");
+}
+
+}  // namespace
+
+CameraFormat camera_format(const std::filesystem::path& path) {
+  std::string end = path.extension().string();
+  for (char& c : end) c = char(std::tolower(static_cast<unsigned char>(c)));
+  if (end == ".yaml" || end == ".yml") return CameraFormat::own;
+  const Projections projections = projections_in(path);
+  if (projections == Projections::rtk) return CameraFormat::rtk;
+  if (projections == Projections::xreg) return CameraFormat::xreg;
+  return is_plastimatch_camera(path) ? CameraFormat::plastimatch : CameraFormat::xmalab;
+}
+
+DistortedCamera read_camera(const std::filesystem::path& path, const CameraReading& reading) {
+  const CameraFormat format = camera_format(path);
+  check_needed(path, reading, format);
+  DistortedCamera found;
+  if (format == CameraFormat::rtk || format == CameraFormat::xreg) {
+    const int number = reading.projection >= 0 ? reading.projection : only_projection(path);
+    found.camera = read_projections(path, {number}, reading.size, reading.mirror, reading.scale)[0];
+  } else {
+    found = format == CameraFormat::plastimatch ? DistortedCamera{read_plastimatch_camera(path, reading.size), {}}
+                                                : files::read_camera_file(path);
+    found.camera.camera_from_world.translation_mm *= reading.scale;
+  }
+  if (reading.size.size_px.empty()) return found;
+  const Eigen::Vector2i size = size_px(reading.size, path.string());
+  if (size.x() != found.camera.width_px || size.y() != found.camera.height_px)
+    throw Error(path.string() + ": this camera is of images of " + std::to_string(found.camera.width_px) + " x " +
+                std::to_string(found.camera.height_px) + " pixels, but the image has " + std::to_string(size.x()) +
+                " x " + std::to_string(size.y()));
+  return found;
+}
+
+std::string doubt_about_unit(const std::filesystem::path& path, const Camera& camera, double scale) {
+  if (camera_format(path) == CameraFormat::own) return {};
+  const std::string doubt = files::doubt_about_distance(camera, scale);
+  return doubt.empty() ? doubt : path.string() + ": " + doubt;
+}
+
+}  // namespace marrow::exchange

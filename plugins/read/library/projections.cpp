@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/read/projections.hpp"
+
+#include <numeric>
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/toolbox/exchange/rtk_geometry.hpp"
+#include "marrow/toolbox/exchange/xreg_file.hpp"
+
+namespace marrow::exchange {
+namespace {
+
+/// The cameras of those of `all` that are named. `camera(one, what)` makes one.
+template <class Projection, class MakeCamera>
+std::vector<Camera> cameras_of(const std::vector<Projection>& all, std::vector<int> numbers, const std::string& what,
+                               MakeCamera camera) {
+  if (numbers.empty()) {
+    numbers.resize(all.size());
+    std::iota(numbers.begin(), numbers.end(), 0);
+  }
+  std::vector<Camera> cameras;
+  for (const int number : numbers) {
+    if (number < 0 || std::size_t(number) >= all.size())
+      throw Error(what + ": has " + std::to_string(all.size()) +
+                  " projections, counted from 0; there is no projection " + std::to_string(number));
+    cameras.push_back(camera(all[std::size_t(number)], what + ": projection " + std::to_string(number)));
+  }
+  return cameras;
+}
+
+}  // namespace
+
+Projections projections_in(const std::filesystem::path& path) {
+  std::string end = path.extension().string();
+  for (char& c : end) c = char(std::tolower(static_cast<unsigned char>(c)));
+  return end == ".xml" ? Projections::rtk : end == ".h5" || end == ".hdf5" ? Projections::xreg : Projections::none;
+}
+
+int projection_number(double number, const std::string& what) {
+  if (!(number >= 0 && number <= 1e6) || number != double(int(number)))
+    throw Error(what + ": projections: expected whole numbers from 0, got " + formatted("{:f}", number));
+  return int(number);
+}
+
+std::size_t count_projections(const std::filesystem::path& path) {
+  return projections_in(path) == Projections::rtk ? read_rtk(path).size() : read_xreg(path).size();
+}
+
+std::vector<Camera> read_projections(const std::filesystem::path& path, const std::vector<int>& numbers,
+                                     const ImageSize& size, Mirror mirror, double scale) {
+  if (projections_in(path) == Projections::none)
+    throw Error(path.string() + ": expected RTK's geometry (.xml) or xReg's projection data (.h5)");
+  ImageSize in_file = size;  // in the file's unit, as RTK's distances are
+  for (double& side : in_file.pixel_mm) side /= scale;
+  for (double& place : in_file.corner_mm) place /= scale;
+  std::vector<Camera> cameras = projections_in(path) == Projections::rtk
+                                    ? cameras_of(read_rtk(path), numbers, path.string(),
+                                                 [&](const RtkProjection& one, const std::string& what) {
+                                                   return camera_of(one, in_file, mirror, what);
+                                                 })
+                                    : cameras_of(read_xreg(path), numbers, path.string(),
+                                                 [&](const XregProjection& one, const std::string& what) {
+                                                   return camera_of(one, mirror, what);
+                                                 });
+  for (Camera& camera : cameras) camera.camera_from_world.translation_mm *= scale;
+  return cameras;
+}
+
+}  // namespace marrow::exchange

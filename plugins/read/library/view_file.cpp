@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/read/view_file.hpp"
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/names.hpp"
+#include "marrow/read/calibration_file.hpp"
+#include "marrow/read/camera_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
+
+namespace marrow::exchange {
+namespace {
+
+/// The image's own size is that of the camera, whose format may not say it.
+DistortedCamera camera_in_file(const ViewSource& source, const Image& image, const Context& context) {
+  CameraReading reading{source.projection, {{}, source.pixel_mm, source.corner_mm}, Mirror::none, source.scale};
+  const CameraFormat format = camera_format(source.camera_file);
+  if (format == CameraFormat::rtk || format == CameraFormat::xreg) reading.mirror = mirror_of(source.mirror);
+  if (format == CameraFormat::rtk || format == CameraFormat::plastimatch)
+    reading.size.size_px = {double(image.width()), double(image.height())};
+  const DistortedCamera found = read_camera(source.camera_file, reading);
+  if (const std::string doubt = doubt_about_unit(source.camera_file, found.camera, source.scale); !doubt.empty())
+    context.warn("view '" + source.name + "': " + doubt);
+  return found;
+}
+
+}  // namespace
+
+const Camera& camera_of_view(const std::string& view, const List<Camera>& cameras) {
+  if (const Camera* camera = cameras.find(view)) return *camera;
+  std::string known;
+  for (const std::string& name : cameras.names()) known += (known.empty() ? "'" : ", '") + name + "'";
+  throw Error("view '" + view + "' has no camera of that name; there are " + known);
+}
+
+ViewCamera read_view_camera(const ViewSource& source, const Image& image, const Context& context) {
+  ViewCamera camera;
+  if (source.camera &&
+      (source.projection >= 0 || !source.pixel_mm.empty() || !source.corner_mm.empty() || source.scale != 1))
+    throw Error(
+        "view '" + source.name +
+        "': its camera is wired; projection, pixel_mm, corner_mm and scale are for a camera file: leave them out");
+  if (source.camera)
+    camera.camera.camera = *source.camera;
+  else
+    camera.camera = camera_in_file(source, image, context);
+  if (source.calibration.empty()) return camera;
+  if (!camera.camera.distortion.is_none())
+    throw Error("view '" + source.name + "': both " + source.camera_file.string() + " and " +
+                source.calibration.string() +
+                " tell of a distortion; it is removed only once: take it out of one of them");
+  camera.calibration = files::read_calibration_file(source.calibration);
+  return camera;
+}
+
+View view_of(const std::string& name, Image image, const ViewCamera& camera) {
+  View view;
+  view.name = name;
+  view.image = std::move(image);
+  view.camera = camera.camera.camera;
+  check_view(view);
+  if (camera.calibration)
+    apply_calibration(view, *camera.calibration);
+  else if (!camera.camera.distortion.is_none())
+    remove_distortion(view, camera.camera.distortion);
+  return view;
+}
+
+View read_view_files(const ViewSource& source, const Context& context) {
+  check_item_name("view", source.name);
+  Image image = files::turned_over(files::read_image_file(source.image, source.frame), source.mirror);
+  const ViewCamera camera = read_view_camera(source, image, context);
+  return view_of(source.name, std::move(image), camera);
+}
+
+}  // namespace marrow::exchange

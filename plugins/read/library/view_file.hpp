@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "marrow/domain/calibration.hpp"
+#include "marrow/domain/camera.hpp"
+#include "marrow/domain/list.hpp"
+#include "marrow/runtime/node/context.hpp"
+
+namespace marrow::exchange {
+
+/// The files of a view. The camera is `*camera` if that is not null, else it is read from `camera_file`.
+struct ViewSource {
+  std::string name;
+  std::filesystem::path image;
+  const Camera* camera = nullptr;
+  std::filesystem::path camera_file;
+  std::filesystem::path calibration;  ///< may be empty
+  int frame = 0;                      ///< of the image file, from 1; 0: the file must have only one
+  std::string mirror = "none";        ///< as files::turned_over() takes it; the camera is that of the image afterwards
+  int projection = -1;                ///< as CameraReading has it
+  std::vector<double> pixel_mm{}, corner_mm{};
+  double scale = 1;  ///< as CameraReading has it
+};
+
+/// The camera of this name. Throws Error, with the names that there are, if there is none.
+const Camera& camera_of_view(const std::string& view, const List<Camera>& cameras);
+
+/// How the images of a view were taken.
+struct ViewCamera {
+  DistortedCamera camera;
+  std::optional<Calibration> calibration;  ///< its camera matrix replaces the camera's
+};
+
+/// Reads the camera of a view whose image is `image`, and its calibration. Warns as doubt_about_unit() does. Throws
+/// Error if a file cannot be read, or does not fit the image, or if both describe a distortion.
+ViewCamera read_view_camera(const ViewSource& source, const Image& image, const Context& context);
+
+/// A view with a plain pinhole camera: a distortion is removed from the image. Throws Error if sizes do not match.
+View view_of(const std::string& name, Image image, const ViewCamera& camera);
+
+/// Reads a view. Throws Error as the functions above do, or if the image cannot be read.
+View read_view_files(const ViewSource& source, const Context& context);
+
+}  // namespace marrow::exchange

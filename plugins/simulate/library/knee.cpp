@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/simulate/knee.hpp"
+
+#include <Eigen/Geometry>
+#include <limits>
+
+#include "marrow/simulate/polygonise.hpp"
+#include "marrow/simulate/shape_functions.hpp"
+
+namespace marrow::phantom {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kSpacingMm = 1.2;
+constexpr double kSteepest = 2.5;
+constexpr double kMeanHalfWidthMm = 41;  // of the femur that the sizes below belong to
+
+// Half width and half depth of the tibia over the depth below its plateau, all in mm.
+constexpr std::array<Node, 7> kTibiaWidth{{{0, 36}, {8, 37}, {20, 33}, {40, 23}, {60, 17}, {100, 13.5}, {200, 12}}};
+constexpr std::array<Node, 7> kTibiaDepth{{{0, 23}, {8, 24}, {20, 22}, {40, 19}, {60, 16.5}, {100, 15}, {200, 13}}};
+constexpr std::array<Node, 4> kTibiaShell{{{0, 1.5}, {25, 1.5}, {70, 3.5}, {200, 4.5}}};
+constexpr double kTibiaEnd = 150;
+
+/// All fields are in a frame with x to the lateral side, y to the back, z up, and the origin in the middle of the
+/// plateau.
+double tibia(const Vector3d& p) {
+  const double down = -p.z(), forward = 5 * std::clamp(down / 60, 0.0, 1.0);
+  const double half_width = along(kTibiaWidth, down), half_depth = along(kTibiaDepth, down);
+  const double x = p.x(), y = p.y() + forward, radius = std::hypot(x, y),
+               relative = std::hypot(x / half_width, y / half_depth);
+  const double wall = relative > 1e-9 ? radius - radius / relative : -half_depth;
+  const double plateau = p.z() + 0.12 * p.y();  // falls to the back by 7 degrees
+  const double body = cut(wall, std::max(plateau, down - kTibiaEnd), 4);
+  const double eminence = std::min(capsule(p, Vector3d(-5, 1, -4), Vector3d(-4, 2, 5), 5, 2),
+                                   capsule(p, Vector3d(5, 2, -4), Vector3d(4, 3, 3.5), 5, 2));
+  const double tuberosity = ellipsoid(p - Vector3d(2, -19, -38), Vector3d(9, 9, 17));
+  return join(join(body, eminence, 3), tuberosity, 8);
+}
+
+double fibula(const Vector3d& p) {
+  const double head = ellipsoid(p - Vector3d(36, 19, -22), Vector3d(9, 10, 12));
+  const double shaft = capsule(p, Vector3d(36, 18, -30), Vector3d(33, 15, -kTibiaEnd + 6), 6, 6.5);
+  return join(head, shaft, 8);
+}
+
+/// Wide and flat, with a point below and a ridge behind. Its frame has the origin in its own middle.
+double patella(const Vector3d& p) {
+  const double body = ellipsoid(p, Vector3d(22, 10, 21));
+  const double apex = capsule(p, Vector3d(0, -1, -10), Vector3d(0, 1, -22), 8, 3);
+  const double ridge = ellipsoid(p - Vector3d(-2, 5, 3), Vector3d(8, 7, 14));
+  return join(join(body, apex, 6), ridge, 5);
+}
+
+double shell_of_tibia(const Vector3d& p) { return along(kTibiaShell, -p.z()); }
+
+struct Part {
+  std::string name;
+  double (*outer)(const Vector3d&);
+  double (*shell)(const Vector3d&);
+  Vector3d low, high;
+};
+
+Mesh turned(Mesh mesh, const RigidTransform& by) {
+  for (auto& vertex : mesh.vertices_mm) vertex = by * vertex;
+  mesh.frame = by.target;
+  return mesh;
+}
+
+RigidTransform bent(const Vector3d& axis_at, double angle) {
+  RigidTransform bend{"bone", "bone"};
+  // About x: the lower leg, which hangs down, moves to the back.
+  bend.rotation = Eigen::AngleAxisd(angle, Vector3d::UnitX()).toRotationMatrix();
+  bend.translation_mm = axis_at - bend.rotation * axis_at;
+  return bend;
+}
+
+}  // namespace
+
+DistalEnd distal_end(const Mesh& outer) {
+  constexpr double kEndMm = 60;
+  constexpr double kHeadShare = 0.12;
+  constexpr double kFar = std::numeric_limits<double>::max();
+  Vector3d low = Vector3d::Constant(kFar), high = -low;
+  for (const auto& vertex : outer.vertices_mm) {
+    low = low.cwiseMin(vertex);
+    high = high.cwiseMax(vertex);
+  }
+  Eigen::Vector2d least = Eigen::Vector2d::Constant(kFar), most = -least;
+  double head_x = 0, heads = 0;
+  for (const auto& vertex : outer.vertices_mm) {
+    if (vertex.z() < low.z() + kEndMm) {
+      least = least.cwiseMin(vertex.head<2>());
+      most = most.cwiseMax(vertex.head<2>());
+    }
+    if (vertex.z() > high.z() - kHeadShare * (high.z() - low.z())) {
+      head_x += vertex.x();
+      ++heads;
+    }
+  }
+  const Eigen::Vector2d middle = 0.5 * (least + most);
+  return {low.z(), 0.5 * (most.x() - least.x()), least.y(), most.y(), middle, head_x / heads > middle.x() ? -1.0 : 1.0};
+}
+
+Vector3d knee_axis_at(const Mesh& femur_outer) {
+  const DistalEnd end = distal_end(femur_outer);
+  const double scale = end.half_width_mm / kMeanHalfWidthMm;
+  return {end.middle_mm.x(), end.back_y - 21 * scale, end.lowest_z + 22 * scale};
+}
+
+Body fixed_to(const Fragment& fragment, const std::string& name, const std::string& material, Mesh surface) {
+  Body body;
+  body.name = name;
+  body.material = material;
+  body.surface = turned(std::move(surface), fragment.world_from_bone());
+  body.in_ct = true;
+  body.ct_from_world = inverse(fragment.world_from_ct);
+  body.moves_with = fragment.name;
+  return body;
+}
+
+std::vector<Body> make_knee(const Mesh& femur_outer, const Fragment& fragment, const KneeShape& shape) {
+  const DistalEnd end = distal_end(femur_outer);
+  const double scale = end.half_width_mm / kMeanHalfWidthMm;
+  const Vector3d plateau(end.middle_mm.x(), end.middle_mm.y() + 3 * scale, end.lowest_z - shape.gap_mm);
+  // The patella lies before the groove, about a thumb above the joint.
+  const Vector3d kneecap(end.middle_mm.x(), end.front_y - (0.5 * shape.gap_mm + 8 * scale),
+                         end.lowest_z + 40 * scale + shape.patella_up_mm);
+  const Vector3d axis = knee_axis_at(femur_outer);
+  const auto one_mm = [](const Vector3d&) { return 1.2; };
+  const std::vector<std::pair<Part, Vector3d>> parts{
+      {{"tibia", tibia, shell_of_tibia, {-46, -40, -kTibiaEnd - 6}, {46, 40, 12}}, plateau},
+      {{"fibula", fibula, one_mm, {20, 0, -kTibiaEnd - 6}, {52, 36, -4}}, plateau},
+      {{"patella", patella, one_mm, {-28, -16, -32}, {28, 18, 28}}, kneecap}};
+  std::vector<Body> bodies;
+  for (const auto& [part, at] : parts) {
+    // Flexed, the patella follows the tibia on a shorter way.
+    const double share = part.name == "patella" ? 0.7 : 1;
+    const RigidTransform in_images = bent(axis, share * shape.flexion_rad),
+                         in_ct = bent(axis, share * shape.ct_flexion_rad);
+    const auto local = [&, &at = at](const Vector3d& p) {
+      Vector3d q = (p - at) / scale;
+      q.x() *= end.lateral_x;
+      return q;
+    };
+    Vector3d low = at + scale * part.low, high = at + scale * part.high;
+    if (end.lateral_x < 0) {
+      low.x() = at.x() - scale * part.high.x();
+      high.x() = at.x() - scale * part.low.x();
+    }
+    for (const bool inside : {false, true}) {
+      const Mesh surface = polygonise(
+          [&, &part = part](const Vector3d& p) {
+            const Vector3d q = local(p);
+            return scale * (part.outer(q) + (inside ? part.shell(q) : 0));
+          },
+          low, high, kSpacingMm, kSteepest);
+      Body body = fixed_to(fragment, part.name + (inside ? ", inside" : ""),
+                           inside ? "cancellous bone" : "cortical bone", turned(surface, in_images));
+      body.ct_from_world = fragment.ct_from_bone * in_ct * inverse(in_images) * inverse(fragment.world_from_bone());
+      bodies.push_back(std::move(body));
+    }
+  }
+  return bodies;
+}
+
+}  // namespace marrow::phantom

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/simulate/posture.hpp"
+
+#include "marrow/base/error.hpp"
+
+namespace marrow::phantom {
+
+ClutteredPhantom in_posture(ClutteredPhantom phantom, const Posture* posture) {
+  if (!posture) return phantom;
+  const auto counts = [](std::size_t fragments, std::size_t bodies) {
+    return std::to_string(fragments) + " fragments and " + std::to_string(bodies) + " bodies";
+  };
+  auto& fragments = phantom.phantom.fragments;
+  if (posture->world_from_ct.size() != fragments.size() || posture->bodies.size() != phantom.bodies.size())
+    throw Error("the posture is that of another phantom: it is for " +
+                counts(posture->world_from_ct.size(), posture->bodies.size()) + ", but the phantom has " +
+                counts(fragments.size(), phantom.bodies.size()) + "; take both from the same node");
+  for (std::size_t i = 0; i < fragments.size(); ++i) fragments[i].world_from_ct = posture->world_from_ct[i];
+  std::vector<Body> bodies;
+  for (std::size_t i = 0; i < phantom.bodies.size(); ++i) {
+    if (!posture->bodies[i]) continue;
+    move(phantom.bodies[i], *posture->bodies[i]);
+    bodies.push_back(std::move(phantom.bodies[i]));
+  }
+  phantom.bodies = std::move(bodies);
+  return phantom;
+}
+
+}  // namespace marrow::phantom

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/exchange/camera_matrix.hpp"
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/domain/decompositions.hpp"
+
+namespace marrow::exchange {
+namespace {
+
+constexpr double kLargestSide_px = 65536;
+
+/// Turns pixels of a program's image into those of the image that was turned over.
+Eigen::Matrix3d turning(Mirror mirror, int width_px, int height_px) {
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  if (mirror == Mirror::left_right) turn.row(0) << -1, 0, width_px - 1;
+  if (mirror == Mirror::upside_down) turn.row(1) << 0, -1, height_px - 1;
+  return turn;
+}
+
+}  // namespace
+
+Mirror mirror_of(const std::string& text) {
+  return text == "left_right" ? Mirror::left_right : text == "upside_down" ? Mirror::upside_down : Mirror::none;
+}
+
+Eigen::Vector2d mirrored(const Eigen::Vector2d& pixel, Mirror mirror, int width_px, int height_px) {
+  return (turning(mirror, width_px, height_px) * pixel.homogeneous()).head<2>();
+}
+
+Eigen::Vector2i size_px(const ImageSize& size, const std::string& what) {
+  if (size.size_px.empty())
+    throw Error(what +
+                ": does not say how many pixels the image has; wire the image, or give size_px: [width, height]");
+  if (size.size_px.size() != 2)
+    throw Error(what + ": size_px: expected [width, height], got " + std::to_string(size.size_px.size()) + " numbers");
+  for (const double side : size.size_px)
+    if (!(side >= 1 && side <= kLargestSide_px) || side != std::floor(side))
+      throw Error(what + ": size_px: expected 1 to 65536 pixels each way, got " + formatted("{:f}", side));
+  return {int(size.size_px[0]), int(size.size_px[1])};
+}
+
+Eigen::Vector2d pixel_mm(const std::vector<double>& numbers, const std::string& what) {
+  if (numbers.empty())
+    throw Error(what + ": needs the size of a pixel on the detector; give pixel_mm: [width, height]");
+  if (numbers.size() > 2)
+    throw Error(what + ": pixel_mm: expected [width, height], or one number for square pixels, got " +
+                std::to_string(numbers.size()));
+  for (const double side : numbers)
+    if (!(side >= 1e-6 && side <= 1000))
+      throw Error(what + ": pixel_mm: expected a size in mm between 1e-6 and 1000, got " + formatted("{:f}", side));
+  return {numbers.front(), numbers.back()};
+}
+
+Eigen::Vector2d corner_mm(const ImageSize& size, const std::string& what) {
+  if (size.corner_mm.empty())
+    return -0.5 *
+           (size_px(size, what).cast<double>() - Eigen::Vector2d::Ones()).cwiseProduct(pixel_mm(size.pixel_mm, what));
+  if (size.corner_mm.size() != 2)
+    throw Error(what + ": corner_mm: expected [u, v], the place of the first pixel's centre on the detector, got " +
+                std::to_string(size.corner_mm.size()) + " numbers");
+  return {size.corner_mm[0], size.corner_mm[1]};
+}
+
+Camera camera_of(const Eigen::Matrix<double, 3, 4>& pixel_from_world, const Eigen::Vector2i& size_px, Mirror mirror,
+                 const std::string& what) {
+  const double scale = pixel_from_world.row(2).head<3>().norm();
+  if (!pixel_from_world.allFinite() || !(scale > 1e-12))
+    throw Error(what + ": its matrix does not project along rays from a source; it is damaged, or of parallel rays");
+  const Eigen::Matrix<double, 3, 4> p = turning(mirror, size_px.x(), size_px.y()) * pixel_from_world / scale;
+  const Eigen::RowVector3d z = p.row(2).head<3>();
+  // Rows of the camera's axes, one after the other: what is left of a row is along the next axis.
+  const double v0 = p.row(1).head<3>().dot(z);
+  const Eigen::RowVector3d y_scaled = p.row(1).head<3>() - v0 * z;
+  const double f_v = y_scaled.norm();
+  const Eigen::RowVector3d y = y_scaled / f_v, x = y.cross(z);
+  const double u0 = p.row(0).head<3>().dot(z), skew = p.row(0).head<3>().dot(y), f_u = p.row(0).head<3>().dot(x);
+  if (!(f_v > 1e-9) || !(std::abs(f_u) > 1e-9))
+    throw Error(what + ": its matrix does not project along rays from a source; it is damaged, or of parallel rays");
+  if (f_u < 0 && mirror == Mirror::none)
+    throw Error(what +
+                ": its images are seen from the detector, or have their rows from below; turn them over by mirror: "
+                "left_right or upside_down when they are read, and give the same mirror here");
+  if (f_u < 0) throw Error(what + ": its images are seen from the source as marrow's are; leave mirror out");
+  Camera camera;
+  camera.width_px = size_px.x();
+  camera.height_px = size_px.y();
+  camera.intrinsics << f_u, skew, u0, 0, f_v, v0, 0, 0, 1;
+  Eigen::Matrix3d axes;
+  axes << x, y, z;
+  camera.camera_from_world.rotation = nearest_orthogonal(axes);
+  Eigen::Vector3d& t = camera.camera_from_world.translation_mm;
+  t.z() = p(2, 3);
+  t.y() = (p(1, 3) - v0 * t.z()) / f_v;
+  t.x() = (p(0, 3) - u0 * t.z() - skew * t.y()) / f_u;
+  check_camera(camera, what);
+  return camera;
+}
+
+}  // namespace marrow::exchange

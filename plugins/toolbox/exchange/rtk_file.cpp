@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+// RTK's geometry in XML. What holds for all projections stands before the first one; a projection that does not name an
+// element has that of the one before.
+#include "rtk_file.hpp"
+
+#include <expat.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <sstream>
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/toolbox/files/input_file.hpp"
+
+namespace marrow::exchange {
+namespace {
+
+constexpr std::uint64_t kMostBytes = 256u << 20;
+constexpr double kLargest = 1e7;  // no angle, no distance, and no number of a matrix of such distances is larger
+constexpr const char* kRoot = "RTKThreeDCircularGeometry";
+
+class RtkReader {
+ public:
+  explicit RtkReader(const std::filesystem::path& path)
+      : what_(path.string()), parser_(XML_ParserCreate(nullptr), XML_ParserFree) {
+    XML_SetUserData(parser_.get(), this);
+    XML_SetElementHandler(parser_.get(), on_start, on_end);
+    XML_SetCharacterDataHandler(parser_.get(), on_text);
+  }
+
+  std::vector<RtkProjection> read(const std::string& bytes) {
+    const XML_Status status = XML_Parse(parser_.get(), bytes.data(), int(bytes.size()), true);
+    if (!fault_.empty()) throw Error(fault_);
+    if (status != XML_STATUS_OK)
+      throw Error(place() + "is no well-formed XML (" + XML_ErrorString(XML_GetErrorCode(parser_.get())) +
+                  "); it is cut off or damaged: write it again");
+    if (projections_.empty()) throw Error(what_ + ": there is no <Projection> in it; write it again with RTK");
+    return std::move(projections_);
+  }
+
+ private:
+  std::string place() const { return what_ + ":" + std::to_string(XML_GetCurrentLineNumber(parser_.get())) + ": "; }
+  /// Notes the first fault, and stops. No exception may pass through the parser.
+  void refuse(const std::string& text) {
+    if (fault_.empty()) fault_ = place() + text;
+    XML_StopParser(parser_.get(), false);
+  }
+
+  static void on_start(void* self, const char* name, const char** attributes) {
+    static_cast<RtkReader*>(self)->start(name, attributes);
+  }
+  static void on_end(void* self, const char* name) { static_cast<RtkReader*>(self)->end(name); }
+  static void on_text(void* self, const char* text, int count) {
+    auto& reader = *static_cast<RtkReader*>(self);
+    if (reader.text_.size() < 4096) reader.text_.append(text, std::size_t(count));
+  }
+
+  void start(const std::string& name, const char** attributes) {
+    text_.clear();
+    if (depth_++ == 0) return start_root(name, attributes);
+    if (name == "Projection") {
+      if (in_projection_) return refuse("a <Projection> begins inside another");
+      in_projection_ = true;
+      matrix_.reset();
+    }
+  }
+
+  void start_root(const std::string& name, const char** attributes) {
+    if (name != kRoot)
+      return refuse("expected <" + std::string(kRoot) + ">, got <" + printable(name.substr(0, 60)) +
+                    ">; only this geometry of RTK is read");
+    std::string version;
+    for (; *attributes; attributes += 2)
+      if (std::strcmp(attributes[0], "version") == 0) version = attributes[1];
+    if (version != "2" && version != "3")
+      refuse("expected version 2 or 3 of RTK's geometry, got " + in_quotes(printable(version.substr(0, 40))) +
+             "; write it again with RTK");
+  }
+
+  void end(const std::string& name) {
+    --depth_;
+    if (depth_ == 0) return;
+    if (name == "Projection") return end_projection();
+    if (name == "Matrix") {
+      matrix_ = numbers();
+      if (matrix_->size() != 12)
+        refuse("Matrix: expected 12 numbers of at most 1e7, got " + std::to_string(matrix_->size()));
+      return;
+    }
+    const std::string known = name == "Angle" ? "GantryAngle" : name;  // its older name
+    const auto element =
+        std::find_if(kRtkElements.begin(), kRtkElements.end(), [&](const auto& pair) { return known == pair.first; });
+    const bool is_radius = name == "RadiusCylindricalDetector";
+    if (element == kRtkElements.end() && !is_radius) {
+      if (name.rfind("Collimation", 0) != 0) refuse("unknown element <" + printable(name.substr(0, 60)) + ">");
+      return;
+    }
+    const std::vector<double> one = numbers();
+    if (one.size() != 1)
+      return refuse(name + ": expected a number of at most 1e7, got " + in_quotes(printable(text_.substr(0, 40))));
+    if (is_radius && one[0] != 0)
+      return refuse("RadiusCylindricalDetector: the detector is curved, but marrow's cameras have flat ones");
+    if (!is_radius) now_.*(element->second) = one[0];
+  }
+
+  void end_projection() {
+    in_projection_ = false;
+    if (!(now_.source_to_detector_mm > 0))
+      return refuse(
+          now_.source_to_detector_mm == 0
+              ? "SourceToDetectorDistance is 0 or missing: the rays are parallel, but marrow's cameras have a "
+                "source"
+              : "SourceToDetectorDistance: expected a positive distance in mm");
+    if (matrix_) check_matrix();
+    projections_.push_back(now_);
+  }
+
+  /// RTK itself allows 0.001 between the matrix and that of the angles and distances.
+  void check_matrix() {
+    const Eigen::Matrix<double, 3, 4> expected = rtk_matrix(now_);
+    for (int i = 0; i < 12 && fault_.empty(); ++i) {
+      const double got = (*matrix_)[std::size_t(i)], wanted = expected(i / 4, i % 4);
+      if (!(std::abs(got - wanted) <= 1e-3 + 1e-9 * std::abs(wanted)))
+        refuse("Matrix: row " + std::to_string(i / 4 + 1) + ", column " + std::to_string(i % 4 + 1) + " is " +
+               formatted("{:f}", got) + ", but the angles and distances give " + formatted("{:f}", wanted) +
+               "; one of them was changed: write it again with RTK");
+    }
+  }
+
+  /// The numbers of the element's text; empty if a word is none.
+  std::vector<double> numbers() const {
+    std::istringstream words(text_);
+    std::vector<double> values;
+    for (std::string word; words >> word;) {
+      const auto value = parsed_number(word);
+      if (!value || !(std::abs(*value) <= kLargest)) return {};
+      values.push_back(*value);
+    }
+    return values;
+  }
+
+  std::string what_, text_, fault_;
+  std::unique_ptr<XML_ParserStruct, void (*)(XML_Parser)> parser_;
+  int depth_ = 0;
+  bool in_projection_ = false;
+  RtkProjection now_;
+  std::optional<std::vector<double>> matrix_;
+  std::vector<RtkProjection> projections_;
+};
+
+}  // namespace
+
+std::vector<RtkProjection> read_rtk(const std::filesystem::path& path) {
+  return RtkReader(path).read(files::read_bytes(path, kMostBytes));
+}
+
+}  // namespace marrow::exchange

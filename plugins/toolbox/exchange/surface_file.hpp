@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Surfaces in all formats that marrow reads, and in those that it writes for other programs.
+#include <filesystem>
+#include <string>
+
+#include "marrow/domain/mesh.hpp"
+#include "marrow/runtime/node/context.hpp"
+
+namespace marrow::exchange {
+
+/// Reads a triangle surface by the end of the file's name: .stl, .ply (files::read_marked_mesh()), .obj or .vtp. Points
+/// with equal coordinates are merged; faces of more corners are cut into triangles. Where the file says that its
+/// coordinates are RAS, as 3D Slicer marks them, they become LPS; all others are kept as they are. Coordinates are
+/// multiplied by `scale`, which must make them mm. A closed surface whose triangles face inwards is turned. Warns of
+/// that, and of a surface that is open, crosses itself, faces different sides, has a size that no bone or implant has,
+/// or whose file names two frames. Throws Error for another end, a damaged file, or a mesh that check_mesh() refuses.
+Mesh read_surface_file(const std::filesystem::path& path, double scale, const Context& context);
+
+/// A whole Wavefront OBJ file, and a whole .vtp file of VTK. Both say that the coordinates are LPS. Reading gives
+/// exactly the same numbers. Throw Error if check_mesh() refuses the mesh.
+std::string obj_text(const Mesh& mesh);
+std::string vtp_bytes(const Mesh& mesh);
+
+}  // namespace marrow::exchange

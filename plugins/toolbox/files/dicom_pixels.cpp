@@ -1,0 +1,389 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dicom_pixels.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "codecs.hpp"
+#include "header_lines.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "packbits.hpp"
+
+namespace marrow::files {
+namespace {
+
+using Kind = DicomTag::Kind;
+constexpr DicomTag kClass{0x0008, 0x0016, "SOPClassUID"};
+constexpr DicomTag kModalityOfPixels{0x0008, 0x0060, "Modality"};
+constexpr DicomTag kSamples{0x0028, 0x0002, "SamplesPerPixel", Kind::us};
+constexpr DicomTag kPhotometric{0x0028, 0x0004, "PhotometricInterpretation"};
+constexpr DicomTag kPlanes{0x0028, 0x0006, "PlanarConfiguration", Kind::us};
+constexpr DicomTag kFrames{0x0028, 0x0008, "NumberOfFrames"};
+constexpr DicomTag kRows{0x0028, 0x0010, "Rows", Kind::us};
+constexpr DicomTag kColumns{0x0028, 0x0011, "Columns", Kind::us};
+constexpr DicomTag kAllocated{0x0028, 0x0100, "BitsAllocated", Kind::us};
+constexpr DicomTag kStored{0x0028, 0x0101, "BitsStored", Kind::us};
+constexpr DicomTag kHighBit{0x0028, 0x0102, "HighBit", Kind::us};
+constexpr DicomTag kRepresentation{0x0028, 0x0103, "PixelRepresentation", Kind::us};
+constexpr DicomTag kIntercept{0x0028, 0x1052, "RescaleIntercept"};
+constexpr DicomTag kSlope{0x0028, 0x1053, "RescaleSlope"};
+constexpr DicomTag kTable{0x0028, 0x3000, "ModalityLUTSequence"};
+
+[[noreturn]] void damaged(const std::filesystem::path& path, const std::string& fault) {
+  throw Error(path.string() + ": is cut off or damaged: " + fault + "; copy or export it again");
+}
+
+int whole(const DicomHeader& header, const DicomTag& tag, std::optional<int> missing = {}) {
+  const auto given = header.number(tag);
+  if (!given && !missing)
+    throw Error(header.path().string() + ": its header has no " + tag.text() +
+                ", without which its pixels cannot be understood; copy or export it again");
+  const double value = given ? *given : *missing;
+  if (value != std::floor(value) || std::abs(value) > 1e9)
+    damaged(header.path(), tag.text() + " is " + formatted("{:f}", value) + "; expected a whole number");
+  return int(value);
+}
+
+void read_size(const DicomHeader& header, DicomPixels& pixels) {
+  pixels.rows = whole(header, kRows, 0);
+  pixels.columns = whole(header, kColumns, 0);
+  if (pixels.rows < 1 || pixels.columns < 1)
+    throw Error(pixels.path.string() + ": its header does not say how large the image is; export it again");
+  pixels.frames = std::max(1, whole(header, kFrames, 1));
+  pixels.channels = whole(header, kSamples);
+  if (pixels.channels < 1 || pixels.channels > 4)
+    damaged(pixels.path, "its header tells of " + std::to_string(pixels.channels) + " values per pixel");
+  const std::string photometric = header.text(kPhotometric).value_or("");
+  if (photometric.rfind("PALETTE", 0) == 0) pixels.channels = 3;  // one number that stands for three
+  if (pixels.channels == 1 && photometric != "MONOCHROME1" && photometric != "MONOCHROME2")
+    throw Error(pixels.path.string() + ": " + kPhotometric.text() +
+                (photometric.empty() ? " is missing" : " is '" + shown(photometric) + "'") +
+                "; expected MONOCHROME1 or MONOCHROME2, as grey pixels have: copy or export it again");
+}
+
+/// A plan or a report has no pixels, and is sound.
+void check_is_image(const DicomFile& file, const DicomHeader& header) {
+  if (file.has_pixels()) return;
+  if (header.has(kRows)) damaged(file.path(), "it has no pixels");
+  const std::string modality = header.text(kModalityOfPixels).value_or("");
+  throw Error(file.path().string() + ": holds no image" + (modality.empty() ? "" : ", it is of modality " + modality) +
+              "; expected a CT slice or an X-ray image");
+}
+
+/// There must be one item per frame in the functional groups. Otherwise values of another frame would be used.
+void check_groups(const DicomFile& file, const DicomPixels& pixels) {
+  const DicomElement* groups = find_element(pixels.path, file.elements(), kFrameGroups);
+  if (groups && groups->items.size() != std::size_t(pixels.frames))
+    damaged(pixels.path, "it has " + std::to_string(pixels.frames) + (pixels.frames == 1 ? " frame" : " frames") +
+                             ", but values for " + std::to_string(groups->items.size()) +
+                             " (PerFrameFunctionalGroupsSequence)");
+}
+
+void read_bits(const DicomHeader& header, DicomPixels& pixels) {
+  pixels.bits_allocated = whole(header, kAllocated);
+  pixels.bits_stored = whole(header, kStored);
+  const int allocated = pixels.bits_allocated, stored = pixels.bits_stored, high = whole(header, kHighBit);
+  const int representation = whole(header, kRepresentation);
+  if ((allocated != 8 && allocated != 16 && allocated != 32) || stored < 1 || stored > allocated || high != stored - 1)
+    throw Error(
+        pixels.path.string() + ": its pixels have " + std::to_string(stored) + " of " + std::to_string(allocated) +
+        " bits, the highest being " + std::to_string(high) +
+        ", which is not read; expected 8, 16 or 32 bits, the highest being the last that is stored: export it with 16");
+  if (representation != 0 && representation != 1) damaged(pixels.path, kRepresentation.text() + " is neither 0 nor 1");
+  pixels.is_signed = representation == 1;
+  const auto slope = header.number(kSlope), intercept = header.number(kIntercept);
+  pixels.slope = slope.value_or(1);
+  pixels.intercept = intercept.value_or(0);
+  pixels.gives_slope = slope.has_value();
+  pixels.gives_intercept = intercept.has_value();
+  pixels.has_table = header.has(kTable);
+  if (pixels.slope == 0) damaged(pixels.path, kSlope.text() + " is 0");
+}
+
+/// The meaning of a value of 16 bits if only `bits_stored` of them count. std::nullopt if it needs more bits.
+std::optional<double> value_of_stored_bits(const DicomPixels& pixels, double value) {
+  const int bits = pixels.bits_stored, word = std::uint16_t(int(value));
+  if (bits >= 16) return value;
+  if (word >> bits == 0) return pixels.is_signed && word >> (bits - 1) == 1 ? word - (1 << bits) : word;
+  if (pixels.is_signed && value >= -double(1 << (bits - 1)) && value < 0) return value;
+  return std::nullopt;
+}
+
+void read_padding(const DicomHeader& header, DicomPixels& pixels) {
+  const Kind kind = pixels.is_signed ? Kind::ss : Kind::us;
+  const auto value = header.number({0x0028, 0x0120, "PixelPaddingValue", kind});
+  if (!value) return;
+  const double limit = header.number({0x0028, 0x0121, "PixelPaddingRangeLimit", kind}).value_or(*value);
+  const auto from = value_of_stored_bits(pixels, *value), to = value_of_stored_bits(pixels, limit);
+  if (from && to)
+    pixels.padding = {std::min(*from, *to), std::max(*from, *to)};
+  else
+    pixels.padding_beyond_bits = std::uint16_t(int(*value));
+}
+
+/// When the other bits are removed, such padding would become another value, possibly that of bone.
+void check_padding(const DicomPixels& pixels, const std::vector<std::byte>& bytes) {
+  if (!pixels.padding_beyond_bits || pixels.bits_allocated != 16) return;
+  for (std::size_t at = 0; at < bytes.size(); at += 2) {
+    std::uint16_t word;
+    std::memcpy(&word, bytes.data() + at, 2);
+    if (word == *pixels.padding_beyond_bits)
+      throw Error(pixels.path.string() + ": has pixels of the value " + std::to_string(word) +
+                  " (PixelPaddingValue), which the " + std::to_string(pixels.bits_stored) +
+                  " bits that its pixels have cannot hold; export it again");
+  }
+}
+
+/// The first part of each frame by the table of offsets. The offsets count from the first part's item.
+std::vector<std::size_t> parts_by_table(const DicomFile& file, const DicomPixels& pixels) {
+  const DicomSpan& table = file.offset_table();
+  std::vector<std::size_t> first;
+  if (table.bytes != std::uint64_t(pixels.frames) * 4 || pixels.frame_parts.empty()) return first;
+  FileWindow window(file.file());
+  const std::uint64_t origin = pixels.frame_parts[0].begin - 8;
+  for (std::uint64_t i = 0; i < table.bytes / 4; ++i) {
+    const std::uint64_t begin = origin + window.number(table.begin + 4 * i, 4, false) + 8;
+    const auto part = std::lower_bound(pixels.frame_parts.begin(), pixels.frame_parts.end(), begin,
+                                       [](const DicomSpan& span, std::uint64_t place) { return span.begin < place; });
+    if (part == pixels.frame_parts.end() || part->begin != begin) return {};
+    const std::size_t index = std::size_t(part - pixels.frame_parts.begin());
+    if (first.empty() ? index != 0 : index <= first.back()) return {};
+    first.push_back(index);
+  }
+  first.push_back(pixels.frame_parts.size());
+  return first;
+}
+
+/// The first part of each frame by the mark with which every JPEG begins. A file need not have a table of offsets.
+std::vector<std::size_t> parts_by_jpeg_start(const DicomFile& file, const DicomPixels& pixels) {
+  std::vector<std::size_t> first;
+  for (std::size_t i = 0; i < pixels.frame_parts.size(); ++i)
+    if (pixels.frame_parts[i].bytes >= 2 && file.file().text(pixels.frame_parts[i].begin, 2) == "\xFF\xD8")
+      first.push_back(i);
+  if (first.size() != std::size_t(pixels.frames) || first[0] != 0) return {};
+  first.push_back(pixels.frame_parts.size());
+  return first;
+}
+
+void find_frames(const DicomFile& file, DicomPixels& pixels) {
+  const std::size_t parts = pixels.frame_parts.size(), frames = std::size_t(pixels.frames);
+  if (parts < frames)
+    damaged(pixels.path, "its header tells of " + std::to_string(frames) + " frames, but there are " +
+                             std::to_string(parts) + " parts of compressed pixels");
+  if (parts == frames)
+    for (std::size_t i = 0; i <= frames; ++i) pixels.first_part_of_frame.push_back(i);
+  else if (frames == 1)
+    pixels.first_part_of_frame = {0, parts};
+  else
+    pixels.first_part_of_frame = parts_by_table(file, pixels);
+  if (pixels.first_part_of_frame.empty()) pixels.first_part_of_frame = parts_by_jpeg_start(file, pixels);
+  if (pixels.first_part_of_frame.empty())
+    throw Error(pixels.path.string() + ": does not say which of its " + std::to_string(parts) +
+                " parts of compressed pixels make up a frame; convert it: gdcmconv --raw IN OUT");
+}
+
+/// Whether the bytes after the pixels are only filling: one byte to make the length even, or up to 512 zeros. Anything
+/// else would be pixels that the header does not mention.
+bool is_filled(const DicomFile& file, std::uint64_t pixel_bytes) {
+  const DicomSpan& part = file.pixel_parts()[0];
+  const std::uint64_t more = part.bytes - pixel_bytes;
+  if (more == 1 && pixel_bytes % 2 == 1) return true;
+  return more <= 512 && file.file().text(part.begin + pixel_bytes, std::size_t(more)) == std::string(more, '\0');
+}
+
+void check_plain(const DicomFile& file, const DicomPixels& pixels) {
+  const double held = file.pixel_parts().empty() ? 0 : double(file.pixel_parts()[0].bytes);
+  // Colours may be subsampled (YBR_FULL_422), so the bytes of one channel are the least that is expected.
+  const double expected =
+      double(pixels.rows) * pixels.columns * pixels.frames * pixels.bits_allocated / 8 * (pixels.is_plain_rgb ? 3 : 1);
+  const bool is_too_much = pixels.channels == 1 && held > expected && !is_filled(file, std::uint64_t(expected));
+  if (expected > held || is_too_much)
+    damaged(pixels.path, "its header tells of " + std::to_string(std::int64_t(expected)) +
+                             " bytes of pixels, but there are " + std::to_string(std::int64_t(held)));
+}
+
+CodedImage coded_frame(const DicomPixels& pixels, const InputFile& file, int frame) {
+  CodedImage image{{}, pixels.columns, pixels.rows, pixels.bits_stored, pixels.bits_allocated};
+  for (std::size_t i = pixels.first_part_of_frame[std::size_t(frame - 1)];
+       i < pixels.first_part_of_frame[std::size_t(frame)]; ++i)
+    image.bytes += file.text(pixels.frame_parts[i].begin, std::size_t(pixels.frame_parts[i].bytes));
+  check_size(pixels.path.string(), {pixels.columns, pixels.rows, 1}, image.bytes.size(), 100);
+  return image;
+}
+
+std::vector<std::byte> decoded(const DicomPixels& pixels, const CodedImage& image) {
+  try {
+    if (pixels.transfer_syntax == "1.2.840.10008.1.2.5") return decode_rle(image);
+    if (pixels.transfer_syntax == "1.2.840.10008.1.2.4.50") return decode_jpeg_baseline(image);
+    if (pixels.transfer_syntax == "1.2.840.10008.1.2.4.80") return decode_jpeg_ls(image);
+    return decode_jpeg_lossless(image);
+  } catch (const CodecNotRead& error) {
+    throw Error(pixels.path.string() + ": " + error.what() + "; convert it: gdcmconv --raw IN OUT");
+  } catch (const CodecError& error) {
+    damaged(pixels.path, error.what());
+  }
+}
+
+std::vector<std::byte> plain_frame(const DicomPixels& pixels, const InputFile& file, int frame) {
+  const std::size_t width = std::size_t(pixels.bits_allocated / 8);
+  std::vector<std::byte> bytes(std::size_t(pixels.columns) * std::size_t(pixels.rows) * width *
+                               std::size_t(pixels.channels));
+  file.read(pixels.frame_parts[0].begin + std::uint64_t(frame - 1) * bytes.size(), bytes.data(), bytes.size());
+  if (pixels.big_endian && width > 1)
+    for (std::size_t at = 0; at < bytes.size(); at += width) std::reverse(bytes.data() + at, bytes.data() + at + width);
+  return bytes;
+}
+
+/// Puts red, green and blue of a pixel side by side.
+std::vector<std::byte> side_by_side(const std::vector<std::byte>& planes, std::size_t width) {
+  std::vector<std::byte> pixels(planes.size());
+  const std::size_t count = planes.size() / (3 * width);
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t k = 0; k < 3; ++k)
+      std::memcpy(pixels.data() + (3 * i + k) * width, planes.data() + (k * count + i) * width, width);
+  return pixels;
+}
+
+/// Keeps only the stored bits. The bits above them may hold overlays.
+template <class T>
+void keep_stored(const DicomPixels& pixels, std::vector<std::byte>& bytes) {
+  const T mask = T((std::uint64_t(1) << pixels.bits_stored) - 1),
+          sign = T(std::uint64_t(1) << (pixels.bits_stored - 1));
+  for (std::size_t at = 0; at < bytes.size(); at += sizeof(T)) {
+    T value;
+    std::memcpy(&value, bytes.data() + at, sizeof(T));
+    value &= mask;
+    if (pixels.is_signed && (value & sign)) value = T(value | T(~mask));
+    std::memcpy(bytes.data() + at, &value, sizeof(T));
+  }
+}
+
+template <class T>
+void scale(const DicomPixels& pixels, const std::vector<std::byte>& bytes, float* values) {
+  for (std::size_t i = 0; i < bytes.size() / sizeof(T); ++i) {
+    T value;
+    std::memcpy(&value, bytes.data() + i * sizeof(T), sizeof(T));
+    values[i] = float(pixels.slope * double(value) + pixels.intercept);
+  }
+}
+
+}  // namespace
+
+std::vector<std::byte> decode_rle(const CodedImage& image) {
+  const std::size_t count = std::size_t(image.columns) * std::size_t(image.rows),
+                    width = std::size_t(image.bits_allocated / 8);
+  const auto word = [&](std::size_t at) {
+    std::uint32_t value = 0;
+    for (int k = 3; k >= 0; --k) value = value << 8 | std::uint8_t(image.bytes[at + std::size_t(k)]);
+    return std::size_t(value);
+  };
+  if (image.bytes.size() < 64 || word(0) != width)
+    throw CodecError("the compressed pixels are not of as many parts as a pixel has bytes");
+  std::vector<std::byte> bytes(count * width), part(count);
+  for (std::size_t k = 0; k < width; ++k) {  // the high bytes of all pixels come first
+    const std::size_t begin = word(4 + 4 * k), end = k + 1 < width ? word(8 + 4 * k) : image.bytes.size();
+    if (begin < 64 || begin > end || end > image.bytes.size())
+      throw CodecError("the compressed pixels are damaged at their start");
+    if (unpack_packbits(std::string_view(image.bytes).substr(begin, end - begin), part.data(), count) != count)
+      throw CodecError("the compressed pixels are too few");
+    for (std::size_t i = 0; i < count; ++i) bytes[i * width + width - 1 - k] = part[i];
+  }
+  return bytes;
+}
+
+DicomPixels read_dicom_pixels(const DicomFile& file, int frame) {
+  const DicomHeader header(file, frame);
+  DicomPixels pixels;
+  pixels.path = file.path();
+  pixels.file_bytes = file.file().size();
+  pixels.transfer_syntax = file.transfer_syntax();
+  pixels.big_endian = file.is_big_endian();
+  if (header.text(kClass).value_or("").rfind("1.2.840.10008.5.1.4.1.1.481.2", 0) == 0)
+    throw Error(pixels.path.string() + ": holds a dose of radiotherapy; expected a CT slice or an X-ray image");
+  check_is_image(file, header);
+  read_size(header, pixels);
+  read_bits(header, pixels);
+  check_groups(file, pixels);
+  if (pixels.channels == 1) read_padding(header, pixels);
+  const bool should_be_compressed =
+      pixels.transfer_syntax.rfind("1.2.840.10008.1.2.4", 0) == 0 || pixels.transfer_syntax == "1.2.840.10008.1.2.5";
+  if (file.is_compressed() != should_be_compressed)
+    damaged(pixels.path, "its pixels are not written as its transfer syntax says");
+  if (pixels.big_endian && pixels.bits_allocated == 8 && file.pixels_are_words())
+    throw Error(pixels.path.string() +
+                ": its pixels of 8 bits are written in pairs, the second one first (OW, big-endian), which is not "
+                "read; convert it: gdcmconv --raw IN OUT");
+  pixels.is_plain_rgb = pixels.channels == 3 && header.text(kPhotometric).value_or("") == "RGB" &&
+                        !file.is_compressed() && !pixels.is_signed;
+  pixels.planes_are_apart = pixels.is_plain_rgb && header.number(kPlanes).value_or(0) == 1;
+  pixels.frame_parts = file.pixel_parts();
+  file.is_compressed() ? find_frames(file, pixels) : check_plain(file, pixels);
+  return pixels;
+}
+
+DicomPixels read_dicom_pixels(const std::filesystem::path& path, int frame) {
+  return read_dicom_pixels(DicomFile(path), frame);
+}
+
+Samples read_dicom_frame(const DicomPixels& pixels, int frame) {
+  const InputFile file(pixels.path);
+  if (file.size() != pixels.file_bytes)
+    throw Error(pixels.path.string() + ": was changed while it was read; try again when nothing writes it");
+  Samples samples;
+  samples.dimensions = 2;
+  samples.size = {pixels.columns, pixels.rows, 1};
+  using Type = Samples::Type;
+  samples.type = pixels.bits_allocated == 8    ? (pixels.is_signed ? Type::i8 : Type::u8)
+                 : pixels.bits_allocated == 16 ? (pixels.is_signed ? Type::i16 : Type::u16)
+                                               : (pixels.is_signed ? Type::i32 : Type::u32);
+  samples.components = pixels.channels;
+  if (pixels.first_part_of_frame.empty())
+    samples.bytes = plain_frame(pixels, file, frame);
+  else if (pixels.bits_allocated == 32 && pixels.transfer_syntax != "1.2.840.10008.1.2.5")
+    damaged(pixels.path, "JPEG has no pixels of 32 bits");
+  else
+    samples.bytes = decoded(pixels, coded_frame(pixels, file, frame));
+  if (pixels.planes_are_apart) samples.bytes = side_by_side(samples.bytes, bytes_each(samples.type));
+  if (pixels.bits_stored == pixels.bits_allocated) return samples;
+  check_padding(pixels, samples.bytes);
+  if (pixels.bits_allocated == 8) keep_stored<std::uint8_t>(pixels, samples.bytes);
+  if (pixels.bits_allocated == 16) keep_stored<std::uint16_t>(pixels, samples.bytes);
+  if (pixels.bits_allocated == 32) keep_stored<std::uint32_t>(pixels, samples.bytes);
+  return samples;
+}
+
+void make_padding_air(const DicomPixels& pixels, float* values, std::size_t count) {
+  constexpr float kAir_hu = -1000;
+  if (!pixels.padding) return;
+  const auto scaled = [&](double stored) { return float(pixels.slope * stored + pixels.intercept); };
+  const auto [lowest, highest] = std::minmax({scaled((*pixels.padding)[0]), scaled((*pixels.padding)[1])});
+  for (std::size_t i = 0; i < count; ++i)
+    if (values[i] >= lowest && values[i] <= highest) values[i] = std::min(values[i], kAir_hu);
+}
+
+double sum_of_limits(const DicomPixels& pixels) {
+  const double sum = pixels.is_signed ? -1 : std::ldexp(1, pixels.bits_stored) - 1;  // signed: -2048 to 2047
+  return pixels.slope * sum + 2 * pixels.intercept;
+}
+
+void scaled_values(const DicomPixels& pixels, const Samples& samples, float* values) {
+  using Type = Samples::Type;
+  switch (samples.type) {
+    case Type::u8:
+      return scale<std::uint8_t>(pixels, samples.bytes, values);
+    case Type::i8:
+      return scale<std::int8_t>(pixels, samples.bytes, values);
+    case Type::u16:
+      return scale<std::uint16_t>(pixels, samples.bytes, values);
+    case Type::i16:
+      return scale<std::int16_t>(pixels, samples.bytes, values);
+    case Type::u32:
+      return scale<std::uint32_t>(pixels, samples.bytes, values);
+    default:
+      return scale<std::int32_t>(pixels, samples.bytes, values);
+  }
+}
+
+}  // namespace marrow::files

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/files/input_file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/plain_text.hpp"
+#include "marrow/runtime/node/reading.hpp"
+
+namespace marrow::files {
+namespace {
+
+constexpr std::size_t kWindow = 16384;
+
+}  // namespace
+
+InputFile::InputFile(std::filesystem::path path, bool may_be_empty) : path_(std::move(path)) {
+  const std::string what = path_.string();
+  descriptor_ = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor_ < 0) {
+    if (errno == ENOENT || errno == ENOTDIR) throw Error(what + ": there is no such file");
+    if (errno == ELOOP) throw Error(what + ": is a link that leads back to itself");
+    if (errno == ENXIO) throw Error(what + ": expected a file, this is none");
+    throw Error(what + ": cannot be read (" + std::strerror(errno) + ")");
+  }
+  struct stat status {};
+  const bool is_known = ::fstat(descriptor_, &status) == 0;
+  if (is_known && S_ISREG(status.st_mode) && (status.st_size > 0 || may_be_empty)) {
+    size_ = std::uint64_t(status.st_size);
+    now_reading(path_);
+    return;
+  }
+  ::close(descriptor_);
+  throw Error(what + (is_known && S_ISREG(status.st_mode) ? ": the file is empty" : ": expected a file, this is none"));
+}
+
+InputFile::~InputFile() { ::close(descriptor_); }
+
+void InputFile::read(std::uint64_t at, void* to, std::size_t count) const {
+  char* place = static_cast<char*>(to);
+  while (count > 0) {
+    const ssize_t got = ::pread(descriptor_, place, std::min<std::size_t>(count, 1 << 30), off_t(at));
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) throw Error(path_.string() + ": cannot be read (" + std::strerror(errno) + ")");
+    if (got == 0) throw Error(path_.string() + ": became shorter while it was read; try again when nothing writes it");
+    place += got;
+    at += std::uint64_t(got);
+    count -= std::size_t(got);
+  }
+}
+
+std::string InputFile::text(std::uint64_t at, std::size_t count) const {
+  std::string bytes(count, '\0');
+  read(at, bytes.data(), count);
+  return bytes;
+}
+
+std::string read_bytes(const std::filesystem::path& path, std::uint64_t most, bool may_be_empty) {
+  const InputFile file(path, may_be_empty);
+  if (file.size() > most)
+    throw Error(path.string() + ": has " + std::to_string(file.size()) + " bytes; at most " + std::to_string(most) +
+                " are read");
+  return file.text(0, std::size_t(file.size()));
+}
+
+std::string read_text(const std::filesystem::path& path, std::uint64_t most, bool may_be_empty) {
+  return plain_text(read_bytes(path, most, may_be_empty));
+}
+
+const char* FileWindow::bytes(std::uint64_t at, std::size_t count) {
+  if (!holds(at, count)) throw std::out_of_range("behind the end");
+  if (at < begin_ || at + count > begin_ + part_.size()) {
+    part_.resize(std::size_t(std::min<std::uint64_t>(std::max(count, kWindow), size_ - at)));
+    file_->read(at, part_.data(), part_.size());
+    begin_ = at;
+  }
+  return part_.data() + (at - begin_);
+}
+
+std::uint64_t FileWindow::number(std::uint64_t at, int width, bool big_endian) {
+  const char* const raw = bytes(at, std::size_t(width));
+  std::uint64_t value = 0;
+  for (int i = 0; i < width; ++i) value = value << 8 | std::uint8_t(raw[big_endian ? i : width - 1 - i]);
+  return value;
+}
+
+std::string FileWindow::text(std::uint64_t at, std::size_t count) { return {bytes(at, count), count}; }
+
+void check_stays_inside(const std::filesystem::path& folder, const std::filesystem::path& file) {
+  std::error_code failure;
+  if (!std::filesystem::is_symlink(std::filesystem::symlink_status(file, failure))) return;
+  const std::filesystem::path target = std::filesystem::canonical(file, failure);
+  if (failure) throw Error(file.string() + ": is a link that leads nowhere; copy the file itself into the folder");
+  const std::filesystem::path inside = target.lexically_relative(std::filesystem::canonical(folder, failure));
+  if (failure || inside.empty() || *inside.begin() == "..")
+    throw Error(file.string() + ": is a link to a place outside the folder; copy the file itself into the folder");
+}
+
+}  // namespace marrow::files

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+// NIfTI-1 and NIfTI-2 (.nii, .nii.gz). The NIfTI library returns zeros for samples that a file does not hold, and
+// accepts a header that contradicts itself. So this file has its own reader.
+#include <algorithm>
+#include <cmath>
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "nifti_header.hpp"
+#include "samples.hpp"
+
+namespace marrow::files {
+namespace {
+
+/// How much more than 1 the squared length of a quaternion's part may be, because its numbers are rounded. What is
+/// longer is no rotation.
+constexpr double kRoundedQuaternion = 1e-5;
+
+Samples::Type nifti_type(const NiftiHeader& header) {
+  using Type = Samples::Type;
+  struct Known {
+    int code, bits;
+    Type type;
+  };
+  static constexpr Known kKnown[] = {
+      {2, 8, Type::u8},     {256, 8, Type::i8},    {4, 16, Type::i16},    {512, 16, Type::u16}, {8, 32, Type::i32},
+      {768, 32, Type::u32}, {1024, 64, Type::i64}, {1280, 64, Type::u64}, {16, 32, Type::f32},  {64, 64, Type::f64}};
+  const int code = header.type, bits = header.bits;
+  if (code == 128 || code == 2304)
+    throw Error(header.what + ": has " + std::to_string(code == 128 ? 3 : 4) + " values per voxel; a CT has one");
+  for (const Known& known : kKnown) {
+    if (known.code != code) continue;
+    if (known.bits != bits)
+      throw Error(header.what + ": its header says that samples are of type " + std::to_string(code) + ", which have " +
+                  std::to_string(known.bits) + " bits, and that they have " + std::to_string(bits) +
+                  " bits; it is damaged: copy or export it again");
+    return known.type;
+  }
+  throw Error(header.what + ": its samples are of type " + std::to_string(code) +
+              ", which is not read; save it as 16 bit integers or float");
+}
+
+std::array<long long, 3> size_of(const NiftiHeader& header) {
+  const long long dimensions = header.dim[0];
+  if (dimensions < 1 || dimensions > 7)
+    throw Error(header.what + ": its header tells of " + std::to_string(dimensions) + " dimensions; it is damaged");
+  for (std::size_t k = 4; k <= std::size_t(dimensions); ++k)
+    if (header.dim[k] != 1)
+      throw Error(header.what + ": has " + std::to_string(dimensions) + " dimensions; expected one volume");
+  std::array<long long, 3> size{1, 1, 1};
+  for (std::size_t k = 0; k < std::min<std::size_t>(3, std::size_t(dimensions)); ++k) size[k] = header.dim[k + 1];
+  return size;
+}
+
+bool is_finite(const NiftiAffine& affine) {
+  for (const auto& row : affine)
+    for (const double value : row)
+      if (!std::isfinite(value)) return false;
+  return true;
+}
+
+double dot(const NiftiAffine& affine, std::size_t a, std::size_t b) {
+  double sum = 0;
+  for (const auto& row : affine) sum += row[a] * row[b];
+  return sum;
+}
+
+/// Whether all its values are finite and none of the three axes is zero.
+bool has_lengths(const NiftiAffine& affine) {
+  return is_finite(affine) && dot(affine, 0, 0) > 0 && dot(affine, 1, 1) > 0 && dot(affine, 2, 2) > 0;
+}
+
+/// Whether its axes are at right angles and none is zero.
+bool is_straight(const NiftiAffine& affine) {
+  if (!has_lengths(affine)) return false;
+  for (const auto& [a, b] : {std::pair<std::size_t, std::size_t>{0, 1}, {0, 2}, {1, 2}})
+    if (std::abs(dot(affine, a, b)) > kRoundedDirection * std::sqrt(dot(affine, a, a) * dot(affine, b, b)))
+      return false;
+  return true;
+}
+
+/// The matrix from the quaternion, as defined in nifti1.h. Throws Error if it is no rotation.
+NiftiAffine qform(const NiftiHeader& header) {
+  auto [b, c, d] = header.quaternion;
+  const double squared = b * b + c * c + d * d;
+  if (squared > 1 + kRoundedQuaternion)
+    throw Error(header.what + ": the quaternion (b, c, d) of its qform has the length " +
+                formatted("{:.6g}", std::sqrt(squared)) +
+                ", but that of a rotation is at most 1; it is damaged, or was written wrongly: export it again, or set "
+                "qform_code to 0 if its sform is right");
+  double a = 1 - squared;
+  if (a < 1e-7) {
+    const double length = std::sqrt(squared);
+    b /= length, c /= length, d /= length, a = 0;
+  } else {
+    a = std::sqrt(a);
+  }
+  const double x = header.pixdim[1], y = header.pixdim[2],
+               z = header.pixdim[0] < 0 ? -header.pixdim[3] : header.pixdim[3];
+  const auto& [along_x, along_y, along_z] = header.offset;
+  return {{{(a * a + b * b - c * c - d * d) * x, 2 * (b * c - a * d) * y, 2 * (b * d + a * c) * z, along_x},
+           {2 * (b * c + a * d) * x, (a * a + c * c - b * b - d * d) * y, 2 * (c * d - a * b) * z, along_y},
+           {2 * (b * d - a * c) * x, 2 * (c * d + a * b) * y, (a * a + d * d - c * c - b * b) * z, along_z}}};
+}
+
+/// Whether both put every voxel of the volume at the same position, up to rounding (0.02 mm per axis).
+bool are_near(const NiftiAffine& one, const NiftiAffine& other, const NiftiHeader& header) {
+  for (std::size_t row = 0; row < 3; ++row) {
+    double apart = std::abs(one[row][3] - other[row][3]);
+    for (std::size_t k = 0; k < 3; ++k)
+      apart += std::abs(one[row][k] - other[row][k]) * double(std::max(0ll, header.dim[k + 1] - 1));
+    if (!(apart * header.unit_mm() < 0.02)) return false;  // also for NaN
+  }
+  return true;
+}
+
+[[noreturn]] void refuse_two_places(const NiftiHeader& header, const NiftiAffine& s, int scode, int qcode) {
+  const std::string codes =
+      "sform (code " + std::to_string(scode) + ") and its qform (code " + std::to_string(qcode) + ")";
+  if (!is_straight(s))
+    throw Error(
+        header.what + ": its " + codes +
+        " do not agree: the sform is a matrix that is sheared (as of a CT with a tilted gantry) or damaged, which "
+        "no qform can say; resample it to axes at right angles, or export it again");
+  throw Error(header.what + ": its " + codes +
+              " put the same voxels to different places; set the code of the wrong one to 0, or export it again");
+}
+
+/// If both are given, they must agree, or the sform must be that of the scanner (code 1). An sform that maps to another
+/// scan (code 2) is not used if the qform is that of the scanner.
+NiftiAffine affine_of(const NiftiHeader& header) {
+  const int qcode = header.qform_code, scode = header.sform_code;
+  if (qcode <= 0 && scode <= 0)  // programs then assume different axes, and one of them mirrors the bone
+    throw Error(header.what +
+                ": its header does not say which axis is left or right, front or back, up or down (qform_code and "
+                "sform_code are 0); export it again with one of them, or as MHA");
+  const NiftiAffine& s = header.sform;
+  if (scode > 0 && is_straight(s) && (qcode <= 0 || scode == 1)) return s;
+  const NiftiAffine q = qcode > 0 ? qform(header) : NiftiAffine{};
+  if (scode > 0 && is_straight(s) && are_near(s, q, header)) return s;
+  const bool is_of_other_scan = scode == 2 && qcode == 1 && has_lengths(s);
+  if (qcode > 0 && is_straight(q) && (scode <= 0 || is_of_other_scan || are_near(s, q, header))) return q;
+  if (qcode > 0 && scode > 0 && is_straight(q)) refuse_two_places(header, s, scode, qcode);
+  throw Error(header.what +
+              ": its header does not say where it lies, or by a matrix that is sheared or damaged; resample or export "
+              "it again");
+}
+
+void read_grid(const NiftiHeader& header, Samples& samples) {
+  const double unit_mm = header.unit_mm();
+  for (std::size_t k = 1; k <= 3; ++k)
+    if (const double length = header.pixdim[k]; !std::isfinite(length) || !(length > 0))
+      throw Error(header.what + ": voxel spacing " + formatted("{:f}", length) + " is not a positive length");
+  const NiftiAffine affine = affine_of(header);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double length = std::sqrt(dot(affine, k, k)), said = header.pixdim[k + 1];
+    if (std::abs(length - said) > 1e-3 * said)  // it is not known which of the two is right
+      throw Error(header.what + ": its header says twice how large a voxel is along axis " + std::to_string(k + 1) +
+                  ": " + formatted("{:f} mm by its sform, {:f}", length * unit_mm, said * unit_mm) +
+                  " mm by its pixdim; set both to the right one, or export it again");
+    samples.spacing_mm[k] = length * unit_mm;
+    for (std::size_t row = 0; row < 3; ++row)
+      samples.direction[row * 3 + k] = (row < 2 ? -1.0 : 1.0) * affine[row][k] / length;
+  }
+  for (std::size_t row = 0; row < 3; ++row) samples.origin_mm[row] = (row < 2 ? -1.0 : 1.0) * affine[row][3] * unit_mm;
+}
+
+void read_scaling(const NiftiHeader& header, StoredSamples& stored) {
+  if (header.slope == 0 || std::isnan(header.slope)) return;  // no scaling: 0 by nifti1.h, NaN by some programs
+  if (!std::isfinite(header.slope) || !std::isfinite(header.intercept))
+    throw Error(header.what + ": its header scales samples by a number that is not finite; it is damaged");
+  stored.slope = header.slope;
+  stored.intercept = header.intercept;
+}
+
+}  // namespace
+
+VolumeSamples read_nifti(const std::filesystem::path& path, bool is_placed) {
+  const InputFile file(path);
+  const NiftiHeader header = read_nifti_header(file);
+  const auto size = size_of(header);
+  StoredSamples stored;
+  stored.type = nifti_type(header);
+  check_size(path.string(), size, file.size());
+  VolumeSamples volume;
+  volume.geometry.dimensions = int(std::min(3ll, header.dim[0]));
+  for (std::size_t k = 0; k < 3; ++k) volume.geometry.size[k] = int(size[k]);
+  if (volume.geometry.dimensions < 3 && is_placed) return volume;  // one image; the caller refuses it
+  if (is_placed) read_grid(header, volume.geometry);
+  read_scaling(header, stored);
+  volume.geometry.type = stored.type_of_values();
+  const double begin = header.begin;
+  if (!(begin >= header.least_begin && begin <= 1e9) || begin != std::floor(begin))
+    throw Error(path.string() + ": its header says that samples begin at byte " + formatted("{:f}", begin) +
+                "; it is damaged");
+  stored.count = volume.geometry.count();
+  stored.big_endian = header.is_swapped;
+  stored.is_packed = file.text(0, 2) == "\x1F\x8B";
+  (stored.is_packed ? stored.skip : stored.begin) = std::uint64_t(begin);
+  volume.values = read_floats(file, stored);
+  return volume;
+}
+
+}  // namespace marrow::files

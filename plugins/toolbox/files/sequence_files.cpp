@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/files/sequence_files.hpp"
+
+#include <fnmatch.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+
+#include "file_format.hpp"
+#include "header_lines.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/toolbox/files/input_file.hpp"
+
+namespace marrow::files {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Files of a higher rank are no images beside those of a lower one: JPEG and BMP are pictures of them, and a file for
+/// volumes is a CT.
+std::size_t rank_of(FileFormat format) {
+  if (format == FileFormat::png || format == FileFormat::tiff || format == FileFormat::dicom) return 0;
+  return format == FileFormat::jpeg || format == FileFormat::bmp ? 1 : 2;
+}
+
+/// The images among the files of a folder.
+std::vector<std::string> images_in(const fs::path& folder, const std::vector<std::string>& names) {
+  std::array<std::vector<std::string>, 3> by_rank;
+  for (const std::string& name : names) {
+    const FileFormat format = file_format(folder / name);
+    if (format == FileFormat::unknown || in_small_letters(fs::path(name).filename().string()) == "dicomdir") continue;
+    by_rank[rank_of(format)].push_back(name);
+  }
+  const auto first = std::find_if(by_rank.begin(), by_rank.end(),
+                                  [](const std::vector<std::string>& found) { return !found.empty(); });
+  return first == by_rank.end() ? std::vector<std::string>() : *first;
+}
+
+std::vector<std::string> names_that_fit(const std::string& pattern, const std::vector<std::string>& names) {
+  std::vector<std::string> fitting;
+  for (const std::string& name : names)
+    if (fnmatch(pattern.c_str(), name.c_str(), FNM_PATHNAME | FNM_PERIOD) == 0) fitting.push_back(name);
+  return fitting;
+}
+
+/// Paths from the folder of all its files, sorted. Folders inside are searched as deep as the pattern reaches.
+std::vector<std::string> files_in(const fs::path& folder, long depth) {
+  std::error_code failure;
+  if (!fs::is_directory(folder, failure)) throw Error(folder.string() + ": there is no such folder");
+  std::vector<std::string> names;
+  fs::recursive_directory_iterator at(folder, failure), end;
+  for (; !failure && at != end; at.increment(failure)) {
+    if (at->is_directory(failure) && at.depth() >= depth) at.disable_recursion_pending();
+    if (at->is_regular_file(failure)) names.push_back(at->path().lexically_relative(folder).generic_string());
+  }
+  if (failure) throw Error(folder.string() + ": cannot be searched: " + failure.message());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+[[noreturn]] void refuse_no_file(const fs::path& folder, const std::string& pattern,
+                                 const std::vector<std::string>& names) {
+  constexpr std::size_t kMost = 5;
+  std::string there;
+  for (std::size_t i = 0; i < std::min(kMost, names.size()); ++i) there += (i ? ", '" : "'") + names[i] + "'";
+  if (names.size() > kMost) there += " and " + std::to_string(names.size() - kMost) + " more";
+  throw Error(folder.string() + ": no " +
+              (pattern.empty() ? std::string("image (PNG, TIFF, DICOM, ...) is in it")
+                               : "file in it fits the pattern '" + pattern + "'") +
+              (there.empty() ? "; the folder is empty" : "; there are " + there));
+}
+
+/// The part of the names in which they differ: behind `prefix` characters, before `suffix` characters. Digits next to
+/// it belong to it.
+struct Part {
+  std::size_t prefix, suffix;
+};
+
+Part differing_part(const std::vector<std::string>& names) {
+  const std::string& first = names.front();
+  Part part{first.size(), first.size()};
+  for (const std::string& name : names) {
+    const auto prefix = std::mismatch(first.begin(), first.end(), name.begin(), name.end()).first - first.begin();
+    const auto suffix = std::mismatch(first.rbegin(), first.rend(), name.rbegin(), name.rend()).first - first.rbegin();
+    part = {std::min(part.prefix, std::size_t(prefix)), std::min(part.suffix, std::size_t(suffix))};
+  }
+  const auto is_digit = [&](std::size_t at) { return std::isdigit(static_cast<unsigned char>(first[at])); };
+  while (part.prefix > 0 && is_digit(part.prefix - 1)) --part.prefix;
+  while (part.suffix > 0 && is_digit(first.size() - part.suffix)) --part.suffix;
+  return part;
+}
+
+struct Numbered {
+  long long number;
+  std::string name;
+};
+
+std::vector<Numbered> numbered(const fs::path& folder, const std::vector<std::string>& names) {
+  constexpr std::size_t kMostDigits = 15;
+  const Part part = differing_part(names);
+  std::vector<Numbered> files;
+  for (const std::string& name : names) {
+    const std::string digits = part.prefix + part.suffix < name.size()
+                                   ? name.substr(part.prefix, name.size() - part.prefix - part.suffix)
+                                   : std::string();
+    if (digits.empty() || digits.size() > kMostDigits ||
+        !std::all_of(digits.begin(), digits.end(), [](unsigned char c) { return std::isdigit(c); }))
+      throw Error(folder.string() + ": the images differ in more than a number: '" + names.front() + "' and '" +
+                  (&name == &names.front() ? names.back() : name) +
+                  "'; name those of one sequence by a pattern, as 'frontal_*.png'");
+    files.push_back({std::stoll(digits), name});
+  }
+  std::stable_sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.number < b.number; });
+  return files;
+}
+
+/// Numbers may go up in any step, but always in the same.
+void check_steps(const fs::path& folder, const std::vector<Numbered>& files) {
+  long long step = 0;
+  for (std::size_t i = 1; i < files.size(); ++i) {
+    const long long gap = files[i].number - files[i - 1].number;
+    if (gap == 0)
+      throw Error(folder.string() + ": two images have the same number: '" + files[i - 1].name + "' and '" +
+                  files[i].name + "'; remove one of them");
+    if (step == 0 || gap < step) step = gap;
+  }
+  for (std::size_t i = 1; i < files.size(); ++i)
+    if (files[i].number - files[i - 1].number != step)
+      throw Error(folder.string() + ": image " + std::to_string(files[i - 1].number + step) + " is missing between '" +
+                  files[i - 1].name + "' and '" + files[i].name +
+                  "'; a bone is followed in even steps of time: put a blank image of the same size there, or move the "
+                  "images behind the gap to a folder of their own");
+}
+
+}  // namespace
+
+std::vector<int> frames_of(const FrameRange& range, int count, const std::string& what) {
+  const int last = range.last == 0 ? count : range.last;
+  for (const int frame : {range.first, last})
+    if (frame > count)
+      throw Error(what + ": has " + std::to_string(count) + " frames; there is no frame " + std::to_string(frame));
+  if (last < range.first)
+    throw Error(what + ": the last frame to be read, " + std::to_string(last) + ", lies before the first, " +
+                std::to_string(range.first));
+  std::vector<int> frames;
+  for (int frame = range.first; frame <= last; frame += range.every) frames.push_back(frame);
+  return frames;
+}
+
+std::vector<fs::path> frame_files(const fs::path& folder, const std::string& pattern) {
+  const std::vector<std::string> all = files_in(folder, std::count(pattern.begin(), pattern.end(), '/'));
+  const std::vector<std::string> names = pattern.empty() ? images_in(folder, all) : names_that_fit(pattern, all);
+  if (names.empty()) refuse_no_file(folder, pattern, all);
+  std::vector<fs::path> paths;
+  if (names.size() == 1) {
+    paths.push_back(folder / names.front());
+  } else {
+    const std::vector<Numbered> files = numbered(folder, names);
+    check_steps(folder, files);
+    for (const Numbered& file : files) paths.push_back(folder / file.name);
+  }
+  // The key of a result covers only the content of the folder.
+  for (const fs::path& path : paths) check_stays_inside(folder, path);
+  return paths;
+}
+
+}  // namespace marrow::files

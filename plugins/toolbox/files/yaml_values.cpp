@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/files/yaml_values.hpp"
+
+#include <cmath>
+
+#include "marrow/base/error.hpp"
+#include "marrow/domain/c_arm.hpp"
+#include "marrow/toolbox/files/yaml_text.hpp"
+
+namespace marrow::files {
+namespace {
+
+void check_frame(const YamlMap& map, const std::string& key, const std::string& expected) {
+  const auto frame = map.text(key);
+  if (frame && *frame != expected)
+    map.fault(key,
+              key + ": expected the frame '" + expected + "', got '" + *frame + "'; this file holds another transform");
+}
+
+std::optional<FragmentFrame> frame_from(const YAML::Node& node, YamlFile& file) {
+  const YamlMap map(file, node, "fragment_frame", {"origin_mm", "axes", "anatomical"});
+  const auto origin = map.vector3("origin_mm");
+  const auto axes = map.matrix("axes", 3, 3);
+  if (!origin || !axes) return std::nullopt;
+  try {
+    check_rigid({"ct", "fragment", *axes, *origin}, "fragment_frame: axes");
+  } catch (const Error& error) {
+    map.fault("axes", error.what());
+    return std::nullopt;
+  }
+  return FragmentFrame{*origin, *axes, map.boolean_or("anatomical", true)};
+}
+
+}  // namespace
+
+const std::vector<std::string>& transform_keys() {
+  static const std::vector<std::string> kKeys{"target", "source", "rotation", "translation_mm", "matrix"};
+  return kKeys;
+}
+
+std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTransform& expected) {
+  if (!map.valid()) return std::nullopt;
+  RigidTransform transform = expected;
+  check_frame(map, "target", expected.target);
+  if (!expected.source.empty())
+    check_frame(map, "source", expected.source);
+  else if (const auto source = map.text("source"))
+    transform.source = *source;
+  if (map.has("matrix")) {
+    for (const char* key : {"rotation", "translation_mm"})
+      if (map.has(key)) map.fault(key, std::string(key) + ": 'matrix' already gives it; keep one of the two");
+    const auto matrix = map.matrix("matrix", 4, 4);
+    if (!matrix) return std::nullopt;
+    if (matrix->row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+      map.fault("matrix", "matrix: the last row of a rigid transform is [0, 0, 0, 1]");
+      return std::nullopt;
+    }
+    transform.rotation = matrix->topLeftCorner<3, 3>();
+    transform.translation_mm = matrix->topRightCorner<3, 1>();
+  } else {
+    const auto rotation = map.matrix("rotation", 3, 3);
+    const auto translation = map.vector3("translation_mm");
+    if (!rotation || !translation) return std::nullopt;
+    transform.rotation = *rotation;
+    transform.translation_mm = *translation;
+  }
+  try {
+    check_rigid(transform, map.has("matrix") ? "matrix" : "rotation");
+  } catch (const Error& error) {
+    map.fault(map.has("matrix") ? "matrix" : "rotation", error.what());
+    return std::nullopt;
+  }
+  return transform;
+}
+
+namespace {
+
+/// A number within limits, which the fault names.
+std::optional<double> number_within(const YamlMap& map, const std::string& key, double least, double most) {
+  const auto value = map.number(key);
+  if (!value || (*value >= least && *value <= most)) return value;
+  map.fault(key, key + ": expected " + number(least) + " to " + number(most) + ", got " + number(*value));
+  return std::nullopt;
+}
+
+/// The camera of an isocentric C-arm from its angles and distances. The isocentre is the origin of the world.
+std::optional<Camera> camera_by_c_arm(const YAML::Node& node, int width_px, int height_px, YamlFile& file) {
+  const YamlMap map(file, node, "c_arm",
+                    {"alpha_deg", "beta_deg", "source_to_detector_mm", "source_to_isocentre_mm", "pixel_mm"});
+  const auto alpha_deg = number_within(map, "alpha_deg", -90, 90), beta_deg = number_within(map, "beta_deg", -180, 180),
+             detector_mm = number_within(map, "source_to_detector_mm", 1, 10000),
+             isocentre_mm = number_within(map, "source_to_isocentre_mm", 1, 10000),
+             pixel_mm = number_within(map, "pixel_mm", 0.001, 100);
+  if (!alpha_deg || !beta_deg || !detector_mm || !isocentre_mm || !pixel_mm) return std::nullopt;
+  if (*isocentre_mm >= *detector_mm) {
+    map.fault("source_to_isocentre_mm",
+              "source_to_isocentre_mm: the isocentre lies between source and detector; expected less than "
+              "source_to_detector_mm");
+    return std::nullopt;
+  }
+  const CArm arm{width_px,     height_px,     Eigen::Vector2d::Constant(*pixel_mm),
+                 *detector_mm, *isocentre_mm, Eigen::Vector3d::Zero()};
+  return carm_camera(arm, world_from_camera_rotation(radians(*alpha_deg), radians(*beta_deg)));
+}
+
+/// The camera from its matrices.
+std::optional<Camera> camera_by_matrices(const YamlMap& map, int width_px, int height_px, YamlFile& file) {
+  const auto intrinsics = map.matrix("intrinsics", 3, 3);
+  const auto transform_node = map.required("camera_from_world");
+  if (!transform_node) return std::nullopt;
+  const YamlMap transform_map(file, *transform_node, "camera_from_world", transform_keys());
+  const auto transform = transform_from(transform_map, Camera{}.camera_from_world);
+  if (!intrinsics || !transform) return std::nullopt;
+  return Camera{width_px, height_px, *intrinsics, *transform};
+}
+
+}  // namespace
+
+std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& file) {
+  const YamlMap map(
+      file, node, "camera",
+      {"marrow-camera", "width_px", "height_px", "intrinsics", "radial_distortion", "camera_from_world", "c_arm"});
+  if (map.has("marrow-camera")) check_version(map, "marrow-camera");
+  const auto width = map.integer("width_px"), height = map.integer("height_px");
+  const int width_px = width.value_or(0), height_px = height.value_or(0);
+  if (map.has("c_arm"))
+    for (const char* key : {"intrinsics", "camera_from_world"})
+      if (map.has(key)) map.fault(key, std::string(key) + ": 'c_arm' already gives it; keep one of the two");
+  const std::optional<Camera> camera = map.has("c_arm") ? camera_by_c_arm(map.node("c_arm"), width_px, height_px, file)
+                                                        : camera_by_matrices(map, width_px, height_px, file);
+  if (!camera || !width || !height) return std::nullopt;
+  DistortedCamera result{*camera, {}};
+  if (map.has("radial_distortion")) {
+    const auto terms = map.vector3("radial_distortion");
+    if (!terms) return std::nullopt;
+    for (int i = 0; i < 3; ++i) result.distortion.k[std::size_t(i)] = (*terms)[i];
+  }
+  try {
+    check_camera(result.camera, "camera");
+    check_distortion(camera->intrinsics, result.distortion, width_px, height_px, "camera");
+  } catch (const Error& error) {
+    file.fault(node.Mark(), error.what());
+    return std::nullopt;
+  }
+  return result;
+}
+
+Seeds seeds_from(const YamlMap& map, const std::string& fragment) {
+  return {fragment, map.points("seeds"), map.boolean_or("register", true)};
+}
+
+void check_version(const YamlMap& map, const std::string& key) {
+  const auto version = map.integer(key);
+  if (version && *version != 1)
+    map.fault(key, key + ": this program reads version 1, the file is of version " + std::to_string(*version));
+}
+
+namespace {
+
+std::optional<Matrix6d> covariance_from(const YamlMap& map) {
+  const auto covariance = map.matrix("covariance", 6, 6);
+  if (!covariance) return std::nullopt;
+  try {
+    check_covariance(*covariance, "covariance");
+  } catch (const Error& error) {
+    map.fault("covariance", error.what());
+    return std::nullopt;
+  }
+  return Matrix6d(*covariance);
+}
+
+/// Pairs of evaluations and the least cost after them.
+std::vector<Pose::Progress> convergence_from(const YamlMap& map) {
+  std::vector<Pose::Progress> convergence;
+  const YAML::Node list = map.node("convergence");
+  if (!list.IsSequence()) {
+    map.fault("convergence", "convergence: expected a list, got " + yaml_described(list));
+    return convergence;
+  }
+  for (const YAML::Node& item : list) {
+    const bool is_pair = item.IsSequence() && item.size() == 2;
+    const std::optional<std::int64_t> evaluations = is_pair ? yaml_integer(item[0]) : std::nullopt;
+    const std::optional<double> cost = is_pair ? yaml_number(item[1]) : std::nullopt;
+    if (evaluations && cost && std::abs(*evaluations) <= 1'000'000'000)
+      convergence.push_back({int(*evaluations), *cost});
+    else
+      map.file().fault(item.Mark(),
+                       map.what() + ": convergence: expected a pair [evaluations, cost], got " + yaml_described(item));
+  }
+  return convergence;
+}
+
+}  // namespace
+
+Pose read_pose_file(const std::filesystem::path& path) {
+  YamlFile file(path);
+  std::vector<std::string> keys = transform_keys();
+  for (const char* key : {"marrow-pose", "fragment_frame", "predicted_deviation", "covariance", "warnings", "cost",
+                          "evaluations", "convergence"})
+    keys.push_back(key);
+  const YamlMap map(file, file.root(), "pose", keys);
+  check_version(map, "marrow-pose");
+  Pose pose;
+  if (map.has("source") && map.text("source") == "world")
+    map.fault("source",
+              "source: expected the frame of what was registered, such as 'ct' or 'implant', got 'world'; this file "
+              "holds another transform");
+  if (const auto transform = transform_from(map, {"world", ""})) pose.world_from_model = *transform;
+  if (map.has("fragment_frame"))
+    if (const auto frame = frame_from(map.node("fragment_frame"), file)) pose.frame = *frame;
+  // predicted_deviation is only for human readers; the covariance contains it.
+  if (map.has("covariance")) pose.covariance = covariance_from(map);
+  pose.warnings = map.texts_or_none("warnings");
+  if (map.has("cost")) pose.cost = map.number("cost").value_or(0);
+  if (map.has("evaluations")) pose.evaluations = map.integer("evaluations").value_or(0);
+  if (map.has("convergence")) pose.convergence = convergence_from(map);
+  file.finish();
+  return pose;
+}
+
+namespace {
+
+/// A number, or what number() writes for one that is not finite.
+std::optional<double> any_number_from(const YamlMap& map, const std::string& key) {
+  const YAML::Node node = map.node(key);
+  const std::string text = node.IsDefined() && node.IsScalar() ? node.Scalar() : "";
+  for (const double value : {std::nan(""), HUGE_VAL, -HUGE_VAL})
+    if (text == number(value)) return value;
+  return map.number(key);
+}
+
+std::vector<Metric> figures_from(const YamlMap& map) {
+  std::vector<Metric> figures;
+  const YAML::Node list = map.node("figures");
+  if (!list.IsSequence()) {
+    map.fault("figures", "figures: expected a list, got " + yaml_described(list));
+    return figures;
+  }
+  for (const YAML::Node& item : list) {
+    const YamlMap figure(map.file(), item, "a figure", {"name", "value", "unit"});
+    const auto name = figure.text("name");
+    const auto value = any_number_from(figure, "value");
+    const auto unit = figure.has("unit") ? figure.text("unit") : "";
+    if (name && value && unit) figures.push_back({*name, *value, *unit});
+  }
+  return figures;
+}
+
+}  // namespace
+
+Verdict read_verdict_file(const std::filesystem::path& path) {
+  YamlFile file(path);
+  const YamlMap map(file, file.root(), "verdict",
+                    {"marrow-verdict", "judgement", "failure_probability", "reasons", "remedies", "figures"});
+  check_version(map, "marrow-verdict");
+  Verdict verdict;
+  if (const auto name = map.text("judgement")) {
+    const auto judgement = judgement_named(*name);
+    if (!judgement) map.fault("judgement", "judgement: expected trusted, doubtful or wrong, got '" + *name + "'");
+    verdict.judgement = judgement.value_or(Judgement::doubtful);
+  }
+  if (const auto probability = any_number_from(map, "failure_probability")) {
+    if (!(std::isnan(*probability) || (*probability >= 0 && *probability <= 1)))
+      map.fault("failure_probability",
+                "failure_probability: expected a number from 0 to 1, or .nan if it is not known, got " +
+                    number(*probability));
+    verdict.failure_probability = *probability;
+  }
+  verdict.reasons = map.texts_or_none("reasons");
+  verdict.remedies = map.texts_or_none("remedies");
+  if (map.has("figures")) verdict.figures = figures_from(map);
+  file.finish();
+  return verdict;
+}
+
+List<Seeds> read_seeds_file(const std::filesystem::path& path) {
+  YamlFile file(path);
+  const YamlMap map(file, file.root(), "seeds", {"marrow-seeds", "fragments"});
+  check_version(map, "marrow-seeds");
+  List<Seeds> seeds;
+  if (const auto fragments = map.required("fragments")) {
+    const YamlMap by_name(file, *fragments, "fragments", FreeKeys{});
+    if (by_name.valid() && by_name.keys().empty() && !file.has_faults())
+      map.fault("fragments", "fragments: expected fragments by name");
+    for (const std::string& name : by_name.keys())
+      seeds.add(name,
+                seeds_from(YamlMap(file, by_name.node(name), "fragment '" + name + "'", {"seeds", "register"}), name));
+  }
+  file.finish();
+  return seeds;
+}
+
+}  // namespace marrow::files

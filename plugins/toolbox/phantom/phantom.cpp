@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/phantom/phantom.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/toolbox/phantom/materials.hpp"
+
+namespace marrow::phantom {
+namespace {
+
+void check_surface(const Mesh& mesh, const std::string& what) {
+  check_mesh(mesh, what);
+  if (!is_closed(mesh))
+    throw Error(what +
+                ": the surface is open or not consistently oriented, so it has no inside; close its holes (each edge "
+                "must be shared by exactly two triangles)");
+  if (!(enclosed_volume_mm3(mesh) > 0))
+    throw Error(what + ": the triangles face inward (enclosed volume " + formatted("{:f}", enclosed_volume_mm3(mesh)) +
+                " mm3); reverse their order");
+}
+
+void shift(Mesh& mesh, const Eigen::Vector3d& by_mm) {
+  for (auto& vertex : mesh.vertices_mm) vertex += by_mm;
+}
+
+}  // namespace
+
+void check_bone(const Bone& bone, const std::string& what) {
+  check_surface(bone.outer, what + ", outer surface");
+  if (!bone.inner.triangles.empty()) check_surface(bone.inner, what + ", inner surface");
+  if (bone.fill_z_mm.empty() || bone.fill_z_mm.size() != bone.fill_fraction.size())
+    throw Error(what + ": the bone share needs as many positions as values, got " +
+                std::to_string(bone.fill_z_mm.size()) + " and " + std::to_string(bone.fill_fraction.size()));
+  for (std::size_t i = 0; i < bone.fill_z_mm.size(); ++i) {
+    if (!std::isfinite(bone.fill_z_mm[i]) || (i > 0 && bone.fill_z_mm[i] <= bone.fill_z_mm[i - 1]))
+      throw Error(what + ": the positions of the bone share must grow");
+    if (!(bone.fill_fraction[i] >= 0 && bone.fill_fraction[i] <= 1))
+      throw Error(what + ": the bone share must lie in 0 to 1, got " + formatted("{:f}", bone.fill_fraction[i]));
+  }
+}
+
+void check_phantom(const Phantom& phantom, const std::string& what) {
+  check_bone(phantom.bone, what);
+  if (phantom.fragments.empty()) throw Error(what + ": the phantom has no fragments; break the bone first");
+  if (!phantom.fracture.triangles.empty()) check_surface(phantom.fracture, what + ", fracture surface");
+  for (const Fragment& fragment : phantom.fragments) {
+    check_rigid(fragment.ct_from_bone, what + ", fragment '" + fragment.name + "' in the CT");
+    check_rigid(fragment.world_from_ct, what + ", fragment '" + fragment.name + "' in the images");
+    if (fragment.side != 0 && phantom.fracture.triangles.empty())
+      throw Error(what + ": fragment '" + fragment.name +
+                  "' lies on one side of a fracture, but there is no fracture surface");
+  }
+}
+
+void check_phantom(const ClutteredPhantom& cluttered, const std::string& what) {
+  check_phantom(cluttered.phantom, what);
+  for (const auto* bodies : {&cluttered.tissues, &cluttered.bodies})
+    for (const Body& body : *bodies) {
+      const std::string name = what + ", '" + body.name + "'";
+      check_surface(body.surface, name);
+      check_rigid(body.ct_from_world, name + " in the CT");
+      try {
+        material(body.material);
+      } catch (const Error& error) {
+        throw Error(name + ": " + error.what());
+      }
+    }
+}
+
+const Fragment& distal_fragment(const Phantom& phantom) {
+  for (const Fragment& fragment : phantom.fragments)
+    if (fragment.side < 0) return fragment;
+  return phantom.fragments.front();
+}
+
+void move(Body& body, const RigidTransform& by) {
+  for (auto& vertex : body.surface.vertices_mm) vertex = by * vertex;
+  body.ct_from_world = body.ct_from_world * inverse(by);
+}
+
+const Fragment& fragment_named(const Phantom& phantom, const std::string& name, const std::string& what) {
+  std::string known;
+  for (const Fragment& fragment : phantom.fragments) {
+    if (fragment.name == name) return fragment;
+    known += (known.empty() ? "" : ", ") + fragment.name;
+  }
+  throw Error(what + ": the phantom has no fragment '" + name + "', only " + known);
+}
+
+void place_distal_end(Bone& bone, double depth_mm) {
+  double lowest = bone.outer.vertices_mm.front().z();
+  for (const auto& vertex : bone.outer.vertices_mm) lowest = std::min(lowest, vertex.z());
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(1e300), high = -low;
+  for (const auto& vertex : bone.outer.vertices_mm)
+    if (vertex.z() <= lowest + 100) {
+      low = low.cwiseMin(vertex.head<2>());
+      high = high.cwiseMax(vertex.head<2>());
+    }
+  const Eigen::Vector2d middle = 0.5 * (low + high);
+  const Eigen::Vector3d by(-middle.x(), -middle.y(), -depth_mm - lowest);
+  shift(bone.outer, by);
+  shift(bone.inner, by);
+  bone.thigh_centre_mm += by.head<2>();
+  for (double& z : bone.fill_z_mm) z += by.z();
+}
+
+std::vector<Eigen::Vector3d> points_within(const Grid& grid, const std::vector<Eigen::Vector3d>& points_mm) {
+  constexpr double kBorder = 2;
+  std::vector<Eigen::Vector3d> inside;
+  for (const auto& point : points_mm) {
+    const Eigen::Vector3d index = grid.index_from_point(point);
+    bool is_inside = true;
+    for (int k = 0; k < 3; ++k)
+      is_inside = is_inside && index[k] >= kBorder && index[k] <= grid.size[std::size_t(k)] - 1 - kBorder;
+    if (is_inside) inside.push_back(point);
+  }
+  return inside;
+}
+
+Fill::Fill(const Bone& bone) : z_(bone.fill_z_mm), fraction_(bone.fill_fraction), integral_(z_.size(), 0.0) {
+  for (std::size_t i = 1; i < z_.size(); ++i)
+    integral_[i] = integral_[i - 1] + 0.5 * (fraction_[i] + fraction_[i - 1]) * (z_[i] - z_[i - 1]);
+}
+
+double Fill::at(double z) const {
+  if (z <= z_.front()) return fraction_.front();
+  if (z >= z_.back()) return fraction_.back();
+  const std::size_t i = std::size_t(std::upper_bound(z_.begin(), z_.end(), z) - z_.begin());
+  return fraction_[i - 1] + (fraction_[i] - fraction_[i - 1]) * (z - z_[i - 1]) / (z_[i] - z_[i - 1]);
+}
+
+double Fill::integral(double z) const {
+  if (z <= z_.front()) return (z - z_.front()) * fraction_.front();
+  if (z >= z_.back()) return integral_.back() + (z - z_.back()) * fraction_.back();
+  const std::size_t i = std::size_t(std::upper_bound(z_.begin(), z_.end(), z) - z_.begin());
+  return integral_[i - 1] + 0.5 * (fraction_[i - 1] + at(z)) * (z - z_[i - 1]);
+}
+
+double Fill::mean(double from, double to) const {
+  // Below a micrometre the quotient loses its precision, but the fraction hardly changes.
+  if (std::abs(to - from) < 1e-3) return at(0.5 * (from + to));
+  return (integral(to) - integral(from)) / (to - from);
+}
+
+}  // namespace marrow::phantom

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/track/tra_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <sstream>
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/domain/decompositions.hpp"
+#include "marrow/toolbox/files/input_file.hpp"
+
+namespace marrow::track {
+namespace {
+
+constexpr std::uintmax_t kMostBytes = 256u << 20;
+
+/// A line of a file, to say what is wrong with it.
+struct Line {
+  const std::filesystem::path& path;
+  std::size_t number;
+  std::string_view text;
+
+  std::string place() const { return path.string() + ":" + std::to_string(number); }
+};
+
+/// The 16 numbers of a line.
+std::array<double, 16> numbers_of(const Line& line) {
+  std::array<double, 16> numbers;
+  std::size_t count = 0, at = 0;
+  while (at < line.text.size()) {
+    const std::size_t begin = at, end = std::min(line.text.find_first_of(", \t", at), line.text.size());
+    at = end + 1;
+    const std::string_view word = line.text.substr(begin, end - begin);
+    if (word.empty()) continue;
+    const auto value = parsed_number(word);
+    if (!value)
+      throw Error(line.place() + ":" + std::to_string(begin + 1) + ": expected a number, got '" +
+                  std::string(word.substr(0, 40)) + "'");
+    if (count < numbers.size()) numbers[count] = *value;
+    ++count;
+  }
+  if (count != numbers.size())
+    throw Error(line.place() + ": expected the 16 numbers of a 4x4 matrix, got " + std::to_string(count) +
+                (count > numbers.size() ? "; a number with a decimal comma counts twice: write 12.5, not 12,5" : ""));
+  return numbers;
+}
+
+/// Whether there is a comma, and between commas nothing but blanks: programs for tables write NaN so.
+bool has_only_empty_cells(std::string_view text) {
+  return text.find(',') != std::string_view::npos && text.find_first_not_of(", \t") == std::string_view::npos;
+}
+
+std::optional<RigidTransform> pose_of(const std::array<double, 16>& m, const Line& line) {
+  if (std::any_of(m.begin(), m.end(), [](double value) { return std::isnan(value); })) return std::nullopt;
+  RigidTransform pose{"world", "ct"};
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) pose.rotation(row, column) = m[std::size_t(4 * row + column)];
+    pose.translation_mm[row] = m[std::size_t(4 * row + 3)];
+  }
+  constexpr double kTolerance = 1e-3;  // files have few digits
+  const bool is_rotation =
+      pose.rotation.allFinite() && pose.translation_mm.allFinite() && pose.rotation.determinant() > 0 &&
+      (pose.rotation * pose.rotation.transpose() - Eigen::Matrix3d::Identity()).norm() < kTolerance;
+  if (!is_rotation || std::abs(m[12]) + std::abs(m[13]) + std::abs(m[14]) + std::abs(m[15] - 1) > kTolerance)
+    throw Error(line.place() +
+                ": the matrix is no rigid motion; Autoscoper writes 4x4 matrices row by row, with 0, 0, 0, 1 at the "
+                "end");
+  pose.rotation = nearest_rotation(pose.rotation);
+  return pose;
+}
+
+}  // namespace
+
+AutoscoperTrack read_tra_file(const std::filesystem::path& path) {
+  std::istringstream lines(files::read_text(path, kMostBytes));
+  AutoscoperTrack track;
+  std::string text;
+  for (std::size_t number = 1; std::getline(lines, text); ++number) {
+    if (text.find_first_not_of(" \t") == std::string::npos) continue;
+    const Line line{path, number, text};
+    if (has_only_empty_cells(text))
+      track.world_from_bone.emplace_back();
+    else
+      track.world_from_bone.push_back(pose_of(numbers_of(line), line));
+  }
+  return track;
+}
+
+std::string tra_text(const AutoscoperTrack& track) {
+  std::string text;
+  for (const auto& pose : track.world_from_bone) {
+    for (int row = 0; row < 4; ++row)
+      for (int column = 0; column < 4; ++column) {
+        const double value = !pose        ? 0
+                             : row == 3   ? double(column == 3)
+                             : column < 3 ? pose->rotation(row, column)
+                                          : pose->translation_mm[row];
+        text += (row + column > 0 ? "," : "") + (pose ? formatted("{:.17g}", value) : "NaN");
+      }
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace marrow::track

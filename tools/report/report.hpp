@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Writes one HTML file that shows a run or a comparison and needs no other file; of a large comparison, further
+// pictures lie beside it. The page is in tools/report; data.js there describes the data.
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "compare/comparison.hpp"
+#include "marrow/base/text_file.hpp"
+
+namespace marrow::cli {
+
+/// Data that the cells of a report share: pictures, meshes and scenes, by the hash of their content.
+struct ReportMaterial {
+  nlohmann::json pictures = nlohmann::json::object();
+  nlohmann::json geometries = nlohmann::json::object();
+  nlohmann::json scenes = nlohmann::json::object();
+  std::vector<std::string> left_out;  ///< sentences about files that a record names outside its run's folder
+  /// Adds a sentence to `left_out` if the name of a file, or a link, leads out of the run's folder.
+  void note_if_outside(const std::filesystem::path& run_folder, const std::string& name);
+  void print_left_out() const;
+
+  /// Adds all pictures, meshes and scenes in a run's folder, and the data about them to `cell`. Files that cannot be
+  /// read are left out.
+  void add_run(const std::filesystem::path& run_folder, nlohmann::json& cell);
+  /// Stores the result of add_run() in the folder itself, because encoding pictures takes most of a report's time.
+  static void prepare(const std::filesystem::path& run_folder);
+  /// The same as add_run(), but uses the result that prepare() stored, if there is one.
+  void add_prepared(const std::filesystem::path& run_folder, nlohmann::json& cell);
+
+ private:
+  void add_file(const std::filesystem::path& file, const std::string& name, nlohmann::json& cell);
+  void add_json(const nlohmann::json& file, nlohmann::json& cell);
+};
+
+/// A PNG file as a data URL, converted to WebP with a longer side of at most `size_px`. Throws Error if it is not a
+/// PNG.
+std::string picture_url(const std::filesystem::path& png_file, int size_px);
+
+/// Writes the page with these data.
+void write_page(const nlohmann::json& data, const std::filesystem::path& file, Kinds kinds = Kinds::files);
+
+/// The figures of merit that a run wrote: one table for each folder of files, one column for each file in it.
+nlohmann::json figures_of(const std::filesystem::path& folder, const nlohmann::json& record);
+
+/// Writes the page of a single run, and returns the file. An empty `file` means RUN/report.html. Throws Error if the
+/// folder is not that of a run.
+std::filesystem::path write_run_page(const std::filesystem::path& folder, std::filesystem::path file = {});
+
+/// {nodes, edges} of a pipeline. Each node also has its differences in each of `variants`.
+nlohmann::json graph_of(const Pipeline& pipeline, const std::vector<std::pair<std::string, Pipeline>>& variants);
+
+/// Processor and number of cores of this machine, and the processor level from the record of a run.
+nlohmann::json machine_of(const nlohmann::json& run_record);
+
+/// Any text as one word of a command that a person copies into a shell. It holds only characters that terminals and
+/// pages show as they are: a text with others is written as $'...', which bash, zsh, ksh and POSIX of 2024 read.
+std::string shell_word(const std::string& text);
+/// The same for a path. It is never taken for an option.
+std::string shell_path(const std::filesystem::path& path);
+/// Any text as one word of a script for /bin/sh, in single quotes, in which no character has a meaning.
+std::string script_word(const std::string& text);
+
+/// Writes FOLDER/report.html of a comparison. `shown`: the cells whose pictures were made, those of a case and start
+/// together, the most important ones first. What does not fit into the page goes to FOLDER/report.
+void write_report(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows,
+                  const Answer& answer, const compare::CellRunner& runner, const std::vector<compare::CellIndex>& shown,
+                  const CompareRequest& request, const std::filesystem::path& folder);
+
+}  // namespace marrow::cli

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// A case.yaml as the document of a draft.
+#include <yaml-cpp/yaml.h>
+
+#include <cstdint>
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/plain_text.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/text_file.hpp"
+#include "workbench/case_text.hpp"
+#include "workbench/drafts.hpp"
+
+namespace fs = std::filesystem;
+
+namespace marrow::workbench {
+namespace {
+
+using nlohmann::json;
+
+/// Numbers and truth values become such; everything else a text.
+json json_of_scalar(const YAML::Node& node) {
+  if (node.Tag() == "!") return node.Scalar();  // it was quoted
+  bool truth = false;
+  double number = 0;
+  std::int64_t whole = 0;
+  if (YAML::convert<std::int64_t>::decode(node, whole)) return whole;  // the width of an image must stay a whole number
+  if (YAML::convert<double>::decode(node, number)) return number;
+  if (YAML::convert<bool>::decode(node, truth)) return truth;
+  return node.Scalar();
+}
+
+json json_of(const YAML::Node& node) {
+  if (node.IsSequence()) {
+    json list = json::array();
+    for (const YAML::Node& item : node) list.push_back(json_of(item));
+    return list;
+  }
+  if (node.IsMap()) {
+    json map = json::object();
+    for (const auto& entry : node) map[entry.first.Scalar()] = json_of(entry.second);
+    return map;
+  }
+  return node.IsScalar() ? json_of_scalar(node) : json();
+}
+
+/// A placement as a 4 x 4 matrix.
+json matrix_of(const json& placement) {
+  if (placement.contains("matrix")) return placement["matrix"];
+  json matrix = json::array();
+  for (std::size_t i = 0; i < 3; ++i) {
+    json row = placement.at("rotation").at(i);
+    row.push_back(placement.at("translation_mm").at(i));
+    matrix.push_back(row);
+  }
+  matrix.push_back({0, 0, 0, 1});
+  return matrix;
+}
+
+void adapt(json& document, const std::string& base) {
+  const auto move = [&](json& path) { path = base + path.get<std::string>(); };
+  json& ct = document["ct"];
+  if (ct.is_string()) ct = {{"file", ct}};
+  move(ct.at("file"));
+  for (json& view : document.at("views")) {
+    move(view.at("image"));
+    if (view.contains("mask")) move(view["mask"]);
+    json& camera = view.at("camera");
+    if (camera.is_string()) camera = {{"file", camera}};
+    if (camera.contains("file")) move(camera["file"]);
+  }
+  for (auto& [name, fragment] : document.at("fragments").items())
+    for (const char* key : {"start", "truth"})
+      if (fragment.contains(key)) fragment[key] = matrix_of(fragment[key]);
+  document.erase("marrow-case");
+}
+
+}  // namespace
+
+json document_of_case(const OpenedFolder& folder, const std::string& case_path) {
+  const fs::path file = folder.inside(case_path) / "case.yaml";
+  json document{{"ct", nullptr}, {"views", json::array()}, {"fragments", json::object()}};
+  if (fs::exists(file)) {
+    try {
+      document = json_of(YAML::Load(plain_text(read_text_file(file, kMostSourceBytes))));
+      adapt(document, case_path.empty() ? "" : case_path + "/");
+    } catch (const std::exception& error) {
+      throw Error(printable(file.string()) + ": this case cannot be read here: " + printable(error.what()) +
+                  "; 'marrow inspect' says what is wrong");
+    }
+  }
+  document["landmarks"] = json::array();
+  const fs::path landmarks = folder.inside(case_path) / "landmarks.yaml";
+  if (!fs::exists(landmarks)) return document;
+  try {
+    document["landmarks"] = landmarks_of_file(landmarks);
+  } catch (const std::exception& error) {
+    throw Error(printable(landmarks.string()) + ": these landmarks cannot be read here: " + printable(error.what()));
+  }
+  return document;
+}
+
+}  // namespace marrow::workbench

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "workbench/drafts.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/printable.hpp"
+#include "workbench/server.hpp"
+
+namespace fs = std::filesystem;
+
+namespace marrow::workbench {
+namespace {
+
+using nlohmann::json;
+
+/// A file's name for the path of a case: "cases/7" is "cases%2F7.jsonl".
+std::string file_name(const std::string& case_path) {
+  std::string name;
+  for (const char c : case_path) name += c == '/' ? "%2F" : c == '%' ? "%25" : std::string(1, c);
+  return (name.empty() ? "%" : name) + ".jsonl";
+}
+
+/// Appends a line and has it on the disk. On any failure the file is as before, and an Error is thrown.
+void append_line(const fs::path& file, const std::string& line) {
+  fs::create_directories(file.parent_path());
+  const int descriptor = open(file.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644);
+  if (descriptor < 0) throw Error("the draft cannot be kept: " + std::string(std::strerror(errno)));
+  const off_t before = lseek(descriptor, 0, SEEK_END);
+  std::size_t done = 0;
+  while (done < line.size()) {
+    const ssize_t written = write(descriptor, line.data() + done, line.size() - done);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) break;
+    done += std::size_t(written);
+  }
+  const bool is_good = done == line.size() && fsync(descriptor) == 0;
+  const std::string why = std::strerror(errno);
+  if (!is_good && ftruncate(descriptor, before) != 0) {
+    // the half line is left out when the draft is read
+  }
+  close(descriptor);
+  if (!is_good) throw Error("the change is not kept in the draft: " + why + "; make room and try again");
+}
+
+}  // namespace
+
+void Drafts::apply(Draft& draft, const json& line) {
+  if (line.contains("document")) {
+    if (draft.saved > int(draft.at)) draft.saved = -1;  // what was saved can be reached no more
+    draft.steps.resize(draft.steps.empty() ? 0 : draft.at + 1);
+    draft.steps.push_back({line.value("what", ""), line["document"]});
+    draft.at = draft.steps.size() - 1;
+  } else if (line.contains("undo") && draft.at > 0) {
+    --draft.at;
+  } else if (line.contains("redo") && draft.at + 1 < draft.steps.size()) {
+    ++draft.at;
+  } else if (line.contains("saved")) {
+    draft.saved = int(draft.at);
+  }
+  ++draft.revision;
+}
+
+void Drafts::append(Draft& draft, const json& line) {
+  const auto text = [](const json& one) { return one.dump(-1, ' ', false, json::error_handler_t::replace) + "\n"; };
+  std::string lines = text(line);
+  if (draft.bytes == 0)  // the beginning belongs to the history, too
+    lines = text({{"what", draft.steps[0].what}, {"document", draft.steps[0].document}}) + lines;
+  append_line(draft.file, lines);
+  draft.bytes += lines.size();
+  apply(draft, line);
+}
+
+Drafts::Draft& Drafts::find(const std::string& case_path) {
+  folder_.inside(case_path);  // refuses a path that leads elsewhere
+  const fs::path path = folder_.inside(".marrow/drafts") / file_name(case_path);
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(path, error), bytes = error ? 0 : size;
+  const auto known = drafts_.find(case_path);
+  if (known != drafts_.end() && known->second.bytes == bytes) return known->second;
+  Draft draft;
+  draft.file = path;
+  std::ifstream file(path);
+  for (std::string text; std::getline(file, text);) {
+    const json line = json::parse(text, nullptr, false);
+    if (line.is_object()) apply(draft, line);  // the last line may be half written
+  }
+  if (draft.steps.empty()) {
+    draft.steps.push_back({"the beginning", document_of_case(folder_, case_path)});
+    draft.saved = fs::exists(folder_.inside(case_path) / "case.yaml") ? 0 : -1;
+  }
+  draft.bytes = bytes;
+  return drafts_[case_path] = std::move(draft);
+}
+
+Drafts::Draft& Drafts::find(const std::string& case_path, int revision) {
+  Draft& draft = find(case_path);
+  if (draft.revision != revision)
+    throw Conflict("this case was changed in another tab; the page now shows what is newest");
+  return draft;
+}
+
+json Drafts::shown(const std::string& case_path, const Draft& draft) const {
+  const bool can_redo = draft.at + 1 < draft.steps.size();
+  return {{"case", case_path},
+          {"revision", draft.revision},
+          {"document", draft.steps[draft.at].document},
+          {"undo", draft.at > 0 ? json(draft.steps[draft.at].what) : json()},
+          {"redo", can_redo ? json(draft.steps[draft.at + 1].what) : json()},
+          {"is_saved", draft.saved == int(draft.at)}};
+}
+
+json Drafts::open(const std::string& case_path) {
+  const std::lock_guard lock(mutex_);
+  return shown(case_path, find(case_path));
+}
+
+json Drafts::change(const std::string& case_path, int revision, const std::string& what, json document) {
+  const std::lock_guard lock(mutex_);
+  if (!document.is_object()) throw Error("the changed case is no object");
+  Draft& draft = find(case_path, revision);
+  append(draft, {{"what", what}, {"document", std::move(document)}});
+  return shown(case_path, draft);
+}
+
+json Drafts::undo(const std::string& case_path, int revision) {
+  const std::lock_guard lock(mutex_);
+  Draft& draft = find(case_path, revision);
+  if (draft.at > 0) append(draft, {{"undo", true}});
+  return shown(case_path, draft);
+}
+
+json Drafts::redo(const std::string& case_path, int revision) {
+  const std::lock_guard lock(mutex_);
+  Draft& draft = find(case_path, revision);
+  if (draft.at + 1 < draft.steps.size()) append(draft, {{"redo", true}});
+  return shown(case_path, draft);
+}
+
+json Drafts::mark_saved(const std::string& case_path, int revision) {
+  const std::lock_guard lock(mutex_);
+  Draft& draft = find(case_path, revision);
+  append(draft, {{"saved", true}});
+  return shown(case_path, draft);
+}
+
+}  // namespace marrow::workbench

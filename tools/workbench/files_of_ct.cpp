@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which files a CT is read from.
+#include "marrow/base/error.hpp"
+#include "marrow/base/printable.hpp"
+#include "workbench/ct_requests.hpp"
+
+namespace fs = std::filesystem;
+
+namespace marrow::workbench {
+
+FilesOfCt::FilesOfCt(const fs::path& place) {
+  constexpr std::size_t kMostSlices = 20'000;  // files of a series
+  std::error_code error;
+  if (!fs::exists(place, error)) throw Error(printable(place.string()) + ": there is no such file or folder");
+  if (!fs::is_directory(place, error)) {
+    add(place);
+    return;
+  }
+  std::size_t count = 0;
+  for (fs::recursive_directory_iterator entry(place, error), end; !error && entry != end; entry.increment(error)) {
+    if (++count > kMostSlices)
+      throw Error(printable(place.string()) + ": this folder holds more than " + std::to_string(kMostSlices) +
+                  " files; choose the folder of one series");
+    std::error_code none;
+    if (entry->is_regular_file(none)) add(entry->path());
+  }
+  if (error) throw Error(printable(place.string()) + ": this folder cannot be read: " + error.message());
+}
+
+void FilesOfCt::add(const fs::path& file) {
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (error) return;  // its reader says more
+  bytes += size;
+  const auto time = fs::last_write_time(file, error).time_since_epoch().count();
+  description += file.filename().string() + ' ' + std::to_string(size) + ' ' + std::to_string(time) + '\n';
+}
+
+std::string content_of_ct(const fs::path& place, nlohmann::json ct, const FilesOfCt& files) {
+  ct.erase("file");
+  return place.string() + '\n' + ct.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + '\n' +
+         files.description;
+}
+
+}  // namespace marrow::workbench

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// The request of the page "Case" that saves the draft as a case.
+#include "marrow/base/printable.hpp"
+#include "marrow/base/text_file.hpp"
+#include "workbench/case_text.hpp"
+#include "workbench/ct_requests.hpp"
+#include "workbench/files_of_case.hpp"
+#include "workbench/kept_comments.hpp"
+
+namespace fs = std::filesystem;
+
+namespace marrow::workbench {
+namespace {
+
+using nlohmann::json;
+
+/// Reads the written case as a pipeline does, and looks whether its seeds lie in the CT.
+void check_case(const fs::path& place, bool has_landmarks, const Workbench& workbench, Job& job) {
+  PipelineCall call{.file = workbench_pipeline("case"), .only = {"ct", "seeds", "views"}, .keep = false};
+  call.arguments.inputs.push_back({"case", place.string()});
+  if (has_landmarks) call.only.push_back("landmarks");
+  const auto outputs = outputs_of(call, workbench, job);
+  const Grid& grid = outputs.at("ct").as<Volume>().grid;
+  std::string faults;
+  for (const Seeds& seeds : outputs.at("seeds").as_list<Seeds>())
+    for (const Eigen::Vector3d& point_mm : seeds.points_mm) {
+      const Eigen::Vector3d index = grid.index_from_point(point_mm);
+      bool is_inside = true;
+      for (int k = 0; k < 3; ++k) is_inside = is_inside && index[k] >= -0.5 && index[k] <= grid.size[k] - 0.5;
+      if (!is_inside)
+        faults += (faults.empty() ? "" : "\n") + std::string("fragment ") + in_quotes(printable(seeds.fragment)) +
+                  ": a seed lies outside the CT; move it into the bone";
+    }
+  if (!faults.empty()) throw Error(faults);
+}
+
+/// The planned document with paths relative to the opened folder again, as drafts hold them.
+json document_after(const PlannedCase& plan, const std::string& case_path) {
+  const std::string base = case_path.empty() ? "" : case_path + "/";
+  const auto move = [&](json& path) { path = base + path.get<std::string>(); };
+  json document = plan.document;
+  move(document["ct"]["file"]);
+  for (json& view : document["views"]) {
+    move(view["image"]);
+    if (view.contains("mask") && view["mask"].is_string()) move(view["mask"]);
+    if (view["camera"].contains("file")) move(view["camera"]["file"]);
+  }
+  return document;
+}
+
+/// The texts of a case's files, with the comments of those that are there.
+struct CaseTexts {
+  std::string case_yaml, landmarks_yaml;
+  std::vector<std::string> lost;  ///< comments that are not kept
+};
+
+CaseTexts texts_of(const fs::path& place, const PlannedCase& plan, const json& document) {
+  CaseTexts texts{case_yaml(plan), landmarks_yaml(document), {}};
+  const auto keep = [&](const char* name, std::string& text) {
+    if (!fs::exists(place / name)) return;
+    const KeptText kept = with_comments_of(read_text_file(place / name, kMostSourceBytes), text);
+    if (!text.empty()) text = kept.text;
+    texts.lost.insert(texts.lost.end(), kept.lost.begin(), kept.lost.end());
+  };
+  keep("case.yaml", texts.case_yaml);
+  keep("landmarks.yaml", texts.landmarks_yaml);
+  return texts;
+}
+
+json lost_comments(const std::string& case_path, Workbench& workbench) {
+  const json document = workbench.drafts.open(case_path)["document"];
+  const PlannedCase plan = plan_case(workbench.folder, case_path, document);
+  json lost = json::array();
+  for (const std::string& comment : texts_of(workbench.folder.inside(case_path), plan, document).lost)
+    lost.push_back(printable(comment));
+  return {{"lost", lost}};
+}
+
+json save(const std::string& case_path, int revision, Workbench& workbench, CtMemory& memory, Job& job) {
+  json draft = workbench.drafts.open(case_path);
+  if (draft["revision"] != revision) throw Conflict("this case was changed in another tab; look at it, and save again");
+  const json& document = draft["document"];
+  const PlannedCase plan = plan_case(workbench.folder, case_path, document);
+  const fs::path place = workbench.folder.inside(case_path);
+  const CaseTexts texts = texts_of(place, plan, document);
+  job.tell({{"event", "message"}, {"text", "writing and reading back"}});
+  const json& ct = document["ct"];
+  const fs::path old_ct = workbench.folder.inside(ct["file"]), new_ct = place / plan.document["ct"]["file"];
+  const std::string content = content_of_ct(old_ct, ct, FilesOfCt(old_ct));
+  write_case_files(place, plan, texts.case_yaml, texts.landmarks_yaml,
+                   [&](const fs::path& staged) { check_case(staged, !texts.landmarks_yaml.empty(), workbench, job); });
+  memory.add_copy(content, content_of_ct(new_ct, ct, FilesOfCt(new_ct)));  // so that it need not be read again
+  json copied = json::array();
+  for (const PlannedCase::File& file : plan.files)
+    if (file.is_new) copied.push_back(file.name);
+  json after = document_after(plan, case_path);
+  if (after != document) {  // so that the next time nothing is copied again
+    draft = workbench.drafts.change(case_path, revision, "use the files in the case's folder", std::move(after));
+    revision = draft["revision"];
+  }
+  return {{"draft", workbench.drafts.mark_saved(case_path, revision)},
+          {"copied", copied},
+          {"folder", place.string()},
+          {"pipelines", workbench_pipeline("case").parent_path().parent_path().string()}};
+}
+
+}  // namespace
+
+void add_saving(Server& server, Workbench& workbench, const std::shared_ptr<CtMemory>& memory) {
+  server.get("/api/case/lost-comments", [&workbench](const Request& request) {
+    return json_answer(lost_comments(request.parameter("case"), workbench));
+  });
+  server.post("/api/case/save", [&workbench, memory](const Request& request) {
+    const std::string case_path = request.text("case");
+    const int revision = request.body.value("revision", -1);
+    workbench.folder.inside(case_path);
+    return json_answer(
+        {{"job", workbench.jobs.start("Saving the case", "", [&workbench, memory, case_path, revision](Job& job) {
+            return save(case_path, revision, workbench, *memory, job);
+          })}});
+  });
+}
+
+}  // namespace marrow::workbench

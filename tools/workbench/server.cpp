@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "workbench/server.hpp"
+
+#include <httplib.h>
+
+#include <charconv>
+#include <chrono>
+#include <thread>
+
+#include "marrow/base/printable.hpp"
+#include "marrow/base/reason_of_exception.hpp"
+
+namespace marrow::workbench {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMostBytes = 64'000'000;  // of one request: a painted mask of a large image
+constexpr int kMostAtOnce = 48;                 // requests that are being answered
+constexpr int kThreads = 32;
+
+/// Scripts, styles and pictures come from this server alone, and nothing of it is shown inside another page.
+constexpr const char* kPolicy =
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
+    "frame-src 'self'; worker-src 'self' blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
+
+Asked asked_by(const httplib::Request& request) {
+  Asked asked;
+  asked.changes = request.method != "GET";
+  asked.host = request.get_header_value("Host");
+  asked.origin = request.get_header_value("Origin");
+  asked.fetch_site = request.get_header_value("Sec-Fetch-Site");
+  asked.cookie = request.get_header_value("Cookie");
+  asked.content_type = request.get_header_value("Content-Type");
+  asked.own_header = request.get_header_value("X-Marrow");
+  return asked;
+}
+
+void refuse(httplib::Response& response, int status, const std::string& text) {
+  response.status = status;
+  response.set_content(json{{"error", printable_lines(text)}}.dump(-1, ' ', false, json::error_handler_t::replace),
+                       "application/json");
+}
+
+Request request_of(const httplib::Request& asked) {
+  Request request;
+  for (const auto& [name, value] : asked.params) request.parameters[name] = value;
+  if (asked.method == "GET") return request;
+  request.body = json::parse(asked.body, nullptr, false);
+  if (!request.body.is_object()) throw Error("the request is no JSON object");
+  return request;
+}
+
+}  // namespace
+
+const std::string& Request::parameter(const std::string& name) const {
+  const auto found = parameters.find(name);
+  if (found == parameters.end()) throw Error("the request lacks '" + name + "'");
+  return found->second;
+}
+
+int Request::number(const std::string& name, int least, int most) const {
+  const std::string& text = parameter(name);
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < least || value > most)
+    throw Error("'" + name + "' must be a whole number from " + std::to_string(least) + " to " + std::to_string(most) +
+                ", got " + in_quotes(text));
+  return value;
+}
+
+std::string Request::text(const std::string& name) const {
+  const auto found = body.find(name);
+  if (found == body.end() || !found->is_string()) throw Error("the request lacks the text '" + name + "'");
+  return found->get<std::string>();
+}
+
+Answer json_answer(const json& value) { return {value.dump(-1, ' ', false, json::error_handler_t::replace)}; }
+
+Answer bytes_answer(std::string bytes, const json& about) {
+  Answer answer{std::move(bytes), "application/octet-stream"};
+  if (!about.is_null()) answer.headers = {{"X-Marrow-About", about.dump(-1, ' ', true)}};
+  return answer;
+}
+
+struct Server::Parts {
+  httplib::Server http;
+  Access access;
+  std::atomic<int> at_once = 0;
+
+  Parts() {
+    http.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
+    http.set_payload_max_length(kMostBytes);
+    http.set_keep_alive_max_count(1'000'000);  // dragging asks 60 times a second over the same connection
+    http.set_tcp_nodelay(true);
+    http.set_socket_options([](socket_t socket) {  // nobody may share the port
+      const int yes = 1;
+      setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    });
+    http.set_read_timeout(10);
+    http.set_default_headers({{"Content-Security-Policy", kPolicy},
+                              {"X-Content-Type-Options", "nosniff"},
+                              {"Referrer-Policy", "no-referrer"},
+                              {"Cross-Origin-Resource-Policy", "same-origin"},
+                              {"Cross-Origin-Opener-Policy", "same-origin"},
+                              {"Cache-Control", "no-store"}});
+    http.set_pre_routing_handler(
+        [this](const httplib::Request& request, httplib::Response& response) { return check(request, response); });
+    http.set_error_handler([](const httplib::Request&, httplib::Response& response) {
+      if (!response.body.empty()) return;
+      refuse(response, response.status,
+             response.status == 413   ? "the request is too large; at most 64 MB can be sent"
+             : response.status == 404 ? "there is no such page"
+                                      : "the request could not be answered");
+    });
+  }
+
+  httplib::Server::HandlerResponse check(const httplib::Request& request, httplib::Response& response) {
+    const bool hands_in_token = request.path == "/" && request.method == "GET" && request.has_param("token");
+    const std::string fault = access.fault(asked_by(request), hands_in_token);
+    if (!fault.empty()) {
+      refuse(response, 403, fault);
+      return httplib::Server::HandlerResponse::Handled;
+    }
+    if (!hands_in_token) return httplib::Server::HandlerResponse::Unhandled;
+    if (access.take_token(request.get_param_value("token"))) {
+      response.set_header("Set-Cookie", access.cookie());
+    } else if (!access.fault(asked_by(request), false).empty()) {
+      refuse(response, 403, "this address was used before; start 'marrow open' anew for a new one");
+      return httplib::Server::HandlerResponse::Handled;
+    }
+    response.set_redirect("/");  // so that the token does not stay in the address; the browser keeps what is behind '#'
+    return httplib::Server::HandlerResponse::Handled;
+  }
+
+  void answer(const Handler& handler, const httplib::Request& asked, httplib::Response& response) {
+    struct Counted {
+      std::atomic<int>& count;
+      explicit Counted(std::atomic<int>& c) : count(c) { ++count; }
+      ~Counted() { --count; }
+    } counted(at_once);
+    if (at_once > kMostAtOnce) return refuse(response, 503, "too many requests at once; try again");
+    try {
+      Answer answer = handler(request_of(asked));
+      for (const auto& [name, value] : answer.headers) {
+        response.headers.erase(name);  // the default one, which would count as well
+        response.set_header(name, value);
+      }
+      response.set_content(std::move(answer.body), answer.type);
+    } catch (const Conflict& error) {
+      refuse(response, 409, error.what());
+    } catch (const std::bad_alloc&) {
+      refuse(response, 500, "out of memory");
+    } catch (...) {
+      refuse(response, 400, reason_of_exception());
+    }
+  }
+};
+
+Server::Server() : parts_(std::make_unique<Parts>()) {}
+Server::~Server() = default;
+
+void Server::get(const std::string& path, Handler handler) {
+  parts_->http.Get(path,
+                   [this, handler = std::move(handler)](const httplib::Request& request, httplib::Response& response) {
+                     parts_->answer(handler, request, response);
+                   });
+}
+
+void Server::post(const std::string& path, Handler handler) {
+  parts_->http.Post(path,
+                    [this, handler = std::move(handler)](const httplib::Request& request, httplib::Response& response) {
+                      parts_->answer(handler, request, response);
+                    });
+}
+
+void Server::page(const std::string& path, const std::string& type, std::string text) {
+  parts_->http.Get(path, [type, text = std::move(text)](const httplib::Request&, httplib::Response& response) {
+    response.set_content(text, type);
+  });
+}
+
+void Server::listen(int port) {
+  if (port == 0)
+    port = parts_->http.bind_to_any_port("127.0.0.1");
+  else if (!parts_->http.bind_to_port("127.0.0.1", port))
+    port = -1;
+  if (port < 0) throw Error("the port is taken, or may not be used; give another with --port, or leave it out");
+  parts_->access.listen_on(port);
+}
+
+const Access& Server::access() const { return parts_->access; }
+
+void Server::run(const std::atomic<bool>& stop) {
+  std::atomic<bool> ended = false;
+  std::thread watcher([&] {
+    // stop() does nothing before the server listens, and a signal may have come earlier.
+    while (!ended && !(stop && parts_->http.is_running())) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    parts_->http.stop();
+  });
+  const bool was_good = parts_->http.listen_after_bind();
+  ended = true;
+  watcher.join();
+  if (!was_good && !stop) throw Error("the server could not go on listening");
+}
+
+}  // namespace marrow::workbench
