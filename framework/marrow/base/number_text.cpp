@@ -19,10 +19,13 @@ std::string fixed_number(double value, int decimals) {
 }
 
 std::string exact_number(double value) {
-  char text[32];
   const bool is_whole = value == std::trunc(value) && std::abs(value) < 1e15;
-  return {text, is_whole ? std::to_chars(text, text + sizeof text, value, std::chars_format::fixed).ptr
-                         : std::to_chars(text, text + sizeof text, value).ptr};
+  return is_whole ? fmt::format("{:.0f}", value) : shortest_number(value);
+}
+
+std::string shortest_number(double value) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value).ptr};
 }
 
 std::string percent_text(double share, int decimals) {
@@ -38,6 +41,10 @@ std::string percent_text(double share, int decimals) {
 
 std::string counted(std::size_t count, std::string_view what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
+std::string counted(std::size_t count, std::string_view one, std::string_view more) {
+  return fmt::format("{} {}", count, count == 1 ? one : more);
 }
 
 std::optional<double> parsed_number(std::string_view text) {

@@ -36,6 +36,9 @@ std::string fixed_number(double value, int decimals);
 /// they can also be read as integers.
 std::string exact_number(double value);
 
+/// The shortest text from which the same number is read again: 1e+05 for 100000. Files of poses hold such texts.
+std::string shortest_number(double value);
+
 /// A share, from 0 to 1, as a number of percent, with at least so many decimals. More are shown where the share would
 /// else read as 0 or 100 and is neither: 1 of 3000 is 0.03, with one decimal.
 std::string percent_text(double share, int decimals);
@@ -43,8 +46,11 @@ std::string percent_text(double share, int decimals);
 /// "1 case", "2 cases". The plural of `what` is formed with an s.
 std::string counted(std::size_t count, std::string_view what);
 
+/// "1 pass", "2 passes", or "1 node was", "2 nodes were".
+std::string counted(std::size_t count, std::string_view one, std::string_view more);
+
 /// The number that all of the text stands for, such as 1, -0.5, +2e-3, inf or nan. Nothing if the text is empty, has a
-/// blank or any other character besides, or if the number is too large.
+/// blank or any other character besides, or if the number is too large or too close to zero for a double.
 std::optional<double> parsed_number(std::string_view text);
 
 }  // namespace marrow
