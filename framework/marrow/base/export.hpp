@@ -4,8 +4,10 @@
 // can come to depend on it. Plugins see no mark: what they compile of these headers stays their own.
 #ifdef MARROW_BUILDS_FRAMEWORK
 #define MARROW_EXPORT [[gnu::visibility("default")]]
+#define MARROW_EXPORT_INSTANCE __attribute__((visibility("default")))  ///< of a template, for types of other libraries
 #else
 #define MARROW_EXPORT
+#define MARROW_EXPORT_INSTANCE
 #endif
 // What a private header declares and marrow's own tests call: exported only from builds that have the tests.
 #if defined(MARROW_BUILDS_FRAMEWORK) && defined(MARROW_HAS_TESTS)

@@ -35,14 +35,16 @@ Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
   return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
 }
 
-template SymmetricEigen<2> eigen_of_symmetric<2>(const Eigen::Matrix<double, 2, 2>&);
-template SymmetricEigen<3> eigen_of_symmetric<3>(const Eigen::Matrix<double, 3, 3>&);
-template SymmetricEigen<6> eigen_of_symmetric<6>(const Eigen::Matrix<double, 6, 6>&);
-template SymmetricEigen<8> eigen_of_symmetric<8>(const Eigen::Matrix<double, 8, 8>&);
-template SymmetricEigen<Eigen::Dynamic> eigen_of_symmetric<Eigen::Dynamic>(const Eigen::MatrixXd&);
-template Eigen::Vector3d solve_symmetric<3>(const Eigen::Matrix3d&, const Eigen::Vector3d&);
-template Eigen::Matrix<double, 6, 1> solve_symmetric<6>(const Eigen::Matrix<double, 6, 6>&,
-                                                        const Eigen::Matrix<double, 6, 1>&);
-template Eigen::VectorXd solve_symmetric<Eigen::Dynamic>(const Eigen::MatrixXd&, const Eigen::VectorXd&);
+template MARROW_EXPORT_INSTANCE SymmetricEigen<2> eigen_of_symmetric<2>(const Eigen::Matrix<double, 2, 2>&);
+template MARROW_EXPORT_INSTANCE SymmetricEigen<3> eigen_of_symmetric<3>(const Eigen::Matrix<double, 3, 3>&);
+template MARROW_EXPORT_INSTANCE SymmetricEigen<6> eigen_of_symmetric<6>(const Eigen::Matrix<double, 6, 6>&);
+template MARROW_EXPORT_INSTANCE SymmetricEigen<8> eigen_of_symmetric<8>(const Eigen::Matrix<double, 8, 8>&);
+template MARROW_EXPORT_INSTANCE SymmetricEigen<Eigen::Dynamic> eigen_of_symmetric<Eigen::Dynamic>(
+    const Eigen::MatrixXd&);
+template MARROW_EXPORT_INSTANCE Eigen::Vector3d solve_symmetric<3>(const Eigen::Matrix3d&, const Eigen::Vector3d&);
+template MARROW_EXPORT_INSTANCE Eigen::Matrix<double, 6, 1> solve_symmetric<6>(const Eigen::Matrix<double, 6, 6>&,
+                                                                               const Eigen::Matrix<double, 6, 1>&);
+template MARROW_EXPORT_INSTANCE Eigen::VectorXd solve_symmetric<Eigen::Dynamic>(const Eigen::MatrixXd&,
+                                                                                const Eigen::VectorXd&);
 
 }  // namespace marrow

@@ -10,7 +10,7 @@ import pathlib
 import sys
 
 FOLDER = pathlib.Path(__file__).resolve().parent
-REPORT = FOLDER.parent / "report"
+REPORT = FOLDER.parent.parent / "report" / "page"
 THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")  # Debian's libjs-three
 # In this order. Scripts of pages come before main.js, which starts them.
 FILES = """

@@ -154,15 +154,15 @@ void NodeDeclaration::add_option(std::string_view name, std::string_view help, c
   });
 }
 
-template const MemberType* member_type<bool>();
-template const MemberType* member_type<int>();
-template const MemberType* member_type<float>();
-template const MemberType* member_type<double>();
-template const MemberType* member_type<std::string>();
-template const MemberType* member_type<std::filesystem::path>();
-template const MemberType* member_type<std::vector<double>>();
-template const MemberType* member_type<std::vector<std::string>>();
-template const MemberType* member_type<std::vector<std::filesystem::path>>();
-template const MemberType* member_type<Eigen::Vector3d>();
+template MARROW_EXPORT_INSTANCE const MemberType* member_type<bool>();
+template MARROW_EXPORT_INSTANCE const MemberType* member_type<int>();
+template MARROW_EXPORT_INSTANCE const MemberType* member_type<float>();
+template MARROW_EXPORT_INSTANCE const MemberType* member_type<double>();
+template MARROW_EXPORT_INSTANCE const MemberType* member_type<std::string>();
+template MARROW_EXPORT_INSTANCE const MemberType* member_type<std::filesystem::path>();
+template MARROW_EXPORT_INSTANCE const MemberType* member_type<std::vector<double>>();
+template MARROW_EXPORT_INSTANCE const MemberType* member_type<std::vector<std::string>>();
+template MARROW_EXPORT_INSTANCE const MemberType* member_type<std::vector<std::filesystem::path>>();
+template MARROW_EXPORT_INSTANCE const MemberType* member_type<Eigen::Vector3d>();
 
 }  // namespace marrow::detail

@@ -137,16 +137,16 @@ __attribute__((visibility("default"))) const MemberType* member_type() {
       narrow_range<M>};
   return &kType;
 }
-extern template const MemberType* member_type<bool>();
-extern template const MemberType* member_type<int>();
-extern template const MemberType* member_type<float>();
-extern template const MemberType* member_type<double>();
-extern template const MemberType* member_type<std::string>();
-extern template const MemberType* member_type<std::filesystem::path>();
-extern template const MemberType* member_type<std::vector<double>>();
-extern template const MemberType* member_type<std::vector<std::string>>();
-extern template const MemberType* member_type<std::vector<std::filesystem::path>>();
-extern template const MemberType* member_type<Eigen::Vector3d>();
+extern template MARROW_EXPORT_INSTANCE const MemberType* member_type<bool>();
+extern template MARROW_EXPORT_INSTANCE const MemberType* member_type<int>();
+extern template MARROW_EXPORT_INSTANCE const MemberType* member_type<float>();
+extern template MARROW_EXPORT_INSTANCE const MemberType* member_type<double>();
+extern template MARROW_EXPORT_INSTANCE const MemberType* member_type<std::string>();
+extern template MARROW_EXPORT_INSTANCE const MemberType* member_type<std::filesystem::path>();
+extern template MARROW_EXPORT_INSTANCE const MemberType* member_type<std::vector<double>>();
+extern template MARROW_EXPORT_INSTANCE const MemberType* member_type<std::vector<std::string>>();
+extern template MARROW_EXPORT_INSTANCE const MemberType* member_type<std::vector<std::filesystem::path>>();
+extern template MARROW_EXPORT_INSTANCE const MemberType* member_type<Eigen::Vector3d>();
 
 }  // namespace detail
 }  // namespace marrow
