@@ -8,6 +8,7 @@
 #include <marrow/plugin.hpp>
 
 #include <marrow/domain/decompositions.hpp>
+#include "marrow/base/number_text.hpp"
 #include "marrow/initial/pose_starts.hpp"
 #include "marrow/toolbox/geometry/rigid_fit.hpp"
 

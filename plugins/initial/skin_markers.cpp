@@ -10,6 +10,7 @@
 #include <marrow/plugin.hpp>
 #include <set>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/geometry/rigid_fit.hpp"
 
 namespace {
