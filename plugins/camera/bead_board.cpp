@@ -24,7 +24,7 @@ struct BeadBoardOptions {
   int radial_terms = 2;
   bool square_pixels = false;
   double largest_bead_px = 0;
-  double least_contrast = 0.2;
+  double min_contrast = 0.2;
   double outlier_deviations = 5;
   double residual_scale = 50;
   int size_px = 800;
@@ -33,8 +33,8 @@ struct BeadBoardOptions {
 struct BeadBoardResult {
   List<Camera> cameras;
   Calibration calibration;
-  Metrics report;
-  List<Metrics> poses;
+  Metrics metrics;
+  List<Metrics> view_metrics;
   List<Picture> pictures;
 };
 
@@ -167,7 +167,7 @@ BeadBoardResult bead_board(const List<Image>& images, const BeadBoardOptions& op
   std::vector<ViewPoints> views;
   for (std::size_t i = 0; i < images.size(); ++i) {
     context.check_cancelled();
-    const auto discs = calibration::find_beads(images[i], {options.largest_bead_px, options.least_contrast});
+    const auto discs = calibration::find_beads(images[i], {options.largest_bead_px, options.min_contrast});
     views.push_back(calibration::match_board(board, discs, width, height, images.name(i)));
     context.progress(double(i + 1) / double(images.size()), "views");
   }
@@ -178,10 +178,10 @@ BeadBoardResult bead_board(const List<Image>& images, const BeadBoardOptions& op
   check_distortion(fit.calibration.intrinsics, fit.calibration.distortion, width, height, "the calibration");
   if (const std::string text = calibration::doubtful_focal_length(fit.calibration, "the images"); !text.empty())
     context.warn(text);
-  result.report = report_of(fit, outliers);
+  result.metrics = report_of(fit, outliers);
   for (std::size_t n = 0; n < views.size(); ++n) {
     result.cameras.add(views[n].name, {width, height, fit.calibration.intrinsics, fit.views[n].camera_from_world});
-    result.poses.add(views[n].name, pose_report(fit.views[n]));
+    result.view_metrics.add(views[n].name, pose_report(fit.views[n]));
     result.pictures.add(views[n].name, picture_of(images[n], views[n], fit.views[n], outliers.pixels[n], options));
   }
   return result;
@@ -221,12 +221,12 @@ MARROW_PLUGIN(plugin) {
            "camera of each view, without distortion; the world frame is the board's frame", over("view"))
       .out("calibration", &BeadBoardResult::calibration,
            "camera matrix and distortion of the device, with standard deviations")
-      .out("report", &BeadBoardResult::report,
+      .out("metrics", &BeadBoardResult::metrics,
            "the same as figures, with the residuals and the numbers of beads and outliers")
       .figures({"residual", "worst_residual", "beads", "outliers", "focal_u", "focal_u_deviation", "principal_u",
                 "principal_u_deviation", "focal_v", "focal_v_deviation", "principal_v", "principal_v_deviation", "k1",
                 "k1_deviation", "k2", "k2_deviation", "k3", "k3_deviation"})
-      .out("poses", &BeadBoardResult::poses,
+      .out("view_metrics", &BeadBoardResult::view_metrics,
            "per view: number of beads, residual, and standard deviations of the camera's pose along and about its own "
            "axes",
            over("view"))
@@ -240,7 +240,7 @@ MARROW_PLUGIN(plugin) {
       .option("square_pixels", &BeadBoardOptions::square_pixels, "use one focal length for both directions")
       .option("largest_bead_px", &BeadBoardOptions::largest_bead_px,
               "diameter of the largest bead in the images; 0: a sixteenth of the image width", at_least(0))
-      .option("least_contrast", &BeadBoardOptions::least_contrast,
+      .option("min_contrast", &BeadBoardOptions::min_contrast,
               "smallest contrast of a bead, as a fraction of the contrast of the darkest bead", at_least(0.01),
               at_most(1), unit("1"))
       .option("outlier_deviations", &BeadBoardOptions::outlier_deviations,

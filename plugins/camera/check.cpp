@@ -20,7 +20,7 @@ using calibration::SeenPoints;
 using files::KnownPoint;
 
 struct Options {
-  std::filesystem::path points;
+  std::filesystem::path known_points;
   double warn_above_px = 2;
   double source_to_detector_mm = 0;
   double pixel_mm = 0;
@@ -202,7 +202,7 @@ void check_directions(const List<View>& views, Context& context, int& warnings) 
 
 Checked check(const List<View>& views, const Mesh* mesh, const Options& options, Context& context) {
   std::vector<KnownPoint> points;
-  if (!options.points.empty()) points = files::read_points_file(options.points);
+  if (!options.known_points.empty()) points = files::read_points_file(options.known_points);
   check_names(points, views);
   if (mesh) check_mesh(*mesh, "camera.check: mesh");
   Checked checked;
@@ -252,7 +252,7 @@ MARROW_PLUGIN(plugin) {
       .figures({"error", "warnings", "*.points", "*.error", "*.worst", "*.mean_at_object", "*.error_with_free_pose"})
       .out("picture", &Checked::pictures, "each image with the seen and the expected positions of the points",
            over("view"))
-      .option("points", &Options::points,
+      .option("known_points", &Options::known_points,
               "file with points of a known object and the pixels where they are seen (YAML, docs/case.md)")
       .option("warn_above_px", &Options::warn_above_px, "a larger reprojection error gives a warning", at_least(0))
       .option("source_to_detector_mm", &Options::source_to_detector_mm,

@@ -21,7 +21,7 @@ struct Options : calibration::Chessboard, calibration::ChessboardPlace {
 struct Result {
   Calibration calibration;
   List<Camera> cameras;
-  Metrics report;
+  Metrics metrics;
 };
 
 /// Corners in one photograph.
@@ -154,7 +154,7 @@ Result chessboard(const List<Picture>& boards, const List<Picture>* placed, cons
                    "the calibration");
   if (const std::string text = calibration::doubtful_focal_length(result.calibration, "the photographs"); !text.empty())
     context.warn(text);
-  result.report = report_of(fit, result.calibration, seen.size());
+  result.metrics = report_of(fit, result.calibration, seen.size());
   const RigidTransform world_from_board = calibration::world_from_board(options, options);
   for (std::size_t i = first_placed; i < seen.size(); ++i)
     result.cameras.add(seen[i].name, camera_of(fit, i, result.calibration, world_from_board));
@@ -173,7 +173,7 @@ MARROW_PLUGIN(plugin) {
       .in("placed", "the board at its known place, one photograph from each place of the camera", over("view"))
       .out("calibration", &Result::calibration, "camera matrix and distortion, with standard deviations")
       .out("camera", &Result::cameras, "camera of each photograph in 'placed', without distortion", over("view"))
-      .out("report", &Result::report,
+      .out("metrics", &Result::metrics,
            "the same as figures, with the residual of a coordinate and the root mean square distance in the worst "
            "photograph")
       .figures({"photographs", "residual", "worst_photograph", "focal_u", "focal_u_deviation", "principal_u",

@@ -10,8 +10,8 @@ namespace {
 using Factors = std::array<double, 3>;
 
 struct Options {
-  Factors rotation{1, 1, 1}, translation{1, 1, 1};
-  Factors first_rotation{1, 1, 1}, first_translation{1, 1, 1};
+  Factors rotation_factors{1, 1, 1}, translation_factors{1, 1, 1};
+  Factors first_rotation_factors{1, 1, 1}, first_translation_factors{1, 1, 1};
 };
 
 struct Result {
@@ -38,8 +38,9 @@ Result calibrated(const marrow::List<marrow::Pose>& stages, const marrow::Mesh& 
   for (std::size_t i = 0; i < stages.size(); ++i) {
     check_pose(stages[i], "the pose of stage '" + stages.name(i) + "'");
     const bool is_first = stages.name(i) == "first" && i + 1 < stages.size();
-    result.stages.add(stages.name(i), scaled(stages[i], axes, is_first ? options.first_rotation : options.rotation,
-                                             is_first ? options.first_translation : options.translation));
+    result.stages.add(stages.name(i),
+                      scaled(stages[i], axes, is_first ? options.first_rotation_factors : options.rotation_factors,
+                             is_first ? options.first_translation_factors : options.translation_factors));
   }
   result.pose = result.stages[result.stages.size() - 1];
   return result;
@@ -55,13 +56,14 @@ MARROW_PLUGIN(plugin) {
       .in("model", "surface of the bone; it gives the axes")
       .out("pose", &Result::pose, "the last pose; a covariance that is absent or not finite stays as it is")
       .out("stages", &Result::stages, "all poses", marrow::over("stage"))
-      .option("rotation", &Options::rotation, "factors of the deviations about the frontal, lateral and long axes",
-              marrow::at_least(0.01), marrow::at_most(100))
-      .option("translation", &Options::translation,
+      .option("rotation_factors", &Options::rotation_factors,
+              "factors of the deviations about the frontal, lateral and long axes", marrow::at_least(0.01),
+              marrow::at_most(100))
+      .option("translation_factors", &Options::translation_factors,
               "factors of the deviations along the frontal, lateral and long axes", marrow::at_least(0.01),
               marrow::at_most(100))
-      .option("first_rotation", &Options::first_rotation, "the same for 'first', about the axes",
+      .option("first_rotation_factors", &Options::first_rotation_factors, "the same for 'first', about the axes",
               marrow::at_least(0.01), marrow::at_most(100))
-      .option("first_translation", &Options::first_translation, "the same for 'first', along the axes",
+      .option("first_translation_factors", &Options::first_translation_factors, "the same for 'first', along the axes",
               marrow::at_least(0.01), marrow::at_most(100));
 }

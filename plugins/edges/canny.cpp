@@ -20,7 +20,7 @@ struct Options {
   double sigma_px = 1.5;
   bool logarithm = true;
   int window_px = 80;
-  double low = 2, high = 5;
+  double noise_low = 2, noise_high = 5;
 };
 
 constexpr float kUnit = 64;  // one standard deviation of the noise in the 16 bit gradient that OpenCV needs
@@ -47,7 +47,7 @@ marrow::EdgeMap canny(const marrow::View& view, const Options& options, marrow::
     }
   });
   cv::Mat marked;
-  cv::Canny(du, dv, marked, options.low * kUnit, options.high * kUnit, true);
+  cv::Canny(du, dv, marked, options.noise_low * kUnit, options.noise_high * kUnit, true);
   marked.setTo(0, image.usable == 0);
   return refined(image, gradient, marked);
 }
@@ -65,11 +65,11 @@ MARROW_PLUGIN(plugin) {
               "find edges of the attenuation (logarithm of the grey value) instead of the grey value")
       .option("window_px", &Options::window_px,
               "side of the window for the median, rounded down to an odd multiple of 16", marrow::at_least(16))
-      .option("low", &Options::low,
+      .option("noise_low", &Options::noise_low,
               "lower hysteresis threshold: the window's median plus this many standard deviations of the noise",
               marrow::at_least(0))
-      .option("high", &Options::high,
+      .option("noise_high", &Options::noise_high,
               "upper hysteresis threshold: the window's median plus this many standard deviations of the noise",
               marrow::at_least(0))
-      .relation(marrow::not_above("low", "high"));
+      .relation(marrow::not_above("noise_low", "noise_high"));
 }

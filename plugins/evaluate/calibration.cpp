@@ -49,7 +49,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.calibration", calibration_error)
       .summary("Errors of a calibration, compared with the exact one of a simulated device")
       .in("calibration", "camera matrix and distortion that were found")
-      .in("truth", "exact camera matrix and distortion")
+      .in("true_calibration", "exact camera matrix and distortion")
       .out("metrics",
            "errors of focal length and principal point, root mean square error of the distortion over the image, and "
            "the residual")

@@ -9,9 +9,9 @@
 namespace {
 
 struct Options {
-  double range_deg = 10;
-  double range_mm = 10;
-  int samples = 81;
+  double max_rotation_deg = 10;
+  double max_shift_mm = 10;
+  int profile_points = 81;
 };
 
 using Axes = std::array<const char*, 6>;
@@ -42,8 +42,9 @@ marrow::Landscape landscape(const marrow::Cost& cost, const marrow::Pose& found,
     };
     marrow::Landscape::Profile profile{axes[std::size_t(axis)], turns ? "deg" : "mm", {}, {}, {}};
     std::vector<marrow::RigidTransform> poses;
-    for (int i = 0; i < options.samples; ++i) {
-      profile.offsets.push_back((turns ? options.range_deg : options.range_mm) * (2.0 * i / (options.samples - 1) - 1));
+    for (int i = 0; i < options.profile_points; ++i) {
+      profile.offsets.push_back((turns ? options.max_rotation_deg : options.max_shift_mm) *
+                                (2.0 * i / (options.profile_points - 1) - 1));
       poses.push_back(marrow::moved(pose.world_from_model, pose.frame, motion_of(profile.offsets.back())));
     }
     profile.costs = cost.values(poses);
@@ -66,10 +67,10 @@ MARROW_PLUGIN(plugin) {
       .in("model", "surface of the fragment: it gives the axes")
       .in("truth", "exact pose; its offset from the pose is noted in each profile")
       .out("landscape", "six profiles: costs at offsets from the pose, in degrees or mm")
-      .option("range_deg", &Options::range_deg, "largest rotation to either side", marrow::at_least(1e-3),
+      .option("max_rotation_deg", &Options::max_rotation_deg, "largest rotation to either side", marrow::at_least(1e-3),
               marrow::at_most(180))
-      .option("range_mm", &Options::range_mm, "largest translation to either side", marrow::at_least(1e-3),
+      .option("max_shift_mm", &Options::max_shift_mm, "largest translation to either side", marrow::at_least(1e-3),
               marrow::at_most(1000))
-      .option("samples", &Options::samples, "number of points of a profile", marrow::at_least(3),
+      .option("profile_points", &Options::profile_points, "number of points of a profile", marrow::at_least(3),
               marrow::at_most(2001));
 }

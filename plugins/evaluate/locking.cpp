@@ -15,13 +15,13 @@ using namespace marrow;
 using Eigen::Vector3d;
 
 struct Options {
-  double most_deg = 1;
-  double most_mm = 0.5;
+  double max_angle_deg = 1;
+  double max_offset_mm = 0.5;
 };
 
 struct Result {
   List<Metrics> holes;
-  Metrics summary;
+  Metrics metrics;
 };
 
 /// Angle between two lines, which have no sense.
@@ -50,7 +50,7 @@ Result locking(const geometry::LockingPlan& plan, const geometry::Implant& impla
     const Eigen::Matrix3d arm = world_from_camera_rotation(radians(drill.alpha_deg), radians(drill.beta_deg));
     const Vector3d source = plan.isocentre_mm - plan.source_to_isocentre_mm * arm.col(2);
     const double view = angle_deg(centre - source, axis);
-    const bool flagged = !drill.doubts.empty(), beyond = turn > options.most_deg || offset > options.most_mm;
+    const bool flagged = !drill.doubts.empty(), beyond = turn > options.max_angle_deg || offset > options.max_offset_mm;
     result.holes.add(drill.hole, Metrics{{{"angle_deg", turn, "deg"},
                                           {"offset_mm", offset, "mm"},
                                           {"view_deg", view, "deg"},
@@ -64,7 +64,7 @@ Result locking(const geometry::LockingPlan& plan, const geometry::Implant& impla
     is_off |= beyond;
     is_silent |= beyond && !flagged;
   }
-  result.summary.items = {{"angle_deg", worst_deg, "deg"},     {"offset_mm", worst_mm, "mm"},
+  result.metrics.items = {{"angle_deg", worst_deg, "deg"},     {"offset_mm", worst_mm, "mm"},
                           {"view_deg", worst_view_deg, "deg"}, {"flagged", double(is_flagged), ""},
                           {"off", double(is_off), ""},         {"silent", double(is_silent), ""}};
   return result;
@@ -83,10 +83,12 @@ MARROW_PLUGIN(plugin) {
            "of the planned view through the true hole and its axis; the predicted deviations; 1 if the plan doubts it",
            over("hole"))
       .figures({"angle_deg", "offset_mm", "view_deg", "predicted_angle_deg", "predicted_offset_mm", "flagged"})
-      .out("summary", &Result::summary,
+      .out("metrics", &Result::metrics,
            "the worst of the holes; 1 or 0: whether the plan doubts a hole (flagged), whether one is off by more than "
-           "most_deg or most_mm (off), and whether one is off that the plan does not doubt (silent)")
+           "max_angle_deg or max_offset_mm (off), and whether one is off that the plan does not doubt (silent)")
       .figures({"angle_deg", "offset_mm", "view_deg", "flagged", "off", "silent"})
-      .option("most_deg", &Options::most_deg, "a hole is off if its axis is turned by more than this", at_least(0))
-      .option("most_mm", &Options::most_mm, "a hole is off if its axis is farther away than this", at_least(0));
+      .option("max_angle_deg", &Options::max_angle_deg, "a hole is off if its axis is turned by more than this",
+              at_least(0))
+      .option("max_offset_mm", &Options::max_offset_mm, "a hole is off if its axis is farther away than this",
+              at_least(0));
 }

@@ -60,9 +60,9 @@ class EdgeSearch {
 };
 
 struct Options {
-  double spacing_px = 1;
+  double contour_spacing_px = 1;
   double reach_px = 30;
-  double angle_deg = 30;
+  double direction_tolerance_deg = 30;
 };
 
 /// The distances of a view's outline points. A point without an edge in reach counts with the reach itself. So parts of
@@ -96,9 +96,10 @@ bool in_mask(const marrow::View& view, const marrow::OutlinePoint& point) {
 Distances measure(const marrow::RigidTransform& world_from_model, const marrow::OutlineProjector& projector,
                   const marrow::View& view, const marrow::EdgeMap& edges, const Options& options) {
   const EdgeSearch search(edges);
-  const double least_cosine = std::cos(marrow::radians(options.angle_deg));
+  const double least_cosine = std::cos(marrow::radians(options.direction_tolerance_deg));
   Distances distances;
-  for (const marrow::OutlinePoint& point : projector.outline(view.camera, world_from_model, options.spacing_px)) {
+  for (const marrow::OutlinePoint& point :
+       projector.outline(view.camera, world_from_model, options.contour_spacing_px)) {
     if (!in_mask(view, point)) continue;
     const marrow::EdgePixel* edge =
         search.nearest(point.u_px, point.v_px, point.normal_u, point.normal_v, options.reach_px, least_cosine);
@@ -181,11 +182,12 @@ MARROW_PLUGIN(plugin) {
       .figures({"median_px", "p90_px", "median_mm", "p90_mm", "matched_percent", "offset_px", "spread_px",
                 "*_median_px", "*_p90_px", "*_median_mm", "*_p90_mm", "*_matched_percent", "*_offset_px",
                 "*_spread_px"})
-      .option("spacing_px", &Options::spacing_px, "distance between two outline points", marrow::at_least(0.1),
-              marrow::at_most(100))
+      .option("contour_spacing_px", &Options::contour_spacing_px, "distance between two outline points",
+              marrow::at_least(0.1), marrow::at_most(100))
       .option("reach_px", &Options::reach_px,
               "largest distance of an edge; outline points without an edge count with this distance",
               marrow::at_least(1), marrow::at_most(10000))
-      .option("angle_deg", &Options::angle_deg, "largest angle between the outline's normal and an edge's gradient",
-              marrow::at_least(0), marrow::at_most(180));
+      .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
+              "largest angle between the outline's normal and an edge's gradient", marrow::at_least(0),
+              marrow::at_most(180));
 }

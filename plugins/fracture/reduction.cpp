@@ -10,7 +10,7 @@ using marrow::geometry::FragmentPair;
 
 struct Reduction {
   marrow::Pose pose;
-  marrow::Metrics motion;
+  marrow::Metrics metrics;
 };
 
 Reduction reduction(const marrow::List<marrow::Pose>& poses, const marrow::List<marrow::Mesh>* models,
@@ -27,10 +27,10 @@ Reduction reduction(const marrow::List<marrow::Pose>& poses, const marrow::List<
   const Eigen::Vector3d turn_deg = marrow::degrees(turn.angle()) * turn.axis();
   const Eigen::Vector3d shift_mm =
       reference.world_from_model * moved.frame.origin_mm - moved.world_from_model * moved.frame.origin_mm;
-  result.motion.items = {{"turn_x_deg", turn_deg.x(), "deg"}, {"turn_y_deg", turn_deg.y(), "deg"},
-                         {"turn_z_deg", turn_deg.z(), "deg"}, {"turn_deg", turn_deg.norm(), "deg"},
-                         {"shift_x_mm", shift_mm.x(), "mm"},  {"shift_y_mm", shift_mm.y(), "mm"},
-                         {"shift_z_mm", shift_mm.z(), "mm"},  {"shift_mm", shift_mm.norm(), "mm"}};
+  result.metrics.items = {{"turn_x_deg", turn_deg.x(), "deg"}, {"turn_y_deg", turn_deg.y(), "deg"},
+                          {"turn_z_deg", turn_deg.z(), "deg"}, {"turn_deg", turn_deg.norm(), "deg"},
+                          {"shift_x_mm", shift_mm.x(), "mm"},  {"shift_y_mm", shift_mm.y(), "mm"},
+                          {"shift_z_mm", shift_mm.z(), "mm"},  {"shift_mm", shift_mm.norm(), "mm"}};
   return result;
 }
 
@@ -42,7 +42,7 @@ MARROW_PLUGIN(plugin) {
       .in("poses", "poses of both fragments", marrow::over("fragment"))
       .in("models", "surfaces of both fragments; they give the centroid if a pose does not", marrow::over("fragment"))
       .out("pose", &Reduction::pose, "pose of the moved fragment in the restored bone")
-      .out("motion", &Reduction::motion,
+      .out("metrics", &Reduction::metrics,
            "in world coordinates: the rotation vector about the fragment's centroid, and the shift of the centroid, "
            "with their lengths")
       .figures(

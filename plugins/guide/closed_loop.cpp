@@ -24,11 +24,11 @@ using robot::RobotReport;
 struct Options : geometry::FragmentPair, robot::StepLimits, robot::ApproachOptions, robot::HandEyeNoise {
   std::string hand_eye = "estimated";
   double astray_mm = 12;
-  double tolerance_deg = 0.5;
-  double tolerance_mm = 0.5;
-  int most_pairs = 8;
-  double most_deviation_deg = 2;
-  double most_deviation_mm = 2;
+  double reduced_deg = 0.5;
+  double reduced_mm = 0.5;
+  int max_pairs = 8;
+  double max_deviation_deg = 2;
+  double max_deviation_mm = 2;
 };
 
 struct Result {
@@ -36,7 +36,7 @@ struct Result {
   Pose motion;
   Stop stop;
   List<Pose> predicted;
-  Metrics figures;
+  Metrics metrics;
 };
 
 std::string shown(double value, const char* unit) { return formatted("{:.2f} {}", value, unit); }
@@ -82,18 +82,16 @@ bool brings_nothing(const std::vector<double>& errors, double deviation) {
 
 Stop stop_of(const GuideState& state, const Remaining& remaining, const std::string& not_trusted,
              const RobotReport& report, const Options& options) {
-  const double of_deg = remaining.rotation_deg / options.tolerance_deg,
-               of_mm = remaining.shift_mm / options.tolerance_mm,
-               deviation =
-                   remaining.deviation_deg / options.tolerance_deg + remaining.deviation_mm / options.tolerance_mm;
+  const double of_deg = remaining.rotation_deg / options.reduced_deg, of_mm = remaining.shift_mm / options.reduced_mm,
+               deviation = remaining.deviation_deg / options.reduced_deg + remaining.deviation_mm / options.reduced_mm;
   if (!not_trusted.empty()) return {true, not_trusted};
-  if (remaining.deviation_deg > options.most_deviation_deg || remaining.deviation_mm > options.most_deviation_mm)
+  if (remaining.deviation_deg > options.max_deviation_deg || remaining.deviation_mm > options.max_deviation_mm)
     return {true, "the poses are not trusted: they are known to " + shown(remaining.deviation_deg, "degrees") +
                       " and " + shown(remaining.deviation_mm, "mm") + " only, at most " +
-                      shown(options.most_deviation_deg, "degrees") + " and " + shown(options.most_deviation_mm, "mm") +
+                      shown(options.max_deviation_deg, "degrees") + " and " + shown(options.max_deviation_mm, "mm") +
                       " are allowed"};
-  if (of_deg + 2 * remaining.deviation_deg / options.tolerance_deg < 1 &&
-      of_mm + 2 * remaining.deviation_mm / options.tolerance_mm < 1)
+  if (of_deg + 2 * remaining.deviation_deg / options.reduced_deg < 1 &&
+      of_mm + 2 * remaining.deviation_mm / options.reduced_mm < 1)
     return {true, "the fracture is reduced: " + remaining.in_words()};
   // More images show no more: the rest is less than one deviation.
   if (of_deg < 1 && of_mm < 1 && remaining.rotation_deg < remaining.deviation_deg &&
@@ -105,7 +103,7 @@ Stop stop_of(const GuideState& state, const Remaining& remaining, const std::str
                       remaining.in_words()};
   if (brings_nothing(state.errors, deviation))
     return {true, "the way has not become shorter in two pairs of images: " + remaining.in_words()};
-  if (state.pairs >= options.most_pairs)
+  if (state.pairs >= options.max_pairs)
     return {true,
             std::to_string(state.pairs) + " pairs of images are taken, no more are allowed: " + remaining.in_words()};
   return {false, remaining.in_words()};
@@ -182,7 +180,7 @@ Command command_for(const GuideState& state, const RobotReport& report, const Le
   Vector6d ask = command.step;
   if (options.hand_eye == "broyden") {
     ask = robot::from_mm(robot::ask_for(state.jacobian, robot::in_mm(command.step)));
-    ask = robot::limited_step(-ask, {1, options.most_deg, options.most_mm});
+    ask = robot::limited_step(-ask, {1, options.max_rotation_deg, options.max_shift_mm});
   }
   command.told = robot::told_for(robot::motion_of(ask, middle_mm), hand_eye.robot_from_reference);
   constexpr double kUnknown_deg = 45;  // of the robot's direction: a step may lead anywhere
@@ -221,7 +219,7 @@ Result closed_loop(const List<Pose>& poses, const GuideState& before, const Robo
   learn(state, seen, centre_mm, report);
   const Remaining remaining(relative, centre_mm);
   // The sum: while the fragment is rotated it is held apart, and its shift becomes no smaller.
-  state.errors.push_back(remaining.rotation_deg / options.tolerance_deg + remaining.shift_mm / options.tolerance_mm);
+  state.errors.push_back(remaining.rotation_deg / options.reduced_deg + remaining.shift_mm / options.reduced_mm);
   std::string not_trusted = why_not_trusted(moved, options.moved, verdicts);
   if (not_trusted.empty()) not_trusted = why_not_trusted(reference, options.reference, verdicts);
   result.stop = stop_of(state, remaining, not_trusted, report, options);
@@ -237,7 +235,7 @@ Result closed_loop(const List<Pose>& poses, const GuideState& before, const Robo
   result.motion.world_from_model = command.told;
   result.predicted = predicted(poses, models, command.expected, command.step, command.hand_eye, options);
   context.info("pair " + std::to_string(state.pairs) + ": " + result.stop.reason);
-  result.figures.items = {
+  result.metrics.items = {
       {"pairs", double(state.pairs), ""},
       {"images", double(state.images), ""},
       {"rotation_deg", remaining.rotation_deg, "deg"},
@@ -270,7 +268,7 @@ MARROW_PLUGIN(plugin) {
       .out("motion", &Result::motion, "next motion in the axes of the robot's base; none at the end")
       .out("stop", &Result::stop, "whether the loop ends, and why; else the stage and what remains")
       .out("predicted", &Result::predicted, "poses that are expected in the next images", over("fragment"))
-      .out("figures", &Result::figures,
+      .out("metrics", &Result::metrics,
            "pairs and images so far, what remains and how exactly it is known, distance between the bones, next step")
       .figures({"pairs", "images", "rotation_deg", "shift_mm", "deviation_deg", "deviation_mm", "distance_mm",
                 "step_deg", "step_mm", "robot_known_to_deg", "reduced"})
@@ -281,29 +279,31 @@ MARROW_PLUGIN(plugin) {
               one_of({"estimated", "fixed", "broyden"}))
       .option("damping", &Options::damping, "part of the way that a step takes (lambda)", at_least(0.01), at_most(1),
               unit(""))
-      .option("most_deg", &Options::most_deg, "largest rotation of a step", at_least(0.01))
-      .option("most_mm", &Options::most_mm, "largest shift of a step", at_least(0.01))
+      .option("max_rotation_deg", &Options::max_rotation_deg, "largest rotation of a step", at_least(0.01))
+      .option("max_shift_mm", &Options::max_shift_mm, "largest shift of a step", at_least(0.01))
       .option("astray_mm", &Options::astray_mm,
               "with 'estimated': a step is so short that what is not known of the robot's place leads it at most this "
               "far astray, or as far as the bones are apart",
               at_least(0.1))
       .option("clearance_mm", &Options::clearance_mm, "the bones are kept this far apart on the way")
-      .option("most_distraction_mm", &Options::most_distraction_mm, "how far they may be pulled apart for this",
+      .option("max_distraction_mm", &Options::max_distraction_mm, "how far they may be pulled apart for this",
               at_least(0))
       .option("rotated_deg", &Options::rotated_deg, "a smaller rotation is no stage of its own", at_least(0))
       .option("aligned_mm", &Options::aligned_mm, "the same of a shift across the shaft", at_least(0))
-      .option("rotation_deg", &Options::rotation_deg, "deviation of a seen motion's rotation", at_least(1e-6))
-      .option("shift_mm", &Options::shift_mm, "deviation of its shift", at_least(1e-6))
-      .option("part", &Options::part, "deviation that is added, as a part of the motion", at_least(0), unit(""))
+      .option("motion_deviation_deg", &Options::motion_deviation_deg, "deviation of a seen motion's rotation",
+              at_least(1e-6))
+      .option("motion_deviation_mm", &Options::motion_deviation_mm, "deviation of its shift", at_least(1e-6))
+      .option("motion_deviation_fraction", &Options::motion_deviation_fraction,
+              "deviation that is added, as a part of the motion", at_least(0), unit(""))
       .option("guess_deg", &Options::guess_deg, "deviation of the robot's direction as planned", at_least(1e-3))
       .option("guess_mm", &Options::guess_mm, "deviation of its place as planned", at_least(1e-3))
-      .option("tolerance_deg", &Options::tolerance_deg,
+      .option("reduced_deg", &Options::reduced_deg,
               "the fracture is reduced if the rotation and two deviations are "
               "below this",
               at_least(1e-3))
-      .option("tolerance_mm", &Options::tolerance_mm, "and the shift and two deviations below this", at_least(1e-3))
-      .option("most_deviation_deg", &Options::most_deviation_deg, "poses with a larger deviation are not trusted",
+      .option("reduced_mm", &Options::reduced_mm, "and the shift and two deviations below this", at_least(1e-3))
+      .option("max_deviation_deg", &Options::max_deviation_deg, "poses with a larger deviation are not trusted",
               at_least(0))
-      .option("most_deviation_mm", &Options::most_deviation_mm, "the same of the shift", at_least(0))
-      .option("most_pairs", &Options::most_pairs, "largest number of pairs of images", at_least(1));
+      .option("max_deviation_mm", &Options::max_deviation_mm, "the same of the shift", at_least(0))
+      .option("max_pairs", &Options::max_pairs, "largest number of pairs of images", at_least(1));
 }

@@ -13,13 +13,13 @@ using namespace marrow;
 
 struct Options : geometry::FragmentPair {
   std::string method = "ax_zb";
-  double most_deviation_deg = 2;
-  double most_deviation_mm = 2;
+  double max_deviation_deg = 2;
+  double max_deviation_mm = 2;
 };
 
 struct Result {
   Pose motion;
-  Metrics figures;
+  Metrics metrics;
 };
 
 /// The robot's base in the world, and the covariance of a small motion of the world about its origin.
@@ -65,13 +65,13 @@ Place place_of(const std::vector<robot::Station>& stations, const std::string& m
 
 /// Throws Error if the move would leave the fragment too far from its place.
 void check_left(double left_deg, double left_mm, const Options& options) {
-  if (left_deg <= options.most_deviation_deg && left_mm <= options.most_deviation_mm) return;
+  if (left_deg <= options.max_deviation_deg && left_mm <= options.max_deviation_mm) return;
   throw Error(
       formatted("the stations do not tell well enough where the robot is: this move would leave the fragment "
                 "{:.2f} degrees and {:.2f} mm from its place (one standard deviation), at most {:g} degrees and {:g} "
                 "mm are allowed; turn the robot further between stations, about axes that are at least 30 "
-                "degrees apart, or raise most_deviation_deg and most_deviation_mm",
-                left_deg, left_mm, options.most_deviation_deg, options.most_deviation_mm));
+                "degrees apart, or raise max_deviation_deg and max_deviation_mm",
+                left_deg, left_mm, options.max_deviation_deg, options.max_deviation_mm));
 }
 
 Result open_loop(const List<Pose>& poses, const List<Pose>& hands, const List<Pose>& targets, const List<Mesh>* models,
@@ -88,7 +88,7 @@ Result open_loop(const List<Pose>& poses, const List<Pose>& hands, const List<Po
   const Matrix6d left = robot::left_by(wanted, place.covariance, wanted * middle);
   const double left_deg = degrees(robot::rotation_deviation_rad(left)), left_mm = robot::shift_deviation_mm(left);
   check_left(left_deg, left_mm, options);
-  result.figures.items = {{"step_deg", turn, "deg"},
+  result.metrics.items = {{"step_deg", turn, "deg"},
                           {"step_mm", shift, "mm"},
                           {"left_deg", left_deg, "deg"},
                           {"left_mm", left_mm, "mm"},
@@ -111,7 +111,7 @@ MARROW_PLUGIN(plugin) {
       .in("targets", "poses of the target in the world, at each station", over("station"))
       .in("models", "surfaces of both fragments; they give the centroid if a pose does not", over("fragment"))
       .out("motion", &Result::motion, "motion in the axes of the robot's base")
-      .out("figures", &Result::figures,
+      .out("metrics", &Result::metrics,
            "size of the motion, how far from its place it leaves the fragment because the robot's place is not known "
            "better (standard deviations in the worst direction), and the number of images")
       .figures({"step_deg", "step_mm", "left_deg", "left_mm", "stations", "images"})
@@ -120,8 +120,8 @@ MARROW_PLUGIN(plugin) {
       .option("method", &Options::method,
               "the robot's place from AX = ZB (all stations) or from AX = XB (motions between stations)",
               one_of({"ax_zb", "ax_xb"}))
-      .option("most_deviation_deg", &Options::most_deviation_deg,
+      .option("max_deviation_deg", &Options::max_deviation_deg,
               "a move that would leave the fragment's rotation less well known is an error", at_least(0))
-      .option("most_deviation_mm", &Options::most_deviation_mm,
+      .option("max_deviation_mm", &Options::max_deviation_mm,
               "a move that would leave the fragment's middle less well known is an error", at_least(0));
 }

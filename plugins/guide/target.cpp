@@ -12,7 +12,7 @@ using namespace marrow;
 
 struct Options {
   std::filesystem::path board;
-  double most_residual_px = 1;
+  double max_residual_px = 1;
 };
 
 Pose target(const View& view, const Options& options, Context& context) {
@@ -28,10 +28,10 @@ Pose target(const View& view, const Options& options, Context& context) {
       calibration::match_board(board, discs, view.camera.width_px, view.camera.height_px, view.name);
   const calibration::BoardPose found = calibration::board_pose(points, view.camera);
   context.info(formatted("{} beads, residual {:.3f} px", points.pixels.size(), found.residual_px));
-  if (found.residual_px > options.most_residual_px)
+  if (found.residual_px > options.max_residual_px)
     throw Error("the target does not fit view '" + view.name +
                 formatted("': its beads are {:.2f} px off where its pose shows them, at most {:.2f} px are allowed",
-                          found.residual_px, options.most_residual_px) +
+                          found.residual_px, options.max_residual_px) +
                 "; is it this target, and the camera of this image?");
   Pose pose;
   RigidTransform camera_from_target = found.camera_from_board;
@@ -50,5 +50,5 @@ MARROW_PLUGIN(plugin) {
       .out("pose", "pose of the target in the world; its cost is the residual in px")
       .option("board", &Options::board, "file with the positions of the target's beads (YAML, docs/case.md)",
               required())
-      .option("most_residual_px", &Options::most_residual_px, "a larger residual is an error", at_least(0));
+      .option("max_residual_px", &Options::max_residual_px, "a larger residual is an error", at_least(0));
 }

@@ -24,7 +24,7 @@ using marrow::Camera, marrow::List, marrow::Mesh, marrow::Plane, marrow::Pose, m
     marrow::ShaftLines, marrow::View;
 
 struct Options {
-  int rounds = 10;
+  int max_iterations = 10;
   double tolerance_mm = 1.0;
   double border_inset_mm = 0.5;
 };
@@ -197,7 +197,7 @@ Pose shaft_axis(const Mesh& model, const List<ShaftLines>& lines, const List<Vie
   marrow::check_pose(pose, "start");
   pose.frame = marrow::fragment_frame(model);
   const std::vector<Sight> sights = sights_of(model, pose, lines, views, options);
-  for (int round = 0; round < options.rounds; ++round) {
+  for (int round = 0; round < options.max_iterations; ++round) {
     const std::vector<ModelBorders> borders = borders_of(model, pose, sights, options.tolerance_mm);
     const Eigen::Vector3d anchor = middle_of(pose);
     const RigidTransform move = sights.size() == 1
@@ -223,8 +223,9 @@ MARROW_PLUGIN(plugin) {
       .in("views", "X-ray views; only their cameras are used", marrow::over("view"))
       .in("start", "nominal placement; its rotation about the axis and its position along the axis are kept")
       .out("pose", "pose: four degrees of freedom from the views, two from the start")
-      .option("rounds", &Options::rounds, "largest number of rounds; each measures the model's axis again",
-              marrow::at_least(1), marrow::at_most(100))
+      .option("max_iterations", &Options::max_iterations,
+              "largest number of iterations; each measures the model's axis again", marrow::at_least(1),
+              marrow::at_most(100))
       .option("tolerance_mm", &Options::tolerance_mm,
               "largest distance, in mm at the bone, of a silhouette point from the model's border line",
               marrow::at_least(0.01))

@@ -8,7 +8,7 @@
 namespace {
 
 struct Options {
-  double radius_mm = 4.5;
+  double reach_mm = 4.5;
 };
 
 /// Marks the pixels of a disc about a point, parallel to the detector. In an image whose pixels are not square it is
@@ -31,7 +31,7 @@ marrow::View near_holes(const marrow::View& view, const marrow::geometry::Implan
     const Eigen::Vector3d centre = pose.world_from_model * hole.centre_mm;
     const Eigen::Vector2d pixel = project(camera, centre);
     if (!pixel.allFinite() || pixel.cwiseAbs().maxCoeff() > 1e6) continue;
-    mark_disc(camera, centre, pixel, options.radius_mm, near);
+    mark_disc(camera, centre, pixel, options.reach_mm, near);
   }
   marrow::View result = view;
   if (!view.mask.empty()) near.setTo(0, view.mask == 0);
@@ -48,6 +48,6 @@ MARROW_PLUGIN(plugin) {
       .in("implant", "implant with its holes")
       .in("pose", "pose of the implant")
       .out("view", "the same view; its mask is 0 except near the holes, and where it was 0 before")
-      .option("radius_mm", &Options::radius_mm, "pixels this near to a hole's centre count", marrow::at_least(0.1),
+      .option("reach_mm", &Options::reach_mm, "pixels this near to a hole's centre count", marrow::at_least(0.1),
               marrow::at_most(1000));
 }

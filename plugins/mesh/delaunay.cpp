@@ -14,7 +14,7 @@ using marrow::Mesh;
 using marrow::SignedField;
 
 struct Options : marrow::surface::Finish {
-  double angle_deg = 30, size_mm = 2, distance_mm = 0.05;
+  double min_angle_deg = 30, max_radius_mm = 2, max_distance_mm = 0.05;
 };
 
 /// Trilinear interpolation of the field with one layer of padding around its grid. Everything beyond this layer is
@@ -67,7 +67,7 @@ std::vector<Vector3d> spread_points(const marrow::surface::Signs& signs, int blo
 std::size_t most_points(const marrow::surface::Signs& signs, const Grid& grid, const Options& options) {
   double crossings = 0;
   signs.for_edges([&](int, int, int, int) { ++crossings; });
-  const double smallest_mm = std::min(options.size_mm, 4 * options.distance_mm);
+  const double smallest_mm = std::min(options.max_radius_mm, 4 * options.max_distance_mm);
   return std::size_t(1000 + 8 * crossings * std::max(1.0, std::pow(grid.spacing_mm.minCoeff() / smallest_mm, 2)));
 }
 
@@ -80,12 +80,12 @@ Mesh delaunay(const SignedField& field, const Options& options, marrow::Context&
   marrow::delaunay::LevelSet level_set;
   level_set.value = [&](const Vector3d& p) { return interpolated(p.cwiseQuotient(grid.spacing_mm) + middle); };
   level_set.radius_mm = 1.1 * (middle + Vector3d::Constant(2)).cwiseProduct(grid.spacing_mm).norm();
-  const marrow::delaunay::Criteria criteria{options.angle_deg, options.size_mm, options.distance_mm,
+  const marrow::delaunay::Criteria criteria{options.min_angle_deg, options.max_radius_mm, options.max_distance_mm,
                                             most_points(signs, grid, options)};
   std::string fault;
   // First, the points are about as far apart as the size of the triangles. Smaller parts of the surface need more
   // points.
-  const int largest_block = std::clamp(int(2 * options.size_mm / grid.spacing_mm.minCoeff()), 4, 16);
+  const int largest_block = std::clamp(int(2 * options.max_radius_mm / grid.spacing_mm.minCoeff()), 4, 16);
   for (int block = largest_block; block > 0; block /= 2) {
     level_set.points_mm.clear();
     for (const Vector3d& index : spread_points(signs, block))
@@ -106,9 +106,9 @@ Mesh delaunay(const SignedField& field, const Options& options, marrow::Context&
       fault = "CGAL's mesher came to a degenerate case";
     }
   }
-  throw marrow::Error(
-      "field: Delaunay refinement does not close its surface: " + fault +
-      "; smooth the field, change size_mm and distance_mm, or use mesh.marching_cubes, which takes every field");
+  throw marrow::Error("field: Delaunay refinement does not close its surface: " + fault +
+                      "; smooth the field, change max_radius_mm and max_distance_mm, or use mesh.marching_cubes, which "
+                      "takes every field");
 }
 
 }  // namespace
@@ -120,12 +120,12 @@ MARROW_PLUGIN(plugin) {
           "triangles of even size")
       .in("field", "signed distance, negative inside")
       .out("mesh", "closed surface of the field's zero level, normals outward")
-      .option("angle_deg", &Options::angle_deg, "smallest allowed angle of a triangle, before smoothing",
+      .option("min_angle_deg", &Options::min_angle_deg, "smallest allowed angle of a triangle, before smoothing",
               marrow::at_least(0), marrow::at_most(30))
-      .option("size_mm", &Options::size_mm, "largest allowed radius of the circle through a triangle's corners",
-              marrow::at_least(0.01))
-      .option("distance_mm", &Options::distance_mm, "largest allowed distance from a triangle's middle to the surface",
-              marrow::at_least(0.001))
+      .option("max_radius_mm", &Options::max_radius_mm,
+              "largest allowed radius of the circle through a triangle's corners", marrow::at_least(0.01))
+      .option("max_distance_mm", &Options::max_distance_mm,
+              "largest allowed distance from a triangle's middle to the surface", marrow::at_least(0.001))
       .option("largest_only", &Options::largest_only, marrow::surface::kLargestOnlyHelp)
       .option("smoothing", &Options::smoothing, marrow::surface::kSmoothingHelp, marrow::at_least(0),
               marrow::at_most(200));

@@ -11,7 +11,7 @@ namespace {
 
 struct Options {
   int population = 0;
-  double sigma = 0.5;
+  double first_spread = 0.5;
   int seed = 1;
 };
 
@@ -34,7 +34,7 @@ class Strategy {
   Strategy(Eigen::Index n, const Options& options)
       : n_(n),
         lambda_(options.population > 0 ? options.population : 4 + int(3 * std::log(double(n)))),
-        sigma_(options.sigma),
+        sigma_(options.first_spread),
         normal_(unsigned(options.seed)),
         mean_(Eigen::VectorXd::Zero(n)),
         path_c_(mean_),
@@ -144,7 +144,8 @@ MARROW_PLUGIN(plugin) {
       .out("optimizer", "minimiser without derivatives, for rugged functions")
       .option("population", &Options::population, "number of points in a generation; 0: 4 + 3 ln n for n variables",
               marrow::at_least(0), marrow::at_most(10000))
-      .option("sigma", &Options::sigma, "standard deviation of the first generation, in units of the initial steps",
-              marrow::at_least(1e-6), marrow::unit("1"))
+      .option("first_spread", &Options::first_spread,
+              "standard deviation of the first generation, in units of the initial steps", marrow::at_least(1e-6),
+              marrow::unit("1"))
       .option("seed", &Options::seed, "seed of the random numbers", marrow::at_least(0));
 }

@@ -6,7 +6,7 @@
 namespace {
 
 struct Options {
-  int points = 3;
+  int grid_points = 3;
 };
 
 /// Evaluates all points of a grid around the best point so far, then of a finer grid around the best of these. The
@@ -46,10 +46,10 @@ class GridSearch : public marrow::Optimizer {
 };
 
 std::shared_ptr<const marrow::Optimizer> grid(const Options& options) {
-  if (options.points % 2 == 0)
-    throw marrow::Error("points: expected an odd number, so that the middle is one of them, got " +
-                        std::to_string(options.points));
-  return std::make_shared<GridSearch>(options.points);
+  if (options.grid_points % 2 == 0)
+    throw marrow::Error("grid_points: expected an odd number, so that the middle is one of them, got " +
+                        std::to_string(options.grid_points));
+  return std::make_shared<GridSearch>(options.grid_points);
 }
 
 }  // namespace
@@ -59,6 +59,6 @@ MARROW_PLUGIN(plugin) {
       .summary("Evaluates all points of a grid, then of a finer grid around the best point")
       .trait("needs_start")
       .out("optimizer", "minimiser without derivatives")
-      .option("points", &Options::points, "number of grid points along each variable, an odd number",
+      .option("grid_points", &Options::grid_points, "number of grid points along each variable, an odd number",
               marrow::at_least(3), marrow::at_most(101));
 }

@@ -24,9 +24,9 @@ struct LockingOptions {
   std::string side = "unknown";
   std::vector<double> from;
   double guide_mm = 100;
-  double most_deg = 1;
-  double most_mm = 0.5;
-  double most_cost = 0.35;
+  double max_angle_deg = 1;
+  double max_offset_mm = 0.5;
+  double max_cost = 0.35;
   Vector3d isocentre_mm = Vector3d::Zero();
   double source_to_isocentre_mm = 600;
 };
@@ -100,12 +100,12 @@ int views_that_show(const Vector3d& point, const List<View>& views) {
 void doubt(const LockingOptions& options, int seen, LockingPlan::Drill& drill) {
   if (std::isnan(drill.deviation_deg))
     drill.doubts.push_back("the pose of the nail has no predicted deviations, so nothing says how far the hole is off");
-  if (!(drill.most_deg <= options.most_deg) && !std::isnan(drill.most_deg))
+  if (!(drill.most_deg <= options.max_angle_deg) && !std::isnan(drill.most_deg))
     drill.doubts.push_back("the direction of the hole is known to " + shown(drill.most_deg) +
-                           " degrees only (95 %), and the limit is " + shown(options.most_deg));
-  if (!(drill.most_mm <= options.most_mm) && !std::isnan(drill.most_mm))
+                           " degrees only (95 %), and the limit is " + shown(options.max_angle_deg));
+  if (!(drill.most_mm <= options.max_offset_mm) && !std::isnan(drill.most_mm))
     drill.doubts.push_back("the place of the hole is known to " + shown(drill.most_mm) +
-                           " mm only (95 %), and the limit is " + shown(options.most_mm));
+                           " mm only (95 %), and the limit is " + shown(options.max_offset_mm));
   if (seen < 2) drill.doubts.push_back(seen == 0 ? "no view shows the hole" : "only one view shows the hole");
 }
 
@@ -145,9 +145,9 @@ LockingPlan::Drill drill_of(const Hole& hole, const Pose& pose, const Vector3d& 
 std::vector<std::string> doubts_about(const Pose& pose, double cost, const LockingOptions& options) {
   std::vector<std::string> doubts;
   for (const std::string& warning : pose.warnings) doubts.push_back("the registration warns: " + warning);
-  if (cost > options.most_cost)
+  if (cost > options.max_cost)
     doubts.push_back("the images do not show the holes where this pose has them: the cost there is " + shown(cost) +
-                     ", and the limit is " + shown(options.most_cost));
+                     ", and the limit is " + shown(options.max_cost));
   return doubts;
 }
 
@@ -228,11 +228,11 @@ MARROW_PLUGIN(plugin) {
               "front",
               unit(""))
       .option("guide_mm", &LockingOptions::guide_mm, "distance of the drill guide from the hole's centre", at_least(0))
-      .option("most_deg", &LockingOptions::most_deg,
+      .option("max_angle_deg", &LockingOptions::max_angle_deg,
               "a hole is doubtful if its direction may be off by more than this (95 %)", at_least(0))
-      .option("most_mm", &LockingOptions::most_mm,
+      .option("max_offset_mm", &LockingOptions::max_offset_mm,
               "a hole is doubtful if its axis may be off by more than this at its centre (95 %)", at_least(0))
-      .option("most_cost", &LockingOptions::most_cost,
+      .option("max_cost", &LockingOptions::max_cost,
               "all holes are doubtful if `cost` at the nail's pose is above this", at_least(0))
       .option("isocentre_mm", &LockingOptions::isocentre_mm, "the C-arm's centre of rotation, as for camera.carm")
       .option("source_to_isocentre_mm", &LockingOptions::source_to_isocentre_mm,

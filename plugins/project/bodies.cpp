@@ -22,7 +22,7 @@ Inputs inputs_of(Volume volume, SignedField field, Mesh mesh) {
   }
   return {{"volume", item(std::move(volume))},
           {"field", item(std::move(field))},
-          {"mesh", item(std::move(mesh))},
+          {"model", item(std::move(mesh))},
           {"views", Value::of(views, "view")}};
 }
 Inputs inputs_of(const analytic::Body& body) {

@@ -6,7 +6,7 @@
 MARROW_PLUGIN(plugin) {
   plugin.kind("project")
       .summary("draws a model as a view would show it: its outline, or a radiograph (DRR)")
-      .in<marrow::Mesh>("mesh", "surface of the bone")
+      .in<marrow::Mesh>("model", "surface of the bone")
       .in<marrow::Volume>("volume", "CT")
       .in<marrow::SignedField>("field", "signed field of one fragment; everything else is left out")
       .in<marrow::View>("views", "views for which the model will be drawn", marrow::over("view"))

@@ -17,10 +17,10 @@ using marrow::rays::Bricks;
 using marrow::rays::Rays;
 
 struct Options : marrow::rays::AttenuationOptions {
-  double range_deg = 8;
-  double step_mm = 2;
-  double step_deg = 1.2;
-  int most_mb = 1024;
+  double max_rotation_deg = 8;
+  double ray_spacing_mm = 2;
+  double direction_spacing_deg = 1.2;
+  int max_memory_mb = 1024;
 };
 
 /// One dimension of a table: `count` samples, the first at `low`.
@@ -64,10 +64,10 @@ class Field {
     for (const double u : {0.0, double(camera.width_px - 1)})
       for (const double v : {0.0, double(camera.height_px - 1)})
         steepest = steepest.cwiseMax((ray_from_pixel * Eigen::Vector3d(u, v, 1)).hnormalized().cwiseAbs());
-    const double slope_step = std::tan(marrow::radians(options.step_deg));
+    const double slope_step = std::tan(marrow::radians(options.direction_spacing_deg));
     for (int k = 0; k < 2; ++k) {
       const double most =
-          std::tan(std::min(std::atan(steepest[k]) + marrow::radians(options.range_deg), marrow::radians(60)));
+          std::tan(std::min(std::atan(steepest[k]) + marrow::radians(options.max_rotation_deg), marrow::radians(60)));
       slopes_[k] = Side::of(-most, most, slope_step);
       // The places must cover all rays with these slopes that meet the box.
       double reach = 0;
@@ -76,7 +76,7 @@ class Field {
             at = axes_.transpose() * half.cwiseProduct(0.5 * (high - low));
         reach = std::max(reach, std::abs(at[k]) + most * std::abs(at.z()));
       }
-      places_[k] = Side::of(-reach - options.step_mm, reach + options.step_mm, options.step_mm);
+      places_[k] = Side::of(-reach - options.ray_spacing_mm, reach + options.ray_spacing_mm, options.ray_spacing_mm);
     }
   }
 
@@ -184,10 +184,11 @@ std::shared_ptr<const marrow::RadiographProjector> lightfield(const marrow::Volu
     count += fields.back().count();
   }
   const std::size_t mb = count * sizeof(std::uint16_t) >> 20;
-  if (mb > std::size_t(options.most_mb))
-    throw marrow::Error("the integrals would take " + std::to_string(mb) + " MB, but most_mb is " +
-                        std::to_string(options.most_mb) +
-                        "; take wider steps (step_mm, step_deg), a smaller range_deg, or the field of a fragment");
+  if (mb > std::size_t(options.max_memory_mb))
+    throw marrow::Error(
+        "the integrals would take " + std::to_string(mb) + " MB, but max_memory_mb is " +
+        std::to_string(options.max_memory_mb) +
+        "; raise ray_spacing_mm or direction_spacing_deg, take a smaller max_rotation_deg, or the field of a fragment");
   context.info("keeps " + std::to_string(count) + " integrals, " + std::to_string(mb) + " MB");
   Bricks bricks(attenuation);
   for (Field& one : fields) one.fill(bricks, attenuation.grid.spacing_mm);
@@ -212,13 +213,13 @@ MARROW_PLUGIN(plugin) {
               "value that counts as no attenuation: that of air, or of the tissue around the bone", marrow::unit("HU"))
       .option("margin_mm", &Options::margin_mm, "voxels farther than this outside the field do not attenuate",
               marrow::at_least(0))
-      .option("range_deg", &Options::range_deg,
+      .option("max_rotation_deg", &Options::max_rotation_deg,
               "largest rotation of the bone that the table covers, from CT axes parallel to the world's axes",
               marrow::at_least(0), marrow::at_most(40))
-      .option("step_mm", &Options::step_mm, "distance between neighbouring rays of the table", marrow::at_least(0.2),
-              marrow::at_most(20))
-      .option("step_deg", &Options::step_deg, "angle between neighbouring directions of the table",
-              marrow::at_least(0.1), marrow::at_most(10))
-      .option("most_mb", &Options::most_mb, "largest memory for the integrals", marrow::at_least(1),
+      .option("ray_spacing_mm", &Options::ray_spacing_mm, "distance between neighbouring rays of the table",
+              marrow::at_least(0.2), marrow::at_most(20))
+      .option("direction_spacing_deg", &Options::direction_spacing_deg,
+              "angle between neighbouring directions of the table", marrow::at_least(0.1), marrow::at_most(10))
+      .option("max_memory_mb", &Options::max_memory_mb, "largest memory for the integrals", marrow::at_least(1),
               marrow::unit("MB"));
 }

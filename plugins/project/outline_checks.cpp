@@ -87,7 +87,7 @@ double points_out_of_view(const OutlineProjector& projector) {
 /// point to the bone would fit other borders in the image.
 double points_facing_inwards(const Subject& subject) {
   const auto& ports = subject.info().inputs;
-  if (std::none_of(ports.begin(), ports.end(), [](const PortInfo& one) { return one.name == "mesh"; }))
+  if (std::none_of(ports.begin(), ports.end(), [](const PortInfo& one) { return one.name == "model"; }))
     throw NotApplicable("it draws no surface");
   Mesh mesh = mesh_of(egg());
   for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);

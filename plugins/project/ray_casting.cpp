@@ -11,7 +11,7 @@ using marrow::rays::RayProjector;
 using marrow::rays::Span;
 
 struct Options : AttenuationOptions {
-  double step_mm = 0.5;
+  double sample_spacing_mm = 0.5;
 };
 
 /// Sums trilinear values at even steps. Each value counts for the step around it.
@@ -65,7 +65,7 @@ class RayCastingProjector : public RayProjector {
 std::shared_ptr<const marrow::RadiographProjector> ray_casting(const marrow::Volume& volume,
                                                                const marrow::SignedField* field,
                                                                const Options& options) {
-  return std::make_shared<RayCastingProjector>(attenuation_of(volume, field, options), options.step_mm);
+  return std::make_shared<RayCastingProjector>(attenuation_of(volume, field, options), options.sample_spacing_mm);
 }
 
 }  // namespace
@@ -74,6 +74,6 @@ MARROW_PLUGIN(plugin) {
   auto node = plugin.node("project.ray_casting", ray_casting);
   marrow::rays::declare<Options>(
       node.summary("Radiographs by ray casting: line integrals as sums of trilinear values at even steps"))
-      .option("step_mm", &Options::step_mm, "largest distance from one value to the next along a ray",
-              marrow::at_least(0.01));
+      .option("sample_spacing_mm", &Options::sample_spacing_mm,
+              "largest distance from one value to the next along a ray", marrow::at_least(0.01));
 }

@@ -139,7 +139,7 @@ std::shared_ptr<const marrow::OutlineProjector> silhouette(const marrow::Mesh& m
 MARROW_PLUGIN(plugin) {
   plugin.node("project.silhouette", silhouette)
       .summary("Outer outline of a surface by drawing: its triangles are filled and the border pixels are traced")
-      .in("mesh", "surface of the bone")
+      .in("model", "surface of the bone")
       .in("volume", "CT from which the surface was made; outline within border_voxels of its end is left out")
       .out("projector", "draws the outline for any camera and pose")
       .option("border_voxels", &Options::border_voxels, "outline closer than this to the end of the CT is left out",

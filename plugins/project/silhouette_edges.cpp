@@ -373,7 +373,7 @@ std::shared_ptr<const marrow::OutlineProjector> silhouette_edges(const marrow::M
 MARROW_PLUGIN(plugin) {
   plugin.node("project.silhouette_edges", silhouette_edges)
       .summary("Exact outer outline of a surface: the curve where it turns away from the X-ray source")
-      .in("mesh", "surface of the bone")
+      .in("model", "surface of the bone")
       .in("volume", "CT from which the surface was made; outline within border_voxels of its end is left out")
       .out("projector", "draws the outline for any camera and pose")
       .option("border_voxels", &Options::border_voxels, "outline closer than this to the end of the CT is left out",

@@ -11,7 +11,7 @@ using namespace marrow;
 struct Options {
   std::filesystem::path path;
   int projection = 0;
-  std::vector<double> size_px, pixel_mm, corner_mm;
+  std::vector<double> image_size_px, pixel_mm, corner_mm;
   std::string mirror = "none";
   double scale = 1;
 };
@@ -21,10 +21,10 @@ Camera camera(const Image* image, const Options& options, Context& context) {
   const exchange::CameraFormat format = exchange::camera_format(options.path);
   const bool is_alone = format == exchange::CameraFormat::own || format == exchange::CameraFormat::xmalab,
              has_size = is_alone || format == exchange::CameraFormat::xreg;
-  if (has_size && !options.size_px.empty())
-    throw Error(options.path.string() + ": size_px is not for this format of cameras; leave it out");
+  if (has_size && !options.image_size_px.empty())
+    throw Error(options.path.string() + ": image_size_px is not for this format of cameras; leave it out");
   exchange::CameraReading reading{options.projection,
-                                  {options.size_px, options.pixel_mm, options.corner_mm},
+                                  {options.image_size_px, options.pixel_mm, options.corner_mm},
                                   exchange::mirror_of(options.mirror),
                                   options.scale};
   if (reading.projection == 0 && (is_alone || format == exchange::CameraFormat::plastimatch))
@@ -52,7 +52,8 @@ MARROW_PLUGIN(plugin) {
               "end: the text of plastimatch or XMALab",
               required())
       .option("projection", &Options::projection, "RTK and xReg: number of the projection, counted from 0", at_least(0))
-      .option("size_px", &Options::size_px, "plastimatch and RTK: width and height of the image; or wire the image")
+      .option("image_size_px", &Options::image_size_px,
+              "plastimatch and RTK: width and height of the image; or wire the image")
       .option("pixel_mm", &Options::pixel_mm,
               "RTK: width and height of a pixel on the detector; one number for square pixels")
       .option(

@@ -15,7 +15,7 @@ using namespace marrow;
 struct Options {
   std::filesystem::path path;
   std::vector<std::string> names;
-  std::vector<double> projections, size_px, pixel_mm, corner_mm;
+  std::vector<double> projections, image_size_px, pixel_mm, corner_mm;
   std::string mirror = "none";
   double scale = 1;
 };
@@ -32,13 +32,13 @@ std::vector<int> numbers_of(const Options& options) {
 
 List<Camera> cameras(const Options& options, Context& context) {
   if (exchange::projections_in(options.path) == exchange::Projections::xreg &&
-      !(options.size_px.empty() && options.pixel_mm.empty() && options.corner_mm.empty()))
+      !(options.image_size_px.empty() && options.pixel_mm.empty() && options.corner_mm.empty()))
     throw Error(options.path.string() +
-                ": says itself how large its images are; leave out size_px, pixel_mm and "
+                ": says itself how large its images are; leave out image_size_px, pixel_mm and "
                 "corner_mm, which are for RTK's geometry");
-  const std::vector<Camera> read = exchange::read_projections(options.path, numbers_of(options),
-                                                              {options.size_px, options.pixel_mm, options.corner_mm},
-                                                              exchange::mirror_of(options.mirror), options.scale);
+  const std::vector<Camera> read = exchange::read_projections(
+      options.path, numbers_of(options), {options.image_size_px, options.pixel_mm, options.corner_mm},
+      exchange::mirror_of(options.mirror), options.scale);
   List<Camera> cameras;
   for (std::size_t i = 0; i < read.size(); ++i) {
     check_item_name("view", options.names.at(i));
@@ -62,7 +62,7 @@ MARROW_PLUGIN(plugin) {
       .option("projections", &Options::projections,
               "number of each view's projection, counted from 0; if empty, the first ones in their order")
       .relation(as_many_or_none("projections", "names"))
-      .option("size_px", &Options::size_px, "RTK: width and height of the images")
+      .option("image_size_px", &Options::image_size_px, "RTK: width and height of the images")
       .option("pixel_mm", &Options::pixel_mm,
               "RTK: width and height of a pixel on the detector; one number for square pixels")
       .option(

@@ -70,7 +70,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("read.implant", implant)
       .summary("Reads an implant: its closed surface from STL, PLY, OBJ or VTP, and its holes from YAML")
       .out("implant", "surface and holes, in mm")
-      .out("surface", "the surface alone")
+      .out("mesh", "the surface alone")
       .option("holes", &Options::holes, "YAML file with the centre, the axis and the diameter of each hole", required())
       .option("surface", &Options::surface, "file of the surface: .stl, .ply, .obj or .vtp", required())
       .option("scale", &Options::scale, "factor that converts the surface's unit to mm: 1000 for metres",

@@ -16,7 +16,7 @@ struct Options {
   std::filesystem::path path;
   std::string fragment = "bone";
   std::filesystem::path seen;
-  std::vector<std::string> views;
+  std::vector<std::string> names;
   std::string mirror = "none";
 };
 
@@ -64,17 +64,17 @@ Landmarks landmarks_of(const YamlMap& fragment, YamlFile& file) {
 void add_seen(Landmarks& landmarks, const Options& options) {
   const std::string what = options.seen.string();
   const std::vector<exchange::XregProjection> projections = exchange::read_xreg(options.seen);
-  if (options.views.size() != projections.size())
-    throw Error(what + ": has " + std::to_string(projections.size()) +
-                " projections; give in views as many names, got " + std::to_string(options.views.size()));
+  if (options.names.size() != projections.size())
+    throw Error(what + ": has " + std::to_string(projections.size()) + " projections; give in names as many, got " +
+                std::to_string(options.names.size()));
   for (std::size_t i = 0; i < projections.size(); ++i) {
-    check_item_name("view", options.views[i]);
+    check_item_name("view", options.names[i]);
     for (const auto& shown : exchange::landmarks_of(projections[i], exchange::mirror_of(options.mirror))) {
       const auto is_it = [&](const Landmarks::Point& point) { return point.name == shown.name; };
       if (std::none_of(landmarks.points.begin(), landmarks.points.end(), is_it))
         throw Error(what + ": projection " + std::to_string(i) + " shows '" + shown.name + "', which " +
                     options.path.string() + " has not; give its place in the CT there");
-      landmarks.seen.push_back({shown.name, options.views[i], shown.pixel});
+      landmarks.seen.push_back({shown.name, options.names[i], shown.pixel});
     }
   }
 }
@@ -89,8 +89,8 @@ List<Landmarks> marked_landmarks(const Options& options) {
 }
 
 List<Landmarks> landmarks(const Options& options) {
-  if (options.seen.empty() && (!options.views.empty() || options.mirror != "none"))
-    throw Error(options.path.string() + ": views and mirror are about the file of seen; give it, or leave them out");
+  if (options.seen.empty() && (!options.names.empty() || options.mirror != "none"))
+    throw Error(options.path.string() + ": names and mirror are about the file of seen; give it, or leave them out");
   if (exchange::is_markups_file(options.path)) return marked_landmarks(options);
   if (!options.seen.empty())
     throw Error(options.path.string() +
@@ -127,7 +127,7 @@ MARROW_PLUGIN(plugin) {
       .option(
           "seen", &Options::seen,
           "only for 3D Slicer's files: projection data of xReg (.h5), which say where its images show the landmarks")
-      .option("views", &Options::views, "names of the views that xReg's projections are, in their order")
+      .option("names", &Options::names, "names of the views that xReg's projections are, in their order")
       .option("mirror", &Options::mirror, "how xReg's images are turned over before use, as for read.camera",
               one_of({"none", "left_right", "upside_down"}));
 }

@@ -8,12 +8,12 @@ namespace {
 struct Options {
   std::filesystem::path path;
   double scale = 1;
-  std::string frame = "ct";
+  std::string coordinates = "ct";
 };
 
 marrow::Mesh mesh(const Options& options, marrow::Context& context) {
   marrow::Mesh mesh = marrow::exchange::read_surface_file(options.path, options.scale, context);
-  mesh.frame = options.frame;
+  mesh.frame = options.coordinates;
   return mesh;
 }
 
@@ -30,7 +30,7 @@ MARROW_PLUGIN(plugin) {
               marrow::required())
       .option("scale", &Options::scale, "factor that converts the file's unit to mm: 10 for cm, 1000 for metres",
               marrow::at_least(1e-6))
-      .option("frame", &Options::frame,
+      .option("coordinates", &Options::coordinates,
               "frame of the file's coordinates: ct, or world (for a surface that was tracked)",
               marrow::one_of({"ct", "world"}));
 }

@@ -29,7 +29,7 @@ void check_inputs(const List<View>& views, const List<Cost>& costs, const List<P
     throw Error("there is one view only; a camera is corrected by comparing it with others, so give two views or more");
   for (const View& view : views) check_view(view);
   if (!reference.empty() && !views.find(reference))
-    throw Error("reference: there is no view '" + reference + "'; " + suggestion(reference, views.names()));
+    throw Error("reference_view: there is no view '" + reference + "'; " + suggestion(reference, views.names()));
   if (poses.empty()) throw Error("there is no bone; wire the pose of at least one");
   if (costs.names() != poses.names())
     throw Error("costs and poses are not of the same bones; wire both from nodes that are called for each fragment");
@@ -79,13 +79,14 @@ void check_compared(const Refinement& refinement, const List<Pose>& poses) {
 Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose>& poses, const Options& options,
                Context& context) {
   search::check_level_list(options.pixel_step, "pixel_step");
-  check_inputs(views, costs, poses, options.reference);
+  check_inputs(views, costs, poses, options.reference_view);
   Refinement refinement(costs, poses, views, options);
   check_compared(refinement, poses);
   refinement.run(context);
   check_compared(refinement, poses);
   if (!refinement.converged())
-    context.warn("the cameras still moved after " + std::to_string(options.max_rounds) + " rounds; raise max_rounds");
+    context.warn("the cameras still moved after " + std::to_string(options.max_iterations) +
+                 " iterations; raise max_iterations");
   const std::string text = formatted(
       "the cameras are off against each other by about {:.3g} times what the options expect", refinement.scale());
   context.info(text);
@@ -137,7 +138,7 @@ MARROW_PLUGIN(plugin) {
       .figures({"rotation_u_deg", "rotation_v_deg", "rotation_depth_deg", "shift_u_mm", "shift_v_mm", "shift_depth_mm",
                 "predicted_rotation_u_deg", "predicted_rotation_v_deg", "predicted_rotation_depth_deg",
                 "predicted_shift_u_mm", "predicted_shift_v_mm", "predicted_shift_depth_mm"})
-      .option("rotation_deg", &Options::rotation_deg, "root mean square of the cameras' rotations", at_least(1e-6))
+      .option("turn_deg", &Options::turn_deg, "root mean square of the cameras' rotations", at_least(1e-6))
       .option("shift_mm", &Options::shift_mm, "root mean square of the cameras' shifts", at_least(1e-6))
       .option(
           "focal_percent", &Options::focal_percent,
@@ -157,9 +158,9 @@ MARROW_PLUGIN(plugin) {
               "per level, for costs of grey values: only every n-th pixel is compared; the first level tells how far "
               "the cameras are off, and the last one decides the poses",
               at_least(1), replaces({"pixel_step"}))
-      .option("max_rounds", &Options::max_rounds, "largest number of steps", at_least(1))
+      .option("max_iterations", &Options::max_iterations, "largest number of iterations", at_least(1))
       .option(
-          "reference", &Options::reference,
+          "reference_view", &Options::reference_view,
           "view whose camera is right and stays, such as the one that was calibrated with the robot; empty: none is "
           "known to be");
 }

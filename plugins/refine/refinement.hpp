@@ -32,8 +32,8 @@ struct Options : ExpectedErrors {
   double contour_spacing_px = 2;
   double reach_px = 6;
   std::vector<double> pixel_step{2};
-  int max_rounds = 15;
-  std::string reference;
+  int max_iterations = 15;
+  std::string reference_view;
 };
 
 /// What is sought: a pose for each bone, and a motion in degrees and mm for each view.
@@ -50,7 +50,7 @@ class Refinement {
     for (const Pose& pose : poses) centre += pose.world_from_model * pose.frame.origin_mm / double(poses.size());
     for (std::size_t v = 0; v < views.size(); ++v) {
       sights_.push_back(sight_of(views[v], centre, options));
-      if (views.name(v) == options.reference) sights_.back().deviation *= kOfReference;
+      if (views.name(v) == options.reference_view) sights_.back().deviation *= kOfReference;
     }
     prior_.emplace(sights_);
     for (const Pose& pose : poses) state_.poses.push_back(pose.world_from_model);
@@ -266,9 +266,9 @@ class Refinement {
   /// wanted. Later rounds keep the curvatures. The first models are kept in `first`; if it holds some, these are those
   /// of the state already.
   bool descend(bool with_noise, Context& context, std::vector<Model>& first) {
-    for (int round = 0; round < options_.max_rounds; ++round) {
+    for (int round = 0; round < options_.max_iterations; ++round) {
       context.check_cancelled();
-      context.progress(double(round) / options_.max_rounds, "rounds");
+      context.progress(double(round) / options_.max_iterations, "rounds");
       if (round == 0 ? first.empty() : with_noise && round == 1)
         expand(with_noise);
       else if (round > 0)

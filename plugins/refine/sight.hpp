@@ -10,7 +10,7 @@ namespace marrow::refine {
 
 /// Root mean squares of what is expected of a calibration.
 struct ExpectedErrors {
-  double rotation_deg = 0.5;
+  double turn_deg = 0.5;
   double shift_mm = 1;
   double focal_percent = 1;
   double centre_px = 5;
@@ -51,7 +51,7 @@ inline Sight sight_of(const View& view, const Eigen::Vector3d& centre_mm, const 
   const Eigen::Vector2d centre =
       offset_at_mm(view.camera, centre_mm, Eigen::Vector2d::Constant(each_of_two * expected.centre_px));
   const double shift = each * expected.shift_mm, depth = expected.focal_percent / 100 * depth_mm,
-               turn = each * expected.rotation_deg;
+               turn = each * expected.turn_deg;
   Sight sight{centre_mm, view.camera.camera_from_world.rotation.transpose(), Vector6d()};
   sight.deviation << turn, turn, turn, std::hypot(shift, centre.x()), std::hypot(shift, centre.y()),
       std::hypot(shift, depth);

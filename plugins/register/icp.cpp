@@ -91,7 +91,7 @@ Result icp(const Pose& initial, const Mesh& model, const Mesh& target, const Opt
 MARROW_PLUGIN(plugin) {
   plugin.node("register.icp", icp)
       .summary("Registers a surface to a surface by iterative closest points, ICP (Besl and McKay 1992; by PCL)")
-      .in("initial", "pose to start from, and the fragment's axes")
+      .in("start", "pose to start from, and the fragment's axes")
       .in("model", "surface of the fragment")
       .in("target", "surface in world coordinates, of the whole fragment or a part")
       .out("pose", &Result::pose,

@@ -10,7 +10,7 @@ MARROW_PLUGIN(plugin) {
       .in<marrow::Cost>("finer_cost", "cost of a pose for a second search, near the result of the first")
       .in<marrow::Optimizer>("optimizer", "minimiser")
       .in<marrow::Optimizer>("finer_optimizer", "minimiser of finer_cost; none: the same as for cost")
-      .in<marrow::Pose>("initial", "pose to start from, and the fragment's axes")
+      .in<marrow::Pose>("start", "pose to start from, and the fragment's axes")
       .in<marrow::Mesh>("model", "surface of the fragment")
       .in<marrow::Mesh>("target", "surface in world coordinates, of the whole fragment or a part")
       .out<marrow::Pose>("pose", "pose of least cost, with its predicted covariance")

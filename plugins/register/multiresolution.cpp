@@ -41,7 +41,7 @@ MARROW_PLUGIN(plugin) {
           "axis, then all six parameters")
       .in("cost", "cost of a pose")
       .in("optimizer", "minimiser")
-      .in("initial", "pose to start from, and the fragment's axes")
+      .in("start", "pose to start from, and the fragment's axes")
       .in("model", "surface of the fragment: it gives the axes of a start that has none")
       .out("pose", &Result::pose, "pose of least cost, with its predicted covariance")
       .out("stages", &Result::stages, "poses of the search: start, axial, final", marrow::over("stage"));

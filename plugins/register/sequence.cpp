@@ -15,8 +15,8 @@ struct Options : marrow::search::SearchOptions {
   std::vector<double> finer_step_axial_deg{2, 0.6};
   std::vector<double> finer_step_mm{1, 0.3};
   std::vector<double> finer_step_tolerance{0.1, 0.03};
-  double most_apart_deg = 5;
-  double most_apart_mm = 3;
+  double max_apart_deg = 5;
+  double max_apart_mm = 3;
 };
 
 struct Result {
@@ -49,7 +49,7 @@ marrow::Pose led_back(const marrow::Pose& result, const marrow::Cost& cost, cons
 std::string disagreement(const marrow::Pose& first, const marrow::Pose& second, const Options& options) {
   const marrow::Vector6d motion = motion_between(first.world_from_model, second.world_from_model, first.frame);
   const double apart_deg = marrow::degrees(motion.head<3>().norm()), apart_mm = motion.tail<3>().norm();
-  if (apart_deg <= options.most_apart_deg && apart_mm <= options.most_apart_mm) return "";
+  if (apart_deg <= options.max_apart_deg && apart_mm <= options.max_apart_mm) return "";
   return marrow::formatted(
       "the two costs lead to poses {:.3g} degrees and {:.3g} mm apart: one of them is wrong; look at the overlays of "
       "both",
@@ -106,7 +106,7 @@ MARROW_PLUGIN(plugin) {
       .in("finer_cost", "cost of a pose for a second search, near the result of the first")
       .in("optimizer", "minimiser")
       .in("finer_optimizer", "minimiser of finer_cost; none: the same as for cost")
-      .in("initial", "pose to start from, and the fragment's axes")
+      .in("start", "pose to start from, and the fragment's axes")
       .in("model", "surface of the fragment: it gives the axes of a start that has none")
       .out("pose", &Result::pose,
            "pose with the least finer_cost, near the pose with the least cost; with its predicted covariance")
@@ -123,8 +123,8 @@ MARROW_PLUGIN(plugin) {
               "per level of finer_cost: the level ends when steps are shorter than this fraction of its first step")
       .relation(marrow::same_length(
           {"finer_pixel_step", "finer_step_deg", "finer_step_axial_deg", "finer_step_mm", "finer_step_tolerance"}))
-      .option("most_apart_deg", &Options::most_apart_deg,
+      .option("max_apart_deg", &Options::max_apart_deg,
               "a larger rotation between the results of the two costs gives a warning", marrow::at_least(0))
-      .option("most_apart_mm", &Options::most_apart_mm,
+      .option("max_apart_mm", &Options::max_apart_mm,
               "a larger shift between the results of the two costs gives a warning", marrow::at_least(0));
 }

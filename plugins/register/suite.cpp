@@ -96,7 +96,7 @@ Inputs inputs_of(const std::shared_ptr<const Cost>& cost, const Mesh& target) {
   const Value optimizer = Value::of<Optimizer>(std::make_shared<const Compass>());
   return {{"cost", Value::of<Cost>(cost)}, {"finer_cost", Value::of<Cost>(cost)},
           {"optimizer", optimizer},        {"finer_optimizer", optimizer},
-          {"initial", item(initial)},      {"model", item(mesh_of(bone()))},
+          {"start", item(initial)},        {"model", item(mesh_of(bone()))},
           {"target", item(target)}};
 }
 
@@ -168,9 +168,9 @@ double views_not_named(const Subject& subject) {
 double long_axis_off_deg(const Subject& subject) {
   if (!takes(subject, "model")) throw NotApplicable("it takes no model");
   Inputs inputs = sample();
-  Pose initial = inputs.at("initial").as<Pose>();
+  Pose initial = inputs.at("start").as<Pose>();
   initial.frame = {};
-  inputs.set("initial", item(initial));
+  inputs.set("start", item(initial));
   const FragmentFrame found = subject.output(inputs, "pose").as<Pose>().frame;
   return degrees(found.axes.col(2).cross(frame().axes.col(2)).norm());
 }
@@ -179,9 +179,9 @@ std::vector<Trial> trials() {
   const auto with_start = [](const std::function<void(Pose&)>& change) {
     return [change] {
       Inputs inputs = sample();
-      Pose initial = inputs.at("initial").as<Pose>();
+      Pose initial = inputs.at("start").as<Pose>();
       change(initial);
-      inputs.set("initial", item(initial));
+      inputs.set("start", item(initial));
       return inputs;
     };
   };

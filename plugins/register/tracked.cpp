@@ -28,8 +28,8 @@ struct Options {
   int max_evaluations = 200;
   double gate = 22.46;
   int wide_poses = 500;
-  double most_wide_deg = 20;
-  double most_wide_mm = 30;
+  double max_wide_deg = 20;
+  double max_wide_mm = 30;
   int covariance_every = 10;
 };
 
@@ -56,18 +56,18 @@ search::SearchOptions search_options(const Options& options, const Pose& predict
     const Matrix6d& covariance = *predicted.covariance;
     return kDeviations * std::sqrt(std::max(covariance(a, a), covariance(b, b)));
   };
-  result.scan_side_deg = std::min(options.most_wide_deg, degrees(range(0, 1)));
-  result.scan_rotation_deg = std::min(options.most_wide_deg, degrees(range(2, 2)));
-  result.scan_side_mm = std::min(options.most_wide_mm, range(3, 4));
-  result.scan_translation_mm = std::min(options.most_wide_mm, range(5, 5));
+  result.scan_side_deg = std::min(options.max_wide_deg, degrees(range(0, 1)));
+  result.scan_rotation_deg = std::min(options.max_wide_deg, degrees(range(2, 2)));
+  result.scan_side_mm = std::min(options.max_wide_mm, range(3, 4));
+  result.scan_translation_mm = std::min(options.max_wide_mm, range(5, 5));
   return result;
 }
 
 /// Of a start that does not say how exact it is: as far as the wider search goes.
 Matrix6d unknown_covariance(const Options& options) {
   Vector6d deviation;
-  deviation << Eigen::Vector3d::Constant(radians(options.most_wide_deg) / kDeviations),
-      Eigen::Vector3d::Constant(options.most_wide_mm / kDeviations);
+  deviation << Eigen::Vector3d::Constant(radians(options.max_wide_deg) / kDeviations),
+      Eigen::Vector3d::Constant(options.max_wide_mm / kDeviations);
   return deviation.cwiseAbs2().asDiagonal();
 }
 
@@ -197,7 +197,7 @@ MARROW_PLUGIN(plugin) {
       .in("finer_cost", "cost for a second search, from the result of the first")
       .in("optimizer", "minimiser")
       .in("finer_optimizer", "minimiser of finer_cost; none: the same as for cost")
-      .in("initial",
+      .in("start",
           "predicted pose with its covariance, and the fragment's axes; without a covariance, "
           "or with one that says nothing, it counts as hardly known")
       .in("state", "what is known before the frame; then most frames take over the covariance of a frame before")
@@ -227,7 +227,7 @@ MARROW_PLUGIN(plugin) {
       .option("covariance_every", &Options::covariance_every,
               "with 'state': the covariance is computed anew for every n-th frame", at_least(1))
       .option("wide_poses", &Options::wide_poses, "number of poses that the wider search tries", at_least(1))
-      .option("most_wide_deg", &Options::most_wide_deg, "largest range of the wider search about each axis",
-              at_least(0), at_most(180))
-      .option("most_wide_mm", &Options::most_wide_mm, "largest range of the wider search along each axis", at_least(0));
+      .option("max_wide_deg", &Options::max_wide_deg, "largest range of the wider search about each axis", at_least(0),
+              at_most(180))
+      .option("max_wide_mm", &Options::max_wide_mm, "largest range of the wider search along each axis", at_least(0));
 }

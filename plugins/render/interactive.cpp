@@ -53,7 +53,7 @@ marrow::Scene interactive(const marrow::List<marrow::Mesh>& meshes, const marrow
 MARROW_PLUGIN(plugin) {
   plugin.node("render.interactive", interactive)
       .summary("Collects models, poses and views for the 3D view of a report")
-      .in("meshes", "surfaces to draw; simplify large ones first (mesh.simplify)", marrow::over("fragment"))
+      .in("models", "surfaces to draw; simplify large ones first (mesh.simplify)", marrow::over("fragment"))
       .in("poses", "poses found", marrow::over("fragment"))
       .in("views", "X-ray views", marrow::over("view"))
       .in("starts", "poses at the start of the registration", marrow::over("fragment"))

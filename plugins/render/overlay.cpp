@@ -13,7 +13,7 @@ using namespace marrow::draw;
 struct Options {
   int size_px = 800;
   std::string contrast = "local";
-  double spacing_px = 1;
+  double contour_spacing_px = 1;
   bool zoom = false;
 };
 
@@ -29,7 +29,7 @@ Layer make_layer(const std::string& text, const cv::Scalar& colour, int thicknes
                  const marrow::OutlineProjector& projector, const marrow::View& view,
                  const marrow::RigidTransform& pose, const Options& options) {
   marrow::check_rigid(pose, "pose '" + text + "'");
-  Layer layer{text, colour, thickness, projector.outline(view.camera, pose, options.spacing_px)};
+  Layer layer{text, colour, thickness, projector.outline(view.camera, pose, options.contour_spacing_px)};
   if (layer.outline.empty()) layer.text += ": outside the image";
   return layer;
 }
@@ -67,7 +67,7 @@ cv::Mat draw(const marrow::View& view, const std::string& title, const std::vect
   if (edges) draw_edges(panel, *edges, kPurple);
   if (lines)
     for (const marrow::LineSegment& line : {lines->left, lines->right}) draw_segment(panel, line, kGreen, 1);
-  for (const Layer& layer : layers) draw_outline(panel, layer, options.spacing_px);
+  for (const Layer& layer : layers) draw_outline(panel, layer, options.contour_spacing_px);
   draw_title(panel, title);
   return panel.pixels;
 }
@@ -117,7 +117,7 @@ MARROW_PLUGIN(plugin) {
       .option("size_px", &Options::size_px, "longer side of a panel", marrow::at_least(64), marrow::at_most(8192))
       .option("contrast", &Options::contrast, "how grey values are shown",
               marrow::one_of({"local", "logarithmic", "linear"}))
-      .option("spacing_px", &Options::spacing_px, "distance between two outline points", marrow::at_least(0.1),
-              marrow::at_most(100))
+      .option("contour_spacing_px", &Options::contour_spacing_px, "distance between two outline points",
+              marrow::at_least(0.1), marrow::at_most(100))
       .option("zoom", &Options::zoom, "show only the part of the image around the outlines");
 }

@@ -122,7 +122,7 @@ marrow::Picture scene(const marrow::List<marrow::Mesh>& meshes, const marrow::Li
 MARROW_PLUGIN(plugin) {
   plugin.node("render.scene", scene)
       .summary("Draws the models in their poses, shaded, as seen from the X-ray source, beside the X-ray")
-      .in("meshes", "surfaces of the fragments", marrow::over("fragment"))
+      .in("models", "surfaces of the fragments", marrow::over("fragment"))
       .in("poses", "poses of the fragments", marrow::over("fragment"))
       .in("view", "X-ray view")
       .out("picture", "on the left the X-ray, on the right the models over the dimmed X-ray")

@@ -18,8 +18,8 @@ struct Options : robot::HexapodShape, robot::HexapodLimits, robot::RobotErrors, 
     base_radius_mm = 250, platform_radius_mm = 150, height_mm = 350;
     stroke_mm = 130, joint_deg = 60;
   }
-  std::string fragment = "distal", reference = "proximal";
-  double grip_mm = 120;
+  std::string moved = "distal", reference = "proximal";
+  double held_at_mm = 120;
   Eigen::Vector3d stand_off_deg{6, -5, 6};
   Eigen::Vector3d stand_off_mm{29, -29, 29};
 };
@@ -31,7 +31,7 @@ struct Result {
 
 RobotState state_of(const Options& options) {
   RobotState state;
-  state.fragment = options.fragment, state.reference = options.reference;
+  state.fragment = options.moved, state.reference = options.reference;
   state.shape = options, state.limits = options, state.errors = options, state.tissue = options, state.force = options;
   return state;
 }
@@ -39,7 +39,7 @@ RobotState state_of(const Options& options) {
 Result hexapod(const phantom::Phantom& phantom, const Options& options, Context& context) {
   const std::string what = "robot.hexapod";
   phantom::check_phantom(phantom, what);
-  const Held held(phantom, options, options.fragment, options.reference, what);
+  const Held held(phantom, options, options.moved, options.reference, what);
   const phantom::Fragment& fragment = held.fragment();
   const Eigen::Vector3d middle_mm = fragment.world_from_ct * fragment.frame.origin_mm;
   Result result{state_of(options), {}};
@@ -51,7 +51,7 @@ Result hexapod(const phantom::Phantom& phantom, const Options& options, Context&
   if (const std::string text = robot::doubtful_condition(condition, "home"); !text.empty()) context.warn(text);
   state.base_from_platform = nominal.base_from_home;
   RigidTransform planned{"base", "world"};
-  planned.translation_mm = nominal.base_from_home * Eigen::Vector3d(0, 0, options.grip_mm) - middle_mm;
+  planned.translation_mm = nominal.base_from_home * Eigen::Vector3d(0, 0, options.held_at_mm) - middle_mm;
   FragmentFrame at_middle;
   at_middle.origin_mm = middle_mm;
   at_middle.axes.setIdentity();
@@ -67,8 +67,9 @@ Result hexapod(const phantom::Phantom& phantom, const Options& options, Context&
   state.platform_from_ct = inverse(state.world_from_base * platform) * fragment.world_from_ct;
   state.world_from_ct = fragment.world_from_ct;
   state.load_at_grip = held.load_at(fragment.world_from_ct);
-  if (state.load_at_grip.force_n > options.stop_n) {
-    const std::string text = formatted("{:.0f} N, its limit is {:.0f} N", state.load_at_grip.force_n, options.stop_n);
+  if (state.load_at_grip.force_n > options.stop_above_n) {
+    const std::string text =
+        formatted("{:.0f} N, its limit is {:.0f} N", state.load_at_grip.force_n, options.stop_above_n);
     throw Error(what + ": the force on the fragment is already " + text +
                 "; does its bone stick in the other fragment? Begin with the fragments apart");
   }
@@ -84,7 +85,7 @@ MARROW_PLUGIN(plugin) {
       .in("phantom", "fractured bone")
       .out("state", &Result::state, "the robot, with what only the simulation knows")
       .out("report", &Result::report, "what the robot says: its place as planned, and the load")
-      .option("fragment", &Options::fragment, "name of the fragment that it holds: the distal one")
+      .option("moved", &Options::moved, "name of the fragment that it holds: the distal one")
       .option("reference", &Options::reference, "name of the fragment that stays: the proximal one")
       .option("base_radius_mm", &Options::base_radius_mm, "radius of the circle of the base's joints", at_least(1))
       .option("platform_radius_mm", &Options::platform_radius_mm, "the same of the platform", at_least(1))
@@ -96,7 +97,7 @@ MARROW_PLUGIN(plugin) {
               at_least(0))
       .option("joint_deg", &Options::joint_deg, "how far a leg may turn in its joints from its direction at home",
               at_least(0), at_most(90))
-      .option("grip_mm", &Options::grip_mm, "distance from the platform's middle to the fragment's", at_least(0))
+      .option("held_at_mm", &Options::held_at_mm, "distance from the platform's middle to the fragment's", at_least(0))
       .option("stand_off_deg", &Options::stand_off_deg,
               "how far the robot is turned from where it is planned to stand, about the fragment's middle")
       .option("stand_off_mm", &Options::stand_off_mm, "how far it is shifted from there")
@@ -116,8 +117,8 @@ MARROW_PLUGIN(plugin) {
       .option("turn_nm_per_deg", &Options::turn_nm_per_deg, "torque against a rotation", at_least(0), unit("Nm/deg"))
       .option("bone_n_per_mm", &Options::bone_n_per_mm, "force for each mm by which the bones are pressed together",
               at_least(0), unit("N/mm"))
-      .option("warn_n", &Options::warn_n, "a larger force is a warning", at_least(0), unit("N"))
-      .option("warn_nm", &Options::warn_nm, "a larger torque is a warning", at_least(0), unit("Nm"))
-      .option("stop_n", &Options::stop_n, "the robot stops before a larger force", at_least(0), unit("N"))
-      .relation(not_above("warn_n", "stop_n"));
+      .option("warn_above_n", &Options::warn_above_n, "a larger force is a warning", at_least(0), unit("N"))
+      .option("warn_above_nm", &Options::warn_above_nm, "a larger torque is a warning", at_least(0), unit("Nm"))
+      .option("stop_above_n", &Options::stop_above_n, "the robot stops before a larger force", at_least(0), unit("N"))
+      .relation(not_above("warn_above_n", "stop_above_n"));
 }

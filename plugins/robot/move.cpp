@@ -20,7 +20,7 @@ using robot::RobotState;
 struct Result {
   RobotState state;
   RobotReport report;
-  Metrics figures;
+  Metrics metrics;
 };
 
 std::string with_unit(double value, const char* unit) { return formatted("{:.0f} {}", value, unit); }
@@ -108,8 +108,8 @@ Result move(const phantom::Phantom& phantom, const RobotState& state, const Pose
       break;
     }
     const Load there = robot.held().load_at(next);
-    if (there.force_n > state.force.stop_n && there.force_n > load.force_n) {
-      result.report.stopped = "the force would pass " + with_unit(state.force.stop_n, "N");
+    if (there.force_n > state.force.stop_above_n && there.force_n > load.force_n) {
+      result.report.stopped = "the force would pass " + with_unit(state.force.stop_above_n, "N");
       result.report.is_pressed = true;
       break;
     }
@@ -125,17 +125,17 @@ Result move(const phantom::Phantom& phantom, const RobotState& state, const Pose
   report.done = result.state.base_from_platform * inverse(state.base_from_platform);
   report.done.target = report.done.source = "robot";
   report.load = load;
-  report.is_warning =
-      report.largest_load.force_n > state.force.warn_n || report.largest_load.torque_nm > state.force.warn_nm;
+  report.is_warning = report.largest_load.force_n > state.force.warn_above_n ||
+                      report.largest_load.torque_nm > state.force.warn_above_nm;
   if (report.is_warning)
     context.warn("the load is large: " + with_unit(report.largest_load.force_n, "N") + " (warning at " +
-                 with_unit(state.force.warn_n, "N") + "), " + with_unit(report.largest_load.torque_nm, "Nm"));
+                 with_unit(state.force.warn_above_n, "N") + "), " + with_unit(report.largest_load.torque_nm, "Nm"));
   if (!report.stopped.empty()) context.warn("the robot stopped: " + report.stopped);
   if (const std::string text = robot::doubtful_condition(worst, "the motion"); !text.empty()) context.warn(text);
   Load& largest = result.state.largest_load;
   largest.force_n = std::max(largest.force_n, report.largest_load.force_n);
   largest.torque_nm = std::max(largest.torque_nm, report.largest_load.torque_nm);
-  result.figures = figures_of(report, largest);
+  result.metrics = figures_of(report, largest);
   return result;
 }
 
@@ -151,6 +151,6 @@ MARROW_PLUGIN(plugin) {
       .in("report", "what the robot said before")
       .out("state", &Result::state, "the robot after the motion")
       .out("report", &Result::report, "the motion by its encoders, the load, and why it stopped early, if it did")
-      .out("figures", &Result::figures, "load at the end; largest load since the robot gripped the fragment")
+      .out("metrics", &Result::metrics, "load at the end; largest load since the robot gripped the fragment")
       .figures({"force_n", "torque_nm", "largest_force_n", "largest_torque_nm", "warned", "stopped"});
 }

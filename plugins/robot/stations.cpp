@@ -22,7 +22,7 @@ struct Options : phantom::Exposure {
 };
 
 struct Result {
-  List<View> images;
+  List<View> views;
   List<Pose> hands;
 };
 
@@ -85,7 +85,7 @@ Result stations(const RobotState& state, const Camera& camera, const View* state
     view.camera = camera;
     if (stated) view.camera.camera_from_world = stated->camera.camera_from_world;
     view.image = phantom::expose_board(board, device, camera_from_board, options, random());
-    result.images.add(name, view);
+    result.views.add(name, view);
     Pose hand;
     hand.world_from_model = {"robot", "hand", told.rotation, told.translation_mm};
     result.hands.add(name, hand);
@@ -102,7 +102,7 @@ MARROW_PLUGIN(plugin) {
       .in("state", "the robot; the target is on its hand instead of the fragment")
       .in("camera", "the exact camera; with the robot at home, it sees the target in the middle")
       .in("stated", "a view with the camera as the calibration states it, for the images; none: the exact one")
-      .out("images", &Result::images, "image of the target at each station", over("station"))
+      .out("views", &Result::views, "image of the target at each station", over("station"))
       .out("hands", &Result::hands, "pose of the hand in the robot's base by its encoders", over("station"))
       .option("board", &Options::board, "file with the positions of the target's beads (YAML, docs/case.md)",
               required())

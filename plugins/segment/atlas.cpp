@@ -32,7 +32,7 @@ struct Options {
   double floor_hu = 150;
   bool affine = false;
   int iterations = 60;
-  double keep_part = 0.9;
+  double keep_fraction = 0.9;
   double band_mm = 4;
 };
 
@@ -159,7 +159,7 @@ std::vector<Map> starts(const Mesh& whole, const std::vector<Vector3d>& bone) {
 
 /// Pairs of template vertices and closest points of the bone, without the pairs of largest distance. Returns their mean
 /// distance.
-double pair_up(const Target& target, const std::vector<Vector3d>& vertices, const Map& map, double keep_part,
+double pair_up(const Target& target, const std::vector<Vector3d>& vertices, const Map& map, double keep_fraction,
                bool at_edge, Eigen::Matrix3Xd& from, Eigen::Matrix3Xd& to) {
   std::vector<std::pair<double, std::size_t>> order;
   std::vector<Vector3d> closest;
@@ -169,7 +169,7 @@ double pair_up(const Target& target, const std::vector<Vector3d>& vertices, cons
     order.emplace_back((closest[i] - moved).norm(), i);
   }
   std::sort(order.begin(), order.end());
-  order.resize(std::max<std::size_t>(20, std::size_t(keep_part * double(order.size()))));
+  order.resize(std::max<std::size_t>(20, std::size_t(keep_fraction * double(order.size()))));
   from.resize(3, Eigen::Index(order.size()));
   to.resize(3, Eigen::Index(order.size()));
   double sum = 0;
@@ -182,12 +182,12 @@ double pair_up(const Target& target, const std::vector<Vector3d>& vertices, cons
 }
 
 /// Fits the map to the bone. Returns the mean distance of the pairs before the last step.
-double fit(const Target& target, const std::vector<Vector3d>& vertices, double keep_part, bool at_edge, bool affine,
+double fit(const Target& target, const std::vector<Vector3d>& vertices, double keep_fraction, bool at_edge, bool affine,
            int iterations, Map& map) {
   double distance = 0;
   Eigen::Matrix3Xd from, to;
   for (int i = 0; i < iterations; ++i) {
-    distance = pair_up(target, vertices, map, keep_part, at_edge, from, to);
+    distance = pair_up(target, vertices, map, keep_fraction, at_edge, from, to);
     if (affine) {
       Eigen::MatrixXd equations(from.cols(), 4);
       equations << from.transpose(), Eigen::VectorXd::Ones(from.cols());
@@ -242,10 +242,10 @@ List<SignedField> atlas(const Volume& volume, const List<Seeds>& seeds, const Me
   double least_mm = 1e30;
   for (Map map : starts(whole, target.points_mm())) {
     context.check_cancelled();
-    const double distance_mm = fit(target, vertices, options.keep_part, false, false, options.iterations, map);
+    const double distance_mm = fit(target, vertices, options.keep_fraction, false, false, options.iterations, map);
     if (distance_mm < least_mm) least_mm = distance_mm, best = map;
   }
-  least_mm = fit(target, vertices, options.keep_part, true, options.affine, options.iterations, best);
+  least_mm = fit(target, vertices, options.keep_fraction, true, options.affine, options.iterations, best);
   const std::string line = marrow::formatted("the template lies {:.2f} mm from the bone on average, scaled by {:.3f}",
                                              least_mm, std::cbrt(best.linear().determinant()));
   context.debug(line);
@@ -282,7 +282,7 @@ MARROW_PLUGIN(plugin) {
       .option("affine", &Options::affine, "end with an affine map instead of a similarity")
       .option("iterations", &Options::iterations, "iterations of closest points from each of the five starts",
               marrow::at_least(1))
-      .option("keep_part", &Options::keep_part,
+      .option("keep_fraction", &Options::keep_fraction,
               "fraction of the template's points to use, those with the smallest distances", marrow::at_least(0.3),
               marrow::at_most(1))
       .option("band_mm", &Options::band_mm, "larger distances are clamped to this", marrow::at_least(1),

@@ -32,7 +32,7 @@ struct Options {
   double regularity = 0.1;
   double length = 1;
   double area = 0;
-  int steps = 80;
+  int iterations = 80;
   double band_mm = 4;
 };
 
@@ -72,7 +72,7 @@ class Evolution {
   }
 
   void run(Context& context) {
-    for (int step = 0; step < options_.steps; ++step) {
+    for (int step = 0; step < options_.iterations; ++step) {
       context.check_cancelled();
       if (step % kStepsPerBand == 0) choose_band();
       advance();
@@ -242,7 +242,7 @@ MARROW_PLUGIN(plugin) {
               marrow::at_most(5))
       .option("area", &Options::area, "alpha: weight of the area term; positive shrinks the body, negative expands it",
               marrow::at_least(-2), marrow::at_most(2))
-      .option("steps", &Options::steps, "number of time steps", marrow::at_least(0))
+      .option("iterations", &Options::iterations, "number of time steps", marrow::at_least(0))
       .option("band_mm", &Options::band_mm, "larger distances are clamped to this", marrow::at_least(1),
               marrow::at_most(50));
 }

@@ -25,16 +25,16 @@ struct Options {
   double band_voxels = 5;
   double sigma_mm = 0.7;
   double cleft_mm = 3.2;
-  double cleft_part = 0.1;
+  double cleft_fraction = 0.1;
   double floor_hu = 150;
-  double advection = 0;
+  double propagation = 0;
   double edge_hu = 150;
   double edge_sigma_mm = 0.4;
   double blur_mm = 0.7;
   double cortex_hu = 1200;
   double curvature_mm = 0.1;
   double stop_speed = 0.03;
-  int steps = 32;
+  int max_iterations = 32;
 };
 
 constexpr double kStepVoxels = 0.4;  // advection and curvature together stay stable (Courant-Friedrichs-Lewy condition)
@@ -49,8 +49,8 @@ void keep_all_apart(std::vector<Front>& fronts) {
 std::vector<Front> begin(const Volume& volume, const List<Seeds>& seeds, const Options& options, Context& context) {
   const auto indices = marrow::field::seed_indices(volume, seeds, options.floor_hu);
   context.progress(0, "racing");
-  const auto owner =
-      marrow::field::race(volume, indices, {options.sigma_mm, options.cleft_mm, options.cleft_part, options.floor_hu});
+  const auto owner = marrow::field::race(
+      volume, indices, {options.sigma_mm, options.cleft_mm, options.cleft_fraction, options.floor_hu});
   std::vector<Front> fronts;
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     context.check_cancelled();
@@ -88,11 +88,11 @@ void hold_unwanted(const List<Seeds>& seeds, std::vector<Front>& fronts) {
 void move(const Volume& volume, const List<Seeds>& seeds, const Options& options, std::vector<Front>& fronts,
           Context& context) {
   const EdgeProfile profile(options.edge_sigma_mm, options.blur_mm, options.cortex_hu);
-  const Force force{options.advection, options.curvature_mm, options.edge_hu, options.floor_hu};
+  const Force force{options.propagation, options.curvature_mm, options.edge_hu, options.floor_hu};
   const double step_mm = kStepVoxels * volume.grid.spacing_mm.minCoeff();
-  for (int step = 0; step < options.steps; step += kStepsPerCycle) {
+  for (int step = 0; step < options.max_iterations; step += kStepsPerCycle) {
     context.check_cancelled();
-    context.progress(0.5 + 0.5 * step / options.steps, "moving");
+    context.progress(0.5 + 0.5 * step / options.max_iterations, "moving");
     if (options.cortex_hu > 0 && step % (2 * kStepsPerCycle) == 0)
       for (Front& front : fronts) front.find_thin_cortex(volume, profile);
     for (int k = 0; k < kStepsPerCycle; ++k) {
@@ -156,14 +156,14 @@ MARROW_PLUGIN(plugin) {
               marrow::at_least(0.1), marrow::at_most(5))
       .option("cleft_mm", &Options::cleft_mm, "widest dark cleft that slows the first expansion", marrow::at_least(0.5),
               marrow::at_most(10))
-      .option("cleft_part", &Options::cleft_part,
+      .option("cleft_fraction", &Options::cleft_fraction,
               "a cleft that is darker than its walls by this fraction of their value slows the first expansion e times",
               marrow::at_least(0.02), marrow::at_most(1))
       .option(
           "floor_hu", &Options::floor_hu,
           "no front advances into voxels below this value; the mean of the voxels around a seed must not be below it",
           marrow::unit("HU"))
-      .option("advection", &Options::advection, "F0: speed at which a front expands if no edge stops it",
+      .option("propagation", &Options::propagation, "F0: speed at which a front expands if no edge stops it",
               marrow::at_least(0), marrow::at_most(1))
       .option("edge_hu", &Options::edge_hu, "K: drop of the CT's value at an edge that halves the speed",
               marrow::at_least(1), marrow::unit("HU"))
@@ -180,5 +180,5 @@ MARROW_PLUGIN(plugin) {
       .option("stop_speed", &Options::stop_speed,
               "a part of a front that is slower than this comes to rest; in units in which F0 is 1",
               marrow::at_least(0.001), marrow::at_most(0.5))
-      .option("steps", &Options::steps, "largest number of time steps", marrow::at_least(0));
+      .option("max_iterations", &Options::max_iterations, "largest number of time steps", marrow::at_least(0));
 }

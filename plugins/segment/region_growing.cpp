@@ -18,7 +18,7 @@ using marrow::SignedField;
 using marrow::Volume;
 
 struct Options {
-  double least_hu = 250;
+  double threshold_hu = 250;
   double floor_hu = 150;
   double band_mm = 4;
 };
@@ -27,16 +27,16 @@ struct Options {
 /// steps of one HU.
 class Growth {
  public:
-  Growth(const Volume& volume, std::size_t fragments, double least_hu)
+  Growth(const Volume& volume, std::size_t fragments, double threshold_hu)
       : volume_(volume),
-        least_hu_(least_hu),
+        threshold_hu_(threshold_hu),
         owner_(volume.values.size(), marrow::field::kNobody),
         sums_hu_(fragments, 0),
         counts_(fragments, 0),
         waiting_(kSteps) {}
 
   void claim(std::size_t at, std::uint8_t fragment) {
-    if (owner_[at] != marrow::field::kNobody || volume_.values[at] < least_hu_) return;
+    if (owner_[at] != marrow::field::kNobody || volume_.values[at] < threshold_hu_) return;
     owner_[at] = fragment;
     sums_hu_[fragment] += volume_.values[at];
     ++counts_[fragment];
@@ -74,7 +74,7 @@ class Growth {
   };
 
   void wait(std::size_t at, std::uint8_t fragment) {
-    if (owner_[at] != marrow::field::kNobody || volume_.values[at] < least_hu_) return;
+    if (owner_[at] != marrow::field::kNobody || volume_.values[at] < threshold_hu_) return;
     const double unlikeness = std::abs(volume_.values[at] - sums_hu_[fragment] / double(counts_[fragment]));
     const std::size_t step = std::min(std::size_t(unlikeness), kSteps - 1);
     waiting_[step].push_back({at, fragment});
@@ -82,7 +82,7 @@ class Growth {
   }
 
   const Volume& volume_;
-  double least_hu_;
+  double threshold_hu_;
   std::vector<std::uint8_t> owner_;
   std::vector<double> sums_hu_;
   std::vector<std::size_t> counts_;
@@ -94,8 +94,8 @@ List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds,
                                  Context& context) {
   marrow::check_volume(volume, "volume");
   // Sparse spongy bone may be darker than the bone's surface. Seeds in it are allowed, although they claim no voxel.
-  const auto indices = marrow::field::seed_indices(volume, seeds, std::min(options.floor_hu, options.least_hu));
-  Growth growth(volume, seeds.size(), options.least_hu);
+  const auto indices = marrow::field::seed_indices(volume, seeds, std::min(options.floor_hu, options.threshold_hu));
+  Growth growth(volume, seeds.size(), options.threshold_hu);
   for (std::size_t f = 0; f < indices.size(); ++f)
     for (const Eigen::Vector3d& index : indices[f]) {
       const int x = int(std::lround(index.x())), y = int(std::lround(index.y())), z = int(std::lround(index.z()));
@@ -111,13 +111,14 @@ List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds,
     context.check_cancelled();
     context.progress(0.4 + 0.6 * double(f) / double(seeds.size()), seeds.name(f));
     if (!growth.has_any(f))
-      throw marrow::Error("seeds of fragment '" + seeds.name(f) + "': at none of them the CT reaches " +
-                          std::to_string(int(options.least_hu)) +
-                          " HU, or it belongs to another fragment; add a point in brighter bone, or lower least_hu");
+      throw marrow::Error(
+          "seeds of fragment '" + seeds.name(f) + "': at none of them the CT reaches " +
+          std::to_string(int(options.threshold_hu)) +
+          " HU, or it belongs to another fragment; add a point in brighter bone, or lower threshold_hu");
     if (!seeds[f].wanted) continue;
     const marrow::field::Mask mask = marrow::field::solid(volume.grid, growth.owner(), std::uint8_t(f),
                                                           marrow::field::margin(volume.grid, options.band_mm));
-    fields.push_back(marrow::field::field_at_threshold(volume, mask, options.least_hu, options.band_mm));
+    fields.push_back(marrow::field::field_at_threshold(volume, mask, options.threshold_hu, options.band_mm));
   }
   return marrow::field::list_of(seeds, std::move(fields));
 }
@@ -130,10 +131,10 @@ MARROW_PLUGIN(plugin) {
       .in("volume", "CT in Hounsfield units")
       .in("seeds", "points inside each fragment", marrow::over("fragment"))
       .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
-      .option("least_hu", &Options::least_hu,
+      .option("threshold_hu", &Options::threshold_hu,
               "darker voxels are not bone; the surface is where the CT crosses this value", marrow::unit("HU"))
       .option("floor_hu", &Options::floor_hu,
-              "least allowed mean of the voxels around a seed; least_hu is used instead if it is lower",
+              "least allowed mean of the voxels around a seed; threshold_hu is used instead if it is lower",
               marrow::unit("HU"))
       .option("band_mm", &Options::band_mm, "larger distances are clamped to this", marrow::at_least(1),
               marrow::at_most(50));

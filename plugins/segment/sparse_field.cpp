@@ -28,8 +28,8 @@ struct Options {
   double propagation = 0;
   double curvature = 0.2;
   double advection = 1;
-  int iterations = 60;
-  double least_rms = 0.005;
+  int max_iterations = 60;
+  double min_rms = 0.005;
   double band_mm = 4;
 };
 
@@ -42,8 +42,8 @@ SignedField field_of(const Volume& volume, const marrow::field::Mask& mask, cons
   marrow::field::march_distances(box, start, options.band_mm);
   const auto& s = box.spacing_mm;
   const marrow::field::Settings settings{options.sigma_mm,  options.edge_hu_per_mm, options.propagation,
-                                         options.curvature, options.advection,      options.iterations,
-                                         options.least_rms};
+                                         options.curvature, options.advection,      options.max_iterations,
+                                         options.min_rms};
   marrow::field::Contour contour = marrow::field::geodesic(marrow::field::cut_out(volume, mask), std::move(start),
                                                            box.size, {s.x(), s.y(), s.z()}, settings);
   const std::string line =
@@ -107,8 +107,8 @@ MARROW_PLUGIN(plugin) {
       .option("curvature", &Options::curvature, "weight of the curvature", marrow::at_least(0), marrow::at_most(5))
       .option("advection", &Options::advection, "weight of the force towards edges", marrow::at_least(0),
               marrow::at_most(10))
-      .option("iterations", &Options::iterations, "largest number of iterations", marrow::at_least(1))
-      .option("least_rms", &Options::least_rms, "stops if the root mean square change of an iteration is below this",
+      .option("max_iterations", &Options::max_iterations, "largest number of iterations", marrow::at_least(1))
+      .option("min_rms", &Options::min_rms, "stops if the root mean square change of an iteration is below this",
               marrow::at_least(0.0001), marrow::at_most(1))
       .option("band_mm", &Options::band_mm, "larger distances are clamped to this", marrow::at_least(1),
               marrow::at_most(50));

@@ -16,7 +16,7 @@ namespace {
 
 struct Options {
   int points = 4000;
-  double blur_px = 1.5;
+  double sigma_px = 1.5;
   double touch_deg = 6;
   std::vector<double> weights;
 };
@@ -72,16 +72,16 @@ std::vector<SurfacePoint> points_of(const marrow::Volume& volume, const marrow::
   return points;
 }
 
-GradientImage gradients_of(const marrow::View& view, double blur_px) {
+GradientImage gradients_of(const marrow::View& view, double sigma_px) {
   GradientImage image;
   cv::Mat smooth = marrow::image::line_integrals(view.image.pixels);
   image.counts = view.mask.empty() ? cv::Mat(smooth.size(), CV_8U, cv::Scalar(1)) : cv::Mat((view.mask != 0) & 1);
   image.counts.setTo(0, smooth != smooth);
   // Near the border of the mask, a gradient depends on pixels outside the mask.
-  const int reach = int(std::ceil(4 * blur_px)) + 1;
+  const int reach = int(std::ceil(4 * sigma_px)) + 1;
   cv::erode(image.counts, image.counts, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8U));
   cv::patchNaNs(smooth, 0);
-  cv::GaussianBlur(smooth, smooth, {}, blur_px, blur_px, cv::BORDER_REPLICATE);
+  cv::GaussianBlur(smooth, smooth, {}, sigma_px, sigma_px, cv::BORDER_REPLICATE);
   cv::Sobel(smooth, image.u, CV_32F, 1, 0, 3, 1, 0, cv::BORDER_REPLICATE);
   cv::Sobel(smooth, image.v, CV_32F, 0, 1, 3, 1, 0, cv::BORDER_REPLICATE);
   cv::Mat magnitude;
@@ -104,9 +104,9 @@ class GradientProjection : public marrow::match::ViewsCost {
     std::vector<SurfacePoint> points;
     Options options;
   };
-  GradientProjection(std::shared_ptr<const Scene> scene, double blur_px, std::size_t point_step)
+  GradientProjection(std::shared_ptr<const Scene> scene, double sigma_px, std::size_t point_step)
       : ViewsCost(scene->views.size(), scene->options.weights), scene_(std::move(scene)), point_step_(point_step) {
-    for (const marrow::View& view : scene_->views) images_.push_back(gradients_of(view, blur_px));
+    for (const marrow::View& view : scene_->views) images_.push_back(gradients_of(view, sigma_px));
   }
 
   double value_in_view(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
@@ -117,7 +117,7 @@ class GradientProjection : public marrow::match::ViewsCost {
   /// Uses fewer points on levels with a wider contour spacing, and smoother images on levels with a larger pixel step.
   std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
     const std::size_t step = std::size_t(std::clamp(level.contour_spacing_px, 1.0, 16.0));
-    return std::make_shared<GradientProjection>(scene_, scene_->options.blur_px * std::max(1, level.pixel_step), step);
+    return std::make_shared<GradientProjection>(scene_, scene_->options.sigma_px * std::max(1, level.pixel_step), step);
   }
 
  private:
@@ -227,7 +227,7 @@ std::shared_ptr<const marrow::Cost> gradient_projection(
       views, marrow::match::shadows_of(projector, others, other_projectors, other_outlines));
   const auto scene = std::make_shared<GradientProjection::Scene>(
       GradientProjection::Scene{own, points_of(volume, mesh, options.points), options});
-  return std::make_shared<GradientProjection>(scene, options.blur_px, 1);
+  return std::make_shared<GradientProjection>(scene, options.sigma_px, 1);
 }
 
 }  // namespace
@@ -238,7 +238,7 @@ MARROW_PLUGIN(plugin) {
           "1 - similarity of the back-projected image gradients and the CT's gradients where rays touch the bone "
           "(Tomazevic et al.; Livyatan et al., IEEE TMI 2003); it predicts no deviations")
       .trait("unmoved_by_gain")
-      .in("mesh", "surface of the bone")
+      .in("model", "surface of the bone")
       .in("volume", "CT from which the surface was made")
       .in("views", "views with their cameras and masks", marrow::over("view"))
       .in("projector", "projector of this fragment's radiographs; it identifies this fragment in other_projectors")
@@ -253,7 +253,7 @@ MARROW_PLUGIN(plugin) {
       .option("points", &Options::points,
               "number of points spread over the surface; only points near its outlines count", marrow::at_least(100),
               marrow::at_most(1000000))
-      .option("blur_px", &Options::blur_px, "standard deviation of the Gaussian that smooths the images",
+      .option("sigma_px", &Options::sigma_px, "standard deviation of the Gaussian that smooths the images",
               marrow::at_least(0.5), marrow::at_most(20))
       .option("touch_deg", &Options::touch_deg,
               "the larger the angle between ray and surface compared with this angle, the less a point counts",

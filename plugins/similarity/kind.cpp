@@ -8,7 +8,7 @@ MARROW_PLUGIN(plugin) {
       .summary("cost of a pose: how badly it explains the images")
       .in<marrow::OutlineProjector, marrow::RadiographProjector>("projector", "draws the model for any camera and pose")
       .in<marrow::OutlineProjector>("outline", "projector of this fragment's outline, if 'projector' makes radiographs")
-      .in<marrow::Mesh>("mesh", "surface of the bone")
+      .in<marrow::Mesh>("model", "surface of the bone")
       .in<marrow::Volume>("volume", "CT from which the surface was made")
       .in<marrow::SignedField>("field", "signed distance to the surface")
       .in<marrow::View>("views", "views with their cameras and masks", marrow::over("view"))

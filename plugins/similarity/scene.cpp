@@ -75,7 +75,7 @@ Inputs inputs_of(const Scene& scene, const std::function<void(View&, EdgeMap&)>&
   return {{"projector", Value::of<OutlineProjector>(bone_projector())},
           {"projector", Value::of<RadiographProjector>(bone_projector())},
           {"outline", Value::of<OutlineProjector>(bone_projector())},
-          {"mesh", item(mesh_of(bone()))},
+          {"model", item(mesh_of(bone()))},
           {"volume", item(volume_of(bone(), grid, 700, 0))},
           {"field", item(field_of(bone(), grid, 6))},
           {"views", Value::of(views, "view")},

@@ -45,7 +45,7 @@ MARROW_PLUGIN(plugin) {
       .random()
       .out("images", &Simulated::images, "image of the board in each pose, with distortion", over("view"))
       .out("cameras", &Simulated::cameras, "exact camera of each view, without the distortion", over("view"))
-      .out("truth", &Simulated::calibration, "exact camera matrix and distortion")
+      .out("true_calibration", &Simulated::calibration, "exact camera matrix and distortion")
       .option("board", &Options::board, "file with the positions of the board's beads (YAML, docs/case.md)", required())
       .option("views", &Options::views, "number of poses of the board, one view each", at_least(1), at_most(100))
       .option("width_px", &Options::width_px, "image width", at_least(64), at_most(4096))

@@ -19,7 +19,7 @@ struct Options {
   double frame_rate_hz = 250;
   double period_s = 0.8;
   std::array<double, 3> rotation_deg{6, 4, 60};
-  std::array<double, 3> shift_mm{4, 3, 6};
+  std::array<double, 3> translation_mm{4, 3, 6};
 };
 
 List<Posture> bone_motion(const Phantom& phantom, const Options& options) {
@@ -31,7 +31,7 @@ List<Posture> bone_motion(const Phantom& phantom, const Options& options) {
     Vector6d motion;
     for (int axis = 0; axis < 3; ++axis) {
       motion[axis] = turned * radians(options.rotation_deg[std::size_t(axis)]);
-      motion[3 + axis] = shifted * options.shift_mm[std::size_t(axis)];
+      motion[3 + axis] = shifted * options.translation_mm[std::size_t(axis)];
     }
     Posture posture;
     for (const Fragment& fragment : phantom.fragments)
@@ -54,6 +54,6 @@ MARROW_PLUGIN(plugin) {
               unit("s"))
       .option("rotation_deg", &Options::rotation_deg,
               "largest rotation vector, about the frontal, the lateral and the long axis; 0 in the first frame")
-      .option("shift_mm", &Options::shift_mm,
+      .option("translation_mm", &Options::translation_mm,
               "amplitude of the shift along the same axes, a quarter of a period ahead of the rotation");
 }

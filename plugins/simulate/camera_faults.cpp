@@ -15,9 +15,9 @@ namespace {
 using namespace marrow;
 
 struct Options {
-  std::string level = "usual";
+  std::string severity = "usual";
   double shift_mm = 1;
-  double rotation_deg = 0.5;
+  double turn_deg = 0.5;
   double focal_percent = 1;
   double centre_px = 5;
   int camera_seed = 1;
@@ -39,7 +39,7 @@ Eigen::Vector3d direction(marrow::Random& random) {
 List<View> camera_faults(const List<View>& views, const Options& options) {
   for (const std::string& name : options.only)
     if (!views.find(name)) throw Error("only: there is no view '" + name + "'; " + suggestion(name, views.names()));
-  const double factor = factor_of(options.level);
+  const double factor = factor_of(options.severity);
   List<View> stated;
   for (std::size_t i = 0; i < views.size(); ++i) {
     View view = views[i];
@@ -48,7 +48,7 @@ List<View> camera_faults(const List<View>& views, const Options& options) {
     if (is_off && factor > 0) {
       marrow::Random random(std::uint64_t(options.camera_seed), i);
       RigidTransform off{"world", "world"};
-      const double angle = radians(factor * options.rotation_deg) * length(random);
+      const double angle = radians(factor * options.turn_deg) * length(random);
       off.rotation = rotation_from_vector(angle * direction(random));
       const double shift = factor * options.shift_mm * length(random);
       off.translation_mm = shift * direction(random);
@@ -74,10 +74,10 @@ MARROW_PLUGIN(plugin) {
       .summary("Gives views cameras as a calibration states them, off by errors whose root mean square is given")
       .in("views", "images with the cameras that took them", over("view"))
       .out("views", "the same images; each error of a camera is at most 1.73 times its root mean square", over("view"))
-      .option("level", &Options::level, "off: no error; mild, usual, bad: half, once or twice the errors below",
+      .option("severity", &Options::severity, "off: no error; mild, usual, bad: half, once or twice the errors below",
               one_of({"off", "mild", "usual", "bad"}))
       .option("shift_mm", &Options::shift_mm, "shift of the camera against the world", at_least(0))
-      .option("rotation_deg", &Options::rotation_deg, "rotation of the camera about the origin of the world",
+      .option("turn_deg", &Options::turn_deg, "rotation of the camera about the origin of the world",
               at_least(0), at_most(30))
       .option("focal_percent", &Options::focal_percent, "change of the focal length", at_least(0), at_most(20))
       .option("centre_px", &Options::centre_px, "shift of the principal point", at_least(0))

@@ -110,7 +110,8 @@ List<View> export_views(const List<View>& views, const List<View>* earlier, cons
       throw Error("simulate.export: view '" + name + "' is not of 16 bits; give it the views of simulate.fluoroscopy");
     const View* before = earlier ? earlier->find(name) : nullptr;
     if (earlier && !before)
-      throw Error("simulate.export: there is no earlier image of view '" + name + "'; give 'earlier' the same views");
+      throw Error("simulate.export: there is no earlier image of view '" + name +
+                  "'; give 'earlier_views' the same views");
     if (before && before->image.pixels.size() != views[i].image.pixels.size())
       throw Error("simulate.export: the earlier image of view '" + name + "' has another size");
     results.add(name, exported(views[i], before, options, marrow::Random(std::uint64_t(options.collimator_seed), i)()));
@@ -124,7 +125,7 @@ MARROW_PLUGIN(plugin) {
   auto node = plugin.node("simulate.export", export_views);
   node.summary("Images as a C-arm exports them: lag, collimator, saturation, and 8 bits with gamma and local contrast")
       .in("views", "X-ray images of 16 bits", over("view"))
-      .in("earlier", "images of an earlier moment, for the lag", over("view"))
+      .in("earlier_views", "images of an earlier moment, for the lag", over("view"))
       .out("views", "the same images, of 8 bits if eight_bit is not off", over("view"));
   const auto level = [&](const char* name, std::string ExportOptions::*member, const char* help) {
     node.option(name, member, help, one_of({"off", "mild", "usual", "bad"}));

@@ -18,7 +18,7 @@ using phantom::Fragment;
 using phantom::Phantom;
 
 struct FractureOptions {
-  double level = 0.45;
+  double height_fraction = 0.45;
   double obliquity_deg = 30;
   double direction_deg = 30;
   double roughness_mm = 0.8;
@@ -153,7 +153,7 @@ Mesh side_of(const Bone& bone, const Relief& relief, const Fragment& fragment) {
   }
   if (mesh.triangles.empty())
     throw Error("simulate.fracture: no bone is left on the " + fragment.name +
-                " side; choose a level nearer the middle of the shaft or a smaller obliquity_deg");
+                " side; choose a height_fraction nearer 0.5 or a smaller obliquity_deg");
   return mesh;
 }
 
@@ -209,11 +209,11 @@ Vector6d motion(const std::array<double, 3>& rotation_deg, const std::array<doub
 
 Phantom fracture(const Bone& bone, const FractureOptions& options) {
   phantom::check_bone(bone, "simulate.fracture");
-  if (!(options.level >= 0.1 && options.level <= 0.9))
-    throw Error("simulate.fracture: the level " + formatted("{:f}", options.level) +
+  if (!(options.height_fraction >= 0.1 && options.height_fraction <= 0.9))
+    throw Error("simulate.fracture: the height_fraction " + formatted("{:f}", options.height_fraction) +
                 " must lie in 0.1 to 0.9 of the bone's length");
   const Box box = bounds(bone.outer);
-  const double z = box.low.z() + options.level * (box.high.z() - box.low.z());
+  const double z = box.low.z() + options.height_fraction * (box.high.z() - box.low.z());
   const Eigen::Vector2d at = centre_at(bone.outer, z);
   const Relief relief(options, {at.x(), at.y(), z});
   Phantom phantom;
@@ -244,7 +244,7 @@ MARROW_PLUGIN(plugin) {
       .summary("Breaks the shaft of a bone along an oblique, rough surface and moves the fragments by known transforms")
       .in("bone", "whole bone")
       .out("phantom", "two fragments, proximal and distal, with their poses in the CT and in the images")
-      .option("level", &FractureOptions::level,
+      .option("height_fraction", &FractureOptions::height_fraction,
               "height of the fracture, as a fraction of the length from the distal end", at_least(0.1), at_most(0.9),
               unit(""))
       .option("obliquity_deg", &FractureOptions::obliquity_deg, "tilt of the fracture; 0: transverse", at_least(0),

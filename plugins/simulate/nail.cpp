@@ -84,7 +84,7 @@ MARROW_PLUGIN(plugin) {
           "implant",
           "closed surface and holes. z runs along the nail from its tip, at the origin; the bow is convex to the front "
           "(-y)")
-      .out("surface", "the surface alone")
+      .out("mesh", "the surface alone")
       .option("length_mm", &NailOptions::length_mm, "length along the middle line", at_least(60), at_most(500))
       .option("diameter_mm", &NailOptions::diameter_mm, "outer diameter", at_least(4), at_most(20))
       .option("bore_mm", &NailOptions::bore_mm, "diameter of the bore", at_least(1), at_most(18))

@@ -28,7 +28,7 @@ struct NailingOptions {
   double turn_deg = 10;
   double shift_mm = 0.5;
   double reaming_mm = 1;
-  double least_cortex_mm = 1;
+  double min_cortex_mm = 1;
   int nail_seed = 1;
 };
 
@@ -173,10 +173,10 @@ void check_fit(const MiddleLine& line, const RigidTransform& pose, const BoneAt&
     const std::string where = height(at);
     if (options.reaming_mm > 0) {
       const double left = bone.distance_to_outer(at) - wide;
-      if (left < options.least_cortex_mm)
+      if (left < options.min_cortex_mm)
         throw Error("simulate.nailing: the nail does not fit in the canal: reamed to " + shown(2 * wide) +
                     " mm, the bone keeps " + shown(left) + " mm of cortex " + where + ", and at least " +
-                    shown(options.least_cortex_mm) + " mm are needed; take a thinner nail, or one of another bow");
+                    shown(options.min_cortex_mm) + " mm are needed; take a thinner nail, or one of another bow");
     } else if (const double room = bone.distance_to_inner(at) - line.radius_mm; room < 0) {
       throw Error("simulate.nailing: the nail does not fit in the canal: it is " + shown(2 * line.radius_mm) +
                   " mm thick, and the canal is " + shown(-room) + " mm too narrow for it " + where +
@@ -247,7 +247,7 @@ MARROW_PLUGIN(plugin) {
       .option("reaming_mm", &NailingOptions::reaming_mm,
               "the canal is reamed wider than the nail by this; 0: it is not reamed, and the nail must fit in it",
               at_least(0), at_most(5))
-      .option("least_cortex_mm", &NailingOptions::least_cortex_mm,
+      .option("min_cortex_mm", &NailingOptions::min_cortex_mm,
               "thickness of the cortex that must be left beside the reamed canal", at_least(0))
       .option("nail_seed", &NailingOptions::nail_seed, "seed of turn and shift", at_least(0));
 }

@@ -11,8 +11,8 @@ using namespace marrow;
 
 struct Options {
   std::vector<std::string> axes{"x", "y", "z"};
-  double range_deg = 15;
-  double step_deg = 1;
+  double max_rotation_deg = 15;
+  double turn_step_deg = 1;
   Eigen::Vector3d pivot_mm{0, 0, 90};
 };
 
@@ -35,14 +35,14 @@ Pose turned(int axis, double angle_deg, const Eigen::Vector3d& pivot_mm) {
 }
 
 List<Pose> sweeps(const Options& options) {
-  const int steps = int(std::floor(options.range_deg / options.step_deg + 1e-9));
-  const int digits = digits_of(options.step_deg);
+  const int steps = int(std::floor(options.max_rotation_deg / options.turn_step_deg + 1e-9));
+  const int digits = digits_of(options.turn_step_deg);
   List<Pose> commands;
   commands.add("neutral", turned(0, 0, options.pivot_mm));
   for (const std::string& axis : options.axes) {
     const auto add = [&](int step) {
-      const std::string name = formatted("r{}{:+0{}.{}f}", axis, step * options.step_deg, 4 + digits, digits);
-      commands.add(name, turned(axis[0] - 'x', step * options.step_deg, options.pivot_mm));
+      const std::string name = formatted("r{}{:+0{}.{}f}", axis, step * options.turn_step_deg, 4 + digits, digits);
+      commands.add(name, turned(axis[0] - 'x', step * options.turn_step_deg, options.pivot_mm));
     };
     // From neutral to one side, then from neutral to the other. So each motion begins near a known one.
     for (int step = 0; step <= steps; ++step) add(step);
@@ -63,7 +63,7 @@ MARROW_PLUGIN(plugin) {
       .option("axes", &Options::axes, "axes of the platform at home", one_of({"x", "y", "z"}))
       .relation(at_least_one({"axes"}))
       .relation(distinct("axes"))
-      .option("range_deg", &Options::range_deg, "largest turn, to either side", at_least(0), at_most(90))
-      .option("step_deg", &Options::step_deg, "step between two turns", at_least(0.01), at_most(90))
+      .option("max_rotation_deg", &Options::max_rotation_deg, "largest turn, to either side", at_least(0), at_most(90))
+      .option("turn_step_deg", &Options::turn_step_deg, "step between two turns", at_least(0.01), at_most(90))
       .option("pivot_mm", &Options::pivot_mm, "the point that stays, from the middle of the platform");
 }

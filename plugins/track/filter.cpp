@@ -14,10 +14,10 @@ using track::TrackState;
 
 struct Options {
   double gate = 38.26;
-  double most_cost_ratio = 2;
+  double max_cost_ratio = 2;
   double first_scale = 2;
-  double least_deg = 0.02;
-  double least_mm = 0.02;
+  double added_deviation_deg = 0.02;
+  double added_deviation_mm = 0.02;
 };
 
 struct Frame {
@@ -30,7 +30,7 @@ struct Frame {
 Measurement measured_by(const Pose& pose, double scale, const Options& options) {
   Measurement measured{pose.world_from_model, scale * *pose.covariance};
   for (int i = 0; i < 6; ++i) {
-    const double least = i < 3 ? radians(options.least_deg) : options.least_mm;
+    const double least = i < 3 ? radians(options.added_deviation_deg) : options.added_deviation_mm;
     measured.covariance(i, i) += least * least;
   }
   return measured;
@@ -43,7 +43,7 @@ std::string why_lost(const TrackState& state, const Pose* pose, const Verdict* v
   if (std::string unknown = track::why_unknown(pose->covariance); !unknown.empty()) return unknown;
   if (verdict && verdict->judgement == Judgement::wrong)
     return "its verdict is wrong" + (verdict->reasons.empty() ? "" : ": " + verdict->reasons[0]);
-  if (pose->cost > options.most_cost_ratio * state.usual_cost)
+  if (pose->cost > options.max_cost_ratio * state.usual_cost)
     return formatted("its cost is {:.3g}, where {:.3g} is usual", pose->cost, state.usual_cost);
   if (!(surprise <= options.gate))
     return formatted("it is not where the motion leads: squared distance {:.3g}, at most {:.3g}", surprise,
@@ -103,11 +103,13 @@ MARROW_PLUGIN(plugin) {
           "in "
           "a million is farther off); it is larger than that of register.tracked, beyond which the search is widened",
           at_least(0), unit(""))
-      .option("most_cost_ratio", &Options::most_cost_ratio,
+      .option("max_cost_ratio", &Options::max_cost_ratio,
               "largest cost of a pose that is taken, as a multiple of that of the frames so far", at_least(0), unit(""))
       .option("first_scale", &Options::first_scale,
               "factor on the covariances of the first registered poses; later it follows from how far they scatter",
               at_least(1), unit(""))
-      .option("least_deg", &Options::least_deg, "deviation that is added to each registered angle", at_least(0))
-      .option("least_mm", &Options::least_mm, "deviation that is added to each registered translation", at_least(0));
+      .option("added_deviation_deg", &Options::added_deviation_deg, "deviation that is added to each registered angle",
+              at_least(0))
+      .option("added_deviation_mm", &Options::added_deviation_mm,
+              "deviation that is added to each registered translation", at_least(0));
 }

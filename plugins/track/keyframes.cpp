@@ -64,7 +64,7 @@ List<AutoscoperTrack> keyframes(const List<Pose>& bones, const List<SequenceFram
 MARROW_PLUGIN(plugin) {
   plugin.node("track.keyframes", keyframes)
       .summary("Poses that a person placed in some frames, from files of Autoscoper (.tra)")
-      .in("bones", "a pose of each bone that is followed; only their names are used", over("fragment"))
+      .in("poses", "a pose of each bone that is followed; only their names are used", over("fragment"))
       .in("frames", "the sequence, to see whether the files have a line for each frame", over("frame"))
       .out("keyframes", "the keyframes of each bone; none for a bone without a file", over("fragment"))
       .option("path", &Options::path,

@@ -24,7 +24,7 @@ using verdicts::Evidence, verdicts::FailureModel, verdicts::Judged;
 struct Options {
   std::filesystem::path failure_model;
   int pixel_step = 4;
-  double most_intersection_mm = 2;
+  double max_intersection_mm = 2;
 };
 
 /// What a figure means, in words for a reason, and what would settle it. The text has one place for the value.
@@ -250,7 +250,7 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
   verdict.judgement = verdict.failure_probability > model.wrong_above      ? Judgement::wrong
                       : verdict.failure_probability > model.doubtful_above ? Judgement::doubtful
                                                                            : Judgement::trusted;
-  if (inside_mm > options.most_intersection_mm && verdict.judgement == Judgement::trusted) {
+  if (inside_mm > options.max_intersection_mm && verdict.judgement == Judgement::trusted) {
     verdict.judgement = Judgement::doubtful;
     verdict.reasons.push_back(filled("the bone reaches {:.1f} mm into another bone", inside_mm));
   }
@@ -281,7 +281,7 @@ MARROW_PLUGIN(plugin) {
       .in("views", "X-ray views", over("view"))
       .in("edges", "edge pixels of each view", over("view"))
       .in("projector", "draws the bone's outline")
-      .in("mesh", "surface of the bone; it gives the axes, and 100 points as the targets of mTRE")
+      .in("model", "surface of the bone; it gives the axes, and 100 points as the targets of mTRE")
       .in("others", "poses of other bones, and maybe of this one", over("fragment"))
       .in("other_bones", "the bones of these poses", over("fragment"))
       .out("verdict", "the judgement, the probability that the pose is off, and all figures of the evidence")
@@ -290,6 +290,6 @@ MARROW_PLUGIN(plugin) {
       .option("pixel_step", &Options::pixel_step,
               "for costs of grey values: only every n-th pixel is compared, and half as many far from the pose",
               at_least(1), at_most(32), replaces({"cost.pixel_step"}))
-      .option("most_intersection_mm", &Options::most_intersection_mm,
+      .option("max_intersection_mm", &Options::max_intersection_mm,
               "a pose is doubtful if the bone reaches deeper into one of the others", at_least(0));
 }

@@ -14,7 +14,7 @@ MARROW_PLUGIN(plugin) {
       .in<marrow::View>("views", "X-ray views", marrow::over("view"))
       .in<marrow::EdgeMap>("edges", "edge pixels of each view", marrow::over("view"))
       .in<marrow::OutlineProjector>("projector", "draws the bone's outline for any camera and pose")
-      .in<marrow::Mesh>("mesh", "surface of the bone; it gives the axes and the targets")
+      .in<marrow::Mesh>("model", "surface of the bone; it gives the axes and the targets")
       .in<marrow::Pose>("others", "poses of other fragments", marrow::over("fragment"))
       .in<marrow::SignedField>("other_bones", "the other fragments' bone", marrow::over("fragment"))
       .out<marrow::Verdict>("verdict", "judgement of the pose, with the probability that it is off");

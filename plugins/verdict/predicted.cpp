@@ -132,7 +132,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("verdict.predicted", predicted)
       .summary("Judges a pose by its predicted deviations and its warnings alone")
       .in("pose", "pose to judge, with its predicted covariance")
-      .in("mesh", "surface of the bone; 200 points spread over it are the targets of the mTRE")
+      .in("model", "surface of the bone; 200 points spread over it are the targets of the mTRE")
       .in("prior",
           "pose known from elsewhere, which the registration took into account: whether its rotation about the long "
           "axis agrees with the images")

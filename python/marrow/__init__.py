@@ -5,7 +5,7 @@ p = marrow.Pipeline("pipelines/femur.yaml", case="cases/7")
 r = p.run(progress=True)
 r["pose"]["distal"].matrix
 
-Each node of a plugin is also a function: marrow.edges.canny(view, high=5).
+Each node of a plugin is also a function: marrow.edges.canny(view, noise_high=5).
 """
 from . import display as _display
 from . import nodes as _nodes

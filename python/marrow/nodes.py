@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The nodes of all plugins as functions: marrow.edges.canny(view, high=5)."""
+"""The nodes of all plugins as functions: marrow.edges.canny(view, noise_high=5)."""
 import collections
 import inspect
 import keyword

@@ -134,8 +134,8 @@ Result calibrated(const List<Image>& images) {
   const auto outputs =
       shipped::call("camera.bead_board", {{"images", shipped::list(images, "view")}}, {{"board", kBoardFile.string()}});
   return {outputs.at("camera").as_list<Camera>(), outputs.at("calibration").as<Calibration>(),
-          outputs.at("picture").as_list<Picture>(), outputs.at("report").as<Metrics>(),
-          outputs.at("poses").as_list<Metrics>()};
+          outputs.at("picture").as_list<Picture>(), outputs.at("metrics").as<Metrics>(),
+          outputs.at("view_metrics").as_list<Metrics>()};
 }
 
 TEST(BeadBoard, DeviceFromRenderedImages) {

@@ -200,7 +200,7 @@ Ran run(const List<View>& views, const std::filesystem::path& points, const Mesh
   hooks.log = [&](std::string_view text, LogLevel) { ran.warnings.emplace_back(text); };
   shipped::Inputs inputs{{"views", shipped::list(views, "view")}};
   if (mesh) inputs["mesh"] = shipped::item(*mesh);
-  ran.outputs = shipped::call("camera.check", inputs, {{"points", points.string()}}, Context(hooks));
+  ran.outputs = shipped::call("camera.check", inputs, {{"known_points", points.string()}}, Context(hooks));
   return ran;
 }
 

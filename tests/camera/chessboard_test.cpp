@@ -105,8 +105,8 @@ TEST(CameraChessboard, FindsTheCameraThatPhotographedTheBoard) {
   // The board covers up to about r = 0.45; at the corners of the image, r is 0.625.
   for (const double r : {0.2, 0.45})
     EXPECT_NEAR(800 * r * calibration.distortion.factor(r * r), 800 * r * truth.distortion.factor(r * r), 1) << r;
-  EXPECT_LT(shipped::figure(found.at("report"), "residual"), 0.15);
-  EXPECT_EQ(shipped::figure(found.at("report"), "photographs"), 16);
+  EXPECT_LT(shipped::figure(found.at("metrics"), "residual"), 0.15);
+  EXPECT_EQ(shipped::figure(found.at("metrics"), "photographs"), 16);
   const auto cameras = found.at("camera").as_list<Camera>();
   ASSERT_EQ(cameras.names(), all.arm.names);
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -122,7 +122,7 @@ TEST(CameraChessboard, LeavesOutAPhotographWithoutTheBoard) {
   List<Picture> photographs = taken().photographs;
   photographs.add("empty", plain());
   const auto found = calibrated(photographs, taken().placed);
-  EXPECT_EQ(shipped::figure(found.at("report"), "photographs"), 16);
+  EXPECT_EQ(shipped::figure(found.at("metrics"), "photographs"), 16);
 }
 
 TEST(CameraChessboard, RefusesWhatItCannotUse) {

@@ -24,7 +24,7 @@ nodes:
   found: {uses: read.pose, with: {path: found.yaml}}
   stages: {uses: deviations.calibrated, in: {stages: [found], model: bone}}
   other: {uses: read.pose, with: {path: other.yaml}}
-  verdict: {uses: verdict.predicted, in: {pose: found, mesh: bone}}
+  verdict: {uses: verdict.predicted, in: {pose: found, model: bone}}
 outputs: {pose: stages.pose, found: found, other: other, bone: bone, verdict: verdict}
 """
 

@@ -11,7 +11,7 @@ nodes:
   bone:    {uses: segment.level_set, in: {volume: case.ct, seeds: case.seeds}}
   model:   {uses: mesh.marching_cubes, in: {field: bone}}
   edges:   {uses: edges.canny, in: {view: case.views}}
-  outline: {uses: project.silhouette, in: {mesh: model}}
+  outline: {uses: project.silhouette, in: {model: model}}
   cost:
     uses: similarity.contour_distance
     in: {projector: outline, views: case.views, edges: edges}
@@ -21,7 +21,7 @@ nodes:
   newton:  {uses: optimizer.bobyqa}
   pose:
     uses: register.multiresolution
-    in: {cost: both, optimizer: newton, initial: case.start}
+    in: {cost: both, optimizer: newton, start: case.start}
     with: {reach_px: [5, 4, 3]}
   shape:   {uses: evaluate.landscape, in: {cost: cost, pose: pose.pose}}
 outputs: {number: number}

@@ -55,17 +55,17 @@ shipped::Inputs search_from(const Pose& start) {
   const auto cost = std::make_shared<well::Well>(marrow::RigidTransform{"world", "ct"}, start.frame);
   return {{"cost", marrow::Value::of<marrow::Cost>(cost)},
           {"optimizer", shipped::call("optimizer.nelder_mead", {}).at("optimizer")},
-          {"initial", shipped::item(start)}};
+          {"start", shipped::item(start)}};
 }
 
 TEST(Covariances, VerdictsTakeNoneThatCannotBe) {
   const auto judged = [](const Pose& pose) {
-    return shipped::Inputs{{"pose", shipped::item(pose)}, {"mesh", shipped::item(box())}};
+    return shipped::Inputs{{"pose", shipped::item(pose)}, {"model", shipped::item(box())}};
   };
   expect_refused("verdict.predicted", "pose", judged);
   expect_refused("verdict.evidence", "pose", [&](const Pose& pose) {
     shipped::Inputs inputs = search_from(pose);
-    inputs.erase("initial");
+    inputs.erase("start");
     marrow::View view;
     view.camera.width_px = view.camera.height_px = 100;
     view.camera.intrinsics << 1000, 0, 50, 0, 1000, 50, 0, 0, 1;
@@ -75,7 +75,7 @@ TEST(Covariances, VerdictsTakeNoneThatCannotBe) {
     views.add("frontal", view);
     inputs["views"] = shipped::list(views, "view");
     inputs["pose"] = shipped::item(pose);
-    inputs["mesh"] = shipped::item(box());
+    inputs["model"] = shipped::item(box());
     return inputs;
   });
   expect_refused("verdict.predicted", "the prior", [&](const Pose& prior) {

@@ -51,10 +51,10 @@ TEST(DeviationsCalibrated, MultipliesTheDeviationsAboutAndAlongTheBonesAxes) {
   stages.add("start", marrow::Pose());
   stages.add("first", pose());
   stages.add("final", pose());
-  const auto outputs = calibrated(stages, {{"rotation", std::vector<double>{2, 3, 0.5}},
-                                           {"translation", std::vector<double>{0.25, 1, 7}},
-                                           {"first_rotation", std::vector<double>{1, 1, 9}},
-                                           {"first_translation", std::vector<double>{1, 0.1, 1}}});
+  const auto outputs = calibrated(stages, {{"rotation_factors", std::vector<double>{2, 3, 0.5}},
+                                           {"translation_factors", std::vector<double>{0.25, 1, 7}},
+                                           {"first_rotation_factors", std::vector<double>{1, 1, 9}},
+                                           {"first_translation_factors", std::vector<double>{1, 0.1, 1}}});
   const auto found = outputs.at("stages").as_list<marrow::Pose>();
   ASSERT_EQ(found.names(), stages.names());
   EXPECT_FALSE(found[0].covariance);
@@ -68,7 +68,7 @@ TEST(DeviationsCalibrated, MultipliesTheDeviationsAboutAndAlongTheBonesAxes) {
 TEST(DeviationsCalibrated, WhereTheFirstStageIsTheLastTheFactorsAreThoseOfTheLast) {
   marrow::List<marrow::Pose> stages;
   stages.add("first", pose());
-  const auto outputs = calibrated(stages, {{"rotation", std::vector<double>{2, 2, 2}}});
+  const auto outputs = calibrated(stages, {{"rotation_factors", std::vector<double>{2, 2, 2}}});
   EXPECT_LT((deviations(outputs.at("pose").as<marrow::Pose>()) - six(2, 2, 2, 1, 1, 1)).norm(), 1e-9);
 }
 
@@ -77,7 +77,7 @@ TEST(DeviationsCalibrated, ADirectionThatIsNotKnownStaysUnknown) {
   (*unknown.covariance)(2, 2) = std::numeric_limits<double>::infinity();
   marrow::List<marrow::Pose> stages;
   stages.add("final", unknown);
-  const auto outputs = calibrated(stages, {{"rotation", std::vector<double>{2, 2, 2}}});
+  const auto outputs = calibrated(stages, {{"rotation_factors", std::vector<double>{2, 2, 2}}});
   EXPECT_EQ(*outputs.at("pose").as<marrow::Pose>().covariance, *unknown.covariance);
 }
 

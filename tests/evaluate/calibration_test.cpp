@@ -18,7 +18,7 @@ Calibration device() {
 }
 
 shipped::Inputs inputs(const Calibration& found, const Calibration& truth) {
-  return {{"calibration", shipped::item(found)}, {"truth", shipped::item(truth)}};
+  return {{"calibration", shipped::item(found)}, {"true_calibration", shipped::item(truth)}};
 }
 
 marrow::Value errors(const Calibration& found, const Calibration& truth) {

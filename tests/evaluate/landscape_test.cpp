@@ -54,7 +54,7 @@ TEST(Landscape, SpeaksOfTheLongAxisOnlyWhereItIsKnown) {
   const auto axis_of = [&](const shipped::Inputs& more) {
     shipped::Inputs inputs{{"cost", cost}, {"pose", shipped::item(pose)}};
     inputs.insert(more.begin(), more.end());
-    return shipped::call("evaluate.landscape", inputs, {{"samples", std::int64_t{3}}})
+    return shipped::call("evaluate.landscape", inputs, {{"profile_points", std::int64_t{3}}})
         .at("landscape")
         .as<marrow::Landscape>()
         .profiles.at(2)

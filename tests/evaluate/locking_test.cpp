@@ -32,26 +32,26 @@ shipped::Outputs errors(const LockingPlan& plan) {
 
 TEST(EvaluateLocking, AngleOffsetAndView) {
   const auto outputs = errors(plan(0.8, {7, 0.3, 0.4}));
-  const marrow::Value& summary = outputs.at("summary");
+  const marrow::Value& summary = outputs.at("metrics");
   EXPECT_NEAR(shipped::figure(summary, "angle_deg"), 0.8, 1e-9);
   EXPECT_NEAR(shipped::figure(summary, "offset_mm"), 0.5, 1e-9) << "along the axis does not count";
   EXPECT_NEAR(shipped::figure(summary, "view_deg"), 0, 1e-9) << "at 90 degrees the rays run along x";
   EXPECT_EQ(shipped::figure(summary, "off"), 0);
   LockingPlan turned = plan(0, {0, 0, 0});
   turned.drills[0].beta_deg = 88.5;
-  EXPECT_NEAR(shipped::figure(errors(turned).at("summary"), "view_deg"), 1.5, 1e-9);
+  EXPECT_NEAR(shipped::figure(errors(turned).at("metrics"), "view_deg"), 1.5, 1e-9);
   turned.isocentre_mm = {0, 0, 600};  // then the ray to the hole is oblique
-  EXPECT_NEAR(shipped::figure(errors(turned).at("summary"), "view_deg"), 45.02, 0.01);
+  EXPECT_NEAR(shipped::figure(errors(turned).at("metrics"), "view_deg"), 45.02, 0.01);
 }
 
 TEST(EvaluateLocking, SilentIsOffAndNotDoubted) {
   LockingPlan off = plan(1.2, {0, 0, 0});
-  EXPECT_EQ(shipped::figure(errors(off).at("summary"), "off"), 1);
-  EXPECT_EQ(shipped::figure(errors(off).at("summary"), "silent"), 1);
+  EXPECT_EQ(shipped::figure(errors(off).at("metrics"), "off"), 1);
+  EXPECT_EQ(shipped::figure(errors(off).at("metrics"), "silent"), 1);
   off.drills[0].doubts = {"doubtful"};
-  EXPECT_EQ(shipped::figure(errors(off).at("summary"), "silent"), 0);
-  EXPECT_EQ(shipped::figure(errors(off).at("summary"), "flagged"), 1);
-  EXPECT_EQ(shipped::figure(errors(plan(0, {0, 0.6, 0})).at("summary"), "silent"), 1);
+  EXPECT_EQ(shipped::figure(errors(off).at("metrics"), "silent"), 0);
+  EXPECT_EQ(shipped::figure(errors(off).at("metrics"), "flagged"), 1);
+  EXPECT_EQ(shipped::figure(errors(plan(0, {0, 0.6, 0})).at("metrics"), "silent"), 1);
 }
 
 TEST(EvaluateLocking, RefusesAPlanForAnotherImplant) {

@@ -96,7 +96,7 @@ TEST(OutlineDistance, EdgesOfAnotherDirectionDoNotCount) {
   marrow::EdgeMap edges = line_of_edges(109, 1);
   for (const auto& edge : line_of_edges(101, -1).pixels) edges.pixels.push_back(edge);
   EXPECT_NEAR(distances(one("frontal", view("frontal")), one("frontal", edges))["median_px"], 9, 1e-6);
-  const shipped::Options options{{"angle_deg", 180.0}};
+  const shipped::Options options{{"direction_tolerance_deg", 180.0}};
   EXPECT_NEAR(distances(one("frontal", view("frontal")), one("frontal", edges), options)["median_px"], 1, 1e-6);
 }
 
@@ -168,7 +168,7 @@ TEST(OutlineDistance, TheNearestEdgeIsThatOfASearchThroughAll) {
       if (edge.direction_u * double(point.normal_u) + edge.direction_v * double(point.normal_v) >= least_cosine)
         best = std::min(best, std::hypot(double(edge.u_px) - point.u_px, double(edge.v_px) - point.v_px));
     auto found =
-        distances(inputs(views, of_views, PointProjector(point)), {{"reach_px", reach_px}, {"angle_deg", angle_deg}});
+        distances(inputs(views, of_views, PointProjector(point)), {{"reach_px", reach_px}, {"direction_tolerance_deg", angle_deg}});
     ASSERT_EQ(found["matched_percent"], best <= reach_px ? 100 : 0) << best << " px, reach " << reach_px;
     EXPECT_EQ(found["median_px"], std::min(best, reach_px));
     none += best > reach_px;

@@ -144,7 +144,7 @@ TEST_F(CameraScale, OfAGeometryWhoseOptionsAreInMm) {
   put(folder / "mm.xml", rtk(false));
   put(folder / "cm.xml", rtk(true));
   shipped::Options options = {{"names", std::vector<std::string>{"ap"}},
-                              {"size_px", std::vector<double>{64, 48}},
+                              {"image_size_px", std::vector<double>{64, 48}},
                               {"pixel_mm", std::vector<double>{0.5, 0.4}},
                               {"corner_mm", std::vector<double>{-15, -10}},
                               {"mirror", "upside_down"}};

@@ -60,12 +60,12 @@ marrow::Digest folder_of_volume(const Path& path) {
   return hash_of(marrow::files::read_volume_file(path.parent_path(), {}));
 }
 marrow::Digest plastimatch(const Path& path) {
-  return read_one<marrow::Camera>("read.camera", path, {{"size_px", std::vector<double>{64, 48}}});
+  return read_one<marrow::Camera>("read.camera", path, {{"image_size_px", std::vector<double>{64, 48}}});
 }
 marrow::Digest rtk(const Path& path) {
   return read_one<marrow::Camera>(
       "read.camera", path,
-      {{"size_px", std::vector<double>{64, 48}}, {"pixel_mm", std::vector<double>{0.5}}, {"mirror", "upside_down"}});
+      {{"image_size_px", std::vector<double>{64, 48}}, {"pixel_mm", std::vector<double>{0.5}}, {"mirror", "upside_down"}});
 }
 
 struct Case {
@@ -190,7 +190,7 @@ TEST(ForeignTexts, FilesOfOthersWithAByteOrderMark) {
   for (const char* name : {"m.obj", "m.ply", "m.stl"}) EXPECT_NO_THROW(mesh(data / name)) << name;
   EXPECT_NO_THROW(read_one<marrow::Camera>(
       "read.camera", data / "g.xml",
-      {{"size_px", std::vector<double>{64, 48}}, {"pixel_mm", std::vector<double>{0.5}}, {"mirror", "upside_down"}}));
+      {{"image_size_px", std::vector<double>{64, 48}}, {"pixel_mm", std::vector<double>{0.5}}, {"mirror", "upside_down"}}));
   for (const char* name : {"v", "w"}) {
     const marrow::Volume volume = marrow::files::read_volume_file(data / name, {});
     EXPECT_EQ(volume.grid.origin_mm, Eigen::Vector3d(5, 6, 7)) << name;

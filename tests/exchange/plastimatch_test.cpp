@@ -16,7 +16,7 @@ using marrow::exchange::PlastimatchFile;
 const std::filesystem::path kData = std::filesystem::path(MARROW_SOURCE_DIR) / "tests/exchange/data";
 
 marrow::Camera read(const std::filesystem::path& path, std::vector<double> size_px = {120, 160}) {
-  return read_by<marrow::Camera>("read.camera", path, {{"size_px", std::move(size_px)}});
+  return read_by<marrow::Camera>("read.camera", path, {{"image_size_px", std::move(size_px)}});
 }
 
 // Written by: plastimatch drr --nrm "1 0 0" --vup "0 0 1" --sad 1000 --sid 1500 -r "120 160" -z "120 240" -c "50 70"
@@ -188,8 +188,8 @@ TEST(Plastimatch, DiagnosesOptionsThatAFormatDoesNotNeed) {
     EXPECT_EQ(shipped::refusal("read.camera", {}, options),
               (folder / name).string() + ": " + said + " is not for this format of cameras; leave it out");
   };
-  expect("c.yaml", {"size_px", std::vector<double>{3, 4}}, "size_px");
-  expect("c.h5", {"size_px", std::vector<double>{3, 4}}, "size_px");
+  expect("c.yaml", {"image_size_px", std::vector<double>{3, 4}}, "size_px");
+  expect("c.h5", {"image_size_px", std::vector<double>{3, 4}}, "size_px");
   expect("c.h5", {"pixel_mm", std::vector<double>{1}}, "pixel_mm");
   expect("c.h5", {"corner_mm", std::vector<double>{0, 0}}, "corner_mm");
   expect("c.yaml", {"mirror", "upside_down"}, "mirror");

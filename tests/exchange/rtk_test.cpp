@@ -18,7 +18,7 @@ std::string file(const std::string& elements, const std::string& matrix = "") {
 }
 
 const shipped::Options kImage = {
-    {"size_px", std::vector<double>{101, 81}}, {"pixel_mm", std::vector<double>{0.5}}, {"mirror", "upside_down"}};
+    {"image_size_px", std::vector<double>{101, 81}}, {"pixel_mm", std::vector<double>{0.5}}, {"mirror", "upside_down"}};
 
 marrow::Camera read(const std::filesystem::path& path, const shipped::Options& changed = {}) {
   shipped::Options options = changed;
@@ -114,7 +114,7 @@ TEST(Rtk, WhatIsWrittenIsReadBack) {
     const marrow::Camera& camera = cameras()[i];
     const marrow::Camera back = read_by<marrow::Camera>("read.camera", folder / "g.xml",
                                                         {{"projection", (long long)(i)},
-                                                         {"size_px", std::vector<double>{640, 480}},
+                                                         {"image_size_px", std::vector<double>{640, 480}},
                                                          {"pixel_mm", std::vector<double>{0.4, 0.5}},
                                                          {"mirror", "upside_down"}});
     for (const Eigen::Vector3d& point : {Eigen::Vector3d(0, 0, 0), {30, -40, 50}, {-60, 20, -10}})
@@ -167,7 +167,7 @@ TEST(Rtk, DiagnosesWhatTheImageLacks) {
       read(folder / "g.xml", {{"mirror", "none"}}),
       "g.xml: projection 0: its images are seen from the detector, or have their rows from below; turn them over "
       "by mirror: left_right or upside_down when they are read, and give the same mirror here");
-  EXPECT_SAYS(read(folder / "g.xml", {{"size_px", std::vector<double>{}}}),
+  EXPECT_SAYS(read(folder / "g.xml", {{"image_size_px", std::vector<double>{}}}),
               "g.xml: projection 0: does not say how many pixels the image has; wire the image, or give size_px");
   EXPECT_SAYS(read(folder / "g.xml", {{"pixel_mm", std::vector<double>{}}}),
               "g.xml: projection 0: needs the size of a pixel on the detector; give pixel_mm: [width, height]");

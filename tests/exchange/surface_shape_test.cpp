@@ -160,7 +160,7 @@ TEST(SurfaceShape, AnImplantIsTurnedToo) {
       "marrow-implant: 1\nholes: {a: {centre_mm: [1, 2, 3], axis: [1, 0, 0], diameter_mm: 5}}\n");
   const auto outputs = shipped::call(
       "read.implant", {}, {{"holes", (folder / "holes.yaml").string()}, {"surface", (folder / "nail.obj").string()}});
-  EXPECT_NEAR(enclosed_volume_mm3(outputs.at("surface").as<marrow::Mesh>()), 125000, 1e-6);
+  EXPECT_NEAR(enclosed_volume_mm3(outputs.at("mesh").as<marrow::Mesh>()), 125000, 1e-6);
 }
 
 }  // namespace surface_shape_test

@@ -59,9 +59,9 @@ TEST_F(ViewCamera, ImageAndCameraAreTurnedOverTogether) {
 
 TEST_F(ViewCamera, TheImageSaysItsSize) {
   expect_same(view(with_image(kData / "plastimatch-lateral.txt", 120, 160)).camera,
-              camera(kData / "plastimatch-lateral.txt", {{"size_px", std::vector<double>{120, 160}}}));
+              camera(kData / "plastimatch-lateral.txt", {{"image_size_px", std::vector<double>{120, 160}}}));
   shipped::Options sized = kRtkImage;
-  sized["size_px"] = std::vector<double>{101, 81};
+  sized["image_size_px"] = std::vector<double>{101, 81};
   const marrow::View read = view(with_image(folder / "g.xml", 101, 81, kRtkImage));
   EXPECT_EQ(read.image.pixels.at<std::uint8_t>(80, 0), 1);
   expect_same(read.camera, camera(folder / "g.xml", sized));
@@ -78,7 +78,7 @@ TEST_F(ViewCamera, EachViewHasItsProjection) {
                                     {"mirror", "upside_down"}};
   const auto views = shipped::call("read.views", {}, options).at("views").as_list<marrow::View>();
   shipped::Options sized = kRtkImage;
-  sized["size_px"] = std::vector<double>{101, 81};
+  sized["image_size_px"] = std::vector<double>{101, 81};
   expect_same(views[0].camera, camera(folder / "g.xml", sized));
   sized["projection"] = 0LL;
   expect_same(views[1].camera, camera(folder / "g.xml", sized));
@@ -154,9 +154,9 @@ TEST_F(CaseCamera, FilesOfOtherPrograms) {
   EXPECT_EQ(read.image.pixels.at<std::uint8_t>(0, 0), 1) << "the image of a case is turned over already";
   expect_same(read.camera, camera(kXreg, {{"projection", 1LL}, {"mirror", "left_right"}}));
   expect_same(view_of_case("p.txt", 120, 160).camera,
-              camera(kData / "plastimatch-lateral.txt", {{"size_px", std::vector<double>{120, 160}}}));
+              camera(kData / "plastimatch-lateral.txt", {{"image_size_px", std::vector<double>{120, 160}}}));
   shipped::Options sized = kRtkImage;
-  sized["size_px"] = std::vector<double>{101, 81};
+  sized["image_size_px"] = std::vector<double>{101, 81};
   sized["corner_mm"] = std::vector<double>{-25, -19};
   expect_same(view_of_case("{file: g.xml, projection: 1, pixel_mm: [0.5, 0.5], corner_mm: [-25, -19], mirror: "
                            "upside_down}",

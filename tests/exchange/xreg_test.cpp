@@ -89,21 +89,21 @@ TEST(Xreg, LandmarksAsImagesShowThem) {
   put(folder / "p.fcsv", kPoints);
   const std::vector<std::string> views{"ap", "lateral", "oblique"};
   const marrow::Landmarks landmarks =
-      landmarks_at(folder / "p.fcsv", {{"seen", kFile.string()}, {"views", views}, {"mirror", "left_right"}});
+      landmarks_at(folder / "p.fcsv", {{"seen", kFile.string()}, {"names", views}, {"mirror", "left_right"}});
   EXPECT_EQ(landmarks.points[0].model_mm, Eigen::Vector3d(-1, -2, 3));
   ASSERT_EQ(landmarks.seen.size(), 6u);
   EXPECT_EQ(landmarks.seen[3].name, "FH-r");
   EXPECT_EQ(landmarks.seen[3].view, "lateral");
   EXPECT_EQ(landmarks.seen[3].pixel, Eigen::Vector2d(199 - 10.25, 20.5));
-  EXPECT_EQ(landmarks_at(folder / "p.fcsv", {{"seen", kFile.string()}, {"views", views}}).seen[0].pixel,
+  EXPECT_EQ(landmarks_at(folder / "p.fcsv", {{"seen", kFile.string()}, {"names", views}}).seen[0].pixel,
             Eigen::Vector2d(124.5, 29.5));
   EXPECT_SAYS(landmarks_at(folder / "p.fcsv", {{"seen", kFile.string()}}),
-              "xreg-by-h5py.h5: has 3 projections; give in views as many names, got 0");
+              "xreg-by-h5py.h5: has 3 projections; give in names as many, got 0");
   put(folder / "p.fcsv", with(kPoints, "FH-r", "GSN-r"));
-  EXPECT_SAYS(landmarks_at(folder / "p.fcsv", {{"seen", kFile.string()}, {"views", views}}),
+  EXPECT_SAYS(landmarks_at(folder / "p.fcsv", {{"seen", kFile.string()}, {"names", views}}),
               "xreg-by-h5py.h5: projection 0 shows 'FH-r', which ");
-  EXPECT_SAYS(landmarks_at(folder / "p.fcsv", {{"views", views}}),
-              "p.fcsv: views and mirror are about the file of seen; give it, or leave them out");
+  EXPECT_SAYS(landmarks_at(folder / "p.fcsv", {{"names", views}}),
+              "p.fcsv: names and mirror are about the file of seen; give it, or leave them out");
   put(folder / "l.yaml", "marrow-landmarks: 1\nfragments: {a: {points: {b: [1, 2, 3]}}}\n");
   EXPECT_SAYS(
       landmarks_at(folder / "l.yaml", {{"seen", kFile.string()}}),

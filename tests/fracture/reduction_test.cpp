@@ -18,7 +18,7 @@ TEST(Reduction, BringsTheFragmentBackBesideTheOther) {
   const auto given = displaced();
   const shipped::Outputs result = shipped::call("fracture.reduction", inputs(given));
   const auto& found = result.at("pose").as<marrow::Pose>().world_from_model;
-  const marrow::Value& moved = result.at("motion");
+  const marrow::Value& moved = result.at("metrics");
   EXPECT_TRUE(found.rotation.isApprox(given[0].world_from_model.rotation, 1e-12));
   EXPECT_TRUE(found.translation_mm.isApprox(given[0].world_from_model.translation_mm, 1e-12));
   EXPECT_NEAR(figure(moved, "turn_deg"), 14, 1e-9);
@@ -39,7 +39,7 @@ TEST(Reduction, IsAboutTheFragmentsMiddleEvenIfThePoseDoesNotSayWhereThatIs) {
   const Vector3d middle_mm = fragment_frame(*models().find("distal")).origin_mm;
   const auto given = without_axes(poses(motion(turn(20, Vector3d::UnitX()), middle_mm)));
   const auto found = shipped::call("fracture.reduction", inputs(given));
-  EXPECT_NEAR(figure(found.at("motion"), "shift_mm"), 0, 1e-9);
+  EXPECT_NEAR(figure(found.at("metrics"), "shift_mm"), 0, 1e-9);
   EXPECT_EQ(found.at("pose").as<marrow::Pose>().frame.origin_mm, middle_mm);
   shipped::Inputs without = inputs(given);
   without.erase("models");

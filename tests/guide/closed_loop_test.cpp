@@ -124,7 +124,7 @@ TEST(ClosedLoop, PosesWithoutAxesOfTheirOwnAreTakenAboutTheirSurfaces) {
                        &other = found.at("motion").as<Pose>().world_from_model;
   EXPECT_LT((one.rotation - other.rotation).norm(), 1e-9);
   EXPECT_LT((one.translation_mm - other.translation_mm).norm(), 1e-6);
-  EXPECT_NEAR(shipped::figure(expected.at("figures"), "shift_mm"), shipped::figure(found.at("figures"), "shift_mm"),
+  EXPECT_NEAR(shipped::figure(expected.at("metrics"), "shift_mm"), shipped::figure(found.at("metrics"), "shift_mm"),
               1e-9);
   const auto poses_one = expected.at("predicted").as_list<Pose>(), poses_other = found.at("predicted").as_list<Pose>();
   for (std::size_t i = 0; i < poses_one.size(); ++i)
@@ -137,10 +137,10 @@ TEST(ClosedLoop, ReducesTheFractureWhereverTheRobotStands) {
     const auto pairs = loop("estimated", stand);
     EXPECT_TRUE(stop_of(pairs.back()).reason.starts_with("the fracture is reduced: ")) << stop_of(pairs.back()).reason;
     EXPECT_LE(pairs.size(), 7u);
-    EXPECT_LT(shipped::figure(pairs.back().at("figures"), "rotation_deg"), 0.5);
-    EXPECT_LT(shipped::figure(pairs.back().at("figures"), "shift_mm"), 0.5);
-    EXPECT_EQ(shipped::figure(pairs.back().at("figures"), "images"), 2 * double(pairs.size()));
-    EXPECT_EQ(shipped::figure(pairs.back().at("figures"), "reduced"), 1);
+    EXPECT_LT(shipped::figure(pairs.back().at("metrics"), "rotation_deg"), 0.5);
+    EXPECT_LT(shipped::figure(pairs.back().at("metrics"), "shift_mm"), 0.5);
+    EXPECT_EQ(shipped::figure(pairs.back().at("metrics"), "images"), 2 * double(pairs.size()));
+    EXPECT_EQ(shipped::figure(pairs.back().at("metrics"), "reduced"), 1);
     const RigidTransform none = pairs.back().at("motion").as<Pose>().world_from_model;
     EXPECT_TRUE(none.rotation.isIdentity() && none.translation_mm.isZero());
   }
@@ -156,8 +156,8 @@ TEST(ClosedLoop, AFixedPlaceThatIsWrongEndsWithAReason) {
 TEST(ClosedLoop, NoStepIsLargerThanItsLimits) {
   for (const std::string hand_eye : {"estimated", "broyden", "fixed"})
     for (const auto& pair : loop(hand_eye, {60, -50, 40})) {
-      EXPECT_LE(shipped::figure(pair.at("figures"), "step_deg"), 15 + 1e-9);
-      EXPECT_LE(shipped::figure(pair.at("figures"), "step_mm"), 25 + 1e-9);
+      EXPECT_LE(shipped::figure(pair.at("metrics"), "step_deg"), 15 + 1e-9);
+      EXPECT_LE(shipped::figure(pair.at("metrics"), "step_mm"), 25 + 1e-9);
     }
 }
 
@@ -172,7 +172,7 @@ TEST(ClosedLoop, TheFirstStepIsShortIfTheRobotMayStandAnywhere) {
   const auto first = [](double limit_mm, const std::string& hand_eye) {
     return shipped::call("guide.closed_loop", inputs(poses(displaced({6, -5, 9}, {8, -6, -10}))),
                          {{"hand_eye", hand_eye}, {"astray_mm", limit_mm}})
-        .at("figures");
+        .at("metrics");
   };
   EXPECT_NEAR(astray_mm(first(12, "estimated")), 12, 1e-6);
   EXPECT_NEAR(astray_mm(first(20, "estimated")), 20, 1e-6);
@@ -180,7 +180,7 @@ TEST(ClosedLoop, TheFirstStepIsShortIfTheRobotMayStandAnywhere) {
   // As far as the bones are apart, it may go astray in any case. The gap is 2 mm in the CT, and 10 mm more.
   const Value apart =
       shipped::call("guide.closed_loop", inputs(poses(displaced({0, 0, 5}, {0, 0, -10}))), {{"astray_mm", 1.0}})
-          .at("figures");
+          .at("metrics");
   EXPECT_NEAR(shipped::figure(apart, "distance_mm"), 12, 1e-3);
   EXPECT_NEAR(astray_mm(apart), 12, 0.01);
 }
@@ -216,13 +216,13 @@ TEST(ClosedLoop, AfterBonesHavePressedItPullsThemApartIfItKnowsHow) {
   const auto pair =
       shipped::call("guide.closed_loop", inputs(poses(displaced({6, -5, 9}, {8, -6, -10})), state, pressed));
   EXPECT_TRUE(stop_of(pair).reason.starts_with("distract: ")) << stop_of(pair).reason;
-  EXPECT_NEAR(shipped::figure(pair.at("figures"), "step_mm"), 4, 1e-6);
-  EXPECT_EQ(shipped::figure(pair.at("figures"), "step_deg"), 0);
+  EXPECT_NEAR(shipped::figure(pair.at("metrics"), "step_mm"), 4, 1e-6);
+  EXPECT_EQ(shipped::figure(pair.at("metrics"), "step_deg"), 0);
 }
 
 TEST(ClosedLoop, FragmentsThatOverlapAreMovedApart) {
   const auto pair = shipped::call("guide.closed_loop", inputs(poses(displaced({0, 0, 0}, {9, 0, 10}))));
-  EXPECT_LT(shipped::figure(pair.at("figures"), "distance_mm"), 0);
+  EXPECT_LT(shipped::figure(pair.at("metrics"), "distance_mm"), 0);
   // Away from the proximal fragment, which lies at larger z of its own frame.
   const RigidTransform told = pair.at("motion").as<Pose>().world_from_model;
   EXPECT_LT((kProximal.rotation.transpose() * told.translation_mm).z(), -1);

@@ -125,8 +125,8 @@ TEST(OpenLoop, SaysHowFarFromItsPlaceTheMoveLeavesTheFragment) {
     const RigidTransform after = inverse(kBase) * outputs.at("motion").as<Pose>().world_from_model * kBase *
                                  made.poses.find("distal")->world_from_model;
     const RigidTransform& place = made.poses.find("proximal")->world_from_model;
-    const double left_deg = shipped::figure(outputs.at("figures"), "left_deg"),
-                 left_mm = shipped::figure(outputs.at("figures"), "left_mm");
+    const double left_deg = shipped::figure(outputs.at("metrics"), "left_deg"),
+                 left_mm = shipped::figure(outputs.at("metrics"), "left_mm");
     EXPECT_LT(degrees(geodesic_angle_rad(after.rotation, place.rotation)), 4 * left_deg) << method;
     EXPECT_LT((after.translation_mm - place.translation_mm).norm(), 4 * left_mm) << method;
     EXPECT_LT(left_mm, 0.5) << method;
@@ -144,10 +144,10 @@ TEST(OpenLoop, AMoveByARobotWhosePlaceIsHardlyKnownIsRefused) {
     EXPECT_TRUE(
         text.ends_with(" mm from its place (one standard deviation), at most 2 degrees and 2 mm are allowed; "
                        "turn the robot further between stations, about axes that are at least 30 degrees "
-                       "apart, or raise most_deviation_deg and most_deviation_mm"))
+                       "apart, or raise max_deviation_deg and max_deviation_mm"))
         << method << ": " << text;
     EXPECT_EQ(shipped::refusal("guide.open_loop", inputs(made),
-                               {{"method", method}, {"most_deviation_deg", 90.0}, {"most_deviation_mm", 1000.0}}),
+                               {{"method", method}, {"max_deviation_deg", 90.0}, {"max_deviation_mm", 1000.0}}),
               "")
         << method;
   }

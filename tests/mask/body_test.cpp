@@ -43,7 +43,7 @@ cv::Mat near_hole(const marrow::View& view) {
                        {{"view", shipped::item(view)},
                         {"implant", shipped::item(implants::rod())},
                         {"pose", shipped::item(implants::pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0}))}},
-                       {{"radius_mm", 10.0}})
+                       {{"reach_mm", 10.0}})
       .at("view")
       .as<marrow::View>()
       .mask;

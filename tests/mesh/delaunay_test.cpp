@@ -59,7 +59,7 @@ TEST(Delaunay, TrianglesAreAsSmallAsAskedFor) {
                                            [](const Vector3d& p) { return mesh_shapes::sphere(p, 15); });
   std::size_t fewer = 0;
   for (const double size_mm : {4.0, 2.0, 1.0}) {
-    const Mesh mesh = mesh_of(field, {{"size_mm", size_mm}, {"distance_mm", size_mm}});
+    const Mesh mesh = mesh_of(field, {{"max_radius_mm", size_mm}, {"max_distance_mm", size_mm}});
     EXPECT_GT(double(mesh.triangles.size()), 1.5 * double(fewer));
     fewer = mesh.triangles.size();
     for (const auto& t : mesh.triangles)

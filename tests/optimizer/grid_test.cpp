@@ -19,8 +19,8 @@ TEST(Grid, LetsExceptionsPass) { optimizer_behaviour::lets_exceptions_pass(*grid
 TEST(Grid, RefusesWhatIsNowhereFinite) { optimizer_behaviour::refuses_what_is_nowhere_finite(*grid()); }
 TEST(Grid, RefusesNonsense) {
   optimizer_behaviour::refuses_nonsense(*grid());
-  EXPECT_EQ(shipped::refusal("optimizer.grid", {}, {{"points", std::int64_t{4}}}),
-            "points: expected an odd number, so that the middle is one of them, got 4");
+  EXPECT_EQ(shipped::refusal("optimizer.grid", {}, {{"grid_points", std::int64_t{4}}}),
+            "grid_points: expected an odd number, so that the middle is one of them, got 4");
 }
 
 }  // namespace grid_test

@@ -70,13 +70,13 @@ def calls(s):
             "project.siddon_jacobs": lambda: ({"volume": s.volume, "field": s.field}, {}),
             "project.lightfield": lambda: (
                 {"volume": s.volume, "field": s.field, "views": s.views},
-                {"step_mm": 12, "step_deg": 6, "range_deg": 6},
+                {"ray_spacing_mm": 12, "direction_spacing_deg": 6, "max_rotation_deg": 6},
             ),
-            "project.silhouette": lambda: ({"mesh": s.mesh, "volume": s.volume}, {}),
-            "project.silhouette_edges": lambda: ({"mesh": s.mesh, "volume": s.volume}, {}),
+            "project.silhouette": lambda: ({"model": s.mesh, "volume": s.volume}, {}),
+            "project.silhouette_edges": lambda: ({"model": s.mesh, "volume": s.volume}, {}),
             "similarity.contour_distance": lambda: (
                 views_and(
-                    projector=s.outline, edges=s.edges, **others(True), **s.with_mesh("similarity.contour_distance")
+                    projector=s.outline, edges=s.edges, **others(True), **s.with_model("similarity.contour_distance")
                 ),
                 {},
             ),
@@ -86,7 +86,7 @@ def calls(s):
                     edges=s.edges,
                     outline=s.outline,
                     **others(True),
-                    **s.with_mesh("similarity.drr_edges")
+                    **s.with_model("similarity.drr_edges")
                 ),
                 {},
             ),
@@ -97,18 +97,18 @@ def calls(s):
                     edges=s.edges,
                     projector=s.outline,
                     **others(True),
-                    **s.with_mesh("similarity.ray_to_surface")
+                    **s.with_model("similarity.ray_to_surface")
                 ),
                 {},
             ),
             "similarity.with_prior": lambda: ({"cost": s.grey, "prior": s.known, "found": s.found.pose}, {}),
-            "register.icp": lambda: ({"initial": s.start, "model": s.mesh, "target": s.placed}, {"points": 300}),
+            "register.icp": lambda: ({"start": s.start, "model": s.mesh, "target": s.placed}, {"points": 300}),
             "register.multiresolution": lambda: (
-                {"cost": s.contour, "optimizer": s.optimizer, "initial": s.start},
+                {"cost": s.contour, "optimizer": s.optimizer, "start": s.start},
                 search,
             ),
             "register.sequence": lambda: (
-                {"cost": s.contour, "finer_cost": s.grey, "optimizer": s.optimizer, "initial": s.start},
+                {"cost": s.contour, "finer_cost": s.grey, "optimizer": s.optimizer, "start": s.start},
                 search,
             ),
             "register.tracked": lambda: (
@@ -116,7 +116,7 @@ def calls(s):
                     "cost": s.contour,
                     "finer_cost": s.grey,
                     "optimizer": s.optimizer,
-                    "initial": s.found.pose,
+                    "start": s.found.pose,
                     "state": s.track,
                 },
                 {"wide_poses": 20, "gate": 0.01},
@@ -137,7 +137,7 @@ def calls(s):
             "deviations.calibrated": lambda: ({"stages": s.sequence.stages, "model": s.mesh}, {}),
             "refine.cameras": lambda: (
                 {"views": s.views, "costs": {"distal": s.contour}, "poses": {"distal": s.found.pose}},
-                {"max_rounds": 3},
+                {"max_iterations": 3},
             ),
             "verdict.evidence": lambda: (
                 {
@@ -148,13 +148,13 @@ def calls(s):
                     "views": s.views,
                     "edges": s.edges,
                     "projector": s.outline,
-                    "mesh": s.mesh,
+                    "model": s.mesh,
                     "others": {"other": s.start},
                     "other_bones": {"other": s.field},
                 },
                 {"failure_model": str(s.pipelines / "verdict" / "femora-contour.yaml")},
             ),
-            "verdict.predicted": lambda: ({"pose": s.found.pose, "mesh": s.mesh, "prior": s.known}, {}),
+            "verdict.predicted": lambda: ({"pose": s.found.pose, "model": s.mesh, "prior": s.known}, {}),
             "mask.body": lambda: ({"view": s.views["frontal"], "projector": s.drr, "pose": s.start}, {}),
             "mask.near_holes": lambda: (
                 {"view": s.views["frontal"], "implant": s.nail.implant, "pose": s.nailed.start},

@@ -85,7 +85,7 @@ class Scene:
 
     @functools.cached_property
     def outline(self):
-        return marrow.project.silhouette(mesh=self.coarse_mesh)
+        return marrow.project.silhouette(model=self.coarse_mesh)
 
     @functools.cached_property
     def drr(self):
@@ -94,7 +94,7 @@ class Scene:
     @functools.cached_property
     def contour(self):
         return marrow.similarity.contour_distance(
-            projector=self.outline, views=self.views, edges=self.edges, **self.with_mesh("similarity.contour_distance")
+            projector=self.outline, views=self.views, edges=self.edges, **self.with_model("similarity.contour_distance")
         )
 
     @functools.cached_property
@@ -109,18 +109,18 @@ class Scene:
     def found(self):
         """A pose with a covariance, and the stages to it."""
         return marrow.register.multiresolution(
-            cost=self.contour, optimizer=self.optimizer, initial=self.start, **SHORT_SEARCH
+            cost=self.contour, optimizer=self.optimizer, start=self.start, **SHORT_SEARCH
         )
 
     @functools.cached_property
     def sequence(self):
         return marrow.register.sequence(
-            cost=self.contour, finer_cost=self.grey, optimizer=self.optimizer, initial=self.start, **SHORT_SEARCH
+            cost=self.contour, finer_cost=self.grey, optimizer=self.optimizer, start=self.start, **SHORT_SEARCH
         )
 
     @functools.cached_property
     def both_outlines(self):
-        return {name: marrow.project.silhouette(mesh=mesh) for name, mesh in self.parts.models.items()}
+        return {name: marrow.project.silhouette(model=mesh) for name, mesh in self.parts.models.items()}
 
     @functools.cached_property
     def both_drrs(self):
@@ -230,7 +230,7 @@ class Scene:
 
     @functools.cached_property
     def sweep(self):
-        return marrow.simulate.sweeps(axes=["x"], range_deg=4, step_deg=4)
+        return marrow.simulate.sweeps(axes=["x"], max_rotation_deg=4, turn_step_deg=4)
 
     @functools.cached_property
     def held(self):
@@ -278,7 +278,7 @@ class Scene:
 
     @functools.cached_property
     def targets(self):
-        return marrow.guide.target(view=self.stations.images, board=str(self.board))
+        return marrow.guide.target(view=self.stations.views, board=str(self.board))
 
     @functools.cached_property
     def poses(self):
@@ -334,5 +334,5 @@ class Scene:
     def ports_of(name):
         return {port["name"] for port in marrow._core.node_info(name)["inputs"]}
 
-    def with_mesh(self, name):
-        return {"mesh": self.mesh} if "mesh" in self.ports_of(name) else {}
+    def with_model(self, name):
+        return {"model": self.mesh} if "model" in self.ports_of(name) else {}

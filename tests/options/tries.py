@@ -37,7 +37,7 @@ TRIES = {
     "register.sequence.scan_side_mm": one(scan_poses=30, to=6),
     # Files
     "camera.bead_board.board": one(to=lambda s: str(written() / "nothing.yaml")),
-    "camera.check.points": one(to=""),
+    "camera.check.known_points": one(to=""),
     "read.camera.path": files("rtk.xml", "xreg.h5"),
     "read.camera.projection": one(path=lambda s: str(written() / "rtk.xml"), to=1),
     "read.cameras.path": files("xreg.h5"),
@@ -54,16 +54,16 @@ TRIES = {
     "read.landmarks.seen": one(
         to=lambda s: str(written() / "xreg.h5"),
         path=lambda s: str(written() / "points.fcsv"),
-        views=["frontal", "lateral"],
+        names=["frontal", "lateral"],
     ),
-    "read.landmarks.views": one(
+    "read.landmarks.names": one(
         to=["left", "right"], path=lambda s: str(written() / "points.fcsv"), seen=lambda s: str(written() / "xreg.h5")
     ),
     "read.landmarks.mirror": one(
         to="left_right",
         path=lambda s: str(written() / "points.fcsv"),
         seen=lambda s: str(written() / "xreg.h5"),
-        views=["frontal", "lateral"],
+        names=["frontal", "lateral"],
     ),
     "read.mesh.path": one(to=lambda s: str(surface_of(s.coarse_mesh, "other"))),
     "read.pose.path": files("start.yaml"),
@@ -84,10 +84,10 @@ TRIES = {
     "read.volume.path": files("nothing.mha"),
     "read.volume.flip": one(to=["x"]),
     "read.camera.corner_mm": one(to=[-100, -90]),
-    "read.camera.size_px": one(to=[90, 96]),
+    "read.camera.image_size_px": one(to=[90, 96]),
     "read.camera.pixel_mm": one(to=[2.5]),
     "read.cameras.corner_mm": one(to=[-100, -90]),
-    "read.cameras.size_px": one(to=[90, 96]),
+    "read.cameras.image_size_px": one(to=[90, 96]),
     "read.cameras.pixel_mm": one(to=[2.5]),
     "read.view.pixel_mm": one(to=[2.5]),
     "read.views.pixel_mm": one(to=[2.5]),
@@ -103,7 +103,7 @@ TRIES = {
     "camera.check.detector_mm": one(pixel_mm=1.9, to=100),
     # Voxels that are softer than this within the bone's margin.
     **{"project.%s.below_hu" % name: one(to=300) for name in ("joseph", "lightfield", "ray_casting", "siddon_jacobs")},
-    "project.lightfield.most_mb": one(step_mm=5, step_deg=3, to=1),
+    "project.lightfield.max_memory_mb": one(ray_spacing_mm=5, direction_spacing_deg=3, to=1),
     "evaluate.projection_distance.source_to_detector_mm": one(to=[1000]),
     "fracture.misalignment.fracture_mm": one(to=[0, 0, 40]),
     "plan.locking.from": one(to=[0, -1, 0]),
@@ -121,7 +121,7 @@ TRIES = {
     "camera.carm.names": one(to=["a", "b"]),
     "evaluate.frames.figures": one(to=["mtre_mm"]),
     "render.curves.figures": one(to=["mtre_mm"]),
-    "refine.cameras.reference": one(to="frontal"),
+    "refine.cameras.reference_view": one(to="frontal"),
     "simulate.bones.bodies": one(to=["distal"]),
     "simulate.camera_arm.names": one(to=["a", "b"]),
     "simulate.camera_faults.only": one(to=["frontal"]),
@@ -140,7 +140,7 @@ for _node in (
     TRIES[_node + ".reference"] = one(to="nobody")
 for _node in ("simulate.hexapod", "simulate.photograph", "robot.hexapod"):
     TRIES[_node + ".fragment"] = one(to="proximal")
-TRIES["robot.hexapod.fragment"] = one(reference="distal", to="proximal")
+TRIES["robot.hexapod.moved"] = one(reference="distal", to="proximal")
 TRIES["robot.hexapod.reference"] = one(to="nobody")
 for _node in (
     "contour_distance",

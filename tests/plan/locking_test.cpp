@@ -194,7 +194,7 @@ TEST(PlanLocking, DoubtsAreSaidInWords) {
       shipped::call("plan.locking", with_cost, {{"side", "left"}}).at("verdict").as<marrow::Verdict>();
   EXPECT_EQ(verdict.reasons.at(0),
             "the images do not show the holes where this pose has them: the cost there is 0.60, and the limit is 0.35");
-  EXPECT_EQ(shipped::call("plan.locking", with_cost, {{"side", "left"}, {"most_cost", 0.7}})
+  EXPECT_EQ(shipped::call("plan.locking", with_cost, {{"side", "left"}, {"max_cost", 0.7}})
                 .at("verdict")
                 .as<marrow::Verdict>()
                 .judgement,
@@ -258,12 +258,12 @@ TEST(PlanBodies, BonesNailAndARodForEachHole) {
   bones.add("without a pose", rod().surface);
   marrow::List<marrow::Pose> poses;
   poses.add("femur", at);
-  const auto bodies = shipped::call("plan.bodies", {{"bones", shipped::list(bones, "fragment")},
-                                                    {"bone_poses", shipped::list(poses, "fragment")},
+  const auto bodies = shipped::call("plan.bodies", {{"models", shipped::list(bones, "fragment")},
+                                                    {"poses", shipped::list(poses, "fragment")},
                                                     {"nail", shipped::item(rod().surface)},
                                                     {"pose", shipped::item(at)},
                                                     {"plan", plan}});
-  const auto meshes = bodies.at("meshes").as_list<marrow::Mesh>();
+  const auto meshes = bodies.at("models").as_list<marrow::Mesh>();
   EXPECT_EQ(meshes.names(), (std::vector<std::string>{"femur", "nail", "distal"}));
   EXPECT_EQ(bodies.at("poses").as_list<marrow::Pose>().names(), meshes.names());
   double most_x = -1e9, least_x = 1e9;

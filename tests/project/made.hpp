@@ -31,7 +31,7 @@ inline std::shared_ptr<const marrow::RadiographProjector> radiographs(const std:
 
 inline std::shared_ptr<const marrow::OutlineProjector> outlines(const std::string& node, const marrow::Mesh& mesh,
                                                                 const marrow::Volume* volume) {
-  shipped::Inputs in{{"mesh", shipped::item(mesh)}};
+  shipped::Inputs in{{"model", shipped::item(mesh)}};
   if (volume) in["volume"] = shipped::item(*volume);
   return projector<marrow::OutlineProjector>(node, in);
 }

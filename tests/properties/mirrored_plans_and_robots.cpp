@@ -65,7 +65,7 @@ void reduction() {
   expect_mirrored(right.at("pose").as<Pose>().world_from_model, left.at("pose").as<Pose>().world_from_model, 1e-9,
                   "the pose");
   const auto vector = [](const shipped::Outputs& outputs, const std::string& what, const std::string& unit) {
-    const Value& motion = outputs.at("motion");
+    const Value& motion = outputs.at("metrics");
     return Eigen::Vector3d(figure(motion, what + "_x_" + unit), figure(motion, what + "_y_" + unit),
                            figure(motion, what + "_z_" + unit));
   };
@@ -136,7 +136,7 @@ void bodies() {
     return shipped::call("plan.bodies", {{"nail", shipped::item(implant.surface)},
                                          {"pose", shipped::item(pose)},
                                          {"plan", plan_of(implant, pose, side)}})
-        .at("meshes")
+        .at("models")
         .as_list<Mesh>();
   };
   const auto of = drawn(rod(), pose_of_rod(), "left"), found = drawn(mirrored(rod()), mirrored(pose_of_rod()), "right");
@@ -249,7 +249,7 @@ void closed_loop() {
   EXPECT_EQ(found.at("stop").as<Stop>().reason, of.at("stop").as<Stop>().reason);
   expect_mirrored(found.at("motion").as<Pose>().world_from_model, of.at("motion").as<Pose>().world_from_model, 1e-4,
                   "the motion");
-  EXPECT_GT(figure(of.at("figures"), "step_mm"), 0.5) << "there is something to be mirrored";
+  EXPECT_GT(figure(of.at("metrics"), "step_mm"), 0.5) << "there is something to be mirrored";
 }
 
 void open_loop() {

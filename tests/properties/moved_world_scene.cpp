@@ -265,7 +265,7 @@ void Scene::add_projectors_and_costs() {
   };
   values_["radiograph_projector"] = made("project.joseph", {{"volume", "volume"}}, "projector");
   values_["outline_projector"] =
-      made("project.silhouette_edges", {{"mesh", "mesh"}, {"volume", "volume"}}, "projector");
+      made("project.silhouette_edges", {{"model", "mesh"}, {"volume", "volume"}}, "projector");
   values_["cost"] =
       made("similarity.contour_distance",
            {{"projector", "outline_projector"}, {"views", "view list"}, {"edges", "edge_map list"}}, "cost");

@@ -69,7 +69,7 @@ shipped::Options options_of(const std::string& node, const Change& change) {
     const Eigen::Vector3d centre_mm = change.in_ct({0, 0, 50});
     return {{"centre_mm", std::vector<double>(centre_mm.begin(), centre_mm.end())}};
   }
-  if (node == "evaluate.landscape") return {{"samples", std::int64_t(5)}};
+  if (node == "evaluate.landscape") return {{"profile_points", std::int64_t(5)}};
   return {};
 }
 

@@ -32,7 +32,7 @@ def contour():
         truth = case.truth["distal"].matrix
         bone = marrow.segment.threshold(case.ct, case.seeds)["distal"]
         model = marrow.mesh.marching_cubes(bone)
-        outline = marrow.project.silhouette_edges(mesh=model, volume=case.ct)
+        outline = marrow.project.silhouette_edges(model=model, volume=case.ct)
         edges = marrow.edges.canny(case.views)
         cost = marrow.similarity.contour_distance(projector=outline, views=case.views, edges=edges)
         _made["all"] = (cost, outline, truth, case.views)
@@ -75,7 +75,7 @@ class Costs(Functions):
         cost, _, truth, _ = contour()
         self.assertEqual((type(cost), cost.type, repr(cost)), (marrow.Cost, "cost", "<marrow cost>"))
         pose = marrow.Pose(truth)
-        profiles = marrow.evaluate.landscape(cost, pose, samples=5).profiles
+        profiles = marrow.evaluate.landscape(cost, pose, profile_points=5).profiles
         for axis, profile in enumerate(profiles[3:]):
             shifts = [offset * pose.axes[:, axis] for offset in profile.offsets]
             poses = numpy.array([moved(truth, shift) for shift in shifts])
@@ -110,7 +110,7 @@ class Costs(Functions):
     def test_a_cost_goes_on_to_another_node_and_outlives_its_inputs(self):
         cost = marrow.similarity.normalised_cross_correlation(marrow.project.joseph(ball()), [view()])
         self.assertEqual(cost(numpy.eye(4)), cost(numpy.eye(4)))
-        self.assertEqual(len(marrow.evaluate.landscape(cost, marrow.Pose(numpy.eye(4)), samples=3).profiles), 6)
+        self.assertEqual(len(marrow.evaluate.landscape(cost, marrow.Pose(numpy.eye(4)), profile_points=3).profiles), 6)
 
     def test_errors_and_ctrl_c_of_a_cost(self):
         self.plugin(SLOW)

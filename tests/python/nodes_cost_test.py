@@ -73,7 +73,7 @@ class Costs(Written):
         found = marrow.register.multiresolution(
             cost=marrow.similarity.near([view()]),
             optimizer=marrow.optimizer.nelder_mead(),
-            initial=marrow.Pose(numpy.eye(4)),
+            start=marrow.Pose(numpy.eye(4)),
         )
         self.assertLess(numpy.abs(found.pose.matrix[:3, 3] - 3).max(), 0.1)
 

@@ -125,7 +125,7 @@ def near():
             "costs.py",
         )
         found = marrow.register.multiresolution(
-            cost=marrow.similarity.near(), optimizer=marrow.optimizer.steps(), initial=marrow.Pose(numpy.eye(4))
+            cost=marrow.similarity.near(), optimizer=marrow.optimizer.steps(), start=marrow.Pose(numpy.eye(4))
         )
         self.assertLess(numpy.abs(found.pose.matrix[:3, 3] - 3).max(), 0.1)
 

@@ -12,7 +12,7 @@ class Nodes(Case):
         pipeline = marrow.Pipeline(FEMUR, case=folder).set({"edges.uses": "edges.canny", "edges.high": 8})
         expected = pipeline.run(only=["edges"])["edges"]["lateral"].pixels
         views = marrow.read.case(path=folder).views
-        self.assertTrue(numpy.array_equal(marrow.edges.canny(views["lateral"], high=8).pixels, expected))
+        self.assertTrue(numpy.array_equal(marrow.edges.canny(views["lateral"], noise_high=8).pixels, expected))
         self.assertTrue(numpy.array_equal(marrow.node("edges.canny")(view=views["lateral"], high=8).pixels, expected))
         self.assertFalse(len(marrow.edges.canny(views["lateral"]).pixels) == len(expected))
 
@@ -37,10 +37,10 @@ class Nodes(Case):
         edges = marrow.edges.adaptive_relaxation(case.views, low=50, high=75)
         shaft = marrow.shaft.hough_pairs(edges=edges, view=case.views)
         start = marrow.initial.shaft_axis(model=model, lines=shaft, views=case.views)
-        outline = marrow.project.silhouette_edges(mesh=model, volume=case.ct)
+        outline = marrow.project.silhouette_edges(model=model, volume=case.ct)
         cost = marrow.similarity.contour_distance(projector=outline, views=case.views, edges=edges)
         found = marrow.register.multiresolution(
-            cost=cost, optimizer=marrow.optimizer.levenberg_marquardt(), initial=start
+            cost=cost, optimizer=marrow.optimizer.levenberg_marquardt(), start=start
         )
         expected = marrow.Pipeline(FEMUR, case=folder).run(only=["pose"], keep=False)["pose"]
         self.assertEqual(found.pose["distal"].matrix.tolist(), expected["distal"].matrix.tolist())
@@ -55,8 +55,8 @@ class Nodes(Case):
         )
         signature = inspect.signature(canny)
         self.assertEqual(list(signature.parameters), ["view", "sigma_px", "logarithm", "window_px", "low", "high"])
-        self.assertEqual(signature.parameters["high"].default, 5)
-        self.assertEqual(signature.parameters["high"].kind, inspect.Parameter.KEYWORD_ONLY)
+        self.assertEqual(signature.parameters["noise_high"].default, 5)
+        self.assertEqual(signature.parameters["noise_high"].kind, inspect.Parameter.KEYWORD_ONLY)
         self.assertIn("canny", dir(marrow.edges))
         self.assertIn("edges", dir(marrow))
         self.assertEqual(marrow.edges.__doc__, "edge pixels of an X-ray view")
@@ -74,9 +74,9 @@ class Nodes(Case):
             (lambda: marrow.edges.canny(), "edges.canny needs the input 'view', of type view"),
             (lambda: marrow.edges.canny([]), "input 'view': the list is empty"),
             (lambda: marrow.edges.canny(7), "input 'view': expected view, got int"),
-            (lambda: marrow.edges.canny(view, high="much"), 'expected a number, got the quoted text "much"'),
-            (lambda: marrow.edges.canny(view, high=-1), "-1 is below the least allowed, 0"),
-            (lambda: marrow.edges.canny(view, low=9, high=5), "low"),
+            (lambda: marrow.edges.canny(view, noise_high="much"), 'expected a number, got the quoted text "much"'),
+            (lambda: marrow.edges.canny(view, noise_high=-1), "-1 is below the least allowed, 0"),
+            (lambda: marrow.edges.canny(view, noise_low=9, noise_high=5), "low"),
             (lambda: marrow.edges.canny(view.image), "input 'view' of edges.canny expects view, got image"),
             (
                 lambda: marrow.edges.canny(view.image.array),
@@ -91,8 +91,8 @@ class Nodes(Case):
             with self.assertRaisesRegex(marrow.Error, text):
                 call()
         with self.assertRaises(marrow.PipelineError) as caught:
-            marrow.edges.canny(view, high=-1)
-        self.assertEqual((caught.exception.node, caught.exception.option), ("edges.canny", "high"))
+            marrow.edges.canny(view, noise_high=-1)
+        self.assertEqual((caught.exception.node, caught.exception.option), ("edges.canny", "noise_high"))
         with self.assertRaises(marrow.PipelineError) as caught:
             marrow.edges.canny(view.image)
         self.assertEqual((caught.exception.node, caught.exception.port), ("edges.canny", "view"))

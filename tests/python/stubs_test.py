@@ -11,7 +11,7 @@ from package import BUILD, TEST_PLUGINS, Case, main, marrow
 
 PACKAGE = BUILD / "python"
 USE = """import marrow
-edges = marrow.edges.canny(marrow.View([[1]], marrow.Camera(1, 1, [[1]], [[1]])), high=5)
+edges = marrow.edges.canny(marrow.View([[1]], marrow.Camera(1, 1, [[1]], [[1]])), noise_high=5)
 marrow.edges.canny.using(threads=2)
 print(marrow.Pipeline("a.yaml", case="b").run(only=["pose"])["pose"], edges)
 print(marrow.optimizer.nelder_mead().minimise(lambda x: float(x @ x), [1], [1]).x)

@@ -43,7 +43,7 @@ TEST(RefineCameras, TheReferenceStaysAndTheOthersGoByIt) {
   std::vector<Bone> bones{Bone({none, off}, 1e6)};
   const RigidTransform right = bones[0].pose.world_from_model;
   bones[0].pose = well::pose_at(bones[0].pose, 0.2, 0.1, -0.1, 0.3, 0.5, -0.3);
-  const auto outputs = shipped::call("refine.cameras", inputs(bones), {{"reference", std::string("frontal")}});
+  const auto outputs = shipped::call("refine.cameras", inputs(bones), {{"reference_view", std::string("frontal")}});
   const auto is_near = [](const RigidTransform& is, const RigidTransform& wanted) {
     return marrow::degrees(marrow::geodesic_angle_rad(wanted.rotation, is.rotation)) < 0.01 &&
            (wanted.translation_mm - is.translation_mm).norm() < 0.05;
@@ -77,7 +77,7 @@ TEST(RefineCameras, WhereImagesHardlyTellHowFarTheCamerasAreOffTheDeviationsSayS
   const auto deviation_mm = [&](double information) {
     // Against a camera that is right, so that nothing of what both share is left.
     const auto outputs = shipped::call("refine.cameras", inputs({Bone({none, none}, information)}),
-                                       {{"reference", std::string("lateral")}});
+                                       {{"reference_view", std::string("lateral")}});
     return figure(motions(outputs, 0), "predicted_shift_u_mm");
   };
   const double expected_mm = std::sqrt(1 / 3.0 + 25 / 2.0 * std::pow(600 / 1700.0, 2));
@@ -167,8 +167,8 @@ TEST(RefineCameras, WarnsOfCamerasThatAreFarOff) {
       << warnings[0];
   warnings.clear();
   shipped::call("refine.cameras", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 1, 0})})}),
-                {{"max_rounds", std::int64_t(1)}}, marrow::Context(hooks));
-  EXPECT_EQ(warnings, std::vector<std::string>{"the cameras still moved after 1 rounds; raise max_rounds"});
+                {{"max_iterations", std::int64_t(1)}}, marrow::Context(hooks));
+  EXPECT_EQ(warnings, std::vector<std::string>{"the cameras still moved after 1 iterations; raise max_iterations"});
 }
 
 TEST(RefineCameras, ACostOfViewsNeedsItsBlocks) {
@@ -204,7 +204,7 @@ TEST(RefineCameras, SaysWhatIsWrong) {
       shipped::refusal("refine.cameras", inputs({Bone({})})),
       "the cost of 'distal' cannot be split into views: it compares no views, or it holds more than them, such as "
       "a prior; give the cost of the images alone");
-  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({bone}), {{"reference", std::string("frontl")}}),
+  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({bone}), {{"reference_view", std::string("frontl")}}),
             "reference: there is no view 'frontl'; did you mean 'frontal'?");
   Bone negative = bone;
   negative.pose.covariance = marrow::Matrix6d(-marrow::Matrix6d::Identity());

@@ -44,7 +44,7 @@ TEST(RefineCameras, AMotionThatBothCamerasShareIsAsLargeAsTheOptionsSay) {
 
 TEST(RefineCameras, WhatIsSharedGoesByTheReference) {
   const RigidTransform off = motion({0.2, 0.2, -0.2}, {1, 1, 1});
-  const Outcome found = outcome(Bone({off, off}, 1e6), {{"reference", std::string("frontal")}});
+  const Outcome found = outcome(Bone({off, off}, 1e6), {{"reference_view", std::string("frontal")}});
   // The reference is taken as right, so the bone follows it. That the other camera is off as much fits by no chance.
   EXPECT_LT(std::sqrt(found.covariance.diagonal().maxCoeff()), 0.05);
 }

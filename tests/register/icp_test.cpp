@@ -53,13 +53,13 @@ const Bone& bone() {
 shipped::Outputs run(const marrow::Pose& start, const marrow::Mesh& target, const shipped::Options& options = {}) {
   return shipped::call(
       "register.icp",
-      {{"initial", shipped::item(start)}, {"model", shipped::item(bone().model)}, {"target", shipped::item(target)}},
+      {{"start", shipped::item(start)}, {"model", shipped::item(bone().model)}, {"target", shipped::item(target)}},
       options);
 }
 std::string refusal(const marrow::Pose& start, const marrow::Mesh& model, const marrow::Mesh& target) {
   return shipped::refusal(
       "register.icp",
-      {{"initial", shipped::item(start)}, {"model", shipped::item(model)}, {"target", shipped::item(target)}});
+      {{"start", shipped::item(start)}, {"model", shipped::item(model)}, {"target", shipped::item(target)}});
 }
 
 marrow::Vector6d displacement() {

@@ -39,7 +39,7 @@ struct Problem {
 struct Trial {
   Trial(marrow::Mesh surface, double height_mm)
       : mesh(std::move(surface)),
-        projector(shipped::call("project.silhouette_edges", {{"mesh", shipped::item(mesh)}}).at("projector")) {
+        projector(shipped::call("project.silhouette_edges", {{"model", shipped::item(mesh)}}).at("projector")) {
     truth.frame = marrow::fragment_frame(mesh);
     truth.world_from_model =
         marrow::search::moved_by_units(shapes::centred_at({0, 0, height_mm}), truth.frame, motion(3, -5, 6, 3, -4, 5));
@@ -56,7 +56,7 @@ struct Trial {
                      {"edges", shipped::list(seen.edges, "view")}};
     problem.inputs = {{"cost", shipped::call("similarity.contour_distance", problem.scene).at("cost")},
                       {"optimizer", shipped::call("optimizer.levenberg_marquardt", {}).at("optimizer")},
-                      {"initial", shipped::item(start)}};
+                      {"start", shipped::item(start)}};
     return problem;
   }
   Result run(const std::vector<double>& angles_deg, const ideal_edges::Faults& faults, const marrow::Vector6d& away,

@@ -79,7 +79,7 @@ struct Made {
         inputs["projector"] = Value::of<RadiographProjector>(scene.radiograph);
       if (port.name == "views") inputs["views"] = shipped::list(scene.views, "view");
       if (port.name == "edges") inputs["edges"] = shipped::list(scene.edges, "view");
-      if (port.name == "mesh") inputs["mesh"] = shipped::item(analytic::mesh_of(bone()));
+      if (port.name == "model") inputs["model"] = shipped::item(analytic::mesh_of(bone()));
       if (port.name == "volume") inputs["volume"] = shipped::item(analytic::volume_of(bone(), grid, 700, 0));
       if (port.name == "field") inputs["field"] = shipped::item(analytic::field_of(bone(), grid, 6));
     }
@@ -102,7 +102,7 @@ shipped::Options one_level(const std::string& node) {
   options["max_evaluations"] = std::int64_t(60);
   if (node == "register.tracked") {
     options["wide_poses"] = std::int64_t(8);
-    options["most_wide_deg"] = options["most_wide_mm"] = 2.0;
+    options["max_wide_deg"] = options["max_wide_mm"] = 2.0;
     return options;
   }
   options["step_tolerance"] = one(0.1);
@@ -122,7 +122,7 @@ shipped::Inputs inputs_of(const std::string& node, const Made& made, const Pose&
     inputs["start"] = shipped::item(start);
     inputs["model"] = shipped::item(analytic::mesh_of(bone()));
   } else {
-    inputs["initial"] = shipped::item(start);
+    inputs["start"] = shipped::item(start);
   }
   if (node == "register.sequence") inputs["finer_cost"] = made.cost;
   return inputs;
@@ -252,7 +252,7 @@ TEST(NothingCompared, ASurfaceTurnedInsideOutIsNoPose) {
   Mesh mesh = analytic::mesh_of(bone());
   for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
   const Value kept = shipped::item(mesh);
-  const Value projector = shipped::call("project.silhouette_edges", {{"mesh", kept}}).at("projector");
+  const Value projector = shipped::call("project.silhouette_edges", {{"model", kept}}).at("projector");
   scene.outline = std::static_pointer_cast<const OutlineProjector>(projector.data);
   for (const std::string& search : kSearches)
     EXPECT_NE(refusal(search, "similarity.contour_distance", scene)

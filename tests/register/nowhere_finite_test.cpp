@@ -20,7 +20,7 @@ TEST(NowhereFinite, ASearchSaysSo) {
   for (const char* node : {"register.multiresolution", "register.tracked"}) {
     const shipped::Inputs inputs{{"cost", marrow::Value::of<marrow::Cost>(std::make_shared<const Nowhere>())},
                                  {"optimizer", shipped::call("optimizer.nelder_mead", {}).at("optimizer")},
-                                 {"initial", shipped::item(marrow::Pose())}};
+                                 {"start", shipped::item(marrow::Pose())}};
     const std::string said = shipped::refusal(node, inputs, {});
     EXPECT_TRUE(said.starts_with("the optimizer found no least value: the function is not finite at any of the "))
         << node << ": " << said;

@@ -45,7 +45,7 @@ TEST(Prior, ThePoseLiesBetweenImagesAndPriorWithTheDeviationOfBoth) {
     const Pose pose = shipped::call("register.multiresolution",
                                     {{"cost", made.at("cost")},
                                      {"optimizer", shipped::call("optimizer.nelder_mead", {}).at("optimizer")},
-                                     {"initial", shipped::item(at)}},
+                                     {"start", shipped::item(at)}},
                                     {{"scan_rotation_deg", 0.0},
                                      {"scan_translation_mm", 0.0},
                                      {"candidates", std::int64_t(1)},

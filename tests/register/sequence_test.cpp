@@ -26,7 +26,7 @@ struct Trial {
                                          6);  // of its waves the first cost is to lead out
     inputs["finer_cost"] = marrow::Value::of<Cost>(finer);
     inputs["optimizer"] = shipped::call("optimizer.nelder_mead", {}).at("optimizer");
-    inputs["initial"] = shipped::item(pose_at(truth(), 2, -2, 8, 3, -3, 9));
+    inputs["start"] = shipped::item(pose_at(truth(), 2, -2, 8, 3, -3, 9));
   }
   shipped::Outputs run(const shipped::Options& options = {}) const {
     return shipped::call("register.sequence", inputs, options);
@@ -47,7 +47,7 @@ TEST(Sequence, TheFirstCostLeadsAndTheSecondDecides) {
   EXPECT_TRUE(pose.warnings.empty());
   const auto stages = out.at("stages").as_list<Pose>();
   ASSERT_EQ(stages.names(), (std::vector<std::string>{"start", "first", "final"}));
-  EXPECT_LT(apart(stages[0], trial.inputs.at("initial").as<Pose>()), 1e-9);
+  EXPECT_LT(apart(stages[0], trial.inputs.at("start").as<Pose>()), 1e-9);
   EXPECT_LT(apart(stages[1], first), 0.1);
   EXPECT_GT(stages[1].evaluations, 50);
   EXPECT_EQ(stages[2].evaluations, pose.evaluations);
@@ -90,7 +90,7 @@ TEST(Sequence, SaysWhereTheCostsDoNotAgree) {
   EXPECT_TRUE(pose.warnings[0].starts_with("the two costs lead to poses ")) << pose.warnings[0];
   EXPECT_TRUE(pose.warnings[0].ends_with(" and 3.5 mm apart: one of them is wrong; look at the overlays of both"))
       << pose.warnings[0];
-  EXPECT_TRUE(trial.run({{"most_apart_mm", 4.0}}).at("pose").as<Pose>().warnings.empty());
+  EXPECT_TRUE(trial.run({{"max_apart_mm", 4.0}}).at("pose").as<Pose>().warnings.empty());
 }
 
 TEST(Sequence, DeclaresAsManyNumbersForEachLevel) {
@@ -108,7 +108,7 @@ TEST(Sequence, SaysWhatIsWrong) {
             "finer_step_deg: each number must be positive");
   Pose broken = truth();
   broken.world_from_model.translation_mm.x() = std::nan("");
-  trial.inputs["initial"] = shipped::item(broken);
+  trial.inputs["start"] = shipped::item(broken);
   EXPECT_NE(shipped::refusal("register.sequence", trial.inputs).find("the pose to start from"), std::string::npos);
 }
 

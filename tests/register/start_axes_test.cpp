@@ -39,7 +39,7 @@ struct Trial {
     inputs = {{"cost", marrow::Value::of<Cost>(std::make_shared<const well::Bowl>(
                            start.world_from_model, marrow::fragment_frame(mesh), hessian))},
               {"optimizer", shipped::call("optimizer.nelder_mead", {}).at("optimizer")},
-              {"initial", shipped::item(start)}};
+              {"start", shipped::item(start)}};
     if (with_model) inputs["model"] = shipped::item(mesh);
   }
   Pose run(const std::string& node) {
@@ -94,13 +94,13 @@ TEST(StartAxes, TheCovarianceOfAPredictionIsTurnedToo) {
   Trial trial(true);
   const FragmentFrame frame = marrow::fragment_frame(trial.mesh);
   Pose predicted;
-  predicted.world_from_model = trial.inputs.at("initial").as<Pose>().world_from_model;
+  predicted.world_from_model = trial.inputs.at("start").as<Pose>().world_from_model;
   predicted.frame = frame;
   Matrix6d covariance = Matrix6d::Identity();
   covariance.diagonal().head<3>() = (Eigen::Vector3d(0.2, 0.2, 1) * marrow::radians(1)).cwiseAbs2();
   predicted.covariance = covariance;
   Pose given = in_frame(predicted, FragmentFrame());
-  trial.inputs["initial"] = shipped::item(given);
+  trial.inputs["start"] = shipped::item(given);
   const auto out = shipped::call("register.tracked", trial.inputs);
   const Pose& told = out.at("stages").as_list<Pose>()[0];
   EXPECT_LT((*told.covariance - covariance).norm(), 1e-12);
@@ -117,9 +117,9 @@ TEST(StartAxes, RefusesTheModelOfAnotherBone) {
 
 TEST(StartAxes, WarningsOfTheStartAreNotOfThePose) {
   Trial trial(true);
-  Pose start = trial.inputs.at("initial").as<Pose>();
+  Pose start = trial.inputs.at("start").as<Pose>();
   start.warnings = {"the landmarks lie nearly on a line"};
-  trial.inputs["initial"] = shipped::item(start);
+  trial.inputs["start"] = shipped::item(start);
   for (const char* node : kNodes)
     for (const std::string& warning : trial.run(node).warnings) EXPECT_NE(warning, start.warnings[0]) << node;
 }

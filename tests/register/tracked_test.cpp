@@ -33,7 +33,7 @@ Pose predicted(const Vector6d& off_deg_mm, double deg, double mm) {
 shipped::Inputs inputs(const std::shared_ptr<const Cost>& cost, const Pose& initial) {
   return {{"cost", marrow::Value::of<Cost>(cost)},
           {"optimizer", shipped::call("optimizer.nelder_mead", {}).at("optimizer")},
-          {"initial", shipped::item(initial)}};
+          {"start", shipped::item(initial)}};
 }
 
 double apart(const Pose& pose) {

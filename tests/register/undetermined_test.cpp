@@ -29,7 +29,7 @@ marrow::Pose found(const marrow::Mesh& mesh, const marrow::Value& projector, uns
   return shipped::call("register.multiresolution",
                        {{"cost", cost.at("cost")},
                         {"optimizer", shipped::call("optimizer.levenberg_marquardt", {}).at("optimizer")},
-                        {"initial", shipped::item(start)}},
+                        {"start", shipped::item(start)}},
                        {{"scan_rotation_deg", 0.0}, {"scan_translation_mm", 0.0}})
       .at("pose")
       .as<marrow::Pose>();
@@ -41,7 +41,7 @@ TEST(Undetermined, ABodyOfRevolutionIsNeverTrusted) {
       for (const unsigned seed : {1u, 2u, 3u}) {
         SCOPED_TRACE(std::string(name) + ", " + std::to_string(facets) + " facets, seed " + std::to_string(seed));
         const marrow::Mesh mesh = shapes::cylinder(14, 90, facets);
-        const shipped::Inputs model{{"mesh", shipped::item(mesh)}};  // the projector refers to it
+        const shipped::Inputs model{{"model", shipped::item(mesh)}};  // the projector refers to it
         const marrow::Pose pose = found(mesh, shipped::call(name, model).at("projector"), seed);
         // A turn that is anywhere between -16 and 16 degrees, as far as is looked, has a deviation of 16 / sqrt(3)
         // = 9.2.
@@ -51,7 +51,7 @@ TEST(Undetermined, ABodyOfRevolutionIsNeverTrusted) {
         ASSERT_EQ(pose.warnings.size(), 1u);
         EXPECT_EQ(pose.warnings[0].rfind("axial rotation is ", 0), 0u) << pose.warnings[0];
         const auto verdict =
-            shipped::call("verdict.predicted", {{"pose", shipped::item(pose)}, {"mesh", shipped::item(mesh)}});
+            shipped::call("verdict.predicted", {{"pose", shipped::item(pose)}, {"model", shipped::item(mesh)}});
         EXPECT_NE(verdict.at("verdict").as<marrow::Verdict>().judgement, marrow::Judgement::trusted);
       }
 }

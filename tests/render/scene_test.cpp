@@ -26,7 +26,7 @@ marrow::Pose at(const Eigen::Vector3d& translation_mm) {
 
 cv::Mat draw(const marrow::List<marrow::Mesh>& meshes, const marrow::List<marrow::Pose>& poses) {
   return shipped::call("render.scene",
-                       {{"meshes", shipped::list(meshes, "fragment")},
+                       {{"models", shipped::list(meshes, "fragment")},
                         {"poses", shipped::list(poses, "fragment")},
                         {"view", shipped::item(view())}},
                        {{"size_px", std::int64_t{200}}})

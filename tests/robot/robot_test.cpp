@@ -124,7 +124,7 @@ TEST(Robot, StopsBeforeTheForceThatIsTooLarge) {
   EXPECT_LE(report.largest_load.force_n, 400);
   EXPECT_LT(report.done.translation_mm.z(), 29);
   EXPECT_GT(report.done.translation_mm.z(), 2);
-  EXPECT_EQ(shipped::figure(after.at("figures"), "stopped"), 1);
+  EXPECT_EQ(shipped::figure(after.at("metrics"), "stopped"), 1);
 }
 
 TEST(Robot, StopsAtItsWorkspace) {
@@ -152,7 +152,7 @@ TEST(Robot, RefusesWhatItCannotGrip) {
       text.ends_with("its limit is 400 N; does its bone stick in the other fragment? Begin with the fragments apart"))
       << text;
   EXPECT_EQ(shipped::refusal("robot.hexapod", {{"phantom", shipped::item(broken({0, 0, 0}, {0, 0, -5}))}},
-                             {{"fragment", "proximal"}, {"reference", "distal"}}),
+                             {{"moved", "proximal"}, {"reference", "distal"}}),
             "robot.hexapod: the robot holds the distal fragment, and the proximal one stays; got 'proximal' and "
             "'distal'");
   Phantom whole = broken({0, 0, 0}, {0, 0, -5});

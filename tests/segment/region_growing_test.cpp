@@ -10,7 +10,7 @@ constexpr const char* kNode = "segment.region_growing";
 
 TEST(RegionGrowing, TwoFragmentsOneMillimetreApart) {
   const phantom::BrokenTube tube;
-  phantom::expect_both(tube, segmented::fields(kNode, tube.volume(), tube.seeds(), {{"least_hu", 650.0}}));
+  phantom::expect_both(tube, segmented::fields(kNode, tube.volume(), tube.seeds(), {{"threshold_hu", 650.0}}));
 }
 
 TEST(RegionGrowing, GivesOnlyWantedFragmentsAndKeepsThemFromTheOthersBone) {

@@ -45,7 +45,7 @@ marrow::View view_of(double angle) {
 shipped::Inputs inputs() {
   marrow::List<marrow::View> views;
   for (const double angle : {0.0, 90.0}) views.add(angle > 0 ? "lateral" : "frontal", view_of(angle));
-  return {{"mesh", shipped::item(shapes::sphere(kRadius_mm))},
+  return {{"model", shipped::item(shapes::sphere(kRadius_mm))},
           {"volume", shipped::item(ball())},
           {"views", shipped::list(views, "view")}};
 }
@@ -77,7 +77,7 @@ TEST(GradientProjection, IsBestAtTheTruth) {
 TEST(GradientProjection, ALevelSmoothsTheImagesAsMuchMoreAsItsPixelsAreWider) {
   const shipped::Inputs in = inputs();
   const auto cost = [&](double blur_px) {
-    return shipped::call("similarity.gradient_projection", in, {{"blur_px", blur_px}}).at("cost");
+    return shipped::call("similarity.gradient_projection", in, {{"sigma_px", blur_px}}).at("cost");
   };
   const marrow::Value fine = cost(1.5), smooth = cost(4.5);
   for (const double off_mm : {0.0, 2.0})
@@ -132,7 +132,7 @@ TEST(GradientProjection, ABrightSpotCountsTwiceAtMost) {
       volume.values[i] += float(brightness * 800 * std::clamp(depth + 0.5, 0.0, 1.0));
     }
     shipped::Inputs in = inputs();
-    in["mesh"] = shipped::item(mesh);
+    in["model"] = shipped::item(mesh);
     in["volume"] = shipped::item(volume);
     return 1 /
            (1 -

@@ -46,7 +46,7 @@ double value(const std::string& node, const shipped::Inputs& inputs, const marro
 }
 
 TEST(Others, TheirShadowsDoNotCount) {
-  const shipped::Options options{{"blur_px", 0.0}};
+  const shipped::Options options{{"sigma_steps", 0.0}};
   const std::shared_ptr<const RadiographProjector> own = std::make_shared<const BlobProjector>();
   const Fragments<RadiographProjector> fragments{own, std::make_shared<const SquareProjector>()};
   for (const bool is_outline : {false, true}) {
@@ -81,7 +81,7 @@ TEST(Others, TheirShadowsDoNotCountHoweverEachIsDrawn) {
     shipped::Inputs inputs = fragments.with({{"views", shipped::list(intensity_behaviour::views_of(view), "view")}});
     inputs["other_outlines"] = shipped::list(outlines, "fragment");
     inputs["others"] = shipped::list(poses, "fragment");
-    return value("similarity.normalised_cross_correlation", inputs, at(2, 1), {{"blur_px", 0.0}});
+    return value("similarity.normalised_cross_correlation", inputs, at(2, 1), {{"sigma_steps", 0.0}});
   };
   EXPECT_NEAR(with(9000), with(40000), 1e-6);
 }

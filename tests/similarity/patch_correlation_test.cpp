@@ -45,7 +45,7 @@ double value(const std::function<double(double, double)>& rendered, const std::f
       {"views", shipped::list(intensity_behaviour::views_of(small_view(seen)), "view")}};
   const shipped::Options options{{"pixel_step", std::int64_t(1)},
                                  {"margin_px", std::int64_t(0)},
-                                 {"blur_px", 0.0},
+                                 {"sigma_steps", 0.0},
                                  {"patch_pixels", std::int64_t(5)}};
   const marrow::Value cost = shipped::call("similarity.patch_correlation", inputs, options).at("cost");
   return cost.as<marrow::Cost>().value(at(0, 0));

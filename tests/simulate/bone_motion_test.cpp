@@ -18,7 +18,7 @@ TEST(BoneMotion, IsAsFarAsAskedHalfAPeriodLater) {
                                      {"frame_rate_hz", 8.0},
                                      {"period_s", 1.0},
                                      {"rotation_deg", std::vector<double>{0, 0, 40}},
-                                     {"shift_mm", std::vector<double>{0, 0, 7}}})
+                                     {"translation_mm", std::vector<double>{0, 0, 7}}})
                           .at("postures")
                           .as_list<phantom::Posture>();
   ASSERT_EQ(frames.names().back(), "0009");

@@ -26,7 +26,7 @@ List<View> one(const View& view) {
 
 View exported(const View& view, const shipped::Options& options, const View* earlier = nullptr) {
   shipped::Inputs inputs{{"views", shipped::list(one(view), "view")}};
-  if (earlier) inputs["earlier"] = shipped::list(one(*earlier), "view");
+  if (earlier) inputs["earlier_views"] = shipped::list(one(*earlier), "view");
   return shipped::call("simulate.export", inputs, options).at("views").as_list<View>()[0];
 }
 
@@ -118,7 +118,7 @@ TEST(SimulateExport, BadInputIsExplained) {
   const auto refusal = [&](const View& earlier) {
     return shipped::refusal(
         "simulate.export",
-        {{"views", shipped::list(one(even(100)), "view")}, {"earlier", shipped::list(one(earlier), "view")}}, lag);
+        {{"views", shipped::list(one(even(100)), "view")}, {"earlier_views", shipped::list(one(earlier), "view")}}, lag);
   };
   EXPECT_EQ(refusal(even(100, 64, "lateral")),
             "simulate.export: there is no earlier image of view 'frontal'; give 'earlier' the same views");
@@ -129,7 +129,7 @@ Camera stated(const Camera& camera, int seed, const std::string& level) {
   View view = even(100, 512);
   view.camera = camera;
   return shipped::call("simulate.camera_faults", {{"views", shipped::list(one(view), "view")}},
-                       {{"camera_seed", seed}, {"level", level}})
+                       {{"camera_seed", seed}, {"severity", level}})
       .at("views")
       .as_list<View>()[0]
       .camera;

@@ -37,7 +37,7 @@ TEST(SimulateFracture, CentreOfAnOutlineIsExact) {
   double low = 1e9, high = -1e9;
   for (const auto& vertex : bone.outer.vertices_mm) low = std::min(low, vertex.z()), high = std::max(high, vertex.z());
   // A smooth fracture contains the centre of the outline at its level, and rises here by 1 mm in 1 mm.
-  shipped::Options options{{"level", (12.34 - low) / (high - low)}, {"obliquity_deg", 45.0}, {"roughness_mm", 0.0}};
+  shipped::Options options{{"height_fraction", (12.34 - low) / (high - low)}, {"obliquity_deg", 45.0}, {"roughness_mm", 0.0}};
   options["direction_deg"] = 0.0;
   for (const auto& point : relief(bone, options)) ASSERT_NEAR(point.x() - (point.z() - 12.34), 3, 0.02);
   options["direction_deg"] = 90.0;
@@ -46,7 +46,7 @@ TEST(SimulateFracture, CentreOfAnOutlineIsExact) {
 
 TEST(SimulateFracture, CutsAtItsLevelWithItsObliquity) {
   const Phantom phantom = simulated::fracture(
-      shaft(), {{"level", 0.4}, {"obliquity_deg", 30.0}, {"direction_deg", 0.0}, {"roughness_mm", 0.0}});
+      shaft(), {{"height_fraction", 0.4}, {"obliquity_deg", 30.0}, {"direction_deg", 0.0}, {"roughness_mm", 0.0}});
   EXPECT_TRUE(is_closed(phantom.fracture));
   EXPECT_GT(enclosed_volume_mm3(phantom.fracture), 0);
   double below = -1e9, above = 1e9;  // the surface's height at the axis and 10 mm to the left
@@ -61,7 +61,7 @@ TEST(SimulateFracture, CutsAtItsLevelWithItsObliquity) {
 TEST(SimulateFracture, RoughnessIsItsRootMeanSquareAndItsSeedChangesIt) {
   Bone block;  // wide against the longest waves of the relief, 40 mm
   block.outer = test::box({-60, -60, -100}, {60, 60, 100});
-  shipped::Options options{{"obliquity_deg", 0.0}, {"roughness_mm", 1.5}, {"level", 0.5}};
+  shipped::Options options{{"obliquity_deg", 0.0}, {"roughness_mm", 1.5}, {"height_fraction", 0.5}};
   const auto surface = [&](int seed) {
     options["fracture_seed"] = std::int64_t{seed};
     return relief(block, options);
@@ -134,7 +134,7 @@ TEST(SimulateFracture, BadInputIsExplained) {
   EXPECT_EQ(marrow::test::message_of([&] { simulated::fracture(few, {}); }),
             "simulate.fracture: the bone share needs as many positions as values, got 1 and 2");
   EXPECT_EQ(marrow::test::message_of([] {
-              simulated::fracture(shaft(), {{"level", 1.2}});
+              simulated::fracture(shaft(), {{"height_fraction", 1.2}});
             }),
             "simulate.fracture: the level 1.200000 must lie in 0.1 to 0.9 of the bone's length");
 }

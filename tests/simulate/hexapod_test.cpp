@@ -46,7 +46,7 @@ std::array<double, 2> errors(const shipped::Outputs& made, const List<Pose>& com
 TEST(SimulateSweeps, BeginAtNeutralAndGoFromThereToEitherSide) {
   const List<Pose> all = sweeps({});
   EXPECT_EQ(all.size(), 94u);  // 3 x 31 and the neutral one
-  const List<Pose> commands = sweeps({{"axes", std::vector<std::string>{"y"}}, {"range_deg", 5.0}, {"step_deg", 2.5}});
+  const List<Pose> commands = sweeps({{"axes", std::vector<std::string>{"y"}}, {"max_rotation_deg", 5.0}, {"turn_step_deg", 2.5}});
   EXPECT_EQ(commands.names(),
             (std::vector<std::string>{"neutral", "ry+00.00", "ry+02.50", "ry+05.00", "ry-02.50", "ry-05.00"}));
   const RigidTransform& last = commands[5].world_from_model;
@@ -56,7 +56,7 @@ TEST(SimulateSweeps, BeginAtNeutralAndGoFromThereToEitherSide) {
 
 TEST(SimulateSweeps, NamesTellAllStepsApart) {
   const auto names = [](double range_deg, double step_deg) {
-    return sweeps({{"axes", std::vector<std::string>{"z"}}, {"range_deg", range_deg}, {"step_deg", step_deg}}).names();
+    return sweeps({{"axes", std::vector<std::string>{"z"}}, {"max_rotation_deg", range_deg}, {"turn_step_deg", step_deg}}).names();
   };
   EXPECT_EQ(names(0.03, 0.015),
             (std::vector<std::string>{"neutral", "rz+00.000", "rz+00.015", "rz+00.030", "rz-00.015", "rz-00.030"}));
@@ -65,7 +65,7 @@ TEST(SimulateSweeps, NamesTellAllStepsApart) {
 }
 
 TEST(SimulateHexapod, WithoutErrorsItDoesWhatItIsTold) {
-  const List<Pose> commands = sweeps({{"range_deg", 15.0}, {"step_deg", 15.0}});
+  const List<Pose> commands = sweeps({{"max_rotation_deg", 15.0}, {"turn_step_deg", 15.0}});
   const auto made = hexapod(commands, {});
   const auto platform = made.at("platform").as_list<Truth>(), fragment = made.at("fragment").as_list<Truth>();
   const RigidTransform& home = platform[0].world_from_model;
@@ -111,7 +111,7 @@ TEST(SimulateHexapod, ErrorsMoveThePlatformByAsMuchAsTheyShould) {
 }
 
 TEST(SimulateHexapod, AHexapodKeepsItsJointsAndARunItsMounting) {
-  const List<Pose> commands = sweeps({{"step_deg", 15.0}});
+  const List<Pose> commands = sweeps({{"turn_step_deg", 15.0}});
   const auto platform = [&](const shipped::Options& options, std::uint64_t seed) {
     return hexapod(commands, options, seed).at("platform").as_list<Truth>()[1].world_from_model.translation_mm;
   };
@@ -132,7 +132,7 @@ TEST(SimulateHexapod, AHexapodKeepsItsJointsAndARunItsMounting) {
 }
 
 TEST(SimulateHexapod, SaysTheLengthsOfItsLegs) {
-  const auto legs = hexapod(sweeps({{"step_deg", 15.0}}), {}).at("legs").as_list<Metrics>();
+  const auto legs = hexapod(sweeps({{"turn_step_deg", 15.0}}), {}).at("legs").as_list<Metrics>();
   // At home: from 150 (cos 12, -sin 12) to 90 (cos 48, -sin 48), 220 mm higher.
   EXPECT_NEAR(shipped::figure(shipped::item(legs[0]), "leg1"),
               std::hypot(std::hypot(150 * std::cos(radians(12)) - 90 * std::cos(radians(48)),
@@ -142,7 +142,7 @@ TEST(SimulateHexapod, SaysTheLengthsOfItsLegs) {
 }
 
 TEST(SimulateHexapod, RefusesWhatItCannotDo) {
-  const List<Pose> commands = sweeps({{"step_deg", 15.0}});
+  const List<Pose> commands = sweeps({{"turn_step_deg", 15.0}});
   const shipped::Inputs inputs{{"phantom", shipped::item(broken())}, {"commands", shipped::list(commands, "position")}};
   const std::string text = shipped::refusal("simulate.hexapod", inputs, {{"stroke_mm", 10.0}});
   EXPECT_TRUE(

@@ -120,7 +120,7 @@ TEST(SimulatePhotograph, ShowsBoneClampAndPlatform) {
   const auto camera =
       shipped::call("simulate.camera_arm", {},
                     {{"width_px", std::int64_t(320)}, {"height_px", std::int64_t(240)}, {"focal_px", 400.0}});
-  const auto commands = shipped::call("simulate.sweeps", {}, {{"range_deg", 0.0}}).at("commands");
+  const auto commands = shipped::call("simulate.sweeps", {}, {{"max_rotation_deg", 0.0}}).at("commands");
   const auto motion = shipped::call("simulate.hexapod", {{"phantom", shipped::item(broken)}, {"commands", commands}});
   const auto photographs = [&](const shipped::Options& options, std::uint64_t seed) {
     return shipped::call("simulate.photograph",

@@ -17,7 +17,7 @@ sys.path.insert(0, str(pathlib.Path(sys.argv[2]) / "python"))
 import marrow  # noqa: E402  (the path to it is set above)
 
 ACCELERATION, NOISE, IMPULSE = 5000.0, 0.09, 0.1  # mm/s^2, mm, mm
-WEIGHED = {"first_scale": 1, "least_deg": 0, "least_mm": 0, "gate": 1e12}  # nothing but the Kalman filter is left
+WEIGHED = {"first_scale": 1, "added_deviation_deg": 0, "added_deviation_mm": 0, "gate": 1e12}  # nothing but the Kalman filter is left
 
 
 def model(rate_hz):

@@ -27,7 +27,7 @@ class TrackKeyframes : public testing::Test {
     for (const char* frame : {"0001", "0002", "0003"}) frames.add(frame, SequenceFrame{});
   }
   shipped::Inputs inputs() const {
-    return {{"bones", shipped::list(bones, "fragment")}, {"frames", shipped::list(frames, "frame")}};
+    return {{"poses", shipped::list(bones, "fragment")}, {"frames", shipped::list(frames, "frame")}};
   }
   marrow::List<AutoscoperTrack> read(const std::string& path) const {
     return shipped::call("track.keyframes", inputs(), {{"path", path}}).at("keyframes").as_list<AutoscoperTrack>();

@@ -230,7 +230,7 @@ TEST(VerdictEvidence, APoseInAnotherBoneIsDoubtful) {
   const Verdict verdict = trial.verdict(options);
   EXPECT_EQ(verdict.judgement, Judgement::doubtful);
   EXPECT_EQ(verdict.reasons, std::vector<std::string>{"the bone reaches 16.0 mm into another bone"});
-  options["most_intersection_mm"] = 20.0;
+  options["max_intersection_mm"] = 20.0;
   EXPECT_EQ(trial.verdict(options).judgement, Judgement::trusted);
 }
 

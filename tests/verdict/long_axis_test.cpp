@@ -47,7 +47,7 @@ double figure(const Verdict& verdict, const std::string& name) {
 }
 
 Verdict verdict_on(const Pose& pose, const Pose* prior = nullptr) {
-  shipped::Inputs inputs{{"pose", shipped::item(pose)}, {"mesh", shipped::item(oblique_box())}};
+  shipped::Inputs inputs{{"pose", shipped::item(pose)}, {"model", shipped::item(oblique_box())}};
   if (prior) inputs["prior"] = shipped::item(*prior);
   return shipped::call("verdict.predicted", inputs).at("verdict").as<Verdict>();
 }

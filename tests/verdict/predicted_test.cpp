@@ -35,7 +35,7 @@ marrow::Pose pose_with(const marrow::Vector6d& deviations) {
 
 Verdict verdict_of(const marrow::Pose& pose, const shipped::Options& options = {}) {
   const auto outputs =
-      shipped::call("verdict.predicted", {{"pose", shipped::item(pose)}, {"mesh", shipped::item(box())}}, options);
+      shipped::call("verdict.predicted", {{"pose", shipped::item(pose)}, {"model", shipped::item(box())}}, options);
   return outputs.at("verdict").as<Verdict>();
 }
 
@@ -133,7 +133,7 @@ TEST(VerdictPredicted, RefusesAnotherBonesSurface) {
   marrow::Mesh mesh = box();
   mesh.frame = "elsewhere";
   EXPECT_EQ(shipped::refusal("verdict.predicted",
-                             {{"pose", shipped::item(pose_with({0, 0, 1, 0, 0, 1}))}, {"mesh", shipped::item(mesh)}}),
+                             {{"pose", shipped::item(pose_with({0, 0, 1, 0, 0, 1}))}, {"model", shipped::item(mesh)}}),
             "the model is in the frame 'elsewhere', but the pose takes points in 'ct'; give the model that was "
             "registered");
 }
@@ -149,7 +149,7 @@ marrow::Pose prior_of(const marrow::Pose& pose, double turned_deg, double deviat
 Verdict verdict_of(const marrow::Pose& pose, const marrow::Pose& prior, marrow::Context context = marrow::Context(),
                    const shipped::Options& options = {}) {
   return shipped::call("verdict.predicted",
-                       {{"pose", shipped::item(pose)}, {"mesh", shipped::item(box())}, {"prior", shipped::item(prior)}},
+                       {{"pose", shipped::item(pose)}, {"model", shipped::item(box())}, {"prior", shipped::item(prior)}},
                        options, context)
       .at("verdict")
       .as<Verdict>();
@@ -197,7 +197,7 @@ TEST(VerdictPredicted, APriorNeedsACovariance) {
   prior.covariance.reset();
   EXPECT_EQ(shipped::refusal(
                 "verdict.predicted",
-                {{"pose", shipped::item(pose)}, {"mesh", shipped::item(box())}, {"prior", shipped::item(prior)}}),
+                {{"pose", shipped::item(pose)}, {"model", shipped::item(box())}, {"prior", shipped::item(prior)}}),
             "the prior has no covariance; take it from a node that predicts one, such as a fit of markers");
 }
 

@@ -70,7 +70,7 @@ struct Trial {
     inputs = {{"pose", shipped::item(pose)},
               {"optimizer", shipped::call("optimizer.bobyqa", {}).at("optimizer")},
               {"views", shipped::list(views, "view")},
-              {"mesh", shipped::item(box())}};
+              {"model", shipped::item(box())}};
   }
   RigidTransform moved_by(const std::array<double, 6>& deg_and_mm) const {
     Vector6d motion = Vector6d::Map(deg_and_mm.data());

@@ -37,7 +37,7 @@ TEST(FilledSurface, LineIntegralsThroughANailAreThoseByHand) {
                                    {"resolution_mm", 0.4},
                                    {"hole_at_mm", std::vector<double>{40}},
                                    {"hole_turn_deg", std::vector<double>{90}}})
-                        .at("surface");
+                        .at("mesh");
   const marrow::Value volume =
       shipped::call("volume.filled_surface", {{"mesh", nail}}, {{"spacing_mm", 0.3}}).at("volume");
   const marrow::Value projector = shipped::call("project.joseph", {{"volume", volume}}).at("projector");

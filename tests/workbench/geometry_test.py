@@ -206,7 +206,7 @@ class GeometryTest(PageTest):
         files = lambda ending: json.dumps([str(self.scratch / (name + ending)) for name in names])
         told = subprocess.run(
             [MARROW, "run", SOURCE / "pipelines/workbench/check-cameras.yaml", "--out", self.scratch / "out"]
-            + ["--only", "metrics", "--set", "check.points=%s" % (self.scratch / "points.yaml")]
+            + ["--only", "metrics", "--set", "check.known_points=%s" % (self.scratch / "points.yaml")]
             + ["--set", "views.names=" + json.dumps(names), "--set", "views.images=" + files(".png")]
             + ["--set", "views.cameras=" + files(".yaml")],
             capture_output=True,

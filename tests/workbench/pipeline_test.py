@@ -17,7 +17,7 @@ inputs:
   level: {type: number, help: height of the fracture}
 nodes:
   bone: {uses: simulate.femur}
-  fracture: {uses: simulate.fracture, in: {bone: bone}, with: {level: $level}}
+  fracture: {uses: simulate.fracture, in: {bone: bone}, with: {height_fraction: $level}}
   cameras:   # two views
     uses: camera.carm
     with:
@@ -26,7 +26,7 @@ nodes:
       height_px: 96
       pixel_mm: 3
   views: {uses: simulate.fluoroscopy, in: {phantom: fracture, cameras: cameras}}
-  edges: {uses: edges.canny, in: {view: views}, with: {high: 5}}  # quick
+  edges: {uses: edges.canny, in: {view: views}, with: {noise_high: 5}}  # quick
   truth: {uses: simulate.truth, in: {phantom: fracture}}
 outputs: {cameras: cameras, edges: edges, model: truth.models}
 """

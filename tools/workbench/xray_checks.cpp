@@ -39,7 +39,7 @@ json checked(const Workbench& workbench, const Request& request) {
   const json points = points_of(landmarks_of(request));
   if (!points.is_null())
     call.arguments.overrides.push_back(
-        {"check.points", set_text(working_file(workbench.folder, "points", ".yaml", points.dump(1)).string())});
+        {"check.known_points", set_text(working_file(workbench.folder, "points", ".yaml", points.dump(1)).string())});
   const Ran ran = run(call, workbench);
   json metrics = json::object();
   for (const Metric& metric : ran.outputs.at("metrics").as<Metrics>().items) metrics[metric.name] = metric.value;

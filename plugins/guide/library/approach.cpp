@@ -135,7 +135,7 @@ Leg next_leg(const Gap& gap, const RigidTransform& now, const FragmentFrame& fra
                                                                                      : "release";
   leg.stage = next;
   if (approach.is_free(now, place)) return leg;
-  for (double away = kStep_mm; away <= options.most_distraction_mm; away += kStep_mm) {
+  for (double away = kStep_mm; away <= options.max_distraction_mm; away += kStep_mm) {
     const RigidTransform by = shifted(place, away * apart);
     if (!approach.is_free(by, place) || !approach.is_free(now, by)) continue;
     leg = leg_to(by);
@@ -144,16 +144,16 @@ Leg next_leg(const Gap& gap, const RigidTransform& now, const FragmentFrame& fra
   }
   // First away from where it is, as far as needed to get on from there.
   const double room_mm =
-      options.most_distraction_mm - apart.dot(Eigen::Vector3d(now * frame.origin_mm - frame.origin_mm));
+      options.max_distraction_mm - apart.dot(Eigen::Vector3d(now * frame.origin_mm - frame.origin_mm));
   for (double away = kStep_mm; away <= room_mm; away += kStep_mm) {
     const RigidTransform here = shifted(now, away * apart);
-    for (double beside = kStep_mm; beside <= options.most_distraction_mm; beside += kStep_mm) {
+    for (double beside = kStep_mm; beside <= options.max_distraction_mm; beside += kStep_mm) {
       if (approach.is_free(here, shifted(place, beside * apart))) return leg_apart(frame, reference, away);
     }
   }
   // No way is free by this margin. The fragment is turned where it is farthest apart; the robot feels if bones touch.
   if (room_mm >= kStep_mm) return leg_apart(frame, reference, room_mm);
-  leg = leg_to(shifted(place, options.most_distraction_mm * apart));
+  leg = leg_to(shifted(place, options.max_distraction_mm * apart));
   leg.stage = next;
   return leg;
 }

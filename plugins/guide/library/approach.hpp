@@ -34,10 +34,10 @@ struct Leg {
 };
 
 struct ApproachOptions {
-  double clearance_mm = 1;          ///< bones are kept this far apart, but less near their place in the restored bone
-  double most_distraction_mm = 14;  ///< from its place
-  double rotated_deg = 2;           ///< smaller rotations do not count as a stage of their own
-  double aligned_mm = 2;            ///< the same of shifts across the shaft
+  double clearance_mm = 1;         ///< bones are kept this far apart, but less near their place in the restored bone
+  double max_distraction_mm = 14;  ///< from its place
+  double rotated_deg = 2;          ///< smaller rotations do not count as a stage of their own
+  double aligned_mm = 2;           ///< the same of shifts across the shaft
 };
 
 /// Straight away from the other fragment, along its shaft.

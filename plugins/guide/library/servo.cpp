@@ -21,8 +21,8 @@ FragmentFrame frame_at(const Eigen::Vector3d& centre_mm) {
 
 Vector6d limited_step(const Vector6d& error, const StepLimits& limits) {
   const Vector6d step = -limits.damping * error;
-  const double share =
-      std::max({1.0, degrees(step.head<3>().norm()) / limits.most_deg, step.tail<3>().norm() / limits.most_mm});
+  const double share = std::max(
+      {1.0, degrees(step.head<3>().norm()) / limits.max_rotation_deg, step.tail<3>().norm() / limits.max_shift_mm});
   return step / share;
 }
 

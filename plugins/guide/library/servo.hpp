@@ -12,7 +12,7 @@ namespace marrow::robot {
 /// How large a step may be.
 struct StepLimits {
   double damping = 1;  ///< lambda: the part of the error that a step takes away
-  double most_deg = 15, most_mm = 25;
+  double max_rotation_deg = 15, max_shift_mm = 25;
 };
 
 /// -lambda times the error, shortened as a whole until neither limit is passed.

@@ -161,7 +161,7 @@ class Costs {
           // At the rim of the bone a cleft is open to the side, so the closing does not find it. A front could then run
           // along the rim around the cleft.
           const float walls = least[at] < race_.floor_hu ? around[at] : closed[at];
-          const double part = std::max(0.f, walls - smooth[at]) / std::max(walls, 1.f) / race_.cleft_part;
+          const double part = std::max(0.f, walls - smooth[at]) / std::max(walls, 1.f) / race_.cleft_fraction;
           costs[local(x, y, z)] =
               std::uint8_t(std::min(kMostCost, std::round(kFreeCost * std::exp(std::min(part * part, 10.0)))));
         }

@@ -14,10 +14,10 @@
 namespace marrow::field {
 
 struct Race {
-  double sigma_mm = 0.7;    ///< standard deviation of the Gaussian that removes noise
-  double cleft_mm = 3.2;    ///< widest dark gap that counts as a cleft (the middle of a wider gap is dark anyway)
-  double cleft_part = 0.1;  ///< a cleft darker than its walls by this fraction of their value slows a front e times
-  double floor_hu = 150;    ///< there is no bone where the smoothed CT is below this
+  double sigma_mm = 0.7;        ///< standard deviation of the Gaussian that removes noise
+  double cleft_mm = 3.2;        ///< widest dark gap that counts as a cleft (the middle of a wider gap is dark anyway)
+  double cleft_fraction = 0.1;  ///< a cleft darker than its walls by this fraction of their value slows a front e times
+  double floor_hu = 150;        ///< there is no bone where the smoothed CT is below this
 };
 
 /// For each voxel the fragment whose front arrived first, as an index into `seeds`, or kNobody. `seeds`: for each

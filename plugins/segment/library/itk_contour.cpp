@@ -44,7 +44,7 @@ Contour geodesic(const std::vector<float>& hu, std::vector<float> start, const s
   geodesic->SetPropagationScaling(settings.propagation);
   geodesic->SetCurvatureScaling(settings.curvature);
   geodesic->SetAdvectionScaling(settings.advection);
-  geodesic->SetMaximumRMSError(settings.least_rms);
+  geodesic->SetMaximumRMSError(settings.min_rms);
   geodesic->SetNumberOfIterations(unsigned(settings.iterations));
   geodesic->Update();
   Contour contour;

@@ -8,12 +8,12 @@ namespace marrow::field {
 
 /// `sigma_mm`: of the Gaussian gradient of the CT. `edge_hu_per_mm`: K in speed = 1 / (1 + (gradient / K)^2).
 /// `propagation`, `curvature`, `advection`: scaling of ITK's three terms. It stops after `iterations`, or when the root
-/// mean square change of an iteration is below `least_rms`.
+/// mean square change of an iteration is below `min_rms`.
 struct Settings {
   double sigma_mm, edge_hu_per_mm;
   double propagation, curvature, advection;
   int iterations;
-  double least_rms;
+  double min_rms;
 };
 
 struct Contour {

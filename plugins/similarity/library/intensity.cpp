@@ -36,7 +36,7 @@ class IntensityCost : public ViewsCost {
         options_(options),
         worst_(worst),
         measure_of_(std::move(measure_of)) {
-    smoothed_ = as_smooth_as_images(projector, views, options.blur_px * options.pixel_step);
+    smoothed_ = as_smooth_as_images(projector, views, options.sigma_steps * options.pixel_step);
     for (const View& view : views) {
       images_.push_back(image_of(view));
       measures_.push_back(measure_of_(images_.back()));
@@ -73,7 +73,7 @@ class IntensityCost : public ViewsCost {
   Patch image_of(const View& view) const {
     const int step = options_.pixel_step;
     cv::Mat smooth = image::line_integrals(view.image.pixels);
-    if (const double sigma = options_.blur_px * step; sigma > 0.1)
+    if (const double sigma = options_.sigma_steps * step; sigma > 0.1)
       cv::GaussianBlur(smooth, smooth, {}, sigma, sigma, cv::BORDER_REPLICATE);
     Patch image{(smooth.cols + step - 1) / step, (smooth.rows + step - 1) / step, 0, 0, {}, {}, {}};
     for (int row = 0; row < image.rows; ++row)

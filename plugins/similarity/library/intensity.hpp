@@ -60,7 +60,7 @@ using MeasureOf = std::function<Measure(const Patch& whole)>;
 struct IntensityOptions {
   int pixel_step = 2;
   int margin_px = 16;
-  double blur_px = 0.5;
+  double sigma_steps = 0.5;
   std::vector<double> weights;
   int least_margin_steps = 0;  ///< no option: the least margin that the measure needs, in compared pixels
   bool has_blocks = true;      ///< no option: whether leaving out a block tells something (ViewsCost::split())
@@ -68,7 +68,7 @@ struct IntensityOptions {
 
 /// A cost that is the weighted mean of a measure over the views. In each view only the region that may show the model
 /// is compared, with margin_px around it. A view that does not show the model, or whose measure is not finite, counts
-/// as `worst`. Only every pixel_step-th pixel is compared, after smoothing the image by a Gaussian of blur_px *
+/// as `worst`. Only every pixel_step-th pixel is compared, after smoothing the image by a Gaussian of sigma_steps *
 /// pixel_step. Pixels that show other fragments do not count. The cost refers to `projector`, which must outlive it.
 /// Throws Error as check_views(), check_weights() and shadows_of() do.
 std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector, const List<View>& views,
@@ -129,8 +129,9 @@ void declare(Node& node) {
       .out("cost", "how badly radiograph and image agree")
       .option("pixel_step", &Options::pixel_step, "compare every n-th pixel", at_least(1), at_most(64))
       .option("margin_px", &Options::margin_px, "margin around the model in which the images are compared", at_least(0))
-      .option("blur_px", &Options::blur_px, "smoothing: standard deviation of a Gaussian, in steps of pixel_step",
-              at_least(0), at_most(10), unit("steps"))
+      .option("sigma_steps", &Options::sigma_steps,
+              "smoothing: standard deviation of a Gaussian, in steps of pixel_step", at_least(0), at_most(10),
+              unit("steps"))
       .option("weights", &Options::weights, "weight of each view; none: all the same");
 }
 

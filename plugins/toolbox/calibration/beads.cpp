@@ -28,12 +28,12 @@ cv::Mat1f darkness_of(const cv::Mat1f& image, double largest_px) {
 }
 
 /// The least darkness of a pixel that may belong to a bead.
-double threshold_of(const cv::Mat1f& darkness, double least_contrast) {
+double threshold_of(const cv::Mat1f& darkness, double min_contrast) {
   std::vector<float> values(darkness.begin(), darkness.end());
   const double middle = quantile_in_place(values, 0.5), darkest = quantile_in_place(values, 0.9995);
   for (float& value : values) value = std::abs(value - float(middle));
   const double noise = 1.4826 * quantile_in_place(values, 0.5);
-  return middle + std::max(kNoiseFactor * noise, least_contrast * (darkest - middle));
+  return middle + std::max(kNoiseFactor * noise, min_contrast * (darkest - middle));
 }
 
 /// Area, centre and second moments of the pixels of a component that are darker than half its peak.
@@ -144,7 +144,7 @@ std::vector<BeadImage> find_beads(const Image& image, const BeadSearch& search) 
   image.pixels.convertTo(grey, CV_32F);
   const double largest = search.largest_px > 0 ? search.largest_px : image.width() / 16.0;
   const cv::Mat1f darkness = darkness_of(grey, largest);
-  const double threshold = threshold_of(darkness, search.least_contrast);
+  const double threshold = threshold_of(darkness, search.min_contrast);
   const cv::Mat dark = darkness > threshold;
   cv::Mat1i labels, boxes;
   cv::Mat centroids;

@@ -9,8 +9,8 @@
 namespace marrow::calibration {
 
 struct BeadSearch {
-  double largest_px = 0;        ///< diameter of the largest bead; 0: a sixteenth of the image's width
-  double least_contrast = 0.2;  ///< contrast of the faintest bead as a fraction of that of the darkest
+  double largest_px = 0;      ///< diameter of the largest bead; 0: a sixteenth of the image's width
+  double min_contrast = 0.2;  ///< contrast of the faintest bead as a fraction of that of the darkest
 };
 
 /// The dark disc of one bead. The image of a sphere is an ellipse. Its centre is not exactly the image of the sphere's

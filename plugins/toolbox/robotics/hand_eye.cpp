@@ -30,9 +30,9 @@ Vector6d difference(const Move& move, const RigidTransform& x, const HandEyeNois
                shift = (move.seen * move.centre_mm - move.centre_mm).norm();
   Vector6d result;
   result.head<3>() = vector_from_rotation(move.seen.rotation * predicted.rotation.transpose()) /
-                     std::hypot(radians(noise.rotation_deg), noise.part * turn);
-  result.tail<3>() =
-      (move.seen * move.centre_mm - predicted * move.centre_mm) / std::hypot(noise.shift_mm, noise.part * shift);
+                     std::hypot(radians(noise.motion_deviation_deg), noise.motion_deviation_fraction * turn);
+  result.tail<3>() = (move.seen * move.centre_mm - predicted * move.centre_mm) /
+                     std::hypot(noise.motion_deviation_mm, noise.motion_deviation_fraction * shift);
   return result;
 }
 

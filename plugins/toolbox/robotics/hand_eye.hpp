@@ -22,9 +22,9 @@ struct Move {
 /// How exactly moves are known, and how far the first guess may be off. One standard deviation each, about and along
 /// each axis.
 struct HandEyeNoise {
-  double rotation_deg = 0.15, shift_mm = 0.15;  ///< of a motion as it is seen
-  double part = 0.02;                           ///< of the motion's size, in addition
-  double guess_deg = 90, guess_mm = 60;         ///< of the guess
+  double motion_deviation_deg = 0.15, motion_deviation_mm = 0.15;  ///< of a motion as it is seen
+  double motion_deviation_fraction = 0.02;                         ///< of the motion's size, in addition
+  double guess_deg = 90, guess_mm = 60;                            ///< of the guess
 };
 
 struct HandEye {

@@ -20,9 +20,9 @@ struct SoftTissue {
 
 /// When a robot warns, and when it stops.
 struct ForceLimits {
-  double warn_n = 250, warn_nm = 5.6, stop_n = 400;
+  double warn_above_n = 250, warn_above_nm = 5.6, stop_above_n = 400;
 
-  using fields = Fields<&ForceLimits::warn_n, &ForceLimits::warn_nm, &ForceLimits::stop_n>;
+  using fields = Fields<&ForceLimits::warn_above_n, &ForceLimits::warn_above_nm, &ForceLimits::stop_above_n>;
 };
 
 struct Load {

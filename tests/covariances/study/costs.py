@@ -43,14 +43,14 @@ def found(name, cost, start):
     optimizer = marrow.optimizer.levenberg_marquardt if name in WITH_DERIVATIVES else marrow.optimizer.bobyqa
     register = marrow.register.multiresolution.using(threads=1)
     initial = marrow.initial.manual(model=bone().mesh, start=marrow.Pose(start))
-    return register(cost=cost, optimizer=optimizer(), initial=initial, **SEARCH).pose
+    return register(cost=cost, optimizer=optimizer(), start=initial, **SEARCH).pose
 
 
 def cost_of(name, views):
     wanted = inputs_of(name)
     # The rendered bone has soft edges, so its edges are taken as they are, without the shift of a sharp surface.
     given = {port: value for port, value in bone().inputs(views, marrow.edges.canny(views)).items() if port in wanted}
-    if "projector" in wanted and "mesh" not in wanted:
+    if "projector" in wanted and "model" not in wanted:
         given["projector"] = bone().outlines if "edges" in wanted and "outline" not in wanted else bone().radiographs
     return getattr(marrow.similarity, name)(**given)
 

@@ -38,14 +38,14 @@ class Bone:
         self.field = marrow.SignedField(np.clip(distance, -6, 6).astype("float32"), **grid)
         self.mesh = marrow.mesh.marching_cubes(field=self.field)
         self.radiographs = marrow.project.joseph(volume=self.volume, field=self.field, background_hu=0)
-        self.outlines = marrow.project.silhouette_edges(mesh=self.mesh, volume=self.volume)
+        self.outlines = marrow.project.silhouette_edges(model=self.mesh, volume=self.volume)
         start = marrow.initial.manual(model=self.mesh, start=marrow.Pose(np.eye(4)))
         self.axes, self.origin_mm = np.array(start.axes), np.array(start.origin_mm)
 
     def inputs(self, views, edges):
         """What the inputs of a cost are, by their names."""
         return {
-            "mesh": self.mesh,
+            "model": self.mesh,
             "volume": self.volume,
             "field": self.field,
             "views": views,

@@ -42,177 +42,156 @@
 // A camera is OpenCV's pinhole: +z to the detector, u right, v down, integer at pixel centres, origin at the X-ray
 // source. "summary" and "comparisons" are left out where kind is "run"; any of pictures, convergence, landscape, scene
 // may be missing.
-'use strict';
+import {withUnit} from './dom.js';
 
-const Data = (() => {
-  const FORMAT = 1;
+const FORMAT = 1;
 
-  const LISTS = [
-    'figures', 'passes', 'variants', 'metrics', 'cases', 'starts', 'summary', 'comparisons', 'cells', 'materials',
-    'parts'
-  ];
-  const IN_TEXTS = ['status', 'reason', 'absent', 'verdict'];
+const LISTS = [
+  'figures', 'passes', 'variants', 'metrics', 'cases', 'starts', 'summary', 'comparisons', 'cells', 'materials', 'parts'
+];
+const IN_TEXTS = ['status', 'reason', 'absent', 'verdict'];
 
-  // The cells of a table, each as an object.
-  function cellsOf(data, {fields, rows, texts}) {
-    const is_text = fields.map((name) => IN_TEXTS.includes(name));
-    return rows.map((row) => {
-      const cell = {};
-      fields.forEach((name, i) => (cell[name] = is_text[i] && row[i] !== null ? texts[row[i]] : row[i]));
-      cell.values = row.slice(fields.length);
-      cell.id = [data.variants[cell.variant].name, data.cases[cell.case], data.starts[cell.start]].join('/');
-      cell.folder = 'cells/' + cell.id;
-      return cell;
-    });
+// The cells of a table, each as an object.
+function cellsOf(data, {fields, rows, texts}) {
+  const is_text = fields.map((name) => IN_TEXTS.includes(name));
+  return rows.map((row) => {
+    const cell = {};
+    fields.forEach((name, i) => (cell[name] = is_text[i] && row[i] !== null ? texts[row[i]] : row[i]));
+    cell.values = row.slice(fields.length);
+    cell.id = [data.variants[cell.variant].name, data.cases[cell.case], data.starts[cell.start]].join('/');
+    cell.folder = 'cells/' + cell.id;
+    return cell;
+  });
+}
+
+function completeCell(data, cell) {
+  for (const name of ['values', 'verdicts', 'poses']) cell[name] = cell[name] || [];
+  cell.pictures = (cell.pictures || []).filter((entry) => data.pictures[entry.picture]);
+  cell.scene = data.scenes[cell.scene] ? cell.scene : null;
+}
+
+function complete(data) {
+  for (const name of LISTS) data[name] = data[name] || [];
+  for (const name of ['experiment', 'pictures', 'scenes', 'geometries']) data[name] = data[name] || {};
+  for (const variant of data.variants) variant.options = variant.options || {};
+  if (data.cell_table) data.cells = cellsOf(data, data.cell_table);
+  delete data.cell_table;
+  for (const cell of data.cells) completeCell(data, cell);
+  return data;
+}
+
+// Enters what a part, or the page itself, knows of some cells besides their rows.
+export function enter(data, {materials, pictures, geometries, scenes}) {
+  Object.assign(data.pictures, pictures);
+  Object.assign(data.geometries, geometries);
+  Object.assign(data.scenes, scenes);
+  for (const material of materials) {
+    const pair = data.pairAt(material.case, material.start), cell = pair && pair.cells[material.variant];
+    if (cell) completeCell(data, Object.assign(cell, material));
   }
+}
 
-  function completeCell(data, cell) {
-    for (const name of ['values', 'verdicts', 'poses']) cell[name] = cell[name] || [];
-    cell.pictures = (cell.pictures || []).filter((entry) => data.pictures[entry.picture]);
-    cell.scene = data.scenes[cell.scene] ? cell.scene : null;
-  }
-
-  function complete(data) {
-    for (const name of LISTS) data[name] = data[name] || [];
-    for (const name of ['experiment', 'pictures', 'scenes', 'geometries']) data[name] = data[name] || {};
-    for (const variant of data.variants) variant.options = variant.options || {};
-    if (data.cell_table) data.cells = cellsOf(data, data.cell_table);
-    delete data.cell_table;
-    for (const cell of data.cells) completeCell(data, cell);
-    return data;
-  }
-
-  // Enters what a part, or the page itself, knows of some cells besides their rows.
-  function enter(data, {materials, pictures, geometries, scenes}) {
-    Object.assign(data.pictures, pictures);
-    Object.assign(data.geometries, geometries);
-    Object.assign(data.scenes, scenes);
-    for (const material of materials) {
-      const pair = data.pairAt(material.case, material.start), cell = pair && pair.cells[material.variant];
-      if (cell) completeCell(data, Object.assign(cell, material));
+// Cells by variant, case and start, and the (case, start) pairs of which anything can be looked at.
+function index(data) {
+  const key = (caseIndex, start) => caseIndex * data.starts.length + start;
+  data.is_run = data.kind === 'run';
+  data.baseline = data.variants.findIndex((variant) => variant.is_baseline);
+  data.pairs = [];
+  data.cellsOf = data.variants.map(() => []);
+  const byKey = new Map();
+  for (const cell of data.cells) {
+    (data.cellsOf[cell.variant] = data.cellsOf[cell.variant] || []).push(cell);
+    const name = key(cell.case, cell.start);
+    if (!byKey.has(name)) {
+      byKey.set(name, {case: cell.case, start: cell.start, cells: []});
+      data.pairs.push(byKey.get(name));
     }
+    byKey.get(name).cells[cell.variant] = cell;
   }
-
-  // Cells by variant, case and start, and the (case, start) pairs of which anything can be looked at.
-  function index(data) {
-    const key = (caseIndex, start) => caseIndex * data.starts.length + start;
-    data.is_run = data.kind === 'run';
-    data.baseline = data.variants.findIndex((variant) => variant.is_baseline);
-    data.pairs = [];
-    data.cellsOf = data.variants.map(() => []);
-    const byKey = new Map();
-    for (const cell of data.cells) {
-      (data.cellsOf[cell.variant] = data.cellsOf[cell.variant] || []).push(cell);
-      const name = key(cell.case, cell.start);
-      if (!byKey.has(name)) {
-        byKey.set(name, {case: cell.case, start: cell.start, cells: []});
-        data.pairs.push(byKey.get(name));
-      }
-      byKey.get(name).cells[cell.variant] = cell;
-    }
-    data.pairAt = (caseIndex, start) => byKey.get(key(caseIndex, start));
-    data.pairOf = (cell) => data.pairAt(cell.case, cell.start);
-    enter(data, {materials: data.materials});
-    for (const part of data.parts) {
-      const pair = data.pairAt(part.case, part.start);
-      if (pair) pair.part = part;
-    }
-    data.lookedAt = data.pairs.filter((pair) => pair.part || pair.cells.some(hasMaterial));
-    data.byId = new Map(data.cells.map((cell) => [String(cell.id), cell]));
-    data.variantIndex = (variant) =>
-        (typeof variant === 'number' ? variant : data.variants.findIndex((item) => item.name === variant));
-    return data;
+  data.pairAt = (caseIndex, start) => byKey.get(key(caseIndex, start));
+  data.pairOf = (cell) => data.pairAt(cell.case, cell.start);
+  enter(data, {materials: data.materials});
+  for (const part of data.parts) {
+    const pair = data.pairAt(part.case, part.start);
+    if (pair) pair.part = part;
   }
+  data.lookedAt = data.pairs.filter((pair) => pair.part || pair.cells.some(hasMaterial));
+  data.byId = new Map(data.cells.map((cell) => [String(cell.id), cell]));
+  data.variantIndex = (variant) =>
+      (typeof variant === 'number' ? variant : data.variants.findIndex((item) => item.name === variant));
+  return data;
+}
 
-  const hasMaterial = (cell) => Boolean(
-      cell && (cell.pictures.length || cell.scene || (cell.convergence || []).length || (cell.landscape || []).length));
+export const hasMaterial = (cell) => Boolean(
+    cell && (cell.pictures.length || cell.scene || (cell.convergence || []).length || (cell.landscape || []).length));
 
-  // What can be looked at of a cell, here or in a part beside the page.
-  function kinds(data, cell) {
-    const {part} = data.pairOf(cell), beside = part && cell.status !== 'failed' ? part.kinds : [];
-    return ['pictures', 'scene', 'convergence', 'landscape'].filter(
-        (kind) => beside.includes(kind) || (kind === 'scene' ? cell.scene : (cell[kind] || []).length));
+// What can be looked at of a cell, here or in a part beside the page.
+export function kinds(data, cell) {
+  const {part} = data.pairOf(cell), beside = part && cell.status !== 'failed' ? part.kinds : [];
+  return ['pictures', 'scene', 'convergence', 'landscape'].filter(
+      (kind) => beside.includes(kind) || (kind === 'scene' ? cell.scene : (cell[kind] || []).length));
+}
+
+export function load() {
+  const data = JSON.parse(document.getElementById('data').textContent);
+  if (!(data.format <= FORMAT)) {
+    throw new Error(
+        'This page reads format ' + FORMAT + ' of a report\'s data, the data are in format ' + data.format +
+        ': make the report again with one version of marrow.');
   }
+  return index(complete(data));
+}
 
-  function load() {
-    const data = JSON.parse(document.getElementById('data').textContent);
-    if (!(data.format <= FORMAT)) {
-      throw new Error(
-          'This page reads format ' + FORMAT + ' of a report\'s data, the data are in format ' + data.format +
-          ': make the report again with one version of marrow.');
-    }
-    return index(complete(data));
-  }
+// What became of a cell: a failed one gave no pose; a missed one gave a pose that is not a success.
+export function outcome(cell) {
+  if (cell.status === 'failed') return 'failed';
+  if (cell.success === true) return 'success';
+  return cell.success === false ? 'missed' : 'done';
+}
 
-  // What became of a cell: a failed one gave no pose; a missed one gave a pose that is not a success.
-  function outcome(cell) {
-    if (cell.status === 'failed') return 'failed';
-    if (cell.success === true) return 'success';
-    return cell.success === false ? 'missed' : 'done';
-  }
+// The limit of success: below it, or above it where higher is better.
+export const limit = (metric) => [metric.success_above, metric.success_below].find(Number.isFinite) ?? null;
+export const limitText = (metric) =>
+    (metric.higher_is_better ? 'above ' : 'below ') + withUnit(limit(metric), metric.unit);
 
-  // The limit of success: below it, or above it where higher is better.
-  const limit = (metric) => [metric.success_above, metric.success_below].find(Number.isFinite) ?? null;
-  const limitText = (metric) =>
-      (metric.higher_is_better ? 'above ' : 'below ') + Dom.withUnit(limit(metric), metric.unit);
+// Up to which value 95 % of the runs are as good or better.
+export const worseEnd = (metric, item) => (metric.higher_is_better ? item.p5 : item.p95);
 
-  // Up to which value 95 % of the runs are as good or better.
-  const worseEnd = (metric, item) => (metric.higher_is_better ? item.p5 : item.p95);
+export const isBetter = (metric, value, base) => (metric.higher_is_better ? value > base : value < base);
 
-  const isBetter = (metric, value, base) => (metric.higher_is_better ? value > base : value < base);
+// Wilson's 95 % interval of a proportion.
+export function wilson(count, of) {
+  if (!of) return {count, of, rate: null, low: null, high: null};
+  const z = 1.959964, rate = count / of, shrink = 1 + z * z / of;
+  const centre = (rate + z * z / (2 * of)) / shrink;
+  const half = z * Math.sqrt(rate * (1 - rate) / of + z * z / (4 * of * of)) / shrink;
+  return {count, of, rate, low: Math.max(0, centre - half), high: Math.min(1, centre + half)};
+}
 
-  // Wilson's 95 % interval of a proportion.
-  function wilson(count, of) {
-    if (!of) return {count, of, rate: null, low: null, high: null};
-    const z = 1.959964, rate = count / of, shrink = 1 + z * z / of;
-    const centre = (rate + z * z / (2 * of)) / shrink;
-    const half = z * Math.sqrt(rate * (1 - rate) / of + z * z / (4 * of * of)) / shrink;
-    return {count, of, rate, low: Math.max(0, centre - half), high: Math.min(1, centre + half)};
-  }
+// Quantile of sorted numbers, linear between the two neighbours.
+export function quantile(sorted, fraction) {
+  if (!sorted.length) return null;
+  const position = fraction * (sorted.length - 1), low = Math.floor(position);
+  return sorted[low] + (position - low) * ((sorted[low + 1] ?? sorted[low]) - sorted[low]);
+}
 
-  // Quantile of sorted numbers, linear between the two neighbours.
-  function quantile(sorted, fraction) {
-    if (!sorted.length) return null;
-    const position = fraction * (sorted.length - 1), low = Math.floor(position);
-    return sorted[low] + (position - low) * ((sorted[low + 1] ?? sorted[low]) - sorted[low]);
-  }
+// The finite values of a metric, one variant's, with their cells.
+export function valuesOf(data, variant, metric) {
+  return data.cellsOf[variant]
+      .filter((cell) => cell.status !== 'failed' && Number.isFinite(cell.values[metric]))
+      .map((cell) => ({value: cell.values[metric], cell}));
+}
 
-  // The finite values of a metric, one variant's, with their cells.
-  function valuesOf(data, variant, metric) {
-    return data.cellsOf[variant]
-        .filter((cell) => cell.status !== 'failed' && Number.isFinite(cell.values[metric]))
-        .map((cell) => ({value: cell.values[metric], cell}));
-  }
+// Variant against baseline: the (case, start) pairs in which both gave a value.
+export function pairedValues(data, variant, metric) {
+  const finite = (cell) => cell && cell.status !== 'failed' && Number.isFinite(cell.values[metric]);
+  return data.pairs.filter((pair) => finite(pair.cells[variant]) && finite(pair.cells[data.baseline]))
+      .map((pair) => ({
+             base: pair.cells[data.baseline].values[metric],
+             value: pair.cells[variant].values[metric],
+             cell: pair.cells[variant]
+           }));
+}
 
-  // Variant against baseline: the (case, start) pairs in which both gave a value.
-  function pairedValues(data, variant, metric) {
-    const finite = (cell) => cell && cell.status !== 'failed' && Number.isFinite(cell.values[metric]);
-    return data.pairs.filter((pair) => finite(pair.cells[variant]) && finite(pair.cells[data.baseline]))
-        .map((pair) => ({
-               base: pair.cells[data.baseline].values[metric],
-               value: pair.cells[variant].values[metric],
-               cell: pair.cells[variant]
-             }));
-  }
-
-  const pairName = (data, pair) => data.cases[pair.case] + ', start ' + data.starts[pair.start];
-  const cellName = (data, cell) => data.variants[cell.variant].name + ', ' + pairName(data, cell);
-
-  return {
-    load,
-    enter,
-    outcome,
-    limit,
-    limitText,
-    isBetter,
-    worseEnd,
-    wilson,
-    quantile,
-    valuesOf,
-    pairedValues,
-    kinds,
-    hasMaterial,
-    pairName,
-    cellName
-  };
-})();
+export const pairName = (data, pair) => data.cases[pair.case] + ', start ' + data.starts[pair.start];
+export const cellName = (data, cell) => data.variants[cell.variant].name + ', ' + pairName(data, cell);

@@ -1,380 +1,362 @@
 // SPDX-License-Identifier: Apache-2.0
 // Puts the page together when it has been read.
-'use strict';
+import * as Cells from './cells.js';
+import * as Curves from './curves.js';
+import * as Data from './data.js';
+import * as Detail from './detail.js';
+import * as Dom from './dom.js';
+import {el} from './dom.js';
+import * as Figures from './figures.js';
+import * as Graph from './graph.js';
+import * as Parts from './parts.js';
+import * as Passes from './passes.js';
+import * as Pictures from './pictures.js';
+import * as Plots from './plots.js';
+import * as Response from './response.js';
+import {SceneView} from './scene.js';
+import * as Sequence from './sequence.js';
+import {shown} from './shown.js';
+import * as Summary from './summary.js';
+import {startTheme} from './theme.js';
+import * as Tuning from './tuning.js';
+import * as Verdict from './verdict.js';
 
-const Page = (() => {
-  const {el} = Dom;
+// A section with a heading, entered in the list of contents. Parts that are null are left out.
+function section(id, title, intro, ...parts) {
+  const node =
+      el('section', {id, 'aria-labelledby': id + '-title'}, el('h2', {id: id + '-title'}, title),
+         intro && el('p', {class: 'intro'}, intro), parts);
+  document.getElementById('contents').append(el('a', {href: '#' + id}, title));
+  return node;
+}
 
-  // A section with a heading, entered in the list of contents. Parts that are null are left out.
-  function section(id, title, intro, ...parts) {
-    const node =
-        el('section', {id, 'aria-labelledby': id + '-title'}, el('h2', {id: id + '-title'}, title),
-           intro && el('p', {class: 'intro'}, intro), parts);
-    document.getElementById('contents').append(el('a', {href: '#' + id}, title));
-    return node;
-  }
+// Where a tenth of the runs end far off, a linear scale would press the others together.
+function skewed(data) {
+  const values = data.variants.flatMap((_, variant) => Data.valuesOf(data, variant, 0).map((item) => item.value))
+                     .sort((a, b) => a - b);
+  return values[0] > 0 && Data.quantile(values, 0.9) > 6 * Data.quantile(values, 0.25);
+}
 
-  // Where a tenth of the runs end far off, a linear scale would press the others together.
-  function skewed(data) {
-    const values = data.variants.flatMap((_, variant) => Data.valuesOf(data, variant, 0).map((item) => item.value))
-                       .sort((a, b) => a - b);
-    return values[0] > 0 && Data.quantile(values, 0.9) > 6 * Data.quantile(values, 0.25);
-  }
+// A figure over all cells: choice of metric and scale, legend, and the drawing.
+function metricFigure(data, kinds, extra, draw) {
+  const state = {metric: 0, kind: kinds[skewed(data) ? 1 : 0][0], extra: extra && extra.options[0][0]};
+  const place = Plots.responsive((width) => draw(state, width)), again = () => place.redraw();
+  const toolbar =
+      el('div', {class: 'toolbar'},
+         data.metrics.length > 1 && Dom.select('Metric', data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => {
+           state.metric = Number(i);
+           again();
+         }), extra && Dom.choice(extra.label, extra.options, state.extra, (value) => {
+           state.extra = value;
+           again();
+         }), Dom.choice('Scale', kinds, state.kind, (kind) => {
+           state.kind = kind;
+           again();
+         }));
+  return el('div', {}, toolbar, place);
+}
 
-  // A figure over all cells: choice of metric and scale, legend, and the drawing.
-  function metricFigure(data, kinds, extra, draw) {
-    const state = {metric: 0, kind: kinds[skewed(data) ? 1 : 0][0], extra: extra && extra.options[0][0]};
-    const place = Plots.responsive((width) => draw(state, width)), again = () => place.redraw();
-    const toolbar = el(
-        'div', {class: 'toolbar'},
-        data.metrics.length > 1 && Dom.select('Metric', data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => {
-          state.metric = Number(i);
-          again();
-        }), extra && Dom.choice(extra.label, extra.options, state.extra, (value) => {
-          state.extra = value;
-          again();
-        }), Dom.choice('Scale', kinds, state.kind, (kind) => {
-          state.kind = kind;
-          again();
-        }));
-    return el('div', {}, toolbar, place);
-  }
+function distributions(data) {
+  return section(
+      'distributions', 'Distributions',
+      'A mark a run; the box spans the quartiles, its bar the median, the whiskers the 5th to the 95th percentile. ' +
+          'Click a mark to open its run.',
+      metricFigure(
+          data, [['linear', 'linear'], ['log', 'log']], null,
+          (state, width) => Figures.drawDistribution(data, state.metric, state.kind, width)));
+}
 
-  function distributions(data) {
-    return section(
-        'distributions', 'Distributions',
-        'A mark a run; the box spans the quartiles, its bar the median, the whiskers the 5th to the 95th percentile. ' +
-            'Click a mark to open its run.',
-        metricFigure(
-            data, [['linear', 'linear'], ['log', 'log']], null,
-            (state, width) => Figures.drawDistribution(data, state.metric, state.kind, width)));
-  }
+function paired(data) {
+  if (data.baseline < 0 || data.variants.length < 2) return null;
+  const draw = (state, width) =>
+      (state.extra === 'pairs' ?
+           Figures.drawPairs(data, state.metric, state.kind === 'signed' ? 'log' : 'linear', width) :
+           Figures.drawDifferences(data, state.metric, state.kind, width));
+  return section(
+      'paired', 'Against the baseline',
+      'Each case and start, run with a variant and with ' + data.variants[data.baseline].name +
+          '. Left of zero the variant is better; right of zero for figures of which higher is better. ' +
+          'The black bar is the estimated difference with its 95 % interval.',
+      metricFigure(
+          data, [['linear', 'linear'], ['signed', 'log']],
+          {label: 'Show', options: [['differences', 'Differences'], ['pairs', 'Pairs']]}, draw),
+      Summary.comparisonTable(data));
+}
 
-  function paired(data) {
-    if (data.baseline < 0 || data.variants.length < 2) return null;
-    const draw = (state, width) =>
-        (state.extra === 'pairs' ?
-             Figures.drawPairs(data, state.metric, state.kind === 'signed' ? 'log' : 'linear', width) :
-             Figures.drawDifferences(data, state.metric, state.kind, width));
-    return section(
-        'paired', 'Against the baseline',
-        'Each case and start, run with a variant and with ' + data.variants[data.baseline].name +
-            '. Left of zero the variant is better; right of zero for figures of which higher is better. ' +
-            'The black bar is the estimated difference with its 95 % interval.',
-        metricFigure(
-            data, [['linear', 'linear'], ['signed', 'log']],
-            {label: 'Show', options: [['differences', 'Differences'], ['pairs', 'Pairs']]}, draw),
-        Summary.comparisonTable(data));
-  }
+function capture(data) {
+  const bins = Figures.captureBins(data);
+  if (!bins.length || !bins[0].length) return null;
+  const ranges =
+      el('ul', {class: 'verdicts'},
+         data.variants.map(
+             (variant, i) =>
+                 el('li', {style: '--mark: ' + Plots.colour(i)}, variant.name + ': ' + Figures.captureRange(data, i))));
+  return section(
+      'capture', 'Capture range',
+      'How far from the truth a start may lie: up to the given error, each bin of starts ' +
+          'has a success rate of 95 % or more. ' +
+          'Bars are 95 % intervals, which know that the starts of a case are not independent. ' +
+          'Failed runs count as no success.',
+      ranges, Plots.legend(data.variants), Plots.responsive((width) => Figures.drawCapture(data, bins, width)),
+      el('details', {}, el('summary', {}, 'The counts'), Figures.captureTable(data, bins)));
+}
 
-  function capture(data) {
-    const bins = Figures.captureBins(data);
-    if (!bins.length || !bins[0].length) return null;
-    const ranges =
-        el('ul', {class: 'verdicts'},
-           data.variants.map(
-               (variant, i) => el(
-                   'li', {style: '--mark: ' + Plots.colour(i)}, variant.name + ': ' + Figures.captureRange(data, i))));
-    return section(
-        'capture', 'Capture range',
-        'How far from the truth a start may lie: up to the given error, each bin of starts ' +
-            'has a success rate of 95 % or more. ' +
-            'Bars are 95 % intervals, which know that the starts of a case are not independent. ' +
-            'Failed runs count as no success.',
-        ranges, Plots.legend(data.variants), Plots.responsive((width) => Figures.drawCapture(data, bins, width)),
-        el('details', {}, el('summary', {}, 'The counts'), Figures.captureTable(data, bins)));
-  }
+function response(data) {
+  const figure = Response.figure(data);
+  return figure &&
+      section(
+             'response', 'Response to options',
+             'The figure’s median, or the success rate, over an option that was swept, with its 95 % interval. ' +
+                 'All runs with the same value count, whatever their other options.' +
+                 (data.tuning ? ' These are runs of the training cases.' : ''),
+             figure);
+}
 
-  function response(data) {
-    const figure = Response.figure(data);
-    return figure &&
+function tuning(data) {
+  const figure = Tuning.figure(data);
+  return figure &&
+      section(
+             'tuning', 'Tuning',
+             'An optimizer chose the tuned variant’s options on training cases. ' +
+                 'All other sections but the response to options are of the cases that were held out.',
+             figure);
+}
+
+function byCase(data) {
+  if (data.cases.length < 2) return null;
+  const place = el('div', {}, Summary.caseTable(data, 0));
+  return section(
+      'by-case', 'Case by case',
+      'The median over a case’s starts, and how many of them end in success. ' +
+          'Sort by a column to find the hard cases.',
+      data.metrics.length > 1 &&
+          el('div', {class: 'toolbar'},
+             Dom.select(
+                 'Metric', data.metrics.map((metric, i) => [i, metric.label]), 0,
+                 (i) => place.replaceChildren(Summary.caseTable(data, Number(i))))),
+      place);
+}
+
+// Pictures, 3D view, convergence and landscapes of one case and start, chosen once for all of them.
+function closer(data) {
+  if (!data.lookedAt.length) return [];
+  const places = {pictures: el('div'), scene: el('div'), convergence: el('div'), landscape: el('div')};
+  const state = {at: 0, each: false};
+  const pickers = [];
+  const picker = () => {
+    const box = Dom.select(
+        'Case and start', data.lookedAt.map((pair, i) => [i, Data.pairName(data, pair)]), 0, (i) => choose(Number(i)));
+    pickers.push(box.box);
+    return data.lookedAt.length < 2 ?
+        null :
+        el('div', {class: 'toolbar picker'}, box, Dom.button('Previous', () => choose(state.at - 1)),
+           Dom.button('Next', () => choose(state.at + 1)));
+  };
+  const each = () => (data.variants.length > 1 ? Dom.checkbox('each scaled to 0–1', false, (on) => {
+    state.each = on;
+    curves();
+  }) : null);
+  const missing = (what) => {
+    const pair = data.lookedAt[state.at];
+    return pair.part ? Parts.note(data, pair, () => fetch(pair)) : nothing(what);
+  };
+  const curves = () => {
+    const {cells} = data.lookedAt[state.at];
+    places.convergence.replaceChildren(Curves.convergence(data, cells, state.each) || missing('curve'));
+    places.landscape.replaceChildren(Curves.landscapes(data, cells, state.each) || missing('landscape'));
+  };
+  let comparer = null, scene = null;
+  const show = (at) => {
+    state.at = (at + data.lookedAt.length) % data.lookedAt.length;
+    pickers.forEach((box) => (box.value = state.at));
+    draw(data.lookedAt[state.at]);
+  };
+  const choose = (at) => {
+    show(at);
+    if (data.lookedAt[state.at].part) fetch(data.lookedAt[state.at]);
+  };
+  // Loads what lies beside the page.
+  const fetch = (pair) => {
+    const again = () => data.lookedAt[state.at] === pair && draw(pair);
+    Parts.load(data, pair).then(again, again);
+    again();
+  };
+  const draw = (pair) => {
+    if (comparer) comparer.dispose();
+    comparer = pair.cells.some((cell) => cell && cell.pictures.length) ? new Pictures.Comparer(data, pair) : null;
+    places.pictures.replaceChildren(comparer ? comparer.element : missing('picture'));
+    curves();
+    const entries = pair.cells.filter((cell) => cell && cell.scene)
+                        .map((cell) => ({label: data.variants[cell.variant].name, scene: cell.scene}));
+    if (scene) scene.dispose();
+    scene = null;
+    places.scene.replaceChildren(missing('3D scene'));
+    const open = () => {
+      shown.scene = scene = new SceneView(data, entries);
+      places.scene.replaceChildren(scene.element);
+      if (shown.player) shown.player.moveModels();
+    };
+    if (entries.length) whenNear(places.scene, () => data.lookedAt[state.at] === pair && !scene && open());
+  };
+  Detail.setLookAt((cell) => {
+    choose(data.lookedAt.indexOf(data.pairOf(cell)));
+    document.getElementById('pictures').scrollIntoView();
+  });
+  const many = data.variants.length > 1;
+  const kinds = new Set(data.lookedAt.flatMap((pair) => pair.cells.flatMap((cell) => Data.kinds(data, cell))));
+  const sections = [
+    kinds.has('pictures') &&
         section(
-               'response', 'Response to options',
-               'The figure’s median, or the success rate, over an option that was swept, with its 95 % interval. ' +
-                   'All runs with the same value count, whatever their other options.' +
-                   (data.tuning ? ' These are runs of the training cases.' : ''),
-               figure);
-  }
-
-  function tuning(data) {
-    const figure = Tuning.figure(data);
-    return figure &&
+            'pictures', 'Pictures',
+            many ? 'Two variants on the same X-ray. Arrow keys move the wipe; in a blink the space bar switches.' :
+                   'Two pictures on each other. Arrow keys move the wipe; in a blink the space bar switches.',
+            picker(), places.pictures,
+            data.is_run && data.cells[0] &&
+                el('details', {open: true}, el('summary', {}, 'All pictures'),
+                   Pictures.gallery(data, {pictures: Sequence.stills(data.cells[0])}))),
+    kinds.has('scene') &&
         section(
-               'tuning', 'Tuning',
-               'An optimizer chose the tuned variant’s options on training cases. ' +
-                   'All other sections but the response to options are of the cases that were held out.',
-               figure);
+            'scene', '3D view',
+            'The model in the pose that was found, in the true one and at the start, ' +
+                'among the X-rays or through the eye of one.',
+            picker(), places.scene),
+    kinds.has('convergence') &&
+        section(
+            'convergence', 'Convergence', 'The cost that the optimizer had reached, against the evaluations it took.',
+            picker(), el('div', {class: 'toolbar'}, each()), many && Plots.legend(data.variants), places.convergence),
+    kinds.has('landscape') &&
+        section(
+            'landscape', 'Cost landscapes',
+            'The cost about the result along each axis; the mark is the lowest. ' +
+                'A mark off zero, a second valley or a flat floor says where the cost misleads.',
+            picker(), el('div', {class: 'toolbar'}, each()), many && Plots.legend(data.variants), places.landscape),
+  ].filter(Boolean);
+  show(Math.max(0, data.lookedAt.findIndex((pair) => !pair.part)));
+  return sections;
+}
+
+function sequence(data) {
+  const found = data.is_run && data.cells[0] && Sequence.of(data.cells[0]);
+  return found ? section(
+                     'sequence', 'Sequence', 'The run frame by frame; the arrow keys move the slider by one frame.',
+                     (shown.player = new Sequence.Player(data, found)).element) :
+                 null;
+}
+
+const nothing = (what) => el('p', {class: 'note'}, 'Of this case and start no ' + what + ' was kept.');
+
+function whenNear(place, action) {
+  const observer = new IntersectionObserver(
+      (entries) => entries.some((entry) => entry.isIntersecting) && (observer.disconnect(), action()),
+      {rootMargin: '300px'});
+  observer.observe(place);
+}
+
+const file = (title, text) =>
+    (text ? el('details', {}, el('summary', {}, title), el('pre', {class: 'file', tabindex: 0}, text)) : null);
+
+function repeat(data) {
+  const {experiment} = data, machine = experiment.machine || {};
+  const lines = [
+    ['Seed', experiment.seed], ['Started', experiment.started], ['Finished', experiment.finished],
+    ['Folder', experiment.folder], ['marrow', data.marrow],
+    ['Machine', [machine.cpu, machine.cores && machine.cores + ' cores', machine.cpu_level].filter(Boolean).join(', ')]
+  ].filter((line) => line[1] !== undefined && line[1] !== null && line[1] !== '');
+  return section(
+      'repeat', 'Repeat it', null, experiment.command && Dom.command(experiment.command),
+      el('div', {class: 'scroll'},
+         el('table', {class: 'values'},
+            el('tbody', {},
+               lines.map(
+                   ([name, value]) => el('tr', {}, el('th', {scope: 'row'}, name), el('td', {}, String(value))))))),
+      file(data.is_run ? 'The run’s settings' : 'The experiment’s file', experiment.text),
+      file('The pipeline’s file', experiment.pipeline_text),
+      (experiment.plugins || []).length > 0 &&
+          el('details', {}, el('summary', {}, 'Plugins and their build ids'),
+             el('div', {class: 'scroll'},
+                el('table', {},
+                   el('tbody', {},
+                      experiment.plugins.map(
+                          (plugin) =>
+                              el('tr', {}, el('th', {scope: 'row'}, plugin.file),
+                                 el('td', {}, el('code', {}, plugin.build_id)))))))));
+}
+
+function summary(data) {
+  const {experiment} = data, cell = data.cells[0], judged = data.is_run && cell && Verdict.all(data, cell);
+  const verdict = judged && section('verdict', 'Verdict', null, judged);
+  const head = section(
+      'summary', data.is_run ? 'Result' : 'Result', null,
+      ...(data.is_run ?
+              (cell ? [Detail.reason(cell), Detail.absent(cell), Detail.values(data, cell), ...Detail.figures(data)] :
+                      []) :
+              [Summary.verdicts(data), Summary.table(data), Verdict.table(data)]),
+      Summary.rules(data));
+  return [
+    el('div', {class: 'head'}, el('p', {class: 'kicker'}, data.is_run ? 'Run' : 'Comparison'),
+       el('h1', {}, experiment.name || 'Unnamed'), experiment.help && el('p', {class: 'lead'}, experiment.help),
+       !data.is_run && el('p', {class: 'facts'}, Summary.facts(data))),
+    verdict, head
+  ];
+}
+
+function build(data) {
+  const {experiment} = data, many = !data.is_run, main = document.getElementById('top');
+  document.title = (experiment.name || 'marrow report') + ' · marrow';
+  const add = (...parts) => main.append(...parts.flat(2).filter(Boolean));  // at once: figures need their width
+  add(summary(data));
+  if (many && data.metrics.length)
+    add(tuning(data), response(data), distributions(data), paired(data), capture(data), byCase(data));
+  add(sequence(data));
+  add(closer(data));
+  if (data.passes.length) add(section('passes', 'Passes', null, ...Passes.draw(data)));
+  if (data.graph && (data.graph.nodes || []).length) {
+    add(section(
+        'graph', 'Pipeline', data.variants.length > 1 ? 'Framed nodes differ between the variants.' : null,
+        Graph.draw(data.graph)));
   }
-
-  function byCase(data) {
-    if (data.cases.length < 2) return null;
-    const place = el('div', {}, Summary.caseTable(data, 0));
-    return section(
-        'by-case', 'Case by case',
-        'The median over a case’s starts, and how many of them end in success. ' +
-            'Sort by a column to find the hard cases.',
-        data.metrics.length > 1 &&
-            el('div', {class: 'toolbar'},
-               Dom.select(
-                   'Metric', data.metrics.map((metric, i) => [i, metric.label]), 0,
-                   (i) => place.replaceChildren(Summary.caseTable(data, Number(i))))),
-        place);
+  if (many) {
+    shown.table = new Cells.Table(data);
+    const intro = 'Click a row for all of one run; its address in the browser’s bar is a link to it. Only the rows ' +
+        'that are seen are drawn, so Ctrl+F goes to the filter here.';
+    add(section('cells', 'All runs', intro, shown.table.element),
+        section('failures', 'Failures', null, Cells.failures(data)));
   }
+  add(repeat(data));
+  document.addEventListener('click', (event) => {
+    const mark = event.target.closest && event.target.closest('[data-cell]');
+    if (mark) Detail.open(data, data.byId.get(mark.dataset.cell));
+  });
+  Detail.openAddress(data);
+  addEventListener('hashchange', () => Detail.openAddress(data));
+}
 
-  // Pictures, 3D view, convergence and landscapes of one case and start, chosen once for all of them.
-  function closer(data) {
-    if (!data.lookedAt.length) return [];
-    const places = {pictures: el('div'), scene: el('div'), convergence: el('div'), landscape: el('div')};
-    const state = {at: 0, each: false};
-    const pickers = [];
-    const picker = () => {
-      const box = Dom.select(
-          'Case and start', data.lookedAt.map((pair, i) => [i, Data.pairName(data, pair)]), 0,
-          (i) => choose(Number(i)));
-      pickers.push(box.box);
-      return data.lookedAt.length < 2 ?
-          null :
-          el('div', {class: 'toolbar picker'}, box, Dom.button('Previous', () => choose(state.at - 1)),
-             Dom.button('Next', () => choose(state.at + 1)));
-    };
-    const each = () => (data.variants.length > 1 ? Dom.checkbox('each scaled to 0–1', false, (on) => {
-      state.each = on;
-      curves();
-    }) : null);
-    const missing = (what) => {
-      const pair = data.lookedAt[state.at];
-      return pair.part ? Parts.note(data, pair, () => fetch(pair)) : nothing(what);
-    };
-    const curves = () => {
-      const {cells} = data.lookedAt[state.at];
-      places.convergence.replaceChildren(Curves.convergence(data, cells, state.each) || missing('curve'));
-      places.landscape.replaceChildren(Curves.landscapes(data, cells, state.each) || missing('landscape'));
-    };
-    let comparer = null, scene = null;
-    const show = (at) => {
-      state.at = (at + data.lookedAt.length) % data.lookedAt.length;
-      pickers.forEach((box) => (box.value = state.at));
-      draw(data.lookedAt[state.at]);
-    };
-    const choose = (at) => {
-      show(at);
-      if (data.lookedAt[state.at].part) fetch(data.lookedAt[state.at]);
-    };
-    // Loads what lies beside the page.
-    const fetch = (pair) => {
-      const again = () => data.lookedAt[state.at] === pair && draw(pair);
-      Parts.load(data, pair).then(again, again);
-      again();
-    };
-    const draw = (pair) => {
-      if (comparer) comparer.dispose();
-      comparer = pair.cells.some((cell) => cell && cell.pictures.length) ? new Pictures.Comparer(data, pair) : null;
-      places.pictures.replaceChildren(comparer ? comparer.element : missing('picture'));
-      Page.comparer = comparer;
-      curves();
-      const entries = pair.cells.filter((cell) => cell && cell.scene)
-                          .map((cell) => ({label: data.variants[cell.variant].name, scene: cell.scene}));
-      if (scene) scene.dispose();
-      scene = null;
-      places.scene.replaceChildren(missing('3D scene'));
-      const open = () => {
-        Page.scene = scene = new SceneView(data, entries);
-        places.scene.replaceChildren(scene.element);
-        if (Page.player) Page.player.moveModels();
-      };
-      if (entries.length) whenNear(places.scene, () => data.lookedAt[state.at] === pair && !scene && open());
-    };
-    Detail.lookAt = (cell) => {
-      choose(data.lookedAt.indexOf(data.pairOf(cell)));
-      document.getElementById('pictures').scrollIntoView();
-    };
-    const many = data.variants.length > 1;
-    const kinds = new Set(data.lookedAt.flatMap((pair) => pair.cells.flatMap((cell) => Data.kinds(data, cell))));
-    const sections = [
-      kinds.has('pictures') &&
-          section(
-              'pictures', 'Pictures',
-              many ? 'Two variants on the same X-ray. Arrow keys move the wipe; in a blink the space bar switches.' :
-                     'Two pictures on each other. Arrow keys move the wipe; in a blink the space bar switches.',
-              picker(), places.pictures,
-              data.is_run && data.cells[0] &&
-                  el('details', {open: true}, el('summary', {}, 'All pictures'),
-                     Pictures.gallery(data, {pictures: Sequence.stills(data.cells[0])}))),
-      kinds.has('scene') &&
-          section(
-              'scene', '3D view',
-              'The model in the pose that was found, in the true one and at the start, ' +
-                  'among the X-rays or through the eye of one.',
-              picker(), places.scene),
-      kinds.has('convergence') &&
-          section(
-              'convergence', 'Convergence', 'The cost that the optimizer had reached, against the evaluations it took.',
-              picker(), el('div', {class: 'toolbar'}, each()), many && Plots.legend(data.variants), places.convergence),
-      kinds.has('landscape') &&
-          section(
-              'landscape', 'Cost landscapes',
-              'The cost about the result along each axis; the mark is the lowest. ' +
-                  'A mark off zero, a second valley or a flat floor says where the cost misleads.',
-              picker(), el('div', {class: 'toolbar'}, each()), many && Plots.legend(data.variants), places.landscape),
-    ].filter(Boolean);
-    show(Math.max(0, data.lookedAt.findIndex((pair) => !pair.part)));
-    return sections;
-  }
-
-  function sequence(data) {
-    const found = data.is_run && data.cells[0] && Sequence.of(data.cells[0]);
-    return found ? section(
-                       'sequence', 'Sequence', 'The run frame by frame; the arrow keys move the slider by one frame.',
-                       (Page.player = new Sequence.Player(data, found)).element) :
-                   null;
-  }
-
-  const nothing = (what) => el('p', {class: 'note'}, 'Of this case and start no ' + what + ' was kept.');
-
-  function whenNear(place, action) {
-    const observer = new IntersectionObserver(
-        (entries) => entries.some((entry) => entry.isIntersecting) && (observer.disconnect(), action()),
-        {rootMargin: '300px'});
-    observer.observe(place);
-  }
-
-  const file = (title, text) =>
-      (text ? el('details', {}, el('summary', {}, title), el('pre', {class: 'file', tabindex: 0}, text)) : null);
-
-  function repeat(data) {
-    const {experiment} = data, machine = experiment.machine || {};
-    const lines = [
-      ['Seed', experiment.seed], ['Started', experiment.started], ['Finished', experiment.finished],
-      ['Folder', experiment.folder], ['marrow', data.marrow],
-      [
-        'Machine',
-        [machine.cpu, machine.cores && machine.cores + ' cores', machine.cpu_level].filter(Boolean).join(', ')
-      ]
-    ].filter((line) => line[1] !== undefined && line[1] !== null && line[1] !== '');
-    return section(
-        'repeat', 'Repeat it', null, experiment.command && Dom.command(experiment.command),
-        el('div', {class: 'scroll'},
-           el('table', {class: 'values'},
-              el('tbody', {},
-                 lines.map(
-                     ([name, value]) => el('tr', {}, el('th', {scope: 'row'}, name), el('td', {}, String(value))))))),
-        file(data.is_run ? 'The run’s settings' : 'The experiment’s file', experiment.text),
-        file('The pipeline’s file', experiment.pipeline_text),
-        (experiment.plugins || []).length > 0 &&
-            el('details', {}, el('summary', {}, 'Plugins and their build ids'),
-               el('div', {class: 'scroll'},
-                  el('table', {},
-                     el('tbody', {},
-                        experiment.plugins.map(
-                            (plugin) =>
-                                el('tr', {}, el('th', {scope: 'row'}, plugin.file),
-                                   el('td', {}, el('code', {}, plugin.build_id)))))))));
-  }
-
-  function summary(data) {
-    const {experiment} = data, cell = data.cells[0], judged = data.is_run && cell && Verdict.all(data, cell);
-    const verdict = judged && section('verdict', 'Verdict', null, judged);
-    const head = section(
-        'summary', data.is_run ? 'Result' : 'Result', null,
-        ...(data.is_run ?
-                (cell ? [Detail.reason(cell), Detail.absent(cell), Detail.values(data, cell), ...Detail.figures(data)] :
-                        []) :
-                [Summary.verdicts(data), Summary.table(data), Verdict.table(data)]),
-        Summary.rules(data));
-    return [
-      el('div', {class: 'head'}, el('p', {class: 'kicker'}, data.is_run ? 'Run' : 'Comparison'),
-         el('h1', {}, experiment.name || 'Unnamed'), experiment.help && el('p', {class: 'lead'}, experiment.help),
-         !data.is_run && el('p', {class: 'facts'}, Summary.facts(data))),
-      verdict, head
-    ];
-  }
-
-  function build(data) {
-    const {experiment} = data, many = !data.is_run, main = document.getElementById('top');
-    document.title = (experiment.name || 'marrow report') + ' · marrow';
-    const add = (...parts) => main.append(...parts.flat(2).filter(Boolean));  // at once: figures need their width
-    add(summary(data));
-    if (many && data.metrics.length)
-      add(tuning(data), response(data), distributions(data), paired(data), capture(data), byCase(data));
-    add(sequence(data));
-    add(closer(data));
-    if (data.passes.length) add(section('passes', 'Passes', null, ...Passes.draw(data)));
-    if (data.graph && (data.graph.nodes || []).length) {
-      add(section(
-          'graph', 'Pipeline', data.variants.length > 1 ? 'Framed nodes differ between the variants.' : null,
-          Graph.draw(data.graph)));
+// The link of the section that is being read stands out in the list of contents.
+function followScroll() {
+  const links = new Map([...document.querySelectorAll('#contents a')].map((link) => [link.hash.slice(1), link]));
+  const seen = new IntersectionObserver((entries) => {
+    for (const entry of entries.filter((item) => item.isIntersecting)) {
+      links.forEach((link) => link.removeAttribute('aria-current'));
+      const link = links.get(entry.target.id), bar = link.parentElement;
+      link.setAttribute('aria-current', 'true');
+      bar.scrollLeft = link.offsetLeft - bar.offsetLeft - bar.clientWidth / 2 + link.offsetWidth / 2;
     }
-    if (many) {
-      Page.table = new Cells.Table(data);
-      const intro = 'Click a row for all of one run; its address in the browser’s bar is a link to it. Only the rows ' +
-          'that are seen are drawn, so Ctrl+F goes to the filter here.';
-      add(section('cells', 'All runs', intro, Page.table.element),
-          section('failures', 'Failures', null, Cells.failures(data)));
-    }
-    add(repeat(data));
-    document.addEventListener('click', (event) => {
-      const mark = event.target.closest && event.target.closest('[data-cell]');
-      if (mark) Detail.open(data, data.byId.get(mark.dataset.cell));
-    });
-    Detail.openAddress(data);
-    addEventListener('hashchange', () => Detail.openAddress(data));
+  }, {rootMargin: '-20% 0px -70% 0px'});
+  document.querySelectorAll('main > section').forEach((node) => seen.observe(node));
+}
+
+export function start() {
+  startTheme();
+  Dom.startTooltip();
+  try {
+    build(Data.load());
+    followScroll();
+  } catch (error) {
+    document.getElementById('top').prepend(
+        el('p', {class: 'fault', role: 'alert'}, 'This report cannot be shown whole: ' + error.message));
+    console.error(error);
   }
+  document.documentElement.dataset.ready = 'true';
+}
 
-  function startTheme() {
-    const button = document.getElementById('theme'), root = document.documentElement;
-    const stored = () => {
-      try {
-        return localStorage.getItem('marrow-theme');
-      } catch (error) {
-        return null;
-      }
-    };
-    const dark = () =>
-        (root.dataset.theme ? root.dataset.theme === 'dark' : matchMedia('(prefers-color-scheme: dark)').matches);
-    const label = () => (button.textContent = dark() ? 'Light' : 'Dark');
-    button.setAttribute('aria-label', 'Change between light and dark');
-    if (stored()) root.dataset.theme = stored();
-    button.addEventListener('click', () => {
-      root.dataset.theme = dark() ? 'light' : 'dark';
-      try {
-        localStorage.setItem('marrow-theme', root.dataset.theme);
-      } catch (error) { /* from disk some browsers keep nothing */
-      }
-      label();
-    });
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', label);
-    label();
-  }
-
-  // The link of the section that is being read stands out in the list of contents.
-  function followScroll() {
-    const links = new Map([...document.querySelectorAll('#contents a')].map((link) => [link.hash.slice(1), link]));
-    const seen = new IntersectionObserver((entries) => {
-      for (const entry of entries.filter((item) => item.isIntersecting)) {
-        links.forEach((link) => link.removeAttribute('aria-current'));
-        const link = links.get(entry.target.id), bar = link.parentElement;
-        link.setAttribute('aria-current', 'true');
-        bar.scrollLeft = link.offsetLeft - bar.offsetLeft - bar.clientWidth / 2 + link.offsetWidth / 2;
-      }
-    }, {rootMargin: '-20% 0px -70% 0px'});
-    document.querySelectorAll('main > section').forEach((node) => seen.observe(node));
-  }
-
-  function start() {
-    startTheme();
-    Dom.startTooltip();
-    try {
-      build(Data.load());
-      followScroll();
-    } catch (error) {
-      document.getElementById('top').prepend(
-          el('p', {class: 'fault', role: 'alert'}, 'This report cannot be shown whole: ' + error.message));
-      console.error(error);
-    }
-    document.documentElement.dataset.ready = 'true';
-  }
-
-  return {start};
-})();
-
-document.addEventListener('DOMContentLoaded', Page.start);
+start();

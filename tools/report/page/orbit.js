@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Turning, shifting and zooming a 3D view by mouse, touch and keys. Free: about a target, the world's z (to the head)
 // up. Looking through an X-ray: shifting and zooming in the image's plane only.
-'use strict';
 
-class Orbit {
+export class Orbit {
   constructor(canvas, changed) {
     Object.assign(this, {canvas, changed, locked: false, pointers: new Map()});
     this.reset({target: [0, 0, 0], distance: 500, azimuth_deg: -65});

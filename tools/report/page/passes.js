@@ -1,37 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 // What happened to the bodies that a run repeated: a line for each pass, those that failed first in words.
-'use strict';
+import {el, withUnit} from './dom.js';
 
-const Passes = (() => {
-  const {el, withUnit} = Dom;
+const isDone = (pass) => pass.status === 'done';
 
-  const isDone = (pass) => pass.status === 'done';
+function summary({node, passes, end}) {
+  const failed = passes.filter((pass) => !isDone(pass)).length;
+  const seconds = passes.map((pass) => pass.seconds).sort((a, b) => a - b), half = (seconds.length - 1) / 2;
+  return node + ': ' + passes.length + (passes.length === 1 ? ' pass' : ' passes') +
+      (failed ? ', ' + failed + ' not done' : '') +
+      (seconds.length ? '; median ' + withUnit((seconds[Math.floor(half)] + seconds[Math.ceil(half)]) / 2, 's') : '') +
+      (end ? '; ended because ' + end : '');
+}
 
-  function summary({node, passes, end}) {
-    const failed = passes.filter((pass) => !isDone(pass)).length;
-    const seconds = passes.map((pass) => pass.seconds).sort((a, b) => a - b), half = (seconds.length - 1) / 2;
-    return node + ': ' + passes.length + (passes.length === 1 ? ' pass' : ' passes') +
-        (failed ? ', ' + failed + ' not done' : '') +
-        (seconds.length ? '; median ' + withUnit((seconds[Math.floor(half)] + seconds[Math.ceil(half)]) / 2, 's') :
-                          '') +
-        (end ? '; ended because ' + end : '');
-  }
+const table = (entry) =>
+    el('div', {class: 'scroll'},
+       el('table', {class: 'figures'},
+          el('thead', {},
+             el('tr', {}, el('th', {scope: 'col'}, 'Pass'), el('th', {scope: 'col'}, 'Status'),
+                el('th', {scope: 'col', class: 'number'}, 'Time'), el('th', {scope: 'col'}, 'Reason'))),
+          el('tbody', {},
+             entry.passes.map(
+                 (pass) =>
+                     el('tr', {}, el('th', {scope: 'row'}, pass.name), el('td', {}, pass.status),
+                        el('td', {class: 'number'}, withUnit(pass.seconds, 's')), el('td', {}, pass.reason || ''))))));
 
-  const table = (entry) =>
-      el('div', {class: 'scroll'},
-         el('table', {class: 'figures'},
-            el('thead', {},
-               el('tr', {}, el('th', {scope: 'col'}, 'Pass'), el('th', {scope: 'col'}, 'Status'),
-                  el('th', {scope: 'col', class: 'number'}, 'Time'), el('th', {scope: 'col'}, 'Reason'))),
-            el('tbody', {},
-               entry.passes.map(
-                   (pass) => el(
-                       'tr', {}, el('th', {scope: 'row'}, pass.name), el('td', {}, pass.status),
-                       el('td', {class: 'number'}, withUnit(pass.seconds, 's')), el('td', {}, pass.reason || ''))))));
-
-  const draw = (data) => data.passes.map(
-      (entry) =>
-          el('div', {}, el('p', {}, summary(entry)), el('details', {}, el('summary', {}, 'All passes'), table(entry))));
-
-  return {draw};
-})();
+export const draw = (data) => data.passes.map(
+    (entry) =>
+        el('div', {}, el('p', {}, summary(entry)), el('details', {}, el('summary', {}, 'All passes'), table(entry))));

@@ -1,195 +1,192 @@
 // SPDX-License-Identifier: Apache-2.0
 // Two pictures of one case laid on each other (wipe), in turn (blink) or side by side; by mouse, touch or keyboard.
-'use strict';
+import * as Dom from './dom.js';
+import {el} from './dom.js';
+import * as Plots from './plots.js';
 
-const Pictures = (() => {
-  const {el} = Dom;
-  const BLINK_MS = 700;  // slower than three times a second
-  const ZOOMS = [['1', 'fit'], ['2', '2×'], ['4', '4×']];
+const BLINK_MS = 700;  // slower than three times a second
+const ZOOMS = [['1', 'fit'], ['2', '2×'], ['4', '4×']];
 
-  // One side: which variant's picture of which name.
-  function sideControls(data, letter, side, names, many, changed) {
-    const variants =
-        Dom.select('Variant ' + letter, data.variants.map((variant, i) => [i, variant.name]), side.variant, (value) => {
-          side.variant = Number(value);
-          changed();
-        });
-    const pictures = Dom.select('Picture ' + letter, names.map((name) => [name, name]), side.name, (value) => {
-      side.name = value;
-      changed();
+// One side: which variant's picture of which name.
+function sideControls(data, letter, side, names, many, changed) {
+  const variants =
+      Dom.select('Variant ' + letter, data.variants.map((variant, i) => [i, variant.name]), side.variant, (value) => {
+        side.variant = Number(value);
+        changed();
+      });
+  const pictures = Dom.select('Picture ' + letter, names.map((name) => [name, name]), side.name, (value) => {
+    side.name = value;
+    changed();
+  });
+  return [data.variants.length > 1 && variants, many && pictures];
+}
+
+export class Comparer {
+  // pair: {cells: [per variant]}; same: both sides show the picture of one name
+  constructor(data, pair) {
+    this.data = data;
+    this.pair = pair;
+    this.names = [...new Set(pair.cells.flatMap((cell) => (cell ? cell.pictures.map((entry) => entry.name) : [])))];
+    this.same = data.variants.length > 1;
+    this.mode = 'wipe';
+    this.wipe = 50;
+    this.shown = 0;  // which side a blink shows
+    this.running = !matchMedia('(prefers-reduced-motion: reduce)').matches;
+    const with_pictures = pair.cells.map((cell, i) => (cell && cell.pictures.length ? i : -1)).filter((i) => i >= 0);
+    const first = with_pictures.includes(data.baseline) ? data.baseline : with_pictures[0];
+    const second = with_pictures.find((i) => i !== first) ?? first;
+    this.sides = [
+      {variant: first, name: this.names[0]},
+      {variant: second, name: this.same ? this.names[0] : this.names[1] || this.names[0]}
+    ];
+    this.element = el('div', {class: 'comparer', 'data-mode': this.mode});
+    this.build();
+  }
+
+  build() {
+    const update = () => this.update();
+    const modes = Dom.choice(
+        'Mode', [['wipe', 'Wipe'], ['blink', 'Blink'], ['side', 'Side by side']], this.mode,
+        (mode) => this.setMode(mode));
+    const zoom = Dom.choice('Zoom', ZOOMS, '1', (value) => this.stage.style.setProperty('--zoom', value));
+    const common = Dom.select('Picture', this.names.map((name) => [name, name]), this.names[0], (name) => {
+      this.sides.forEach((side) => (side.name = name));
+      update();
     });
-    return [data.variants.length > 1 && variants, many && pictures];
+    this.pause = Dom.button(this.running ? 'Pause' : 'Run', () => {
+      this.running = !this.running;
+      this.pause.textContent = this.running ? 'Pause' : 'Run';
+    });
+    this.flip = Dom.button('Switch', () => this.turn());
+    this.images = [0, 1].map((i) => el('img', {
+                               class: 'side side-' +
+                                   'ab'[i],
+                               alt: '',
+                               draggable: 'false',
+                               onload: () => this.fit()
+                             }));
+    this.labels = [0, 1].map((i) => el('figcaption', {
+                               class: 'label label-' +
+                                   'ab'[i]
+                             }));
+    this.handle = el('div', {
+      class: 'handle',
+      role: 'slider',
+      tabindex: 0,
+      'aria-label': 'Wipe between the two pictures',
+      'aria-valuemin': 0,
+      'aria-valuemax': 100
+    });
+    this.missing = el('p', {class: 'note', hidden: true});
+    this.stage =
+        el('div', {
+          class: 'stage',
+          tabindex: 0,
+          'aria-label': 'Pictures: arrow keys move the wipe, the space bar switches in a blink'
+        },
+           el('figure', {class: 'layer-a'}, this.images[0], this.labels[0]),
+           el('figure', {class: 'layer-b'}, this.images[1], this.labels[1]), this.handle);
+    this.element.append(
+        el('div', {class: 'toolbar'}, modes, this.same && common,
+           sideControls(this.data, 'A', this.sides[0], this.names, !this.same, update),
+           sideControls(this.data, 'B', this.sides[1], this.names, !this.same, update), zoom, this.pause, this.flip),
+        this.missing, el('div', {class: 'picture-box'}, this.stage));
+    this.listen();
+    this.setWipe(50);
+    this.update();
+    this.setMode('wipe');
+    this.timer =
+        setInterval(() => this.mode === 'blink' && this.running && this.element.isConnected && this.turn(), BLINK_MS);
   }
 
-  class Comparer {
-    // pair: {cells: [per variant]}; same: both sides show the picture of one name
-    constructor(data, pair) {
-      this.data = data;
-      this.pair = pair;
-      this.names = [...new Set(pair.cells.flatMap((cell) => (cell ? cell.pictures.map((entry) => entry.name) : [])))];
-      this.same = data.variants.length > 1;
-      this.mode = 'wipe';
-      this.wipe = 50;
-      this.shown = 0;  // which side a blink shows
-      this.running = !matchMedia('(prefers-reduced-motion: reduce)').matches;
-      const with_pictures = pair.cells.map((cell, i) => (cell && cell.pictures.length ? i : -1)).filter((i) => i >= 0);
-      const first = with_pictures.includes(data.baseline) ? data.baseline : with_pictures[0];
-      const second = with_pictures.find((i) => i !== first) ?? first;
-      this.sides = [
-        {variant: first, name: this.names[0]},
-        {variant: second, name: this.same ? this.names[0] : this.names[1] || this.names[0]}
-      ];
-      this.element = el('div', {class: 'comparer', 'data-mode': this.mode});
-      this.build();
-    }
-
-    build() {
-      const update = () => this.update();
-      const modes = Dom.choice(
-          'Mode', [['wipe', 'Wipe'], ['blink', 'Blink'], ['side', 'Side by side']], this.mode,
-          (mode) => this.setMode(mode));
-      const zoom = Dom.choice('Zoom', ZOOMS, '1', (value) => this.stage.style.setProperty('--zoom', value));
-      const common = Dom.select('Picture', this.names.map((name) => [name, name]), this.names[0], (name) => {
-        this.sides.forEach((side) => (side.name = name));
-        update();
-      });
-      this.pause = Dom.button(this.running ? 'Pause' : 'Run', () => {
-        this.running = !this.running;
-        this.pause.textContent = this.running ? 'Pause' : 'Run';
-      });
-      this.flip = Dom.button('Switch', () => this.turn());
-      this.images = [0, 1].map((i) => el('img', {
-                                 class: 'side side-' +
-                                     'ab'[i],
-                                 alt: '',
-                                 draggable: 'false',
-                                 onload: () => this.fit()
-                               }));
-      this.labels = [0, 1].map((i) => el('figcaption', {
-                                 class: 'label label-' +
-                                     'ab'[i]
-                               }));
-      this.handle = el('div', {
-        class: 'handle',
-        role: 'slider',
-        tabindex: 0,
-        'aria-label': 'Wipe between the two pictures',
-        'aria-valuemin': 0,
-        'aria-valuemax': 100
-      });
-      this.missing = el('p', {class: 'note', hidden: true});
-      this.stage =
-          el('div', {
-            class: 'stage',
-            tabindex: 0,
-            'aria-label': 'Pictures: arrow keys move the wipe, the space bar switches in a blink'
-          },
-             el('figure', {class: 'layer-a'}, this.images[0], this.labels[0]),
-             el('figure', {class: 'layer-b'}, this.images[1], this.labels[1]), this.handle);
-      this.element.append(
-          el('div', {class: 'toolbar'}, modes, this.same && common,
-             sideControls(this.data, 'A', this.sides[0], this.names, !this.same, update),
-             sideControls(this.data, 'B', this.sides[1], this.names, !this.same, update), zoom, this.pause, this.flip),
-          this.missing, el('div', {class: 'picture-box'}, this.stage));
-      this.listen();
-      this.setWipe(50);
-      this.update();
-      this.setMode('wipe');
-      this.timer =
-          setInterval(() => this.mode === 'blink' && this.running && this.element.isConnected && this.turn(), BLINK_MS);
-    }
-
-    listen() {
-      const drag = (event) => {
-        if (this.mode !== 'wipe' || !(event.buttons & 1)) return;
-        const area = this.stage.getBoundingClientRect();
-        this.setWipe(100 * (event.clientX - area.left) / area.width);
-      };
-      this.stage.addEventListener('pointerdown', (event) => {
-        this.stage.setPointerCapture(event.pointerId);
-        drag(event);
-      });
-      this.stage.addEventListener('pointermove', drag);
-      this.stage.addEventListener('keydown', (event) => {
-        const step = {ArrowLeft: -2, ArrowRight: 2, PageDown: -10, PageUp: 10, Home: -100, End: 100}[event.key];
-        if (this.mode === 'wipe' && step)
-          this.setWipe(this.wipe + step);
-        else if (this.mode === 'blink' && (event.key === ' ' || step))
-          this.turn();
-        else
-          return;
-        event.preventDefault();
-      });
-    }
-
-    setMode(mode) {
-      this.mode = this.element.dataset.mode = mode;
-      this.pause.hidden = this.flip.hidden = mode !== 'blink';
-      this.handle.hidden = mode !== 'wipe';
-      this.show();
-    }
-
-    setWipe(percent) {
-      this.wipe = Math.max(0, Math.min(100, percent));
-      this.stage.style.setProperty('--wipe', this.wipe + '%');
-      this.handle.setAttribute('aria-valuenow', Math.round(this.wipe));
-    }
-
-    turn() {
-      this.shown = 1 - this.shown;
-      this.show();
-    }
-
-    show() {
-      this.element.dataset.shown = this.shown ? 'b' : 'a';
-    }
-
-    pictureOf(side) {
-      const cell = this.pair.cells[side.variant], entry = cell && cell.pictures.find((item) => item.name === side.name);
-      return entry ? this.data.pictures[entry.picture] : null;
-    }
-
-    update() {
-      const absent = [];
-      this.sides.forEach((side, i) => {
-        const source = this.pictureOf(side),
-              title = this.data.variants.length > 1 ? this.data.variants[side.variant].name : side.name;
-        if (source)
-          this.images[i].src = source;
-        else
-          this.images[i].removeAttribute('src');
-        this.images[i].alt = source ? side.name + ', ' + this.data.variants[side.variant].name : '';
-        this.labels[i].textContent = title;
-        this.labels[i].style.setProperty('--mark', Plots.colour(side.variant));
-        if (!source) absent.push(title);
-      });
-      this.missing.hidden = !absent.length;
-      this.missing.textContent = 'Of this case and start no such picture was kept of: ' + absent.join(', ') + '.';
-    }
-
-    fit() {
-      const image = this.images.find((item) => item.naturalWidth);
-      if (image) this.stage.style.setProperty('--aspect', image.naturalWidth / image.naturalHeight);
-    }
-
-    dispose() {
-      clearInterval(this.timer);
-    }
+  listen() {
+    const drag = (event) => {
+      if (this.mode !== 'wipe' || !(event.buttons & 1)) return;
+      const area = this.stage.getBoundingClientRect();
+      this.setWipe(100 * (event.clientX - area.left) / area.width);
+    };
+    this.stage.addEventListener('pointerdown', (event) => {
+      this.stage.setPointerCapture(event.pointerId);
+      drag(event);
+    });
+    this.stage.addEventListener('pointermove', drag);
+    this.stage.addEventListener('keydown', (event) => {
+      const step = {ArrowLeft: -2, ArrowRight: 2, PageDown: -10, PageUp: 10, Home: -100, End: 100}[event.key];
+      if (this.mode === 'wipe' && step)
+        this.setWipe(this.wipe + step);
+      else if (this.mode === 'blink' && (event.key === ' ' || step))
+        this.turn();
+      else
+        return;
+      event.preventDefault();
+    });
   }
 
-  // All pictures of a cell, small; a click shows one in the full width.
-  function gallery(data, cell) {
-    return el('div', {class: 'gallery'}, cell.pictures.map((entry) => {
-      const button = el(
-          'button', {
-            type: 'button',
-            'aria-expanded': 'false',
-            onclick: () => button.setAttribute('aria-expanded', String(button.classList.toggle('large')))
-          },
-          el('img', {src: data.pictures[entry.picture], alt: entry.name, loading: 'lazy'}), el('span', {}, entry.name));
-      return button;
-    }));
+  setMode(mode) {
+    this.mode = this.element.dataset.mode = mode;
+    this.pause.hidden = this.flip.hidden = mode !== 'blink';
+    this.handle.hidden = mode !== 'wipe';
+    this.show();
   }
 
-  return {Comparer, gallery};
-})();
+  setWipe(percent) {
+    this.wipe = Math.max(0, Math.min(100, percent));
+    this.stage.style.setProperty('--wipe', this.wipe + '%');
+    this.handle.setAttribute('aria-valuenow', Math.round(this.wipe));
+  }
+
+  turn() {
+    this.shown = 1 - this.shown;
+    this.show();
+  }
+
+  show() {
+    this.element.dataset.shown = this.shown ? 'b' : 'a';
+  }
+
+  pictureOf(side) {
+    const cell = this.pair.cells[side.variant], entry = cell && cell.pictures.find((item) => item.name === side.name);
+    return entry ? this.data.pictures[entry.picture] : null;
+  }
+
+  update() {
+    const absent = [];
+    this.sides.forEach((side, i) => {
+      const source = this.pictureOf(side),
+            title = this.data.variants.length > 1 ? this.data.variants[side.variant].name : side.name;
+      if (source)
+        this.images[i].src = source;
+      else
+        this.images[i].removeAttribute('src');
+      this.images[i].alt = source ? side.name + ', ' + this.data.variants[side.variant].name : '';
+      this.labels[i].textContent = title;
+      this.labels[i].style.setProperty('--mark', Plots.colour(side.variant));
+      if (!source) absent.push(title);
+    });
+    this.missing.hidden = !absent.length;
+    this.missing.textContent = 'Of this case and start no such picture was kept of: ' + absent.join(', ') + '.';
+  }
+
+  fit() {
+    const image = this.images.find((item) => item.naturalWidth);
+    if (image) this.stage.style.setProperty('--aspect', image.naturalWidth / image.naturalHeight);
+  }
+
+  dispose() {
+    clearInterval(this.timer);
+  }
+}
+
+// All pictures of a cell, small; a click shows one in the full width.
+export function gallery(data, cell) {
+  return el('div', {class: 'gallery'}, cell.pictures.map((entry) => {
+    const button = el(
+        'button', {
+          type: 'button',
+          'aria-expanded': 'false',
+          onclick: () => button.setAttribute('aria-expanded', String(button.classList.toggle('large')))
+        },
+        el('img', {src: data.pictures[entry.picture], alt: entry.name, loading: 'lazy'}), el('span', {}, entry.name));
+    return button;
+  }));
+}

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The 3D view: models in the result's, the true and the start's pose, among the X-rays or seen through one of them.
-'use strict';
+import * as THREE from 'three';
+
+import {button, checkbox, el, select, slider} from './dom.js';
+import * as Meshes from './meshes.js';
+import {Orbit} from './orbit.js';
 
 const POSES = {
   result: {colour: 0x2f86c9, line: 0x4db8ff, text: 'result'},
@@ -9,7 +13,7 @@ const POSES = {
 };
 const OUTLINE_PX = 1.8;
 
-class SceneView {
+export class SceneView {
   // entries: [{label, scene: id}], one shown at a time
   constructor(data, entries) {
     Object.assign(
@@ -17,20 +21,20 @@ class SceneView {
     this.style = {free: 'surface', through: 'outline'};
     this.shownPoses = {result: true, truth: true, start: false};
     this.hiddenMeshes = new Set();
-    this.canvas = Dom.el('canvas', {
+    this.canvas = el('canvas', {
       class: 'scene',
       tabindex: 0,
       'aria-label': '3D view. Arrow keys turn, shift and arrow keys move, plus and minus zoom, 0 resets'
     });
-    this.controls = Dom.el('div', {class: 'toolbar'});
-    this.hint = Dom.el('p', {class: 'note'});
-    this.element = Dom.el('div', {class: 'scene-view'}, this.controls, this.canvas, this.hint);
+    this.controls = el('div', {class: 'toolbar'});
+    this.hint = el('p', {class: 'note'});
+    this.element = el('div', {class: 'scene-view'}, this.controls, this.canvas, this.hint);
     this.failure = this.open();
-    if (this.failure) this.element.replaceChildren(Dom.el('p', {class: 'note'}, this.failure));
+    if (this.failure) this.element.replaceChildren(el('p', {class: 'note'}, this.failure));
   }
 
   open() {
-    if (typeof THREE === 'undefined')
+    if (!THREE.WebGLRenderer)
       return 'The 3D view was left out: three.js was not at hand when this report was written ' +
           '(Debian package libjs-three).';
     try {
@@ -168,7 +172,7 @@ class SceneView {
     const draw = () => this.draw(), names = [...new Set(this.source.meshes.map((mesh) => mesh.name))];
     const poses =
         Object.keys(POSES).filter((name) => this.models.some((model) => model.pose.name === name)).map((name) => {
-          const box = Dom.checkbox(POSES[name].text, this.shownPoses[name], (on) => {
+          const box = checkbox(POSES[name].text, this.shownPoses[name], (on) => {
             this.shownPoses[name] = on;
             draw();
           });
@@ -176,32 +180,32 @@ class SceneView {
           box.classList.add('marked');
           return box;
         });
-    const meshes = names.length > 1 ? names.map((name) => Dom.checkbox(name, !this.hiddenMeshes.has(name), (on) => {
-      this.hiddenMeshes[on ? 'delete' : 'add'](name);
-      draw();
-    })) : [];
+    const meshes = names.length > 1 ? names.map((name) => checkbox(name, !this.hiddenMeshes.has(name), (on) => {
+                                                  this.hiddenMeshes[on ? 'delete' : 'add'](name);
+                                                  draw();
+                                                })) : [];
     const mode = this.through ? 'through' : 'free';
     const set = (change) => (value) => {
       change(value);
       draw();
     };
     const entry = this.entries.findIndex((entry) => entry.scene === this.id);
-    const variants = () => Dom.select(
+    const variants = () => select(
         'Variant', this.entries.map((entry, i) => [i, entry.label]), entry, (i) => this.load(this.entries[i].scene));
     const views = [['', 'free'], ...this.views.map((view) => [view.name, 'through ' + view.name])];
     const styles = [['surface', 'surface'], ['outline', 'outline'], ['both', 'surface and outline']];
     const image = () => this.through ?
         [
-          Dom.slider('X-ray’s opacity', this.imageOpacity, set((value) => this.imageOpacity = value)),
-          Dom.checkbox('X-ray in front', this.imageInFront, set((on) => this.imageInFront = on)),
+          slider('X-ray’s opacity', this.imageOpacity, set((value) => this.imageOpacity = value)),
+          checkbox('X-ray in front', this.imageInFront, set((on) => this.imageInFront = on)),
         ] :
-        [Dom.checkbox('X-rays', this.planes, set((on) => this.planes = on))];
+        [checkbox('X-rays', this.planes, set((on) => this.planes = on))];
     this.controls.replaceChildren(
         ...(this.entries.length > 1 ? [variants()] : []),
-        Dom.select('View', views, this.through || '', (name) => this.lookThrough(name || null)),
-        Dom.select('Drawn as', styles, this.style[mode], set((style) => this.style[mode] = style)), ...poses, ...meshes,
-        Dom.slider('Model’s opacity', this.modelOpacity, set((value) => this.modelOpacity = value)), ...image(),
-        Dom.button('Reset view', () => this.orbit.again()));
+        select('View', views, this.through || '', (name) => this.lookThrough(name || null)),
+        select('Drawn as', styles, this.style[mode], set((style) => this.style[mode] = style)), ...poses, ...meshes,
+        slider('Model’s opacity', this.modelOpacity, set((value) => this.modelOpacity = value)), ...image(),
+        button('Reset view', () => this.orbit.again()));
     this.hint.textContent = this.through ?
         'The camera of this X-ray. Drag to shift, wheel (after a click) or + and − to zoom, 0 to reset.' :
         'Drag to turn, shift and drag to move, wheel (after a click) or + and − to zoom, 0 to reset.';

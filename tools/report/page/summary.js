@@ -1,292 +1,278 @@
 // SPDX-License-Identifier: Apache-2.0
 // The head of the page: what was compared, what came out in a sentence each, and the table of the variants.
-'use strict';
+import * as Data from './data.js';
+import {button, el, number, percent, probability, select, withUnit} from './dom.js';
+import * as Plots from './plots.js';
 
-const Summary = (() => {
-  const {el, number, percent, probability, withUnit} = Dom;
+const OTHER_RUNS =
+    'The variants have this figure in different runs, so these numbers are not of the same cases and starts.';
 
-  const OTHER_RUNS =
-      'The variants have this figure in different runs, so these numbers are not of the same cases and starts.';
+const plural = (count, word) => count + ' ' + word + (count === 1 ? '' : 's');
 
-  const plural = (count, word) => count + ' ' + word + (count === 1 ? '' : 's');
+export function facts(data) {
+  const failed = data.cells.filter((cell) => cell.status === 'failed').length;
+  const incomplete =
+      data.cells.filter((cell) => cell.status !== 'failed' && !cell.values.every(Number.isFinite)).length;
+  const parts =
+      [plural(data.variants.length, 'variant'), plural(data.cases.length, 'case'), plural(data.starts.length, 'start')];
+  return parts.join(' × ') + ': ' + plural(data.cells.length, 'run') +
+      (failed ? ', ' + failed + ' failed' : ', none failed') + (incomplete ? ', ' + incomplete + ' incomplete' : '') +
+      '.';
+}
 
-  function facts(data) {
-    const failed = data.cells.filter((cell) => cell.status === 'failed').length;
-    const incomplete =
-        data.cells.filter((cell) => cell.status !== 'failed' && !cell.values.every(Number.isFinite)).length;
-    const parts = [
-      plural(data.variants.length, 'variant'), plural(data.cases.length, 'case'), plural(data.starts.length, 'start')
-    ];
-    return parts.join(' × ') + ': ' + plural(data.cells.length, 'run') +
-        (failed ? ', ' + failed + ' failed' : ', none failed') + (incomplete ? ', ' + incomplete + ' incomplete' : '') +
-        '.';
-  }
+// The main metric's sentences; where it has none, all.
+export function verdicts(data) {
+  const main = data.metrics[0] && data.comparisons.filter((item) => item.metric === data.metrics[0].name);
+  const shown = (main && main.length ? main : data.comparisons).filter((item) => item.sentence);
+  return shown.length ?
+      el('ul', {class: 'verdicts'},
+         shown.map(
+             (item) => el('li', {style: '--mark: ' + Plots.colour(data.variantIndex(item.variant))}, item.sentence))) :
+      null;
+}
 
-  // The main metric's sentences; where it has none, all.
-  function verdicts(data) {
-    const main = data.metrics[0] && data.comparisons.filter((item) => item.metric === data.metrics[0].name);
-    const shown = (main && main.length ? main : data.comparisons).filter((item) => item.sentence);
-    return shown.length ?
-        el('ul', {class: 'verdicts'},
-           shown.map(
-               (item) =>
-                   el('li', {style: '--mark: ' + Plots.colour(data.variantIndex(item.variant))}, item.sentence))) :
-        null;
-  }
+export function rateBar(success) {
+  if (!success || !Number.isFinite(success.rate)) return '–';
+  const text = success.count + ' of ' + success.of + ' = ' + percent(success.rate) + ', 95 % interval ' +
+      percent(success.low) + ' to ' + percent(success.high);
+  const at = (fraction) => (100 * fraction).toFixed(2) + '%';
+  return el(
+      'div', {class: 'rate', 'data-tip': text},
+      el('span', {class: 'rate-bar', role: 'img', 'aria-label': text},
+         el('span', {class: 'rate-fill', style: 'width: ' + at(success.rate)}), el('span', {
+           class: 'rate-interval',
+           style: 'left: ' + at(success.low) + '; width: ' + at(success.high - success.low)
+         })),
+      el('span', {class: 'rate-text'}, percent(success.rate), ' ', el('small', {}, success.count + '/' + success.of)));
+}
 
-  function rateBar(success) {
-    if (!success || !Number.isFinite(success.rate)) return '–';
-    const text = success.count + ' of ' + success.of + ' = ' + percent(success.rate) + ', 95 % interval ' +
-        percent(success.low) + ' to ' + percent(success.high);
-    const at = (fraction) => (100 * fraction).toFixed(2) + '%';
-    return el(
-        'div', {class: 'rate', 'data-tip': text},
-        el('span', {class: 'rate-bar', role: 'img', 'aria-label': text},
-           el('span', {class: 'rate-fill', style: 'width: ' + at(success.rate)}), el('span', {
-             class: 'rate-interval',
-             style: 'left: ' + at(success.low) + '; width: ' + at(success.high - success.low)
-           })),
-        el('span', {class: 'rate-text'}, percent(success.rate), ' ',
-           el('small', {}, success.count + '/' + success.of)));
-  }
+const spread = (item, unit) =>
+    (item && Number.isFinite(item.median) ?
+         [number(item.median), ' ', el('small', {}, '[' + number(item.q1) + ', ' + number(item.q3) + ']')] :
+         '–');
 
-  const spread = (item, unit) =>
-      (item && Number.isFinite(item.median) ?
-           [number(item.median), ' ', el('small', {}, '[' + number(item.q1) + ', ' + number(item.q3) + ']')] :
+// Where bounds are known, the median's.
+const median = (item) =>
+    (item && Number.isFinite(item.median_low) ?
+         el('span', {'data-tip': '95 % interval ' + number(item.median_low) + ' to ' + number(item.median_high)},
+            spread(item)) :
+         spread(item));
+
+// Runs that failed, and those that are done without a figure whose node may fail.
+const lost = ({failed, incomplete}) =>
+    [String(failed ?? '–'),
+     incomplete > 0 &&
+         el('small', {'data-tip': 'done, but without a figure whose node may fail'},
+            ' + ' + incomplete + ' incomplete')];
+
+const countOf = (item) => (item && Number.isFinite(item.of) ? item.count + ' of ' + item.of : '–');
+
+function variantName(data, i) {
+  const variant = data.variants[i], options = Object.entries(variant.options);
+  return el(
+      'div', {class: 'variant-name'}, Plots.swatch(i),
+      el('div', {}, el('strong', {}, variant.name), variant.is_baseline && el('span', {class: 'tag'}, 'baseline'),
+         options.map(
+             ([name, value]) =>
+                 el('code', {class: 'option'},
+                    name + ' = ' + (typeof value === 'string' ? value : JSON.stringify(value))))));
+}
+
+function columns(data, metric) {
+  const of = (i) => data.summary[i] || {}, found = (i) => (of(i).metrics || {})[metric.name] || {};
+  return [
+    {title: 'Variant', key: (i) => data.variants[i].name, cell: (i) => variantName(data, i)},
+    {title: 'Success', key: (i) => -(of(i).success || {}).rate, cell: (i) => rateBar(of(i).success)},
+    {
+      title: 'Median [quartiles]',
+      unit: metric.unit,
+      key: (i) => found(i).median,
+      cell: (i) => median(found(i)),
+      number: true
+    },
+    {
+      title: metric.higher_is_better ? '5th percentile' : '95th percentile',
+      unit: metric.unit,
+      key: (i) => Data.worseEnd(metric, found(i)),
+      cell: (i) => number(Data.worseEnd(metric, found(i))),
+      number: true
+    },
+    {title: 'Worst', unit: metric.unit, key: (i) => found(i).worst, cell: (i) => number(found(i).worst), number: true},
+    {
+      title: 'Of runs',
+      key: (i) => found(i).count,
+      cell: (i) => el('span', {'data-tip': 'runs that have the figure, of all'}, countOf(found(i))),
+      number: true
+    },
+    {title: 'Failed', key: (i) => of(i).failed + of(i).incomplete, cell: (i) => lost(of(i)), number: true},
+    {
+      title: 'Time [quartiles]',
+      unit: 's',
+      key: (i) => (of(i).seconds || {}).median,
+      cell: (i) => spread(of(i).seconds),
+      number: true
+    },
+    {
+      title: 'Evaluations',
+      key: (i) => (of(i).evaluations || {}).median,
+      cell: (i) => String((of(i).evaluations || {}).median ?? '–'),
+      number: true
+    },
+  ];
+}
+
+// A table whose columns sort: rows are indices, a column {title, unit, key, cell, number}.
+export function sortable(rows, all, state, caption) {
+  const compare = (a, b) =>
+      (typeof a === 'string' ? a.localeCompare(b, undefined, {numeric: true}) :
+                               (Number.isFinite(a) ? a : Infinity) - (Number.isFinite(b) ? b : Infinity) || 0);
+  const body = el('tbody');
+  const heads = all.map(
+      (column, i) =>
+          el('th', {scope: 'col', class: column.number ? 'number' : null},
+             button([column.title, column.unit && el('small', {}, ' ' + column.unit)].filter(Boolean), () => {
+               state.down = state.column === i ? !state.down : false;
+               state.column = i;
+               fill();
+             }, {class: 'sort'})));
+  const fill = () => {
+    const sorted = [...rows];
+    if (state.column !== undefined)
+      sorted.sort((a, b) => (state.down ? -1 : 1) * compare(all[state.column].key(a), all[state.column].key(b)));
+    heads.forEach(
+        (head, i) => head.setAttribute(
+            'aria-sort',
+            state.column !== i ? 'none' :
+                state.down     ? 'descending' :
+                                 'ascending'));
+    body.replaceChildren(...sorted.map(
+        (row) =>
+            el('tr', {'data-row': row},
+               all.map((column) => el('td', {class: column.number ? 'number' : null}, column.cell(row))))));
+  };
+  fill();
+  return el(
+      'div', {class: 'scroll', tabindex: 0, role: 'region', 'aria-label': caption},
+      el('table', {class: 'sortable'}, el('caption', {class: 'hidden'}, caption), el('thead', {}, el('tr', {}, heads)),
+         body));
+}
+
+export function table(data) {
+  const place = el('div'), state = {};
+  const show = (metric) => place.replaceChildren(
+      sortable(
+          data.variants.map((_, i) => i), columns(data, data.metrics[metric]), state,
+          'Variants: ' + data.metrics[metric].label),
+      ...(data.metrics[metric].same_runs === false ? [el('p', {class: 'note'}, OTHER_RUNS)] : []));
+  if (!data.metrics.length) return null;
+  show(0);
+  return el(
+      'div', {},
+      data.metrics.length > 1 &&
+          el('div', {class: 'toolbar'},
+             select('Metric', data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => show(Number(i)))),
+      place);
+}
+
+// Which cases are hard: each case's median and successes, a column a variant. Without limits of success, how many
+// starts have the figure.
+export function caseTable(data, metric) {
+  const cells = data.variants.map(() => data.cases.map(() => []));
+  for (const cell of data.cells) cells[cell.variant][cell.case].push(cell);
+  const median = (list) => Data.quantile(
+      list.filter((cell) => cell.status !== 'failed')
+          .map((cell) => cell.values[metric])
+          .filter(Number.isFinite)
+          .sort((a, b) => a - b),
+      0.5);
+  const has_limits = data.metrics.some((item) => Data.limit(item) !== null);
+  const is_good = (cell) => (has_limits ? cell.success === true : Number.isFinite(cell.values[metric]));
+  const good = (list) => list.filter(is_good).length;
+  const tip = (list) =>
+      good(list) + ' of ' + list.length + ' starts ' + (has_limits ? 'end in success' : 'have the figure');
+  const of = (list) =>
+      (list.length ?
+           el('span', {'data-tip': tip(list)},
+              el('span', {class: 'share', style: '--part: ' + Math.round(100 * good(list) / list.length) + '%'}),
+              number(median(list)), ' ', el('small', {}, good(list) + '/' + list.length)) :
            '–');
+  const all = [
+    {title: 'Case', key: (i) => data.cases[i], cell: (i) => data.cases[i]},
+    ...data.variants.map((variant, v) => ({
+                           title: variant.name,
+                           unit: data.metrics[metric].unit,
+                           key: (i) => median(cells[v][i]),
+                           cell: (i) => of(cells[v][i]),
+                           number: true
+                         }))
+  ];
+  return sortable(
+      data.cases.map((_, i) => i), all, {}, 'Medians and successes of each case: ' + data.metrics[metric].label);
+}
 
-  // Where bounds are known, the median's.
-  const median = (item) =>
-      (item && Number.isFinite(item.median_low) ?
-           el('span', {'data-tip': '95 % interval ' + number(item.median_low) + ' to ' + number(item.median_high)},
-              spread(item)) :
-           spread(item));
+// The median difference, or who fails more often where that decides.
+function difference(item, unit) {
+  if (Number.isFinite(item.difference)) return withUnit(item.difference, unit);
+  return {variant: 'fails more often', baseline: 'the baseline fails more often'}[item.fails_more] || '–';
+}
 
-  // Runs that failed, and those that are done without a figure whose node may fail.
-  const lost = ({failed, incomplete}) =>
-      [String(failed ?? '–'),
-       incomplete > 0 &&
-           el('small', {'data-tip': 'done, but without a figure whose node may fail'},
-              ' + ' + incomplete + ' incomplete')];
+// Without a number, a bound is a failure of one of both; without two, there are too few cases.
+function interval(item, metric) {
+  if (!Number.isFinite(item.low) && !Number.isFinite(item.high)) return '–';
+  const failure = (is_high) => (is_high !== Boolean(metric.higher_is_better) ? 'a failure' : 'the baseline’s failure');
+  const bound = (value, is_high) => (Number.isFinite(value) ? number(value) : failure(is_high));
+  return '[' + bound(item.low, false) + ', ' + bound(item.high, true) + ']';
+}
 
-  const countOf = (item) => (item && Number.isFinite(item.of) ? item.count + ' of ' + item.of : '–');
+// Every comparison with its interval and p: the numbers behind the figure of the pairs.
+export function comparisonTable(data) {
+  const metric = (item) => data.metrics.find((one) => one.name === item.metric) || {label: item.metric};
+  const label = (item) => metric(item).label;
+  const lostRuns = ({runs_variant_lost: own, runs_baseline_lost: others}) =>
+      (own || others ?
+           el('small', {'data-tip': 'lost by it alone, and by the baseline alone'}, ' lost ' + own + ' / ' + others) :
+           null);
+  const list = data.comparisons,
+        name = (item) => (data.variants[data.variantIndex(item.variant)] || {name: item.variant}).name;
+  const all = [
+    {title: 'Variant', key: (i) => name(list[i]), cell: (i) => el('strong', {}, name(list[i]))},
+    {title: 'Metric', key: (i) => label(list[i]), cell: (i) => label(list[i])},
+    {
+      title: 'Difference',
+      key: (i) => list[i].difference,
+      cell: (i) => difference(list[i], metric(list[i]).unit),
+      number: true
+    },
+    {title: '95 % interval', key: (i) => list[i].low, cell: (i) => interval(list[i], metric(list[i])), number: true},
+    {title: 'p', key: (i) => list[i].p, cell: (i) => probability(list[i].p), number: true},
+    {title: 'p (Holm)', key: (i) => list[i].p_holm, cell: (i) => probability(list[i].p_holm), number: true},
+    {
+      title: 'Cases',
+      key: (i) => list[i].cases,
+      cell: (i) => countOf({count: list[i].cases, of: list[i].of_cases}),
+      number: true
+    },
+    {
+      title: 'Pairs',
+      key: (i) => list[i].pairs,
+      cell: (i) => [countOf({count: list[i].pairs, of: list[i].runs}), lostRuns(list[i])],
+      number: true
+    },
+    {
+      title: 'In words',
+      key: (i) => list[i].sentence || '',
+      cell: (i) => el('span', {class: 'words'}, list[i].sentence || '')
+    },
+  ];
+  return list.length ? sortable(list.map((_, i) => i), all, {}, 'Comparisons with the baseline') : null;
+}
 
-  function variantName(data, i) {
-    const variant = data.variants[i], options = Object.entries(variant.options);
-    return el(
-        'div', {class: 'variant-name'}, Plots.swatch(i),
-        el('div', {}, el('strong', {}, variant.name), variant.is_baseline && el('span', {class: 'tag'}, 'baseline'),
-           options.map(
-               ([name, value]) =>
-                   el('code', {class: 'option'},
-                      name + ' = ' + (typeof value === 'string' ? value : JSON.stringify(value))))));
-  }
-
-  function columns(data, metric) {
-    const of = (i) => data.summary[i] || {}, found = (i) => (of(i).metrics || {})[metric.name] || {};
-    return [
-      {title: 'Variant', key: (i) => data.variants[i].name, cell: (i) => variantName(data, i)},
-      {title: 'Success', key: (i) => -(of(i).success || {}).rate, cell: (i) => rateBar(of(i).success)},
-      {
-        title: 'Median [quartiles]',
-        unit: metric.unit,
-        key: (i) => found(i).median,
-        cell: (i) => median(found(i)),
-        number: true
-      },
-      {
-        title: metric.higher_is_better ? '5th percentile' : '95th percentile',
-        unit: metric.unit,
-        key: (i) => Data.worseEnd(metric, found(i)),
-        cell: (i) => number(Data.worseEnd(metric, found(i))),
-        number: true
-      },
-      {
-        title: 'Worst',
-        unit: metric.unit,
-        key: (i) => found(i).worst,
-        cell: (i) => number(found(i).worst),
-        number: true
-      },
-      {
-        title: 'Of runs',
-        key: (i) => found(i).count,
-        cell: (i) => el('span', {'data-tip': 'runs that have the figure, of all'}, countOf(found(i))),
-        number: true
-      },
-      {title: 'Failed', key: (i) => of(i).failed + of(i).incomplete, cell: (i) => lost(of(i)), number: true},
-      {
-        title: 'Time [quartiles]',
-        unit: 's',
-        key: (i) => (of(i).seconds || {}).median,
-        cell: (i) => spread(of(i).seconds),
-        number: true
-      },
-      {
-        title: 'Evaluations',
-        key: (i) => (of(i).evaluations || {}).median,
-        cell: (i) => String((of(i).evaluations || {}).median ?? '–'),
-        number: true
-      },
-    ];
-  }
-
-  // A table whose columns sort: rows are indices, a column {title, unit, key, cell, number}.
-  function sortable(rows, all, state, caption) {
-    const compare = (a, b) =>
-        (typeof a === 'string' ? a.localeCompare(b, undefined, {numeric: true}) :
-                                 (Number.isFinite(a) ? a : Infinity) - (Number.isFinite(b) ? b : Infinity) || 0);
-    const body = el('tbody');
-    const heads = all.map(
-        (column, i) =>
-            el('th', {scope: 'col', class: column.number ? 'number' : null},
-               Dom.button([column.title, column.unit && el('small', {}, ' ' + column.unit)].filter(Boolean), () => {
-                 state.down = state.column === i ? !state.down : false;
-                 state.column = i;
-                 fill();
-               }, {class: 'sort'})));
-    const fill = () => {
-      const sorted = [...rows];
-      if (state.column !== undefined)
-        sorted.sort((a, b) => (state.down ? -1 : 1) * compare(all[state.column].key(a), all[state.column].key(b)));
-      heads.forEach(
-          (head, i) => head.setAttribute(
-              'aria-sort',
-              state.column !== i ? 'none' :
-                  state.down     ? 'descending' :
-                                   'ascending'));
-      body.replaceChildren(...sorted.map(
-          (row) =>
-              el('tr', {'data-row': row},
-                 all.map((column) => el('td', {class: column.number ? 'number' : null}, column.cell(row))))));
-    };
-    fill();
-    return el(
-        'div', {class: 'scroll', tabindex: 0, role: 'region', 'aria-label': caption},
-        el('table', {class: 'sortable'}, el('caption', {class: 'hidden'}, caption),
-           el('thead', {}, el('tr', {}, heads)), body));
-  }
-
-  function table(data) {
-    const place = el('div'), state = {};
-    const show = (metric) => place.replaceChildren(
-        sortable(
-            data.variants.map((_, i) => i), columns(data, data.metrics[metric]), state,
-            'Variants: ' + data.metrics[metric].label),
-        ...(data.metrics[metric].same_runs === false ? [el('p', {class: 'note'}, OTHER_RUNS)] : []));
-    if (!data.metrics.length) return null;
-    show(0);
-    return el(
-        'div', {},
-        data.metrics.length > 1 &&
-            el('div', {class: 'toolbar'},
-               Dom.select('Metric', data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => show(Number(i)))),
-        place);
-  }
-
-  // Which cases are hard: each case's median and successes, a column a variant. Without limits of success, how many
-  // starts have the figure.
-  function caseTable(data, metric) {
-    const cells = data.variants.map(() => data.cases.map(() => []));
-    for (const cell of data.cells) cells[cell.variant][cell.case].push(cell);
-    const median = (list) => Data.quantile(
-        list.filter((cell) => cell.status !== 'failed')
-            .map((cell) => cell.values[metric])
-            .filter(Number.isFinite)
-            .sort((a, b) => a - b),
-        0.5);
-    const has_limits = data.metrics.some((item) => Data.limit(item) !== null);
-    const is_good = (cell) => (has_limits ? cell.success === true : Number.isFinite(cell.values[metric]));
-    const good = (list) => list.filter(is_good).length;
-    const tip = (list) =>
-        good(list) + ' of ' + list.length + ' starts ' + (has_limits ? 'end in success' : 'have the figure');
-    const of = (list) =>
-        (list.length ?
-             el('span', {'data-tip': tip(list)},
-                el('span', {class: 'share', style: '--part: ' + Math.round(100 * good(list) / list.length) + '%'}),
-                number(median(list)), ' ', el('small', {}, good(list) + '/' + list.length)) :
-             '–');
-    const all = [
-      {title: 'Case', key: (i) => data.cases[i], cell: (i) => data.cases[i]},
-      ...data.variants.map((variant, v) => ({
-                             title: variant.name,
-                             unit: data.metrics[metric].unit,
-                             key: (i) => median(cells[v][i]),
-                             cell: (i) => of(cells[v][i]),
-                             number: true
-                           }))
-    ];
-    return sortable(
-        data.cases.map((_, i) => i), all, {}, 'Medians and successes of each case: ' + data.metrics[metric].label);
-  }
-
-  // The median difference, or who fails more often where that decides.
-  function difference(item, unit) {
-    if (Number.isFinite(item.difference)) return withUnit(item.difference, unit);
-    return {variant: 'fails more often', baseline: 'the baseline fails more often'}[item.fails_more] || '–';
-  }
-
-  // Without a number, a bound is a failure of one of both; without two, there are too few cases.
-  function interval(item, metric) {
-    if (!Number.isFinite(item.low) && !Number.isFinite(item.high)) return '–';
-    const failure = (is_high) =>
-        (is_high !== Boolean(metric.higher_is_better) ? 'a failure' : 'the baseline’s failure');
-    const bound = (value, is_high) => (Number.isFinite(value) ? number(value) : failure(is_high));
-    return '[' + bound(item.low, false) + ', ' + bound(item.high, true) + ']';
-  }
-
-  // Every comparison with its interval and p: the numbers behind the figure of the pairs.
-  function comparisonTable(data) {
-    const metric = (item) => data.metrics.find((one) => one.name === item.metric) || {label: item.metric};
-    const label = (item) => metric(item).label;
-    const lostRuns = ({runs_variant_lost: own, runs_baseline_lost: others}) =>
-        (own || others ?
-             el('small', {'data-tip': 'lost by it alone, and by the baseline alone'}, ' lost ' + own + ' / ' + others) :
-             null);
-    const list = data.comparisons,
-          name = (item) => (data.variants[data.variantIndex(item.variant)] || {name: item.variant}).name;
-    const all = [
-      {title: 'Variant', key: (i) => name(list[i]), cell: (i) => el('strong', {}, name(list[i]))},
-      {title: 'Metric', key: (i) => label(list[i]), cell: (i) => label(list[i])},
-      {
-        title: 'Difference',
-        key: (i) => list[i].difference,
-        cell: (i) => difference(list[i], metric(list[i]).unit),
-        number: true
-      },
-      {title: '95 % interval', key: (i) => list[i].low, cell: (i) => interval(list[i], metric(list[i])), number: true},
-      {title: 'p', key: (i) => list[i].p, cell: (i) => probability(list[i].p), number: true},
-      {title: 'p (Holm)', key: (i) => list[i].p_holm, cell: (i) => probability(list[i].p_holm), number: true},
-      {
-        title: 'Cases',
-        key: (i) => list[i].cases,
-        cell: (i) => countOf({count: list[i].cases, of: list[i].of_cases}),
-        number: true
-      },
-      {
-        title: 'Pairs',
-        key: (i) => list[i].pairs,
-        cell: (i) => [countOf({count: list[i].pairs, of: list[i].runs}), lostRuns(list[i])],
-        number: true
-      },
-      {
-        title: 'In words',
-        key: (i) => list[i].sentence || '',
-        cell: (i) => el('span', {class: 'words'}, list[i].sentence || '')
-      },
-    ];
-    return list.length ? sortable(list.map((_, i) => i), all, {}, 'Comparisons with the baseline') : null;
-  }
-
-  function rules(data) {
-    const lines = [
-      ['Starts', data.experiment.starts_protocol], ['Success', data.experiment.success_rule],
-      ['Time', data.experiment.time_rule]
-    ].filter((line) => line[1]);
-    return lines.length ?
-        el('dl', {class: 'rules'}, lines.map(([name, text]) => el('div', {}, el('dt', {}, name), el('dd', {}, text)))) :
-        null;
-  }
-
-  return {facts, verdicts, table, comparisonTable, caseTable, rules, sortable, rateBar};
-})();
+export function rules(data) {
+  const lines = [
+    ['Starts', data.experiment.starts_protocol], ['Success', data.experiment.success_rule],
+    ['Time', data.experiment.time_rule]
+  ].filter((line) => line[1]);
+  return lines.length ?
+      el('dl', {class: 'rules'}, lines.map(([name, text]) => el('div', {}, el('dt', {}, name), el('dd', {}, text)))) :
+      null;
+}

@@ -1,59 +1,56 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page "Case". Its parts are panels: each shows a part of the draft's document and changes it.
-'use strict';
+import {button, el} from '../../report/page/dom.js';
 
-const CasePage = (() => {
-  const {el} = Dom;
-  const panels = [];
-  const keys = [['Ctrl+z', 'undo', () => draft.undo()], ['Ctrl+y or Ctrl+Z', 'redo', () => draft.redo()]];
-  let draft = null, open = [];
+import {CaseDraft} from './draft.js';
+import * as Shell from './shell.js';
 
-  // Adds a panel. make(draft) returns {element, update(), dispose()}; update() is called after each change of the
-  // draft. Panels with a smaller `order` come first. `more_keys` are as in Shell.page().
-  function panel(title, order, make, more_keys = []) {
-    panels.push({title, order, make});
-    panels.sort((a, b) => a.order - b.order);
-    keys.push(...more_keys);
-  }
+const panels = [];
+const keys = [['Ctrl+z', 'undo', () => draft.undo()], ['Ctrl+y or Ctrl+Z', 'redo', () => draft.redo()]];
+let draft = null, open = [];
 
-  function bar() {
-    const undo = Dom.button('Undo', () => draft.undo(), {'data-do': 'undo'});
-    const redo = Dom.button('Redo', () => draft.redo(), {'data-do': 'redo'});
-    const state = el('span', {class: 'note', role: 'status'});
-    const update = () => {
-      undo.disabled = draft.state_undo === null;
-      undo.title = draft.state_undo ? 'Undo: ' + draft.state_undo : 'There is nothing to undo';
-      redo.disabled = draft.state_redo === null;
-      redo.title = draft.state_redo ? 'Redo: ' + draft.state_redo : 'There is nothing to redo';
-      state.textContent = draft.is_saved ? 'saved' : 'kept as a draft';
-    };
-    return {element: el('div', {class: 'toolbar'}, undo, redo, state), update};
-  }
+// Adds a panel. make(draft) returns {element, update(), dispose()}; update() is called after each change of the
+// draft. Panels with a smaller `order` come first. `more_keys` are as in Shell.page().
+export function panel(title, order, make, more_keys = []) {
+  panels.push({title, order, make});
+  panels.sort((a, b) => a.order - b.order);
+  keys.push(...more_keys);
+}
 
-  async function show(place, parameters, first) {
-    draft = await CaseDraft.open(first || 'case');
-    const head = bar();
-    open = panels.map(({title, make}) => ({title, ...make(draft)}));
-    place.append(
-        el('div', {class: 'page-head'}, el('h1', {}, draft.path), head.element),
-        el('div', {class: 'panels-of-case'},
-           open.map(
-               ({title, element}) =>
-                   el('section', {class: 'panel', 'aria-label': title}, el('h2', {}, title), element))));
-    const update = () => [head, ...open].forEach((one) => one.update && one.update());
-    draft.addEventListener('change', update);
-    update();
-  }
+function bar() {
+  const undo = button('Undo', () => draft.undo(), {'data-do': 'undo'});
+  const redo = button('Redo', () => draft.redo(), {'data-do': 'redo'});
+  const state = el('span', {class: 'note', role: 'status'});
+  const update = () => {
+    undo.disabled = draft.state_undo === null;
+    undo.title = draft.state_undo ? 'Undo: ' + draft.state_undo : 'There is nothing to undo';
+    redo.disabled = draft.state_redo === null;
+    redo.title = draft.state_redo ? 'Redo: ' + draft.state_redo : 'There is nothing to redo';
+    state.textContent = draft.is_saved ? 'saved' : 'kept as a draft';
+  };
+  return {element: el('div', {class: 'toolbar'}, undo, redo, state), update};
+}
 
-  Shell.page('case', {
-    title: 'Case',
-    show,
-    leave() {
-      open.forEach((one) => one.dispose && one.dispose());
-      open = [];
-    },
-    keys
-  });
+async function show(place, parameters, first) {
+  draft = await CaseDraft.open(first || 'case');
+  const head = bar();
+  open = panels.map(({title, make}) => ({title, ...make(draft)}));
+  place.append(
+      el('div', {class: 'page-head'}, el('h1', {}, draft.path), head.element),
+      el('div', {class: 'panels-of-case'},
+         open.map(({title,
+                    element}) => el('section', {class: 'panel', 'aria-label': title}, el('h2', {}, title), element))));
+  const update = () => [head, ...open].forEach((one) => one.update && one.update());
+  draft.addEventListener('change', update);
+  update();
+}
 
-  return {panel};
-})();
+Shell.page('case', {
+  title: 'Case',
+  show,
+  leave() {
+    open.forEach((one) => one.dispose && one.dispose());
+    open = [];
+  },
+  keys
+});

@@ -1,209 +1,213 @@
 // SPDX-License-Identifier: Apache-2.0
 // The panel "CT": choosing it, how it is read, and its three slices.
-'use strict';
+import * as Dom from '../../report/page/dom.js';
+import {el} from '../../report/page/dom.js';
 
-(() => {
-  const {el} = Dom;
-  const VOLUME = /\.(mha|nrrd|nii|nii\.gz|tif|tiff)$/i;
-  const PRESETS = [['bone', 'Bone', 400, 1800], ['soft', 'Soft tissue', 40, 400]];
+import * as CasePage from './case.js';
+import {CtState} from './ct_state.js';
+import * as Shell from './shell.js';
+import * as SliceGeometry from './slice_geometry.js';
+import * as SliceInput from './slice_input.js';
+import {SliceView} from './slice_view.js';
 
-  const numberOf = (box) => (box.value.trim() === '' ? null : Number(box.value));
+const VOLUME = /\.(mha|nrrd|nii|nii\.gz|tif|tiff)$/i;
+const PRESETS = [['bone', 'Bone', 400, 1800], ['soft', 'Soft tissue', 40, 400]];
 
-  // How the file is read, where it does not say all itself. changed(options) gets the keys of a case's `ct`.
-  function optionsForm(changed) {
-    const number = (label) => el(
-        'label', {class: 'field'}, el('span', {}, label), el('input', {type: 'number', step: 'any', class: 'short'}));
-    const box = (field) => field.querySelector('input');
-    const sizes = ['x', 'y', 'z'].map((axis) => number('voxel ' + axis + ', mm'));
-    const offset = number('offset, HU');
-    const flips = ['x', 'y', 'z'].map((axis) => Dom.checkbox('flip ' + axis, false, () => {}));
-    const series = el('label', {class: 'field'}, el('span', {}, 'series UID'), el('input', {type: 'text'}));
-    function read() {
-      const size = sizes.map((field) => numberOf(box(field))), options = {};
-      if (size.some((value) => value !== null)) {
-        if (size.some((value) => !(value > 0)))
-          return void Shell.notice(
-              'Give the voxel\'s size along x, y and z, each above 0 mm, or none of them.', 'fault');
-        options.voxel_size_mm = size;
-      }
-      const flip = ['x', 'y', 'z'].filter((axis, k) => box(flips[k]).checked);
-      if (flip.length) options.flip = flip;
-      if (numberOf(box(offset))) options.value_offset_hu = numberOf(box(offset));
-      if (box(series).value.trim()) options.series_uid = box(series).value.trim();
-      changed(options);
+const numberOf = (box) => (box.value.trim() === '' ? null : Number(box.value));
+
+// How the file is read, where it does not say all itself. changed(options) gets the keys of a case's `ct`.
+function optionsForm(changed) {
+  const number = (label) =>
+      el('label', {class: 'field'}, el('span', {}, label), el('input', {type: 'number', step: 'any', class: 'short'}));
+  const box = (field) => field.querySelector('input');
+  const sizes = ['x', 'y', 'z'].map((axis) => number('voxel ' + axis + ', mm'));
+  const offset = number('offset, HU');
+  const flips = ['x', 'y', 'z'].map((axis) => Dom.checkbox('flip ' + axis, false, () => {}));
+  const series = el('label', {class: 'field'}, el('span', {}, 'series UID'), el('input', {type: 'text'}));
+  function read() {
+    const size = sizes.map((field) => numberOf(box(field))), options = {};
+    if (size.some((value) => value !== null)) {
+      if (size.some((value) => !(value > 0)))
+        return void Shell.notice('Give the voxel\'s size along x, y and z, each above 0 mm, or none of them.', 'fault');
+      options.voxel_size_mm = size;
     }
-    function fill(ct) {
-      const {voxel_size_mm = [], flip = [], value_offset_hu = '', series_uid = ''} = ct || {};
-      sizes.forEach((field, k) => (box(field).value = voxel_size_mm[k] === undefined ? '' : voxel_size_mm[k]));
-      flips.forEach((field, k) => (box(field).checked = flip.includes('xyz'[k])));
-      box(offset).value = value_offset_hu;
-      box(series).value = series_uid;
-    }
-    const form =
-        el('form', {
-          class: 'toolbar',
-          onsubmit: (event) => {
-            event.preventDefault();
-            read();
-          }
-        },
-           sizes, flips, offset, series, el('button', {type: 'submit', 'data-do': 'read-ct'}, 'Read again'));
-    const element =
-        el('details', {class: 'ct-options'}, el('summary', {}, 'How it is read'),
-           el('p', {class: 'note'}, 'Only where its files do not say it, or say it wrongly.'), form);
-    return {element, fill};
+    const flip = ['x', 'y', 'z'].filter((axis, k) => box(flips[k]).checked);
+    if (flip.length) options.flip = flip;
+    if (numberOf(box(offset))) options.value_offset_hu = numberOf(box(offset));
+    if (box(series).value.trim()) options.series_uid = box(series).value.trim();
+    changed(options);
   }
-
-  async function choose(draft) {
-    const file = await Shell.choose(
-        'Choose a CT: a file, or the folder of a DICOM series',
-        {folders: true, accepts: (name) => VOLUME.test(name), at: startOf(draft)});
-    if (file !== undefined) draft.change('choose the CT ' + file, (document) => (document.ct = {file}));
+  function fill(ct) {
+    const {voxel_size_mm = [], flip = [], value_offset_hu = '', series_uid = ''} = ct || {};
+    sizes.forEach((field, k) => (box(field).value = voxel_size_mm[k] === undefined ? '' : voxel_size_mm[k]));
+    flips.forEach((field, k) => (box(field).checked = flip.includes('xyz'[k])));
+    box(offset).value = value_offset_hu;
+    box(series).value = series_uid;
   }
-  // The chooser begins beside the present CT.
-  const startOf = ({document: {ct}}) => (ct ? ct.file.split('/').slice(0, -1).join('/') : '');
-
-  // If the fault lists the series of a folder, a button for each.
-  const seriesIn = (draft, fault) => [...fault.matchAll(/^ +(\d+(?:\.\d+)+) \((.*)\)$/gm)].map(
-      ([, uid, words]) =>
-          el('p', {}, Dom.button('Read the series of ' + words, () => draft.change('choose a series', (document) => {
-            document.ct.series_uid = uid;
-          }), {'data-series': uid})));
-
-  function windowBar(state) {
-    const presets = PRESETS.map(
-        ([key, text, level, width]) => Dom.button(text, () => state.setWindow(level, width), {'data-window': key}));
-    const all = Dom.button('All values', () => {
-      const {lowest_hu: low, highest_hu: high} = state.ct;
-      state.setWindow((low + high) / 2, high - low);
-    }, {'data-window': 'all'});
-    const level = el('input', {type: 'number', class: 'short', onchange: () => take()});
-    const width = el('input', {type: 'number', class: 'short', min: 1, onchange: () => take()});
-    const take = () => state.setWindow(Number(level.value), Number(width.value));
-    const field = (label, box) => el('label', {class: 'field'}, el('span', {}, label), box);
-    return {
-      element:
-          el('div', {class: 'toolbar'},
-             el('span', {class: 'field'}, el('span', {}, 'Window'), el('span', {class: 'choice'}, presets, all)),
-             field('level, HU', level), field('width, HU', width)),
-      update() {
-        if (document.activeElement !== level) level.value = state.window.level;
-        if (document.activeElement !== width) width.value = state.window.width;
-        for (const [i, [, , at, wide]] of PRESETS.entries())
-          presets[i].setAttribute('aria-pressed', String(state.window.level === at && state.window.width === wide));
-      }
-    };
-  }
-
-  // What is at the crosshair, or under the pointer.
-  function readout(state, views) {
-    const here = el('span', {'data-read': 'crosshair'}), pointer = el('span', {'data-read': 'pointer'});
-    const words = (point_mm, value_hu) => point_mm.map((value) => value.toFixed(1)).join(', ') + ' mm' +
-        (value_hu === null ? '' : ', ' + value_hu + ' HU');
-    state.pointed = (what) => {
-      pointer.textContent = what ? 'Pointer: ' + words(SliceGeometry.point(state.ct, what.index), what.value_hu) : '';
-    };
-    return {
-      element: el('p', {class: 'note readout'}, here, ' ', pointer),
-      update() {
-        const view = views.find((one) => one.view);
-        here.textContent = 'Crosshair (left, back, head): ' +
-            words(state.cursor_mm, view ? view.at(view.placeOf(state.cursor_mm)).value_hu : null);
-      }
-    };
-  }
-
-  // The three slices with their tools; shown while there is a CT.
-  function slices(state) {
-    const views = ['axial', 'coronal', 'sagittal'].map((name) => new SliceView(name, state));
-    const bar = windowBar(state), values = readout(state, views);
-    const tool = el('p', {class: 'tool-hint', role: 'status'});
-    const zoom =
-        el('span', {class: 'field'}, el('span', {}, 'Zoom'),
-           el('span', {class: 'choice'}, Dom.button('Closer', () => all(1.4), {'data-do': 'closer'}),
-              Dom.button('Further', () => all(1 / 1.4), {'data-do': 'further'}),
-              Dom.button('Whole', () => views.forEach((view) => view.fit()), {'data-do': 'whole'})));
-    const all = (factor) => views.forEach((view) => view.zoom(factor, view.placeOf(state.cursor_mm)));
-    bar.element.append(zoom);
-    const element = el(
-        'div', {}, bar.element, tool, el('div', {class: 'slices'}, views.map((view) => view.element)), values.element,
-        el('p', {class: 'note'},
-           'Click into a slice; then the wheel goes through the slices, and with Ctrl it zooms. Drag: with the right ' +
-               'button for the window, with Shift to move the picture. ',
-           el('kbd', {}, '?'), ' lists the keys.'));
-    return {
-      element,
-      views,
-      values,
-      reset: () => views.forEach((view) => view.reset()),
-      update() {
-        views.forEach((view) => view.show());
-        bar.update();
-        values.update();
-        tool.textContent = state.tool ? state.tool.hint : '';
-        element.classList.toggle('has-tool', Boolean(state.tool));
+  const form =
+      el('form', {
+        class: 'toolbar',
+        onsubmit: (event) => {
+          event.preventDefault();
+          read();
+        }
       },
-      dispose: () => views.forEach((view) => view.dispose())
-    };
-  }
+         sizes, flips, offset, series, el('button', {type: 'submit', 'data-do': 'read-ct'}, 'Read again'));
+  const element =
+      el('details', {class: 'ct-options'}, el('summary', {}, 'How it is read'),
+         el('p', {class: 'note'}, 'Only where its files do not say it, or say it wrongly.'), form);
+  return {element, fill};
+}
 
-  function make(draft) {
-    const state = CtState.of(draft), shown = slices(state);
-    const name = el('strong', {'data-ct': ''}), facts = el('span', {class: 'note'}), says = el('div', {});
-    const options = optionsForm((more) => draft.change('read the CT in another way', (document) => {
-      document.ct = {file: document.ct.file, ...more};
-      state.read = '';
-    }));
-    const command = el('details', {}, el('summary', {}, 'The same in a shell'));
-    const head =
+async function choose(draft) {
+  const file = await Shell.choose(
+      'Choose a CT: a file, or the folder of a DICOM series',
+      {folders: true, accepts: (name) => VOLUME.test(name), at: startOf(draft)});
+  if (file !== undefined) draft.change('choose the CT ' + file, (document) => (document.ct = {file}));
+}
+// The chooser begins beside the present CT.
+const startOf = ({document: {ct}}) => (ct ? ct.file.split('/').slice(0, -1).join('/') : '');
+
+// If the fault lists the series of a folder, a button for each.
+const seriesIn = (draft, fault) => [...fault.matchAll(/^ +(\d+(?:\.\d+)+) \((.*)\)$/gm)].map(
+    ([, uid, words]) =>
+        el('p', {}, Dom.button('Read the series of ' + words, () => draft.change('choose a series', (document) => {
+          document.ct.series_uid = uid;
+        }), {'data-series': uid})));
+
+function windowBar(state) {
+  const presets = PRESETS.map(
+      ([key, text, level, width]) => Dom.button(text, () => state.setWindow(level, width), {'data-window': key}));
+  const all = Dom.button('All values', () => {
+    const {lowest_hu: low, highest_hu: high} = state.ct;
+    state.setWindow((low + high) / 2, high - low);
+  }, {'data-window': 'all'});
+  const level = el('input', {type: 'number', class: 'short', onchange: () => take()});
+  const width = el('input', {type: 'number', class: 'short', min: 1, onchange: () => take()});
+  const take = () => state.setWindow(Number(level.value), Number(width.value));
+  const field = (label, box) => el('label', {class: 'field'}, el('span', {}, label), box);
+  return {
+    element:
         el('div', {class: 'toolbar'},
-           Dom.button('Choose a CT …', () => Shell.guarded(() => choose(draft)), {'data-do': 'choose-ct'}),
-           el('span', {}, name, ' ', facts));
-    let reset_for = null;  // the name of the CT
-    function tell() {
-      const {ct} = state, {ct: chosen} = draft.document;
-      name.textContent = chosen ? chosen.file : 'No CT is chosen.';
-      facts.textContent = state.isReading ? 'is being read' :
-          ct                              ? ct.size.join(' × ') + ' voxels of ' +
-              ct.spacing_mm.map((size) => Number(size.toPrecision(4))).join(' × ') + ' mm' :
-               '';
-      says.replaceChildren(
-          ...(state.fault ? [el('p', {class: 'fault', role: 'alert'}, state.fault), ...seriesIn(draft, state.fault)] :
-                            []),
-          ...(ct ? ct.doubts : []).map((doubt) => el('p', {class: 'fault doubt', role: 'status'}, doubt)));
-      options.element.hidden = command.hidden = !chosen;
-      if (state.fault) options.element.open = true;
-      command.replaceChildren(command.firstChild, Dom.command(state.command));
-      shown.element.hidden = !ct;
-      shown.element.inert = state.isReading;
-      if ((ct ? ct.name : '') !== reset_for) shown.reset();
-      reset_for = ct ? ct.name : '';
-      if (ct) shown.update();
+           el('span', {class: 'field'}, el('span', {}, 'Window'), el('span', {class: 'choice'}, presets, all)),
+           field('level, HU', level), field('width, HU', width)),
+    update() {
+      if (document.activeElement !== level) level.value = state.window.level;
+      if (document.activeElement !== width) width.value = state.window.width;
+      for (const [i, [, , at, wide]] of PRESETS.entries())
+        presets[i].setAttribute('aria-pressed', String(state.window.level === at && state.window.width === wide));
     }
-    const viewed = () => state.ct && shown.update();
-    state.addEventListener('ct', tell);
-    state.addEventListener('view', viewed);
-    state.addEventListener('slice', shown.values.update);
-    options.fill(draft.document.ct);
-    tell();
-    let filled = JSON.stringify(draft.document.ct);
-    return {
-      element: el('div', {class: 'ct-panel'}, head, options.element, says, shown.element, command),
-      update() {
-        const now = JSON.stringify(draft.document.ct);
-        if (now !== filled) options.fill(draft.document.ct);
-        filled = now;
-        if (now === state.read) return viewed();
-        state.follow();
-      },
-      dispose() {
-        state.removeEventListener('ct', tell);
-        state.removeEventListener('view', viewed);
-        state.removeEventListener('slice', shown.values.update);
-        shown.dispose();
-      }
-    };
-  }
+  };
+}
 
-  CasePage.panel('CT', 10, make, SliceInput.KEYS);
-})();
+// What is at the crosshair, or under the pointer.
+function readout(state, views) {
+  const here = el('span', {'data-read': 'crosshair'}), pointer = el('span', {'data-read': 'pointer'});
+  const words = (point_mm, value_hu) =>
+      point_mm.map((value) => value.toFixed(1)).join(', ') + ' mm' + (value_hu === null ? '' : ', ' + value_hu + ' HU');
+  state.pointed = (what) => {
+    pointer.textContent = what ? 'Pointer: ' + words(SliceGeometry.point(state.ct, what.index), what.value_hu) : '';
+  };
+  return {
+    element: el('p', {class: 'note readout'}, here, ' ', pointer),
+    update() {
+      const view = views.find((one) => one.view);
+      here.textContent = 'Crosshair (left, back, head): ' +
+          words(state.cursor_mm, view ? view.at(view.placeOf(state.cursor_mm)).value_hu : null);
+    }
+  };
+}
+
+// The three slices with their tools; shown while there is a CT.
+function slices(state) {
+  const views = ['axial', 'coronal', 'sagittal'].map((name) => new SliceView(name, state));
+  const bar = windowBar(state), values = readout(state, views);
+  const tool = el('p', {class: 'tool-hint', role: 'status'});
+  const zoom =
+      el('span', {class: 'field'}, el('span', {}, 'Zoom'),
+         el('span', {class: 'choice'}, Dom.button('Closer', () => all(1.4), {'data-do': 'closer'}),
+            Dom.button('Further', () => all(1 / 1.4), {'data-do': 'further'}),
+            Dom.button('Whole', () => views.forEach((view) => view.fit()), {'data-do': 'whole'})));
+  const all = (factor) => views.forEach((view) => view.zoom(factor, view.placeOf(state.cursor_mm)));
+  bar.element.append(zoom);
+  const element = el(
+      'div', {}, bar.element, tool, el('div', {class: 'slices'}, views.map((view) => view.element)), values.element,
+      el('p', {class: 'note'},
+         'Click into a slice; then the wheel goes through the slices, and with Ctrl it zooms. Drag: with the right ' +
+             'button for the window, with Shift to move the picture. ',
+         el('kbd', {}, '?'), ' lists the keys.'));
+  return {
+    element,
+    views,
+    values,
+    reset: () => views.forEach((view) => view.reset()),
+    update() {
+      views.forEach((view) => view.show());
+      bar.update();
+      values.update();
+      tool.textContent = state.tool ? state.tool.hint : '';
+      element.classList.toggle('has-tool', Boolean(state.tool));
+    },
+    dispose: () => views.forEach((view) => view.dispose())
+  };
+}
+
+function make(draft) {
+  const state = CtState.of(draft), shown = slices(state);
+  const name = el('strong', {'data-ct': ''}), facts = el('span', {class: 'note'}), says = el('div', {});
+  const options = optionsForm((more) => draft.change('read the CT in another way', (document) => {
+    document.ct = {file: document.ct.file, ...more};
+    state.read = '';
+  }));
+  const command = el('details', {}, el('summary', {}, 'The same in a shell'));
+  const head =
+      el('div', {class: 'toolbar'},
+         Dom.button('Choose a CT …', () => Shell.guarded(() => choose(draft)), {'data-do': 'choose-ct'}),
+         el('span', {}, name, ' ', facts));
+  let reset_for = null;  // the name of the CT
+  function tell() {
+    const {ct} = state, {ct: chosen} = draft.document;
+    name.textContent = chosen ? chosen.file : 'No CT is chosen.';
+    facts.textContent = state.isReading ? 'is being read' :
+        ct                              ? ct.size.join(' × ') + ' voxels of ' +
+            ct.spacing_mm.map((size) => Number(size.toPrecision(4))).join(' × ') + ' mm' :
+             '';
+    says.replaceChildren(
+        ...(state.fault ? [el('p', {class: 'fault', role: 'alert'}, state.fault), ...seriesIn(draft, state.fault)] :
+                          []),
+        ...(ct ? ct.doubts : []).map((doubt) => el('p', {class: 'fault doubt', role: 'status'}, doubt)));
+    options.element.hidden = command.hidden = !chosen;
+    if (state.fault) options.element.open = true;
+    command.replaceChildren(command.firstChild, Dom.command(state.command));
+    shown.element.hidden = !ct;
+    shown.element.inert = state.isReading;
+    if ((ct ? ct.name : '') !== reset_for) shown.reset();
+    reset_for = ct ? ct.name : '';
+    if (ct) shown.update();
+  }
+  const viewed = () => state.ct && shown.update();
+  state.addEventListener('ct', tell);
+  state.addEventListener('view', viewed);
+  state.addEventListener('slice', shown.values.update);
+  options.fill(draft.document.ct);
+  tell();
+  let filled = JSON.stringify(draft.document.ct);
+  return {
+    element: el('div', {class: 'ct-panel'}, head, options.element, says, shown.element, command),
+    update() {
+      const now = JSON.stringify(draft.document.ct);
+      if (now !== filled) options.fill(draft.document.ct);
+      filled = now;
+      if (now === state.read) return viewed();
+      state.follow();
+    },
+    dispose() {
+      state.removeEventListener('ct', tell);
+      state.removeEventListener('view', viewed);
+      state.removeEventListener('slice', shown.values.update);
+      shown.dispose();
+    }
+  };
+}
+
+CasePage.panel('CT', 10, make, SliceInput.KEYS);

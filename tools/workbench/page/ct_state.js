@@ -2,9 +2,11 @@
 // The CT of the case that is open, and what its panels share: the crosshair, the window, what a click does, and what is
 // drawn over the slices. Events: 'ct' (another CT, or a fault), 'slice' (values of a slice have come), 'view' (anything
 // else).
-'use strict';
+import * as Ask from './server.js';
+import * as Shell from './shell.js';
+import * as SliceGeometry from './slice_geometry.js';
 
-class CtState extends EventTarget {
+export class CtState extends EventTarget {
   // The panels of one page share one.
   static of(draft) {
     if (!CtState.known.has(draft)) CtState.known.set(draft, new CtState(draft));

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A case that is being made, as the server keeps it. drafts.hpp says what its document holds. Events: 'change'.
-'use strict';
+import * as Ask from './server.js';
+import * as Shell from './shell.js';
 
-class CaseDraft extends EventTarget {
+export class CaseDraft extends EventTarget {
   static async open(path) {
     const draft = new CaseDraft();
     draft.take(await Ask.json('api/draft', {case: path}));

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The first page: what there is in the folder.
-'use strict';
+import {el} from '../../report/page/dom.js';
+
+import * as Ask from './server.js';
+import * as Shell from './shell.js';
 
 Shell.page('home', {
   title: 'Folder',
   async show(place) {
-    const {el} = Dom;
     const contents = await Ask.json('api/folder');
     const list = (title, page, paths, empty) =>
         el('section', {}, el('h2', {}, title),

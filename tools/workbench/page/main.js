@@ -1,4 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-'use strict';
+// The workbench: each page adds itself, in the order of the bar, and each panel of a case adds itself to its page.
+import './home.js';
+import './case.js';
+import './ct_panel.js';
+import './fragments_panel.js';
+import './segmentation_panel.js';
+import './ct_landmarks.js';
+import './save_panel.js';
+import './xrays.js';
+import './xray_views.js';
+import './place.js';
+import './pipeline.js';
+import './results.js';
 
-document.addEventListener('DOMContentLoaded', Shell.start);
+import * as Shell from './shell.js';
+
+Shell.start();

@@ -1,147 +1,144 @@
 // SPDX-License-Identifier: Apache-2.0
 // The form of a node: its options, its wires, and the nodes that would fit in its place.
-'use strict';
+import {button, checkbox, el} from '../../report/page/dom.js';
 
-const PipelineNode = (() => {
-  const {el} = Dom;
-  let count = 0;
+import * as Ask from './server.js';
+import * as Shell from './shell.js';
 
-  // A field with a label, a control and a remark below it.
-  function field(label, control, remark, more) {
-    const id = 'field-' + (++count);
-    control.id = id;
-    control.setAttribute('aria-describedby', id + '-about');
+let count = 0;
+
+// A field with a label, a control and a remark below it.
+function field(label, control, remark, more) {
+  const id = 'field-' + (++count);
+  control.id = id;
+  control.setAttribute('aria-describedby', id + '-about');
+  return el(
+      'div', {class: 'form-field'},
+      el('label',
+         {for: id
+         },
+         label),
+      el('div', {class: 'control'}, control, more || ''), el('p', {class: 'note', id: id + '-about'}, remark));
+}
+
+function control(option, written, changed) {
+  const attributes = {'data-option': option.name};
+  const choices = option.type === 'true/false' ? ['true', 'false'] : option.choices;
+  const typed = written !== undefined && choices && !choices.includes(written);  // such as $input
+  if (choices && !typed)
     return el(
-        'div', {class: 'form-field'},
-        el('label',
-           {for: id
-           },
-           label),
-        el('div', {class: 'control'}, control, more || ''), el('p', {class: 'note', id: id + '-about'}, remark));
-  }
+        'select', {...attributes, onchange: (event) => changed(event.target.value || null)},
+        el('option', {value: '', selected: written === undefined}, 'default (' + option.default + ')'),
+        choices.map((value) => el('option', {value, selected: value === written}, value)));
+  return el('input', {
+    ...attributes,
+    type: 'text',
+    value: written === undefined ? '' : written,
+    placeholder: option.required ? 'required' : option.default,
+    onchange: (event) => changed(event.target.value === '' ? null : event.target.value)
+  });
+}
 
-  function control(option, written, changed) {
-    const attributes = {'data-option': option.name};
-    const choices = option.type === 'true/false' ? ['true', 'false'] : option.choices;
-    const typed = written !== undefined && choices && !choices.includes(written);  // such as $input
-    if (choices && !typed)
-      return el(
-          'select', {...attributes, onchange: (event) => changed(event.target.value || null)},
-          el('option', {value: '', selected: written === undefined}, 'default (' + option.default + ')'),
-          choices.map((value) => el('option', {value, selected: value === written}, value)));
-    return el('input', {
-      ...attributes,
-      type: 'text',
-      value: written === undefined ? '' : written,
-      placeholder: option.required ? 'required' : option.default,
-      onchange: (event) => changed(event.target.value === '' ? null : event.target.value)
-    });
-  }
+function optionField(option, written, edit) {
+  const changed = (value) => edit({what: 'option', name: option.name, value});
+  const given = written !== undefined;
+  const about = [
+    option.help, option.range,
+    option.required ? 'it must be given' :
+        given       ? 'default ' + option.default :
+                      'at its default'
+  ].filter(Boolean).join('; ');
+  return field(
+      option.name, control(option, written, changed), about,
+      given && !option.required &&
+          button(
+              'Default', () => changed(null),
+              {'data-default': option.name, 'aria-label': 'Take out ' + option.name + ', so that its default holds'}));
+}
 
-  function optionField(option, written, edit) {
-    const changed = (value) => edit({what: 'option', name: option.name, value});
-    const given = written !== undefined;
-    const about = [
-      option.help, option.range,
-      option.required ? 'it must be given' :
-          given       ? 'default ' + option.default :
-                        'at its default'
-    ].filter(Boolean).join('; ');
-    return field(
-        option.name, control(option, written, changed), about,
-        given && !option.required && Dom.button('Default', () => changed(null), {
-          'data-default': option.name,
-          'aria-label': 'Take out ' + option.name + ', so that its default holds'
-        }));
+// What could be wired: outputs of the other nodes that have the port's type.
+function sources(nodes, id, port) {
+  const names = [];
+  for (const [other, {info}] of Object.entries(nodes)) {
+    if (other === id || !info) continue;
+    const fitting = info.outputs.filter((output) => output.type === port.type);
+    for (const output of fitting) names.push(info.outputs.length === 1 ? other : other + '.' + output.name);
   }
+  return names;
+}
 
-  // What could be wired: outputs of the other nodes that have the port's type.
-  function sources(nodes, id, port) {
-    const names = [];
-    for (const [other, {info}] of Object.entries(nodes)) {
-      if (other === id || !info) continue;
-      const fitting = info.outputs.filter((output) => output.type === port.type);
-      for (const output of fitting) names.push(info.outputs.length === 1 ? other : other + '.' + output.name);
-    }
-    return names;
-  }
+function wireField(port, written, nodes, id, edit) {
+  const list =
+      el('datalist', {id: 'sources-' + (++count)}, sources(nodes, id, port).map((name) => el('option', {value: name})));
+  const box = el('input', {
+    type: 'text',
+    list: list.id,
+    value: written === undefined ? '' : written,
+    placeholder: port.optional ? 'not wired' : 'required',
+    'data-wire': port.name,
+    onchange: (event) =>
+        edit({what: 'wire', name: port.name, value: event.target.value === '' ? null : event.target.value})
+  });
+  const type = port.type + (port.axis ? ', a list over ' + port.axis : '');
+  return field(port.name, box, [port.help, type].filter(Boolean).join('; '), list);
+}
 
-  function wireField(port, written, nodes, id, edit) {
-    const list = el(
-        'datalist', {id: 'sources-' + (++count)}, sources(nodes, id, port).map((name) => el('option', {value: name})));
-    const box = el('input', {
-      type: 'text',
-      list: list.id,
-      value: written === undefined ? '' : written,
-      placeholder: port.optional ? 'not wired' : 'required',
-      'data-wire': port.name,
-      onchange: (event) =>
-          edit({what: 'wire', name: port.name, value: event.target.value === '' ? null : event.target.value})
-    });
-    const type = port.type + (port.axis ? ', a list over ' + port.axis : '');
-    return field(port.name, box, [port.help, type].filter(Boolean).join('; '), list);
-  }
+function fitting(file, node, edit) {
+  const place = el('div', {class: 'fits'});
+  const find = button(
+      'Which nodes fit here?', () => Shell.guarded(async () => {
+        place.replaceChildren(el('p', {class: 'note', role: 'status'}, 'Each node is tried in its place …'));
+        const fits = await Ask.json('api/pipeline/fits', {file, node});
+        const part = (title, verdict, lines) => {
+          const some = fits.filter((one) => one.fits === verdict);
+          if (!some.length) return null;
+          return el(
+              verdict === 'yes' ? 'div' : 'details', {}, el(verdict === 'yes' ? 'h4' : 'summary', {}, title),
+              el('ul', {class: 'files'},
+                 some.map(
+                     (one) =>
+                         el('li', {},
+                            verdict === 'yes' ? button(
+                                                    'Use ' + one.node, () => edit({what: 'uses', value: one.node}),
+                                                    {'data-use': one.node}) :
+                                                el('code', {}, one.node),
+                            ' ', el('small', {}, one.summary),
+                            lines && one[lines].map((line) => el('small', {class: 'option'}, line))))));
+        };
+        place.replaceChildren(
+            ...[part('These fit', 'yes'), part('These fit when more is wired or given', 'with more', 'missing'),
+                part('These do not fit', 'no', 'faults')]
+                .filter(Boolean));
+        if (!fits.length) place.append(el('p', {class: 'note'}, 'No other node fits here.'));
+      }),
+      {'data-do': 'fits'});
+  return el('div', {}, el('p', {class: 'note'}, 'Another node begins with the defaults of its options.'), find, place);
+}
 
-  function fitting(file, node, edit) {
-    const place = el('div', {class: 'fits'});
-    const find = Dom.button(
-        'Which nodes fit here?', () => Shell.guarded(async () => {
-          place.replaceChildren(el('p', {class: 'note', role: 'status'}, 'Each node is tried in its place …'));
-          const fits = await Ask.json('api/pipeline/fits', {file, node});
-          const part = (title, verdict, lines) => {
-            const some = fits.filter((one) => one.fits === verdict);
-            if (!some.length) return null;
-            return el(
-                verdict === 'yes' ? 'div' : 'details', {}, el(verdict === 'yes' ? 'h4' : 'summary', {}, title),
-                el('ul', {class: 'files'},
-                   some.map(
-                       (one) =>
-                           el('li', {},
-                              verdict === 'yes' ? Dom.button(
-                                                      'Use ' + one.node, () => edit({what: 'uses', value: one.node}),
-                                                      {'data-use': one.node}) :
-                                                  el('code', {}, one.node),
-                              ' ', el('small', {}, one.summary),
-                              lines && one[lines].map((line) => el('small', {class: 'option'}, line))))));
-          };
-          place.replaceChildren(
-              ...[part('These fit', 'yes'), part('These fit when more is wired or given', 'with more', 'missing'),
-                  part('These do not fit', 'no', 'faults')]
-                  .filter(Boolean));
-          if (!fits.length) place.append(el('p', {class: 'note'}, 'No other node fits here.'));
-        }),
-        {'data-do': 'fits'});
+// The form of node `id` in `state` (api/pipeline). edit(change) asks for a change of the file.
+export function form(state, id, edit, goTo) {
+  const node = state.nodes[id], own = (change) => edit({node: id, uses: node.uses, ...change});
+  const head =
+      el('p', {class: 'node-head'}, el('strong', {}, id), ' ', el('code', {}, node.uses || 'repeats ' + node.body), ' ',
+         button('line ' + node.line, () => goTo(node.line), {class: 'link', 'data-do': 'line'}));
+  const info = node.info;
+  if (!info) return el('div', {}, head, el('p', {class: 'note'}, 'The form comes when the file has no faults.'));
+  const inputs = info.inputs.map((port) => wireField(port, node.in[port.name], state.nodes, id, own));
+  if (node.is_repeated)
     return el(
-        'div', {}, el('p', {class: 'note'}, 'Another node begins with the defaults of its options.'), find, place);
-  }
-
-  // The form of node `id` in `state` (api/pipeline). edit(change) asks for a change of the file.
-  function form(state, id, edit, goTo) {
-    const node = state.nodes[id], own = (change) => edit({node: id, uses: node.uses, ...change});
-    const head =
-        el('p', {class: 'node-head'}, el('strong', {}, id), ' ', el('code', {}, node.uses || 'repeats ' + node.body),
-           ' ', Dom.button('line ' + node.line, () => goTo(node.line), {class: 'link', 'data-do': 'line'}));
-    const info = node.info;
-    if (!info) return el('div', {}, head, el('p', {class: 'note'}, 'The form comes when the file has no faults.'));
-    const inputs = info.inputs.map((port) => wireField(port, node.in[port.name], state.nodes, id, own));
-    if (node.is_repeated)
-      return el(
-          'div', {}, head, el('p', {class: 'note'}, 'This node runs a body again and again. Change it in the text.'),
-          el('h3', {}, 'Wires'), inputs);
-    const given = info.options.filter((option) => option.name in node.with);
-    const others = info.options.filter((option) => !(option.name in node.with));
-    const fields = (options) => options.map((option) => optionField(option, node.with[option.name], own));
-    return el(
-        'div', {}, head, el('p', {}, info.summary), el('h3', {}, 'Options'),
-        info.options.length ? '' : el('p', {class: 'note'}, 'It has no options.'), fields(given), fields(others),
-        info.relations.length ? el('ul', {class: 'note relations'}, info.relations.map((text) => el('li', {}, text))) :
-                                '',
-        Dom.checkbox(
-            'may fail without ending the run', node.may_fail,
-            (value) => own({what: 'may_fail', value: value ? 'true' : null})),
-        el('h3', {}, 'Wires'), inputs.length ? inputs : el('p', {class: 'note'}, 'It takes nothing from other nodes.'),
-        el('h3', {}, 'Another node in its place'), fitting(state.file, id, own));
-  }
-
-  return {form};
-})();
+        'div', {}, head, el('p', {class: 'note'}, 'This node runs a body again and again. Change it in the text.'),
+        el('h3', {}, 'Wires'), inputs);
+  const given = info.options.filter((option) => option.name in node.with);
+  const others = info.options.filter((option) => !(option.name in node.with));
+  const fields = (options) => options.map((option) => optionField(option, node.with[option.name], own));
+  return el(
+      'div', {}, head, el('p', {}, info.summary), el('h3', {}, 'Options'),
+      info.options.length ? '' : el('p', {class: 'note'}, 'It has no options.'), fields(given), fields(others),
+      info.relations.length ? el('ul', {class: 'note relations'}, info.relations.map((text) => el('li', {}, text))) :
+                              '',
+      checkbox(
+          'may fail without ending the run', node.may_fail,
+          (value) => own({what: 'may_fail', value: value ? 'true' : null})),
+      el('h3', {}, 'Wires'), inputs.length ? inputs : el('p', {class: 'note'}, 'It takes nothing from other nodes.'),
+      el('h3', {}, 'Another node in its place'), fitting(state.file, id, own));
+}

@@ -1,8 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // A case on the page "Place": the poses of its bones, how they are moved, kept, judged and registered.
-'use strict';
+import * as Dom from '../../report/page/dom.js';
 
-class PlacedCase extends PlaceControls {
+import {CaseDraft} from './draft.js';
+import * as Geometry from './geometry.js';
+import {PlaceControls} from './place_controls.js';
+import * as PlaceMotion from './place_motion.js';
+import {PlaceSequence} from './place_sequence.js';
+import {PlaceSteps} from './place_steps.js';
+import {PlaceView} from './place_view.js';
+import * as Ask from './server.js';
+import * as Shell from './shell.js';
+
+export class PlacedCase extends PlaceControls {
   constructor(path) {
     super();
     Object.assign(this, {

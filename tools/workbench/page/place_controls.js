@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The controls of the page "Place": its bar, the ways to show the bones, and the side with costs, verdict and steps.
-'use strict';
+import {button, checkbox, choice, el, select, slider} from '../../report/page/dom.js';
 
-class PlaceControls {
+import * as Geometry from './geometry.js';
+
+export class PlaceControls {
   updateBar() {
     if (!this.bar) return;
     const {undo, redo, from, state} = this.bar, {draft} = this;
@@ -21,31 +23,28 @@ class PlaceControls {
   }
 
   fill(place) {
-    this.commandPlace = Dom.el('div', {class: 'place-command'});
+    this.commandPlace = el('div', {class: 'place-command'});
     this.bar = {
-      undo: Dom.button('Undo', () => this.undo(), {'data-do': 'undo'}),
-      redo: Dom.button('Redo', () => this.draft.redo(), {'data-do': 'redo'}),
-      from: Dom.button('From here', () => this.fromHere(), {'data-do': 'register', class: 'primary'}),
-      sequence: Dom.button(
+      undo: button('Undo', () => this.undo(), {'data-do': 'undo'}),
+      redo: button('Redo', () => this.draft.redo(), {'data-do': 'redo'}),
+      from: button('From here', () => this.fromHere(), {'data-do': 'register', class: 'primary'}),
+      sequence: button(
           'Sequence', () => this.sequence.timeline.toggle(this.bar.sequence),
           {'data-do': 'open-sequence', 'aria-expanded': 'false'}),
-      state: Dom.el('span', {class: 'note', role: 'status'})
+      state: el('span', {class: 'note', role: 'status'})
     };
-    const part = (title, ...content) => Dom.el('section', {'aria-label': title}, Dom.el('h2', {}, title), ...content);
+    const part = (title, ...content) => el('section', {'aria-label': title}, el('h2', {}, title), ...content);
     this.pipelineField = this.pipelineChoice();
     this.ofSequence = part('Keyframes', this.sequence.timeline.list);
     this.ofOneFrame = [part('Costs', this.steps.costTable), part('Verdict', this.judgeBox(), this.steps.verdict)];
     place.append(
-        Dom.el(
-            'div', {class: 'page-head'}, Dom.el('h1', {}, this.path || '(this folder)'),
-            Dom.el('div', {class: 'toolbar'}, this.bar.undo, this.bar.redo, this.bar.state),
-            Dom.el('div', {class: 'toolbar'}, this.bar.sequence, this.pipelineField, this.bar.from)),
+        el('div', {class: 'page-head'}, el('h1', {}, this.path || '(this folder)'),
+           el('div', {class: 'toolbar'}, this.bar.undo, this.bar.redo, this.bar.state),
+           el('div', {class: 'toolbar'}, this.bar.sequence, this.pipelineField, this.bar.from)),
         this.sequence.timeline.setup, this.tools(), this.sequence.timeline.element,
-        Dom.el(
-            'div', {class: 'place-work'}, Dom.el('div', {class: 'place-views'}, this.views.map((view) => view.element)),
-            Dom.el(
-                'aside', {class: 'place-side', 'aria-label': 'The present poses'}, this.ofOneFrame, this.ofSequence,
-                part('Steps', this.steps.list), this.commandPlace)));
+        el('div', {class: 'place-work'}, el('div', {class: 'place-views'}, this.views.map((view) => view.element)),
+           el('aside', {class: 'place-side', 'aria-label': 'The present poses'}, this.ofOneFrame, this.ofSequence,
+              part('Steps', this.steps.list), this.commandPlace)));
     this.ofSequence.hidden = true;
     this.steps.showVerdict(null);
     this.updateBar();
@@ -54,7 +53,7 @@ class PlaceControls {
   pipelineChoice() {
     const options = this.about.pipelines.map((one) => [one.file, one.name]);
     const help = () => (this.about.pipelines.find((one) => one.file === this.pipeline) || {help: ''}).help;
-    const field = Dom.select('register by', options, this.pipeline, (file) => {
+    const field = select('register by', options, this.pipeline, (file) => {
       this.pipeline = file;
       field.title = help();
     });
@@ -64,35 +63,33 @@ class PlaceControls {
 
   judgeBox() {
     this.judges = true;
-    return Dom.checkbox('judge each pose after a pause', true, (judges) => {
+    return checkbox('judge each pose after a pause', true, (judges) => {
       this.judges = judges;
       this.pause();
     });
   }
 
   tools() {
-    const strength = Dom.slider('strength', this.strength, (value) => this.restyle({strength: value}));
-    const wipe = Dom.slider('line', this.wipe, (value) => this.restyle({wipe: value}));
+    const strength = slider('strength', this.strength, (value) => this.restyle({strength: value}));
+    const wipe = slider('line', this.wipe, (value) => this.restyle({wipe: value}));
     const shown = () => {
       strength.hidden = !['blend', 'edges'].includes(this.mode);
       wipe.hidden = this.mode !== 'wipe';
     };
-    this.modes = Dom.choice('show', PlaceControls.MODES, this.mode, (mode) => {
+    this.modes = choice('show', PlaceControls.MODES, this.mode, (mode) => {
       this.mode = mode;
       shown();
       this.redraw();
     });
     shown();
-    this.stepChoice = Dom.choice(
+    this.stepChoice = choice(
         'step of keys (mm, °)', [['0.1', '0.1'], ['0.5', '0.5'], ['1', '1'], ['5', '5']], String(this.step),
         (step) => (this.step = Number(step)));
-    this.zoomChoice =
-        Dom.choice('zoom', [['1', '1'], ['2', '2'], ['4', '4']], '1', (factor) => this.zoom(Number(factor)));
+    this.zoomChoice = choice('zoom', [['1', '1'], ['2', '2'], ['4', '4']], '1', (factor) => this.zoom(Number(factor)));
     const bones = this.about.bones.length > 1 &&
-        Dom.el(
-            'fieldset', {class: 'place-bones'}, Dom.el('legend', {}, 'moved'),
-            this.about.bones.map((bone) => this.boneBox(bone)));
-    return Dom.el(
+        el('fieldset', {class: 'place-bones'}, el('legend', {}, 'moved'),
+           this.about.bones.map((bone) => this.boneBox(bone)));
+    return el(
         'div', {class: 'toolbar place-tools'}, this.modes, strength, wipe, this.zoomChoice, this.stepChoice, bones);
   }
 
@@ -102,12 +99,12 @@ class PlaceControls {
   }
 
   boneBox(bone) {
-    const box = Dom.checkbox(bone.name, true, (isMoved) => {
+    const box = checkbox(bone.name, true, (isMoved) => {
       this.moving[isMoved ? 'add' : 'delete'](bone.name);
       this.askCosts();
     });
     const [r, g, b] = this.colours[bone.name];
-    box.prepend(Dom.el('span', {class: 'swatch', style: `background: rgb(${r} ${g} ${b})`, 'aria-hidden': 'true'}));
+    box.prepend(el('span', {class: 'swatch', style: `background: rgb(${r} ${g} ${b})`, 'aria-hidden': 'true'}));
     return box;
   }
 
@@ -119,4 +116,3 @@ class PlaceControls {
 PlaceControls.MODES = [
   ['blend', 'Blend'], ['wipe', 'Wipe'], ['checkerboard', 'Checkerboard'], ['edges', 'Edges'], ['outline', 'Outline']
 ];
-let page = null;  // of the case that is shown; a new object for each

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The images of a sequence's frames. They are read in blocks when one is wanted, the next block ahead of time, and the
 // blocks that were used last are kept within a limit of memory.
-'use strict';
+import * as Ask from './server.js';
 
-class PlaceFrames {
+export class PlaceFrames {
   // views: [{name, step_px}]; sources: {VIEW: {images, pattern}}
   constructor(casePath, views, sources, frames) {
     Object.assign(this, {casePath, views, sources, frames, blocks: new Map(), stopped: new AbortController()});

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Paints bones over an X-ray image. Layers come from the server: {bone, u_px, v_px, step_px, columns, rows, bytes}, or
 // {bone, points: Float32Array of u, v} for an outline.
-'use strict';
 
-class PlacePaint {
+export class PlacePaint {
   // grey: 8 bit pixels of the image, each a square of `step_px` pixels of the X-ray
   constructor(canvas, grey, width, height, step_px) {
     Object.assign(this, {canvas, width, height, step_px, layers: new Map(), last: null});

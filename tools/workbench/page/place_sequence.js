@@ -2,9 +2,13 @@
 // A sequence on the page "Place": the frame that is shown, the keyframes of the bones, and their tracking. All of it is
 // kept in the draft as `sequence`: {views: {VIEW: {images, pattern}}, frame_rate_hz, keyframes: {BONE: {FRAME: {pose,
 // used}}}, tracked: the folder with the tracked poses}. PlaceBetween says what `used` means.
-'use strict';
+import * as PlaceBetween from './place_between.js';
+import {PlaceFrames} from './place_frames.js';
+import {PlaceTimeline} from './place_timeline.js';
+import * as Ask from './server.js';
+import * as Shell from './shell.js';
 
-class PlaceSequence {
+export class PlaceSequence {
   constructor(page) {
     Object.assign(this, {page, frame: 1, wanted: 1, frames: 0, tracked: {}, arriving: Promise.resolve(), opened: null});
     this.timeline = new PlaceTimeline(this);

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page "Place" says about poses: the steps that led to the present one, their costs and verdicts.
-'use strict';
+import {button, el, number, percent, withUnit} from '../../report/page/dom.js';
 
-class PlaceSteps {
+export class PlaceSteps {
   // goTo(step) makes a step's poses the present ones.
   constructor(goTo) {
-    const {el} = Dom;
     Object.assign(this, {goTo, steps: [], current: null, present: null});
     this.costTable = el('table', {class: 'values place-costs'});
     this.list = el('ol', {class: 'place-steps'});
@@ -38,7 +37,6 @@ class PlaceSteps {
   }
 
   showCosts(costs, bone) {
-    const {el} = Dom;
     this.present = {costs, bone};
     if (!costs || !costs[bone]) return this.costTable.replaceChildren();
     const measures = [['contour', 'contour'], ['grey_values', 'grey values']];
@@ -47,20 +45,19 @@ class PlaceSteps {
     this.costTable.replaceChildren(
         el('caption', {}, 'How badly ' + bone + ' fits here'),
         el('thead', {}, el('tr', {}, el('td', {}), measures.map(([, title]) => el('th', {scope: 'col'}, title)))),
-        el('tbody', {}, row('all views', (measure, {value}) => el('td', {'data-cost': measure}, Dom.number(value))),
+        el('tbody', {}, row('all views', (measure, {value}) => el('td', {'data-cost': measure}, number(value))),
            row('against the best step', (measure, {value}) => el('td', {}, this.comparison(value, bone, measure))),
            Object.keys(costs[bone].contour.views)
-               .map((name) => row(name, (measure, {views}) => el('td', {}, Dom.number(views[name]))))));
+               .map((name) => row(name, (measure, {views}) => el('td', {}, number(views[name]))))));
   }
 
   comparison(value, bone, measure) {
     const best = this.best(bone, measure);
     if (!Number.isFinite(best)) return '–';
-    return value <= best * 1.0005 ? 'the best' : Dom.number(value / best) + ' × it';
+    return value <= best * 1.0005 ? 'the best' : number(value / best) + ' × it';
   }
 
   showVerdict(verdicts, note) {
-    const {el} = Dom;
     if (!verdicts) return this.verdict.replaceChildren(el('p', {class: 'note'}, note || 'not judged yet'));
     this.verdict.replaceChildren(...Object.entries(verdicts).map(
         ([bone, verdict]) =>
@@ -68,7 +65,7 @@ class PlaceSteps {
                el('p', {}, el('strong', {}, bone + ': ' + verdict.judgement),
                   verdict.failure_probability === null ?
                       '' :
-                      ', probability of a failure ' + Dom.percent(verdict.failure_probability)),
+                      ', probability of a failure ' + percent(verdict.failure_probability)),
                el('ul', {}, verdict.reasons.map((reason) => el('li', {}, reason))),
                verdict.remedies.length > 0 && el('p', {}, 'Would settle it: ' + verdict.remedies.join('; ')))));
   }
@@ -81,20 +78,18 @@ class PlaceSteps {
                 Object.entries(one)
                     .map(
                         ([axis, {rotation_deg, shift_mm}]) =>
-                            axis + ' ' + Dom.withUnit(rotation_deg, '°') + ', ' + Dom.withUnit(shift_mm, 'mm'))
+                            axis + ' ' + withUnit(rotation_deg, '°') + ', ' + withUnit(shift_mm, 'mm'))
                     .join('; '))
         .join('. ');
   }
 
   show() {
-    const {el} = Dom;
     this.list.replaceChildren(...this.steps.map((step) => {
-      const costs = step.costs && Object.values(step.costs).map((one) => Dom.number(one.contour.value)).join(', ');
+      const costs = step.costs && Object.values(step.costs).map((one) => number(one.contour.value)).join(', ');
       const verdicts = step.verdicts && Object.values(step.verdicts).map((one) => one.judgement).join(', ');
       const deviations = PlaceSteps.deviationText(step.deviations);
       return el(
-          'li', {},
-          Dom.button(step.what, () => this.goTo(step), {'aria-current': step === this.current ? 'step' : null}),
+          'li', {}, button(step.what, () => this.goTo(step), {'aria-current': step === this.current ? 'step' : null}),
           el('small', {}, [costs && 'contour ' + costs, verdicts].filter(Boolean).join(' · ')),
           deviations && el('small', {class: 'deviations'}, deviations));
     }));

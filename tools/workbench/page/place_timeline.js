@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page "Place" shows of a sequence: where its frames are, the slider with the keyframes and the tracked poses,
 // and the list of keyframes.
-'use strict';
+import * as Dom from '../../report/page/dom.js';
+import {el, svg} from '../../report/page/dom.js';
 
-class PlaceTimeline {
+import * as Shell from './shell.js';
+
+export class PlaceTimeline {
   constructor(sequence) {
-    const {el} = Dom;
     this.sequence = sequence;
     this.setup = el('section', {class: 'place-setup', 'aria-label': 'Where the frames are', hidden: true});
     this.slider = el('input', {
@@ -35,7 +37,7 @@ class PlaceTimeline {
   }
 
   fillSetup() {
-    const {el} = Dom, {page, sequence} = this, {kept} = sequence;
+    const {page, sequence} = this, {kept} = sequence;
     const fields = page.views.map(({name}) => this.viewFields(name, ((kept || {}).views || {})[name] || {}));
     const rate =
         el('input', {type: 'number', min: 0.001, step: 'any', value: (kept || {}).frame_rate_hz || 30, name: 'rate'});
@@ -78,7 +80,6 @@ class PlaceTimeline {
   }
 
   viewFields(name, given) {
-    const {el} = Dom;
     const images = el('input', {type: 'text', value: given.images || '', 'data-images': name});
     const pattern = el('input', {type: 'text', value: given.pattern || '', 'data-pattern': name, placeholder: '*.png'});
     const choose = async () => {
@@ -98,7 +99,7 @@ class PlaceTimeline {
 
   // All of it: after a change of keyframes or tracked poses.
   update() {
-    const {sequence, page} = this, {el} = Dom;
+    const {sequence, page} = this;
     this.element.hidden = !sequence.isOn;
     if (!sequence.isOn) return;
     this.slider.max = sequence.frames;
@@ -118,7 +119,7 @@ class PlaceTimeline {
   }
 
   fill() {
-    const {el} = Dom, {sequence} = this;
+    const {sequence} = this;
     const button = (text, label, action) => Dom.button(text, action, {'aria-label': label, title: label});
     this.element.append(
         el('div', {class: 'toolbar'}, button('◆◀', 'Keyframe before', () => sequence.stepKeyframe(-1)),
@@ -134,7 +135,7 @@ class PlaceTimeline {
 
   // A bone's keyframes and tracked frames, under the slider. Frames in a row are one mark.
   row(bone) {
-    const {el, svg} = Dom, {sequence, page} = this, {frames} = sequence, tracked = sequence.tracked[bone.name];
+    const {sequence, page} = this, {frames} = sequence, tracked = sequence.tracked[bone.name];
     const at = (frame) => (frames > 1 ? 100 * (frame - 1) / (frames - 1) : 50), half = 50 / Math.max(1, frames - 1);
     const marks = [];
     if (tracked)

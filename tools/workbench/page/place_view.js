@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // One X-ray view of the page "Place": asks the server for the bones at their newest poses, paints them, and tells what
 // the pointer does.
-'use strict';
+import {el} from '../../report/page/dom.js';
 
-class PlaceView {
+import {PlacePaint} from './place_paint.js';
+import * as Ask from './server.js';
+
+export class PlaceView {
   // page: {casePath, style(), poses(), drag(view, drag), dragEnded(), wheel(view, notches), chosen(view)}
   static async make(view, page) {
     const made = new PlaceView();
@@ -20,7 +23,7 @@ class PlaceView {
     });
     const {camera, step_px} = made;
     const {bytes} = await Ask.bytes('api/place/image', {case: page.casePath, view: view.name, step_px});
-    made.canvas = Dom.el('canvas', {
+    made.canvas = el('canvas', {
       class: 'place-canvas',
       tabindex: 0,
       role: 'application',
@@ -31,8 +34,8 @@ class PlaceView {
     made.paint = new PlacePaint(
         made.canvas, made.image, Math.floor(camera.width_px / step_px), Math.floor(camera.height_px / step_px),
         step_px);
-    made.window = Dom.el('div', {class: 'place-window'}, made.canvas);
-    made.element = Dom.el('figure', {class: 'place-view'}, Dom.el('figcaption', {}, view.name), made.window);
+    made.window = el('div', {class: 'place-window'}, made.canvas);
+    made.element = el('figure', {class: 'place-view'}, el('figcaption', {}, view.name), made.window);
     made.listen();
     return made;
   }

@@ -1,79 +1,74 @@
 // SPDX-License-Identifier: Apache-2.0
 // Points of a CT as a list that can be used by keys alone, and names that are typed.
-'use strict';
+import {button, el} from '../../report/page/dom.js';
 
-const PointList = (() => {
-  const {el} = Dom;
-  // Seen well on grey pictures, and told apart by colour-blind readers.
-  const COLOURS = ['#56b4e9', '#e69f00', '#2fd6a5', '#f08ac0', '#f0e442', '#ff8a4c', '#b9b0ff'];
-  const colour = (i) => COLOURS[i % COLOURS.length];
+import * as Shell from './shell.js';
 
-  const words = (point_mm) => point_mm.map((value) => value.toFixed(1)).join(', ');
-  const rounded = (point_mm) => point_mm.map((value) => Math.round(1000 * value) / 1000);
+// Seen well on grey pictures, and told apart by colour-blind readers.
+const COLOURS = ['#56b4e9', '#e69f00', '#2fd6a5', '#f08ac0', '#f0e442', '#ff8a4c', '#b9b0ff'];
+export const colour = (i) => COLOURS[i % COLOURS.length];
 
-  // One point: buttons that go to it, move it to the crosshair and remove it. `what` names it for screen readers.
-  const row = (state, what, point_mm, {moveTo, remove}, more) => el(
-      'li', {class: 'point'},
-      Dom.button(words(point_mm) + ' mm', () => state.goTo(point_mm), {class: 'link', 'aria-label': 'Go to ' + what}),
-      Dom.button(
-          'Move here', () => moveTo([...state.cursor_mm]),
-          {'aria-label': 'Move ' + what + ' to the crosshair', title: 'to the crosshair'}),
-      Dom.button('Remove', remove, {'aria-label': 'Remove ' + what}), more);
+export const words = (point_mm) => point_mm.map((value) => value.toFixed(1)).join(', ');
+export const rounded = (point_mm) => point_mm.map((value) => Math.round(1000 * value) / 1000);
 
-  // A field for a name with a button. taken() lists the names that are in use.
-  function nameField(label, text, taken, chosen) {
-    const box = el('input', {type: 'text', maxlength: 100});
-    const form =
-        el('form', {
-          class: 'toolbar',
-          onsubmit: (event) => {
-            event.preventDefault();
-            const name = box.value.trim(), fault = faultOf(name, taken());
-            if (fault) return void Shell.notice(fault, 'fault');
-            box.value = '';
-            chosen(name);
-          }
-        },
-           el('label', {class: 'field'}, el('span', {}, label), box), el('button', {type: 'submit'}, text));
-    form.box = box;
-    return form;
-  }
+// One point: buttons that go to it, move it to the crosshair and remove it. `what` names it for screen readers.
+export const row = (state, what, point_mm, {moveTo, remove}, more) =>
+    el('li', {class: 'point'},
+       button(words(point_mm) + ' mm', () => state.goTo(point_mm), {class: 'link', 'aria-label': 'Go to ' + what}),
+       button(
+           'Move here', () => moveTo([...state.cursor_mm]),
+           {'aria-label': 'Move ' + what + ' to the crosshair', title: 'to the crosshair'}),
+       button('Remove', remove, {'aria-label': 'Remove ' + what}), more);
 
-  function faultOf(name, taken) {
-    if (!name) return 'Give a name.';
-    if (taken.includes(name)) return 'There is one named "' + name + '" already; choose another name.';
-    return '';
-  }
+// A field for a name with a button. taken() lists the names that are in use.
+export function nameField(label, text, taken, chosen) {
+  const box = el('input', {type: 'text', maxlength: 100});
+  const form =
+      el('form', {
+        class: 'toolbar',
+        onsubmit: (event) => {
+          event.preventDefault();
+          const name = box.value.trim(), fault = faultOf(name, taken());
+          if (fault) return void Shell.notice(fault, 'fault');
+          box.value = '';
+          chosen(name);
+        }
+      },
+         el('label', {class: 'field'}, el('span', {}, label), box), el('button', {type: 'submit'}, text));
+  form.box = box;
+  return form;
+}
 
-  // Asks for another name. Resolves to it, or to undefined.
-  const rename = (title, name, taken) => Shell.dialog(title, (close) => {
-    const field = nameField('name', 'Rename', () => taken, close);
-    field.box.value = name;
-    return field;
-  });
+function faultOf(name, taken) {
+  if (!name) return 'Give a name.';
+  if (taken.includes(name)) return 'There is one named "' + name + '" already; choose another name.';
+  return '';
+}
 
-  // Fills a list anew when what it shows has changed, and leaves the focus where it was. what() says what it shows.
-  function renewed(list, what, rows) {
-    const nameOf = (one) => one.dataset.tool || one.getAttribute('aria-label');
-    let shown = '';
-    return () => {
-      const now = JSON.stringify(what());
-      if (now === shown) return;
-      shown = now;
-      const focused = list.contains(document.activeElement) && nameOf(document.activeElement);
-      list.replaceChildren(...rows());
-      const again =
-          focused && [...list.querySelectorAll('button, input, select')].find((one) => nameOf(one) === focused);
-      if (again) again.focus({preventScroll: true});
-    };
-  }
+// Asks for another name. Resolves to it, or to undefined.
+export const rename = (title, name, taken) => Shell.dialog(title, (close) => {
+  const field = nameField('name', 'Rename', () => taken, close);
+  field.box.value = name;
+  return field;
+});
 
-  // Buttons of one panel act as a choice: pressing one again ends it.
-  function toggle(state, key, text, tool) {
-    const is_on = Boolean(state.tool && state.tool.key === key);
-    return Dom.button(
-        text, () => state.setTool(is_on ? null : tool), {'aria-pressed': String(is_on), 'data-tool': key});
-  }
+// Fills a list anew when what it shows has changed, and leaves the focus where it was. what() says what it shows.
+export function renewed(list, what, rows) {
+  const nameOf = (one) => one.dataset.tool || one.getAttribute('aria-label');
+  let shown = '';
+  return () => {
+    const now = JSON.stringify(what());
+    if (now === shown) return;
+    shown = now;
+    const focused = list.contains(document.activeElement) && nameOf(document.activeElement);
+    list.replaceChildren(...rows());
+    const again = focused && [...list.querySelectorAll('button, input, select')].find((one) => nameOf(one) === focused);
+    if (again) again.focus({preventScroll: true});
+  };
+}
 
-  return {colour, words, rounded, row, nameField, rename, renewed, toggle};
-})();
+// Buttons of one panel act as a choice: pressing one again ends it.
+export function toggle(state, key, text, tool) {
+  const is_on = Boolean(state.tool && state.tool.key === key);
+  return button(text, () => state.setTool(is_on ? null : tool), {'aria-pressed': String(is_on), 'data-tool': key});
+}

@@ -1,74 +1,75 @@
 // SPDX-License-Identifier: Apache-2.0
 // The panel "Save": writes the draft as a case that `marrow run` reads.
-'use strict';
+import * as Dom from '../../report/page/dom.js';
+import {el} from '../../report/page/dom.js';
 
-(() => {
-  const {el} = Dom;
-  const PIPELINES = [['femur-best', 'A fractured femur:'], ['bone', 'Any other bone:']];
+import * as CasePage from './case.js';
+import * as Ask from './server.js';
+import * as Shell from './shell.js';
 
-  // Whether comments of the older files that cannot be kept may be lost. Without an answer of the server, for example
-  // because the case is not whole yet, saving says what is wrong.
-  async function mayLose(draft) {
-    const {lost} = await Ask.json('api/case/lost-comments', {case: draft.path}).catch(() => ({lost: []}));
-    if (!lost.length) return true;
-    return Boolean(await Shell.dialog(
-        'Comments will be lost',
-        (close) =>
-            el('div', {}, el('p', {}, 'What they belong to has changed, so these comments of the older files go:'),
-               el('ul', {class: 'faults', 'data-lost': ''}, lost.map((comment) => el('li', {}, comment))),
-               el('div', {class: 'toolbar'},
-                  Dom.button('Save without them', () => close(true), {'data-do': 'save-without'}),
-                  Dom.button('Do not save', () => close(false), {'data-do': 'do-not-save'})))));
-  }
+const PIPELINES = [['femur-best', 'A fractured femur:'], ['bone', 'Any other bone:']];
 
-  function make(draft) {
-    const outcome = el('div', {role: 'status', 'data-saved': ''});
-    const button = Dom.button('Save the case', () => save(), {'data-do': 'save'});
+// Whether comments of the older files that cannot be kept may be lost. Without an answer of the server, for example
+// because the case is not whole yet, saving says what is wrong.
+async function mayLose(draft) {
+  const {lost} = await Ask.json('api/case/lost-comments', {case: draft.path}).catch(() => ({lost: []}));
+  if (!lost.length) return true;
+  return Boolean(await Shell.dialog(
+      'Comments will be lost',
+      (close) => el(
+          'div', {}, el('p', {}, 'What they belong to has changed, so these comments of the older files go:'),
+          el('ul', {class: 'faults', 'data-lost': ''}, lost.map((comment) => el('li', {}, comment))),
+          el('div', {class: 'toolbar'}, Dom.button('Save without them', () => close(true), {'data-do': 'save-without'}),
+             Dom.button('Do not save', () => close(false), {'data-do': 'do-not-save'})))));
+}
 
-    async function save() {
-      await draft.last;  // changes on their way come first
-      button.disabled = true;
-      outcome.replaceChildren();
-      if (!await mayLose(draft)) {
-        button.disabled = false;
-        return;
-      }
-      try {
-        const {job} = await Ask.post('api/case/save', {case: draft.path, revision: draft.revision});
-        const result = await Shell.follow('Saving the case', job);
-        draft.take(result.draft);
-        outcome.replaceChildren(...written(result));
-      } catch (error) {
-        outcome.replaceChildren(
-            el('p', {}, 'Not saved:'),
-            el('ul', {class: 'faults'},
-               error.message.split('\n').map((line) => line.trim()).filter(Boolean).map((line) => el('li', {}, line))));
-      }
+function make(draft) {
+  const outcome = el('div', {role: 'status', 'data-saved': ''});
+  const button = Dom.button('Save the case', () => save(), {'data-do': 'save'});
+
+  async function save() {
+    await draft.last;  // changes on their way come first
+    button.disabled = true;
+    outcome.replaceChildren();
+    if (!await mayLose(draft)) {
       button.disabled = false;
+      return;
     }
-
-    const written = ({folder, copied, pipelines}) =>
-        [el('p', {}, 'Saved in ', el('strong', {}, folder),
-            copied.length ? '; copied into it: ' + copied.join(', ') : '', '.'),
-         ...PIPELINES.flatMap(
-             ([name, words]) =>
-                 [el('p', {class: 'note'}, words),
-                  Dom.command(
-                      'marrow run ' + Dom.shellPath(pipelines + '/' + name + '.yaml') + ' ' +
-                      'case=' + Dom.shellWord(folder))])];
-
-    return {
-      element: el(
-          'div', {},
-          el('p', {class: 'note'},
-             'Writes case.yaml and landmarks.yaml into the case\'s folder, copies files that lie elsewhere into it, ' +
-                 'and reads the case back before anything is replaced.'),
-          el('div', {class: 'toolbar'}, button), outcome),
-      update() {
-        button.textContent = draft.is_saved ? 'Save again' : 'Save the case';
-      }
-    };
+    try {
+      const {job} = await Ask.post('api/case/save', {case: draft.path, revision: draft.revision});
+      const result = await Shell.follow('Saving the case', job);
+      draft.take(result.draft);
+      outcome.replaceChildren(...written(result));
+    } catch (error) {
+      outcome.replaceChildren(
+          el('p', {}, 'Not saved:'),
+          el('ul', {class: 'faults'},
+             error.message.split('\n').map((line) => line.trim()).filter(Boolean).map((line) => el('li', {}, line))));
+    }
+    button.disabled = false;
   }
 
-  CasePage.panel('Save', 90, make);
-})();
+  const written = ({folder, copied, pipelines}) =>
+      [el('p', {}, 'Saved in ', el('strong', {}, folder), copied.length ? '; copied into it: ' + copied.join(', ') : '',
+          '.'),
+       ...PIPELINES.flatMap(
+           ([name, words]) =>
+               [el('p', {class: 'note'}, words),
+                Dom.command(
+                    'marrow run ' + Dom.shellPath(pipelines + '/' + name + '.yaml') + ' ' +
+                    'case=' + Dom.shellWord(folder))])];
+
+  return {
+    element:
+        el('div', {},
+           el('p', {class: 'note'},
+              'Writes case.yaml and landmarks.yaml into the case\'s folder, copies files that lie elsewhere into it, ' +
+                  'and reads the case back before anything is replaced.'),
+           el('div', {class: 'toolbar'}, button), outcome),
+    update() {
+      button.textContent = draft.is_saved ? 'Save again' : 'Save the case';
+    }
+  };
+}
+
+CasePage.panel('Save', 90, make);

@@ -1,150 +1,157 @@
 // SPDX-License-Identifier: Apache-2.0
 // The panel "Segmentation": the fragments' bone grows from the seeds, and is shown in the slices and in 3D.
-'use strict';
+import {button, command, el, number, select, shellPath, shellWord} from '../../report/page/dom.js';
 
-(() => {
-  const {el} = Dom;
-  const METHODS = [['bone', 'by a threshold, as bone.yaml does'], ['femur', 'by a level set, as femur.yaml does']];
-  const STAGES = {coarse: 'on a coarse grid; the full one is being computed', full: 'on the grid of the CT'};
+import * as CasePage from './case.js';
+import {CtState} from './ct_state.js';
+import * as PointList from './point_list.js';
+import * as Ask from './server.js';
+import * as Shell from './shell.js';
+import {SurfaceView} from './surface_view.js';
 
-  // The outlines of one result, asked for slice by slice.
-  function outlines(segmentation, colourOf) {
-    const known = new Map(), asked = new Set();
-    async function ask(key, axis, index, later) {
-      asked.add(key);
-      try {
-        const {bytes, about} = await Ask.bytes('api/segmentation/outlines', {segmentation, axis, index});
-        const numbers = new Float32Array(bytes), [low, high] = [0, 1, 2].filter((one) => one !== axis);
-        let from = 0;
-        known.set(key, about.map(({name, numbers: count}) => {
-          const part = numbers.subarray(from, from += count), ends = new Float32Array(count / 2 * 3);
-          for (let i = 0; 2 * i < count; ++i) {
-            ends[3 * i + axis] = index;
-            ends[3 * i + low] = part[2 * i];
-            ends[3 * i + high] = part[2 * i + 1];
-          }
-          return {name, colour: colourOf(name), ends};
-        }));
-        if (known.size > 300) known.delete(known.keys().next().value);
-        later();
-      } catch (error) {
-        if (error.status !== 409) Shell.notice(error.message, 'fault');
-      }
-      asked.delete(key);
+const METHODS = [['bone', 'by a threshold, as bone.yaml does'], ['femur', 'by a level set, as femur.yaml does']];
+const STAGES = {
+  coarse: 'on a coarse grid; the full one is being computed',
+  full: 'on the grid of the CT'
+};
+
+// The outlines of one result, asked for slice by slice.
+function outlines(segmentation, colourOf) {
+  const known = new Map(), asked = new Set();
+  async function ask(key, axis, index, later) {
+    asked.add(key);
+    try {
+      const {bytes, about} = await Ask.bytes('api/segmentation/outlines', {segmentation, axis, index});
+      const numbers = new Float32Array(bytes), [low, high] = [0, 1, 2].filter((one) => one !== axis);
+      let from = 0;
+      known.set(key, about.map(({name, numbers: count}) => {
+        const part = numbers.subarray(from, from += count), ends = new Float32Array(count / 2 * 3);
+        for (let i = 0; 2 * i < count; ++i) {
+          ends[3 * i + axis] = index;
+          ends[3 * i + low] = part[2 * i];
+          ends[3 * i + high] = part[2 * i + 1];
+        }
+        return {name, colour: colourOf(name), ends};
+      }));
+      if (known.size > 300) known.delete(known.keys().next().value);
+      later();
+    } catch (error) {
+      if (error.status !== 409) Shell.notice(error.message, 'fault');
     }
-    return {
-      lines(axis, index, later) {
-        const key = axis + ' ' + index;
-        if (!known.has(key) && asked.size < 3 && !asked.has(key)) ask(key, axis, index, later);
-        return known.get(key);
-      }
+    asked.delete(key);
+  }
+  return {
+    lines(axis, index, later) {
+      const key = axis + ' ' + index;
+      if (!known.has(key) && asked.size < 3 && !asked.has(key)) ask(key, axis, index, later);
+      return known.get(key);
+    }
+  };
+}
+
+async function surfaces(segmentation, names, colourOf) {
+  const meshes = [];
+  for (const fragment of names) {
+    const {bytes, about} = await Ask.bytes('api/segmentation/surface', {segmentation, fragment});
+    meshes.push({
+      vertices: new Float32Array(bytes, 0, 3 * about.vertices),
+      triangles: new Uint32Array(bytes, 12 * about.vertices, 3 * about.triangles),
+      colour: colourOf(fragment)
+    });
+  }
+  return meshes;
+}
+
+class Panel {
+  constructor(draft) {
+    Object.assign(
+        this,
+        {draft, state: CtState.of(draft), method: 'bone', segmented: '', shownFor: '', isRunning: false, turn: 0});
+    this.solid = new SurfaceView('Surfaces of the fragments; arrow keys turn them');
+    this.solid.element.hidden = true;
+    this.threshold = el('input', {type: 'number', class: 'short', value: 250, step: 10});
+    const field = el('label', {class: 'field'}, el('span', {}, 'threshold, HU'), this.threshold);
+    const how = select('how', METHODS, this.method, (value) => {
+      this.method = value;
+      field.hidden = value !== 'bone';
+    });
+    this.button = button('Segment', () => this.run(), {'data-do': 'segment'});
+    this.outcome = el('p', {class: 'note', role: 'status', 'data-segmented': ''});
+    this.old = el('p', {class: 'note'});
+    this.command = el('details', {hidden: true}, el('summary', {}, 'The same in a shell, once the case is saved'));
+    this.element =
+        el('div', {}, el('div', {class: 'toolbar'}, how, field, this.button), this.outcome, this.old,
+           this.solid.element, this.command);
+    this.renewed = () => {
+      if (!this.state.ct || this.state.ct.name !== this.segmented) this.state.contours.delete('segmentation');
+      this.update();
     };
+    this.state.addEventListener('ct', this.renewed);
   }
 
-  async function surfaces(segmentation, names, colourOf) {
-    const meshes = [];
-    for (const fragment of names) {
-      const {bytes, about} = await Ask.bytes('api/segmentation/surface', {segmentation, fragment});
-      meshes.push({
-        vertices: new Float32Array(bytes, 0, 3 * about.vertices),
-        triangles: new Uint32Array(bytes, 12 * about.vertices, 3 * about.triangles),
-        colour: colourOf(fragment)
+  dispose() {
+    this.state.removeEventListener('ct', this.renewed);
+    this.solid.dispose();
+  }
+
+  fragments() {
+    return this.draft.document.fragments || {};
+  }
+
+  // Shows a result: its outlines, volumes and surfaces.
+  async take({segmentation, stage, volumes_ml}) {
+    const names = Object.keys(volumes_ml), mine = ++this.turn;
+    const colourOf = (name) => PointList.colour(Math.max(0, Object.keys(this.fragments()).indexOf(name)));
+    this.state.contours.set('segmentation', outlines(segmentation, colourOf));
+    this.state.tell('view');
+    const volumes = names.map((name) => name + ' ' + number(volumes_ml[name]) + ' ml').join(', ');
+    this.outcome.textContent = 'Segmented ' + STAGES[stage] + ': ' + volumes;
+    this.outcome.dataset.segmented = stage;
+    const meshes = await Shell.guarded(() => surfaces(segmentation, names, colourOf));
+    if (!meshes || mine !== this.turn) return;
+    this.solid.element.hidden = false;
+    this.solid.set(meshes);
+  }
+
+  async run() {
+    this.isRunning = true;
+    this.segmented = this.state.ct.name;
+    this.update();
+    const asked = {ct: this.state.ct.name, fragments: structuredClone(this.fragments()), method: this.method};
+    if (this.method === 'bone') asked.threshold_hu = Number(this.threshold.value);
+    try {
+      const {job, pipeline} = await Ask.post('api/segment', asked);
+      this.tellCommand(pipeline, asked);
+      await Shell.follow('Segmenting', job, (event) => {
+        if (event.event === 'grown') this.take(event);
       });
+      this.shownFor = JSON.stringify([asked.fragments, asked.ct]);
+    } catch (error) {
+      Shell.notice(error.message, 'fault');
+      if (error.status === 409) this.state.follow(true);
     }
-    return meshes;
+    this.isRunning = false;
+    this.update();
   }
 
-  class Panel {
-    constructor(draft) {
-      Object.assign(
-          this,
-          {draft, state: CtState.of(draft), method: 'bone', segmented: '', shownFor: '', isRunning: false, turn: 0});
-      this.solid = new SurfaceView('Surfaces of the fragments; arrow keys turn them');
-      this.solid.element.hidden = true;
-      this.threshold = el('input', {type: 'number', class: 'short', value: 250, step: 10});
-      const field = el('label', {class: 'field'}, el('span', {}, 'threshold, HU'), this.threshold);
-      const how = Dom.select('how', METHODS, this.method, (value) => {
-        this.method = value;
-        field.hidden = value !== 'bone';
-      });
-      this.button = Dom.button('Segment', () => this.run(), {'data-do': 'segment'});
-      this.outcome = el('p', {class: 'note', role: 'status', 'data-segmented': ''});
-      this.old = el('p', {class: 'note'});
-      this.command = el('details', {hidden: true}, el('summary', {}, 'The same in a shell, once the case is saved'));
-      this.element =
-          el('div', {}, el('div', {class: 'toolbar'}, how, field, this.button), this.outcome, this.old,
-             this.solid.element, this.command);
-      this.renewed = () => {
-        if (!this.state.ct || this.state.ct.name !== this.segmented) this.state.contours.delete('segmentation');
-        this.update();
-      };
-      this.state.addEventListener('ct', this.renewed);
-    }
-
-    dispose() {
-      this.state.removeEventListener('ct', this.renewed);
-      this.solid.dispose();
-    }
-
-    fragments() {
-      return this.draft.document.fragments || {};
-    }
-
-    // Shows a result: its outlines, volumes and surfaces.
-    async take({segmentation, stage, volumes_ml}) {
-      const names = Object.keys(volumes_ml), mine = ++this.turn;
-      const colourOf = (name) => PointList.colour(Math.max(0, Object.keys(this.fragments()).indexOf(name)));
-      this.state.contours.set('segmentation', outlines(segmentation, colourOf));
-      this.state.tell('view');
-      const volumes = names.map((name) => name + ' ' + Dom.number(volumes_ml[name]) + ' ml').join(', ');
-      this.outcome.textContent = 'Segmented ' + STAGES[stage] + ': ' + volumes;
-      this.outcome.dataset.segmented = stage;
-      const meshes = await Shell.guarded(() => surfaces(segmentation, names, colourOf));
-      if (!meshes || mine !== this.turn) return;
-      this.solid.element.hidden = false;
-      this.solid.set(meshes);
-    }
-
-    async run() {
-      this.isRunning = true;
-      this.segmented = this.state.ct.name;
-      this.update();
-      const asked = {ct: this.state.ct.name, fragments: structuredClone(this.fragments()), method: this.method};
-      if (this.method === 'bone') asked.threshold_hu = Number(this.threshold.value);
-      try {
-        const {job, pipeline} = await Ask.post('api/segment', asked);
-        this.tellCommand(pipeline, asked);
-        await Shell.follow('Segmenting', job, (event) => {
-          if (event.event === 'grown') this.take(event);
-        });
-        this.shownFor = JSON.stringify([asked.fragments, asked.ct]);
-      } catch (error) {
-        Shell.notice(error.message, 'fault');
-        if (error.status === 409) this.state.follow(true);
-      }
-      this.isRunning = false;
-      this.update();
-    }
-
-    tellCommand(pipeline, {threshold_hu}) {
-      const words = ['marrow run', Dom.shellPath(pipeline), 'case=' + Dom.shellWord(this.draft.path || '.')];
-      if (threshold_hu !== undefined) words.push('threshold_hu=' + threshold_hu);
-      this.command.hidden = false;
-      this.command.replaceChildren(this.command.firstChild, Dom.command(words.join(' ')));
-    }
-
-    update() {
-      const has_seeds = Object.values(this.fragments()).some(({seeds}) => seeds && seeds.length);
-      this.button.disabled = this.isRunning || !this.state.ct || !has_seeds;
-      this.button.title = has_seeds ? '' : 'Add a fragment and put seeds into its bone first';
-      const now = JSON.stringify([this.draft.document.fragments, this.state.ct && this.state.ct.name]);
-      this.old.textContent =
-          this.shownFor && this.shownFor !== now ? 'The seeds or the CT have changed since; segment again.' : '';
-    }
+  tellCommand(pipeline, {threshold_hu}) {
+    const words = ['marrow run', shellPath(pipeline), 'case=' + shellWord(this.draft.path || '.')];
+    if (threshold_hu !== undefined) words.push('threshold_hu=' + threshold_hu);
+    this.command.hidden = false;
+    this.command.replaceChildren(this.command.firstChild, command(words.join(' ')));
   }
 
-  CasePage.panel('Segmentation', 30, (draft) => {
-    const panel = new Panel(draft);
-    return {element: panel.element, update: () => panel.update(), dispose: () => panel.dispose()};
-  });
-})();
+  update() {
+    const has_seeds = Object.values(this.fragments()).some(({seeds}) => seeds && seeds.length);
+    this.button.disabled = this.isRunning || !this.state.ct || !has_seeds;
+    this.button.title = has_seeds ? '' : 'Add a fragment and put seeds into its bone first';
+    const now = JSON.stringify([this.draft.document.fragments, this.state.ct && this.state.ct.name]);
+    this.old.textContent =
+        this.shownFor && this.shownFor !== now ? 'The seeds or the CT have changed since; segment again.' : '';
+  }
+}
+
+CasePage.panel('Segmentation', 30, (draft) => {
+  const panel = new Panel(draft);
+  return {element: panel.element, update: () => panel.update(), dispose: () => panel.dispose()};
+});

@@ -1,212 +1,195 @@
 // SPDX-License-Identifier: Apache-2.0
 // What surrounds all pages: the bar, notices, jobs, dialogs and keys. The address names the page and what it shows:
 // #case=cases/7&view=lateral
-'use strict';
+import * as Dom from '../../report/page/dom.js';
+import {el} from '../../report/page/dom.js';
+import {startTheme} from '../../report/page/theme.js';
 
-const Shell = (() => {
-  const {el} = Dom;
-  const pages = new Map();  // name: {title, show(place, parameters), keys, leave()}
-  let current = null;
+import * as Ask from './server.js';
 
-  // Adds a page. show(place, parameters, first) fills the element `place`; `first` is what follows the page's name in
-  // the address. `keys`: [[key, what it does, action]], where key is as in KeyboardEvent.key, with 'Ctrl+' in front.
-  function page(name, description) {
-    pages.set(name, description);
+const pages = new Map();  // name: {title, show(place, parameters), keys, leave()}
+let current = null;
+
+// Adds a page. show(place, parameters, first) fills the element `place`; `first` is what follows the page's name in
+// the address. `keys`: [[key, what it does, action]], where key is as in KeyboardEvent.key, with 'Ctrl+' in front.
+export function page(name, description) {
+  pages.set(name, description);
+}
+
+function parsed(hash) {
+  const parameters = new URLSearchParams(hash.replace(/^#/, ''));
+  const [name, first] = [...parameters.entries()][0] || ['home', ''];
+  return {name: pages.has(name) ? name : 'home', first, parameters};
+}
+
+export const addressOf = (name, first, more) =>
+    '#' + new URLSearchParams([[name, first || ''], ...Object.entries(more || {})]).toString().replaceAll('%2F', '/');
+
+// Opens a page. Of the present page, only the address is changed.
+export function go(name, first, more) {
+  location.hash = addressOf(name, first, more);
+}
+
+async function show() {
+  const {name, first, parameters} = parsed(location.hash), place = document.getElementById('page');
+  if (current && current.leave) current.leave();
+  current = pages.get(name);
+  document.title = (first ? first + ' · ' : '') + current.title + ' · marrow';
+  for (const link of document.querySelectorAll('#pages a'))
+    link.toggleAttribute('aria-current', link.dataset.page === name);
+  const inside = el('div', {class: 'page page-' + name});
+  place.replaceChildren(inside);
+  place.dataset.page = name;
+  delete document.documentElement.dataset.ready;
+  try {
+    await current.show(inside, parameters, first);
+  } catch (error) {
+    inside.append(el('p', {class: 'fault', role: 'alert'}, error.message));
+    console.error(error);
   }
+  document.documentElement.dataset.ready = name;
+}
 
-  function parsed(hash) {
-    const parameters = new URLSearchParams(hash.replace(/^#/, ''));
-    const [name, first] = [...parameters.entries()][0] || ['home', ''];
-    return {name: pages.has(name) ? name : 'home', first, parameters};
+// A line above the page. kind: 'fault' stays until it is closed, others go after some seconds.
+export function notice(text, kind) {
+  const line =
+      el('p', {class: 'notice ' + (kind || ''), role: kind === 'fault' ? 'alert' : null}, text,
+         Dom.button('Close', () => line.remove()));
+  document.getElementById('notices').append(line);
+  if (kind !== 'fault') setTimeout(() => line.remove(), 6000);
+  return line;
+}
+
+// Calls an async action and shows what goes wrong. Resolves to its value, or to undefined.
+export async function guarded(action) {
+  try {
+    return await action();
+  } catch (error) {
+    if (error.name === 'AbortError') return undefined;
+    notice(error.message, 'fault');
+    if (!(error instanceof Ask.Refused)) console.error(error);
+    return undefined;
   }
+}
 
-  const addressOf = (name, first, more) =>
-      '#' + new URLSearchParams([[name, first || ''], ...Object.entries(more || {})]).toString().replaceAll('%2F', '/');
-
-  // Opens a page. Of the present page, only the address is changed.
-  function go(name, first, more) {
-    location.hash = addressOf(name, first, more);
-  }
-
-  async function show() {
-    const {name, first, parameters} = parsed(location.hash), place = document.getElementById('page');
-    if (current && current.leave) current.leave();
-    current = pages.get(name);
-    document.title = (first ? first + ' · ' : '') + current.title + ' · marrow';
-    for (const link of document.querySelectorAll('#pages a'))
-      link.toggleAttribute('aria-current', link.dataset.page === name);
-    const inside = el('div', {class: 'page page-' + name});
-    place.replaceChildren(inside);
-    place.dataset.page = name;
-    delete document.documentElement.dataset.ready;
-    try {
-      await current.show(inside, parameters, first);
-    } catch (error) {
-      inside.append(el('p', {class: 'fault', role: 'alert'}, error.message));
-      console.error(error);
-    }
-    document.documentElement.dataset.ready = name;
-  }
-
-  // A line above the page. kind: 'fault' stays until it is closed, others go after some seconds.
-  function notice(text, kind) {
-    const line =
-        el('p', {class: 'notice ' + (kind || ''), role: kind === 'fault' ? 'alert' : null}, text,
-           Dom.button('Close', () => line.remove()));
-    document.getElementById('notices').append(line);
-    if (kind !== 'fault') setTimeout(() => line.remove(), 6000);
-    return line;
-  }
-
-  // Calls an async action and shows what goes wrong. Resolves to its value, or to undefined.
-  async function guarded(action) {
-    try {
-      return await action();
-    } catch (error) {
-      if (error.name === 'AbortError') return undefined;
-      notice(error.message, 'fault');
-      if (!(error instanceof Ask.Refused)) console.error(error);
-      return undefined;
-    }
-  }
-
-  // Shows the progress of a job and a button that stops it. told(event) may return how much is done, from 0 to 1, where
-  // the events themselves tell it of a part only. Resolves to the job's result; rejects as Ask.follow().
-  async function follow(title, job, told) {
-    const bar = el('progress', {'aria-label': title, max: 1}), text = el('span', {class: 'job-text'});
-    const line =
-        el('p', {class: 'notice job'}, el('strong', {}, title), ' ', bar, ' ', text,
-           Dom.button('Stop', () => guarded(() => Ask.stop(job)), {'data-stop': job}));
-    document.getElementById('notices').append(line);
-    try {
-      return await Ask.follow(job, (event) => {
-        const share = told && told(event);
-        if (Number.isFinite(share))
-          bar.value = share;
-        else if (event.event === 'progress')
-          bar.value = event.fraction;
-        if (['started', 'progress', 'message', 'warning'].includes(event.event))
-          text.textContent = [event.node, event.item, event.text].filter(Boolean).join(' ');
-      });
-    } finally {
-      line.remove();
-    }
-  }
-
-  // A modal dialog. Resolves to what close(value) is given, or to undefined if the user leaves it. fill(close) returns
-  // its content.
-  function dialog(title, fill) {
-    const box = document.getElementById('dialog');
-    return new Promise((resolve) => {
-      let value;
-      const close = (given) => {
-        value = given;
-        box.close();
-      };
-      box.setAttribute('aria-label', title);
-      box.replaceChildren(
-          el('div', {class: 'dialog-head'}, el('h2', {tabindex: -1}, title), Dom.button('Close', () => close())),
-          fill(close));
-      box.addEventListener('close', () => resolve(value), {once: true});
-      box.showModal();
+// Shows the progress of a job and a button that stops it. told(event) may return how much is done, from 0 to 1, where
+// the events themselves tell it of a part only. Resolves to the job's result; rejects as Ask.follow().
+export async function follow(title, job, told) {
+  const bar = el('progress', {'aria-label': title, max: 1}), text = el('span', {class: 'job-text'});
+  const line =
+      el('p', {class: 'notice job'}, el('strong', {}, title), ' ', bar, ' ', text,
+         Dom.button('Stop', () => guarded(() => Ask.stop(job)), {'data-stop': job}));
+  document.getElementById('notices').append(line);
+  try {
+    return await Ask.follow(job, (event) => {
+      const share = told && told(event);
+      if (Number.isFinite(share))
+        bar.value = share;
+      else if (event.event === 'progress')
+        bar.value = event.fraction;
+      if (['started', 'progress', 'message', 'warning'].includes(event.event))
+        text.textContent = [event.node, event.item, event.text].filter(Boolean).join(' ');
     });
+  } finally {
+    line.remove();
   }
+}
 
-  // Lets the user choose a file or a folder of the opened folder. accepts(name) says which files may be chosen; with
-  // `folders`, the folder that is shown may be chosen, too. Resolves to its relative path, or undefined.
-  const choose = (title, {accepts = () => true, folders = false, at = ''} = {}) => dialog(title, (close) => {
-    const place = el('div', {class: 'chooser'});
-    const open = (path) => guarded(async () => {
-      const {folders: names, files, path: here} = await Ask.json('api/listing', {path});
-      const below = (name) => (here ? here + '/' : '') + name;
-      place.replaceChildren(
-          el('p', {class: 'note'}, here || '(the folder that is open)',
-             folders && Dom.button('Choose this folder', () => close(here), {'data-choose': here || '.'})),
-          el('ul', {class: 'files'},
-             here !== '' && el('li', {}, Dom.button('.. up', () => open(here.split('/').slice(0, -1).join('/')))),
-             names.map(
-                 (name) => el('li', {}, Dom.button(name + '/', () => open(below(name)), {'data-open': below(name)}))),
-             files.filter((file) => accepts(file.name))
-                 .map(
-                     (file) =>
-                         el('li', {},
-                            Dom.button(file.name, () => close(below(file.name)), {'data-choose': below(file.name)}),
-                            el('small', {}, ' ' + size(file.bytes))))));
-    });
-    open(at);
-    return place;
+// A modal dialog. Resolves to what close(value) is given, or to undefined if the user leaves it. fill(close) returns
+// its content.
+export function dialog(title, fill) {
+  const box = document.getElementById('dialog');
+  return new Promise((resolve) => {
+    let value;
+    const close = (given) => {
+      value = given;
+      box.close();
+    };
+    box.setAttribute('aria-label', title);
+    box.replaceChildren(
+        el('div', {class: 'dialog-head'}, el('h2', {tabindex: -1}, title), Dom.button('Close', () => close())),
+        fill(close));
+    box.addEventListener('close', () => resolve(value), {once: true});
+    box.showModal();
   });
+}
 
-  const size = (bytes) =>
-      (bytes < 1e4     ? bytes + ' B' :
-           bytes < 1e6 ? Math.round(bytes / 1e3) + ' kB' :
-                         (bytes / 1e6).toFixed(1) + ' MB');
+// Lets the user choose a file or a folder of the opened folder. accepts(name) says which files may be chosen; with
+// `folders`, the folder that is shown may be chosen, too. Resolves to its relative path, or undefined.
+export const choose = (title, {accepts = () => true, folders = false, at = ''} = {}) => dialog(title, (close) => {
+  const place = el('div', {class: 'chooser'});
+  const open = (path) => guarded(async () => {
+    const {folders: names, files, path: here} = await Ask.json('api/listing', {path});
+    const below = (name) => (here ? here + '/' : '') + name;
+    place.replaceChildren(
+        el('p', {class: 'note'}, here || '(the folder that is open)',
+           folders && Dom.button('Choose this folder', () => close(here), {'data-choose': here || '.'})),
+        el('ul', {class: 'files'},
+           here !== '' && el('li', {}, Dom.button('.. up', () => open(here.split('/').slice(0, -1).join('/')))),
+           names.map(
+               (name) => el('li', {}, Dom.button(name + '/', () => open(below(name)), {'data-open': below(name)}))),
+           files.filter((file) => accepts(file.name))
+               .map(
+                   (file) =>
+                       el('li', {},
+                          Dom.button(file.name, () => close(below(file.name)), {'data-choose': below(file.name)}),
+                          el('small', {}, ' ' + size(file.bytes))))));
+  });
+  open(at);
+  return place;
+});
 
-  const GENERAL_KEYS = [['?', 'this list'], ['Alt+1 … Alt+9', 'a page'], ['Esc', 'close a dialog']];
-  function showKeys() {
-    const keys = [...((current && current.keys) || []), ...GENERAL_KEYS];
-    return dialog(
-        'Keys of this page',
-        () => el(
-            'table', {class: 'values'},
-            el('tbody', {},
-               keys.map(
-                   ([key, does]) => el('tr', {}, el('th', {scope: 'row'}, el('kbd', {}, key)), el('td', {}, does))))));
-  }
+const size = (bytes) =>
+    (bytes < 1e4     ? bytes + ' B' :
+         bytes < 1e6 ? Math.round(bytes / 1e3) + ' kB' :
+                       (bytes / 1e6).toFixed(1) + ' MB');
 
-  function pressed(event) {
-    const types =
-        event.target.matches && event.target.matches('input:not([type="range"],[type="checkbox"]), textarea, select');
-    if (document.getElementById('dialog').open) return;
-    const name = (event.ctrlKey || event.metaKey ? 'Ctrl+' : '') + (event.altKey ? 'Alt+' : '') +
-        (event.shiftKey && event.key.length > 1 ? 'Shift+' : '') + event.key;
-    if (event.altKey && /^[1-9]$/.test(event.key)) {
-      const link = document.querySelectorAll('#pages a')[Number(event.key) - 1];
-      if (link) link.click();
-      event.preventDefault();
-      return;
-    }
-    if (event.target.matches && event.target.matches('input[type="range"]') && /^(Arrow|Page|Home|End)/.test(event.key))
-      return;  // they move the slider
-    const button = event.target.closest && event.target.closest('a, button, summary, [role="button"]');
-    if (button && /^( |Enter)$/.test(event.key)) return;  // it is pressed
-    if (types && !event.ctrlKey && !event.metaKey) return;
-    if (types && !event.target.matches('select') && /^Ctrl\+[zyZ]$/.test(name)) return;  // the field's own undo
-    if (name === '?') return void showKeys();
-    const found =
-        ((current && current.keys) || []).find(([key, , action]) => action && key.split(' or ').includes(name));
-    if (!found) return;
+const GENERAL_KEYS = [['?', 'this list'], ['Alt+1 … Alt+9', 'a page'], ['Esc', 'close a dialog']];
+function showKeys() {
+  const keys = [...((current && current.keys) || []), ...GENERAL_KEYS];
+  return dialog(
+      'Keys of this page',
+      () =>
+          el('table', {class: 'values'},
+             el('tbody', {},
+                keys.map(
+                    ([key, does]) => el('tr', {}, el('th', {scope: 'row'}, el('kbd', {}, key)), el('td', {}, does))))));
+}
+
+function pressed(event) {
+  const types =
+      event.target.matches && event.target.matches('input:not([type="range"],[type="checkbox"]), textarea, select');
+  if (document.getElementById('dialog').open) return;
+  const name = (event.ctrlKey || event.metaKey ? 'Ctrl+' : '') + (event.altKey ? 'Alt+' : '') +
+      (event.shiftKey && event.key.length > 1 ? 'Shift+' : '') + event.key;
+  if (event.altKey && /^[1-9]$/.test(event.key)) {
+    const link = document.querySelectorAll('#pages a')[Number(event.key) - 1];
+    if (link) link.click();
     event.preventDefault();
-    found[2](event);
+    return;
   }
+  if (event.target.matches && event.target.matches('input[type="range"]') && /^(Arrow|Page|Home|End)/.test(event.key))
+    return;  // they move the slider
+  const button = event.target.closest && event.target.closest('a, button, summary, [role="button"]');
+  if (button && /^( |Enter)$/.test(event.key)) return;  // it is pressed
+  if (types && !event.ctrlKey && !event.metaKey) return;
+  if (types && !event.target.matches('select') && /^Ctrl\+[zyZ]$/.test(name)) return;  // the field's own undo
+  if (name === '?') return void showKeys();
+  const found = ((current && current.keys) || []).find(([key, , action]) => action && key.split(' or ').includes(name));
+  if (!found) return;
+  event.preventDefault();
+  found[2](event);
+}
 
-  function startTheme() {
-    const button = document.getElementById('theme'), root = document.documentElement;
-    const dark = () =>
-        (root.dataset.theme ? root.dataset.theme === 'dark' : matchMedia('(prefers-color-scheme: dark)').matches);
-    const label = () => (button.textContent = dark() ? 'Light' : 'Dark');
-    button.setAttribute('aria-label', 'Change between light and dark');
-    if (localStorage.getItem('marrow-theme')) root.dataset.theme = localStorage.getItem('marrow-theme');
-    button.addEventListener('click', () => {
-      root.dataset.theme = dark() ? 'light' : 'dark';
-      localStorage.setItem('marrow-theme', root.dataset.theme);
-      label();
-    });
-    label();
-  }
-
-  function start() {
-    startTheme();
-    Dom.startTooltip();
-    document.getElementById('keys').addEventListener('click', showKeys);
-    document.addEventListener('keydown', pressed);
-    document.getElementById('pages').append(
-        ...[...pages]
-            .filter(([, one]) => one.inBar !== false)
-            .map(([name, one]) => el('a', {href: '#' + name, 'data-page': name}, one.title)));
-    addEventListener('hashchange', show);
-    show();
-  }
-
-  return {page, go, addressOf, notice, guarded, follow, dialog, choose, start};
-})();
+export function start() {
+  startTheme();
+  Dom.startTooltip();
+  document.getElementById('keys').addEventListener('click', showKeys);
+  document.addEventListener('keydown', pressed);
+  document.getElementById('pages').append(
+      ...[...pages]
+          .filter(([, one]) => one.inBar !== false)
+          .map(([name, one]) => el('a', {href: '#' + name, 'data-page': name}, one.title)));
+  addEventListener('hashchange', show);
+  show();
+}

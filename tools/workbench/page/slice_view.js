@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // One slice of the CT on a canvas, with all that can be done in it by mouse, touch and keys.
-'use strict';
+import {el} from '../../report/page/dom.js';
 
-class SliceView {
+import * as Shell from './shell.js';
+import * as SliceGeometry from './slice_geometry.js';
+import * as SliceInput from './slice_input.js';
+import * as SlicePicture from './slice_picture.js';
+
+export class SliceView {
   constructor(name, state) {
-    const {el} = Dom;
     Object.assign(this, {name, state, slices: new Map(), wanted: null, isAsking: false, drag: null});
     this.canvas = el('canvas', {tabindex: 0, role: 'application', 'data-slice': name});
     this.slider = el('input', {type: 'range', min: 0, step: 1, 'aria-label': name + ' slice'});

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Surfaces of bone fragments in 3D, to be turned and looked at.
-'use strict';
+import * as THREE from 'three';
 
-class SurfaceView {
+import {el} from '../../report/page/dom.js';
+import {Orbit} from '../../report/page/orbit.js';
+
+export class SurfaceView {
   constructor(label) {
-    this.canvas = Dom.el('canvas', {class: 'surface', tabindex: 0, role: 'img', 'aria-label': label});
-    this.element = Dom.el('div', {}, this.canvas);
+    this.canvas = el('canvas', {class: 'surface', tabindex: 0, role: 'img', 'aria-label': label});
+    this.element = el('div', {}, this.canvas);
     this.orbit = new Orbit(this.canvas, () => this.draw());
     this.observer = new ResizeObserver(() => this.draw());
     this.observer.observe(this.canvas);
@@ -23,8 +26,7 @@ class SurfaceView {
       this.renderer = new THREE.WebGLRenderer({canvas: this.canvas, antialias: true, preserveDrawingBuffer: true});
     } catch (error) {
       this.isMissing = true;
-      this.element.replaceChildren(
-          Dom.el('p', {class: 'note'}, 'The surface cannot be shown: there is no WebGL here.'));
+      this.element.replaceChildren(el('p', {class: 'note'}, 'The surface cannot be shown: there is no WebGL here.'));
       return null;
     }
     this.renderer.setClearColor(0x0b0e11, 1);

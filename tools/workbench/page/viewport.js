@@ -1,49 +1,44 @@
 // SPDX-License-Identifier: Apache-2.0
 // How an image lies on the screen. Places on the screen are [x, y] in CSS pixels from the top left corner of the frame
 // that shows the image; pixels are [u, v] with (0, 0) at the centre of the top left pixel.
-'use strict';
 
-const Viewport = (() => {
-  const LEAST_ZOOM = 0.02, MOST_ZOOM = 64;
+const LEAST_ZOOM = 0.02, MOST_ZOOM = 64;
 
-  // The whole image in the middle of the frame. `zoom`: CSS pixels per pixel of the image; `centre`: the pixel in the
-  // middle of the frame; `flip_u`, `flip_v`: shown mirrored, which changes no pixel's name.
-  function fitted(width_px, height_px, frame_width, frame_height) {
-    const zoom = Math.min(frame_width / width_px, frame_height / height_px);
-    return {
-      zoom,
-      centre: [(width_px - 1) / 2, (height_px - 1) / 2],
-      flip_u: false,
-      flip_v: false,
-      frame: [frame_width, frame_height]
-    };
-  }
-  const scales = (port) => [port.flip_u ? -port.zoom : port.zoom, port.flip_v ? -port.zoom : port.zoom];
-  const toScreen = (port, pixel) =>
-      scales(port).map((scale, i) => port.frame[i] / 2 + scale * (pixel[i] - port.centre[i]));
-  const toPixel = (port, place) =>
-      scales(port).map((scale, i) => port.centre[i] + (place[i] - port.frame[i] / 2) / scale);
-
-  // The pixel under `place` stays under it.
-  function zoomed(port, factor, place) {
-    const zoom = Math.min(MOST_ZOOM, Math.max(LEAST_ZOOM, port.zoom * factor)), fixed = toPixel(port, place);
-    const next = {...port, zoom};
-    return {...next, centre: fixed.map((value, i) => value - (place[i] - port.frame[i] / 2) / scales(next)[i])};
-  }
-  // What is shown moves with the pointer by [dx, dy].
-  const panned = (port, by) => ({...port, centre: scales(port).map((scale, i) => port.centre[i] - by[i] / scale)});
-  // The frame got another size; its middle stays.
-  const resized = (port, frame_width, frame_height) => ({
-    ...port,
-    zoom: port.zoom * Math.min(frame_width / port.frame[0], frame_height / port.frame[1]),
+// The whole image in the middle of the frame. `zoom`: CSS pixels per pixel of the image; `centre`: the pixel in the
+// middle of the frame; `flip_u`, `flip_v`: shown mirrored, which changes no pixel's name.
+export function fitted(width_px, height_px, frame_width, frame_height) {
+  const zoom = Math.min(frame_width / width_px, frame_height / height_px);
+  return {
+    zoom,
+    centre: [(width_px - 1) / 2, (height_px - 1) / 2],
+    flip_u: false,
+    flip_v: false,
     frame: [frame_width, frame_height]
-  });
-  // The six numbers of a canvas' setTransform() that draws the image so that its pixels lie as toScreen() says. On a
-  // canvas, pixel (0, 0) covers the square from (0, 0) to (1, 1), so its centre is at (0.5, 0.5).
-  function canvasTransform(port, screen_per_css) {
-    const [a, d] = scales(port), [x, y] = toScreen(port, [-0.5, -0.5]);
-    return [a, 0, 0, d, x, y].map((value) => value * screen_per_css);
-  }
+  };
+}
+const scales = (port) => [port.flip_u ? -port.zoom : port.zoom, port.flip_v ? -port.zoom : port.zoom];
+export const toScreen = (port, pixel) =>
+    scales(port).map((scale, i) => port.frame[i] / 2 + scale * (pixel[i] - port.centre[i]));
+export const toPixel = (port, place) =>
+    scales(port).map((scale, i) => port.centre[i] + (place[i] - port.frame[i] / 2) / scale);
 
-  return {fitted, toScreen, toPixel, zoomed, panned, resized, canvasTransform};
-})();
+// The pixel under `place` stays under it.
+export function zoomed(port, factor, place) {
+  const zoom = Math.min(MOST_ZOOM, Math.max(LEAST_ZOOM, port.zoom * factor)), fixed = toPixel(port, place);
+  const next = {...port, zoom};
+  return {...next, centre: fixed.map((value, i) => value - (place[i] - port.frame[i] / 2) / scales(next)[i])};
+}
+// What is shown moves with the pointer by [dx, dy].
+export const panned = (port, by) => ({...port, centre: scales(port).map((scale, i) => port.centre[i] - by[i] / scale)});
+// The frame got another size; its middle stays.
+export const resized = (port, frame_width, frame_height) => ({
+  ...port,
+  zoom: port.zoom * Math.min(frame_width / port.frame[0], frame_height / port.frame[1]),
+  frame: [frame_width, frame_height]
+});
+// The six numbers of a canvas' setTransform() that draws the image so that its pixels lie as toScreen() says. On a
+// canvas, pixel (0, 0) covers the square from (0, 0) to (1, 1), so its centre is at (0.5, 0.5).
+export function canvasTransform(port, screen_per_css) {
+  const [a, d] = scales(port), [x, y] = toScreen(port, [-0.5, -0.5]);
+  return [a, 0, 0, d, x, y].map((value) => value * screen_per_css);
+}

@@ -1,141 +1,140 @@
 // SPDX-License-Identifier: Apache-2.0
 // The dialogs that add a view to a case, or give another camera to one.
-'use strict';
+import {button, el} from '../../report/page/dom.js';
 
-const XrayAdd = (() => {
-  const {el} = Dom;
-  const is_image = (name) => /\.(png|tiff?|dcm|dicom)$/i.test(name);
-  const folderOf = (path) => path.split('/').slice(0, -1).join('/');
-  // Of "a/frontal.0001.png" the name "frontal.0001".
-  const stem = (path) => path.split('/').pop().replace(/\.[^.]*$/, '');
+import * as Ask from './server.js';
+import * as Shell from './shell.js';
+import * as XrayCameraFile from './xray_camera_file.js';
 
-  // The keys of docs/case.md: [key, label, first value, least, most].
-  const C_ARM = [
-    ['alpha_deg', 'Cranio-caudal angle, degrees: positive if the detector is towards the head', 0, -90, 90],
-    ['beta_deg', 'Right/left anterior angle, degrees: positive if the detector is on the patient’s left', 0, -180, 180],
-    ['source_to_detector_mm', 'Source to detector, mm', 1000, 1, 10000],
-    ['source_to_isocentre_mm', 'Source to isocentre, mm', 600, 1, 10000],
-    ['pixel_mm', 'Size of a pixel on the detector, mm', 0.3, 0.001, 100]
-  ];
+const is_image = (name) => /\.(png|tiff?|dcm|dicom)$/i.test(name);
+const folderOf = (path) => path.split('/').slice(0, -1).join('/');
+// Of "a/frontal.0001.png" the name "frontal.0001".
+const stem = (path) => path.split('/').pop().replace(/\.[^.]*$/, '');
 
-  function freeName(name, taken) {
-    if (!taken.includes(name)) return name;
-    for (let number = 2;; ++number)
-      if (!taken.includes(`${name} ${number}`)) return `${name} ${number}`;
+// The keys of docs/case.md: [key, label, first value, least, most].
+const C_ARM = [
+  ['alpha_deg', 'Cranio-caudal angle, degrees: positive if the detector is towards the head', 0, -90, 90],
+  ['beta_deg', 'Right/left anterior angle, degrees: positive if the detector is on the patient’s left', 0, -180, 180],
+  ['source_to_detector_mm', 'Source to detector, mm', 1000, 1, 10000],
+  ['source_to_isocentre_mm', 'Source to isocentre, mm', 600, 1, 10000],
+  ['pixel_mm', 'Size of a pixel on the detector, mm', 0.3, 0.001, 100]
+];
+
+function freeName(name, taken) {
+  if (!taken.includes(name)) return name;
+  for (let number = 2;; ++number)
+    if (!taken.includes(`${name} ${number}`)) return `${name} ${number}`;
+}
+
+function armFields(known) {
+  const boxes = C_ARM.map(([key, , value, min, max]) => el('input', {
+                            type: 'number',
+                            step: 'any',
+                            required: true,
+                            min,
+                            max,
+                            value: known && known[key] !== undefined ? known[key] : value,
+                            'data-arm': key
+                          }));
+  const element =
+      el('div', {class: 'arm-fields'},
+         C_ARM.map(([, label], i) => el('label', {class: 'field'}, el('span', {}, label), boxes[i])));
+  const values = () => Object.fromEntries(C_ARM.map(([key], i) => [key, Number(boxes[i].value)]));
+  return {element, values};
+}
+
+// Resolves to {name, kind: 'file' | 'header' | 'c_arm', c_arm}, or to undefined.
+function ask(title, image, name, taken, camera) {
+  return Shell.dialog(title, (close) => {
+    const box = el('input', {type: 'text', value: name, maxlength: 100, 'data-name': 'view'});
+    const fault = el('p', {class: 'fault', role: 'alert'});
+    const arm = armFields(camera && camera.c_arm);
+    const finish = (kind) => {
+      const chosen = box.value.trim();
+      if (!chosen) return void (fault.textContent = 'Give the view a name.');
+      if (chosen !== name && taken.includes(chosen))
+        return void (fault.textContent = `There is a view “${chosen}” already; give another name.`);
+      const c_arm = arm.values();
+      if (kind === 'c_arm' && !(c_arm.source_to_isocentre_mm < c_arm.source_to_detector_mm))
+        return void (
+            fault.textContent =
+                'The isocentre lies between source and detector, so its distance must be the smaller one.');
+      close({name: chosen, kind, c_arm});
+    };
+    const form =
+        el('form', {
+          onsubmit: (event) => {
+            event.preventDefault();
+            finish('c_arm');
+          }
+        },
+           arm.element, el('button', {type: 'submit', 'data-camera': 'c_arm'}, 'Use these angles and distances'));
+    return el(
+        'div', {class: 'add-view'}, el('p', {class: 'note'}, image),
+        el('label', {class: 'field'}, el('span', {}, 'Name of the view'), box), fault,
+        el('h3', {}, 'How was it taken?'),
+        el('p', {}, button('Choose a camera file', () => finish('file'), {'data-camera': 'file'}), ' ',
+           el('span', {class: 'note'}, 'marrow’s YAML, or a file of XMALab, plastimatch, RTK or xReg')),
+        /\.(dcm|dicom)$/i.test(image) &&
+            el('p', {}, button('Read the DICOM header', () => finish('header'), {'data-camera': 'header'}), ' ',
+               el('span', {class: 'note'}, 'exact to about a degree at best')),
+        el('details', {open: Boolean(camera && camera.c_arm)}, el('summary', {}, 'Angles and distances of a C-arm'),
+           form));
+  });
+}
+
+// What the document gets as the camera of an image, or undefined if the user leaves.
+async function cameraFor(answer, image) {
+  if (answer.kind === 'file') {
+    const file =
+        await Shell.choose(`Camera of ${answer.name}`, {at: folderOf(image), accepts: (name) => !is_image(name)});
+    return file && XrayCameraFile.cameraOf(file);
   }
-
-  function armFields(known) {
-    const boxes = C_ARM.map(([key, , value, min, max]) => el('input', {
-                              type: 'number',
-                              step: 'any',
-                              required: true,
-                              min,
-                              max,
-                              value: known && known[key] !== undefined ? known[key] : value,
-                              'data-arm': key
-                            }));
-    const element =
-        el('div', {class: 'arm-fields'},
-           C_ARM.map(([, label], i) => el('label', {class: 'field'}, el('span', {}, label), boxes[i])));
-    const values = () => Object.fromEntries(C_ARM.map(([key], i) => [key, Number(boxes[i].value)]));
-    return {element, values};
+  if (answer.kind === 'header') {
+    const {camera, warnings} = await Ask.json('api/xray/header-camera', {image});
+    for (const warning of warnings) Shell.notice(warning);
+    return camera;
   }
+  const {about} = await Ask.bytes('api/xray/image', {path: image});
+  return {width_px: about.width_px, height_px: about.height_px, c_arm: answer.c_arm};
+}
 
-  // Resolves to {name, kind: 'file' | 'header' | 'c_arm', c_arm}, or to undefined.
-  function ask(title, image, name, taken, camera) {
-    return Shell.dialog(title, (close) => {
-      const box = el('input', {type: 'text', value: name, maxlength: 100, 'data-name': 'view'});
-      const fault = el('p', {class: 'fault', role: 'alert'});
-      const arm = armFields(camera && camera.c_arm);
-      const finish = (kind) => {
-        const chosen = box.value.trim();
-        if (!chosen) return void (fault.textContent = 'Give the view a name.');
-        if (chosen !== name && taken.includes(chosen))
-          return void (fault.textContent = `There is a view “${chosen}” already; give another name.`);
-        const c_arm = arm.values();
-        if (kind === 'c_arm' && !(c_arm.source_to_isocentre_mm < c_arm.source_to_detector_mm))
-          return void (
-              fault.textContent =
-                  'The isocentre lies between source and detector, so its distance must be the smaller one.');
-        close({name: chosen, kind, c_arm});
-      };
-      const form =
-          el('form', {
-            onsubmit: (event) => {
-              event.preventDefault();
-              finish('c_arm');
-            }
-          },
-             arm.element, el('button', {type: 'submit', 'data-camera': 'c_arm'}, 'Use these angles and distances'));
-      return el(
-          'div', {class: 'add-view'}, el('p', {class: 'note'}, image),
-          el('label', {class: 'field'}, el('span', {}, 'Name of the view'), box), fault,
-          el('h3', {}, 'How was it taken?'),
-          el('p', {}, Dom.button('Choose a camera file', () => finish('file'), {'data-camera': 'file'}), ' ',
-             el('span', {class: 'note'}, 'marrow’s YAML, or a file of XMALab, plastimatch, RTK or xReg')),
-          /\.(dcm|dicom)$/i.test(image) &&
-              el('p', {}, Dom.button('Read the DICOM header', () => finish('header'), {'data-camera': 'header'}), ' ',
-                 el('span', {class: 'note'}, 'exact to about a degree at best')),
-          el('details', {open: Boolean(camera && camera.c_arm)}, el('summary', {}, 'Angles and distances of a C-arm'),
-             form));
+export async function add(draft) {
+  const last = (draft.document.views || []).at(-1);
+  const image = await Shell.choose('X-ray image', {accepts: is_image, at: last ? folderOf(last.image) : ''});
+  if (!image) return;
+  const taken = (draft.document.views || []).map((view) => view.name), name = freeName(stem(image), taken);
+  const answer = await ask('Add an X-ray', image, name, taken);
+  if (!answer) return;
+  await Shell.guarded(async () => {
+    const camera = await cameraFor(answer, image);
+    if (!camera) return;
+    await draft.change(`add the view ${answer.name}`, (document) => {
+      document.views = [...(document.views || []), {name: answer.name, image, camera}];
     });
-  }
+  });
+}
 
-  // What the document gets as the camera of an image, or undefined if the user leaves.
-  async function cameraFor(answer, image) {
-    if (answer.kind === 'file') {
-      const file =
-          await Shell.choose(`Camera of ${answer.name}`, {at: folderOf(image), accepts: (name) => !is_image(name)});
-      return file && XrayCameraFile.cameraOf(file);
+// Everywhere in the document where the view is named.
+export function renameIn(document, name, next) {
+  document.views.find((view) => view.name === name).name = next;
+  for (const one of document.landmarks || [])
+    if (one.pixels && one.pixels[name]) {
+      one.pixels[next] = one.pixels[name];
+      delete one.pixels[name];
     }
-    if (answer.kind === 'header') {
-      const {camera, warnings} = await Ask.json('api/xray/header-camera', {image});
-      for (const warning of warnings) Shell.notice(warning);
-      return camera;
-    }
-    const {about} = await Ask.bytes('api/xray/image', {path: image});
-    return {width_px: about.width_px, height_px: about.height_px, c_arm: answer.c_arm};
-  }
+}
 
-  async function add(draft) {
-    const last = (draft.document.views || []).at(-1);
-    const image = await Shell.choose('X-ray image', {accepts: is_image, at: last ? folderOf(last.image) : ''});
-    if (!image) return;
-    const taken = (draft.document.views || []).map((view) => view.name), name = freeName(stem(image), taken);
-    const answer = await ask('Add an X-ray', image, name, taken);
-    if (!answer) return;
-    await Shell.guarded(async () => {
-      const camera = await cameraFor(answer, image);
-      if (!camera) return;
-      await draft.change(`add the view ${answer.name}`, (document) => {
-        document.views = [...(document.views || []), {name: answer.name, image, camera}];
-      });
+export async function edit(draft, view) {
+  const taken = draft.document.views.map((one) => one.name);
+  const answer = await ask(`Camera of ${view.name}`, view.image, view.name, taken, view.camera);
+  if (!answer) return;
+  await Shell.guarded(async () => {
+    const camera = await cameraFor(answer, view.image);
+    if (!camera) return;
+    await draft.change(`camera of ${answer.name}`, (document) => {
+      document.views.find((one) => one.name === view.name).camera = camera;
+      if (answer.name !== view.name) renameIn(document, view.name, answer.name);
     });
-  }
-
-  // Everywhere in the document where the view is named.
-  function renameIn(document, name, next) {
-    document.views.find((view) => view.name === name).name = next;
-    for (const one of document.landmarks || [])
-      if (one.pixels && one.pixels[name]) {
-        one.pixels[next] = one.pixels[name];
-        delete one.pixels[name];
-      }
-  }
-
-  async function edit(draft, view) {
-    const taken = draft.document.views.map((one) => one.name);
-    const answer = await ask(`Camera of ${view.name}`, view.image, view.name, taken, view.camera);
-    if (!answer) return;
-    await Shell.guarded(async () => {
-      const camera = await cameraFor(answer, view.image);
-      if (!camera) return;
-      await draft.change(`camera of ${answer.name}`, (document) => {
-        document.views.find((one) => one.name === view.name).camera = camera;
-        if (answer.name !== view.name) renameIn(document, view.name, answer.name);
-      });
-    });
-  }
-
-  return {add, edit, renameIn};
-})();
+  });
+}

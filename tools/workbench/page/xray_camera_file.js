@@ -1,47 +1,44 @@
 // SPDX-License-Identifier: Apache-2.0
 // The dialog that asks what a camera file of another program leaves open (docs/formats.md).
-'use strict';
+import {el, select} from '../../report/page/dom.js';
 
-const XrayCameraFile = (() => {
-  const {el} = Dom;
-  const MIRRORS = [
-    ['none', 'as it was: seen from the source, rows from above'],
-    ['left_right', 'left to right: it was seen from the detector'],
-    ['upside_down', 'upside down: its rows were from below']
-  ];
-  const is_rtk = (file) => /\.xml$/i.test(file);
-  const holdsProjections = (file) => /\.(xml|h5|hdf5)$/i.test(file);
+import * as Shell from './shell.js';
 
-  // Resolves to the draft's camera, {file, projection, mirror, pixel_mm}, or to undefined.
-  const ask = (file) => Shell.dialog('Camera file with projections', (close) => {
-    const projection =
-        el('input', {type: 'number', min: 0, step: 1, value: 0, required: true, 'data-camera-file': 'projection'});
-    const pixel = el(
-        'input', {type: 'number', min: 0.000001, max: 1000, step: 'any', required: true, 'data-camera-file': 'pixel'});
-    const mirror = Dom.select(
-        'How the program’s image was turned over to become this one', MIRRORS, is_rtk(file) ? 'upside_down' : 'none',
-        () => {});
-    mirror.box.dataset.cameraFile = 'mirror';
-    const submit = (event) => {
-      event.preventDefault();
-      const camera = {file, projection: Number(projection.value)};
-      if (mirror.box.value !== 'none') camera.mirror = mirror.box.value;
-      if (is_rtk(file)) camera.pixel_mm = [Number(pixel.value), Number(pixel.value)];
-      close(camera);
-    };
-    return el(
-        'form', {class: 'arm-fields', onsubmit: submit}, el('p', {class: 'note'}, file),
-        el('label', {class: 'field'}, el('span', {}, 'Number of the projection, counted from 0'), projection), mirror,
-        is_rtk(file) && el('label', {class: 'field'}, el('span', {}, 'Size of a pixel on the detector, mm'), pixel),
-        el('div', {class: 'toolbar'}, el('button', {type: 'submit', 'data-camera-file': 'ok'}, 'Use this camera')));
-  });
+const MIRRORS = [
+  ['none', 'as it was: seen from the source, rows from above'],
+  ['left_right', 'left to right: it was seen from the detector'],
+  ['upside_down', 'upside down: its rows were from below']
+];
+const is_rtk = (file) => /\.xml$/i.test(file);
+const holdsProjections = (file) => /\.(xml|h5|hdf5)$/i.test(file);
 
-  // The draft's camera for a file that was chosen; asks what the file does not say.
-  const cameraOf = (file) => (holdsProjections(file) ? ask(file) : {file});
+// Resolves to the draft's camera, {file, projection, mirror, pixel_mm}, or to undefined.
+const ask = (file) => Shell.dialog('Camera file with projections', (close) => {
+  const projection =
+      el('input', {type: 'number', min: 0, step: 1, value: 0, required: true, 'data-camera-file': 'projection'});
+  const pixel =
+      el('input', {type: 'number', min: 0.000001, max: 1000, step: 'any', required: true, 'data-camera-file': 'pixel'});
+  const mirror = select(
+      'How the program’s image was turned over to become this one', MIRRORS, is_rtk(file) ? 'upside_down' : 'none',
+      () => {});
+  mirror.box.dataset.cameraFile = 'mirror';
+  const submit = (event) => {
+    event.preventDefault();
+    const camera = {file, projection: Number(projection.value)};
+    if (mirror.box.value !== 'none') camera.mirror = mirror.box.value;
+    if (is_rtk(file)) camera.pixel_mm = [Number(pixel.value), Number(pixel.value)];
+    close(camera);
+  };
+  return el(
+      'form', {class: 'arm-fields', onsubmit: submit}, el('p', {class: 'note'}, file),
+      el('label', {class: 'field'}, el('span', {}, 'Number of the projection, counted from 0'), projection), mirror,
+      is_rtk(file) && el('label', {class: 'field'}, el('span', {}, 'Size of a pixel on the detector, mm'), pixel),
+      el('div', {class: 'toolbar'}, el('button', {type: 'submit', 'data-camera-file': 'ok'}, 'Use this camera')));
+});
 
-  const inWords = ({file, projection, mirror}) => file +
-      (projection === undefined ? '' : `, projection ${projection}`) +
-      (mirror ? `, image turned over ${mirror === 'left_right' ? 'left to right' : 'upside down'}` : '');
+// The draft's camera for a file that was chosen; asks what the file does not say.
+export const cameraOf = (file) => (holdsProjections(file) ? ask(file) : {file});
 
-  return {cameraOf, inWords};
-})();
+export const inWords = ({file, projection, mirror}) => file +
+    (projection === undefined ? '' : `, projection ${projection}`) +
+    (mirror ? `, image turned over ${mirror === 'left_right' ? 'left to right' : 'upside down'}` : '');

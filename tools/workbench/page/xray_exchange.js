@@ -1,70 +1,77 @@
 // SPDX-License-Identifier: Apache-2.0
 // Seeds, landmarks and starts from files of the folder, and to files.
-'use strict';
+import * as Dom from '../../report/page/dom.js';
+import {el} from '../../report/page/dom.js';
 
-const XrayExchange = (() => {
-  const {el} = Dom;
-  const TITLES = {seeds: 'Seeds', landmarks: 'Landmarks', pose: 'Start'};
+import * as Ask from './server.js';
+import * as Shell from './shell.js';
+import * as XrayExport from './xray_export.js';
 
-  const fragmentOf = (document, name) => {
-    document.fragments = document.fragments || {};
-    return document.fragments[name] = document.fragments[name] || {seeds: [], register: true};
-  };
+const TITLES = {
+  seeds: 'Seeds',
+  landmarks: 'Landmarks',
+  pose: 'Start'
+};
 
-  // How the content of a file becomes a part of the document. Landmarks of the same name get the file's places, and
-  // keep what the file does not say.
-  const PUT = {
-    seeds(document, {seeds}) {
-      for (const [name, one] of Object.entries(seeds)) Object.assign(fragmentOf(document, name), one);
-    },
-    landmarks(document, {landmarks}) {
-      document.landmarks = document.landmarks || [];
-      for (const one of landmarks) {
-        const old = document.landmarks.find((other) => other.name === one.name);
-        if (old)
-          Object.assign(old, one, {pixels: {...(old.pixels || {}), ...(one.pixels || {})}});
-        else
-          document.landmarks.push(one);
-      }
-    },
-    pose(document, {world_from_ct}, fragment) {
-      fragmentOf(document, fragment).start = world_from_ct;
+const fragmentOf = (document, name) => {
+  document.fragments = document.fragments || {};
+  return document.fragments[name] = document.fragments[name] || {seeds: [], register: true};
+};
+
+// How the content of a file becomes a part of the document. Landmarks of the same name get the file's places, and
+// keep what the file does not say.
+const PUT = {
+  seeds(document, {seeds}) {
+    for (const [name, one] of Object.entries(seeds)) Object.assign(fragmentOf(document, name), one);
+  },
+  landmarks(document, {landmarks}) {
+    document.landmarks = document.landmarks || [];
+    for (const one of landmarks) {
+      const old = document.landmarks.find((other) => other.name === one.name);
+      if (old)
+        Object.assign(old, one, {pixels: {...(old.pixels || {}), ...(one.pixels || {})}});
+      else
+        document.landmarks.push(one);
     }
+  },
+  pose(document, {world_from_ct}, fragment) {
+    fragmentOf(document, fragment).start = world_from_ct;
+  }
+};
+
+async function importFrom(shared, what) {
+  const path = await Shell.choose(`Import: ${TITLES[what].toLowerCase()}`);
+  if (path === undefined) return;
+  await Shell.guarded(async () => {
+    const got = await Ask.json('api/xray/import', {what, path});
+    await shared.draft.change(`import ${path}`, (document) => PUT[what](document, got, shared.fragment()));
+    for (const warning of got.warnings) Shell.notice(warning);
+    Shell.notice(`${TITLES[what]} read from ${path}`);
+  });
+}
+
+const NAMES = {
+  ...TITLES,
+  cameras: 'Cameras',
+  result: 'Result’s pose'
+};
+
+export function make(shared) {
+  const command = el('div', {role: 'status', 'data-exported': ''});
+  const told = ({path, command: text}) => command.replaceChildren(...(
+      text ? [el('p', {class: 'note'}, `The same as ${path} in a shell, into the folder runs:`), Dom.command(text)] :
+             []));
+  const button = (text, what, does) => Dom.button(
+      text, does, {[`data-${text.toLowerCase()}`]: what, 'aria-label': `${text} ${NAMES[what].toLowerCase()}`});
+  const row = (what) => el(
+      'span', {class: 'field'}, el('span', {}, NAMES[what]),
+      el('span', {class: 'pair'}, TITLES[what] && button('Import', what, () => importFrom(shared, what)),
+         button(
+             'Export', what,
+             () => (what === 'result' ? XrayExport.beginResult(shared, told) : XrayExport.begin(shared, what, told)))));
+  return {
+    element:
+        el('div', {class: 'exchange'}, el('h3', {}, 'Files'),
+           el('div', {class: 'toolbar'}, Object.keys(NAMES).map(row)), command)
   };
-
-  async function importFrom(shared, what) {
-    const path = await Shell.choose(`Import: ${TITLES[what].toLowerCase()}`);
-    if (path === undefined) return;
-    await Shell.guarded(async () => {
-      const got = await Ask.json('api/xray/import', {what, path});
-      await shared.draft.change(`import ${path}`, (document) => PUT[what](document, got, shared.fragment()));
-      for (const warning of got.warnings) Shell.notice(warning);
-      Shell.notice(`${TITLES[what]} read from ${path}`);
-    });
-  }
-
-  const NAMES = {...TITLES, cameras: 'Cameras', result: 'Result’s pose'};
-
-  function make(shared) {
-    const command = el('div', {role: 'status', 'data-exported': ''});
-    const told = ({path, command: text}) => command.replaceChildren(...(
-        text ? [el('p', {class: 'note'}, `The same as ${path} in a shell, into the folder runs:`), Dom.command(text)] :
-               []));
-    const button = (text, what, does) => Dom.button(
-        text, does, {[`data-${text.toLowerCase()}`]: what, 'aria-label': `${text} ${NAMES[what].toLowerCase()}`});
-    const row = (what) => el(
-        'span', {class: 'field'}, el('span', {}, NAMES[what]),
-        el('span', {class: 'pair'}, TITLES[what] && button('Import', what, () => importFrom(shared, what)),
-           button(
-               'Export', what,
-               () =>
-                   (what === 'result' ? XrayExport.beginResult(shared, told) : XrayExport.begin(shared, what, told)))));
-    return {
-      element:
-          el('div', {class: 'exchange'}, el('h3', {}, 'Files'),
-             el('div', {class: 'toolbar'}, Object.keys(NAMES).map(row)), command)
-    };
-  }
-
-  return {make};
-})();
+}

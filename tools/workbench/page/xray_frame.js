@@ -1,223 +1,219 @@
 // SPDX-License-Identifier: Apache-2.0
 // One X-ray on the screen: it is zoomed, moved and windowed here. What else is done to it is the tool's part.
-'use strict';
+import {el, svg} from '../../report/page/dom.js';
+import * as Viewport from './viewport.js';
+import * as XrayImages from './xray_images.js';
 
-const XrayFrame = (() => {
-  const {el, svg} = Dom;
+// tool() gives the present tool: {press(pixel, event), key(name, step_px), marks(frame)} with optional functions.
+// press() returns {move(pixel), end(pixel), cancel()}, or nothing if the image is to be moved instead. said(text)
+// gets what is under the pointer.
+export function make(name, tool) {
+  const canvas = el('canvas', {role: 'img', 'aria-label': 'X-ray ' + name});
+  const overlay = svg('svg', {class: 'xray-marks', 'aria-hidden': 'true'});
+  const box =
+      el('div', {
+        class: 'xray-box',
+        tabindex: 0,
+        role: 'application',
+        'data-view': name,
+        'aria-label': 'X-ray ' + name + '. Plus and minus zoom, W and L change window and level, arrows move.'
+      },
+         canvas, overlay);
+  const value = el('span', {class: 'xray-value', 'data-value-of': name}, '');
+  const frame =
+      {name, box, overlay, value, entry: null, port: null, window: null, pointer: null, mask: null, element: null};
 
-  // tool() gives the present tool: {press(pixel, event), key(name, step_px), marks(frame)} with optional functions.
-  // press() returns {move(pixel), end(pixel), cancel()}, or nothing if the image is to be moved instead. said(text)
-  // gets what is under the pointer.
-  function make(name, tool) {
-    const canvas = el('canvas', {role: 'img', 'aria-label': 'X-ray ' + name});
-    const overlay = svg('svg', {class: 'xray-marks', 'aria-hidden': 'true'});
-    const box =
-        el('div', {
-          class: 'xray-box',
-          tabindex: 0,
-          role: 'application',
-          'data-view': name,
-          'aria-label': 'X-ray ' + name + '. Plus and minus zoom, W and L change window and level, arrows move.'
-        },
-           canvas, overlay);
-    const value = el('span', {class: 'xray-value', 'data-value-of': name}, '');
-    const frame =
-        {name, box, overlay, value, entry: null, port: null, window: null, pointer: null, mask: null, element: null};
-
-    // A new image gets a window of its own; one of the same size stays where it is.
-    frame.show = (entry) => {
-      if (frame.entry !== entry) frame.picture = frame.shown = null;
-      frame.entry = entry;
-      if (entry.numbers && !frame.shown) {
-        if (!frame.size || frame.size[0] !== entry.width_px || frame.size[1] !== entry.height_px) frame.port = null;
-        frame.size = [entry.width_px, entry.height_px];
-        frame.window = [...entry.range];
-        frame.shown = true;
-      }
-      frame.draw();
+  // A new image gets a window of its own; one of the same size stays where it is.
+  frame.show = (entry) => {
+    if (frame.entry !== entry) frame.picture = frame.shown = null;
+    frame.entry = entry;
+    if (entry.numbers && !frame.shown) {
+      if (!frame.size || frame.size[0] !== entry.width_px || frame.size[1] !== entry.height_px) frame.port = null;
+      frame.size = [entry.width_px, entry.height_px];
+      frame.window = [...entry.range];
+      frame.shown = true;
+    }
+    frame.draw();
+  };
+  frame.fit = () => {
+    if (!entryIsShown(frame)) return;
+    const {flip_u, flip_v} = frame.port || {flip_u: false, flip_v: false};
+    frame.port = {
+      ...Viewport.fitted(frame.entry.width_px, frame.entry.height_px, box.clientWidth, box.clientHeight),
+      flip_u,
+      flip_v
     };
-    frame.fit = () => {
-      if (!entryIsShown(frame)) return;
-      const {flip_u, flip_v} = frame.port || {flip_u: false, flip_v: false};
-      frame.port = {
-        ...Viewport.fitted(frame.entry.width_px, frame.entry.height_px, box.clientWidth, box.clientHeight),
-        flip_u,
-        flip_v
-      };
-      frame.draw();
-    };
-    frame.change = (next) => {
-      frame.port = next;
-      frame.draw();
-    };
-    frame.setWindow = (low, high) => {
-      frame.window = [low, Math.max(low + 1, high)];
-      frame.picture = null;
-      frame.draw();
-    };
-    let is_waiting = false;
-    frame.draw = () => {
-      if (is_waiting) return;
-      is_waiting = true;
-      requestAnimationFrame(() => {
-        is_waiting = false;
-        if (!frame.port) frame.fit();
-        draw(frame, canvas, tool);
-      });
-    };
-    frame.place = (event) => {
-      const {left, top} = box.getBoundingClientRect();
-      return [event.clientX - left - box.clientLeft, event.clientY - top - box.clientTop];
-    };
-    listen(frame, tool);
-    const watcher = new ResizeObserver(() => {
-      if (frame.port && box.clientWidth) frame.port = Viewport.resized(frame.port, box.clientWidth, box.clientHeight);
-      frame.draw();
+    frame.draw();
+  };
+  frame.change = (next) => {
+    frame.port = next;
+    frame.draw();
+  };
+  frame.setWindow = (low, high) => {
+    frame.window = [low, Math.max(low + 1, high)];
+    frame.picture = null;
+    frame.draw();
+  };
+  let is_waiting = false;
+  frame.draw = () => {
+    if (is_waiting) return;
+    is_waiting = true;
+    requestAnimationFrame(() => {
+      is_waiting = false;
+      if (!frame.port) frame.fit();
+      draw(frame, canvas, tool);
     });
-    watcher.observe(box);
-    frame.dispose = () => watcher.disconnect();
-    return frame;
-  }
-
-  const entryIsShown = ({entry, box}) => entry && entry.numbers && box.clientWidth > 0;
-
-  function draw(frame, canvas, tool) {
-    const {box, entry} = frame, dots = window.devicePixelRatio || 1;
-    const width = box.clientWidth, height = box.clientHeight;
-    canvas.width = Math.round(width * dots);
-    canvas.height = Math.round(height * dots);
-    frame.overlay.setAttribute('viewBox', `0 0 ${width} ${height}`);
-    frame.overlay.replaceChildren();
-    if (!entry || !entry.numbers || !frame.port) return;
-    frame.picture = frame.picture || XrayImages.painted(entry, frame.window);
-    const pen = canvas.getContext('2d');
-    pen.setTransform(...Viewport.canvasTransform(frame.port, dots));
-    pen.imageSmoothingEnabled = frame.port.zoom < 3;
-    pen.drawImage(frame.picture, 0, 0);
-    if (frame.mask) pen.drawImage(frame.mask, 0, 0);
-    frame.overlay.append(...tool().marks(frame).filter(Boolean));
-  }
-
-  // Without the sign of a zero.
-  const tenths = (value) => value.toFixed(1).replace(/^-0\.0$/, '0.0');
-
-  function tell(frame, pixel) {
-    const grey = XrayImages.valueAt(frame.entry, pixel);
-    frame.value.textContent = grey === null ?
-        '' :
-        `(${tenths(pixel[0])}, ${tenths(pixel[1])}) px: ` + (frame.entry.scale === 1 ? grey : grey.toPrecision(5));
-  }
-
-  // Pointers: one does what the tool says, or moves the image; two zoom and move it, on a touch screen.
-  function listen(frame, tool) {
-    const {box} = frame, pointers = new Map();
-    let doing = null, last = null;
-    const stop = (how, pixel) => {
-      if (doing && doing[how]) doing[how](pixel);
-      doing = null;
-    };
-    box.addEventListener('pointerdown', (event) => {
-      if (!frame.port) return;
-      box.focus({preventScroll: true});
-      box.setPointerCapture(event.pointerId);
-      pointers.set(event.pointerId, frame.place(event));
-      last = frame.place(event);
-      if (pointers.size > 1) return stop('cancel');
-      const pixel = Viewport.toPixel(frame.port, last);
-      if (event.button === 0) doing = tool().press(frame, pixel, event) || panning(frame);
-      if (event.button === 1 || event.button === 2) doing = panning(frame);
-      event.preventDefault();
-    });
-    box.addEventListener('pointermove', (event) => {
-      if (!frame.port) return;
-      const place = frame.place(event), pixel = Viewport.toPixel(frame.port, place);
-      if (pointers.size === 2 && pointers.has(event.pointerId)) return pinch(frame, pointers, event.pointerId, place);
-      frame.pointer = pixel;
-      tell(frame, pixel);
-      if (doing && pointers.has(event.pointerId)) doing.move(pixel, place, last);
-      last = place;
-      frame.draw();
-    });
-    const up = (how) => (event) => {
-      if (!pointers.delete(event.pointerId)) return;
-      stop(how, Viewport.toPixel(frame.port, frame.place(event)));
-    };
-    box.addEventListener('pointerup', up('end'));
-    box.addEventListener('pointercancel', up('cancel'));
-    box.addEventListener('pointerleave', () => {
-      frame.pointer = null;
-      frame.value.textContent = '';
-      frame.draw();
-    });
-    box.addEventListener('contextmenu', (event) => event.preventDefault());
-    box.addEventListener('wheel', (event) => {
-      if (!frame.port) return;
-      event.preventDefault();
-      frame.change(Viewport.zoomed(frame.port, Math.exp(-event.deltaY / 400), frame.place(event)));
-    }, {passive: false});
-    box.addEventListener('keydown', (event) => {
-      if (pressed(frame, tool(), event)) {
-        event.preventDefault();
-        event.stopPropagation();
-      }
-    });
-  }
-
-  const panning = (frame) => ({
-    move: (pixel, place, last) => frame.change(Viewport.panned(frame.port, [place[0] - last[0], place[1] - last[1]]))
+  };
+  frame.place = (event) => {
+    const {left, top} = box.getBoundingClientRect();
+    return [event.clientX - left - box.clientLeft, event.clientY - top - box.clientTop];
+  };
+  listen(frame, tool);
+  const watcher = new ResizeObserver(() => {
+    if (frame.port && box.clientWidth) frame.port = Viewport.resized(frame.port, box.clientWidth, box.clientHeight);
+    frame.draw();
   });
+  watcher.observe(box);
+  frame.dispose = () => watcher.disconnect();
+  return frame;
+}
 
-  function pinch(frame, pointers, moved, place) {
-    const [other] = [...pointers.entries()].filter(([id]) => id !== moved).map(([, at]) => at);
-    const before = pointers.get(moved), size = (at) => Math.hypot(at[0] - other[0], at[1] - other[1]);
-    const middle = (at) => [(at[0] + other[0]) / 2, (at[1] + other[1]) / 2];
-    const by = [0, 1].map((i) => middle(place)[i] - middle(before)[i]);
-    pointers.set(moved, place);
-    frame.change(
-        Viewport.panned(Viewport.zoomed(frame.port, size(place) / Math.max(1, size(before)), middle(before)), by));
-  }
+const entryIsShown = ({entry, box}) => entry && entry.numbers && box.clientWidth > 0;
 
-  const ARROWS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]};
+function draw(frame, canvas, tool) {
+  const {box, entry} = frame, dots = window.devicePixelRatio || 1;
+  const width = box.clientWidth, height = box.clientHeight;
+  canvas.width = Math.round(width * dots);
+  canvas.height = Math.round(height * dots);
+  frame.overlay.setAttribute('viewBox', `0 0 ${width} ${height}`);
+  frame.overlay.replaceChildren();
+  if (!entry || !entry.numbers || !frame.port) return;
+  frame.picture = frame.picture || XrayImages.painted(entry, frame.window);
+  const pen = canvas.getContext('2d');
+  pen.setTransform(...Viewport.canvasTransform(frame.port, dots));
+  pen.imageSmoothingEnabled = frame.port.zoom < 3;
+  pen.drawImage(frame.picture, 0, 0);
+  if (frame.mask) pen.drawImage(frame.mask, 0, 0);
+  frame.overlay.append(...tool().marks(frame).filter(Boolean));
+}
 
-  // Whether the key means something here.
-  function pressed(frame, tool, event) {
-    if (!frame.port || event.ctrlKey || event.metaKey) return false;
-    const middle = frame.port.frame.map((side) => side / 2), [low, high] = frame.window, part = (high - low) / 20;
-    const arrow = ARROWS[event.key];
-    if (arrow) {
-      const step = event.shiftKey ? 10 : event.altKey ? 0.1 : 1;
-      // On the screen, right is right in a mirrored image, too.
-      const turn = [frame.port.flip_u ? -1 : 1, frame.port.flip_v ? -1 : 1];
-      if (tool.arrow && tool.arrow(frame, arrow.map((one, i) => one * step * turn[i]))) return true;
-      frame.change(Viewport.panned(frame.port, arrow.map((one) => -40 * one)));
-      return true;
+// Without the sign of a zero.
+export const tenths = (value) => value.toFixed(1).replace(/^-0\.0$/, '0.0');
+
+function tell(frame, pixel) {
+  const grey = XrayImages.valueAt(frame.entry, pixel);
+  frame.value.textContent = grey === null ?
+      '' :
+      `(${tenths(pixel[0])}, ${tenths(pixel[1])}) px: ` + (frame.entry.scale === 1 ? grey : grey.toPrecision(5));
+}
+
+// Pointers: one does what the tool says, or moves the image; two zoom and move it, on a touch screen.
+function listen(frame, tool) {
+  const {box} = frame, pointers = new Map();
+  let doing = null, last = null;
+  const stop = (how, pixel) => {
+    if (doing && doing[how]) doing[how](pixel);
+    doing = null;
+  };
+  box.addEventListener('pointerdown', (event) => {
+    if (!frame.port) return;
+    box.focus({preventScroll: true});
+    box.setPointerCapture(event.pointerId);
+    pointers.set(event.pointerId, frame.place(event));
+    last = frame.place(event);
+    if (pointers.size > 1) return stop('cancel');
+    const pixel = Viewport.toPixel(frame.port, last);
+    if (event.button === 0) doing = tool().press(frame, pixel, event) || panning(frame);
+    if (event.button === 1 || event.button === 2) doing = panning(frame);
+    event.preventDefault();
+  });
+  box.addEventListener('pointermove', (event) => {
+    if (!frame.port) return;
+    const place = frame.place(event), pixel = Viewport.toPixel(frame.port, place);
+    if (pointers.size === 2 && pointers.has(event.pointerId)) return pinch(frame, pointers, event.pointerId, place);
+    frame.pointer = pixel;
+    tell(frame, pixel);
+    if (doing && pointers.has(event.pointerId)) doing.move(pixel, place, last);
+    last = place;
+    frame.draw();
+  });
+  const up = (how) => (event) => {
+    if (!pointers.delete(event.pointerId)) return;
+    stop(how, Viewport.toPixel(frame.port, frame.place(event)));
+  };
+  box.addEventListener('pointerup', up('end'));
+  box.addEventListener('pointercancel', up('cancel'));
+  box.addEventListener('pointerleave', () => {
+    frame.pointer = null;
+    frame.value.textContent = '';
+    frame.draw();
+  });
+  box.addEventListener('contextmenu', (event) => event.preventDefault());
+  box.addEventListener('wheel', (event) => {
+    if (!frame.port) return;
+    event.preventDefault();
+    frame.change(Viewport.zoomed(frame.port, Math.exp(-event.deltaY / 400), frame.place(event)));
+  }, {passive: false});
+  box.addEventListener('keydown', (event) => {
+    if (pressed(frame, tool(), event)) {
+      event.preventDefault();
+      event.stopPropagation();
     }
-    if (event.altKey) return false;
-    const actions = {
-      '+': () => frame.change(Viewport.zoomed(frame.port, 1.25, middle)),
-      '-': () => frame.change(Viewport.zoomed(frame.port, 0.8, middle)),
-      '0': () => frame.fit(),
-      w: () => frame.setWindow(low + part, high - part),
-      W: () => frame.setWindow(low - part, high + part),
-      l: () => frame.setWindow(low + part, high + part),
-      L: () => frame.setWindow(low - part, high - part),
-      m: () => frame.change({...frame.port, flip_u: !frame.port.flip_u}),
-      M: () => frame.change({...frame.port, flip_v: !frame.port.flip_v})
-    };
-    if (actions[event.key]) {
-      actions[event.key]();
-      return true;
-    }
-    return Boolean(tool.key && tool.key(frame, event.key));
+  });
+}
+
+const panning = (frame) => ({
+  move: (pixel, place, last) => frame.change(Viewport.panned(frame.port, [place[0] - last[0], place[1] - last[1]]))
+});
+
+function pinch(frame, pointers, moved, place) {
+  const [other] = [...pointers.entries()].filter(([id]) => id !== moved).map(([, at]) => at);
+  const before = pointers.get(moved), size = (at) => Math.hypot(at[0] - other[0], at[1] - other[1]);
+  const middle = (at) => [(at[0] + other[0]) / 2, (at[1] + other[1]) / 2];
+  const by = [0, 1].map((i) => middle(place)[i] - middle(before)[i]);
+  pointers.set(moved, place);
+  frame.change(
+      Viewport.panned(Viewport.zoomed(frame.port, size(place) / Math.max(1, size(before)), middle(before)), by));
+}
+
+const ARROWS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]};
+
+// Whether the key means something here.
+function pressed(frame, tool, event) {
+  if (!frame.port || event.ctrlKey || event.metaKey) return false;
+  const middle = frame.port.frame.map((side) => side / 2), [low, high] = frame.window, part = (high - low) / 20;
+  const arrow = ARROWS[event.key];
+  if (arrow) {
+    const step = event.shiftKey ? 10 : event.altKey ? 0.1 : 1;
+    // On the screen, right is right in a mirrored image, too.
+    const turn = [frame.port.flip_u ? -1 : 1, frame.port.flip_v ? -1 : 1];
+    if (tool.arrow && tool.arrow(frame, arrow.map((one, i) => one * step * turn[i]))) return true;
+    frame.change(Viewport.panned(frame.port, arrow.map((one) => -40 * one)));
+    return true;
   }
+  if (event.altKey) return false;
+  const actions = {
+    '+': () => frame.change(Viewport.zoomed(frame.port, 1.25, middle)),
+    '-': () => frame.change(Viewport.zoomed(frame.port, 0.8, middle)),
+    '0': () => frame.fit(),
+    w: () => frame.setWindow(low + part, high - part),
+    W: () => frame.setWindow(low - part, high + part),
+    l: () => frame.setWindow(low + part, high + part),
+    L: () => frame.setWindow(low - part, high - part),
+    m: () => frame.change({...frame.port, flip_u: !frame.port.flip_u}),
+    M: () => frame.change({...frame.port, flip_v: !frame.port.flip_v})
+  };
+  if (actions[event.key]) {
+    actions[event.key]();
+    return true;
+  }
+  return Boolean(tool.key && tool.key(frame, event.key));
+}
 
-  const KEYS = [
-    ['+ or -', 'in an X-ray: zoom'], ['0', 'in an X-ray: the whole image'],
-    ['w or W', 'in an X-ray: narrower or wider window'],
-    ['l or L', 'in an X-ray: window up or down, darker or brighter'],
-    ['m or M', 'in an X-ray: show it mirrored, left to right or top to bottom'],
-    ['Arrows', 'in an X-ray: move the landmark, the brush or the image; Shift: 10 px, Alt: 0.1 px']
-  ];
-
-  return {make, tenths, KEYS};
-})();
+export const KEYS = [
+  ['+ or -', 'in an X-ray: zoom'], ['0', 'in an X-ray: the whole image'],
+  ['w or W', 'in an X-ray: narrower or wider window'],
+  ['l or L', 'in an X-ray: window up or down, darker or brighter'],
+  ['m or M', 'in an X-ray: show it mirrored, left to right or top to bottom'],
+  ['Arrows', 'in an X-ray: move the landmark, the brush or the image; Shift: 10 px, Alt: 0.1 px']
+];

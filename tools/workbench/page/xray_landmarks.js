@@ -1,221 +1,219 @@
 // SPDX-License-Identifier: Apache-2.0
 // Landmarks in X-rays: the tool that marks them, and what the views together say about each.
-'use strict';
+import {svg} from '../../report/page/dom.js';
+import * as Geometry from './geometry.js';
+import * as Sight from './sight.js';
+import * as Viewport from './viewport.js';
 
-const XrayLandmarks = (() => {
-  const {svg} = Dom;
-  const NEAR_CSS_PX = 12, PAUSE_ms = 500;
+const NEAR_CSS_PX = 12, PAUSE_ms = 500;
 
-  const rounded = (pixel) => pixel.map((value) => Math.round(value * 1000) / 1000);
-  // Inside the image, whose border lies half a pixel outside the centres of its outer pixels.
-  const inside = (entry, [
-    u, v
-  ]) => [Math.min(entry.width_px - 0.5, Math.max(-0.5, u)), Math.min(entry.height_px - 0.5, Math.max(-0.5, v))];
+const rounded = (pixel) => pixel.map((value) => Math.round(value * 1000) / 1000);
+// Inside the image, whose border lies half a pixel outside the centres of its outer pixels.
+const inside = (entry, [
+  u, v
+]) => [Math.min(entry.width_px - 0.5, Math.max(-0.5, u)), Math.min(entry.height_px - 0.5, Math.max(-0.5, v))];
 
-  // The document's landmarks, with the place that is being dragged.
-  function all(bench) {
-    const list = (bench.draft.document.landmarks || []).map((one) => ({...one, pixels: {...(one.pixels || {})}}));
-    if (!bench.live) return list;
-    const {name, view, pixel} = bench.live;
-    let one = list.find((landmark) => landmark.name === name);
-    if (!one) list.push(one = {name, pixels: {}});
-    one.pixels[view] = pixel;
-    return list;
-  }
+// The document's landmarks, with the place that is being dragged.
+export function all(bench) {
+  const list = (bench.draft.document.landmarks || []).map((one) => ({...one, pixels: {...(one.pixels || {})}}));
+  if (!bench.live) return list;
+  const {name, view, pixel} = bench.live;
+  let one = list.find((landmark) => landmark.name === name);
+  if (!one) list.push(one = {name, pixels: {}});
+  one.pixels[view] = pixel;
+  return list;
+}
 
-  function freeName(bench) {
-    const names = new Set(all(bench).map((one) => one.name));
-    for (let number = 1;; ++number)
-      if (!names.has('point ' + number)) return 'point ' + number;
-  }
+export function freeName(bench) {
+  const names = new Set(all(bench).map((one) => one.name));
+  for (let number = 1;; ++number)
+    if (!names.has('point ' + number)) return 'point ' + number;
+}
 
-  function put(document, name, view, pixel) {
-    document.landmarks = document.landmarks || [];
-    let one = document.landmarks.find((landmark) => landmark.name === name);
-    if (!one) document.landmarks.push(one = {name});
-    one.pixels = {...(one.pixels || {}), [view]: rounded(pixel)};
-  }
+function put(document, name, view, pixel) {
+  document.landmarks = document.landmarks || [];
+  let one = document.landmarks.find((landmark) => landmark.name === name);
+  if (!one) document.landmarks.push(one = {name});
+  one.pixels = {...(one.pixels || {}), [view]: rounded(pixel)};
+}
 
-  // The views that show the landmark and have a camera: [{view, camera, pixel}].
-  const seenIn = (bench, landmark) => Object.entries(landmark.pixels)
-                                          .map(([view, pixel]) => ({view, pixel, camera: bench.cameraOf(view)}))
-                                          .filter(({camera}) => camera);
+// The views that show the landmark and have a camera: [{view, camera, pixel}].
+export const seenIn = (bench, landmark) => Object.entries(landmark.pixels)
+                                        .map(([view, pixel]) => ({view, pixel, camera: bench.cameraOf(view)}))
+                                        .filter(({camera}) => camera);
 
-  // {world_mm, distance_mm, off_px: by view} or null.
-  function placeOf(bench, landmark) {
-    const seen = seenIn(bench, landmark), found = Sight.triangulated(seen);
-    if (!found) return null;
-    return {...found, off_px: Object.fromEntries(seen.map(({view}, i) => [view, found.residuals_px[i]]))};
-  }
+// {world_mm, distance_mm, off_px: by view} or null.
+export function placeOf(bench, landmark) {
+  const seen = seenIn(bench, landmark), found = Sight.triangulated(seen);
+  if (!found) return null;
+  return {...found, off_px: Object.fromEntries(seen.map(({view}, i) => [view, found.residuals_px[i]]))};
+}
 
-  // How far the fitted pose has the landmark from where each view shows it.
-  function fitOff(bench, landmark) {
-    if (!bench.fit || !landmark.model_mm) return null;
-    const world_mm = Geometry.moved(bench.fit.world_from_ct, landmark.model_mm);
-    const off = seenIn(bench, landmark).map(({camera, pixel}) => {
-      const at = Geometry.pixel(camera, world_mm);
-      return at ? Geometry.length(Geometry.minus(at, pixel)) : Infinity;
-    });
-    return off.length ? Math.max(...off) : null;
-  }
+// How far the fitted pose has the landmark from where each view shows it.
+export function fitOff(bench, landmark) {
+  if (!bench.fit || !landmark.model_mm) return null;
+  const world_mm = Geometry.moved(bench.fit.world_from_ct, landmark.model_mm);
+  const off = seenIn(bench, landmark).map(({camera, pixel}) => {
+    const at = Geometry.pixel(camera, world_mm);
+    return at ? Geometry.length(Geometry.minus(at, pixel)) : Infinity;
+  });
+  return off.length ? Math.max(...off) : null;
+}
 
-  // Has the place that was moved written, once the keys rest or something else is done.
-  function commit(bench) {
-    clearTimeout(bench.pause);
-    const live = bench.live;
-    if (!live) return Promise.resolve();
-    return bench.draft
-        .change(`mark ${live.name} in ${live.view}`, (document) => put(document, live.name, live.view, live.pixel))
-        .then(() => {
-          if (bench.live === live) bench.live = null;
-          bench.refresh();
-        });
-  }
-
-  function move(bench, name, view, pixel) {
-    const entry = bench.frames.get(view).entry;
-    bench.live = {name, view, pixel: rounded(inside(entry, pixel))};
-    bench.refresh();
-  }
-
-  function marked(bench, name, view) {
-    const one = all(bench).find((landmark) => landmark.name === name);
-    return one && one.pixels[view];
-  }
-
-  function nearest(bench, frame, pixel) {
-    let best = null, least = NEAR_CSS_PX;
-    for (const one of all(bench)) {
-      const at = one.pixels[frame.name];
-      if (!at) continue;
-      const away =
-          Geometry.length(Geometry.minus(Viewport.toScreen(frame.port, at), Viewport.toScreen(frame.port, pixel)));
-      if (away < least) [best, least] = [one.name, away];
-    }
-    return best;
-  }
-
-  // The landmark that a click places: the chosen one where this view does not show it yet, or a new one.
-  const nameToPlace = (bench, view) =>
-      (bench.chosen && !marked(bench, bench.chosen, view) ? bench.chosen : freeName(bench));
-
-  function press(bench, frame, pixel) {
-    commit(bench);
-    const hit = nearest(bench, frame, pixel);
-    const name = hit || nameToPlace(bench, frame.name);
-    const grab = hit ? Geometry.minus(marked(bench, hit, frame.name), pixel) : [0, 0];
-    bench.choose(name);
-    if (!hit) move(bench, name, frame.name, pixel);
-    return {
-      move: (at) => move(bench, name, frame.name, Geometry.plus(at, grab)),
-      end: () => commit(bench),
-      cancel() {
-        bench.live = null;
+// Has the place that was moved written, once the keys rest or something else is done.
+export function commit(bench) {
+  clearTimeout(bench.pause);
+  const live = bench.live;
+  if (!live) return Promise.resolve();
+  return bench.draft
+      .change(`mark ${live.name} in ${live.view}`, (document) => put(document, live.name, live.view, live.pixel))
+      .then(() => {
+        if (bench.live === live) bench.live = null;
         bench.refresh();
-      }
-    };
-  }
+      });
+}
 
-  function arrow(bench, frame, step) {
-    const at = bench.chosen && marked(bench, bench.chosen, frame.name);
-    if (at) {
-      clearTimeout(bench.pause);
-      if (bench.live && (bench.live.view !== frame.name || bench.live.name !== bench.chosen)) commit(bench);
-      move(bench, bench.chosen, frame.name, Geometry.plus(at, step));
-      bench.pause = setTimeout(() => commit(bench), PAUSE_ms);
-    } else {
-      const middle = Viewport.toPixel(frame.port, frame.port.frame.map((side) => side / 2)).map(Math.round);
-      frame.cursor = inside(frame.entry, frame.cursor ? Geometry.plus(frame.cursor, step) : middle);
-      frame.draw();
+function move(bench, name, view, pixel) {
+  const entry = bench.frames.get(view).entry;
+  bench.live = {name, view, pixel: rounded(inside(entry, pixel))};
+  bench.refresh();
+}
+
+function marked(bench, name, view) {
+  const one = all(bench).find((landmark) => landmark.name === name);
+  return one && one.pixels[view];
+}
+
+function nearest(bench, frame, pixel) {
+  let best = null, least = NEAR_CSS_PX;
+  for (const one of all(bench)) {
+    const at = one.pixels[frame.name];
+    if (!at) continue;
+    const away =
+        Geometry.length(Geometry.minus(Viewport.toScreen(frame.port, at), Viewport.toScreen(frame.port, pixel)));
+    if (away < least) [best, least] = [one.name, away];
+  }
+  return best;
+}
+
+// The landmark that a click places: the chosen one where this view does not show it yet, or a new one.
+const nameToPlace = (bench, view) =>
+    (bench.chosen && !marked(bench, bench.chosen, view) ? bench.chosen : freeName(bench));
+
+function press(bench, frame, pixel) {
+  commit(bench);
+  const hit = nearest(bench, frame, pixel);
+  const name = hit || nameToPlace(bench, frame.name);
+  const grab = hit ? Geometry.minus(marked(bench, hit, frame.name), pixel) : [0, 0];
+  bench.choose(name);
+  if (!hit) move(bench, name, frame.name, pixel);
+  return {
+    move: (at) => move(bench, name, frame.name, Geometry.plus(at, grab)),
+    end: () => commit(bench),
+    cancel() {
+      bench.live = null;
+      bench.refresh();
     }
+  };
+}
+
+function arrow(bench, frame, step) {
+  const at = bench.chosen && marked(bench, bench.chosen, frame.name);
+  if (at) {
+    clearTimeout(bench.pause);
+    if (bench.live && (bench.live.view !== frame.name || bench.live.name !== bench.chosen)) commit(bench);
+    move(bench, bench.chosen, frame.name, Geometry.plus(at, step));
+    bench.pause = setTimeout(() => commit(bench), PAUSE_ms);
+  } else {
+    const middle = Viewport.toPixel(frame.port, frame.port.frame.map((side) => side / 2)).map(Math.round);
+    frame.cursor = inside(frame.entry, frame.cursor ? Geometry.plus(frame.cursor, step) : middle);
+    frame.draw();
+  }
+  return true;
+}
+
+function key(bench, frame, name) {
+  if (name === 'Enter') {
+    if (!frame.cursor) return arrow(bench, frame, [0, 0]);
+    const place = frame.cursor, landmark = nameToPlace(bench, frame.name);
+    frame.cursor = null;
+    bench.choose(landmark);
+    move(bench, landmark, frame.name, place);
+    commit(bench);
     return true;
   }
-
-  function key(bench, frame, name) {
-    if (name === 'Enter') {
-      if (!frame.cursor) return arrow(bench, frame, [0, 0]);
-      const place = frame.cursor, landmark = nameToPlace(bench, frame.name);
-      frame.cursor = null;
-      bench.choose(landmark);
-      move(bench, landmark, frame.name, place);
-      commit(bench);
-      return true;
-    }
-    if (name === 'Delete' && bench.chosen && marked(bench, bench.chosen, frame.name)) {
-      const chosen = bench.chosen;
-      commit(bench);
-      bench.draft.change(`take ${chosen} out of ${frame.name}`, (document) => {
-        const one = document.landmarks.find((landmark) => landmark.name === chosen);
-        delete one.pixels[frame.name];
-      });
-      return true;
-    }
-    if (name === 'Escape') {
-      frame.cursor = null;
-      bench.choose(null);
-      return true;
-    }
-    if (name === 'n') {
-      const names = all(bench).map((one) => one.name), next = names.indexOf(bench.chosen) + 1;
-      bench.choose(names[next] || null);
-      return true;
-    }
-    return false;
-  }
-
-  const line = (frame, ends, attributes) => {
-    const [[x1, y1], [x2, y2]] = ends.map((end) => Viewport.toScreen(frame.port, end));
-    return svg('line', {x1, y1, x2, y2, ...attributes});
-  };
-  function cross(frame, pixel, size, attributes) {
-    const [x, y] = Viewport.toScreen(frame.port, pixel);
-    return svg('path', {d: `M${x - size} ${y}h${2 * size}M${x} ${y - size}v${2 * size}`, ...attributes});
-  }
-
-  // The chosen landmark as the other views see it: a line for each, and the place on which all agree.
-  function linesOf(bench, frame, landmark) {
-    const camera = bench.cameraOf(frame.name);
-    if (!camera) return [];
-    const lines = seenIn(bench, landmark).filter(({view}) => view !== frame.name).map((seen) => {
-      const ends = Sight.epipolarLine(seen.camera, seen.pixel, camera);
-      return ends && line(frame, ends, {class: 'epipolar', 'data-from': seen.view});
+  if (name === 'Delete' && bench.chosen && marked(bench, bench.chosen, frame.name)) {
+    const chosen = bench.chosen;
+    commit(bench);
+    bench.draft.change(`take ${chosen} out of ${frame.name}`, (document) => {
+      const one = document.landmarks.find((landmark) => landmark.name === chosen);
+      delete one.pixels[frame.name];
     });
-    const place = placeOf(bench, landmark), at = place && Geometry.pixel(camera, place.world_mm);
-    return [...lines, at && cross(frame, at, 7, {class: 'agreed'})];
+    return true;
   }
-
-  function marks(bench, frame) {
-    const camera = bench.cameraOf(frame.name), shown = [];
-    for (const one of all(bench)) {
-      const is_chosen = one.name === bench.chosen;
-      if (is_chosen) shown.push(...linesOf(bench, frame, one));
-      if (bench.fit && one.model_mm && camera) {
-        const at = Geometry.pixel(camera, Geometry.moved(bench.fit.world_from_ct, one.model_mm));
-        if (at) shown.push(cross(frame, at, 5, {class: 'fitted'}));
-      }
-      const at = one.pixels[frame.name];
-      if (!at) continue;
-      const [cx, cy] = Viewport.toScreen(frame.port, at);
-      shown.push(
-          svg('circle', {class: 'landmark-rim', cx, cy, r: 6}),
-          svg('circle', {class: 'landmark' + (is_chosen ? ' chosen' : ''), cx, cy, r: 6, 'data-landmark': one.name}),
-          svg('circle', {class: 'landmark-dot', cx, cy, r: 1}), svg('text', {x: cx + 9, y: cy - 7}, one.name));
-    }
-    if (frame.cursor) shown.push(cross(frame, frame.cursor, 14, {class: 'keyboard-cursor'}));
-    return shown;
+  if (name === 'Escape') {
+    frame.cursor = null;
+    bench.choose(null);
+    return true;
   }
+  if (name === 'n') {
+    const names = all(bench).map((one) => one.name), next = names.indexOf(bench.chosen) + 1;
+    bench.choose(names[next] || null);
+    return true;
+  }
+  return false;
+}
 
-  const tool = (bench) => ({
-    press: (frame, pixel) => press(bench, frame, pixel),
-    arrow: (frame, step) => arrow(bench, frame, step),
-    key: (frame, name) => key(bench, frame, name)
+const line = (frame, ends, attributes) => {
+  const [[x1, y1], [x2, y2]] = ends.map((end) => Viewport.toScreen(frame.port, end));
+  return svg('line', {x1, y1, x2, y2, ...attributes});
+};
+function cross(frame, pixel, size, attributes) {
+  const [x, y] = Viewport.toScreen(frame.port, pixel);
+  return svg('path', {d: `M${x - size} ${y}h${2 * size}M${x} ${y - size}v${2 * size}`, ...attributes});
+}
+
+// The chosen landmark as the other views see it: a line for each, and the place on which all agree.
+function linesOf(bench, frame, landmark) {
+  const camera = bench.cameraOf(frame.name);
+  if (!camera) return [];
+  const lines = seenIn(bench, landmark).filter(({view}) => view !== frame.name).map((seen) => {
+    const ends = Sight.epipolarLine(seen.camera, seen.pixel, camera);
+    return ends && line(frame, ends, {class: 'epipolar', 'data-from': seen.view});
   });
+  const place = placeOf(bench, landmark), at = place && Geometry.pixel(camera, place.world_mm);
+  return [...lines, at && cross(frame, at, 7, {class: 'agreed'})];
+}
 
-  const KEYS = [
-    ['Enter', 'in an X-ray: place a landmark, or put the brush down and lift it'],
-    ['n', 'in an X-ray: the next landmark'], ['Delete', 'in an X-ray: take the landmark out of it'],
-    ['Esc', 'in an X-ray: no landmark']
-  ];
+export function marks(bench, frame) {
+  const camera = bench.cameraOf(frame.name), shown = [];
+  for (const one of all(bench)) {
+    const is_chosen = one.name === bench.chosen;
+    if (is_chosen) shown.push(...linesOf(bench, frame, one));
+    if (bench.fit && one.model_mm && camera) {
+      const at = Geometry.pixel(camera, Geometry.moved(bench.fit.world_from_ct, one.model_mm));
+      if (at) shown.push(cross(frame, at, 5, {class: 'fitted'}));
+    }
+    const at = one.pixels[frame.name];
+    if (!at) continue;
+    const [cx, cy] = Viewport.toScreen(frame.port, at);
+    shown.push(
+        svg('circle', {class: 'landmark-rim', cx, cy, r: 6}),
+        svg('circle', {class: 'landmark' + (is_chosen ? ' chosen' : ''), cx, cy, r: 6, 'data-landmark': one.name}),
+        svg('circle', {class: 'landmark-dot', cx, cy, r: 1}), svg('text', {x: cx + 9, y: cy - 7}, one.name));
+  }
+  if (frame.cursor) shown.push(cross(frame, frame.cursor, 14, {class: 'keyboard-cursor'}));
+  return shown;
+}
 
-  return {tool, marks, all, placeOf, fitOff, seenIn, freeName, commit, KEYS};
-})();
+export const tool = (bench) => ({
+  press: (frame, pixel) => press(bench, frame, pixel),
+  arrow: (frame, step) => arrow(bench, frame, step),
+  key: (frame, name) => key(bench, frame, name)
+});
+
+export const KEYS = [
+  ['Enter', 'in an X-ray: place a landmark, or put the brush down and lift it'],
+  ['n', 'in an X-ray: the next landmark'], ['Delete', 'in an X-ray: take the landmark out of it'],
+  ['Esc', 'in an X-ray: no landmark']
+];

@@ -1,203 +1,209 @@
 // SPDX-License-Identifier: Apache-2.0
 // The panel "X-rays" of the page "Case": the views side by side, the tools that work on them, and the landmarks.
-'use strict';
+import {el} from '../../report/page/dom.js';
+import * as Dom from '../../report/page/dom.js';
+import * as CasePage from './case.js';
+import * as Ask from './server.js';
+import * as XrayExchange from './xray_exchange.js';
+import * as XrayFrame from './xray_frame.js';
+import * as XrayImages from './xray_images.js';
+import * as XrayLandmarks from './xray_landmarks.js';
+import * as XrayMasks from './xray_masks.js';
+import * as XrayTable from './xray_table.js';
 
-const Xrays = (() => {
-  const {el} = Dom;
-  const FIT_PAUSE_ms = 400;
+const FIT_PAUSE_ms = 400;
 
-  // What the parts of the panel share.
-  function bench(draft) {
-    const shared = {draft, frames: new Map(), chosen: null, live: null, fit: null, fit_fault: '', tool: 'look'};
-    let fragment = null;
-    shared.views = () => draft.document.views || [];
-    shared.entryOf = (name) => {
-      const view = shared.views().find((one) => one.name === name);
-      return view && XrayImages.of(view);
+// What the parts of the panel share.
+function bench(draft) {
+  const shared = {draft, frames: new Map(), chosen: null, live: null, fit: null, fit_fault: '', tool: 'look'};
+  let fragment = null;
+  shared.views = () => draft.document.views || [];
+  shared.entryOf = (name) => {
+    const view = shared.views().find((one) => one.name === name);
+    return view && XrayImages.of(view);
+  };
+  shared.cameraOf = (name) => {
+    const entry = shared.entryOf(name);
+    return entry && entry.camera;
+  };
+  shared.choose = (name) => {
+    shared.chosen = name;
+    shared.refresh();
+  };
+  shared.fragment = () => {
+    const names = Object.keys(draft.document.fragments || {});
+    return names.includes(fragment) ? fragment : names[0] || 'bone';
+  };
+  shared.chooseFragment = (name) => {
+    fragment = name;
+    shared.refit();
+  };
+  return shared;
+}
+
+// A tool has press(frame, pixel, event), arrow(frame, step) and key(frame, name), each optional.
+const LOOK = {};
+const windowing = () => ({
+  press(frame) {
+    const [low, high] = frame.window, width = high - low, middle = (low + high) / 2;
+    let begin = null;
+    return {
+      move(pixel, place) {
+        begin = begin || place;
+        const next = width * Math.exp((place[0] - begin[0]) / 200);
+        const level = middle + width * (place[1] - begin[1]) / 300;
+        frame.setWindow(level - next / 2, level + next / 2);
+      }
     };
-    shared.cameraOf = (name) => {
-      const entry = shared.entryOf(name);
-      return entry && entry.camera;
-    };
-    shared.choose = (name) => {
-      shared.chosen = name;
-      shared.refresh();
-    };
-    shared.fragment = () => {
-      const names = Object.keys(draft.document.fragments || {});
-      return names.includes(fragment) ? fragment : names[0] || 'bone';
-    };
-    shared.chooseFragment = (name) => {
-      fragment = name;
-      shared.refit();
-    };
-    return shared;
   }
+});
 
-  // A tool has press(frame, pixel, event), arrow(frame, step) and key(frame, name), each optional.
-  const LOOK = {};
-  const windowing = () => ({
-    press(frame) {
-      const [low, high] = frame.window, width = high - low, middle = (low + high) / 2;
-      let begin = null;
-      return {
-        move(pixel, place) {
-          begin = begin || place;
-          const next = width * Math.exp((place[0] - begin[0]) / 200);
-          const level = middle + width * (place[1] - begin[1]) / 300;
-          frame.setWindow(level - next / 2, level + next / 2);
-        }
-      };
+function toolbar(shared, tools) {
+  const options = [
+    ['look', 'Move'], ['window', 'Window'], ['landmark', 'Landmark'], ['brush', 'Mask'], ['rectangle', 'Mask box'],
+    ['eraser', 'Erase']
+  ];
+  const choice = Dom.choice('Tool', options, shared.tool, (name) => {
+    shared.tool = name;
+    shared.refresh();
+  });
+  const size = el('input', {
+    type: 'range',
+    min: 1,
+    max: 200,
+    value: shared.brush_px,
+    'data-do': 'brush-size',
+    oninput: () => {
+      shared.brush_px = Number(size.value);
+      number.textContent = size.value + ' px';
+      shared.refresh();
     }
   });
+  const number = el('span', {class: 'note'}, size.value + ' px');
+  const brush =
+      el('label', {class: 'field'}, el('span', {}, 'Brush'), el('span', {class: 'with-number'}, size, number));
+  const all = Dom.button('Whole images', () => shared.frames.forEach((frame) => frame.fit()), {'data-do': 'fit'});
+  const update = () => {
+    brush.hidden = !['brush', 'eraser'].includes(shared.tool);
+    choice.querySelector('[role="group"]').choose(shared.tool);
+  };
+  return {element: el('div', {class: 'toolbar'}, choice, brush, all), update};
+}
 
-  function toolbar(shared, tools) {
-    const options = [
-      ['look', 'Move'], ['window', 'Window'], ['landmark', 'Landmark'], ['brush', 'Mask'], ['rectangle', 'Mask box'],
-      ['eraser', 'Erase']
-    ];
-    const choice = Dom.choice('Tool', options, shared.tool, (name) => {
-      shared.tool = name;
-      shared.refresh();
-    });
-    const size = el('input', {
-      type: 'range',
-      min: 1,
-      max: 200,
-      value: shared.brush_px,
-      'data-do': 'brush-size',
-      oninput: () => {
-        shared.brush_px = Number(size.value);
-        number.textContent = size.value + ' px';
-        shared.refresh();
-      }
-    });
-    const number = el('span', {class: 'note'}, size.value + ' px');
-    const brush =
-        el('label', {class: 'field'}, el('span', {}, 'Brush'), el('span', {class: 'with-number'}, size, number));
-    const all = Dom.button('Whole images', () => shared.frames.forEach((frame) => frame.fit()), {'data-do': 'fit'});
-    const update = () => {
-      brush.hidden = !['brush', 'eraser'].includes(shared.tool);
-      choice.querySelector('[role="group"]').choose(shared.tool);
-    };
-    return {element: el('div', {class: 'toolbar'}, choice, brush, all), update};
-  }
+// A view in the row of X-rays, with its name, its fault and what is under the pointer.
+function figure(shared, view, tool) {
+  const frame = XrayFrame.make(view.name, tool);
+  const fault = el('p', {class: 'fault', role: 'alert', hidden: true});
+  const wait = el('p', {class: 'note'}, 'The image is being read …');
+  frame.element =
+      el('figure', {class: 'xray', 'data-xray': view.name},
+         el('figcaption', {}, el('span', {}, view.name), frame.value), fault, wait, frame.box);
+  frame.update = (next) => {
+    const entry = XrayImages.of(next, shared.refresh);
+    wait.hidden = entry.is_ready;
+    fault.hidden = !entry.fault;
+    fault.textContent = entry.fault || '';
+    frame.box.hidden = entry.is_ready && !entry.numbers;
+    frame.show(entry);
+  };
+  return frame;
+}
 
-  // A view in the row of X-rays, with its name, its fault and what is under the pointer.
-  function figure(shared, view, tool) {
-    const frame = XrayFrame.make(view.name, tool);
-    const fault = el('p', {class: 'fault', role: 'alert', hidden: true});
-    const wait = el('p', {class: 'note'}, 'The image is being read …');
-    frame.element =
-        el('figure', {class: 'xray', 'data-xray': view.name},
-           el('figcaption', {}, el('span', {}, view.name), frame.value), fault, wait, frame.box);
-    frame.update = (next) => {
-      const entry = XrayImages.of(next, shared.refresh);
-      wait.hidden = entry.is_ready;
-      fault.hidden = !entry.fault;
-      fault.textContent = entry.fault || '';
-      frame.box.hidden = entry.is_ready && !entry.numbers;
-      frame.show(entry);
-    };
-    return frame;
-  }
+function row(shared, tool) {
+  const place = el('div', {class: 'xray-row'});
+  const empty = el('p', {class: 'note'}, 'No X-ray yet. Add one above.');
+  const update = () => {
+    const views = shared.views(), names = views.map((one) => one.name);
+    if ([...shared.frames.keys()].join('\n') !== names.join('\n')) {
+      for (const [name, frame] of shared.frames)
+        if (!names.includes(name)) {
+          frame.dispose();
+          shared.frames.delete(name);
+        }
+      const kept =
+          new Map(views.map((view) => [view.name, shared.frames.get(view.name) || figure(shared, view, tool)]));
+      shared.frames.clear();
+      kept.forEach((frame, name) => shared.frames.set(name, frame));
+      place.replaceChildren(...[...shared.frames.values()].map((frame) => frame.element));
+    }
+    for (const view of views) shared.frames.get(view.name).update(view);
+    empty.hidden = views.length > 0;
+  };
+  return {element: el('div', {}, empty, place), update};
+}
 
-  function row(shared, tool) {
-    const place = el('div', {class: 'xray-row'});
-    const empty = el('p', {class: 'note'}, 'No X-ray yet. Add one above.');
-    const update = () => {
-      const views = shared.views(), names = views.map((one) => one.name);
-      if ([...shared.frames.keys()].join('\n') !== names.join('\n')) {
-        for (const [name, frame] of shared.frames)
-          if (!names.includes(name)) {
-            frame.dispose();
-            shared.frames.delete(name);
-          }
-        const kept =
-            new Map(views.map((view) => [view.name, shared.frames.get(view.name) || figure(shared, view, tool)]));
-        shared.frames.clear();
-        kept.forEach((frame, name) => shared.frames.set(name, frame));
-        place.replaceChildren(...[...shared.frames.values()].map((frame) => frame.element));
-      }
-      for (const view of views) shared.frames.get(view.name).update(view);
-      empty.hidden = views.length > 0;
-    };
-    return {element: el('div', {}, empty, place), update};
-  }
+// Asks for the pose that the landmarks give, once they rest.
+function fitting(shared, told) {
+  let asked = '', timer = null, aborter = null;
+  const ask = async (body) => {
+    if (aborter) aborter.abort();
+    aborter = new AbortController();
+    try {
+      shared.fit = await Ask.post('api/xray/fit', body, aborter.signal);
+      shared.fit_fault = '';
+    } catch (error) {
+      if (error.name === 'AbortError') return;
+      shared.fit = null;
+      shared.fit_fault = error.message;
+    }
+    told();
+  };
+  return () => {
+    const fragment = shared.fragment();
+    const landmarks = (shared.draft.document.landmarks ||
+                       []).filter((one) => one.model_mm && (!one.fragment || one.fragment === fragment));
+    const views =
+        shared.views()
+            .filter((view) => shared.cameraOf(view.name))
+            .map(({name, image, camera}) => ({name, image, camera, width_px: shared.cameraOf(name).width_px}));
+    const body = {fragment, landmarks, views}, text = JSON.stringify(body);
+    if (text === asked) return;
+    asked = text;
+    clearTimeout(timer);
+    if (landmarks.length >= 3 && views.length && landmarks.some((one) => Object.keys(one.pixels || {}).length))
+      timer = setTimeout(() => ask(body), FIT_PAUSE_ms);
+    else {
+      shared.fit = null;
+      shared.fit_fault = '';
+    }
+  };
+}
 
-  // Asks for the pose that the landmarks give, once they rest.
-  function fitting(shared, told) {
-    let asked = '', timer = null, aborter = null;
-    const ask = async (body) => {
-      if (aborter) aborter.abort();
-      aborter = new AbortController();
-      try {
-        shared.fit = await Ask.post('api/xray/fit', body, aborter.signal);
-        shared.fit_fault = '';
-      } catch (error) {
-        if (error.name === 'AbortError') return;
-        shared.fit = null;
-        shared.fit_fault = error.message;
-      }
-      told();
-    };
-    return () => {
-      const fragment = shared.fragment();
-      const landmarks = (shared.draft.document.landmarks ||
-                         []).filter((one) => one.model_mm && (!one.fragment || one.fragment === fragment));
-      const views =
-          shared.views()
-              .filter((view) => shared.cameraOf(view.name))
-              .map(({name, image, camera}) => ({name, image, camera, width_px: shared.cameraOf(name).width_px}));
-      const body = {fragment, landmarks, views}, text = JSON.stringify(body);
-      if (text === asked) return;
-      asked = text;
-      clearTimeout(timer);
-      if (landmarks.length >= 3 && views.length && landmarks.some((one) => Object.keys(one.pixels || {}).length))
-        timer = setTimeout(() => ask(body), FIT_PAUSE_ms);
-      else {
-        shared.fit = null;
-        shared.fit_fault = '';
-      }
-    };
-  }
-
-  function make(draft) {
-    const shared = bench(draft);
-    shared.brush_px = 20;
-    const masks = XrayMasks.make(shared);
-    const tools = {look: LOOK, window: windowing(), landmark: XrayLandmarks.tool(shared), ...masks.tools};
-    const none = {press: () => null};
-    const tool = () => ({
-      ...none,
-      ...tools[shared.tool],
-      marks: (frame) => [...XrayLandmarks.marks(shared, frame), ...masks.marks(frame)]
-    });
-    const bar = toolbar(shared, tools), views = row(shared, tool), table = XrayTable.make(shared);
-    const exchange = XrayExchange.make(shared);
-    shared.refresh = () => {
-      bar.update();
-      views.update();
-      masks.update();
-      table.update();
-      shared.refit();
-    };
-    shared.refit = fitting(shared, () => {
+function make(draft) {
+  const shared = bench(draft);
+  shared.brush_px = 20;
+  const masks = XrayMasks.make(shared);
+  const tools = {look: LOOK, window: windowing(), landmark: XrayLandmarks.tool(shared), ...masks.tools};
+  const none = {press: () => null};
+  const tool = () => ({
+    ...none,
+    ...tools[shared.tool],
+    marks: (frame) => [...XrayLandmarks.marks(shared, frame), ...masks.marks(frame)]
+  });
+  const bar = toolbar(shared, tools), views = row(shared, tool), table = XrayTable.make(shared);
+  const exchange = XrayExchange.make(shared);
+  shared.refresh = () => {
+    bar.update();
+    views.update();
+    masks.update();
+    table.update();
+    shared.refit();
+  };
+  shared.refit = fitting(shared, () => {
+    shared.refresh();
+    table.updateFit();
+  });
+  return {
+    element: el('div', {class: 'xrays'}, bar.element, views.element, table.element, exchange.element),
+    update() {
       shared.refresh();
       table.updateFit();
-    });
-    return {
-      element: el('div', {class: 'xrays'}, bar.element, views.element, table.element, exchange.element),
-      update() {
-        shared.refresh();
-        table.updateFit();
-      },
-      dispose() {
-        XrayLandmarks.commit(shared);
-        shared.frames.forEach((frame) => frame.dispose());
-      }
-    };
-  }
+    },
+    dispose() {
+      XrayLandmarks.commit(shared);
+      shared.frames.forEach((frame) => frame.dispose());
+    }
+  };
+}
 
-  CasePage.panel('X-rays', 30, make, [...XrayFrame.KEYS, ...XrayLandmarks.KEYS]);
-})();
+CasePage.panel('X-rays', 30, make, [...XrayFrame.KEYS, ...XrayLandmarks.KEYS]);

@@ -21,6 +21,7 @@
 #include "marrow/runtime/pipeline/pipeline_replaced.hpp"
 #include "marrow/runtime/pipeline/pipeline_text.hpp"
 #include "marrow/runtime/pipeline/pipeline_trial.hpp"
+#include "marrow/runtime/pipeline/renamed.hpp"
 #include "marrow/runtime/plugins/contract.hpp"
 
 namespace marrow {
@@ -168,7 +169,7 @@ class Resolver {
           std::find_if(of_kind.begin(), of_kind.end(), [&, n = name](const KindPort& p) { return p.name == n; });
       if (!own && sibling == of_kind.end()) {
         diagnostics_.add(value.place, in_quotes(node.info.name) + " has no input " + in_quotes(name),
-                         suggested(diagnostics_, name, names_of(of_kind)));
+                         suggested_for(node.info.name, name, names_of(of_kind), diagnostics_));
         continue;
       }
       // A port that only other nodes of the kind have is checked like any other, and then left unwired.

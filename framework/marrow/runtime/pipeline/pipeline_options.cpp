@@ -9,6 +9,7 @@
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/relations.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
+#include "marrow/runtime/pipeline/renamed.hpp"
 
 namespace marrow {
 namespace {
@@ -31,7 +32,7 @@ void resolve_options(const WrittenNode& written, PipelineNode& node, InputTexts&
   for (const auto& [name, value] : written.options)
     if (!contains(known, name))
       diagnostics.add(value.place, in_quotes(node.info.name) + " has no option " + in_quotes(name),
-                      suggested(diagnostics, name, known));
+                      suggested_for(node.info.name, name, known, diagnostics));
   for (const OptionInfo& option : node.info.options) {
     OptionValue result = option.default_value;
     const auto given = std::find_if(written.options.begin(), written.options.end(),

@@ -8,6 +8,7 @@
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
+#include "marrow/runtime/pipeline/renamed.hpp"
 #include "marrow/runtime/plugins/contract.hpp"
 
 namespace marrow {
@@ -68,7 +69,7 @@ Reference resolve_reference(const std::string& text, const Place& place, const s
   if (output < 0) {
     if (parts.size() > 1)
       diagnostics.add(place, "node " + in_quotes(parts[0]) + " has no output " + in_quotes(parts[1]),
-                      suggested(diagnostics, parts[1], names_of(outputs)));
+                      suggested_for(nodes[index].info.name, parts[1], names_of(outputs), diagnostics));
     else
       diagnostics.add(place,
                       "node " + in_quotes(parts[0]) + " has several outputs" +
