@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "marrow/runtime/node/types.hpp"
+#include "marrow/runtime/store/shared_claim.hpp"
 #include "marrow/runtime/store/shared_store.hpp"
 #include "marrow/runtime/store/store.hpp"
 
