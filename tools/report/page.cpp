@@ -3,7 +3,7 @@
 #include "report/cell_material.hpp"
 #include "report/report.hpp"
 
-// The page without its data. tools/report/page/assemble.py makes it when marrow is built.
+// The page without its data. tools/report/page/bundle.py makes it when marrow is built.
 asm(".section .rodata\n"
     ".global marrow_report_page\n"
     ".global marrow_report_page_end\n"

@@ -2,17 +2,17 @@
 // What all pages share: the page itself, the folder, and the jobs.
 #include "workbench/workbench.hpp"
 
-// The page, its script and its style. tools/workbench/page/assemble.py makes them when marrow is built.
+// The page, its script and its style. tools/report/page/bundle.py makes the latter two when marrow is built.
 asm(".section .rodata\n"
     ".global marrow_workbench_html\n.global marrow_workbench_html_end\n"
-    "marrow_workbench_html:\n.incbin \"" MARROW_WORKBENCH
-    "/index.html\"\nmarrow_workbench_html_end:\n.byte 0\n"
+    "marrow_workbench_html:\n.incbin \"" MARROW_WORKBENCH_HTML
+    "\"\nmarrow_workbench_html_end:\n.byte 0\n"
     ".global marrow_workbench_js\n.global marrow_workbench_js_end\n"
     "marrow_workbench_js:\n.incbin \"" MARROW_WORKBENCH
-    "/workbench.js\"\nmarrow_workbench_js_end:\n.byte 0\n"
+    ".js\"\nmarrow_workbench_js_end:\n.byte 0\n"
     ".global marrow_workbench_css\n.global marrow_workbench_css_end\n"
     "marrow_workbench_css:\n.incbin \"" MARROW_WORKBENCH
-    "/workbench.css\"\nmarrow_workbench_css_end:\n.byte 0\n"
+    ".css\"\nmarrow_workbench_css_end:\n.byte 0\n"
     ".previous\n");
 extern "C" const char marrow_workbench_html[], marrow_workbench_html_end[];
 extern "C" const char marrow_workbench_js[], marrow_workbench_js_end[];

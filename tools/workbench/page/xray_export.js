@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Seeds, landmarks, starts and cameras to files of marrow and of other programs (docs/formats.md).
 import {button, el, select} from '../../report/page/dom.js';
+
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
 
@@ -10,8 +11,20 @@ const POINTS = [
 ];
 const POSE = [['.yaml', 'marrow (.yaml)'], ['.tfm', 'ITK, 3D Slicer (.tfm)']];
 const CAMERAS = [['.h5', 'xReg (.h5)'], ['.xml', 'RTK (.xml)'], ['.txt', 'plastimatch (.txt), one view']];
-const FORMATS = {seeds: POINTS, landmarks: POINTS, pose: POSE, cameras: CAMERAS, result: POSE.slice(1)};
-const TITLES = {seeds: 'seeds', landmarks: 'landmarks', pose: 'start', cameras: 'cameras', result: 'a result’s pose'};
+const FORMATS = {
+  seeds: POINTS,
+  landmarks: POINTS,
+  pose: POSE,
+  cameras: CAMERAS,
+  result: POSE.slice(1)
+};
+const TITLES = {
+  seeds: 'seeds',
+  landmarks: 'landmarks',
+  pose: 'start',
+  cameras: 'cameras',
+  result: 'a result’s pose'
+};
 
 // What is written, or a sentence that says why there is nothing.
 const GET = {
@@ -140,8 +153,8 @@ export async function begin(shared, what, told) {
 
 // A pose that a run found, in one of its files.
 export async function beginResult(shared, told) {
-  const file = await Shell.choose(
-      'Pose of a run, such as runs/NAME/outputs/pose/…', {accepts: (name) => /\.ya?ml$/.test(name)});
+  const file =
+      await Shell.choose('Pose of a run, such as runs/NAME/outputs/pose/…', {accepts: (name) => /\.ya?ml$/.test(name)});
   if (file === undefined) return;
   const answer = await ask(shared, 'result', [], file.replace(/\.ya?ml$/, ''));
   if (answer) await send(shared, 'result', {file}, answer, told);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One X-ray on the screen: it is zoomed, moved and windowed here. What else is done to it is the tool's part.
 import {el, svg} from '../../report/page/dom.js';
+
 import * as Viewport from './viewport.js';
 import * as XrayImages from './xray_images.js';
 
@@ -176,7 +177,12 @@ function pinch(frame, pointers, moved, place) {
       Viewport.panned(Viewport.zoomed(frame.port, size(place) / Math.max(1, size(before)), middle(before)), by));
 }
 
-const ARROWS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]};
+const ARROWS = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, -1],
+  ArrowDown: [0, 1]
+};
 
 // Whether the key means something here.
 function pressed(frame, tool, event) {
@@ -212,8 +218,7 @@ function pressed(frame, tool, event) {
 
 export const KEYS = [
   ['+ or -', 'in an X-ray: zoom'], ['0', 'in an X-ray: the whole image'],
-  ['w or W', 'in an X-ray: narrower or wider window'],
-  ['l or L', 'in an X-ray: window up or down, darker or brighter'],
+  ['w or W', 'in an X-ray: narrower or wider window'], ['l or L', 'in an X-ray: window up or down, darker or brighter'],
   ['m or M', 'in an X-ray: show it mirrored, left to right or top to bottom'],
   ['Arrows', 'in an X-ray: move the landmark, the brush or the image; Shift: 10 px, Alt: 0.1 px']
 ];

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Landmarks in X-rays: the tool that marks them, and what the views together say about each.
 import {svg} from '../../report/page/dom.js';
+
 import * as Geometry from './geometry.js';
 import * as Sight from './sight.js';
 import * as Viewport from './viewport.js';
@@ -9,9 +10,9 @@ const NEAR_CSS_PX = 12, PAUSE_ms = 500;
 
 const rounded = (pixel) => pixel.map((value) => Math.round(value * 1000) / 1000);
 // Inside the image, whose border lies half a pixel outside the centres of its outer pixels.
-const inside = (entry, [
-  u, v
-]) => [Math.min(entry.width_px - 0.5, Math.max(-0.5, u)), Math.min(entry.height_px - 0.5, Math.max(-0.5, v))];
+const inside =
+    (entry,
+     [u, v]) => [Math.min(entry.width_px - 0.5, Math.max(-0.5, u)), Math.min(entry.height_px - 0.5, Math.max(-0.5, v))];
 
 // The document's landmarks, with the place that is being dragged.
 export function all(bench) {
@@ -39,8 +40,8 @@ function put(document, name, view, pixel) {
 
 // The views that show the landmark and have a camera: [{view, camera, pixel}].
 export const seenIn = (bench, landmark) => Object.entries(landmark.pixels)
-                                        .map(([view, pixel]) => ({view, pixel, camera: bench.cameraOf(view)}))
-                                        .filter(({camera}) => camera);
+                                               .map(([view, pixel]) => ({view, pixel, camera: bench.cameraOf(view)}))
+                                               .filter(({camera}) => camera);
 
 // {world_mm, distance_mm, off_px: by view} or null.
 export function placeOf(bench, landmark) {

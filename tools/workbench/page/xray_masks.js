@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Masks of X-rays: zero where a view may not be used. A stroke is kept as one change of the case.
 import {svg} from '../../report/page/dom.js';
+
 import * as Geometry from './geometry.js';
 import * as Ask from './server.js';
 import * as Shell from './shell.js';

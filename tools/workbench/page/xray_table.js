@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The list of landmarks with what the X-rays say about each, and the pose that they give.
-import {el} from '../../report/page/dom.js';
 import * as Dom from '../../report/page/dom.js';
+import {el} from '../../report/page/dom.js';
+
 import * as Shell from './shell.js';
 import * as XrayLandmarks from './xray_landmarks.js';
 
@@ -111,8 +112,7 @@ function useAsStart(bench) {
 
 export function make(bench) {
   const rows = new Map(), body = el('tbody', {});
-  const empty =
-      el('p', {class: 'note'}, 'No landmark yet. Choose the tool “Landmark”, and click a point in an X-ray.');
+  const empty = el('p', {class: 'note'}, 'No landmark yet. Choose the tool “Landmark”, and click a point in an X-ray.');
   const head = ['Landmark', 'Seen in (u, v) px', 'World, mm', 'Rays apart, mm', 'Off, px', 'Fit off, px'].map(
       (text, i) => el('th', {scope: 'col', class: i > 1 ? 'number' : ''}, text));
   const table =

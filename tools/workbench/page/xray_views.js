@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The panel "X-ray views" of the page "Case": which views there are, their geometry, and what is wrong with it.
-import {el} from '../../report/page/dom.js';
 import * as Dom from '../../report/page/dom.js';
+import {el} from '../../report/page/dom.js';
+
 import * as CasePage from './case.js';
 import * as Geometry from './geometry.js';
 import * as Ask from './server.js';
@@ -49,8 +50,7 @@ async function move(draft, name, by) {
     const at = document.views.findIndex((view) => view.name === name), [view] = document.views.splice(at, 1);
     document.views.splice(at + by, 0, view);
   });
-  const button =
-      document.querySelector(`[data-view-row="${CSS.escape(name)}"] [data-do="${by < 0 ? 'up' : 'down'}"]`);
+  const button = document.querySelector(`[data-view-row="${CSS.escape(name)}"] [data-do="${by < 0 ? 'up' : 'down'}"]`);
   if (button) button.focus();
 }
 
@@ -182,10 +182,9 @@ function make(draft) {
       list.replaceChildren(...views.map((view, i) => item(draft, view, i, views.length, entries[i])));
     }
     const known = views.map((view, i) => ({view, camera: entries[i].camera})).filter((one) => one.camera);
-    figures.replaceChildren(
-        el('tbody', {},
-           figuresOf(known).map(
-               ([what, figure]) => el('tr', {}, el('th', {scope: 'row'}, what), el('td', {}, figure)))));
+    figures.replaceChildren(el(
+        'tbody', {},
+        figuresOf(known).map(([what, figure]) => el('tr', {}, el('th', {scope: 'row'}, what), el('td', {}, figure)))));
     if (entries.every((one) => one.is_ready)) ask(known);
   };
   const again = Dom.button('Read again', () => {

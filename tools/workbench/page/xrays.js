@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The panel "X-rays" of the page "Case": the views side by side, the tools that work on them, and the landmarks.
-import {el} from '../../report/page/dom.js';
 import * as Dom from '../../report/page/dom.js';
+import {el} from '../../report/page/dom.js';
+
 import * as CasePage from './case.js';
 import * as Ask from './server.js';
 import * as XrayExchange from './xray_exchange.js';
