@@ -77,8 +77,8 @@ MARROW_PLUGIN(plugin) {
       .option("severity", &Options::severity, "off: no error; mild, usual, bad: half, once or twice the errors below",
               one_of({"off", "mild", "usual", "bad"}))
       .option("shift_mm", &Options::shift_mm, "shift of the camera against the world", at_least(0))
-      .option("turn_deg", &Options::turn_deg, "rotation of the camera about the origin of the world",
-              at_least(0), at_most(30))
+      .option("turn_deg", &Options::turn_deg, "rotation of the camera about the origin of the world", at_least(0),
+              at_most(30))
       .option("focal_percent", &Options::focal_percent, "change of the focal length", at_least(0), at_most(20))
       .option("centre_px", &Options::centre_px, "shift of the principal point", at_least(0))
       .option("camera_seed", &Options::camera_seed, "seed of the errors", at_least(0))

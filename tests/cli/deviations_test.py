@@ -55,10 +55,10 @@ class Deviations(unittest.TestCase):
             for name, numbers in re.findall(r"(\w+): \[(.*)\]", text)
         }
         wanted = {
-            "first_rotation": TRUE_FACTORS["first"][:3],
-            "first_translation": TRUE_FACTORS["first"][3:],
-            "rotation": TRUE_FACTORS["final"][:3],
-            "translation": TRUE_FACTORS["final"][3:],
+            "first_rotation_factors": TRUE_FACTORS["first"][:3],
+            "first_translation_factors": TRUE_FACTORS["first"][3:],
+            "rotation_factors": TRUE_FACTORS["final"][:3],
+            "translation_factors": TRUE_FACTORS["final"][3:],
         }
         self.assertEqual(list(found), list(wanted))
         for name, factors in wanted.items():

@@ -167,8 +167,8 @@ TEST(OutlineDistance, TheNearestEdgeIsThatOfASearchThroughAll) {
     for (const auto& edge : edges.pixels)
       if (edge.direction_u * double(point.normal_u) + edge.direction_v * double(point.normal_v) >= least_cosine)
         best = std::min(best, std::hypot(double(edge.u_px) - point.u_px, double(edge.v_px) - point.v_px));
-    auto found =
-        distances(inputs(views, of_views, PointProjector(point)), {{"reach_px", reach_px}, {"direction_tolerance_deg", angle_deg}});
+    auto found = distances(inputs(views, of_views, PointProjector(point)),
+                           {{"reach_px", reach_px}, {"direction_tolerance_deg", angle_deg}});
     ASSERT_EQ(found["matched_percent"], best <= reach_px ? 100 : 0) << best << " px, reach " << reach_px;
     EXPECT_EQ(found["median_px"], std::min(best, reach_px));
     none += best > reach_px;

@@ -63,9 +63,10 @@ marrow::Digest plastimatch(const Path& path) {
   return read_one<marrow::Camera>("read.camera", path, {{"image_size_px", std::vector<double>{64, 48}}});
 }
 marrow::Digest rtk(const Path& path) {
-  return read_one<marrow::Camera>(
-      "read.camera", path,
-      {{"image_size_px", std::vector<double>{64, 48}}, {"pixel_mm", std::vector<double>{0.5}}, {"mirror", "upside_down"}});
+  return read_one<marrow::Camera>("read.camera", path,
+                                  {{"image_size_px", std::vector<double>{64, 48}},
+                                   {"pixel_mm", std::vector<double>{0.5}},
+                                   {"mirror", "upside_down"}});
 }
 
 struct Case {
@@ -188,9 +189,10 @@ TEST(ForeignTexts, FilesOfOthersWithAByteOrderMark) {
   const auto track = shipped::call("read.tra", {}, {{"path", (data / "track.tra").string()}});
   EXPECT_EQ(track.at("poses").as_list<marrow::Pose>()[1].world_from_model.translation_mm, Eigen::Vector3d(1, 2, 4));
   for (const char* name : {"m.obj", "m.ply", "m.stl"}) EXPECT_NO_THROW(mesh(data / name)) << name;
-  EXPECT_NO_THROW(read_one<marrow::Camera>(
-      "read.camera", data / "g.xml",
-      {{"image_size_px", std::vector<double>{64, 48}}, {"pixel_mm", std::vector<double>{0.5}}, {"mirror", "upside_down"}}));
+  EXPECT_NO_THROW(read_one<marrow::Camera>("read.camera", data / "g.xml",
+                                           {{"image_size_px", std::vector<double>{64, 48}},
+                                            {"pixel_mm", std::vector<double>{0.5}},
+                                            {"mirror", "upside_down"}}));
   for (const char* name : {"v", "w"}) {
     const marrow::Volume volume = marrow::files::read_volume_file(data / name, {});
     EXPECT_EQ(volume.grid.origin_mm, Eigen::Vector3d(5, 6, 7)) << name;

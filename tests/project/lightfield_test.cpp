@@ -17,13 +17,15 @@ shipped::Inputs inputs(const Volume& volume, const marrow::SignedField* field) {
 }
 
 std::shared_ptr<const RadiographProjector> make_medium(const Volume& volume, const marrow::SignedField* field) {
-  return made::projector<RadiographProjector>("project.lightfield", inputs(volume, field),
-                                              {{"ray_spacing_mm", 2.0}, {"direction_spacing_deg", 1.5}, {"max_rotation_deg", 2.0}});
+  return made::projector<RadiographProjector>(
+      "project.lightfield", inputs(volume, field),
+      {{"ray_spacing_mm", 2.0}, {"direction_spacing_deg", 1.5}, {"max_rotation_deg", 2.0}});
 }
 /// In a moment.
 std::shared_ptr<const RadiographProjector> make_coarse(const Volume& volume, const marrow::SignedField* field) {
-  return made::projector<RadiographProjector>("project.lightfield", inputs(volume, field),
-                                              {{"ray_spacing_mm", 5.0}, {"direction_spacing_deg", 4.0}, {"max_rotation_deg", 2.0}});
+  return made::projector<RadiographProjector>(
+      "project.lightfield", inputs(volume, field),
+      {{"ray_spacing_mm", 5.0}, {"direction_spacing_deg", 4.0}, {"max_rotation_deg", 2.0}});
 }
 
 TEST(LightField, IntegralsOfACloud) { radiograph_behaviour::integrals_of_a_cloud(make_medium, 0.2, 1.0); }
@@ -47,8 +49,9 @@ TEST(LightField, FinerStepsAreMoreAccurate) {
   const auto expected = exact->radiograph(camera, pose, grid);
   const auto error = [&](double step_mm, double step_deg) {
     const auto values =
-        made::projector<RadiographProjector>("project.lightfield", in,
-                                             {{"ray_spacing_mm", step_mm}, {"direction_spacing_deg", step_deg}, {"max_rotation_deg", 4.0}})
+        made::projector<RadiographProjector>(
+            "project.lightfield", in,
+            {{"ray_spacing_mm", step_mm}, {"direction_spacing_deg", step_deg}, {"max_rotation_deg", 4.0}})
             ->radiograph(camera, pose, grid);
     double sum = 0;
     for (std::size_t i = 0; i < values.size(); ++i)
@@ -74,8 +77,10 @@ TEST(LightField, OutOfRangeItIsJosephs) {
 
 TEST(LightField, SaysWhatIsWrong) {
   shipped::Inputs in = inputs(radiograph_behaviour::cloud(), nullptr);
-  const std::string text = shipped::refusal("project.lightfield", in, {{"ray_spacing_mm", 0.2}, {"direction_spacing_deg", 0.3}});
-  EXPECT_NE(text.find("MB, but max_memory_mb is 1024; raise ray_spacing_mm or direction_spacing_deg, take a smaller max_rotation_deg, or the "
+  const std::string text =
+      shipped::refusal("project.lightfield", in, {{"ray_spacing_mm", 0.2}, {"direction_spacing_deg", 0.3}});
+  EXPECT_NE(text.find("MB, but max_memory_mb is 1024; raise ray_spacing_mm or direction_spacing_deg, take a smaller "
+                      "max_rotation_deg, or the "
                       "field of a fragment"),
             std::string::npos)
       << text;

@@ -77,8 +77,9 @@ void expect_mirrored_postures(const List<Posture>& found, const List<Posture>& o
 void bone_motion() {
   const Eigen::Vector3d turn(6, 4, 60), shift(4, 3, 6);
   const auto postures = [](const Phantom& phantom, const Eigen::Vector3d& turn, const Eigen::Vector3d& shift) {
-    return shipped::call("simulate.bone_motion", {{"phantom", shipped::item(phantom)}},
-                         {{"frames", std::int64_t(9)}, {"rotation_deg", list_of(turn)}, {"translation_mm", list_of(shift)}})
+    return shipped::call(
+               "simulate.bone_motion", {{"phantom", shipped::item(phantom)}},
+               {{"frames", std::int64_t(9)}, {"rotation_deg", list_of(turn)}, {"translation_mm", list_of(shift)}})
         .at("postures")
         .as_list<Posture>();
   };

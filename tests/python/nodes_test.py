@@ -9,11 +9,13 @@ from package import FEMUR, Case, main, marrow, small_case
 class Nodes(Case):
     def test_a_node_gives_what_it_gives_in_a_pipeline(self):
         folder, case = small_case()
-        pipeline = marrow.Pipeline(FEMUR, case=folder).set({"edges.uses": "edges.canny", "edges.high": 8})
+        pipeline = marrow.Pipeline(FEMUR, case=folder).set({"edges.uses": "edges.canny", "edges.noise_high": 8})
         expected = pipeline.run(only=["edges"])["edges"]["lateral"].pixels
         views = marrow.read.case(path=folder).views
         self.assertTrue(numpy.array_equal(marrow.edges.canny(views["lateral"], noise_high=8).pixels, expected))
-        self.assertTrue(numpy.array_equal(marrow.node("edges.canny")(view=views["lateral"], high=8).pixels, expected))
+        self.assertTrue(
+            numpy.array_equal(marrow.node("edges.canny")(view=views["lateral"], noise_high=8).pixels, expected)
+        )
         self.assertFalse(len(marrow.edges.canny(views["lateral"]).pixels) == len(expected))
 
     def test_a_list_means_one_call_for_each_item(self):
@@ -66,8 +68,8 @@ class Nodes(Case):
         view = case.views["lateral"]
         for call, text in (
             (
-                lambda: marrow.edges.canny(view, hihg=5),
-                "edges.canny has no input or option 'hihg'; did you mean 'high'?",
+                lambda: marrow.edges.canny(view, noise_hihg=5),
+                "edges.canny has no input or option 'noise_hihg'; did you mean 'noise_high'?",
             ),
             (lambda: marrow.edges.canny(view, 5), "edges.canny takes 1 input, got 2; options are given by name"),
             (lambda: marrow.edges.canny(view, view=view), "edges.canny: the input 'view' is given twice"),

@@ -52,7 +52,7 @@ class Run(Case):
         folder, _ = small_case()
         pipeline = marrow.Pipeline(FEMUR, case=folder)
         before = pipeline.run(only=["edges"])
-        after = pipeline.set("edges.uses", "edges.canny").set("edges.high", 8).run(only=["edges"])
+        after = pipeline.set("edges.uses", "edges.canny").set("edges.noise_high", 8).run(only=["edges"])
         self.assertEqual(pipeline.nodes["edges"], "edges.canny")
         self.assertIn("high: 8", pipeline.resolved())
         self.assertNotEqual(len(before["edges"]["lateral"]), len(after["edges"]["lateral"]))

@@ -7,7 +7,7 @@ from values import read_yaml
 
 
 def calibration(call):
-    found, truth = call.one("calibration", read_yaml), call.one("truth", read_yaml)
+    found, truth = call.one("calibration", read_yaml), call.one("true_calibration", read_yaml)
     k, exact = (np.asarray(one["intrinsics"], float) for one in (found, truth))
     focal = [100 * abs(k[i, i] - exact[i, i]) / exact[i, i] for i in (0, 1)]
     # A shift of the principal point is nearly a turn of the device, so the mean shift over the image does not count.

@@ -65,7 +65,7 @@ def edges(picture, image, sigma_px):
 
 def outline_distance(call):
     options, place = call.options, call.one("pose", read_pose).world_from_ct
-    mesh = call.one("projector.mesh", surface.read)
+    mesh = call.one("projector.model", surface.read)
     check_whole(mesh, call)
     cameras, images = call.many("views", read_camera), call.many("views", read_view_image)
     sigma_px = call.run.option("sigma_px")
@@ -92,7 +92,7 @@ def check_whole(mesh, call):
 
 def to_edges(points, normals, places, directions, options):
     """(distances [px], of matched points along the normal [px]); a point without an edge counts with the reach."""
-    tree, least = cKDTree(places), np.cos(np.radians(options["angle_deg"]))
+    tree, least = cKDTree(places), np.cos(np.radians(options["direction_tolerance_deg"]))
     off, across = np.full(len(points), options["reach_px"], float), []
     for number, (point, normal) in enumerate(zip(points, normals)):
         near = np.array(tree.query_ball_point(point, options["reach_px"]), int)

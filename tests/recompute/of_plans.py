@@ -132,7 +132,9 @@ def locking(call):
     if call.item in errors:
         return {name: exactly(value) for name, value in errors[call.item].items()}
     options, holes = call.options, list(errors.values())
-    is_off = [one["angle_deg"] > options["most_deg"] or one["offset_mm"] > options["most_mm"] for one in holes]
+    is_off = [
+        one["angle_deg"] > options["max_angle_deg"] or one["offset_mm"] > options["max_offset_mm"] for one in holes
+    ]
     worst = {name: max(one[name] for one in holes) for name in ("angle_deg", "offset_mm", "view_deg", "flagged")}
     worst["off"] = float(any(is_off))
     worst["silent"] = float(any(off and not one["flagged"] for off, one in zip(is_off, holes)))

@@ -22,7 +22,7 @@ class Targets:
             self.weights = np.full(len(self.points_mm), 1 / len(self.points_mm))
             self.corners_mm, self.count = self.points_mm, None
         else:
-            bone = call.one("model" if call.has("model") else "mesh", surface.read)
+            bone = call.one("model", surface.read)
             self.points_mm, self.weights = bone.points()
             self.corners_mm, self.count = bone.vertices_mm, count or call.options.get("points", 500)
 
@@ -159,7 +159,7 @@ def calibrated(call):
     if last.covariance is None:
         return {}
     axes = call.one("model", surface.read).frame()
-    factors = np.diag(np.concatenate([call.options["rotation"], call.options["translation"]]))
+    factors = np.diag(np.concatenate([call.options["rotation_factors"], call.options["translation_factors"]]))
     scaled = factors @ in_other_frame(last.covariance, last.frame, axes) @ factors
     back = np.sqrt(np.diag(in_other_frame(scaled, axes, last.frame)))
     back[:3] = np.degrees(back[:3])

@@ -94,7 +94,7 @@ def is_determined(pose):
 
 
 def predicted(call):
-    pose, bone, options = call.one("pose", read_pose), call.one("mesh", surface.read), call.options
+    pose, bone, options = call.one("pose", read_pose), call.one("model", surface.read), call.options
     if pose.deviations and not is_determined(pose):
         return {"failure_probability": exactly(1), "judgement": "wrong"}
     if not is_determined(pose):
@@ -130,7 +130,7 @@ def against_prior(pose, prior, frame, options):
 
 def of_evidence(call, printed):
     """The probability from the printed figures, by the failure model; and those figures that poses alone give."""
-    pose, bone, options = call.one("pose", read_pose), call.one("mesh", surface.read), call.options
+    pose, bone, options = call.one("pose", read_pose), call.one("model", surface.read), call.options
     if not options.get("failure_model"):
         return {"judgement": "doubtful"}
     model = read_yaml(call.run.file_of(options["failure_model"]))
@@ -148,7 +148,7 @@ def of_evidence(call, printed):
         printed.get(by + "apart_mm", 0) > MOST_MM or printed.get(by + "apart_deg", 0) > MOST_DEG
         for by in ("", "contour_")
     )
-    is_denied |= printed.get("intersection_mm", 0) > options["most_intersection_mm"]
+    is_denied |= printed.get("intersection_mm", 0) > options["max_intersection_mm"]
     if is_denied and result["judgement"] == "trusted":
         result["judgement"] = "doubtful"
     return result

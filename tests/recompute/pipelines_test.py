@@ -88,7 +88,7 @@ class Pipelines(Case):
 
     def test_a_calibration(self):
         out = run(self.scratch / "run", "calibrate.yaml")
-        self.check(out, 18, ["calibration.report", "calibration.poses"])
+        self.check(out, 18, ["calibration.metrics", "calibration.view_metrics"])
 
     def test_segmentations_and_surfaces(self):
         out = self.scratch / "run"

@@ -47,13 +47,13 @@ RECOMPUTED = {
     ),
     ("evaluate.outline_distance", "metrics"): (
         of_outlines.outline_distance,
-        ("pose", "views", "edges", "projector.mesh", "projector.volume"),
+        ("pose", "views", "edges", "projector.model", "projector.volume"),
     ),
     ("evaluate.shaft_lines", "metrics"): (of_shafts.shaft_lines, ("lines", "view", "models", "truths")),
     ("evaluate.dice", "metrics"): (of_surfaces.dice, ("field", "reference")),
     ("evaluate.surface_distance", "metrics"): (of_surfaces.surface_distance, ("mesh", "reference")),
     ("evaluate.frames", "metrics"): (of_sequences.frames, ("metrics", "states")),
-    ("evaluate.calibration", "metrics"): (of_calibrations.calibration, ("calibration", "truth")),
+    ("evaluate.calibration", "metrics"): (of_calibrations.calibration, ("calibration", "true_calibration")),
     ("evaluate.reduced", "metrics"): (of_fractures.reduced, ("truths", "models")),
     ("evaluate.reduction_gap", "metrics"): (of_fractures.reduction_gap, ("poses", "truths", "models")),
     ("evaluate.locking", "holes"): (of_plans.locking, ("plan", "implant", "truth")),
@@ -66,8 +66,8 @@ RECOMPUTED = {
     ("plan.locking", "verdict"): (of_plans.plan_verdict, ("implant", "pose")),
     ("track.joint", "metrics"): (of_sequences.joint, ("proximal", "distal")),
     ("track.trajectory", "trajectory"): (of_sequences.trajectory, ("states", "verdicts", "@model")),
-    ("verdict.predicted", "verdict"): (of_verdicts.predicted, ("pose", "mesh", "prior")),
-    ("verdict.evidence", "verdict"): (of_verdicts.evidence, ("pose", "mesh", "stages", "contour_pose")),
+    ("verdict.predicted", "verdict"): (of_verdicts.predicted, ("pose", "model", "prior")),
+    ("verdict.evidence", "verdict"): (of_verdicts.evidence, ("pose", "model", "stages", "contour_pose")),
 }
 
 

@@ -118,7 +118,8 @@ TEST(SimulateExport, BadInputIsExplained) {
   const auto refusal = [&](const View& earlier) {
     return shipped::refusal(
         "simulate.export",
-        {{"views", shipped::list(one(even(100)), "view")}, {"earlier_views", shipped::list(one(earlier), "view")}}, lag);
+        {{"views", shipped::list(one(even(100)), "view")}, {"earlier_views", shipped::list(one(earlier), "view")}},
+        lag);
   };
   EXPECT_EQ(refusal(even(100, 64, "lateral")),
             "simulate.export: there is no earlier image of view 'frontal'; give 'earlier' the same views");

@@ -37,7 +37,8 @@ TEST(SimulateFracture, CentreOfAnOutlineIsExact) {
   double low = 1e9, high = -1e9;
   for (const auto& vertex : bone.outer.vertices_mm) low = std::min(low, vertex.z()), high = std::max(high, vertex.z());
   // A smooth fracture contains the centre of the outline at its level, and rises here by 1 mm in 1 mm.
-  shipped::Options options{{"height_fraction", (12.34 - low) / (high - low)}, {"obliquity_deg", 45.0}, {"roughness_mm", 0.0}};
+  shipped::Options options{
+      {"height_fraction", (12.34 - low) / (high - low)}, {"obliquity_deg", 45.0}, {"roughness_mm", 0.0}};
   options["direction_deg"] = 0.0;
   for (const auto& point : relief(bone, options)) ASSERT_NEAR(point.x() - (point.z() - 12.34), 3, 0.02);
   options["direction_deg"] = 90.0;

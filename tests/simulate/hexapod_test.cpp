@@ -46,7 +46,8 @@ std::array<double, 2> errors(const shipped::Outputs& made, const List<Pose>& com
 TEST(SimulateSweeps, BeginAtNeutralAndGoFromThereToEitherSide) {
   const List<Pose> all = sweeps({});
   EXPECT_EQ(all.size(), 94u);  // 3 x 31 and the neutral one
-  const List<Pose> commands = sweeps({{"axes", std::vector<std::string>{"y"}}, {"max_rotation_deg", 5.0}, {"turn_step_deg", 2.5}});
+  const List<Pose> commands =
+      sweeps({{"axes", std::vector<std::string>{"y"}}, {"max_rotation_deg", 5.0}, {"turn_step_deg", 2.5}});
   EXPECT_EQ(commands.names(),
             (std::vector<std::string>{"neutral", "ry+00.00", "ry+02.50", "ry+05.00", "ry-02.50", "ry-05.00"}));
   const RigidTransform& last = commands[5].world_from_model;
@@ -56,7 +57,9 @@ TEST(SimulateSweeps, BeginAtNeutralAndGoFromThereToEitherSide) {
 
 TEST(SimulateSweeps, NamesTellAllStepsApart) {
   const auto names = [](double range_deg, double step_deg) {
-    return sweeps({{"axes", std::vector<std::string>{"z"}}, {"max_rotation_deg", range_deg}, {"turn_step_deg", step_deg}}).names();
+    return sweeps(
+               {{"axes", std::vector<std::string>{"z"}}, {"max_rotation_deg", range_deg}, {"turn_step_deg", step_deg}})
+        .names();
   };
   EXPECT_EQ(names(0.03, 0.015),
             (std::vector<std::string>{"neutral", "rz+00.000", "rz+00.015", "rz+00.030", "rz-00.015", "rz-00.030"}));

@@ -148,9 +148,10 @@ marrow::Pose prior_of(const marrow::Pose& pose, double turned_deg, double deviat
 }
 Verdict verdict_of(const marrow::Pose& pose, const marrow::Pose& prior, marrow::Context context = marrow::Context(),
                    const shipped::Options& options = {}) {
-  return shipped::call("verdict.predicted",
-                       {{"pose", shipped::item(pose)}, {"model", shipped::item(box())}, {"prior", shipped::item(prior)}},
-                       options, context)
+  return shipped::call(
+             "verdict.predicted",
+             {{"pose", shipped::item(pose)}, {"model", shipped::item(box())}, {"prior", shipped::item(prior)}}, options,
+             context)
       .at("verdict")
       .as<Verdict>();
 }

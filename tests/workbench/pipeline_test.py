@@ -92,7 +92,9 @@ class RequestTest(PipelineBench):
         old = self.state()["revision"]
         self.file.write_text(PIPELINE.replace("high: 5", "high: 6"))
         self.assertEqual(
-            self.error(self.edit(old, what="option", node="edges", uses="edges.canny", name="high", value="7"), 409),
+            self.error(
+                self.edit(old, what="option", node="edges", uses="edges.canny", name="noise_high", value="7"), 409
+            ),
             "small.yaml was changed elsewhere; the page now shows what is newest",
         )
         state = self.state()
@@ -264,7 +266,7 @@ class PipelinePageTest(PageTest, PipelineBench):
         self.browser.wait("return !!document.querySelector('[data-fault]')", 60)
         self.assertIn("line 16:", self.text_of("[data-fault]"))
         self.assertEqual(self.text_of(".gutter .bad").strip(), "● 16")
-        self.assertIn("did you mean 'high'?", self.text_of(".faults"))
+        self.assertIn("did you mean 'noise_high'?", self.text_of(".faults"))
         self.click("[data-fault]")
         chosen = self.js(
             "const box = document.activeElement; return box.value.slice(box.selectionStart, box.selectionEnd)"

@@ -25,7 +25,7 @@ class ResultsBench(BenchTest):
             (cls.made / "small.yaml").write_text(PIPELINE)
             for name, high in (("first", 5), ("second", 9)):
                 subprocess.run(
-                    [MARROW, "run", "small.yaml", "level=0.4", "--set", "edges.high=%d" % high]
+                    [MARROW, "run", "small.yaml", "level=0.4", "--set", "edges.noise_high=%d" % high]
                     + ["--out", "runs/" + name, "--quiet", "--no-cache"],
                     cwd=cls.made,
                     check=True,
@@ -182,9 +182,9 @@ class ResultsPageTest(PageTest, ResultsBench):
             "They begin to differ at the node edges (edges.canny).",
         )
         cells = self.js(
-            "return [...document.querySelectorAll('[data-change=\"edges.high\"] > *')].map((one) => one.textContent)"
+            "return [...document.querySelectorAll('[data-change=\"edges.noise_high\"] > *')].map((one) => one.textContent)"
         )
-        self.assertEqual(cells, ["edges", "option high", "5", "9", "the first difference"])
+        self.assertEqual(cells, ["edges", "option noise_high", "5", "9", "the first difference"])
         self.browser.wait(
             "return [...document.querySelectorAll('.overlays img')].every((one) => one.naturalWidth === 96)"
         )

@@ -43,7 +43,7 @@ def bead_board(random):
     board, side_px, pixel_mm = str(ROOT / "pipelines/calibration/board.yaml"), 512, 0.6
     simulate = marrow.simulate.bead_board.using(seed=int(random.integers(1 << 31)))
     seen = simulate(board=board, views=IMAGES, width_px=side_px, height_px=side_px, pixel_mm=pixel_mm)
-    report = marrow.camera.bead_board(images=seen.images, board=board).report
+    report = marrow.camera.bead_board(images=seen.images, board=board).metrics
     right = {"focal_u": 1000 / pixel_mm, "focal_v": 1000 / pixel_mm}
     right.update(principal_u=(side_px - 1) / 2 + 7, principal_v=(side_px - 1) / 2 - 5)
     error = np.array([report[name] - value for name, value in right.items()])
