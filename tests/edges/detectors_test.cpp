@@ -243,7 +243,7 @@ TEST_P(Edges, AreFoundInReasonableTime) {
 }
 
 TEST(Canny, DeclaresTheOrderOfItsThresholds) {
-  EXPECT_TRUE(shipped::declares("edges.canny", marrow::not_above("low", "high")));
+  EXPECT_TRUE(shipped::declares("edges.canny", marrow::not_above("noise_low", "noise_high")));
 }
 
 }  // namespace detectors_test

@@ -166,7 +166,7 @@ void expect_no_pose(const std::string& what, const Scene& scene, const std::func
 
 bool any(const std::string&) { return true; }
 bool needs_projector(const std::string& cost) {
-  return has(cost, "projector") && !has(cost, "field") && !has(cost, "mesh");
+  return has(cost, "projector") && !has(cost, "field") && !has(cost, "model");
 }
 bool needs_edges(const std::string& cost) { return has(cost, "edges"); }
 bool needs_grey_values(const std::string& cost) { return !has(cost, "edges"); }

@@ -94,7 +94,7 @@ class Everywhere : public intensity_behaviour::BlobProjector {
 };
 
 double value(const std::string& measure, double du, double dv, shipped::Options options = {}) {
-  options["blur_px"] = 0.0;
+  options["sigma_steps"] = 0.0;
   options["pixel_step"] = std::int64_t(1);
   options["margin_px"] = std::int64_t(kMargin_px);
   const shipped::Inputs in{
@@ -208,7 +208,7 @@ TEST(Formulas, WhatTheModelDoesNotReachCountsAsWell) {
           {"views",
            shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of(50000, 0.02, 0)), "view")}};
       return shipped::call("similarity." + measure, in,
-                           {{"pixel_step", std::int64_t(1)}, {"blur_px", 0.0}, {"margin_px", std::int64_t(16)}})
+                           {{"pixel_step", std::int64_t(1)}, {"sigma_steps", 0.0}, {"margin_px", std::int64_t(16)}})
           .at("cost")
           .as<marrow::Cost>()
           .value(intensity_behaviour::at(du, dv));
