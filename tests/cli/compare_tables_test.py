@@ -8,8 +8,12 @@ import resource
 import shlex
 import shutil
 import subprocess
+import sys
 
 from marrow_cli import IS_SANITIZED, SOURCE, TEST_PLUGINS, Case, main, marrow
+
+sys.path.insert(0, str(SOURCE / "tests" / "report"))
+from modules import modules  # noqa: E402
 
 PIPELINE = """marrow: 1
 inputs: {case: {type: path}}
@@ -102,8 +106,8 @@ class Tables(Case):
         self.assertFalse((self.scratch / "hurt").exists())
 
     def test_the_page_quotes_as_well(self):
-        if not shutil.which("node"):
-            self.skipTest("needs node")
+        if not (shutil.which("node") and shutil.which("esbuild")):
+            self.skipTest("needs node and esbuild")
         words = [
             "plain/a-b_c.yaml",
             "it's",
@@ -123,7 +127,7 @@ class Tables(Case):
         quoted = "\nconsole.log(JSON.stringify(%s.map((w) => [Dom.shellWord(w), Dom.shellPath(w)])));" % json.dumps(
             words
         )
-        script = (SOURCE / "tools" / "report" / "dom.js").read_text() + quoted
+        script = modules(Dom="report/page/dom.js") + quoted
         pairs = json.loads(subprocess.run(["node", "-e", script], capture_output=True, text=True, check=True).stdout)
         for word, (quoted, path) in zip(words, pairs):
             said = subprocess.run(

@@ -10,13 +10,13 @@ import time
 
 def missing():
     """What keeps the tests from running here, or None."""
-    needed = {"chromium": "chromium", "chromedriver": "chromium-driver"}
+    needed = {"chromium": "chromium", "chromedriver": "chromium-driver", "esbuild": "esbuild"}
     absent = [package for program, package in needed.items() if not shutil.which(program)]
     try:
         import selenium  # noqa: F401
     except ImportError:
         absent.append("python3-selenium (for /usr/bin/python3)")
-    if not pathlib.Path("/usr/share/javascript/three/three.min.js").exists():
+    if not pathlib.Path("/usr/share/javascript/three/three.module.js").exists():
         absent.append("libjs-three")
     return "missing Debian packages: " + ", ".join(absent) if absent else None
 

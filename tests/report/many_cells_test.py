@@ -83,9 +83,9 @@ class ManyCellsTest(BrowserTest):
         self.browser.open(self.page)
         busy = "[() => {}, () => { const end = performance.now() + 120; while (performance.now() < end); }]"
         self.eventually(lambda: self.longest_task_ms(busy) > MOST_TASK_MS, True)  # a stall is seen
-        sort = """[() => Page.table.orders.clear(),
+        sort = """[() => marrow.table.orders.clear(),
             ...[...document.querySelectorAll('#cells .sort')].flatMap((b) => [() => b.click(), () => b.click()])]"""
-        filters = """[() => Page.table.words.clear(),
+        filters = """[() => marrow.table.words.clear(),
             ...[['Text', ['c', 'ca', 'case-07/3', 'shaft', '']], ['Variant', ['7', '']], ['Case', ['50', '']],
                 ['Outcome', ['missed', '']]].flatMap(([label, values]) => {
               const fields = [...document.querySelectorAll('#cells label.field')];
@@ -133,7 +133,7 @@ class ManyCellsTest(BrowserTest):
         count = lambda: self.browser.js("return document.querySelector('#cells table').getAttribute('aria-rowcount')")
         self.assertEqual(count(), "10001")
         self.assertLess(len(self.rows()), 60)
-        self.browser.js("const r = document.querySelector('.rows'); r.scrollTop = Page.table.table.row_px * 5000")
+        self.browser.js("const r = document.querySelector('.rows'); r.scrollTop = marrow.table.table.row_px * 5000")
         self.eventually(lambda: self.cells[5000]["id"] in self.rows(), True)
         self.assertLess(len(self.rows()), 60)
         place = self.browser.js(

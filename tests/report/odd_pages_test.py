@@ -9,7 +9,7 @@ import pathlib
 import sys
 
 import synthetic
-from page import PageTest, assemble, run_tests
+from page import PageTest, page_of, run_tests
 
 HOSTILE = "</script><script>window.hurt = 1</script><img src=x onerror='window.hurt = 2'>\"&amp;${1}"
 
@@ -42,7 +42,7 @@ class OddPagesTest(PageTest):
 
     def test_without_three_and_without_data(self):
         path = self.folder / "no_three.html"
-        path.write_text(assemble.assemble(self.run_data, three=pathlib.Path("/nowhere/three.min.js")))
+        path.write_text(page_of(self.run_data, three=pathlib.Path("/nowhere/three.module.js")))
         self.browser.open(path)
         self.browser.show("scene")
         self.browser.wait("return document.querySelector('#scene').innerText.includes('libjs-three')")
@@ -69,7 +69,7 @@ class OddPagesTest(PageTest):
     def test_controls_have_names(self):
         self.browser.open(self.comparison)
         self.browser.show("scene")
-        self.browser.wait("return !!Page.scene")
+        self.browser.wait("return !!marrow.scene")
         nameless = self.browser.js(
             """const controls = 'button, select, input, [role=button], [role=slider], svg[role=img], canvas, img';
             const named = (item) => item.textContent.trim() || item.getAttribute('aria-label') ||

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of the report's page share: pages of made-up data in headless Chromium, and how they are used."""
+import functools
+import json
 import pathlib
 import shutil
 import sys
@@ -8,9 +10,9 @@ import time
 import unittest
 
 HERE = pathlib.Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE.parents[1] / "tools" / "report")]
-import assemble  # noqa: E402
+sys.path[:0] = [str(HERE), str(HERE.parents[1] / "tools" / "report" / "page")]
 import browser  # noqa: E402
+import bundle  # noqa: E402
 import synthetic  # noqa: E402
 
 SECTIONS = [
@@ -30,6 +32,18 @@ SECTIONS = [
 ]
 
 
+@functools.lru_cache
+def page_without_data(three):
+    return bundle.html(pathlib.Path(bundle.__file__).with_name("report.html"), three)
+
+
+def page_of(data, three=bundle.THREE):
+    """The text of a report's page with this data."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    script = '<script type="application/json" id="data">%s</script>' % text
+    return page_without_data(three).replace("<!-- marrow:data -->", script)
+
+
 class BrowserTest(unittest.TestCase):
     """A browser, a folder for pages, and what is done with a page."""
 
@@ -46,7 +60,7 @@ class BrowserTest(unittest.TestCase):
     @classmethod
     def write(cls, name, data):
         path = cls.folder / (name + ".html")
-        path.write_text(assemble.assemble(data))
+        path.write_text(page_of(data))
         return path
 
     def tearDown(self):

@@ -12,7 +12,7 @@ import sys
 import threading
 
 import synthetic
-from page import BrowserTest, assemble, run_tests
+from page import BrowserTest, page_of, run_tests
 
 SOURCES = "return [...document.querySelectorAll('#cell .gallery img')].map((image) => image.naturalWidth)"
 
@@ -29,7 +29,7 @@ class PartsTest(BrowserTest):
         data = synthetic.as_table(synthetic.comparison(cases=3, starts=2, variants=2, looked_at=2))
         (cls.folder / "whole").mkdir()
         cls.page = cls.folder / "whole" / "report.html"
-        cls.page.write_text(assemble.assemble(synthetic.put_beside(data, cls.folder / "whole" / "report", [(0, 1)])))
+        cls.page.write_text(page_of(synthetic.put_beside(data, cls.folder / "whole" / "report", [(0, 1)])))
         cls.part = cls.folder / "whole" / "report" / data["parts"][0]["file"]
         (cls.folder / "alone").mkdir()
         cls.alone = shutil.copy(cls.page, cls.folder / "alone" / "report.html")
@@ -60,7 +60,7 @@ class PartsTest(BrowserTest):
         widths = "return [...document.querySelectorAll('#pictures .stage img')].map((image) => image.naturalWidth)"
         self.eventually(lambda: self.browser.js(widths), [256, 256])
         self.browser.show("scene")
-        self.browser.wait("return !!Page.scene")
+        self.browser.wait("return !!marrow.scene")
         self.eventually(lambda: len(self.texts("#convergence svg.plot")), 1)
 
     def test_from_a_server(self):

@@ -77,7 +77,7 @@ class Program(unittest.TestCase):
     def check_scene(self):
         """The 3D view opens when it is near, and has what the node gave it: the result, the start and the truth."""
         self.browser.show("scene")
-        self.browser.wait("return window.Page && !!Page.scene || typeof Page !== 'undefined' && !!Page.scene")
+        self.browser.wait("return !!marrow.scene")
         self.assertEqual(
             self.browser.js(
                 "return Object.values(JSON.parse(document.getElementById('data').textContent).scenes)[0].poses.map(pose"

@@ -14,7 +14,8 @@ import time
 import browser
 import synthetic
 import synthetic_verdicts
-from page import SECTIONS, PageTest, assemble, run_tests
+from modules import modules
+from page import SECTIONS, PageTest, page_of, run_tests
 
 
 class ReportTest(PageTest):
@@ -41,8 +42,10 @@ class ReportTest(PageTest):
 
     def test_capture_counts_every_cell_once(self):
         self.browser.open(self.comparison)
+        scripts = modules(Data="report/page/data.js", Figures="report/page/figures.js")
         counts = self.browser.js(
-            "return Figures.captureBins(Data.load()).map((row) => row.reduce((sum, item) => [sum[0] + item.count,"
+            scripts + "return Figures.captureBins(Data.load())"
+            ".map((row) => row.reduce((sum, item) => [sum[0] + item.count,"
             " sum[1] + item.of], [0, 0]))"
         )
         wanted = [[item["success"]["count"], item["success"]["of"]] for item in self.comparison_data["summary"]]
@@ -57,7 +60,7 @@ class ReportTest(PageTest):
             self.assertAlmostEqual(
                 float(value.removeprefix("at least ").removesuffix("\u00a0mm")), item["capture"]["range"], delta=0.05
             )
-        ours = self.browser.js("return Data.wilson(7, 20)")
+        ours = self.browser.js(scripts + "return Data.wilson(7, 20)")
         for key, value in synthetic.wilson(7, 20).items():
             self.assertAlmostEqual(ours[key], value, 9)
 
@@ -248,7 +251,7 @@ class ReportTest(PageTest):
 def photograph(folder):
     folder.mkdir(parents=True, exist_ok=True)
     page = folder / "comparison.html"
-    page.write_text(assemble.assemble(synthetic.comparison()))
+    page.write_text(page_of(synthetic.comparison()))
     window = browser.Browser()
     for name, width_px, theme in (("light", 1200, "light"), ("dark", 1200, "dark"), ("narrow", 400, "light")):
         window.open(page, width_px, theme=theme)

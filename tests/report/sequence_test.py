@@ -102,10 +102,10 @@ class SequenceTest(PageTest):
     def test_the_3d_view_moves_with_it(self):
         self.choose("Frame", 2, "#sequence")
         self.browser.show("scene")
-        self.browser.wait("return !!Page.scene")
-        if self.browser.js("return !!Page.scene.failure"):
+        self.browser.wait("return !!marrow.scene")
+        if self.browser.js("return !!marrow.scene.failure"):
             self.skipTest("no WebGL")
-        place = "const m = Page.scene.models[0].group.matrix.elements; return [m[12], m[13], m[14]]"
+        place = "const m = marrow.scene.models[0].group.matrix.elements; return [m[12], m[13], m[14]]"
         at = lambda i: [self.data["cells"][0]["trajectories"][0]["world_from_model"][i][k] for k in (3, 7, 11)]
         self.assertEqual(self.browser.js(place), at(2))
         self.choose("Frame", 5, "#sequence")

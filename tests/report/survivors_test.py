@@ -9,6 +9,7 @@ import copy
 import sys
 
 import synthetic
+from modules import modules
 from page import PageTest, run_tests
 
 
@@ -115,7 +116,10 @@ class SurvivorsTest(PageTest):
         self.page(change)
         for number, text in enumerate(("0.3 % 1/301", "99.97 % 2999/3000", " 0 % 0/301", "100 % 60/60")):
             self.assertIn(text, self.row(number))
-        texts = self.browser.js("return [0.0004, 0.9996, 0, 1, 0.03, 1e-20].map((p) => Verdict.failure(p))")
+        texts = self.browser.js(
+            modules(Verdict="report/page/verdict.js")
+            + "return [0.0004, 0.9996, 0, 1, 0.03, 1e-20].map((p) => Verdict.failure(p))"
+        )
         self.assertEqual(
             texts,
             ["failure 0.04 %", "failure 99.96 %", "failure 0.0 %", "failure 100 %"]

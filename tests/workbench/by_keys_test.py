@@ -87,11 +87,11 @@ class ByKeysTest(WholeWay):
     def moved_by_keys(self):
         """The bone, a step to the left in the first view and back, and turned about its axis: the draft has it."""
         self.reach(".place-canvas")
-        before = self.browser.js("return PlacePage.current().placed.distal")
+        before = self.browser.js("return marrow.place().placed.distal")
         self.keys(Keys.ARROW_LEFT, "a", "q", "w", "r")
         self.until(lambda document: document["fragments"]["distal"].get("start") not in (None, before))
         self.keys("f", "s", "e", "d", Keys.ARROW_RIGHT)
-        self.browser.wait("return !PlacePage.current().keyMoves && !PlacePage.current().isKeeping")
+        self.browser.wait("return !marrow.place().keyMoves && !marrow.place().isKeeping")
 
     def test_from_dicom_to_a_pose(self):
         self.make_case()

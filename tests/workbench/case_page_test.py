@@ -108,7 +108,8 @@ class CasePageTest(PageTest):
     def document(self):
         """What the server keeps."""
         return self.browser.driver.execute_async_script(
-            "const done = arguments[0]; Ask.json('api/draft', {case: 'mine'}).then((state) => done(state.document))"
+            "fetch('api/draft?case=mine').then((answer) => answer.json())"
+            ".then((state) => arguments[0](state.document))"
         )
 
     def saved_when(self, condition):

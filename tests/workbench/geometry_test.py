@@ -9,6 +9,7 @@ import unittest
 import numpy
 
 from bench import MARROW, SOURCE, PageTest, main
+from modules import modules
 from xray_bench import write_png
 
 COUNT = 1000
@@ -57,11 +58,14 @@ def ray(camera, at):
 
 class GeometryTest(PageTest):
     def js(self, body, argument):
-        """The value of a function's body with the scripts of the page in front. It calls its argument `given`."""
-        names = ("geometry.js", "viewport.js", "sight.js")
-        scripts = "\n".join((SOURCE / "tools" / "workbench" / name).read_text() for name in names)
+        """The value of a function's body with modules of the page in front. It calls its argument `given`."""
+        scripts = modules(
+            Geometry="workbench/page/geometry.js",
+            Viewport="workbench/page/viewport.js",
+            Sight="workbench/page/sight.js",
+        )
         self.browser.driver.get("about:blank")
-        text = scripts.replace("'use strict';", "") + "\nconst given = JSON.parse(arguments[0]);\n" + body
+        text = scripts + "const given = JSON.parse(arguments[0]);\n" + body
         return json.loads(self.browser.js(text, json.dumps(argument)))
 
     def test_what_is_clicked_comes_back(self):

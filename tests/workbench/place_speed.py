@@ -16,12 +16,15 @@ import tempfile
 import time
 
 import bench
+from modules import modules
 
 POSES = 300
 DRAGS = 1000
 
-MOVE = """
-const page = PlacePage.current(), took = [];
+MOVE = (
+    modules(Geometry="workbench/page/geometry.js")
+    + """
+const page = marrow.place(), took = [];
 let missing = new Set(), all = () => {};
 const painted = page.painted.bind(page);
 page.painted = (view, since) => {
@@ -51,6 +54,7 @@ const answer = arguments[1], count = arguments[0];
   answer(took);
 })();
 """
+)
 
 
 def summary(times_ms):
@@ -122,15 +126,15 @@ def measure(width_px, case, browser, with_drags):
         test = bench.PageTest()
         bench.PageTest.browser = browser
         test.show(server, "place=case")
-        browser.js("PlacePage.current().judges = false")
-        browser.js("return PlacePage.current().stopVerdict()")
+        browser.js("marrow.place().judges = false")
+        browser.js("return marrow.place().stopVerdict()")
         browser.driver.execute_async_script(MOVE, 30)  # warm
         load = os.getloadavg()[0]
         times_ms = browser.driver.execute_async_script(MOVE, POSES)
-        coarse = browser.js("return PlacePage.current().views.some((view) => view.isSlow)")
+        coarse = browser.js("return marrow.place().views.some((view) => view.isSlow)")
         print("every second pixel while moving" if coarse else "all pixels while moving")
         print("%d px, pose change to both views painted: %s (load %.1f)" % (width_px, summary(times_ms), load))
-        about = browser.js("return PlacePage.current().about")
+        about = browser.js("return marrow.place().about")
         server.cookie = "; ".join(
             "%s=%s" % (cookie["name"], cookie["value"]) for cookie in browser.driver.get_cookies()
         )

@@ -250,14 +250,14 @@ class PageOfCaseTest(PageOfCase, Placing, PageTest):
             ["begin: CT coordinates taken as world coordinates", "move distal", "turn distal"],
         )
         self.js("document.querySelector('[data-do=undo]').click()")
-        self.browser.wait("return PlacePage.current().draft.state_redo === 'turn distal'")
+        self.browser.wait("return marrow.place().draft.state_redo === 'turn distal'")
         self.assertEqual(self.pose(), one)
         self.js("document.querySelector('[data-do=undo]').click()")
-        self.browser.wait("return PlacePage.current().draft.state_undo === null")
+        self.browser.wait("return marrow.place().draft.state_undo === null")
         self.assertEqual(self.pose(), begin)
         for _ in range(2):
             self.js("document.querySelector('[data-do=redo]').click()")
-        self.browser.wait("return PlacePage.current().draft.state_redo === null")
+        self.browser.wait("return marrow.place().draft.state_redo === null")
         self.assertEqual(self.pose(), two)
         self.js("document.querySelectorAll('.place-steps button')[1].click()")
         self.assertEqual(self.kept(), one)
@@ -268,14 +268,15 @@ class PageOfCaseTest(PageOfCase, Placing, PageTest):
     def test_the_overlay_is_that_of_the_newest_pose(self):
         server = self.place()
         self.js(
-            "const page = PlacePage.current();"
-            "for (let i = 0; i < 30; ++i) page.move(page.placed, Geometry.shift([0.5, 0, 0]), i < 29)"
+            "const page = marrow.place();"
+            "const shift = [[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]];"
+            "for (let i = 0; i < 30; ++i) page.move(page.placed, shift, i < 29)"
         )
-        self.browser.wait("return PlacePage.current().views.every((view) => !view.inFlight && !view.wanted)")
+        self.browser.wait("return marrow.place().views.every((view) => !view.inFlight && !view.wanted)")
         server.cookie = "; ".join("%s=%s" % (c["name"], c["value"]) for c in self.browser.driver.get_cookies())
         _, headers, content = self.overlay(server, poses={"distal": self.pose()})
         drawn = self.js(
-            "const layer = PlacePage.current().views[0].paint.layers.get('distal');"
+            "const layer = marrow.place().views[0].paint.layers.get('distal');"
             "return [layer.u_px, layer.columns, [...layer.bytes]]"
         )
         layer = json.loads(headers["X-Marrow-About"])["layers"][0]
@@ -284,12 +285,12 @@ class PageOfCaseTest(PageOfCase, Placing, PageTest):
 
     def test_it_registers_from_here(self):
         self.place()
-        self.js("PlacePage.current().show({distal: arguments[0]})", truth())
+        self.js("marrow.place().show({distal: arguments[0]})", truth())
         for name in ("ARROW_RIGHT", "ARROW_RIGHT", "q"):
             self.browser.key(name, "[data-view=frontal]")
         self.kept()
         self.js("document.querySelector('[data-do=register]').click()")
-        self.browser.wait("return PlacePage.current().steps.current.what === 'register distal by register'")
+        self.browser.wait("return marrow.place().steps.current.what === 'register distal by register'")
         self.assertLess(math.dist(self.middle(self.kept()), self.middle(truth())), 0.2)
         self.assertIn("distal: trusted", self.js("return document.querySelector('.place-verdict').textContent"))
         self.assertIn("predicted deviations", self.js("return document.querySelector('.place-steps').textContent"))
@@ -302,7 +303,7 @@ class PageOfCaseTest(PageOfCase, Placing, PageTest):
         for mode in ("blend", "wipe", "checkerboard", "edges", "outline"):
             self.js("document.querySelector('[data-value=%s]').click()" % mode)
             self.browser.wait(
-                "return PlacePage.current().views.every((view) => !view.inFlight && view.paint.layers.size === 1)"
+                "return marrow.place().views.every((view) => !view.inFlight && view.paint.layers.size === 1)"
             )
             picture = "document.querySelector('[data-view=frontal]').toDataURL()"
             self.browser.wait("return !%s.includes(%s)" % (json.dumps(pictures), picture))  # it is drawn in time
@@ -323,7 +324,7 @@ class PageOfCaseTest(PageOfCase, Placing, PageTest):
         file.write_text(file.read_text().replace("register: false", "register: true").split("    truth:")[0])
         self.place()
         self.assertEqual([bone["name"] for bone in self.about["bones"]], ["proximal", "distal"])
-        placed = lambda: self.js("return structuredClone(PlacePage.current().placed)")
+        placed = lambda: self.js("return structuredClone(marrow.place().placed)")
         begin = placed()
         self.browser.key("ARROW_RIGHT", "[data-view=frontal]")
         self.kept()
@@ -336,9 +337,9 @@ class PageOfCaseTest(PageOfCase, Placing, PageTest):
         alone = placed()
         self.assertEqual(alone["proximal"], together["proximal"])
         self.assertNotEqual(alone["distal"], together["distal"])
-        layers = self.js("return [...PlacePage.current().views[0].paint.layers.keys()].sort()")
+        layers = self.js("return [...marrow.place().views[0].paint.layers.keys()].sort()")
         self.assertEqual(layers, ["distal", "proximal"])
-        fragments = self.js("return PlacePage.current().draft.document.fragments")
+        fragments = self.js("return marrow.place().draft.document.fragments")
         self.assertEqual({name: one["start"] for name, one in fragments.items()}, alone)
 
     def test_nothing_is_cut_off_on_a_narrow_page(self):

@@ -140,10 +140,10 @@ class Wrist(placing.PageOfCase, bench.PageTest):
             self.browser.picture(PICTURES / (name + ".png"))
 
     def registered(self):
-        count = len(self.js("return PlacePage.current().steps.steps"))
+        count = len(self.js("return marrow.place().steps.steps"))
         self.js("document.querySelector('[data-do=register]').click()")
         self.browser.wait(
-            "const page = PlacePage.current(); return !page.isRegistering && page.steps.steps.length > %d" % count, 600
+            "const page = marrow.place(); return !page.isRegistering && page.steps.steps.length > %d" % count, 600
         )
         return self.kept()
 
@@ -152,7 +152,7 @@ class Wrist(placing.PageOfCase, bench.PageTest):
         goal = placement()
         reference = self.registered()
         far = displaced(goal, self.about["bones"][0]["middle_mm"])
-        self.js("PlacePage.current().show({radius: arguments[0]})", far)
+        self.js("marrow.place().show({radius: arguments[0]})", far)
         self.picture("start")
         begin = time.monotonic()
         for _ in range(3):

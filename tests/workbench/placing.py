@@ -74,25 +74,25 @@ class PageOfCase:
         server = self.open()
         self.browser.logs()  # those of the page before
         self.show(server, "place=case", **options)
-        self.js("PlacePage.current().judges = false; PlacePage.current().stopVerdict()")
-        self.about = self.js("return PlacePage.current().about")
+        self.js("marrow.place().judges = false; marrow.place().stopVerdict()")
+        self.about = self.js("return marrow.place().about")
         return server
 
     def js(self, text, *arguments):
         return self.browser.js(text, *arguments)
 
     def pose(self):
-        return self.js("return PlacePage.current().placed[arguments[0]]", self.bone)
+        return self.js("return marrow.place().placed[arguments[0]]", self.bone)
 
     def kept(self):
         """The pose of the draft, after all changes were kept."""
-        self.browser.wait("return !PlacePage.current().keyMoves && !PlacePage.current().isKeeping")
-        return self.js("return PlacePage.current().draft.document.fragments[arguments[0]].start", self.bone)
+        self.browser.wait("return !marrow.place().keyMoves && !marrow.place().isKeeping")
+        return self.js("return marrow.place().draft.document.fragments[arguments[0]].start", self.bone)
 
     def place_of(self, view, pixel):
         """Where a pixel of the X-ray is in the window."""
         return self.js(
-            "const view = PlacePage.current().views.find((one) => one.name === arguments[0]);"
+            "const view = marrow.place().views.find((one) => one.name === arguments[0]);"
             "const r = view.canvas.getBoundingClientRect(), camera = view.camera;"
             "return [r.left + (arguments[1][0] + 0.5) / camera.width_px * r.width,"
             " r.top + (arguments[1][1] + 0.5) / camera.height_px * r.height]",

@@ -12,6 +12,7 @@ import yaml
 import bench
 from accessible_test import LOW_CONTRAST, UNNAMED
 from bench import PageTest
+from modules import modules
 from moving import NONE, VIEWS, Moving, line, shifted, truth
 from placing import PageOfCase, angle_deg, at
 from xray_bench import write_png
@@ -30,7 +31,7 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.js("document.querySelector('[name=rate]').value = 60")
         self.press("sequence")
         self.browser.wait(
-            "return PlacePage.current().sequence.isOn && !document.querySelector('.place-sequence').hidden"
+            "return marrow.place().sequence.isOn && !document.querySelector('.place-sequence').hidden"
             " && document.querySelector('.place-setup').hidden"
         )
         self.arrived(1)
@@ -40,7 +41,7 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.js("document.querySelector('[data-do=%s]').click()" % name)
 
     def arrived(self, frame):
-        script = "const s = PlacePage.current().sequence; return s.frame === %d && s.wanted === %d && !s.isArriving"
+        script = "const s = marrow.place().sequence; return s.frame === %d && s.wanted === %d && !s.isArriving"
         self.browser.wait(script % (frame, frame))
 
     def keys(self, *names):
@@ -48,27 +49,27 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
             self.browser.key(name, "[data-view=frontal]")
 
     def settled(self):
-        self.browser.wait("return !PlacePage.current().keyMoves && !PlacePage.current().isKeeping")
+        self.browser.wait("return !marrow.place().keyMoves && !marrow.place().isKeeping")
 
     def keyframes(self):
         self.settled()
-        sequence = self.js("return PlacePage.current().draft.document.sequence")
+        sequence = self.js("return marrow.place().draft.document.sequence")
         return {int(frame): one["pose"] for frame, one in (sequence["keyframes"].get("bone") or {}).items()}
 
     def put(self, frame, pose):
         """Places the bone in a frame, as a person does who then sets the keyframe."""
-        self.js("PlacePage.current().sequence.go(%d)" % frame)
+        self.js("marrow.place().sequence.go(%d)" % frame)
         self.arrived(frame)
-        self.js("PlacePage.current().show({bone: arguments[0]})", pose)
+        self.js("marrow.place().show({bone: arguments[0]})", pose)
         self.keys("k")
-        self.browser.wait("return !!PlacePage.current().sequence.keyframes('bone')[%d]" % frame)
+        self.browser.wait("return !!marrow.place().sequence.keyframes('bone')[%d]" % frame)
         self.settled()
 
     def status(self):
         return self.js("return document.querySelector('.place-frame').textContent")
 
     def picture(self):
-        return self.js("return PlacePage.current().views[0].paint.grey.join()")
+        return self.js("return marrow.place().views[0].paint.grey.join()")
 
     def test_frames_and_keyframes_by_keys(self):
         self.place()
@@ -78,16 +79,16 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.assertNotEqual(self.picture(), first)
         self.assertEqual(self.status(), "Frame 3 of 6 · 0.033 s · bone: the start")
         self.keys("ARROW_RIGHT")
-        self.browser.wait("return !!PlacePage.current().sequence.keyframes('bone')[3]")
+        self.browser.wait("return !!marrow.place().sequence.keyframes('bone')[3]")
         self.assertEqual(sorted(self.keyframes()), [3])
-        self.assertEqual(self.js("return PlacePage.current().draft.state_undo"), "frame 3: move bone")
+        self.assertEqual(self.js("return marrow.place().draft.state_undo"), "frame 3: move bone")
         self.assertEqual(self.status(), "Frame 3 of 6 · 0.033 s · bone: keyframe")
         self.keys("[")
         self.arrived(2)
         self.assertEqual(self.pose(), self.keyframes()[3], "before the first keyframe, it is as in that")
         self.assertEqual(self.status(), "Frame 2 of 6 · 0.017 s · bone: as in frame 3")
         self.keys("]", "]", "]", "k")
-        self.browser.wait("return !!PlacePage.current().sequence.keyframes('bone')[5]")
+        self.browser.wait("return !!marrow.place().sequence.keyframes('bone')[5]")
         self.keys("{")
         self.arrived(3)
         self.keys("}")
@@ -95,11 +96,9 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         marks = "return [...document.querySelectorAll('[data-keyframe]')].map((one) => one.dataset.keyframe)"
         self.assertEqual(self.js(marks), ["3", "5"])
         self.keys("K")
-        self.browser.wait("return !PlacePage.current().sequence.keyframes('bone')[5]")
+        self.browser.wait("return !marrow.place().sequence.keyframes('bone')[5]")
         self.assertEqual(self.js(marks), ["3"])
-        self.assertEqual(
-            self.js("return PlacePage.current().draft.state_undo"), "remove the keyframe of bone in frame 5"
-        )
+        self.assertEqual(self.js("return marrow.place().draft.state_undo"), "remove the keyframe of bone in frame 5")
         self.js("document.querySelector('[data-remove]').click()")
         self.browser.wait("return document.querySelectorAll('[data-keyframe]').length === 0")
         self.assertEqual(self.browser.logs()[0], [])
@@ -109,14 +108,14 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.put(2, truth(2))
         self.put(5, truth(5))
         self.press("undo")
-        self.browser.wait("return !PlacePage.current().sequence.keyframes('bone')[5]")
-        self.js("return PlacePage.current().sequence.go(6)")
+        self.browser.wait("return !marrow.place().sequence.keyframes('bone')[5]")
+        self.js("return marrow.place().sequence.go(6)")
         self.arrived(6)
         self.press("undo")
         self.arrived(2)
         self.assertEqual(self.keyframes(), {})
         self.press("redo")
-        self.browser.wait("return !!PlacePage.current().sequence.keyframes('bone')[2]")
+        self.browser.wait("return !!marrow.place().sequence.keyframes('bone')[2]")
         self.assertEqual(self.pose(), truth(2))
 
     def test_a_step_leads_to_its_frame(self):
@@ -128,7 +127,7 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
             "steps.find((step) => step.textContent.includes('frame 2')).click()"
         )
         self.arrived(2)
-        self.browser.wait("return PlacePage.current().draft.state_undo === 'frame 2: back to: keyframe of bone'")
+        self.browser.wait("return marrow.place().draft.state_undo === 'frame 2: back to: keyframe of bone'")
         self.assertEqual(self.keyframes(), {2: truth(2), 5: truth(5)})
 
     def test_between_keyframes_the_middle_goes_straight_and_the_rotation_evenly(self):
@@ -137,7 +136,7 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.put(5, truth(5))
         poses = {}
         for frame in (2, 3, 6):
-            self.js("PlacePage.current().sequence.go(%d)" % frame)
+            self.js("marrow.place().sequence.go(%d)" % frame)
             self.arrived(frame)
             poses[frame] = self.pose()
         begin, end = (self.middle(truth(frame)) for frame in (1, 5))
@@ -148,12 +147,12 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.assertEqual(poses[6], truth(5))
         self.assertIn(
             "between frames 1 and 5",
-            self.js("PlacePage.current().sequence.go(3); return document.querySelector('.place-frame').textContent"),
+            self.js("marrow.place().sequence.go(3); return document.querySelector('.place-frame').textContent"),
         )
 
     def test_large_turns_take_the_shorter_way(self):
         self.place()
-        script = (
+        script = modules(Geometry="workbench/page/geometry.js", PlaceBetween="workbench/page/place_between.js") + (
             "const turn = (deg) => Geometry.rotation([1, 2, 3], deg * Math.PI / 180, [5, 6, 7]);"
             "return PlaceBetween.between(turn(arguments[0]), turn(arguments[1]), arguments[2], [5, 6, 7])"
         )
@@ -172,7 +171,7 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.put(1, truth(1))
         self.put(4, shifted(truth(4), 1))
         self.keys("ENTER")
-        self.browser.wait("return !!PlacePage.current().sequence.kept.tracked && !PlacePage.current().isRegistering")
+        self.browser.wait("return !!marrow.place().sequence.kept.tracked && !marrow.place().isRegistering")
         command = shlex.split(self.js("return document.querySelector('.command code').textContent"))
         self.assertIn("keyframes=placed/case/1", command)
         self.assertIn(
@@ -183,28 +182,28 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
             (4, "tracked from the keyframe, trusted"),
             (6, "tracked, trusted"),
         ):
-            self.js("PlacePage.current().sequence.go(%d)" % frame)
+            self.js("marrow.place().sequence.go(%d)" % frame)
             self.arrived(frame)
             self.assertLess(math.dist(self.middle(self.pose()), self.middle(truth(frame))), 1)
             self.assertTrue(self.status().endswith("bone: " + what), self.status())
         self.assertEqual(self.js("return document.querySelectorAll('.place-marks rect.tracked').length"), 1)
         tracked = self.pose()
         self.keys("ARROW_RIGHT")
-        self.browser.wait("return !!PlacePage.current().sequence.keyframes('bone')[6]")
+        self.browser.wait("return !!marrow.place().sequence.keyframes('bone')[6]")
         self.settled()
         self.assertTrue(self.status().endswith("bone: keyframe"), self.status())
         self.assertAlmostEqual(math.dist(self.middle(self.pose()), self.middle(tracked)), 1, places=6)
         self.press("undo")
-        self.browser.wait("return !PlacePage.current().sequence.keyframes('bone')[6]")
+        self.browser.wait("return !marrow.place().sequence.keyframes('bone')[6]")
         self.assertEqual(self.pose(), tracked)
         self.press("undo")
-        self.browser.wait("return !PlacePage.current().sequence.kept.tracked")
+        self.browser.wait("return !marrow.place().sequence.kept.tracked")
         self.browser.wait("return document.querySelectorAll('.place-marks rect').length === 0")
         self.press("redo")
         self.browser.wait("return document.querySelectorAll('.place-marks rect.tracked').length === 1")
         self.show(server, "home")
         self.show(server, "place=case")
-        self.js("PlacePage.current().sequence.go(6)")
+        self.js("marrow.place().sequence.go(6)")
         self.arrived(6)
         self.assertEqual(self.pose(), tracked, "the tracked poses outlive the page")
         self.assertEqual(self.browser.logs()[0], [])
@@ -216,12 +215,12 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.place()
         self.put(1, truth(1))
         self.press("register")
-        self.browser.wait("return !!PlacePage.current().sequence.kept.tracked && !PlacePage.current().isRegistering")
+        self.browser.wait("return !!marrow.place().sequence.kept.tracked && !marrow.place().isRegistering")
         self.assertIn(
             "bone is lost in 1 of 6 frames, first in 4: place it there, and track again",
             self.js("return document.querySelector('#notices').textContent"),
         )
-        self.js("PlacePage.current().sequence.go(4)")
+        self.js("marrow.place().sequence.go(4)")
         self.arrived(4)
         self.assertTrue(self.status().endswith("bone: lost; between frames 3 and 5"), self.status())
         self.assertEqual(self.js("return document.querySelectorAll('.place-marks rect.lost').length"), 1)
@@ -237,14 +236,14 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
     def test_few_images_are_kept_in_memory(self):
         self.place()
         self.js(
-            "PlaceFrames.MOST_BYTES = 5 * 65536; const images = PlacePage.current().sequence.images;"
-            "images.blocks.clear(); PlaceFrames.BLOCK = 1"
+            "const images = marrow.place().sequence.images; images.constructor.MOST_BYTES = 5 * 65536;"
+            "images.blocks.clear(); images.constructor.BLOCK = 1"
         )
         for frame in (1, 2, 3, 4, 5, 6, 1):
-            self.js("PlacePage.current().sequence.go(%d)" % frame)
+            self.js("marrow.place().sequence.go(%d)" % frame)
             self.arrived(frame)
         held = (
-            "const blocks = [...PlacePage.current().sequence.images.blocks.values()];"
+            "const blocks = [...marrow.place().sequence.images.blocks.values()];"
             "return blocks.reduce((sum, one) => sum + (one.bytes || 0), 0)"
         )
         time.sleep(0.5)
@@ -256,33 +255,33 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.assertTrue(self.js("return document.querySelector('[aria-label=Costs]').hidden"))
         self.press("open-sequence")
         self.press("remove-sequence")
-        self.browser.wait("return !PlacePage.current().sequence.isOn")
+        self.browser.wait("return !marrow.place().sequence.isOn")
         self.assertTrue(self.js("return document.querySelector('.place-sequence').hidden"))
         self.assertFalse(self.js("return document.querySelector('[aria-label=Costs]').hidden"))
-        self.assertTrue(self.js("return PlacePage.current().views.every((view) => view.paint.grey === view.image)"))
+        self.assertTrue(self.js("return marrow.place().views.every((view) => view.paint.grey === view.image)"))
         self.press("undo")
-        self.browser.wait("return PlacePage.current().sequence.isOn")
+        self.browser.wait("return marrow.place().sequence.isOn")
 
     def test_other_images_have_no_tracked_poses(self):
         self.place()
         self.put(1, truth(1))
         self.press("register")
-        self.browser.wait("return !!PlacePage.current().sequence.kept.tracked && !PlacePage.current().isRegistering")
+        self.browser.wait("return !!marrow.place().sequence.kept.tracked && !marrow.place().isRegistering")
         self.press("open-sequence")
         self.js("document.querySelector('[data-pattern=frontal]').value = '000[1-3]/frontal/image.png'")
         self.js("document.querySelector('[data-pattern=lateral]').value = '000[1-3]/lateral/image.png'")
         self.press("sequence")
-        self.browser.wait("return PlacePage.current().sequence.frames === 3 && PlacePage.current().sequence.isOn")
+        self.browser.wait("return marrow.place().sequence.frames === 3 && marrow.place().sequence.isOn")
         self.arrived(1)
         self.assertEqual(self.status(), "Frame 1 of 3 · 0.000 s · bone: keyframe")
         self.assertEqual(self.js("return document.querySelectorAll('.place-marks rect').length"), 0)
         self.press("undo")
-        self.browser.wait("return PlacePage.current().sequence.frames === 6 && PlacePage.current().sequence.isOn")
+        self.browser.wait("return marrow.place().sequence.frames === 6 && marrow.place().sequence.isOn")
         self.browser.wait("return document.querySelectorAll('.place-marks rect.tracked').length === 1")
 
     def test_a_dragged_slider_asks_for_the_newest_frame(self):
         self.place()
-        self.js("PlaceFrames.BLOCK = 1; PlacePage.current().sequence.images.blocks.clear()")
+        self.js("const images = marrow.place().sequence.images; images.constructor.BLOCK = 1; images.blocks.clear()")
         self.browser.logs()
         self.js(
             "const slider = document.querySelector('[aria-label=Frame]');"
@@ -307,9 +306,9 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.assertEqual([bone["name"] for bone in self.about["bones"]], ["bone", "other"])
         self.js("document.querySelectorAll('.place-bones input')[1].click()")
         self.keys("k")
-        self.browser.wait("return !!PlacePage.current().sequence.keyframes('bone')[1]")
+        self.browser.wait("return !!marrow.place().sequence.keyframes('bone')[1]")
         self.settled()
-        self.assertEqual(self.js("return PlacePage.current().sequence.keyframes('other')"), {})
+        self.assertEqual(self.js("return marrow.place().sequence.keyframes('other')"), {})
         self.assertEqual(self.status(), "Frame 1 of 6 · 0.000 s · bone: keyframe · other: the start")
         self.assertEqual(self.js("return document.querySelector('[data-frame]').textContent"), "Frame 1: bone")
 

@@ -59,7 +59,8 @@ class WholeWayTest(PageTest):
 
     def document(self):
         return self.browser.driver.execute_async_script(
-            "const done = arguments[0]; Ask.json('api/draft', {case: 'mine'}).then((state) => done(state.document))"
+            "fetch('api/draft?case=mine').then((answer) => answer.json())"
+            ".then((state) => arguments[0](state.document))"
         )
 
     def until(self, condition):

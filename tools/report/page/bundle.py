@@ -21,7 +21,6 @@ def bundle(entry, three=THREE):
     """The text of the bundle. What esbuild warns of, such as a name that no module exports, is an error."""
     given = ["--alias:three=%s" % three]
     if not three.exists():
-        print("%s is missing: there will be no 3D view. Install the Debian package libjs-three." % three)
         given = ["--alias:three=data:text/javascript,", "--log-override:import-is-undefined=silent"]
     done = subprocess.run(["esbuild", str(entry), *FLAGS, *given], capture_output=True, encoding="utf-8")
     if done.returncode or done.stderr:
@@ -44,6 +43,8 @@ def main():
     parser.add_argument("entry", type=pathlib.Path, help="a script, a style or an HTML page")
     parser.add_argument("out", type=pathlib.Path, help="the file to write")
     arguments = parser.parse_args()
+    if not THREE.exists():
+        print("%s is missing: there will be no 3D view. Install the Debian package libjs-three." % THREE)
     make = html if arguments.entry.suffix == ".html" else bundle
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     arguments.out.write_text(make(arguments.entry))

@@ -82,7 +82,7 @@ export const figures = (data) => data.figures.map(upright).map(
                                  'td', {class: 'number'}, Number.isFinite(row.values[i]) ? number(row.values[i]) : '')),
                          el('td', {}, row.unit)))))));
 
-export function options(variant) {
+function options(variant) {
   const entries = Object.entries(variant.options);
   return entries.length ?
       rows(entries.map(

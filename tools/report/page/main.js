@@ -345,7 +345,7 @@ function followScroll() {
   document.querySelectorAll('main > section').forEach((node) => seen.observe(node));
 }
 
-export function start() {
+function start() {
   startTheme();
   Dom.startTooltip();
   try {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // What all plots share: scales, axes, marks, legends, and drawing anew when the width changes.
-import {el, number, svg} from './dom.js';
+import {el, svg} from './dom.js';
 
 const MARKERS = ['circle', 'square', 'triangle', 'diamond', 'cross'];
 const DASHES = ['none', '7 3', '2 3', '9 3 2 3'];
 
 export const colour = (variant) => 'var(--variant-' + (variant % 7 + 1) + ')';
-export const dash = (variant) => DASHES[Math.floor(variant / 7) % DASHES.length];
+const dash = (variant) => DASHES[Math.floor(variant / 7) % DASHES.length];
 
 function ticksLinear([low, high], count) {
   const raw = (high - low) / Math.max(1, count), power = 10 ** Math.floor(Math.log10(raw));
@@ -61,7 +61,7 @@ export function domain(values, kind, with_zero) {
   return [with_zero && low === 0 ? 0 : low - margin, high + margin];
 }
 
-export const tickText = (value) =>
+const tickText = (value) =>
     (value === 0                                          ? '0' :
          Math.abs(value) >= 1e5 || Math.abs(value) < 1e-3 ? value.toExponential(0) :
                                                             String(Number(value.toPrecision(6))))

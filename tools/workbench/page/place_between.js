@@ -50,7 +50,7 @@ export function between(first, second, share, middle_mm) {
 }
 
 // What is known in the frame itself: {pose, is}, or null.
-export function known(frame, keyframes, tracked) {
+function known(frame, keyframes, tracked) {
   const keyframe = keyframes[frame], found = (tracked || [])[frame - 1];
   if (keyframe && !(keyframe.used && found)) return {pose: keyframe.pose, is: 'keyframe'};
   if (found) return {pose: found, is: keyframe ? 'tracked from the keyframe' : 'tracked'};

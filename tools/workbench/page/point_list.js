@@ -8,7 +8,7 @@ import * as Shell from './shell.js';
 const COLOURS = ['#56b4e9', '#e69f00', '#2fd6a5', '#f08ac0', '#f0e442', '#ff8a4c', '#b9b0ff'];
 export const colour = (i) => COLOURS[i % COLOURS.length];
 
-export const words = (point_mm) => point_mm.map((value) => value.toFixed(1)).join(', ');
+const words = (point_mm) => point_mm.map((value) => value.toFixed(1)).join(', ');
 export const rounded = (point_mm) => point_mm.map((value) => Math.round(1000 * value) / 1000);
 
 // One point: buttons that go to it, move it to the crosshair and remove it. `what` names it for screen readers.

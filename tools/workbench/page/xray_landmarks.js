@@ -25,7 +25,7 @@ export function all(bench) {
   return list;
 }
 
-export function freeName(bench) {
+function freeName(bench) {
   const names = new Set(all(bench).map((one) => one.name));
   for (let number = 1;; ++number)
     if (!names.has('point ' + number)) return 'point ' + number;
@@ -39,9 +39,9 @@ function put(document, name, view, pixel) {
 }
 
 // The views that show the landmark and have a camera: [{view, camera, pixel}].
-export const seenIn = (bench, landmark) => Object.entries(landmark.pixels)
-                                               .map(([view, pixel]) => ({view, pixel, camera: bench.cameraOf(view)}))
-                                               .filter(({camera}) => camera);
+const seenIn = (bench, landmark) => Object.entries(landmark.pixels)
+                                        .map(([view, pixel]) => ({view, pixel, camera: bench.cameraOf(view)}))
+                                        .filter(({camera}) => camera);
 
 // {world_mm, distance_mm, off_px: by view} or null.
 export function placeOf(bench, landmark) {
