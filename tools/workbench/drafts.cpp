@@ -8,6 +8,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/printable.hpp"
 #include "workbench/server.hpp"
@@ -29,22 +30,14 @@ std::string file_name(const std::string& case_path) {
 /// Appends a line and has it on the disk. On any failure the file is as before, and an Error is thrown.
 void append_line(const fs::path& file, const std::string& line) {
   fs::create_directories(file.parent_path());
-  const int descriptor = open(file.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644);
-  if (descriptor < 0) throw Error("the draft cannot be kept: " + std::string(std::strerror(errno)));
+  const Descriptor descriptor(open(file.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644));
+  if (!descriptor.is_open()) throw Error("the draft cannot be kept: " + std::string(std::strerror(errno)));
   const off_t before = lseek(descriptor, 0, SEEK_END);
-  std::size_t done = 0;
-  while (done < line.size()) {
-    const ssize_t written = write(descriptor, line.data() + done, line.size() - done);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) break;
-    done += std::size_t(written);
-  }
-  const bool is_good = done == line.size() && fsync(descriptor) == 0;
+  const bool is_good = write_all(descriptor, line) && fsync(descriptor) == 0;
   const std::string why = std::strerror(errno);
   if (!is_good && ftruncate(descriptor, before) != 0) {
     // the half line is left out when the draft is read
   }
-  close(descriptor);
   if (!is_good) throw Error("the change is not kept in the draft: " + why + "; make room and try again");
 }
 

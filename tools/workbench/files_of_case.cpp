@@ -15,6 +15,7 @@
 #include <fstream>
 #include <vector>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/process_identity.hpp"
 #include "workbench/case_text.hpp"
@@ -51,43 +52,30 @@ bool is_same_file(const fs::path& a, const fs::path& b) {
 
 [[noreturn]] void fail() { throw fs::filesystem_error("", std::error_code(errno, std::generic_category())); }
 
-/// An open file that is closed in any case.
-struct Descriptor {
-  const int number;
-  explicit Descriptor(int opened) : number(opened) {
-    if (number < 0) fail();
-  }
-  ~Descriptor() { close(number); }
-};
+Descriptor opened(const fs::path& file, int flags) {
+  Descriptor descriptor(open(file.c_str(), flags | O_CLOEXEC, 0644));
+  if (!descriptor.is_open()) fail();
+  return descriptor;
+}
 
 /// Has a file or a folder's list of names on the disk, so that it outlives a loss of power.
 void settle(const Descriptor& place) {
-  if (fsync(place.number) != 0 && errno != EINVAL) fail();  // some file systems cannot
+  if (fsync(place) != 0 && errno != EINVAL) fail();  // some file systems cannot
 }
-void settle(const fs::path& folder) { settle(Descriptor(open(folder.c_str(), O_RDONLY | O_CLOEXEC))); }
+void settle(const fs::path& folder) { settle(opened(folder, O_RDONLY)); }
 
-void write_all(const Descriptor& file, const char* bytes, std::size_t count) {
-  while (count > 0) {
-    const ssize_t written = write(file.number, bytes, count);
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) fail();
-    bytes += written;
-    count -= std::size_t(written);
-  }
-}
-
-constexpr int kNewFile = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC;
+constexpr int kNewFile = O_WRONLY | O_CREAT | O_EXCL;
 
 /// As fs::copy_file(), which calls a full disk an input/output error.
 void copy_whole(const fs::path& from, const fs::path& to) {
-  const Descriptor source(open(from.c_str(), O_RDONLY | O_CLOEXEC)), copy(open(to.c_str(), kNewFile, 0644));
+  const Descriptor source = opened(from, O_RDONLY), copy = opened(to, kNewFile);
   std::vector<char> bytes(1 << 20);
   for (;;) {
-    const ssize_t count = read(source.number, bytes.data(), bytes.size());
+    const ssize_t count = read(source, bytes.data(), bytes.size());
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) fail();
     if (count == 0) return settle(copy);
-    write_all(copy, bytes.data(), std::size_t(count));
+    if (!write_all(copy, {bytes.data(), std::size_t(count)})) fail();
   }
 }
 
@@ -113,8 +101,8 @@ void bring(const PlannedCase::File& file, const fs::path& staging) {
 }
 
 void write_text(const fs::path& to, const std::string& text) {
-  const Descriptor file(open(to.c_str(), kNewFile, 0644));
-  write_all(file, text.data(), text.size());
+  const Descriptor file = opened(to, kNewFile);
+  if (!write_all(file, text)) fail();
   settle(file);
 }
 

@@ -19,6 +19,7 @@
 #include <optional>
 #include <vector>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/thread_state.hpp"
 #include "marrow/base/working_folder.hpp"
@@ -109,15 +110,9 @@ class StandardStreams {
   StandardStreams() {
     for (int i = 0; i < 3; ++i) {
       if (fstat(i, &files_[std::size_t(i)]) != 0) continue;
-      copies_[std::size_t(i)] = fcntl(i, F_DUPFD_CLOEXEC, 3);
+      copies_[std::size_t(i)] = Descriptor(fcntl(i, F_DUPFD_CLOEXEC, 3));
     }
   }
-  ~StandardStreams() {
-    for (const int copy : copies_)
-      if (copy >= 0) close(copy);
-  }
-  StandardStreams(const StandardStreams&) = delete;
-  StandardStreams& operator=(const StandardStreams&) = delete;
   std::string put_back() const {
     std::string changed;
     for (int i = 0; i < 3; ++i) {
@@ -133,7 +128,7 @@ class StandardStreams {
 
  private:
   std::array<struct stat, 3> files_{};
-  std::array<int, 3> copies_{-1, -1, -1};
+  std::array<Descriptor, 3> copies_;
 };
 
 class Limits {

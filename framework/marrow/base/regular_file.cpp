@@ -2,14 +2,13 @@
 #include "marrow/base/regular_file.hpp"
 
 #include <fcntl.h>
-#include <unistd.h>
 
-#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <memory>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow {
 namespace {
@@ -35,59 +34,22 @@ Error changed() { return Error("was changed while it was read; try again when no
 
 bool same(const timespec& a, const timespec& b) { return a.tv_sec == b.tv_sec && a.tv_nsec == b.tv_nsec; }
 
-/// Makes a new file next to the one that it will replace. Returns -1 with errno if it cannot be made.
-int make_temporary(const fs::path& file, mode_t mode, fs::path& temporary) {
-  static std::atomic<unsigned> count{0};
-  int descriptor = -1;
-  // A killed process with the same number may have left a file of that name.
-  for (int attempt = 0; attempt < 100 && descriptor < 0; ++attempt) {
-    temporary = file.string() + "." + std::to_string(getpid()) + "-" + std::to_string(count++) + ".tmp";
-    descriptor = open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
-    if (descriptor < 0 && errno != EEXIST) break;
-  }
-  return descriptor;
-}
-
 }  // namespace
-
-bool write_all(int descriptor, const std::string& text) {
-  for (std::size_t at = 0; at < text.size();) {
-    const ssize_t count = write(descriptor, text.data() + at, text.size() - at);
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) return false;
-    at += std::size_t(count);
-  }
-  return true;
-}
 
 RegularFile::RegularFile(const fs::path& file) {
   // The kind of the file is checked before it is opened, because opening a device may have an effect. It is checked
   // again afterwards, because the file may have been replaced in between.
   if (stat(file.c_str(), &status_) != 0) throw unreadable();
   expect_regular(status_);
-  descriptor_ = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
-  if (descriptor_ < 0) throw unreadable();
-  try {
-    if (fstat(descriptor_, &status_) != 0) throw unreadable();
-    expect_regular(status_);
-  } catch (...) {
-    close(descriptor_);
-    throw;
-  }
+  descriptor_ = Descriptor(open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+  if (!descriptor_.is_open() || fstat(descriptor_, &status_) != 0) throw unreadable();
+  expect_regular(status_);
 }
 
-RegularFile::~RegularFile() { close(descriptor_); }
-
 std::size_t RegularFile::read(void* to, std::size_t wanted, std::uint64_t offset) const {
-  std::size_t got = 0;
-  while (got < wanted) {
-    const ssize_t count = pread(descriptor_, static_cast<char*>(to) + got, wanted - got, off_t(offset + got));
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) throw unreadable();
-    if (count == 0) break;
-    got += std::size_t(count);
-  }
-  return got;
+  const std::int64_t got = read_at(descriptor_, to, wanted, offset);
+  if (got < 0) throw unreadable();
+  return std::size_t(got);
 }
 
 void RegularFile::expect_unchanged() const {
@@ -117,24 +79,11 @@ Digest file_digest(const fs::path& file) try { return digest_of(RegularFile(file
 
 std::string read_text(const RegularFile& file, std::size_t most_bytes) {
   if (file.size() > most_bytes)
-    throw Error("has " + std::to_string(file.size()) + " bytes, more than the " + std::to_string(most_bytes) +
-                " that it may have");
+    throw Error(formatted("has {} bytes, more than the {} that it may have", file.size(), most_bytes));
   std::string text(std::size_t(file.size()), '\0');
   if (file.read(text.data(), text.size(), 0) != text.size()) throw changed();
   file.expect_unchanged();
   return text;
-}
-
-void write_text(const fs::path& file, const std::string& text, mode_t mode) {
-  fs::path temporary;
-  const int descriptor = make_temporary(file, mode, temporary);
-  if (descriptor < 0) throw Error("cannot write " + file.string() + ": " + std::strerror(errno));
-  int reason = write_all(descriptor, text) ? 0 : errno;
-  if (close(descriptor) != 0 && !reason) reason = errno;
-  if (!reason && rename(temporary.c_str(), file.c_str()) != 0) reason = errno;
-  if (!reason) return;
-  unlink(temporary.c_str());
-  throw Error("cannot write " + file.string() + ": " + std::strerror(reason));
 }
 
 }  // namespace marrow

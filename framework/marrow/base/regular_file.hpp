@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Reads files that someone else may have put there, and writes files as a whole.
+// Reads files that someone else may have put there.
 #include <sys/stat.h>
 
 #include <cstdint>
 #include <filesystem>
 #include <string>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/base/export.hpp"
 #include "marrow/base/hash.hpp"
 
@@ -18,9 +19,6 @@ namespace MARROW_EXPORT_TO_TESTS marrow {
 class RegularFile {
  public:
   explicit RegularFile(const std::filesystem::path& file);
-  ~RegularFile();
-  RegularFile(const RegularFile&) = delete;
-  RegularFile& operator=(const RegularFile&) = delete;
 
   /// The status at the time when the file was opened.
   const struct stat& status() const { return status_; }
@@ -31,7 +29,7 @@ class RegularFile {
   void expect_unchanged() const;
 
  private:
-  int descriptor_;
+  Descriptor descriptor_;
   struct stat status_ {};
 };
 
@@ -44,12 +42,5 @@ Digest file_digest(const std::filesystem::path& file);
 /// The whole content. Throws Error, with a text that begins with a verb, if the file has more than `most_bytes` or
 /// changes while it is read.
 std::string read_text(const RegularFile& file, std::size_t most_bytes);
-
-/// Writes all of the text, also in parts. Returns false, with errno, if that is not possible.
-bool write_all(int descriptor, const std::string& text);
-
-/// Writes a file under a temporary name and then renames it, so that no reader and no second writer sees half of it. If
-/// this fails, leaves nothing behind and throws Error with the file's name and the reason.
-void write_text(const std::filesystem::path& file, const std::string& text, mode_t mode);
 
 }  // namespace marrow

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Reads whole text files with a limit of their size. Writes them so that a file is never half written.
+#include <sys/types.h>
+
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -21,7 +23,8 @@ enum class Kinds { files, files_and_pipes };
 /// Writes a temporary file next to `file` and renames it. If the disk is full or the process is killed, the old file
 /// stays, or there is none. A link is replaced. A pipe or device is replaced too, unless `kinds` includes pipes. A user
 /// who names a pipe, or a link to one, as the place of a result wants it to be used. But a pipe among marrow's own
-/// files would only make the writer wait. Throws Error if the file cannot be written.
-void write_text_file(const std::filesystem::path& file, const std::string& text, Kinds kinds = Kinds::files);
+/// files would only make the writer wait. `mode` is that of open(). Throws Error if the file cannot be written.
+void write_text_file(const std::filesystem::path& file, const std::string& text, Kinds kinds = Kinds::files,
+                     mode_t mode = 0666);
 
 }  // namespace marrow

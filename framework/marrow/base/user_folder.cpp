@@ -7,6 +7,8 @@
 #include <cstdlib>
 #include <vector>
 
+#include "marrow/base/number_text.hpp"
+
 namespace marrow {
 namespace {
 
@@ -17,33 +19,26 @@ fs::path absolute_path_in(const char* variable) {
   return text && fs::path(text).is_absolute() ? fs::path(text) : fs::path();
 }
 
-/// Calls use(entry) with what the system knows about a user, if it knows the user.
-template <class Use>
-void look_up(uid_t user, const Use& use) {
+}  // namespace
+
+std::optional<User> user_of(uid_t id) {
   std::vector<char> text(16384);
-  passwd entry{};
-  passwd* found = nullptr;
-  if (getpwuid_r(user, &entry, text.data(), text.size(), &found) == 0 && found) use(*found);
+  passwd entry{}, *found = nullptr;
+  if (getpwuid_r(id, &entry, text.data(), text.size(), &found) != 0 || !found) return std::nullopt;
+  const fs::path home = found->pw_dir ? found->pw_dir : "";
+  return User{found->pw_name ? found->pw_name : "", home.is_absolute() ? home : fs::path(), found->pw_gid};
 }
 
-}  // namespace
+std::string user_name(uid_t id) {
+  const std::optional<User> user = user_of(id);
+  return user && !user->name.empty() ? user->name : formatted("user {}", id);
+}
 
 fs::path user_cache_folder() {
   if (fs::path cache = absolute_path_in("XDG_CACHE_HOME"); !cache.empty()) return cache;
   fs::path home = absolute_path_in("HOME");
-  if (home.empty())
-    look_up(geteuid(), [&](const passwd& entry) {
-      if (entry.pw_dir && fs::path(entry.pw_dir).is_absolute()) home = entry.pw_dir;
-    });
+  if (home.empty()) home = user_of(geteuid()).value_or(User()).home;
   return home.empty() ? home : home / ".cache";
-}
-
-std::string user_name(unsigned user) {
-  std::string name = "user " + std::to_string(user);
-  look_up(user, [&](const passwd& entry) {
-    if (entry.pw_name) name = entry.pw_name;
-  });
-  return name;
 }
 
 }  // namespace marrow

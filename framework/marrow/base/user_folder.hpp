@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <sys/types.h>
+
 #include <filesystem>
+#include <optional>
 #include <string>
 
 namespace marrow {
@@ -10,7 +13,15 @@ namespace marrow {
 /// there is none of these. It is never a folder that all users share.
 std::filesystem::path user_cache_folder();
 
+struct User {
+  std::string name;            ///< empty if the system knows none
+  std::filesystem::path home;  ///< empty if it is not an absolute path
+  gid_t group = 0;
+};
+/// What the system knows about a user, if it knows the user.
+std::optional<User> user_of(uid_t id);
+
 /// The name of a user, "alice"; or "user 1001" if the system knows no name.
-std::string user_name(unsigned user);
+std::string user_name(uid_t id);
 
 }  // namespace marrow

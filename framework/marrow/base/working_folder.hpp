@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "marrow/base/descriptor.hpp"
+
 namespace marrow {
 
 /// The working folder of this process, at which all relative paths start. A plugin's library may change it. Then inputs
@@ -11,16 +13,13 @@ namespace marrow {
 class WorkingFolder {
  public:
   WorkingFolder();
-  ~WorkingFolder();
-  WorkingFolder(const WorkingFolder&) = delete;
-  WorkingFolder& operator=(const WorkingFolder&) = delete;
 
   /// Goes back to the folder in which the process was when this object was made. Returns the folder in which it was;
   /// empty if it had not changed.
   std::string go_back() const;
 
  private:
-  int descriptor_;
+  Descriptor descriptor_;
   dev_t device_ = 0;
   ino_t number_ = 0;
 };

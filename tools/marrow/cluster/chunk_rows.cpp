@@ -10,7 +10,6 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string_view>
-#include <utility>
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/process_identity.hpp"
@@ -39,32 +38,19 @@ ChunkFile::ChunkFile(const fs::path& folder, const std::string& chunk)
       part_(rows_folder(folder) / (chunk + "." + this_process() + ".part")) {
   std::error_code error;
   fs::create_directories(rows_folder(folder), error);
-  descriptor_ = open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0666);
-  expect_good(descriptor_ >= 0);
-}
-
-ChunkFile::~ChunkFile() {
-  if (descriptor_ >= 0) close(descriptor_);
+  descriptor_ = Descriptor(open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0666));
+  expect_good(descriptor_.is_open());
 }
 
 void ChunkFile::expect_good(bool is_good) const {
   if (!is_good) throw Error("cannot write " + part_.string() + ": " + std::strerror(errno));
 }
 
-void ChunkFile::add(const CellRow& row) {
-  const std::string line = compare::to_json(row) + "\n";
-  for (std::size_t at = 0; at < line.size();) {
-    const ssize_t count = ::write(descriptor_, line.data() + at, line.size() - at);
-    if (count < 0 && errno == EINTR) continue;
-    expect_good(count > 0);
-    at += std::size_t(count);
-  }
-}
+void ChunkFile::add(const CellRow& row) { expect_good(write_all(descriptor_, compare::to_json(row) + "\n")); }
 
 void ChunkFile::finish() {
   expect_good(fsync(descriptor_) == 0);
-  const int descriptor = std::exchange(descriptor_, -1);
-  expect_good(close(descriptor) == 0);  // a full disk may be noticed only here
+  expect_good(descriptor_.close());  // a full disk may be noticed only here
   expect_good(rename(part_.c_str(), final_.c_str()) == 0);
 }
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/compare/cell.hpp"
 
 namespace marrow::cli {
@@ -19,9 +20,6 @@ class ChunkFile {
  public:
   /// Throws Error if the file cannot be made.
   ChunkFile(const std::filesystem::path& folder, const std::string& chunk);
-  ~ChunkFile();
-  ChunkFile(const ChunkFile&) = delete;
-  ChunkFile& operator=(const ChunkFile&) = delete;
 
   /// Throws Error if the row cannot be written.
   void add(const compare::CellRow& row);
@@ -32,7 +30,7 @@ class ChunkFile {
   void expect_good(bool is_good) const;
 
   std::filesystem::path final_, part_;
-  int descriptor_ = -1;
+  Descriptor descriptor_;
 };
 
 /// The chunks that have a file: true if it has its final name. The folder is listed, because on a shared folder a file

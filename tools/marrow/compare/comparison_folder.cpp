@@ -10,6 +10,7 @@
 #include <cstring>
 #include <optional>
 
+#include "marrow/base/atomic_file.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/hash.hpp"
 #include "marrow/base/printable.hpp"
@@ -103,8 +104,7 @@ void refuse_links(const fs::path& folder, const compare::Experiment& experiment)
 void remove_parts(const fs::path& folder) {
   std::error_code error, ignored;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
-    if (at->path().filename().native().starts_with(".part") && at->is_regular_file(ignored))
-      fs::remove(at->path(), ignored);
+    if (is_hidden_temporary(at->path()) && at->is_regular_file(ignored)) fs::remove(at->path(), ignored);
 }
 
 }  // namespace
@@ -116,27 +116,20 @@ bool is_comparison(const fs::path& folder) {
 
 ComparisonFolder::ComparisonFolder(const fs::path& folder, const compare::Experiment& experiment, Use use)
     : folder_(folder) {
-  try {
-    open_marker();
-    check_marker(experiment);
-    if (!lock(kUse, use == Use::alone ? F_WRLCK : F_RDLCK, false))
-      throw Error("another " + std::string(use == Use::alone ? "comparison or cell" : "comparison") +
-                  " is running in " + folder.string() + "; wait for it, or choose another folder with --out");
-    refuse_links(folder, experiment);
-    if (use == Use::alone) remove_parts(folder);
-    std::error_code error;
-    fs::create_directories(folder / "cells", error);
-    if (error)
-      throw Error("cannot make the folder " + (folder / "cells").string() + ": " + error.message() +
-                  "; choose another with --out");
-    write_text_file(folder / "experiment.yaml", experiment.text);
-  } catch (...) {
-    if (marker_ >= 0) close(marker_);
-    throw;
-  }
+  open_marker();
+  check_marker(experiment);
+  if (!lock(kUse, use == Use::alone ? F_WRLCK : F_RDLCK, false))
+    throw Error("another " + std::string(use == Use::alone ? "comparison or cell" : "comparison") + " is running in " +
+                folder.string() + "; wait for it, or choose another folder with --out");
+  refuse_links(folder, experiment);
+  if (use == Use::alone) remove_parts(folder);
+  std::error_code error;
+  fs::create_directories(folder / "cells", error);
+  if (error)
+    throw Error("cannot make the folder " + (folder / "cells").string() + ": " + error.message() +
+                "; choose another with --out");
+  write_text_file(folder / "experiment.yaml", experiment.text);
 }
-
-ComparisonFolder::~ComparisonFolder() { close(marker_); }
 
 void ComparisonFolder::take_cell(const std::string& id) {
   if (!lock(kCells + long(hash_of(id).low >> 2), F_WRLCK, false))
@@ -151,13 +144,13 @@ void ComparisonFolder::open_marker() {
   if (error)
     throw Error("cannot make the folder " + folder_.string() + ": " + error.message() + "; choose another with --out");
   for (bool is_second_look = false;; is_second_look = true) {
-    marker_ = open(marker.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
-    if (marker_ >= 0) break;
+    marker_ = Descriptor(open(marker.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+    if (marker_.is_open()) break;
     if (errno == ELOOP || errno == EISDIR || errno == ENXIO) refuse_foreign(folder_);
     if (errno != ENOENT) refuse_unwritable(folder_, errno);
     if (fs::is_empty(folder_, error)) {
-      marker_ = open(marker.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-      if (marker_ >= 0) break;
+      marker_ = Descriptor(open(marker.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+      if (marker_.is_open()) break;
       if (errno != EEXIST) refuse_unwritable(folder_, errno);
     } else if (error) {
       refuse_unwritable(folder_, error.value());

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/compare/experiment.hpp"
 
 namespace marrow::cli {
@@ -19,9 +20,6 @@ class ComparisonFolder {
   enum class Use { alone, with_others };  ///< with_others: together with processes that run single cells
   /// Throws Error if the folder cannot be written, belongs to something else, or is in use.
   ComparisonFolder(const std::filesystem::path& folder, const compare::Experiment& experiment, Use use);
-  ~ComparisonFolder();
-  ComparisonFolder(const ComparisonFolder&) = delete;
-  ComparisonFolder& operator=(const ComparisonFolder&) = delete;
 
   /// Throws Error if another process runs this cell.
   void take_cell(const std::string& id);
@@ -34,7 +32,7 @@ class ComparisonFolder {
   bool lock(long byte, short type, bool wait);
 
   std::filesystem::path folder_;
-  int marker_ = -1;
+  Descriptor marker_;
 };
 
 }  // namespace marrow::cli

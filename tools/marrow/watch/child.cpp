@@ -11,6 +11,7 @@
 #include <csignal>
 #include <cstring>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/base/error.hpp"
 
 extern char** environ;
@@ -61,20 +62,14 @@ bool take(int from, Said said, std::string& kept) {
 }  // namespace
 
 ChildEnd run_child(const std::vector<std::string>& command, const std::function<bool()>& should_stop, Said said) {
-  int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) throw Error("cannot start " + command[0] + ": " + std::strerror(errno));
-  pid_t process = -1;
-  try {
-    process = started(command, ends[1]);
-  } catch (...) {
-    close(ends[0]), close(ends[1]);
-    throw;
-  }
-  close(ends[1]);
+  Pipe pipe = open_pipe();
+  if (!pipe.read_end.is_open()) throw Error("cannot start " + command[0] + ": " + std::strerror(errno));
+  const pid_t process = started(command, pipe.write_end);
+  pipe.write_end.close();
   ChildEnd end;
   Clock::time_point stopped_at;
-  for (pollfd readable{ends[0], POLLIN, 0};;) {
-    if (poll(&readable, 1, 200) > 0 && !take(ends[0], said, end.said)) break;
+  for (pollfd readable{pipe.read_end, POLLIN, 0};;) {
+    if (poll(&readable, 1, 200) > 0 && !take(pipe.read_end, said, end.said)) break;
     if (!end.stopped && should_stop()) {
       end.stopped = true;
       stopped_at = Clock::now();
@@ -83,7 +78,7 @@ ChildEnd run_child(const std::vector<std::string>& command, const std::function<
       kill(-process, SIGKILL);
     }
   }
-  close(ends[0]);
+  pipe.read_end.close();
   int status = 0;
   while (waitpid(process, &status, 0) < 0 && errno == EINTR) {
   }

@@ -13,6 +13,8 @@
 #include <sstream>
 #include <string>
 
+#include "marrow/base/descriptor.hpp"
+
 namespace marrow {
 namespace {
 
@@ -27,11 +29,11 @@ std::string loader_of_system() {
 
 /// What a program prints; empty if it cannot be started.
 std::string output_of(const std::vector<std::string>& command) {
-  int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) return "";
+  Pipe pipe = open_pipe();
+  if (!pipe.read_end.is_open()) return "";
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, pipe.write_end, STDOUT_FILENO);
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
   std::vector<char*> arguments;
   for (const std::string& text : command) arguments.push_back(const_cast<char*>(text.c_str()));
@@ -39,13 +41,12 @@ std::string output_of(const std::vector<std::string>& command) {
   pid_t process = -1;
   const int fault = posix_spawn(&process, arguments[0], &actions, nullptr, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
-  close(ends[1]);
+  pipe.write_end.close();
   std::string output;
   std::array<char, 4096> buffer;
   for (ssize_t count = 0;
-       !fault && (count = read(ends[0], buffer.data(), buffer.size())) != 0 && (count > 0 || errno == EINTR);)
+       !fault && (count = read(pipe.read_end, buffer.data(), buffer.size())) != 0 && (count > 0 || errno == EINTR);)
     if (count > 0) output.append(buffer.data(), std::size_t(count));
-  close(ends[0]);
   while (!fault && waitpid(process, nullptr, 0) < 0 && errno == EINTR) continue;
   return output;
 }

@@ -103,29 +103,10 @@ WorkerSettings python_process(const fs::path& file, int made, int replies) {
   return {command, shared};
 }
 
-ReplyPipe::ReplyPipe() {
-  int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) throw Error(std::string("cannot start a process: ") + std::strerror(errno));
-  read_end_ = ends[0];
-  write_end_ = ends[1];
+ReplyPipe::ReplyPipe() : pipe_(open_pipe()) {
+  if (!pipe_.read_end.is_open()) throw Error(std::string("cannot start a process: ") + std::strerror(errno));
 }
 
-ReplyPipe::~ReplyPipe() {
-  close_read_end();
-  close(write_end_);
-}
-
-void ReplyPipe::close_read_end() {
-  if (read_end_ >= 0) close(std::exchange(read_end_, -1));
-}
-
-void ReplyPipe::send(const nlohmann::json& reply) {
-  const std::string line = reply.dump() + "\n";
-  for (std::size_t done = 0; done < line.size();) {
-    const ssize_t count = write(write_end_, line.data() + done, line.size() - done);
-    if (count < 0 && errno != EINTR) return;
-    if (count > 0) done += std::size_t(count);
-  }
-}
+void ReplyPipe::send(const nlohmann::json& reply) { write_all(pipe_.write_end, reply.dump() + "\n"); }
 
 }  // namespace marrow

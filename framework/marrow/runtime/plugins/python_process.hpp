@@ -5,6 +5,7 @@
 
 #include <filesystem>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/runtime/process/worker.hpp"
 
 namespace marrow {
@@ -35,18 +36,15 @@ class ReplyPipe {
  public:
   /// Throws Error if no more files can be opened.
   ReplyPipe();
-  ~ReplyPipe();
-  ReplyPipe(const ReplyPipe&) = delete;
-  ReplyPipe& operator=(const ReplyPipe&) = delete;
 
-  int read_end() const { return read_end_; }
+  int read_end() const { return pipe_.read_end; }
   /// To be called when the process has been started: only it reads.
-  void close_read_end();
+  void close_read_end() { pipe_.read_end.close(); }
   /// Does nothing if the process has ended.
   void send(const nlohmann::json& reply);
 
  private:
-  int read_end_ = -1, write_end_ = -1;
+  Pipe pipe_;
 };
 
 }  // namespace marrow

@@ -12,13 +12,14 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <optional>
 #include <vector>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/base/user_folder.hpp"
 #include "marrow/runtime/plugins/library.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
 
@@ -28,23 +29,6 @@ namespace {
 namespace fs = std::filesystem;
 constexpr const char* kTrustAll = "MARROW_TRUST_ALL_PLUGINS";
 constexpr std::size_t kMostNames_bytes = 1 << 20;  // for the names of a group's members
-
-struct User {
-  std::string name;
-  gid_t group = 0;
-};
-
-std::optional<User> user_of(uid_t id) {
-  std::vector<char> buffer(1 << 14);
-  passwd entry{}, *found = nullptr;
-  if (getpwuid_r(id, &entry, buffer.data(), buffer.size(), &found) != 0 || !found) return std::nullopt;
-  return User{found->pw_name, found->pw_gid};
-}
-
-std::string name_of(uid_t id) {
-  const std::optional<User> user = user_of(id);
-  return user ? user->name : "user " + std::to_string(id);
-}
 
 /// Whether a group is the owner's private group. Most systems make one for each user, and programs of developers let it
 /// write (umask 002).
@@ -70,11 +54,7 @@ uid_t owner_of_framework() {
   return owner;
 }
 
-std::string mode_text(mode_t mode) {
-  char text[8];
-  std::snprintf(text, sizeof text, "%04o", unsigned(mode & 07777));
-  return text;
-}
+std::string mode_text(mode_t mode) { return formatted("{:04o}", mode & 07777); }
 
 /// Whether a file has an access list. The list lets other users write as far as the mode lets the group write, and the
 /// group itself may have nothing to do with it.
@@ -88,7 +68,7 @@ std::string fault_of(const fs::path& path, bool is_above, uid_t also) {
   const std::string quoted = "'" + path.string() + "'";
   if (status.st_uid != geteuid() && status.st_uid != 0 && status.st_uid != owner_of_framework() &&
       status.st_uid != also)
-    return "is not trusted, because " + quoted + " belongs to " + name_of(status.st_uid) + " (mode " +
+    return "is not trusted, because " + quoted + " belongs to " + user_name(status.st_uid) + " (mode " +
            mode_text(status.st_mode) + "), who is neither you nor root; copy it into a folder of your own";
   if (is_above && (status.st_mode & S_ISVTX)) return "";
   const bool has_list = (status.st_mode & S_IWGRP) && has_access_list(path);
@@ -96,7 +76,7 @@ std::string fault_of(const fs::path& path, bool is_above, uid_t also) {
   if (!group && !(status.st_mode & S_IWOTH)) return "";
   // A folder with a sticky bit is for all users, as /tmp is.
   const bool is_for_all = S_ISDIR(status.st_mode) && (status.st_mode & S_ISVTX);
-  return "is not trusted, because others may write to " + quoted + " (owner " + name_of(status.st_uid) + ", mode " +
+  return "is not trusted, because others may write to " + quoted + " (owner " + user_name(status.st_uid) + ", mode " +
          mode_text(status.st_mode) + (has_list ? " and an access list" : "") + "); " +
          (is_for_all ? "move the library into a folder of your own" : "chmod go-w " + quoted);
 }
@@ -108,14 +88,20 @@ bool holds_framework(const fs::path& folder) {
   return std::mismatch(folder.begin(), folder.end(), framework.begin(), framework.end()).first == folder.end();
 }
 
+/// Checks a folder, given without links, and all folders above it.
+std::string fault_of_folders(fs::path folder, bool is_above, uid_t also) {
+  std::string fault;
+  for (bool is_last = false; fault.empty() && !is_last; is_above = true, folder = folder.parent_path()) {
+    if (!holds_framework(folder)) fault = fault_of(folder, is_above, also);
+    is_last = folder == folder.parent_path();
+  }
+  return fault;
+}
+
 /// Checks a path without links: a file or folder, and all folders above it.
 std::string fault_of_chain(const fs::path& real, uid_t also) {
   std::string fault = fault_of(real, false, also);
-  bool is_above = fs::is_directory(real);
-  for (fs::path folder = real; fault.empty() && folder != folder.parent_path(); is_above = true) {
-    folder = folder.parent_path();
-    if (!holds_framework(folder)) fault = fault_of(folder, is_above, also);
-  }
+  if (fault.empty()) fault = fault_of_folders(real.parent_path(), fs::is_directory(real), also);
   return fault;
 }
 
@@ -131,16 +117,35 @@ std::string fault_of_both_ends(const fs::path& file, fs::path& real, uid_t also 
   return fault;
 }
 
-bool all_are_trusted() {
-  const char* all = std::getenv(kTrustAll);
-  return all && std::strcmp(all, "1") == 0;
-}
-
 std::string with_way_out(const std::string& fault) {
   return fault + (fault.starts_with("is not") ? std::string(", or set ") + kTrustAll + "=1" : "");
 }
 
 }  // namespace
+
+bool all_are_trusted() {
+  const char* all = std::getenv(kTrustAll);
+  return all && std::strcmp(all, "1") == 0;
+}
+
+bool is_still_trusted(const TrustedFiles& files) {
+  return all_are_trusted() ||
+         (std::all_of(files.folders.begin(), files.folders.end(),
+                      [](const std::string& folder) { return fault_of_folders(folder, false, 0).empty(); }) &&
+          std::all_of(files.groups.begin(), files.groups.end(),
+                      [](const auto& group) { return is_private(group[0], group[1]); }));
+}
+
+bool TrustedFiles::add(const fs::path& file) {
+  fs::path real;
+  struct stat status {};
+  if (all_are_trusted()) return true;
+  if (!fault_of_both_ends(file, real).empty() || stat(real.c_str(), &status) != 0) return false;
+  folders.insert(real.parent_path().string());
+  folders.insert(fs::canonical(fs::absolute(file).parent_path()).string());
+  if (status.st_mode & S_IWGRP) groups.insert({status.st_gid, status.st_uid});
+  return true;
+}
 
 std::string changeable_by_others(const fs::path& file) {
   fs::path real;

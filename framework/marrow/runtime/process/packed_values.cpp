@@ -231,22 +231,16 @@ class PackedReader {
 /// Copies the whole file to our own memory, because the other process may still write to the file.
 std::string contents_of(int descriptor) {
   std::string bytes(std::size_t(bytes_in(descriptor)), '\0');
-  for (std::size_t done = 0; done < bytes.size();) {
-    const ssize_t count = pread(descriptor, bytes.data() + done, bytes.size() - done, off_t(done));
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) throw Error("another process handed nothing over");
-    done += std::size_t(count);
-  }
+  if (read_at(descriptor, bytes.data(), bytes.size(), 0) != std::int64_t(bytes.size()))
+    throw Error("another process handed nothing over");
   return bytes;
 }
 
 }  // namespace
 
 SharedMemory::SharedMemory() : descriptor_(memfd_create("marrow", MFD_CLOEXEC | MFD_ALLOW_SEALING)) {
-  if (descriptor_ < 0) throw Error(std::string("cannot make memory to share: ") + std::strerror(errno));
+  if (!descriptor_.is_open()) throw Error(std::string("cannot make memory to share: ") + std::strerror(errno));
 }
-
-SharedMemory::~SharedMemory() { close(descriptor_); }
 
 void SharedMemory::seal() const {
   if (fcntl(descriptor_, F_ADD_SEALS, F_SEAL_WRITE | F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) != 0)

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/export.hpp"
 #include "marrow/runtime/node/value.hpp"
@@ -19,16 +20,13 @@ namespace MARROW_EXPORT marrow {
 class SharedMemory {
  public:
   SharedMemory();
-  ~SharedMemory();
-  SharedMemory(const SharedMemory&) = delete;
-  SharedMemory& operator=(const SharedMemory&) = delete;
   int descriptor() const { return descriptor_; }
   /// From now on nobody can write to it, also no other process that opens it through /proc. Throws Error if the system
   /// does not allow this.
   void seal() const;
 
  private:
-  int descriptor_;
+  Descriptor descriptor_;
 };
 
 /// Writes values to an open file. With `in_place`, large pieces stay where they are and only their addresses are

@@ -41,42 +41,24 @@ constexpr rlim_t kMostFiles = kFirstFreeDescriptor + 16, kEnoughFiles = 1024;
   rlimit files{};
   getrlimit(RLIMIT_NOFILE, &files);
   if (code == EMFILE || (code == EINVAL && files.rlim_cur <= kMostFiles))
-    throw NoProcess("cannot start a process: no more than " + std::to_string(files.rlim_cur) +
-                    " files may be open at once; raise the limit (ulimit -n " + std::to_string(kEnoughFiles) + ")");
+    throw NoProcess(
+        formatted("cannot start a process: no more than {} files may be open at once; raise the limit (ulimit -n {})",
+                  files.rlim_cur, kEnoughFiles));
   throw NoProcess(std::string("cannot start a process: ") + std::strerror(code) +
                   (code == EAGAIN ? "; the limit of processes is reached (ulimit -u)" : ""));
 }
 
-/// An open file that closes itself. Its number is different from all descriptors of the worker.
-class Descriptor {
- public:
-  explicit Descriptor(int original) : number_(fcntl(original, F_DUPFD_CLOEXEC, kFirstFreeDescriptor)) {
-    if (number_ < 0) cannot_start(errno);
-  }
-  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
-  ~Descriptor() {
-    if (number_ >= 0) close(number_);
-  }
-  int number() const { return number_; }
-  int release() { return std::exchange(number_, -1); }
+/// The same file under a number that is different from all descriptors of the worker.
+Descriptor above_those_of_worker(int original) {
+  Descriptor copy(fcntl(original, F_DUPFD_CLOEXEC, kFirstFreeDescriptor));
+  if (!copy.is_open()) cannot_start(errno);
+  return copy;
+}
 
- private:
-  int number_;
-};
-
-/// A pipe: the end to read from and the end to write to.
-std::pair<Descriptor, Descriptor> make_pipe() {
-  int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) cannot_start(errno);
-  struct Closed {
-    int* ends;
-    ~Closed() {
-      close(ends[0]);
-      close(ends[1]);
-    }
-  } closed{ends};
-  Descriptor read_end(ends[0]);
-  return {std::move(read_end), Descriptor(ends[1])};
+Pipe make_pipe() {
+  const Pipe pipe = open_pipe();
+  if (!pipe.read_end.is_open()) cannot_start(errno);
+  return {above_those_of_worker(pipe.read_end), above_those_of_worker(pipe.write_end)};
 }
 
 /// The environment, with the number of this process added. A worker that has another parent knows that it was left
@@ -85,7 +67,7 @@ std::vector<std::string> environment_of_worker() {
   std::vector<std::string> texts;
   for (char** one = environ; one && *one; ++one)
     if (std::strncmp(*one, "MARROW_PARENT=", 14) != 0) texts.emplace_back(*one);
-  texts.push_back("MARROW_PARENT=" + std::to_string(getpid()));
+  texts.push_back(formatted("MARROW_PARENT={}", getpid()));
   return texts;
 }
 
@@ -99,14 +81,13 @@ std::vector<char*> pointers_to(const std::vector<std::string>& texts) {
 /// Starts the program with default signals, in its own process group, so that Ctrl-C reaches only this process.
 pid_t start(const WorkerSettings& settings, int input, int output) {
   std::vector<Descriptor> shared;
-  for (const int original : settings.shared) shared.emplace_back(original);
+  for (const int original : settings.shared) shared.push_back(above_those_of_worker(original));
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
   posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
   if (settings.quiet) posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
-  for (std::size_t i = 0; i < shared.size(); ++i)
-    posix_spawn_file_actions_adddup2(&actions, shared[i].number(), 3 + int(i));
+  for (std::size_t i = 0; i < shared.size(); ++i) posix_spawn_file_actions_adddup2(&actions, shared[i], 3 + int(i));
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   sigset_t none, all;
@@ -143,18 +124,14 @@ Worker::Worker(const WorkerSettings& settings) {
   auto input = make_pipe(), output = make_pipe();
   ProcessState::of_runs()->keep_for_process([&] {
     close();  // one that took over what a node had changed
-    process_ = start(settings, input.first.number(), output.second.number());
+    process_ = start(settings, input.read_end, output.write_end);
   });
-  to_ = input.second.release();
-  from_ = output.first.release();
+  to_ = std::move(input.write_end);
+  from_ = std::move(output.read_end);
   fcntl(from_, F_SETFL, O_NONBLOCK);
 }
 
-Worker::~Worker() {
-  close();
-  if (to_ >= 0) ::close(to_);
-  ::close(from_);
-}
+Worker::~Worker() { close(); }
 
 void Worker::close() {
   if (process_ <= 0) return;
@@ -172,11 +149,7 @@ void Worker::ask(json request) {
   seconds_ = 0;
   looked_ = Clock::now();
   const std::string line = request.dump() + "\n";
-  for (std::size_t done = 0; to_ >= 0 && done < line.size();) {
-    const ssize_t count = write(to_, line.data() + done, line.size() - done);
-    if (count < 0 && errno != EINTR) ::close(std::exchange(to_, -1));  // it has ended; the next take() reports it
-    if (count > 0) done += std::size_t(count);
-  }
+  if (to_.is_open() && !write_all(to_, line)) to_.close();  // it has ended; the next take() reports it
 }
 
 std::optional<WorkerEnd> Worker::take(const Said& said) {
@@ -243,7 +216,7 @@ WorkerEnd Worker::died() {
     end.failed = "crashed" + where + ": " + strsignal(end.signal);
     if (end.signal == SIGKILL) end.failed += ", as by a system whose memory, or that of a cluster's job, runs out";
   } else {
-    end.failed = "ended" + where + " with exit code " + std::to_string(WEXITSTATUS(status));
+    end.failed = formatted("ended{} with exit code {}", where, WEXITSTATUS(status));
   }
   return end;
 }
@@ -292,7 +265,7 @@ WorkerEnd Worker::wait(const WorkerLimits& limits, const std::atomic<bool>* canc
 
 /// The state of its main thread, as in `ps`; 0 if there is no such process.
 char Worker::state() const {
-  std::ifstream stream("/proc/" + std::to_string(process_) + "/stat");
+  std::ifstream stream(formatted("/proc/{}/stat", process_));
   std::string text;
   std::getline(stream, text);
   const std::size_t name_end = text.rfind(") ");

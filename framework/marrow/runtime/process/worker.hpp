@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/base/export.hpp"
 
 namespace MARROW_EXPORT marrow {
@@ -97,7 +98,7 @@ class Worker {
   bool is_suspended() const;
 
   pid_t process_ = -1;
-  int to_ = -1, from_ = -1;
+  Descriptor to_, from_;
   std::uint64_t job_ = 0;
   bool is_busy_ = false, is_waiting_ = false;
   std::string text_, at_;

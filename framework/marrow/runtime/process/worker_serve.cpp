@@ -11,8 +11,10 @@
 #include <new>
 #include <opencv2/core.hpp>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/json_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/process_tree.hpp"
 #include "marrow/base/reason_of_exception.hpp"
 #include "marrow/runtime/process/plugin_code.hpp"
@@ -31,9 +33,8 @@ constexpr std::size_t kLongestText_bytes = 1 << 20;
 class Requests {
  public:
   Requests() : descriptor_(fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, kFirstOwnDescriptor)) {
-    const int nothing = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    const Descriptor nothing(open("/dev/null", O_RDONLY | O_CLOEXEC));
     dup2(nothing, STDIN_FILENO);
-    close(nothing);
   }
   std::optional<std::string> next() {
     for (std::size_t newline; (newline = text_.find('\n')) == std::string::npos;) {
@@ -58,8 +59,8 @@ class Requests {
 void shorten(json& text) {
   if (!text.is_string() || text.get_ref<const std::string&>().size() <= kLongestText_bytes) return;
   const std::size_t all = text.get_ref<const std::string&>().size();
-  text = text.get_ref<const std::string&>().substr(0, kLongestText_bytes) + "... (" +
-         std::to_string(all - kLongestText_bytes) + " more bytes)";
+  text = formatted("{}... ({} more bytes)", text.get_ref<const std::string&>().substr(0, kLongestText_bytes),
+                   all - kLongestText_bytes);
 }
 
 /// Sends answers to the standard output as it was at the start. What a library prints there must not be taken for an

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/run/keys.hpp"
-#include "marrow/base/regular_file.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -10,12 +9,15 @@
 #include <map>
 #include <mutex>
 #include <optional>
-#include <sstream>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/base/file_state.hpp"
 #include "marrow/base/machine.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/base/regular_file.hpp"
 #include "marrow/runtime/node/mapping.hpp"
 #include "marrow/runtime/pipeline/named_files.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/store/digest_memory.hpp"
 
 namespace marrow {
@@ -27,10 +29,9 @@ namespace fs = std::filesystem;
 void write_back(const fs::path& file) {
   struct stat status {};
   if (stat(file.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return;
-  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
-  if (descriptor < 0) return;  // whoever reads the file says why
+  const Descriptor descriptor(open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+  if (!descriptor.is_open()) return;  // whoever reads the file says why
   sync_file_range(descriptor, 0, 0, SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER);
-  close(descriptor);
 }
 
 Digest digest_once(const fs::path& file) {
@@ -142,43 +143,31 @@ Digest function_key(const Digest& result, std::size_t output) {
 }
 
 std::string text_of(const OptionValue& value, OptionType type, const Contents& contents) {
-  std::ostringstream out;
-  out.precision(17);
-  const auto add_file = [&](const std::string& path) {
+  const auto text_of_file = [&](const std::string& path) {
     const auto known = contents.find(path);
     const Digest digest = known == contents.end() ? path_digest(path) : known->second.digest;
-    out << path << " (content " << digest.hex().substr(0, 8) << ")";
+    return formatted("{} (content {})", path, digest.hex().substr(0, 8));
   };
-  std::visit(
-      [&](const auto& one) {
-        using T = std::decay_t<decltype(one)>;
-        if constexpr (std::is_same_v<T, bool>) {
-          out << (one ? "true" : "false");
-        } else if constexpr (std::is_same_v<T, std::string>) {
-          if (type == OptionType::path)
-            add_file(one);
-          else
-            out << one;
-        } else if constexpr (requires { one.size(); }) {
-          out << '[';
-          for (std::size_t i = 0; i < one.size(); ++i) {
-            if (i) out << ", ";
-            if constexpr (std::is_same_v<T, std::vector<std::string>>) {
-              if (type == OptionType::paths)
-                add_file(one[i]);
-              else
-                out << one[i];
-            } else {
-              out << one[i];
-            }
-          }
-          out << ']';
+  const auto text_of_one = [&](const auto& one) {
+    using T = std::decay_t<decltype(one)>;
+    if constexpr (std::is_same_v<T, double>)
+      return short_number(one, 17);
+    else if constexpr (std::is_same_v<T, std::string>)
+      return type == OptionType::path || type == OptionType::paths ? text_of_file(one) : one;
+    else
+      return formatted("{}", one);
+  };
+  return std::visit(
+      [&](const auto& all) {
+        if constexpr (requires { all.front(); } && !std::is_same_v<std::decay_t<decltype(all)>, std::string>) {
+          std::vector<std::string> texts;
+          for (const auto& one : all) texts.push_back(text_of_one(one));
+          return "[" + joined(texts, ", ") + "]";
         } else {
-          out << one;
+          return text_of_one(all);
         }
       },
       value);
-  return out.str();
 }
 
 std::vector<std::string> differences(const Provenance& before, const Provenance& now) {
@@ -198,7 +187,7 @@ std::vector<std::string> differences(const Provenance& before, const Provenance&
     if (old == before.inputs.end() || old->second != key) changes.push_back("input '" + name + "' changed");
   }
   if (now.random && before.seed != now.seed)
-    changes.push_back("the seed is " + std::to_string(now.seed) + ", was " + std::to_string(before.seed));
+    changes.push_back(formatted("the seed is {}, was {}", now.seed, before.seed));
   return changes;
 }
 

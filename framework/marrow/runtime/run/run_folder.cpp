@@ -13,10 +13,12 @@
 #include <set>
 #include <thread>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/framework_file.hpp"
 #include "marrow/base/machine.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/process_state.hpp"
 #include "marrow/base/reason_of_exception.hpp"
@@ -246,7 +248,7 @@ RunFolder RunFolder::with_free_name(const fs::path& base, const Pipeline& pipeli
   if (base.has_parent_path()) fs::create_directories(base.parent_path(), error);
   for (int i = 1;; ++i) {
     RunFolder run;
-    run.folder_ = i == 1 ? base : fs::path(base.string() + "-" + std::to_string(i));
+    run.folder_ = i == 1 ? base : fs::path(formatted("{}-{}", base.string(), i));
     if (::mkdir(run.folder_.c_str(), 0777) == 0) {
       try {
         if (run.take(pipeline)) return run;
@@ -263,11 +265,11 @@ RunFolder RunFolder::with_free_name(const fs::path& base, const Pipeline& pipeli
 bool RunFolder::take(const Pipeline& pipeline) {
   const fs::path log = folder_ / "log.txt";
   // O_EXCL: this succeeds for one process only.
-  const int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  if (file < 0 && errno == EEXIST) return false;
-  if (file < 0)
+  Descriptor file(::open(log.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  if (!file.is_open() && errno == EEXIST) return false;
+  if (!file.is_open())
     throw Error("cannot write to the output folder " + folder_.string() + ": " + std::strerror(errno) + kAdvice);
-  ::close(file);
+  file.close();
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error))
     if (entry.path() != log) {

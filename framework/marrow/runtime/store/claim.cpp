@@ -28,24 +28,22 @@ struct flock one_byte(short type, off_t place) {
 }  // namespace
 
 Store::Claim::~Claim() {
-  if (descriptor_ < 0) return;
+  if (!descriptor_.is_open()) return;
   // A child that was forked in the meantime shares the lock through its copy of the descriptor. Closing only our
   // descriptor would not release the lock.
   struct flock lock = one_byte(F_UNLCK, 0);
   lock.l_len = 0;  // to the end of the file
   fcntl(descriptor_, F_OFD_SETLK, &lock);
-  close(descriptor_);
 }
 
 Store::Claim Store::claim(const Digest& key, const std::atomic<bool>* cancelled,
                           const std::function<void(bool)>& on_wait) const {
   if (!prepare().empty()) return Claim();
   // This opens the file anew, so that two threads of one process exclude each other too.
-  const int descriptor =
-      open((folder_ / "claims").c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0600);
-  if (descriptor < 0) return Claim();
+  Descriptor descriptor(
+      open((folder_ / "claims").c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0600));
+  if (!descriptor.is_open()) return Claim();
   fchmod(descriptor, 0600);  // with any umask
-  Claim claim(descriptor);
   Waiting waiting(on_wait);
   struct flock lock = one_byte(F_WRLCK, off_t(key.low >> 2));
   auto pause = std::chrono::milliseconds(1);
@@ -55,7 +53,7 @@ Store::Claim Store::claim(const Digest& key, const std::atomic<bool>* cancelled,
     std::this_thread::sleep_for(pause);
     pause = std::min(2 * pause, std::chrono::milliseconds(50));
   }
-  return claim;
+  return Claim(std::move(descriptor));
 }
 
 }  // namespace marrow

@@ -19,6 +19,7 @@
 #include <thread>
 #include <vector>
 
+#include "marrow/base/atomic_file.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/process_identity.hpp"
 #include "marrow/base/waiting.hpp"
@@ -74,8 +75,8 @@ std::optional<std::string> claim_text(const fs::path& file) {
 /// A claim file of this process. It stays open, so that a sign of life never goes to another's file of the same name.
 class HeldClaim {
  public:
-  HeldClaim(fs::path file, int descriptor)
-      : file_(std::move(file)), descriptor_(descriptor), process_(getpid()), number_(next_number()) {
+  HeldClaim(fs::path file, Descriptor descriptor)
+      : file_(std::move(file)), descriptor_(std::move(descriptor)), process_(getpid()), number_(next_number()) {
     beat();
   }
   ~HeldClaim() {
@@ -84,7 +85,6 @@ class HeldClaim {
       if (const ClaimText now = parsed(claim_text(file_).value_or(""));
           now.owner == this_process() && now.number == number_)
         unlink(file_.c_str());
-    close(descriptor_);
   }
   HeldClaim(const HeldClaim&) = delete;
   HeldClaim& operator=(const HeldClaim&) = delete;
@@ -93,7 +93,7 @@ class HeldClaim {
   /// see it; fsync() would also wait for its disk. A fault is no harm: at worst others take the claim over.
   void beat() {
     const std::string text = formatted("{} {} {:.3f} {:012}\n", this_process(), number_, claim_seconds(), ++beats_);
-    if (pwrite(descriptor_, text.data(), text.size(), 0) == ssize_t(text.size())) close(dup(descriptor_));
+    if (pwrite(descriptor_, text.data(), text.size(), 0) == ssize_t(text.size())) Descriptor(dup(descriptor_)).close();
   }
 
  private:
@@ -103,7 +103,7 @@ class HeldClaim {
   }
 
   fs::path file_;
-  int descriptor_;
+  Descriptor descriptor_;
   pid_t process_;
   unsigned long long number_, beats_ = 0;
 };
@@ -228,8 +228,8 @@ SharedClaim claim_file(const fs::path& file, const Permissions& permissions, con
   constexpr int kMostTries = 5;
   for (int stale = 0;;) {
     if (cancelled && cancelled->load()) return {};
-    if (const int descriptor = open_new_file(file, permissions); descriptor >= 0) {
-      const auto held = std::make_shared<HeldClaim>(file, descriptor);
+    if (Descriptor descriptor(open_new_file(file, permissions)); descriptor.is_open()) {
+      const auto held = std::make_shared<HeldClaim>(file, std::move(descriptor));
       heart().add(held);
       return SharedClaim(held);
     }

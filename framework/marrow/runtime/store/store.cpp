@@ -11,6 +11,7 @@
 #include "marrow/base/plain_path.hpp"
 #include "marrow/base/reason_of_exception.hpp"
 #include "marrow/base/user_folder.hpp"
+#include "marrow/runtime/store/shared_folder.hpp"
 #include "marrow/runtime/store/shared_store.hpp"
 #include "marrow/runtime/store/store_entry.hpp"
 #include "marrow/runtime/store/store_folder.hpp"

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/base/export.hpp"
 #include "marrow/base/fields.hpp"
 #include "marrow/runtime/node/value.hpp"
@@ -92,13 +93,14 @@ class Store {
   /// The right to make one result. Others that want the same result wait until the holder has kept it or has ended.
   class Claim {
    public:
-    explicit Claim(int descriptor = -1) : descriptor_(descriptor) {}
-    Claim(Claim&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+    Claim() = default;
+    explicit Claim(Descriptor descriptor) : descriptor_(std::move(descriptor)) {}
+    Claim(Claim&&) noexcept = default;
     /// Gives the claim back, even if a process that was forked in the meantime still has the file open.
     ~Claim();
 
    private:
-    int descriptor_;
+    Descriptor descriptor_;
   };
   /// Waits for the claim. Look the result up again afterwards: its holder may have made it. Returns an empty claim if
   /// the folder cannot be written to or `cancelled` becomes true. The claim belongs to this process: if the process is

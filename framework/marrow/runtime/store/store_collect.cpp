@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <map>
 
+#include "marrow/base/atomic_file.hpp"
 #include "marrow/base/folder_use.hpp"
 #include "marrow/base/remove_tree.hpp"
 #include "marrow/runtime/store/shared_claim.hpp"

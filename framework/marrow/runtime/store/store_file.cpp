@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <time.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -12,6 +11,7 @@
 #include <cstring>
 #include <new>
 
+#include "marrow/base/atomic_file.hpp"
 #include "marrow/base/reason_of_exception.hpp"
 #include "marrow/runtime/store/store_folder.hpp"
 
@@ -30,43 +30,26 @@ class FileWriter : public Archive {
   void bytes(const void* data, std::size_t size) override {
     if (buffer_.size() + size > kBuffer) flush();
     if (size > kBuffer)
-      write_all(static_cast<const char*>(data), size);
+      write({static_cast<const char*>(data), size});
     else
       buffer_.append(static_cast<const char*>(data), size);
   }
   /// Returns 0, or the errno of the first fault.
   int flush() {
-    write_all(buffer_.data(), buffer_.size());
+    write(buffer_);
     buffer_.clear();
     return fault_;
   }
 
  private:
-  void write_all(const char* data, std::size_t size) {
-    while (size > 0 && !fault_) {
-      const ssize_t count = write(descriptor_, data, size);
-      if (count == 0 || (count < 0 && errno != EINTR)) fault_ = count ? errno : EIO;
-      if (count > 0) {
-        data += count;
-        size -= std::size_t(count);
-      }
-    }
+  void write(std::string_view part) {
+    if (!fault_ && !write_all(descriptor_, part)) fault_ = errno;
   }
 
   int descriptor_;
   int fault_ = 0;
   std::string buffer_;
 };
-
-/// Makes a new file next to `file` and puts its name into `temporary`. Returns -1 with errno if it cannot be made.
-int open_temporary(const fs::path& file, const Permissions& permissions, fs::path& temporary) {
-  int descriptor = -1;
-  do {
-    temporary = temporary_beside(file);
-    descriptor = open_new_file(temporary, permissions);
-  } while (descriptor < 0 && (errno == EEXIST || errno == EINTR));
-  return descriptor;
-}
 
 constexpr int kMostOpenings = 5;  // to open a file whose handle has become stale
 
@@ -98,30 +81,20 @@ int open_new_file(const fs::path& file, const Permissions& permissions) {
 
 StoreFile::StoreFile(const fs::path& path) {
   // On a shared folder a name may lead to a file that another host has just replaced. The next try finds the new one.
-  for (int tries = 0; descriptor_ < 0 && tries < kMostOpenings && (tries == 0 || errno == ESTALE); ++tries)
-    descriptor_ = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY);
-  if (descriptor_ < 0) fault_ = errno;
+  for (int tries = 0; !is_open() && tries < kMostOpenings && (tries == 0 || errno == ESTALE); ++tries)
+    descriptor_ = Descriptor(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY));
+  if (!is_open()) fault_ = errno;
   struct stat status {};
-  if (descriptor_ >= 0 && fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode)) {
+  if (is_open() && fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode)) {
     size_ = std::uint64_t(status.st_size);
-  } else if (descriptor_ >= 0) {
-    close(descriptor_);
-    descriptor_ = -1;
+  } else if (is_open()) {
+    descriptor_.close();
     fault_ = ENOENT;
   }
 }
 
-StoreFile::~StoreFile() {
-  if (descriptor_ >= 0) close(descriptor_);
-}
-
 bool StoreFile::read(void* data, std::size_t size, std::uint64_t offset) const {
-  for (std::size_t done = 0; done < size;) {
-    const ssize_t count = pread(descriptor_, static_cast<char*>(data) + done, size - done, off_t(offset + done));
-    if (count == 0 || (count < 0 && errno != EINTR)) return false;
-    if (count > 0) done += std::size_t(count);
-  }
-  return true;
+  return read_at(descriptor_, data, size, offset) == std::int64_t(size);
 }
 
 void StoreFile::mark_as_used() const { futimens(descriptor_, nullptr); }
@@ -170,26 +143,19 @@ void FileUnpacker::take(void* data, std::size_t size) {
 
 std::string write_whole(const fs::path& file, const std::function<void(Archive&)>& fill, bool is_durable,
                         const Permissions& permissions) {
-  fs::path temporary;
   const auto fault_of = [&](int number) { return "cannot write " + file.string() + ": " + std::strerror(number); };
-  const int descriptor = open_temporary(file, permissions, temporary);
-  if (descriptor < 0) return fault_of(errno);
-  std::string fault;
+  AtomicFile whole(file, temporary_beside, [&](const fs::path& name) { return open_new_file(name, permissions); });
+  if (!whole.descriptor().is_open()) return fault_of(errno);
   try {
-    FileWriter writer(descriptor);
+    FileWriter writer(whole.descriptor());
     fill(writer);
-    if (const int number = writer.flush()) fault = fault_of(number);
+    if (const int number = writer.flush()) return fault_of(number);
   } catch (const std::bad_alloc&) {
-    fault = fault_of(ENOMEM);
+    return fault_of(ENOMEM);
   } catch (...) {  // a value of a plugin's own type
-    fault = reason_of_exception();
+    return reason_of_exception();
   }
-  if (fault.empty() && is_durable && fsync(descriptor)) fault = fault_of(errno);
-  // Some file systems report only now that there is no space. After EINTR, the file is closed nevertheless.
-  if (close(descriptor) && errno != EINTR && fault.empty()) fault = fault_of(errno);
-  if (fault.empty() && std::rename(temporary.c_str(), file.c_str())) fault = fault_of(errno);
-  if (!fault.empty()) unlink(temporary.c_str());
-  return fault;
+  return whole.finish(is_durable) ? "" : fault_of(errno);
 }
 
 std::string write_checked(const fs::path& file, std::string_view text) {

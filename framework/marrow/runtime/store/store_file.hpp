@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/base/hash.hpp"
 
 namespace marrow {
@@ -32,11 +33,8 @@ int open_new_file(const std::filesystem::path& file, const Permissions& permissi
 class StoreFile {
  public:
   explicit StoreFile(const std::filesystem::path& path);
-  ~StoreFile();
-  StoreFile(const StoreFile&) = delete;
-  StoreFile& operator=(const StoreFile&) = delete;
 
-  bool is_open() const { return descriptor_ >= 0; }
+  bool is_open() const { return descriptor_.is_open(); }
   std::uint64_t size() const { return size_; }  ///< the size when it was opened
   int fault() const { return fault_; }          ///< errno, if it is not open
   /// Returns false if the file has become shorter or cannot be read.
@@ -47,7 +45,7 @@ class StoreFile {
 
  private:
   int fault_ = 0;
-  int descriptor_ = -1;
+  Descriptor descriptor_;
   std::uint64_t size_ = 0;
 };
 

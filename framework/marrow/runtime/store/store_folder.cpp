@@ -5,13 +5,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <optional>
 
+#include "marrow/base/atomic_file.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/process_identity.hpp"
 #include "marrow/base/user_folder.hpp"
 #include "marrow/runtime/store/store.hpp"
@@ -176,19 +177,13 @@ std::string make_shared_folder(const fs::path& folder, const Permissions& permis
   const auto fault = [&] { return "cannot make the folder " + folder.string() + ": " + std::strerror(errno); };
   const fs::path temporary = temporary_beside(folder);
   if (mkdir(temporary.c_str(), 0700) != 0) return fault();
-  const int descriptor = open(temporary.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-  bool is_done = descriptor >= 0 && permit(descriptor, permissions.folder, permissions);
-  if (descriptor >= 0) close(descriptor);
+  Descriptor descriptor(open(temporary.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+  bool is_done = descriptor.is_open() && permit(descriptor, permissions.folder, permissions);
   // Another process may have been quicker.
   is_done = is_done && (std::rename(temporary.c_str(), folder.c_str()) == 0 || errno == EEXIST || errno == ENOTEMPTY);
   const std::string text = is_done ? "" : fault();
   rmdir(temporary.c_str());
   return text;
-}
-
-fs::path temporary_beside(const fs::path& final) {
-  static std::atomic<std::uint64_t> number{0};
-  return final.string() + ".tmp-" + this_process() + "-" + std::to_string(number++);
 }
 
 fs::path new_folder_beside(const fs::path& final) {
@@ -244,12 +239,11 @@ std::vector<StoreItem> items_of_store(const fs::path& folder, std::string& fault
 
 std::optional<timespec> time_in(const fs::path& folder, const Permissions& permissions) {
   const fs::path file = temporary_beside(folder / kStoreMarker);
-  const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
-  if (descriptor < 0) return std::nullopt;
+  const Descriptor descriptor(open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600));
+  if (!descriptor.is_open()) return std::nullopt;
   permit(descriptor, permissions.file, permissions);
   struct stat status {};
   const bool is_known = write(descriptor, "\n", 1) == 1 && fsync(descriptor) == 0 && fstat(descriptor, &status) == 0;
-  close(descriptor);
   unlink(file.c_str());
   return is_known ? std::optional(status.st_mtim) : std::nullopt;
 }

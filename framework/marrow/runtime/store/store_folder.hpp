@@ -45,8 +45,6 @@ std::string make_private_folder(const std::filesystem::path& folder);
 /// folder that exists is left as it is. Returns why this failed, or an empty text.
 std::string make_shared_folder(const std::filesystem::path& folder, const Permissions& permissions);
 
-/// A temporary name for a file or folder that is renamed to `final` when it is complete. Each call returns a new name.
-std::filesystem::path temporary_beside(const std::filesystem::path& final);
 /// Makes a new private folder with a temporary name. Throws Error if it cannot.
 std::filesystem::path new_folder_beside(const std::filesystem::path& final);
 
