@@ -14,7 +14,7 @@
 #include <marrow/runtime/plugins/catalogue.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "edges/radiograph.hpp"
+#include "tests/plugins/edges/radiograph.hpp"
 
 namespace {
 

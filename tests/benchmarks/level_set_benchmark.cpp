@@ -13,7 +13,7 @@
 #include "itk_geodesic.hpp"
 #include "marrow/toolbox/field/interior.hpp"
 #include "plugins/segment/level_set.cpp"
-#include "segment/distal_end.hpp"
+#include "tests/plugins/segment/distal_end.hpp"
 
 namespace {
 

@@ -13,7 +13,7 @@ import sys
 import time
 import unittest
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "cli"))
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "tools" / "marrow"))
 from harness import SKIPPED, arguments_parser, program_of, sample
 from processes import has_processes
 from subjects import Compare, Run, bytes_below

@@ -9,7 +9,7 @@
 #include "marrow/toolbox/robotics/guide_state.hpp"
 #include "marrow/toolbox/robotics/robot_state.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
-#include "properties/mirrored_values.hpp"
+#include "tests/properties/mirrored_values.hpp"
 
 namespace mirrored_patient {
 namespace {

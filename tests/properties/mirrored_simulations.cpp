@@ -4,7 +4,7 @@
 #include <opencv2/core.hpp>
 
 #include "marrow/simulate/posture.hpp"
-#include "properties/mirrored_values.hpp"
+#include "tests/properties/mirrored_values.hpp"
 
 namespace mirrored_patient {
 namespace {

@@ -5,7 +5,7 @@
 #include <marrow/runtime/plugins/catalogue.hpp>
 #include <set>
 
-#include "properties/mirrored_values.hpp"
+#include "tests/properties/mirrored_values.hpp"
 
 namespace mirrored_test {
 
@@ -26,7 +26,7 @@ const std::map<std::string, std::string>& apart() {
       {"simulate.case_parts", "takes them apart"},
       {"simulate.chessboard", "images of a board"},
       {"simulate.export", "changes the grey values of an image"},
-      {"simulate.landmarks", "takes any points of the surface, and tests/simulate says that they lie on it"},
+      {"simulate.landmarks", "takes any points of the surface, and tests/plugins/simulate says that they lie on it"},
       {"simulate.mistake", "takes the other side for this one on purpose"},
       {"simulate.nail", "a nail is the same for both sides"},
       {"simulate.photograph", "photographs of a platform, by a camera that is given"},

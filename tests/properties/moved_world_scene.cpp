@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "properties/moved_world_scene.hpp"
+#include "tests/properties/moved_world_scene.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "properties/moved_world_values.hpp"
+#include "tests/properties/moved_world_values.hpp"
 #include "shipped.hpp"
 
 namespace moved_world {

@@ -9,7 +9,7 @@
 #include <map>
 #include <set>
 
-#include "properties/moved_world_scene.hpp"
+#include "tests/properties/moved_world_scene.hpp"
 
 namespace moved_world_test {
 
@@ -21,7 +21,7 @@ const std::map<std::string, std::string>& apart() {
   static const std::map<std::string, std::string> nodes{
       {"evaluate.calibration", "compares two camera matrices of one device, which have no place"},
       {"evaluate.frames", "sums up figures"},
-      {"evaluate.locking", "a plan of plan.locking; tests/plan moves its world"},
+      {"evaluate.locking", "a plan of plan.locking; tests/plugins/plan moves its world"},
       {"track.keyframes", "reads files; their poses are those of the world they were placed in"}};
   return nodes;
 }

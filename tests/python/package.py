@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 
-sys.path.insert(0, str(pathlib.Path(sys.argv[1]) / "tests" / "cli"))
+sys.path.insert(0, str(pathlib.Path(sys.argv[1]) / "tests" / "tools" / "marrow"))
 from marrow_cli import BUILD, MARROW, SHARED_CACHE, SOURCE, TEST_PLUGINS, Case, main, wait_until  # noqa: E402, F401
 
 FEMUR = SOURCE / "pipelines" / "femur.yaml"

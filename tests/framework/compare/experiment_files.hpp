@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Experiment files in a folder of their own, with a pipeline and cases beside them.
+#include <string>
+
+#include "marrow/compare/experiment.hpp"
+#include "tests/framework/runtime/fixture.hpp"
+
+namespace experiment_files {
+
+using runtime_fixture::Scratch;
+using runtime_fixture::test_catalogue;
+
+inline constexpr const char* kPipeline =
+    "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  c: {uses: test.constant, with: {path: $case, value: 1}}\n"
+    "  n: {uses: test.add, in: {a: c, b: c}}\n  f: {uses: test.fail_above, in: {a: n}, with: {value: 9}}\n"
+    "  t: {uses: test.truth}\noutputs: {number: n, other: f, truth: t}\n";
+inline constexpr const char* kSimulation =
+    "marrow: 1\ninputs: {x: {type: number, default: 0}, shape: {type: integer, default: 1}}\nnodes:\n"
+    "  c: {uses: test.constant, with: {value: $x, count: $shape}}\noutputs: {case: c}\n";
+inline constexpr const char* kHead = "experiment: 1\npipeline: p.yaml\n";
+inline constexpr const char* kCases = "cases: {folders: [cases/*]}\n";
+inline constexpr const char* kVariants = "variants:\n  one: {}\n  two: {c.value: 2}\n";
+inline constexpr const char* kMetrics = "metrics: [number.value]\n";
+
+/// The file p.yaml and the folders cases/a and cases/b; s.yaml makes cases.
+class ExperimentFiles : public testing::Test {
+ protected:
+  ExperimentFiles() {
+    scratch.write("p.yaml", kPipeline);
+    scratch.write("s.yaml", kSimulation);
+    for (const char* name : {"b", "a"}) std::filesystem::create_directories(scratch.path / "cases" / name);
+  }
+  marrow::compare::Experiment read(const std::string& text) {
+    diagnostics = marrow::Diagnostics();
+    return marrow::compare::read_experiment(scratch.write("e.yaml", text), test_catalogue(), diagnostics);
+  }
+  Scratch scratch;
+  marrow::Diagnostics diagnostics;
+};
+
+}  // namespace experiment_files

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <marrow/compare/statistics.hpp>
+
+#include "tests/harness/message_of.hpp"
+
+namespace statistics_test {
+
+using namespace marrow::compare;
+using marrow::test::message_of;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+TEST(Wilson, IsTheClosedForm) {
+  // z = 1.959964; 8 of 10: centre (0.8 + 0.192073) / 1.384146, half-width 0.226582.
+  const Interval interval = wilson_interval(8, 10);
+  EXPECT_NEAR(interval.lower, 0.490162, 1e-6);
+  EXPECT_NEAR(interval.upper, 0.943318, 1e-6);
+}
+
+TEST(Wilson, OfNoneAndOfAllEndsAtZeroAndOne) {
+  // The other bound of 0 of n is z^2 / (n + z^2).
+  const Interval none = wilson_interval(0, 10);
+  EXPECT_EQ(none.lower, 0);
+  EXPECT_NEAR(none.upper, 3.841459 / 13.841459, 1e-6);
+  const Interval all = wilson_interval(10, 10);
+  EXPECT_EQ(all.upper, 1);
+  EXPECT_NEAR(all.lower, 10 / 13.841459, 1e-6);
+}
+
+TEST(Wilson, RefusesWhatIsNoRate) {
+  EXPECT_NE(message_of([] { wilson_interval(0, 0); }).find("at least one trial"), std::string::npos);
+  EXPECT_NE(message_of([] { wilson_interval(3, 2); }).find("3 successes of 2 trials"), std::string::npos);
+  EXPECT_NE(message_of([] { wilson_interval(1, 2, 95); }).find("0.95"), std::string::npos);
+  EXPECT_NE(message_of([] { wilson_interval(1, 2, nan); }).find("confidence"), std::string::npos);
+}
+
+/// `successes` of `runs` from a start of that error.
+void add(std::vector<StartOutcome>& outcomes, double error, std::size_t successes, std::size_t runs) {
+  for (std::size_t i = 0; i < runs; ++i) outcomes.push_back({error, i < successes});
+}
+
+TEST(CaptureRange, EndsBeforeTheFirstBinThatFails) {
+  std::vector<StartOutcome> outcomes;
+  add(outcomes, 7.9, 20, 20);  // beyond the failing bin: does not count
+  add(outcomes, 0, 3, 3);
+  add(outcomes, 2, 19, 20);  // just 95 %
+  add(outcomes, 4, 8, 10);
+  const CaptureRange capture = capture_range(outcomes);
+  EXPECT_EQ(capture.range, 4);
+  EXPECT_FALSE(capture.is_open);
+  ASSERT_EQ(capture.bins.size(), 4u);
+  EXPECT_EQ(capture.bins[2].from, 4);
+  EXPECT_EQ(capture.bins[2].to, 6);
+  EXPECT_EQ(capture.bins[2].successes, 8u);
+  EXPECT_EQ(capture.bins[2].runs, 10u);
+  EXPECT_NEAR(capture.bins[2].success.lower, 0.490162, 1e-6) << "as Wilson's interval of 8 of 10 above";
+  EXPECT_NEAR(capture.bins[2].success.upper, 0.943318, 1e-6);
+}
+
+TEST(CaptureRange, CountsACaseOnceWhereItsStartsEndAlike) {
+  std::vector<StartOutcome> outcomes;
+  for (int i = 0; i < 100; ++i) outcomes.push_back({1, i >= 20, "case " + std::to_string(i / 10)});
+  const CaptureRange capture = capture_range(outcomes);
+  EXPECT_EQ(capture.bins[0].successes, 80u);
+  EXPECT_EQ(capture.bins[0].runs, 100u);
+  EXPECT_NEAR(capture.bins[0].success.lower, 0.490162, 1e-6) << "as Wilson's interval of 8 of 10 above";
+  EXPECT_NEAR(capture.bins[0].success.upper, 0.943318, 1e-6);
+}
+
+TEST(CaptureRange, IsOpenWhereNoStartIsTooFar) {
+  std::vector<StartOutcome> outcomes;
+  add(outcomes, 1.5, 10, 10);
+  add(outcomes, 7.25, 10, 10);
+  const CaptureRange capture = capture_range(outcomes);
+  EXPECT_EQ(capture.range, 7.25);
+  EXPECT_TRUE(capture.is_open);
+  EXPECT_EQ(capture.bins[1].runs, 0u);
+  EXPECT_EQ(capture.bins[1].success.lower, 0) << "nothing is known of an empty bin";
+  EXPECT_EQ(capture.bins[1].success.upper, 1);
+}
+
+TEST(CaptureRange, PassesOverEmptyBinsButReachesNoFurtherByThem) {
+  std::vector<StartOutcome> outcomes;
+  add(outcomes, 3, 10, 10);
+  add(outcomes, 11, 1, 10);
+  EXPECT_EQ(capture_range(outcomes).range, 4) << "4 to 10 mm were not tried";
+  EXPECT_EQ(capture_range({{9, false}}).range, 0) << "0 to 8 mm were not tried";
+  EXPECT_FALSE(capture_range({{9, false}}).is_open);
+  EXPECT_EQ(capture_range({{0.3, true}, {0.4, true}}, 0.1).range, 0.4) << "no farther than was tried";
+  EXPECT_EQ(capture_range({}).range, 0);
+  EXPECT_FALSE(capture_range({}).is_open);
+}
+
+TEST(CaptureRange, LostStartsShareTheLastBin) {
+  const CaptureRange capture = capture_range({{1, true}, {250, false}, {1e9, false}});
+  EXPECT_EQ(capture.range, 2);
+  ASSERT_EQ(capture.bins.size(), 100u);
+  EXPECT_EQ(capture.bins.back().from, 198);
+  EXPECT_EQ(capture.bins.back().to, 1e9);
+  EXPECT_EQ(capture.bins.back().runs, 2u);
+}
+
+TEST(CaptureRange, OfOtherBinsAndRates) {
+  std::vector<StartOutcome> outcomes;
+  add(outcomes, 0.5, 9, 10);
+  add(outcomes, 1.5, 8, 10);
+  EXPECT_EQ(capture_range(outcomes, 1, 0.9).range, 1);
+  EXPECT_EQ(capture_range(outcomes, 2, 0.85).range, 1.5);
+}
+
+TEST(CaptureRange, RefusesWhatIsNoDistance) {
+  EXPECT_EQ(message_of([] {
+              capture_range({{nan, true}});
+            }),
+            "the error of a start is nan, which is no distance; leave runs out whose start is not known");
+  EXPECT_EQ(message_of([] {
+              capture_range({{-1, true}});
+            }),
+            "the error of a start is -1.000000, which is no distance; leave runs out whose start is not known");
+  EXPECT_EQ(message_of([] { capture_range({}, 0); }), "the width of a bin is 0.000000; give a positive one");
+  EXPECT_EQ(message_of([] { capture_range({}, 2, 95); }),
+            "the success rate is 95.000000; give a fraction from 0 to 1, such as 0.95");
+}
+
+TEST(Summarise, InterpolatesBetweenSortedValues) {
+  const Summary summary = summarise({4, 1, 3, 10});  // positions 0.75, 1.5, 2.25 and 2.85 in 1 3 4 10
+  EXPECT_EQ(summary.count, 4u);
+  EXPECT_DOUBLE_EQ(summary.mean, 4.5);
+  EXPECT_DOUBLE_EQ(summary.lower_quartile, 2.5);
+  EXPECT_DOUBLE_EQ(summary.median, 3.5);
+  EXPECT_DOUBLE_EQ(summary.upper_quartile, 5.5);
+  EXPECT_DOUBLE_EQ(summary.percentile_95, 9.1);
+  EXPECT_DOUBLE_EQ(summary.worst, 10);
+}
+
+TEST(Summarise, OfOneValueIsThatValue) {
+  const Summary summary = summarise({-2});
+  for (double value : {summary.mean, summary.median, summary.lower_quartile, summary.upper_quartile,
+                       summary.percentile_95, summary.worst})
+    EXPECT_EQ(value, -2);
+}
+
+TEST(Summarise, OfAScoreTheLowestAreTheWorst) {
+  const Summary summary = summarise({4, 1, 3, 10}, true);
+  EXPECT_DOUBLE_EQ(summary.percentile_95, 1.3);  // position 0.15 in 1 3 4 10
+  EXPECT_DOUBLE_EQ(summary.worst, 1);
+  EXPECT_DOUBLE_EQ(summary.upper_quartile, 5.5);
+}
+
+TEST(Summarise, RefusesWhatIsNotFinite) {
+  EXPECT_NE(message_of([] { summarise({1, nan, 3}); }).find("value 2 of 3 is nan"), std::string::npos);
+  EXPECT_NE(message_of([] { summarise({infinite}); }).find("value 1 of 1 is inf"), std::string::npos);
+  EXPECT_NE(message_of([] { summarise({}); }).find("no values"), std::string::npos);
+}
+
+TEST(Holm, StepsDownAndKeepsTheOrder) {
+  const std::vector<double> corrected = holm({0.01, 0.04, 0.03, 0.005});
+  ASSERT_EQ(corrected.size(), 4u);
+  EXPECT_DOUBLE_EQ(corrected[0], 0.03);
+  EXPECT_DOUBLE_EQ(corrected[1], 0.06);
+  EXPECT_DOUBLE_EQ(corrected[2], 0.06);
+  EXPECT_DOUBLE_EQ(corrected[3], 0.02);
+  EXPECT_EQ(holm({0.7, 0.9}), (std::vector<double>{1, 1}));
+  EXPECT_TRUE(holm({}).empty());
+  EXPECT_NE(message_of([] { holm({0.5, nan}); }).find("p-value 2 of 2 is nan"), std::string::npos);
+  EXPECT_NE(message_of([] { holm({-0.1}); }).find("from 0 to 1"), std::string::npos);
+}
+
+}  // namespace statistics_test

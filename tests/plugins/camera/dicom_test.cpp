@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "marrow/domain/c_arm.hpp"
+#include "tests/plugins/read/dicom_text.hpp"
+#include "tests/plugins/read/files.hpp"
+#include "shipped.hpp"
+
+namespace dicom_test {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using marrow::test::dicom_elements;
+using marrow::test::dicom_file;
+using marrow::test::dicom_item;
+using marrow::test::dicom_items;
+using marrow::test::Elements;
+using marrow::test::fluoroscopy;
+using marrow::test::implicit_elements;
+using marrow::test::implicit_file;
+using marrow::test::put;
+using marrow::test::TemporaryFolder;
+
+constexpr std::uint32_t kPrimary = 0x00181510, kSecondary = 0x00181511, kOrientation = 0x00200020;
+
+struct Read {
+  marrow::Camera camera;
+  std::vector<std::string> warnings;
+};
+
+marrow::List<marrow::Camera> cameras_of(const std::vector<std::string>& paths, shipped::Options options = {},
+                                        const marrow::Context& context = marrow::Context()) {
+  options["paths"] = paths;
+  return shipped::call("camera.dicom", {}, options, context).at("camera").as_list<marrow::Camera>();
+}
+
+Read read(const Elements& elements, const shipped::Options& options = {}) {
+  const TemporaryFolder folder;
+  put(folder / "x.dcm", dicom_file(elements));
+  Read result;
+  marrow::Context::Hooks hooks;
+  hooks.log = [&](std::string_view text, marrow::LogLevel) { result.warnings.emplace_back(text); };
+  result.camera = cameras_of({folder / "x.dcm"}, options, marrow::Context(hooks))[0];
+  return result;
+}
+
+shipped::Options frame(std::int64_t number) { return {{"frame", number}}; }
+
+Elements with(Elements elements, std::uint32_t tag, const std::string& value) {
+  elements[tag] = value;
+  return elements;
+}
+Elements without(Elements elements, std::initializer_list<std::uint32_t> tags) {
+  for (const auto tag : tags) elements.erase(tag);
+  return elements;
+}
+
+Vector3d towards_detector(const marrow::Camera& camera) { return camera.camera_from_world.rotation.row(2); }
+
+/// Without PatientOrientation the angles alone decide.
+marrow::Camera at(const std::string& primary, const std::string& secondary) {
+  return read(with(with(without(fluoroscopy(), {kOrientation}), kPrimary, "DS:" + primary), kSecondary,
+                   "DS:" + secondary))
+      .camera;
+}
+
+TEST(DicomCamera, LeftAnteriorObliqueIsPositive) {
+  EXPECT_TRUE(towards_detector(at("0", "0")).isApprox(-Vector3d::UnitY())) << "at 0 the patient faces the detector";
+  EXPECT_TRUE(towards_detector(at("90", "0")).isApprox(Vector3d::UnitX())) << "+90: the patient's left";
+  EXPECT_TRUE(towards_detector(at("-30", "0")).isApprox(Vector3d(-0.5, -std::sqrt(0.75), 0), 1e-12)) << "RAO 30";
+}
+
+TEST(DicomCamera, CranialIsPositive) {
+  EXPECT_TRUE(towards_detector(at("0", "90")).isApprox(Vector3d::UnitZ()));
+  const double c = std::cos(marrow::radians(20)), s = std::sin(marrow::radians(20));
+  EXPECT_TRUE(towards_detector(at("0", "20")).isApprox(Vector3d(0, -c, s), 1e-12)) << "CRA 20";
+  EXPECT_TRUE(towards_detector(at("0", "-20")).isApprox(Vector3d(0, -c, -s), 1e-12)) << "CAU 20";
+}
+
+// The example of PS3.17: RAO 30, CRA 20.
+TEST(DicomCamera, BothAnglesTogether) {
+  const double p = marrow::radians(-30), s = marrow::radians(20);
+  const Vector3d expected(std::sin(p) * std::cos(s), -std::cos(p) * std::cos(s), std::sin(s));
+  const marrow::Camera camera = at(" -30.0 ", "+20");
+  EXPECT_TRUE(towards_detector(camera).isApprox(expected, 1e-12));
+  EXPECT_LT((source_position_mm(camera) + 600 * expected).norm(), 1e-9)
+      << "the source lies opposite, SOD from the isocentre";
+}
+
+TEST(DicomCamera, DistancesAndPixels) {
+  const marrow::Camera camera = read(fluoroscopy()).camera;
+  EXPECT_EQ(camera.width_px, 6);
+  EXPECT_EQ(camera.height_px, 4);
+  EXPECT_NEAR(camera.intrinsics(0, 0), 1000 / 0.3, 1e-9) << "the second value is the distance of columns";
+  EXPECT_NEAR(camera.intrinsics(1, 1), 1000 / 0.4, 1e-9) << "the first value is the distance of rows";
+  EXPECT_LT((project(camera, Vector3d::Zero()) - Vector2d(2.5, 1.5)).norm(), 1e-12);
+  EXPECT_NEAR((camera.camera_from_world * Vector3d::Zero()).z(), 600, 1e-9);
+}
+
+TEST(DicomCamera, ImagerPixelSpacingComesFirst) {
+  const Elements both = with(fluoroscopy(), 0x00280030, "DS:0.24\\0.18");
+  EXPECT_NEAR(read(both).camera.intrinsics(0, 0), 1000 / 0.3, 1e-9);
+  EXPECT_TRUE(read(both).warnings.empty());
+  const Read alone = read(without(both, {0x00181164}));
+  EXPECT_NEAR(alone.camera.intrinsics(0, 0), 1000 / 0.18, 1e-9);
+  ASSERT_EQ(alone.warnings.size(), 1u);
+  EXPECT_NE(
+      alone.warnings[0].find("ImagerPixelSpacing (0018,1164) is missing; PixelSpacing (0028,0030) is taken for it"),
+      std::string::npos);
+  const Read calibrated = read(with(without(both, {0x00181164}), 0x00280a02, "CS:GEOMETRY"));
+  EXPECT_NEAR(calibrated.camera.intrinsics(0, 0), 1000 / 0.3, 1e-9)
+      << "at the isocentre a pixel is smaller by SOD / SID";
+  EXPECT_NE(calibrated.warnings.at(0).find("is calibrated to the patient, so it is multiplied by the magnification"),
+            std::string::npos);
+}
+
+TEST(DicomCamera, IsocentreDistanceFromTheMagnification) {
+  const Elements header = with(without(fluoroscopy(), {0x00181111}), 0x00181114, "DS:1.6");
+  EXPECT_NEAR((read(header).camera.camera_from_world * Vector3d::Zero()).z(), 1000 / 1.6, 1e-9);
+}
+
+TEST(DicomCamera, NamesAllThatIsMissing) {
+  EXPECT_SAYS(read(without(fluoroscopy(), {0x00181110, 0x00181111, 0x00181164, kPrimary, kSecondary})),
+              "x.dcm: its header does not say how it was taken; missing: PositionerPrimaryAngle (0018,1510) (or "
+              "describe the C-arm yourself); "
+              "PositionerSecondaryAngle (0018,1511) (or describe the C-arm yourself); DistanceSourceToDetector "
+              "(0018,1110) (or give "
+              "source_to_detector_mm); DistanceSourceToPatient (0018,1111) or EstimatedRadiographicMagnificationFactor "
+              "(0018,1114) (or "
+              "give source_to_isocentre_mm); ImagerPixelSpacing (0018,1164) (or give pixel_mm)");
+  const shipped::Options given{{"source_to_detector_mm", 1100.0}, {"source_to_isocentre_mm", 700.0}, {"pixel_mm", 0.5}};
+  const marrow::Camera camera = read(without(fluoroscopy(), {0x00181110, 0x00181111, 0x00181164}), given).camera;
+  EXPECT_NEAR(camera.intrinsics(0, 0), 2200, 1e-9);
+  EXPECT_NEAR((camera.camera_from_world * Vector3d::Zero()).z(), 700, 1e-9);
+}
+
+// What PatientOrientation says is what the image shows to its right and downwards. Whatever it is, the patient's left
+// must come out where the image as read shows it.
+TEST(DicomCamera, OrientationOfTheStoredImage) {
+  const Vector3d left(20, 0, 0), head(0, 0, 20), back(0, 20, 0);
+  const auto moved = [](const marrow::Camera& camera, const Vector3d& to) {
+    return Vector2d(project(camera, to) - project(camera, Vector3d::Zero()));
+  };
+  // As seen from the source: the patient's right is to the right.
+  marrow::Camera camera = read(fluoroscopy()).camera;
+  EXPECT_LT(moved(camera, left).x(), 0);
+  EXPECT_LT(moved(camera, head).y(), 0);
+  // As one facing the patient sees it: stored mirrored, and mirrored back when it is read, so the camera stays.
+  camera = read(with(fluoroscopy(), kOrientation, "CS:L\\F")).camera;
+  EXPECT_LT(moved(camera, left).x(), 0);
+  EXPECT_LT(moved(camera, head).y(), 0);
+  EXPECT_TRUE(read(with(fluoroscopy(), kOrientation, "CS:L\\F")).warnings.empty());
+  // Turned by a half and by quarters.
+  camera = read(with(fluoroscopy(), kOrientation, "CS:L\\H")).camera;
+  EXPECT_GT(moved(camera, left).x(), 0);
+  EXPECT_GT(moved(camera, head).y(), 0);
+  camera = read(with(fluoroscopy(), kOrientation, "CS:F\\L")).camera;
+  EXPECT_LT(moved(camera, head).x(), 0);
+  EXPECT_GT(moved(camera, left).y(), 0);
+  // Lateral from the left: the detector at the patient's left.
+  camera = read(with(with(fluoroscopy(), kPrimary, "DS:90"), kOrientation, "CS:A\\F")).camera;
+  EXPECT_TRUE(towards_detector(camera).isApprox(Vector3d::UnitX()));
+  EXPECT_LT(moved(camera, head).y(), 0);
+  for (const char* letters : {"A\\F", "P\\F"})
+    EXPECT_GT(
+        moved(read(with(with(fluoroscopy(), kPrimary, "DS:90"), kOrientation, std::string("CS:") + letters)).camera,
+              back)
+                .x() *
+            moved(camera, back).x(),
+        0)
+        << "mirrored or not, the image as read is the one that the source sees";
+  // Oblique, with two letters each.
+  EXPECT_TRUE(read(with(with(fluoroscopy(), kPrimary, "DS:40"), kOrientation, "CS:RP\\F")).warnings.empty());
+}
+
+TEST(DicomCamera, OrientationThatTheAnglesCannotShow) {
+  EXPECT_SAYS(
+      read(with(fluoroscopy(), kOrientation, "CS:A\\F")),
+      "PatientOrientation (0020,0020) says 'A\\F', which no view from these angles shows; one of them is wrong");
+}
+
+TEST(DicomCamera, WarnsWhereTheHeaderIsSilent) {
+  const Read silent = read(without(fluoroscopy(), {kOrientation}));
+  ASSERT_EQ(silent.warnings.size(), 1u);
+  EXPECT_NE(silent.warnings[0].find(
+                "PatientOrientation (0020,0020) is missing, so the image is taken to have the head up and to be seen "
+                "from the source"),
+            std::string::npos);
+  const Read prone = read(with(fluoroscopy(), 0x00185100, "CS:HFP"));
+  ASSERT_EQ(prone.warnings.size(), 1u);
+  EXPECT_NE(prone.warnings[0].find("PatientPosition (0018,5100) is HFP"), std::string::npos);
+}
+
+TEST(DicomCamera, WarnsWhereTheCentreMayLieElsewhere) {
+  for (const auto& [tag, value, name] : {std::tuple{0x00187030u, "DS:500\\0", "FieldOfViewOrigin (0018,7030)"},
+                                         {0x00189430u, "FL:510", "PositionOfIsocenterProjection (0018,9430)"}}) {
+    const Read warned = read(with(fluoroscopy(), tag, value));
+    ASSERT_EQ(warned.warnings.size(), 1u) << name;
+    EXPECT_NE(warned.warnings[0].find(std::string(name) +
+                                      " is not made use of: the ray through the isocentre is taken to meet"),
+              std::string::npos)
+        << warned.warnings[0];
+  }
+}
+
+TEST(DicomCamera, WarnsOfTheCentreOnce) {
+  EXPECT_EQ(read(with(with(fluoroscopy(), 0x00187030, "DS:500\\0"), 0x00189430, "FL:510")).warnings.size(), 1u);
+}
+
+TEST(DicomCamera, RefusesWhatCannotBe) {
+  EXPECT_SAYS(read(with(fluoroscopy(), 0x00080060, "CS:CT")), "is of modality 'CT'; expected XA or RF");
+  EXPECT_SAYS(read(with(fluoroscopy(), 0x00181110, "DS:500")),
+              "the isocentre (600.000000 mm from the source) lies behind the detector");
+  EXPECT_SAYS(read(with(with(fluoroscopy(), 0x00181110, "DS:1.0"), 0x00181111, "DS:0.6")), "mm, which no C-arm has");
+  EXPECT_SAYS(read(with(fluoroscopy(), kSecondary, "DS:120")),
+              "PositionerSecondaryAngle (0018,1511) is 120.000000, expected -90 to 90");
+  EXPECT_SAYS(read(with(fluoroscopy(), kPrimary, "DS:left")),
+              "PositionerPrimaryAngle (0018,1510): expected 1 number, got 'left'");
+  EXPECT_SAYS(read(with(fluoroscopy(), 0x00181164, "DS:0.3")),
+              "ImagerPixelSpacing (0018,1164): expected 2 numbers, got '0.3'");
+  EXPECT_SAYS(read(with(fluoroscopy(), 0x00181500, "CS:DYNAMIC"), frame(2)), "the arm moves during this run");
+}
+
+// Enhanced files keep the same elements in sequences: shared by all frames, or one item for each frame.
+TEST(DicomCamera, EnhancedFile) {
+  Elements header = without(fluoroscopy(), {0x00181110, 0x00181111, kPrimary, kSecondary});
+  header[0x52009229] = dicom_item({{0x00189476, dicom_item({{0x00181110, "DS:1200"}, {0x00189402, "DS:780"}})}});
+  header[0x52009230] = dicom_item({{0x00189405, dicom_item({{kPrimary, "DS:90"}, {kSecondary, "DS:0"}})}});
+  header[kOrientation] = "CS:A\\F";
+  const marrow::Camera camera = read(header).camera;
+  EXPECT_NEAR(camera.intrinsics(0, 0), 1200 / 0.3, 1e-9);
+  EXPECT_NEAR((camera.camera_from_world * Vector3d::Zero()).z(), 780, 1e-9);
+  EXPECT_TRUE(towards_detector(camera).isApprox(Vector3d::UnitX()));
+}
+
+// Enhanced files have it as a binary number of 4 bytes.
+TEST(DicomCamera, IsocentreDistanceAsABinaryNumber) {
+  const Elements header = with(without(fluoroscopy(), {0x00181111}), 0x00189402, "FL:785.5");
+  EXPECT_NEAR((read(header).camera.camera_from_world * Vector3d::Zero()).z(), 785.5, 1e-9);
+  const TemporaryFolder folder;
+  put(folder / "x.dcm", implicit_file(header));
+  EXPECT_NEAR((cameras_of({folder / "x.dcm"})[0].camera_from_world * Vector3d::Zero()).z(), 785.5, 1e-9);
+  EXPECT_SAYS(read(with(header, 0x00189402, "FL:nan")),
+              "DistanceSourceToIsocenter (0018,9402): expected 1 number, got 4 bytes");
+}
+
+// Implicit files do not say that these are sequences.
+TEST(DicomCamera, AnglesOfEachFrameInAnImplicitFile) {
+  Elements header = without(fluoroscopy(), {kPrimary, kSecondary, kOrientation});
+  std::vector<std::string> frames;
+  for (const char* angle : {"DS:0", "DS:90"})
+    frames.push_back(
+        implicit_elements({{0x00189405, dicom_items({implicit_elements({{kPrimary, angle}, {kSecondary, "DS:0"}})})}}));
+  header[0x00280008] = "IS:2";
+  header[0x7FE00010] += header[0x7FE00010].substr(3);
+  header[0x52009230] = dicom_items(frames);
+  const TemporaryFolder folder;
+  put(folder / "x.dcm", implicit_file(header));
+  EXPECT_TRUE(towards_detector(cameras_of({folder / "x.dcm"}, frame(2))[0]).isApprox(Vector3d::UnitX()));
+}
+
+/// Three frames, at these angles.
+Elements frames_at(const std::vector<std::string>& angles) {
+  Elements header = without(fluoroscopy(), {kPrimary, kSecondary, kOrientation});
+  std::vector<std::string> frames;
+  const std::string pixels = header[0x7FE00010].substr(3);
+  header[0x7FE00010] = "OW:";
+  for (const std::string& angle : angles) {
+    frames.push_back(dicom_elements({{0x00189405, dicom_item({{kPrimary, "DS:" + angle}, {kSecondary, "DS:0"}})}}));
+    header[0x7FE00010] += pixels;
+  }
+  header[0x00280008] = "IS:" + std::to_string(angles.size());
+  header[0x52009230] = dicom_items(frames);
+  return header;
+}
+
+// The image may be of any of them: read.views takes the frame that it is told.
+TEST(DicomCamera, FramesWithAGeometryEachMustBeNamed) {
+  const Elements turning = frames_at({"0", "30", "60"});
+  EXPECT_SAYS(
+      read(turning),
+      "x.dcm: has 3 frames with a geometry each (frame 1 at 0, 0 degrees; frame 2 at 30, 0 degrees; frame 3 at 60, 0 "
+      "degrees); name the one that the image is of with frame (from 1)");
+  const Eigen::Matrix3d third = read(turning, frame(3)).camera.camera_from_world.rotation;
+  EXPECT_TRUE(third.isApprox(at("60", "0").camera_from_world.rotation));
+  EXPECT_TRUE(read(frames_at({"60", "60", "60"})).camera.camera_from_world.rotation.isApprox(third)) << "all alike";
+  EXPECT_SAYS(read(turning, frame(4)), "x.dcm: has 3 frames; there is no frame 4");
+}
+
+TEST(DicomCamera, IncrementsOfTheAnglesAreMotion) {
+  Elements header = with(fluoroscopy(), 0x00280008, "IS:3");
+  const std::string pixels = header[0x7FE00010].substr(3);
+  header[0x7FE00010] += pixels + pixels;
+  const Elements still = with(with(header, 0x00181520, "DS:0\\0\\0"), 0x00181500, "CS:STATIC");
+  EXPECT_EQ(read(still).camera.width_px, 6);
+  for (const std::uint32_t tag : {0x00181520u, 0x00181521u}) {
+    const Elements moving = with(still, tag, "DS:0\\30\\60");
+    EXPECT_SAYS(read(moving), "the arm moves during this run of 3 frames");
+    EXPECT_SAYS(read(moving, frame(3)), "use frame 1, or describe the C-arm yourself with the angles of frame 3");
+    EXPECT_TRUE(read(moving, frame(1))
+                    .camera.camera_from_world.rotation.isApprox(read(still).camera.camera_from_world.rotation));
+  }
+}
+
+TEST(DicomCamera, OneCameraPerFileByName) {
+  const TemporaryFolder folder;
+  put(folder / "front.dcm", dicom_file(fluoroscopy()));
+  put(folder / "side.dcm", dicom_file(with(with(fluoroscopy(), kPrimary, "DS:90"), kOrientation, "CS:A\\F")));
+  const std::vector<std::string> paths{folder / "front.dcm", folder / "side.dcm"};
+  EXPECT_EQ(cameras_of(paths).names(), (std::vector<std::string>{"front", "side"}));
+  EXPECT_SAYS(cameras_of(paths, {{"names", std::vector<std::string>{"frontal", "frontal"}}}),
+              "names: two views are named 'frontal'");
+  EXPECT_TRUE(shipped::declares("camera.dicom", marrow::as_many_or_none("names", "paths")));
+  EXPECT_TRUE(shipped::declares("camera.dicom", marrow::at_least_one({"paths"})));
+}
+
+}  // namespace dicom_test

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+// Costs are the mean square of the six numbers (degrees and mm) that a pose is away from the bottom of a bowl.
+#include <gtest/gtest.h>
+
+#include "tests/plugins/project/shapes.hpp"
+#include "tests/plugins/register/bowl.hpp"
+#include "shipped.hpp"
+
+namespace best_of_test {
+
+using marrow::Cost;
+using marrow::Pose;
+
+struct Trial {
+  Trial() {
+    const marrow::Mesh mesh = shapes::cylinder(14, 120);
+    bottom.frame = marrow::fragment_frame(mesh);
+    bottom.world_from_model = {"world", mesh.frame};
+    cost = std::make_shared<const well::Well>(bottom.world_from_model, bottom.frame);
+    inputs["cost"] = marrow::Value::of<Cost>(cost);
+    use(std::make_shared<const well::Listener>());
+  }
+  void use(std::shared_ptr<const marrow::Optimizer> optimizer) {
+    inputs["optimizer"] = marrow::Value::of<marrow::Optimizer>(std::move(optimizer));
+  }
+  /// A start at this distance along the bone. Its cost is the sixth part of its square.
+  Pose away(double mm) const { return well::pose_at(bottom, 0, 0, 0, 0, 0, mm); }
+  void give(const std::string& input, double mm) { inputs[input] = shipped::item(away(mm)); }
+  Pose run(const shipped::Options& options = {}) {
+    marrow::Context::Hooks hooks;
+    hooks.log = [this](std::string_view text, marrow::LogLevel level) {
+      EXPECT_EQ(level, marrow::LogLevel::info);
+      log.emplace_back(text);
+    };
+    return shipped::call("initial.best_of", inputs, options, marrow::Context(hooks)).at("pose").as<Pose>();
+  }
+  Pose bottom;
+  std::shared_ptr<const well::Well> cost;
+  shipped::Inputs inputs;
+  std::vector<std::string> log;
+};
+
+TEST(BestOf, TakesTheStartOfLeastCostAndSaysWhatEachCosts) {
+  Trial trial;
+  trial.give("first", 6);
+  trial.give("second", 3);
+  trial.give("fourth", -12);
+  const Pose best = trial.run();
+  EXPECT_NEAR(best.cost, 9.0 / 6, 1e-9);
+  EXPECT_NEAR((best.world_from_model.translation_mm - trial.away(3).world_from_model.translation_mm).norm(), 0, 1e-9);
+  EXPECT_EQ(best.evaluations, 3 * 7) << "of all starts";
+  ASSERT_EQ(trial.log.size(), 1u);
+  EXPECT_EQ(trial.log[0], "second is the best start, with a cost of 1.5; first 6, fourth 24");
+}
+
+TEST(BestOf, RefinesEachStart) {
+  Trial trial;
+  trial.inputs["optimizer"] = shipped::call("optimizer.nelder_mead", {}).at("optimizer");
+  trial.give("third", 20);
+  const Pose refined = trial.run();
+  EXPECT_LT(refined.cost, 1);
+  EXPECT_LT(well::way(trial.bottom.world_from_model, refined.world_from_model, refined.frame).norm(), 2.5);
+}
+
+TEST(BestOf, OfEqualStartsTheFirstIsTaken) {
+  Trial trial;
+  Pose one = trial.away(5), same = trial.away(5);
+  one.warnings = {"one"};
+  same.warnings = {"same"};
+  trial.inputs["third"] = shipped::item(one);
+  trial.inputs["fourth"] = shipped::item(same);
+  EXPECT_EQ(trial.run().warnings, std::vector<std::string>{"one"});
+}
+
+TEST(BestOf, SearchesAtOneCoarseLevelWithFewEvaluations) {
+  Trial trial;
+  trial.give("first", 1);
+  const auto listener = std::make_shared<const well::Listener>();
+  trial.use(listener);
+  trial.run({{"contour_spacing_px", 10.0},
+             {"reach_px", 32.0},
+             {"pixel_step", std::int64_t(4)},
+             {"max_evaluations", std::int64_t(70)}});
+  ASSERT_EQ(trial.cost->asked->levels.size(), 1u);
+  EXPECT_EQ(trial.cost->asked->levels[0].contour_spacing_px, 10);
+  EXPECT_EQ(trial.cost->asked->levels[0].reach_px, 32);
+  EXPECT_EQ(trial.cost->asked->levels[0].pixel_step, 4);
+  ASSERT_EQ(listener->problems.size(), 1u);
+  EXPECT_EQ(listener->problems[0].max_evaluations, 70);
+  const Eigen::VectorXd steps = listener->problems[0].initial_step;
+  EXPECT_EQ(steps.maxCoeff(), 8) << "a quarter of the reach about the long axis, else an eighth";
+  EXPECT_EQ(steps.sum(), 5 * 4 + 8);
+}
+
+TEST(BestOf, SaysThatNoWayLedToAStart) {
+  EXPECT_EQ(shipped::refusal("initial.best_of", Trial().inputs),
+            "no way led to a start: none of the inputs first, second, third and fourth is there; see why the nodes "
+            "that they are wired to gave none");
+}
+
+TEST(BestOf, NamesTheStartThatIsNoRigidPose) {
+  Trial trial;
+  trial.give("first", 1);
+  Pose bent = trial.away(1);
+  bent.world_from_model.rotation *= 2;
+  trial.inputs["second"] = shipped::item(bent);
+  EXPECT_NE(shipped::refusal("initial.best_of", trial.inputs).find("second"), std::string::npos);
+}
+
+/// Says nothing beyond 10 mm.
+class Shortsighted : public well::Well {
+ public:
+  using Well::Well;
+  std::string nothing_compared(const marrow::RigidTransform& pose) const override {
+    return pose.translation_mm.norm() > 10 ? "view 'a': it shows nothing of the bone" : "";
+  }
+  std::shared_ptr<const Cost> at_level(const marrow::CostLevel&) const override {
+    return std::make_shared<Shortsighted>(*this);
+  }
+};
+
+TEST(BestOf, AStartAboutWhichTheImagesSayNothingIsNone) {
+  Trial trial;
+  trial.inputs["cost"] =
+      marrow::Value::of<Cost>(std::make_shared<const Shortsighted>(trial.bottom.world_from_model, trial.bottom.frame));
+  trial.give("first", 20);
+  trial.give("third", 30);
+  EXPECT_EQ(shipped::refusal("initial.best_of", trial.inputs),
+            "the images say nothing about any start: first: view 'a': it shows nothing of the bone; third: view 'a': "
+            "it shows nothing of the bone; give a start nearer to the bone, or see whether the masks, the edges and "
+            "the model are right");
+  trial.give("second", 9);
+  EXPECT_NEAR(trial.run().cost, 81.0 / 6, 1e-9);
+  ASSERT_EQ(trial.log.size(), 2u);
+  EXPECT_EQ(trial.log[0],
+            "the images say nothing about a start: first: view 'a': it shows nothing of the bone; third: view 'a': it "
+            "shows nothing of the bone");
+}
+
+TEST(BestOf, TheModelGivesTheAxesOfAStartThatHasNone) {
+  Trial trial;
+  Pose start = trial.away(5);
+  start.frame = {};
+  trial.inputs["second"] = shipped::item(start);
+  trial.inputs["model"] = shipped::item(shapes::cylinder(14, 120));
+  const Pose best = trial.run();
+  EXPECT_TRUE(best.frame.is_anatomical);
+  EXPECT_LT((best.frame.origin_mm - trial.bottom.frame.origin_mm).norm(), 1e-9);
+}
+
+}  // namespace best_of_test

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <random>
+
+#include "tests/plugins/initial/landmark_scene.hpp"
+
+namespace landmarks_test {
+
+using Eigen::Vector3d;
+using scene::exact_pose, scene::model, scene::seen_in, scene::views;
+
+marrow::Pose found(const marrow::Landmarks& landmarks, const shipped::Options& options = {}) {
+  return shipped::call(
+             "initial.landmarks",
+             {{"model", model()}, {"landmarks", shipped::item(landmarks)}, {"views", shipped::list(views(), "view")}},
+             options)
+      .at("pose")
+      .as<marrow::Pose>();
+}
+std::string refusal(const marrow::Landmarks& landmarks) {
+  return shipped::refusal(
+      "initial.landmarks",
+      {{"model", model()}, {"landmarks", shipped::item(landmarks)}, {"views", shipped::list(views(), "view")}});
+}
+
+void expect_exact(const marrow::Pose& pose, const std::string& what) {
+  EXPECT_LT(marrow::geodesic_angle_rad(pose.world_from_model.rotation, exact_pose().rotation), 1e-7) << what;
+  EXPECT_LT((pose.world_from_model * Vector3d(0, 0, 50) - exact_pose() * Vector3d(0, 0, 50)).norm(), 1e-4) << what;
+  EXPECT_LT(pose.cost, 1e-5) << what;
+  EXPECT_TRUE(pose.warnings.empty()) << what;
+}
+
+TEST(Landmarks, ExactPixelsGiveTheExactPose) {
+  const auto points = scene::spread();
+  expect_exact(found(seen_in(points, {"frontal"})), "one view");
+  expect_exact(found(seen_in(points, {"frontal", "lateral"})), "two views");
+  expect_exact(found(seen_in(points, {"frontal", "lateral", "oblique"})), "three views");
+  expect_exact(found(seen_in({points.begin(), points.begin() + 3}, {"frontal", "lateral"})),
+               "three points in two views");
+  expect_exact(found(seen_in({points.begin(), points.begin() + 4}, {"frontal"})), "four points in one view");
+}
+
+TEST(Landmarks, ViewsMayShowDifferentPoints) {
+  const auto points = scene::spread();
+  marrow::Landmarks landmarks = seen_in({points.begin(), points.begin() + 3}, {"frontal"});
+  const marrow::Landmarks others = seen_in({points.begin() + 3, points.end()}, {"lateral"});
+  landmarks.points.insert(landmarks.points.end(), others.points.begin(), others.points.end());
+  landmarks.seen.insert(landmarks.seen.end(), others.seen.begin(), others.seen.end());
+  expect_exact(found(landmarks), "three points in the one, three others in the other");
+}
+
+TEST(Landmarks, PointsInAPlaneAreEnoughInTwoViews) {
+  std::vector<Vector3d> flat;
+  for (const Vector3d& point : scene::spread()) flat.emplace_back(point.x(), 0.2 * point.x(), point.z());
+  expect_exact(found(seen_in(flat, {"frontal", "lateral"})), "six points in a plane");
+}
+
+TEST(Landmarks, ErrorsAreAsLargeAsPredicted) {
+  for (const std::vector<std::string>& names : {std::vector<std::string>{"frontal"}, {"frontal", "lateral"}}) {
+    std::mt19937 random(7);
+    std::normal_distribution<double> noise(0, 1.5);
+    constexpr int kRuns = 400;
+    double squares = 0, costs = 0;
+    marrow::Vector6d ratio = marrow::Vector6d::Zero();
+    for (int run = 0; run < kRuns; ++run) {
+      marrow::Landmarks landmarks = seen_in(scene::spread(), names);
+      for (auto& seen : landmarks.seen) seen.pixel += Eigen::Vector2d(noise(random), noise(random));
+      const marrow::Pose pose = found(landmarks, {{"noise_px", 1.5}});
+      const marrow::Vector6d off = marrow::motion_between(exact_pose(), pose.world_from_model, pose.frame);
+      squares += off.dot(pose.covariance->ldlt().solve(off));
+      ratio += off.cwiseAbs2().cwiseQuotient(pose.covariance->diagonal());
+      costs += pose.cost * pose.cost;
+    }
+    ratio = (ratio / kRuns).cwiseSqrt();
+    const double count = 6.0 * double(names.size());
+    std::printf(
+        "%zu views: mean squared error in units of the covariance %.2f (6 expected); by axis %.2f %.2f %.2f deg, %.2f "
+        "%.2f %.2f mm of the predicted\n",
+        names.size(), squares / kRuns, ratio[0], ratio[1], ratio[2], ratio[3], ratio[4], ratio[5]);
+    EXPECT_NEAR(squares / kRuns, 6, 0.6) << "3.5 standard deviations of a mean of 400";
+    EXPECT_NEAR(ratio.minCoeff(), 1, 0.12);
+    EXPECT_NEAR(ratio.maxCoeff(), 1, 0.12);
+    // Of 2 n coordinates, 6 degrees of freedom are fitted.
+    EXPECT_NEAR(std::sqrt(costs / kRuns), 1.5 * std::sqrt((2 * count - 6) / count), 0.06);
+  }
+}
+
+TEST(Landmarks, RefusesWhatDoesNotDetermineAPose) {
+  const auto points = scene::spread();
+  EXPECT_EQ(refusal(seen_in({points.begin(), points.begin() + 3}, {"frontal"})),
+            "3 landmarks are seen in 1 view; a pose takes three that are seen in two views, or four in one");
+  EXPECT_EQ(refusal(seen_in({points.begin(), points.begin() + 2}, {"frontal", "lateral"})),
+            "2 landmarks are seen in 2 views; a pose takes three that are seen in two views, or four in one");
+  EXPECT_EQ(refusal({}),
+            "0 landmarks are seen in 0 views; a pose takes three that are seen in two views, or four in one");
+  EXPECT_EQ(
+      refusal(seen_in({{0, 0, 0}, {1, 2, 20}, {2, 4, 40}, {3, 6, 60}}, {"frontal", "lateral"})),
+      "the landmarks that are seen lie on one line, so the rotation about it is not determined; add one aside of it");
+  marrow::Landmarks apart = seen_in({points.begin(), points.begin() + 2}, {"frontal"});
+  const marrow::Landmarks others = seen_in({points.begin() + 2, points.begin() + 4}, {"lateral"});
+  apart.points.insert(apart.points.end(), others.points.begin(), others.points.end());
+  apart.seen.insert(apart.seen.end(), others.seen.begin(), others.seen.end());
+  EXPECT_EQ(refusal(apart),
+            "no pose was found for the landmarks: no view shows three of them, and no three are seen in two views; "
+            "mark more of them");
+  marrow::Landmarks unknown = seen_in(points, {"frontal"});
+  unknown.seen[2].name = "patella";
+  EXPECT_EQ(refusal(unknown),
+            "view 'frontal' shows 'patella', but the landmarks have no point of that name in the CT; give its place "
+            "there, or leave it out");
+}
+
+TEST(Landmarks, LeavesOutWhatOtherViewsShow) {
+  marrow::Landmarks landmarks = seen_in(scene::spread(), {"frontal"});
+  landmarks.seen.push_back({landmarks.points[0].name, "axial", {3, 4}});
+  std::vector<std::string> warnings;
+  marrow::Context::Hooks hooks;
+  hooks.log = [&](std::string_view text, marrow::LogLevel level) {
+    if (level == marrow::LogLevel::warning) warnings.emplace_back(text);
+  };
+  const auto outputs = shipped::call(
+      "initial.landmarks",
+      {{"model", model()}, {"landmarks", shipped::item(landmarks)}, {"views", shipped::list(views(), "view")}}, {},
+      marrow::Context(hooks));
+  expect_exact(outputs.at("pose").as<marrow::Pose>(), "the frontal view alone");
+  EXPECT_EQ(warnings, std::vector<std::string>{
+                          "landmarks are seen in a view 'axial', which is none of the views; they are left out"});
+}
+
+TEST(Landmarks, RefusesAPlaneThatMayTiltToEitherSide) {
+  // 6 points within 30 mm in a plane across the beam, tilted by 10 degrees: both tilts show them within a fraction of a
+  // pixel.
+  std::vector<Vector3d> flat;
+  const Eigen::Matrix3d to_beam =
+      exact_pose().rotation.transpose() * marrow::rotation_from_vector({marrow::radians(10), 0, 0});
+  for (const Vector3d& point : {Vector3d(15, 0, 15), {-15, 0, 15}, {15, 0, -15}, {-15, 0, -15}, {0, 0, 12}, {7, 0, 0}})
+    flat.push_back(to_beam * point);
+  const std::string said = refusal(seen_in(flat, {"frontal"}));
+  EXPECT_EQ(said.find("two poses explain the landmarks: they differ by "), 0u) << said;
+  EXPECT_NE(said.find("add a view, or a landmark that lies off that plane"), std::string::npos) << said;
+  expect_exact(found(seen_in(flat, {"frontal", "lateral"})), "the second view tells");
+}
+
+TEST(Landmarks, RefusesTheMirrorImage) {
+  marrow::Landmarks landmarks = seen_in(scene::spread(), {"frontal", "lateral"});
+  for (auto& point : landmarks.points) point.model_mm.x() *= -1;
+  EXPECT_EQ(refusal(landmarks).find(
+                "the landmarks that two views show are the mirror image of those in the CT: a reflection leaves "),
+            0u)
+      << refusal(landmarks);
+}
+
+TEST(Landmarks, WarnsOfExchangedNames) {
+  marrow::Landmarks landmarks = seen_in(scene::spread(), {"frontal", "lateral"});
+  std::swap(landmarks.seen[0].pixel, landmarks.seen[1].pixel);
+  const marrow::Pose pose = found(landmarks);
+  ASSERT_EQ(pose.warnings.size(), 1u);
+  EXPECT_NE(pose.warnings[0].find("where 1 px were expected; are two names exchanged, or is a camera wrong?"),
+            std::string::npos)
+      << pose.warnings[0];
+  EXPECT_GT(pose.cost, 3);
+}
+
+}  // namespace landmarks_test

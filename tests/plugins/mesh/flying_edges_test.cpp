@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/plugins/mesh/shapes.hpp"
+
+namespace flying_edges_test {
+
+using Eigen::Vector3d;
+using marrow::kPi;
+using marrow::Mesh;
+using marrow::SignedField;
+
+constexpr const char* kNode = "mesh.flying_edges";
+
+Mesh flying_edges(const SignedField& field, const shipped::Options& options = {}) {
+  return mesh_shapes::meshed(kNode, field, options);
+}
+
+TEST(FlyingEdges, SphereInATurnedGrid) {
+  const mesh_shapes::Distance distance = [](const Vector3d& p) { return mesh_shapes::sphere(p, 15); };
+  const Mesh mesh = flying_edges(mesh_shapes::field_of(mesh_shapes::turned_grid({48, 48, 40}), distance));
+  EXPECT_EQ(mesh.frame, "scanner");
+  EXPECT_TRUE(marrow::is_closed(mesh));
+  EXPECT_EQ(mesh_shapes::euler_number(mesh), 2);
+  EXPECT_LT(mesh_shapes::largest_error_mm(mesh, distance), 0.012);
+  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (4.0 / 3 * kPi * 15 * 15 * 15), 1, 3e-3);
+  EXPECT_TRUE(mesh_shapes::normals_point_outward(mesh, distance));
+}
+
+TEST(FlyingEdges, ClosesHalfAVoxelBeyondTheBorder) {
+  marrow::Grid grid;
+  grid.size = {40, 40, 11};
+  grid.spacing_mm = {1, 1, 2};
+  const Mesh mesh = flying_edges(
+      mesh_shapes::field_of(grid, [](const Vector3d& p) { return std::hypot(p.x() - 19.7, p.y() - 19.4) - 10; }));
+  EXPECT_TRUE(marrow::is_closed(mesh));
+  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (kPi * 100 * 22), 1, 8e-3);
+}
+
+TEST(FlyingEdges, KeepsTheLargestPart) {
+  const auto field = mesh_shapes::field_of(mesh_shapes::turned_grid({64, 64, 52}), [](const Vector3d& p) {
+    return std::min(std::abs(p.norm() - 12) - 2, (p - Vector3d(0, 0, 19)).norm() - 3);
+  });
+  const Mesh largest = flying_edges(field);
+  EXPECT_EQ(mesh_shapes::euler_number(largest), 2);
+  EXPECT_NEAR(marrow::enclosed_volume_mm3(largest) / (4.0 / 3 * kPi * 14 * 14 * 14), 1, 3e-3);
+}
+
+TEST(FlyingEdges, EveryPatternIsAClosedManifold) {
+  for (const bool around : {false, true})
+    for (unsigned inside = 0; inside < 256; ++inside) {
+      if (inside == (around ? 255u : 0u)) continue;  // no surface
+      EXPECT_TRUE(
+          marrow::is_manifold(flying_edges(mesh_shapes::pattern_field(inside, around), {{"largest_only", false}})))
+          << "pattern " << inside;
+    }
+}
+
+TEST(FlyingEdges, SaysWhatIsWrongWithAField) { mesh_shapes::expect_texts_for_bad_fields(kNode); }
+
+}  // namespace flying_edges_test

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <tbb/global_control.h>
+
+#include <cmath>
+
+#include "tests/plugins/mesh/shapes.hpp"
+
+namespace surface_nets_test {
+
+using Eigen::Vector3d;
+using marrow::kPi;
+using marrow::Mesh;
+using marrow::SignedField;
+
+constexpr const char* kNode = "mesh.surface_nets";
+
+Mesh nets(const SignedField& field, bool largest_only = true, int relaxation = 0) {
+  return mesh_shapes::meshed(kNode, field, {{"largest_only", largest_only}, {"relaxation", std::int64_t{relaxation}}});
+}
+
+TEST(SurfaceNets, EveryPatternIsAClosedManifold) {
+  for (const bool around : {false, true})
+    for (unsigned inside = 0; inside < 256; ++inside) {
+      if (inside == (around ? 255u : 0u)) continue;  // no surface
+      const Mesh mesh = nets(mesh_shapes::pattern_field(inside, around), false);
+      EXPECT_TRUE(marrow::is_manifold(mesh)) << "pattern " << inside << (around ? " in the inside" : "");
+      EXPECT_GT(marrow::enclosed_volume_mm3(mesh), 0);
+    }
+}
+
+TEST(SurfaceNets, NoiseIsAClosedManifold) {
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    const auto field = mesh_shapes::noise_field({17, 14, 13}, seed, 0.2 + 0.015 * seed);
+    EXPECT_TRUE(marrow::is_manifold(nets(field, false))) << "seed " << seed;
+    EXPECT_TRUE(marrow::is_manifold(nets(field, false, 3))) << "seed " << seed;
+  }
+}
+
+/// Two samples that touch along the diagonal of a face, in an inside elsewhere: both cells about the face have one
+/// loop, which crosses it twice.
+TEST(SurfaceNets, AFaceThatIsCrossedTwiceByTheSameTwoLoopsIsSplit) {
+  SignedField field;
+  field.grid.size = {5, 5, 5};
+  field.values_mm.assign(125, -1);
+  field.values_mm[field.grid.offset(2, 2, 2)] = field.values_mm[field.grid.offset(3, 3, 2)] = 1;
+  const Mesh mesh = nets(field, false);
+  EXPECT_TRUE(marrow::is_manifold(mesh));
+  int split = 0;
+  for (const auto& v : mesh.vertices_mm) split += (v - Vector3d(2.5, 2.5, 2)).head<2>().norm() < 0.4 && v.z() == 2;
+  EXPECT_EQ(split, 2) << "one vertex for each crossing of the face";
+}
+
+TEST(SurfaceNets, SphereInATurnedGrid) {
+  const mesh_shapes::Distance distance = [](const Vector3d& p) { return mesh_shapes::sphere(p, 15); };
+  const Mesh mesh = nets(mesh_shapes::field_of(mesh_shapes::turned_grid({48, 48, 40}), distance));
+  EXPECT_EQ(mesh.frame, "scanner");
+  EXPECT_EQ(mesh_shapes::euler_number(mesh), 2);
+  EXPECT_LT(mesh_shapes::largest_error_mm(mesh, distance), 0.05);
+  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (4.0 / 3 * kPi * 15 * 15 * 15), 1, 5e-3);
+  EXPECT_TRUE(mesh_shapes::normals_point_outward(mesh, distance));
+}
+
+TEST(SurfaceNets, Torus) {
+  const mesh_shapes::Distance distance = [](const Vector3d& p) { return mesh_shapes::torus(p, 12, 5); };
+  const Mesh mesh = nets(mesh_shapes::field_of(mesh_shapes::turned_grid({50, 50, 50}), distance));
+  EXPECT_EQ(mesh_shapes::euler_number(mesh), 0);
+  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (2 * kPi * kPi * 12 * 25), 1, 1.5e-2);
+}
+
+TEST(SurfaceNets, KeepsApartWhatOneSampleParts) {
+  const auto field = mesh_shapes::field_of(mesh_shapes::turned_grid({48, 48, 40}),
+                                           [](const Vector3d& p) { return mesh_shapes::two_slabs(p, 1.5); });
+  EXPECT_EQ(mesh_shapes::euler_number(nets(field, false)), 4);
+}
+
+/// A field of signs alone has steps as high as a sample.
+TEST(SurfaceNets, RelaxationTakesTheStepsOfABinaryField) {
+  const mesh_shapes::Distance distance = [](const Vector3d& p) { return mesh_shapes::sphere(p, 22); };
+  SignedField field = mesh_shapes::field_of(mesh_shapes::turned_grid({62, 62, 50}), distance);
+  for (float& value : field.values_mm) value = value < 0 ? -0.5f : 0.5f;
+  const auto roughness = [&](const Mesh& mesh) {  // sine between the triangles' normals and the sphere's
+    double sum = 0;
+    for (const auto& t : mesh.triangles) {
+      const Vector3d a = mesh.vertices_mm[t[0]], b = mesh.vertices_mm[t[1]], c = mesh.vertices_mm[t[2]];
+      sum += (b - a).cross(c - a).normalized().cross((a + b + c).normalized()).squaredNorm();
+    }
+    return std::sqrt(sum / double(mesh.triangles.size()));
+  };
+  const Mesh rough = nets(field), relaxed = nets(field, true, 5);
+  EXPECT_LT(roughness(relaxed), 0.5 * roughness(rough));
+  EXPECT_TRUE(marrow::is_manifold(relaxed));
+  EXPECT_NEAR(marrow::enclosed_volume_mm3(relaxed) / (4.0 / 3 * kPi * 22 * 22 * 22), 1, 0.02);
+  const Mesh long_relaxed = nets(field, true, 100);
+  ASSERT_EQ(long_relaxed.vertices_mm.size(), rough.vertices_mm.size());
+  for (std::size_t v = 0; v < rough.vertices_mm.size(); ++v) {  // both lie in the same cell, a sample wide
+    const Vector3d moved =
+        field.grid.index_from_point(long_relaxed.vertices_mm[v]) - field.grid.index_from_point(rough.vertices_mm[v]);
+    EXPECT_LE(moved.cwiseAbs().maxCoeff(), 1 + 1e-9);
+  }
+}
+
+TEST(SurfaceNets, SameBytesAtAnyNumberOfThreads) {
+  const auto field = mesh_shapes::noise_field({60, 50, 40}, 5);
+  const auto at_threads = [&](std::size_t threads) {
+    tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    return nets(field, true, 2);
+  };
+  const Mesh one = at_threads(1), two = at_threads(2);
+  EXPECT_EQ(one.triangles, two.triangles);
+  EXPECT_EQ(one.vertices_mm, two.vertices_mm);
+}
+
+TEST(SurfaceNets, SaysWhatIsWrongWithAField) { mesh_shapes::expect_texts_for_bad_fields(kNode); }
+
+}  // namespace surface_nets_test

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What every outline must be, as functions that the test of each projector calls with its own tolerance in pixels.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <marrow/base/error.hpp>
+#include <marrow/domain/functions.hpp>
+#include <marrow/domain/volume.hpp>
+#include <memory>
+
+#include "tests/plugins/project/shapes.hpp"
+
+namespace outline_behaviour {
+
+using Make = std::function<std::shared_ptr<const marrow::OutlineProjector>(const marrow::Mesh&, const marrow::Volume*)>;
+
+/// The outline of a sphere is the circle (ellipse) where the cone of tangent rays meets the detector: half angle asin(r
+/// / d).
+inline void sphere_is_its_tangent_cone(const Make& make, double tolerance_px, double model_tolerance_px) {
+  const marrow::Mesh mesh = shapes::sphere(30);
+  const auto projector = make(mesh, nullptr);
+  const marrow::Camera camera = shapes::c_arm(0);
+  const Eigen::Vector3d centre(12, -20, 9);
+  marrow::RigidTransform world_from_model = shapes::centred_at({0, 0, 30});
+  world_from_model.translation_mm += centre;
+  const auto points = projector->outline(camera, world_from_model, 2);
+  ASSERT_GT(points.size(), 100u);
+  const Eigen::Vector3d source = marrow::source_position_mm(camera), sight = centre - source;
+  const double half_angle = std::asin(30 / sight.norm());
+  for (const auto& p : points) {
+    const Eigen::Vector3d ray = marrow::ray_direction(camera, {p.u_px, p.v_px});
+    const double angle = std::acos(ray.dot(sight.normalized()));
+    const double focal_px = camera.intrinsics(0, 0);
+    EXPECT_NEAR((angle - half_angle) * focal_px, 0, tolerance_px);
+    const Eigen::Vector2d outward = Eigen::Vector2d(p.u_px, p.v_px) - marrow::project(camera, centre);
+    EXPECT_GT(outward.normalized().dot(Eigen::Vector2d(p.normal_u, p.normal_v)), 0.95);
+    EXPECT_NEAR(std::hypot(p.normal_u, p.normal_v), 1, 1e-5);
+    EXPECT_LT((marrow::project(camera, world_from_model * p.model_mm.cast<double>()) - Eigen::Vector2d(p.u_px, p.v_px))
+                  .norm(),
+              model_tolerance_px);
+  }
+  const double circumference_px = 2 * marrow::kPi * camera.intrinsics(0, 0) * std::tan(half_angle);
+  EXPECT_GT(double(points.size()), 0.65 * circumference_px / 2);
+  EXPECT_LT(double(points.size()), 1.15 * circumference_px / 2);
+}
+
+/// Of two spheres one behind the other only the outer outline counts; side by side, both.
+inline void hidden_parts_are_left_out(const Make& make) {
+  marrow::Mesh mesh = shapes::sphere(30);
+  const marrow::Mesh second = shapes::sphere(15);
+  const auto offset = std::uint32_t(mesh.vertices_mm.size());
+  for (const auto& v : second.vertices_mm) mesh.vertices_mm.push_back(v + Eigen::Vector3d(0, 60, 15));
+  for (const auto& t : second.triangles) mesh.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
+  const auto projector = make(mesh, nullptr);
+  const auto pose = shapes::centred_at({0, 30, 30});
+  const auto count_small = [&](double angle_deg) {
+    std::size_t count = 0;
+    for (const auto& p : projector->outline(shapes::c_arm(angle_deg), pose, 2)) count += p.model_mm.y() > 40;
+    return count;
+  };
+  EXPECT_EQ(count_small(0), 0u);
+  EXPECT_GT(count_small(90), 40u);
+}
+
+/// A cylinder that goes through both ends of its CT: the sides count, the two ends do not.
+inline void ends_of_the_volume_are_left_out(const Make& make) {
+  const marrow::Mesh mesh = shapes::cylinder(14, 100);
+  marrow::Volume volume;
+  volume.grid.size = {61, 61, 101};
+  volume.grid.origin_mm = {-30, -30, 0};
+  const auto pose = shapes::centred_at({0, 0, 50});
+  const marrow::Camera camera = shapes::c_arm(0);
+  std::size_t all = 0, level = 0;
+  for (const auto& p : make(mesh, &volume)->outline(camera, pose, 1)) {
+    ++all;
+    level += std::abs(p.normal_v) > 0.5;
+    EXPECT_GT(p.model_mm.z(), 1);
+    EXPECT_LT(p.model_mm.z(), 99);
+  }
+  EXPECT_GT(all, 400u);
+  EXPECT_EQ(level, 0u);
+  level = 0;
+  for (const auto& p : make(mesh, nullptr)->outline(camera, pose, 1)) level += std::abs(p.normal_v) > 0.9;
+  EXPECT_GT(level, 60u);
+
+  const auto refusal = [&] {
+    try {
+      make(mesh, &volume);
+    } catch (const marrow::Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  volume.grid.origin_mm.x() += 500;
+  EXPECT_EQ(refusal(), "only 0 % of the mesh lies in the volume; give those that belong together");
+  volume.grid.frame = "mr";
+  EXPECT_EQ(refusal(), "the mesh is in frame 'ct', but the volume in frame 'mr'; give those that belong together");
+}
+
+inline void keeps_inside_the_image(const Make& make) {
+  const marrow::Mesh mesh = shapes::cylinder(14, 400);
+  const auto projector = make(mesh, nullptr);
+  const auto points = projector->outline(shapes::c_arm(0), shapes::centred_at({0, 0, 200}), 1);
+  EXPECT_GT(points.size(), 900u);
+  for (const auto& p : points) {
+    EXPECT_TRUE(p.u_px >= 0 && p.u_px <= 511 && p.v_px >= 0 && p.v_px <= 511);
+    EXPECT_GT(std::abs(p.normal_u), 0.9) << "the image's border is no outline";
+  }
+  EXPECT_TRUE(projector->outline(shapes::c_arm(0), shapes::centred_at({500, 0, 0}), 1).empty());
+  EXPECT_TRUE(projector->outline(shapes::c_arm(0), shapes::centred_at({0, 2000, 0}), 1).empty()) << "behind the source";
+}
+
+inline void refuses_nonsense(const Make& make) {
+  try {
+    make(marrow::Mesh{}, nullptr);
+    FAIL();
+  } catch (const marrow::Error& error) {
+    EXPECT_STREQ(error.what(), "the mesh to project: the surface has no triangles");
+  }
+  const marrow::Mesh mesh = shapes::sphere(10);
+  EXPECT_THROW(make(mesh, nullptr)->outline(shapes::c_arm(0), shapes::centred_at({0, 0, 10}), 0), marrow::Error);
+}
+
+}  // namespace outline_behaviour

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+
+#include "marrow/toolbox/track/sequence.hpp"
+#include "tests/plugins/read/avi.hpp"
+#include "tests/plugins/read/files.hpp"
+#include "tests/plugins/read/itk_files.hpp"
+#include "shipped.hpp"
+
+extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavutil/pixdesc.h>
+}
+
+namespace video_test {
+
+using marrow::test::avi_file;
+using marrow::test::AviFrames;
+using marrow::test::ItkGrid;
+using marrow::test::put;
+using marrow::test::TemporaryFolder;
+using Path = std::filesystem::path;
+using Texts = std::vector<std::string>;
+
+constexpr int kWidth_px = 64, kHeight_px = 48;
+
+class DeepVideo : public testing::Test {
+ protected:
+  DeepVideo() {
+    put(folder / "camera.txt",
+        "image size\n64,48\n\ncamera matrix\n10,0,3\n0,10,2\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\n"
+        "translation\n0\n0\n600\n");
+  }
+  /// The frames of a file, as read.sequence gives them.
+  std::vector<cv::Mat> read(const std::string& name) {
+    const shipped::Options options{
+        {"names", Texts{"a"}}, {"images", Texts{folder / name}}, {"cameras", Texts{folder / "camera.txt"}}};
+    std::vector<cv::Mat> frames;
+    for (const auto& frame :
+         shipped::call("read.sequence", {}, options).at("frames").as_list<marrow::track::SequenceFrame>())
+      frames.push_back(frame.views.at(0).image.pixels);
+    return frames;
+  }
+  TemporaryFolder folder;
+};
+
+/// Grey value of a pixel of the k-th frame; the values of all bits occur.
+int ramp(int u, int v, int k, int bits) { return (u * 1021 + v * 997 + k * 10007) % (1 << bits); }
+
+/// Frames of the ramp by FFmpeg's lossless encoder FFV1; `black` and `white` are the lowest and the highest value.
+AviFrames ffv1(AVPixelFormat kind, int black, int white) {
+  const int bits = av_pix_fmt_desc_get(kind)->comp[0].depth;
+  AVCodecContext* encoder = avcodec_alloc_context3(avcodec_find_encoder(AV_CODEC_ID_FFV1));
+  encoder->width = kWidth_px, encoder->height = kHeight_px, encoder->pix_fmt = kind, encoder->time_base = {1, 10};
+  AviFrames video{"FFV1", kWidth_px, kHeight_px};
+  EXPECT_EQ(avcodec_open2(encoder, encoder->codec, nullptr), 0);
+  video.extra.assign(reinterpret_cast<const char*>(encoder->extradata), std::size_t(encoder->extradata_size));
+  AVFrame* frame = av_frame_alloc();
+  AVPacket* packet = av_packet_alloc();
+  for (int k = 0; k < 3; ++k) {
+    frame->width = kWidth_px, frame->height = kHeight_px, frame->format = kind, frame->pts = k;
+    EXPECT_EQ(av_frame_get_buffer(frame, 0), 0);
+    for (int plane = 0; plane < av_pix_fmt_count_planes(kind); ++plane)
+      for (int v = 0; v < kHeight_px; ++v)
+        for (int u = 0; u < kWidth_px; ++u)
+          reinterpret_cast<std::uint16_t*>(frame->data[plane] + v * frame->linesize[plane])[u] =
+              std::uint16_t(plane == 0 ? black + ramp(u, v, k, bits) % (white - black + 1) : 1 << (bits - 1));
+    EXPECT_EQ(avcodec_send_frame(encoder, frame), 0);
+    EXPECT_EQ(avcodec_receive_packet(encoder, packet), 0);
+    video.frames.emplace_back(reinterpret_cast<const char*>(packet->data), std::size_t(packet->size));
+    av_packet_unref(packet);
+    av_frame_unref(frame);
+  }
+  av_packet_free(&packet);
+  av_frame_free(&frame);
+  avcodec_free_context(&encoder);
+  return video;
+}
+
+// FFmpeg's encoder without loss takes the ramp, so the values that must come back are known.
+TEST_F(DeepVideo, GreyOf10To16BitsKeepsThem) {
+  for (const auto& [kind, bits] :
+       {std::pair{AV_PIX_FMT_GRAY10LE, 10}, {AV_PIX_FMT_GRAY12LE, 12}, {AV_PIX_FMT_GRAY16LE, 16}}) {
+    put(folder / "deep.avi", avi_file(ffv1(kind, 0, (1 << bits) - 1)));
+    const std::vector<cv::Mat> frames = read("deep.avi");
+    ASSERT_EQ(frames.size(), 3u);
+    ASSERT_EQ(frames[2].type(), CV_16U) << bits;
+    for (int v = 0; v < kHeight_px; ++v)
+      for (int u = 0; u < kWidth_px; ++u) ASSERT_EQ(frames[2].at<std::uint16_t>(v, u), ramp(u, v, 2, bits)) << bits;
+  }
+}
+
+// By ITU-R BT.709, 10 bits of brightness run from 64 (black) to 940 (white). (v - 64) / 876 * 1023 is the level.
+TEST_F(DeepVideo, BrightnessBecomesLevelsFromBlackToWhite) {
+  put(folder / "colour.avi", avi_file(ffv1(AV_PIX_FMT_YUV444P10LE, 64, 940)));
+  const cv::Mat frame = read("colour.avi").at(1);
+  ASSERT_EQ(frame.type(), CV_16U);
+  for (int u = 0; u < kWidth_px; ++u) {
+    const int stored = 64 + ramp(u, 3, 1, 10) % 877;
+    EXPECT_EQ(frame.at<std::uint16_t>(3, u), std::lround((stored - 64) / 876.0 * 1023)) << stored;
+  }
+}
+
+TEST_F(DeepVideo, PngFramesOf16BitsAreThoseThatItkWrote) {
+  AviFrames video{"MPNG", kWidth_px, kHeight_px};
+  for (int k = 0; k < 2; ++k) {
+    ItkGrid<std::uint16_t> image{.size = {kWidth_px, kHeight_px}};
+    for (int i = 0; i < kWidth_px * kHeight_px; ++i) image.samples.push_back(std::uint16_t(i * 21 + k * 500));
+    write_itk(folder / "frame.png", image);
+    video.frames.push_back(marrow::test::bytes_of(folder / "frame.png"));
+  }
+  put(folder / "named.bin", avi_file(video));  // the content tells that it is a video
+  const std::vector<cv::Mat> frames = read("named.bin");
+  ASSERT_EQ(frames.size(), 2u);
+  ASSERT_EQ(frames[1].type(), CV_16U);
+  EXPECT_EQ(frames[1].at<std::uint16_t>(2, 5), (2 * 64 + 5) * 21 + 500);
+}
+
+TEST_F(DeepVideo, AFrameThatCannotBeDecodedIsNamed) {
+  AviFrames video = ffv1(AV_PIX_FMT_GRAY12LE, 0, 4095);
+  video.codec = "ZZZZ";
+  put(folder / "odd.avi", avi_file(video));
+  EXPECT_SAYS(read("odd.avi"),
+              "odd.avi: its frames are compressed by 'ZZZZ', for which FFmpeg has no decoder here; "
+              "convert it, to FFV1 for example");
+}
+
+// Frames in other files are not part of the key of the result: a change of them would go unnoticed.
+TEST_F(DeepVideo, ListsOfOtherFilesAreRefused) {
+  put(folder / "good.avi", avi_file(ffv1(AV_PIX_FMT_GRAY12LE, 0, 4095)));
+  const std::vector<std::pair<std::string, std::string>> lists{
+      {"ffconcat version 1.0\nfile good.avi\n", "is a list of files (ffconcat), not a video"},
+      {"#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\ngood.avi\n#EXT-X-ENDLIST\n", "is a playlist (M3U8), not a video"},
+      {"v=0\no=- 0 0 IN IP4 127.0.0.1\ns=x\nm=video 5004 RTP/AVP 96\n",
+       "is a description of a stream (SDP), not a video"},
+      {"<?xml version=\"1.0\"?>\n<MPD xmlns=\"urn:mpeg:dash:schema:mpd:2011\"></MPD>\n",
+       "is a description of a stream (DASH), not a video"}};
+  for (const auto& [content, words] : lists)
+    for (const char* name : {"list.avi", "list.mp4", "list.txt"}) {
+      put(folder / name, content);
+      EXPECT_SAYS(read(name), std::string(name) + ": " + words +
+                                  ": the frames are in other files, whose changes would go unnoticed; name the video "
+                                  "itself, or a folder of images");
+    }
+  put(folder / "no.mov", "hello");
+  EXPECT_SAYS(read("no.mov"),
+              "no.mov: is no video, or is damaged at its start; read are AVI, MP4, MOV, MKV, WebM, WMV and MPEG");
+}
+
+// FFmpeg takes a name with % for a pattern of many images. Here the file's content alone counts.
+TEST_F(DeepVideo, NamesArePatternsOfNothing) {
+  put(folder / "a%03d.png", avi_file(ffv1(AV_PIX_FMT_GRAY12LE, 0, 4095)));
+  write_itk(folder / "a001.png",
+            ItkGrid<std::uint8_t>{.size = {64, 48}, .samples = std::vector<std::uint8_t>(64 * 48)});
+  EXPECT_EQ(read("a%03d.png").size(), 3u);
+}
+
+// A MOV may name the file with its frames in the box 'dref' (ISO 14496-12, 8.7.2): flag 1 means this file.
+TEST_F(DeepVideo, AMovWhoseFramesAreElsewhereIsRefused) {
+  const auto box = [](const std::string& name, const std::string& content) {
+    const std::string bytes = marrow::test::little_endian(content.size() + 8, 4);
+    return std::string(bytes.rbegin(), bytes.rend()) + name + content;
+  };
+  const auto mov = [&](char flag) {
+    using namespace std::string_literals;
+    const std::string reference = box("url ", "\0\0\0"s + flag + (flag ? "" : "file:///tmp/other.mov\0"s));
+    return box("ftyp", "qt  \0\0\0\0"s) +
+           box("moov",
+               box("trak", box("mdia", box("minf", box("dinf", box("dref", "\0\0\0\0\0\0\0\1"s + reference))))));
+  };
+  put(folder / "away.mov", mov(0));
+  EXPECT_SAYS(read("away.mov"),
+              "away.mov: its frames are in another file, which it names; save it as one self-contained file");
+  put(folder / "here.mov", mov(1));
+  EXPECT_SAYS(read("here.mov"), "here.mov: holds no pictures that FFmpeg finds");
+}
+
+}  // namespace video_test

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Cameras, bones and costs of which one can compute by hand what refine.cameras must find.
+#include <marrow/domain/decompositions.hpp>
+#include <marrow/domain/functions.hpp>
+
+#include "marrow/toolbox/match/views_cost.hpp"
+#include "tests/plugins/register/well.hpp"
+#include "shipped.hpp"
+
+namespace refine_cameras_test {
+
+using Eigen::Vector3d;
+using marrow::RigidTransform, marrow::Vector6d;
+
+/// Two cameras of a C-arm at right angles, 600 mm from the origin of the world, with images of 64 blocks.
+inline marrow::List<marrow::View> views(int count = 2) {
+  marrow::List<marrow::View> views;
+  for (int i = 0; i < count; ++i) {
+    marrow::View view;
+    view.name = i == 0 ? "frontal" : "lateral";
+    view.camera.width_px = view.camera.height_px = 512;
+    view.camera.intrinsics << 1700, 0, 256, 0, 1700, 256, 0, 0, 1;
+    view.camera.camera_from_world.rotation = marrow::rotation_from_vector(i * marrow::kPi / 2 * Vector3d::UnitY());
+    view.camera.camera_from_world.translation_mm = Vector3d(0, 0, 600);
+    view.image.pixels = cv::Mat(512, 512, CV_16U, cv::Scalar(1000));
+    views.add(view.name, view);
+  }
+  return views;
+}
+
+/// Each view likes one pose best. Its blocks say that the cost is known as well as `information` observations of noise
+/// 1 would make it: noise 1 / information.
+class Split : public marrow::Cost {
+ public:
+  Split(std::vector<RigidTransform> best, marrow::FragmentFrame frame, double information, double stiffness = 1)
+      : best_(std::move(best)), frame_(frame), information_(information), stiffness_(stiffness) {}
+  double value(const RigidTransform& pose) const override {
+    double sum = 0;
+    for (std::size_t v = 0; v < best_.size(); ++v) sum += value_in_view(v, pose) / double(best_.size());
+    return sum;
+  }
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
+    return std::make_shared<Split>(*this);
+  }
+  std::size_t view_count() const override { return best_.size(); }
+  double value_in_view(std::size_t view, const RigidTransform& pose) const override {
+    return 0.5 * stiffness_ * well::way(best_[view], pose, frame_).squaredNorm();
+  }
+  std::vector<double> without_each_block(const RigidTransform& pose) const override {
+    if (information_ == 0) return {};
+    std::vector<double> values;
+    for (std::size_t v = 0; v < best_.size(); ++v)
+      for (int block = 0; block < 64; ++block) {
+        const double slope = block < 6 ? well::way(best_[v], pose, frame_)[block] : 0;
+        values.push_back(value(pose) + std::sqrt(stiffness_ / information_) * slope / double(best_.size()));
+      }
+    return values;
+  }
+
+ private:
+  std::vector<RigidTransform> best_;
+  marrow::FragmentFrame frame_;
+  double information_, stiffness_;
+};
+
+/// The same as a cost that is a mean over views.
+class SplitInViews : public marrow::match::ViewsCost {
+ public:
+  explicit SplitInViews(std::shared_ptr<const marrow::Cost> cost) : ViewsCost(cost->view_count(), {}), cost_(cost) {}
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
+    return std::make_shared<SplitInViews>(*this);
+  }
+  double value_in_view(std::size_t view, const RigidTransform& pose) const override {
+    return cost_->value_in_view(view, pose);
+  }
+  ViewsCost::Split split(std::size_t view, const RigidTransform& pose) const override {
+    const std::vector<double> without = cost_->without_each_block(pose);
+    const std::size_t count = without.size() / view_count();
+    ViewsCost::Split split{value_in_view(view, pose), {}};
+    for (std::size_t block = 0; block < count; ++block)
+      split.without_block.push_back(split.value +
+                                    double(view_count()) * (without[view * count + block] - cost_->value(pose)));
+    return split;
+  }
+
+ private:
+  std::shared_ptr<const marrow::Cost> cost_;
+};
+
+/// A bone 40 mm above the origin of the world, seen by each camera as if it had moved.
+struct Bone {
+  explicit Bone(const std::vector<RigidTransform>& motions, double information = 1e4, double at_mm = 40) {
+    pose.frame.origin_mm = Vector3d(10, 0, 0);
+    pose.world_from_model.rotation = marrow::rotation_from_vector({0.3, -0.2, 0.5});
+    pose.world_from_model.translation_mm = Vector3d(0, at_mm, 0);
+    std::vector<RigidTransform> best;
+    for (const RigidTransform& motion : motions) best.push_back(motion * pose.world_from_model);
+    cost = std::make_shared<Split>(best, pose.frame, information);
+  }
+  marrow::Pose pose;
+  std::shared_ptr<const marrow::Cost> cost;
+};
+
+inline RigidTransform motion(const Vector3d& rotation_deg, const Vector3d& shift_mm) {
+  RigidTransform world_from_world{"world", "world"};
+  world_from_world.rotation = marrow::rotation_from_vector(marrow::radians(1) * rotation_deg);
+  world_from_world.translation_mm = shift_mm;
+  return world_from_world;
+}
+
+inline shipped::Inputs inputs(const std::vector<Bone>& bones, const marrow::List<marrow::View>& of = views()) {
+  marrow::List<marrow::Cost> costs;
+  marrow::List<marrow::Pose> poses;
+  for (std::size_t i = 0; i < bones.size(); ++i) {
+    costs.add_shared(i ? "proximal" : "distal", bones[i].cost);
+    poses.add(i ? "proximal" : "distal", bones[i].pose);
+  }
+  return {{"views", shipped::list(of, "view")},
+          {"costs", shipped::list(costs, "fragment")},
+          {"poses", shipped::list(poses, "fragment")}};
+}
+
+/// Which motion of the world the corrected camera of a view stands for.
+inline RigidTransform found(const shipped::Outputs& outputs, std::size_t view) {
+  return inverse(views()[view].camera.camera_from_world) *
+         outputs.at("views").as_list<marrow::View>()[view].camera.camera_from_world;
+}
+inline marrow::Metrics motions(const shipped::Outputs& outputs, std::size_t view) {
+  return outputs.at("motions").as_list<marrow::Metrics>()[view];
+}
+inline double figure(const marrow::Metrics& metrics, const std::string& name) {
+  return shipped::figure(shipped::item(metrics), name);
+}
+
+}  // namespace refine_cameras_test

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <functional>
+
+#include "tests/plugins/segment/distal_end.hpp"
+#include "tests/plugins/segment/segmented.hpp"
+
+namespace level_set_test {
+
+using Eigen::Vector3d;
+using marrow::List;
+using marrow::Seeds;
+using marrow::SignedField;
+using marrow::Volume;
+
+List<SignedField> level_set_fields(const Volume& volume, const List<Seeds>& seeds) {
+  return segmented::fields("segment.level_set", volume, seeds);
+}
+
+/// A long bone along z, slightly tilted, that leaves the volume at both ends, of a wall that gets thinner upwards.
+struct HollowBone {
+  double inside_hu = -20, wall_low_mm = 7, wall_high_mm = 1.5, radius_low_mm = 13, radius_high_mm = 19;
+  Vector3d low{-3, -2, -60}, high{3, 2, 60};
+  double outer(const Vector3d& p) const { return phantom::round_cone(p, low, high, radius_low_mm, radius_high_mm); }
+  double inner(const Vector3d& p) const {
+    return phantom::round_cone(p, low, high, radius_low_mm - wall_low_mm, radius_high_mm - wall_high_mm);
+  }
+  double hu(const Vector3d& p, double cut_mm = -1e9) const {
+    const double bone = phantom::filled(std::max(outer(p), cut_mm)), canal = phantom::filled(inner(p));
+    return 50 + bone * (1400 - 50) + bone * canal * (inside_hu - 1400);
+  }
+  /// Halfway through the wall.
+  Vector3d seed(double z) const {
+    const double t = (z - low.z()) / (high.z() - low.z());
+    const Vector3d axis = low + t * (high - low);
+    const double outer_mm = radius_low_mm + t * (radius_high_mm - radius_low_mm),
+                 wall_mm = wall_low_mm + t * (wall_high_mm - wall_low_mm);
+    return axis + Vector3d(outer_mm - wall_mm / 2, 0, 0);
+  }
+};
+
+double timed(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+TEST(LevelSet, HollowBoneOverMarrowAndOverSpongyBone) {
+  for (double inside_hu : {-20.0, 300.0}) {
+    HollowBone bone;
+    bone.inside_hu = inside_hu;
+    const Volume volume = phantom::scan(
+        phantom::ct_grid({64, 60, 110}), [&](const Vector3d& p) { return bone.hu(p); }, 0.5, 30, 1);
+    List<Seeds> seeds;
+    seeds.add("distal", Seeds{"distal", {bone.seed(-20)}});
+    List<SignedField> fields;
+    const double seconds = timed([&] { fields = level_set_fields(volume, seeds); });
+    ASSERT_EQ(fields.size(), 1u);
+    const auto accuracy = phantom::compare(fields[0], [&](const Vector3d& p) { return bone.outer(p); });
+    phantom::print("inside " + std::to_string(int(inside_hu)) + " HU", accuracy);
+    for (double z : {-45, -15, 15, 45})
+      phantom::print("  z " + std::to_string(int(z)), phantom::compare(
+                                                          fields[0], [&](const Vector3d& p) { return bone.outer(p); },
+                                                          [&](const Vector3d& p) { return std::abs(p.z() - z) < 5; }));
+    std::printf("%.2f s\n", seconds);
+    EXPECT_GT(accuracy.dice, 0.99);
+    EXPECT_LT(std::abs(accuracy.bias_mm), 0.03);
+    EXPECT_LT(accuracy.mean_mm, 0.08);
+  }
+}
+
+TEST(LevelSet, TwoFragmentsOneMillimetreApart) {
+  HollowBone bone;
+  bone.wall_high_mm = 4;
+  const Vector3d normal = Vector3d(0.5, 0.2, 1).normalized();
+  const auto cut = [&](const Vector3d& p) { return 0.5 - std::abs(normal.dot(p)); };  // > 0 in the gap
+  const Volume volume = phantom::scan(
+      phantom::ct_grid({64, 60, 110}), [&](const Vector3d& p) { return bone.hu(p, cut(p)); }, 0.5, 30, 2);
+  List<Seeds> seeds;
+  seeds.add("proximal", Seeds{"proximal", {bone.seed(30)}});
+  seeds.add("distal", Seeds{"distal", {bone.seed(-30)}});
+  const auto fields = level_set_fields(volume, seeds);
+  ASSERT_EQ(fields.size(), 2u);
+  for (std::size_t f = 0; f < 2; ++f) {
+    const double side = f == 0 ? -1 : 1;
+    const auto truth = [&](const Vector3d& p) { return std::max(bone.outer(p), side * normal.dot(p) + 0.5); };
+    const auto on_wall = [&](const Vector3d& p) { return std::abs(normal.dot(p)) > 4; };
+    const auto wall = phantom::compare(fields[f], truth, on_wall);
+    phantom::print(fields.name(f) + " wall", wall);
+    EXPECT_LT(std::abs(wall.bias_mm), 0.03);
+    EXPECT_LT(wall.mean_mm, 0.08);
+    phantom::print(fields.name(f) + " fracture",
+                   phantom::compare(fields[f], truth, [&](const Vector3d& p) { return !on_wall(p); }));
+    EXPECT_GT(phantom::compare(fields[f], truth).dice, 0.97);
+  }
+  for (std::size_t at = 0; at < fields[0].values_mm.size(); ++at)
+    ASSERT_FALSE(fields[0].values_mm[at] < 0 && fields[1].values_mm[at] < 0) << "both claim voxel " << at;
+}
+
+TEST(LevelSet, AFragmentIsTheSameWhetherTheOtherIsWantedOrOnlyKeptApart) {
+  HollowBone bone;
+  bone.wall_high_mm = 4;
+  const Volume volume = phantom::scan(
+      phantom::ct_grid({64, 60, 150}), [&](const Vector3d& p) { return bone.hu(p, 0.5 - std::abs(p.z())); }, 0.5, 30,
+      2);
+  const auto distal = [&](bool other_is_wanted) {
+    List<Seeds> seeds;
+    seeds.add("proximal", Seeds{"proximal", {bone.seed(30)}, other_is_wanted});
+    seeds.add("distal", Seeds{"distal", {bone.seed(-30)}});
+    const auto fields = level_set_fields(volume, seeds);
+    EXPECT_EQ(fields.size(), other_is_wanted ? 2u : 1u);
+    return *fields.find("distal");
+  };
+  EXPECT_EQ(distal(true).values_mm, distal(false).values_mm);
+}
+
+TEST(LevelSet, TwoFragmentsInVoxelsAsWideAsTheGap) {
+  HollowBone bone;
+  bone.wall_high_mm = 4;
+  for (double gap_mm : {1.2, 2.0, 4.0}) {
+    const Vector3d normal = Vector3d(0.5, 0.2, 1).normalized();
+    marrow::Grid grid = phantom::ct_grid({44, 42, 92});
+    grid.spacing_mm.setConstant(1.2);
+    grid.origin_mm = -Vector3d(43, 41, 91) * 0.6;
+    const Volume volume = phantom::scan(
+        grid, [&](const Vector3d& p) { return bone.hu(p, gap_mm / 2 - std::abs(normal.dot(p))); }, 0.5, 30, 2);
+    List<Seeds> seeds;
+    seeds.add("proximal", Seeds{"proximal", {bone.seed(40)}});
+    seeds.add("distal", Seeds{"distal", {bone.seed(-15)}});
+    const auto fields = level_set_fields(volume, seeds);
+    for (std::size_t f = 0; f < 2; ++f) {
+      const double side = f == 0 ? -1 : 1;
+      const auto truth = [&](const Vector3d& p) { return std::max(bone.outer(p), side * normal.dot(p) + gap_mm / 2); };
+      const auto wall =
+          phantom::compare(fields[f], truth, [&](const Vector3d& p) { return std::abs(normal.dot(p)) > 5; });
+      phantom::print("gap " + std::to_string(gap_mm) + " " + fields.name(f), wall);
+      EXPECT_GT(wall.dice, 0.97);
+      EXPECT_LT(std::abs(wall.bias_mm), 0.05);
+      EXPECT_LT(wall.mean_mm, 0.1);
+    }
+  }
+}
+
+TEST(LevelSet, ADistalEndWithThinCortexAndAnInvisibleGap) {
+  const phantom::DistalEnd bone;
+  const Volume volume = bone.scan_of({128, 128, 192}, 40);
+  List<SignedField> fields;
+  const double seconds = timed([&] { fields = level_set_fields(volume, bone.seeds()); });
+  std::printf("%.2f s\n", seconds);
+  for (std::size_t f = 0; f < 2; ++f) {
+    const auto accuracy = phantom::compare(
+        fields[f], [&](const Vector3d& p) { return bone.distance(p, f == 0 ? 1 : -1); },
+        [](const Vector3d& p) { return p.z() < 90; });
+    phantom::print(fields.name(f), accuracy);
+    EXPECT_GT(accuracy.dice, 0.99);
+    EXPECT_LT(std::abs(accuracy.bias_mm), 0.06);
+    EXPECT_LT(accuracy.mean_mm, 0.1);
+  }
+}
+
+/// A short bone in a grid that is turned against the frame, both ends inside the volume.
+struct ShortBone {
+  marrow::Grid grid = phantom::ct_grid({48, 48, 56});
+  ShortBone() {
+    grid.direction = Eigen::AngleAxisd(0.5, Vector3d(1, -1, 2).normalized()).toRotationMatrix();
+    const Vector3d middle = Vector3d(grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1) / 2;
+    grid.origin_mm = Vector3d(100, -50, 30) - grid.direction * middle.cwiseProduct(grid.spacing_mm);
+  }
+  Vector3d at(double x, double y, double z) const {
+    return Vector3d(100, -50, 30) + grid.direction * Vector3d(x, y, z);
+  }
+  double outer(const Vector3d& p) const { return phantom::round_cone(p, at(0, 0, -10), at(0, 0, 10), 9, 11); }
+  double hu(const Vector3d& p) const { return 50 + 1300 * phantom::filled(outer(p)) * phantom::filled(-outer(p) - 3); }
+  Volume volume() const {
+    return phantom::scan(
+        grid, [&](const Vector3d& p) { return hu(p); }, 0.5, 30, 4);
+  }
+  List<Seeds> seeds(const Vector3d& point) const {
+    List<Seeds> seeds;
+    seeds.add("distal", Seeds{"distal", {point}});
+    return seeds;
+  }
+};
+
+TEST(LevelSet, TurnedGridAndTheSameBytesAtAnyNumberOfThreads) {
+  const ShortBone bone;
+  const Volume volume = bone.volume();
+  const auto at_threads = [&](std::size_t threads) {
+    tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    return level_set_fields(volume, bone.seeds(bone.at(8.5, 0, 0)));
+  };
+  const auto one = at_threads(1), two = at_threads(2);
+  EXPECT_EQ(std::memcmp(one[0].values_mm.data(), two[0].values_mm.data(), one[0].values_mm.size() * sizeof(float)), 0);
+  const auto accuracy = phantom::compare(one[0], [&](const Vector3d& p) { return bone.outer(p); });
+  phantom::print("turned, closed shell of 3 mm", accuracy);
+  EXPECT_GT(accuracy.dice, 0.985);
+  EXPECT_LT(std::abs(accuracy.bias_mm), 0.06);
+  EXPECT_LT(accuracy.mean_mm, 0.09);
+}
+
+std::string message_of(const Volume& volume, const List<Seeds>& seeds) {
+  return shipped::refusal("segment.level_set", segmented::inputs(volume, seeds));
+}
+
+TEST(LevelSet, SaysWhatIsWrongWithSeeds) {
+  const ShortBone bone;
+  Volume volume{bone.grid, std::vector<float>(bone.grid.count(), 40.f)};
+  EXPECT_EQ(message_of(volume, {}),
+            "seeds: there are none; give at least one fragment with one point inside its bone (seeds in case.yaml)");
+  EXPECT_EQ(message_of(volume, bone.seeds(bone.at(0, 0, 0))),
+            "seeds of fragment 'distal': point 1 at (100.0, -50.0, 30.0) mm is not in bone: the CT shows 40 HU there, "
+            "at least "
+            "150 HU expected; move it into cortical or spongy bone");
+  EXPECT_EQ(message_of(volume, bone.seeds(Vector3d(900, 0, 0))),
+            "seeds of fragment 'distal': point 1 at (900.0, 0.0, 0.0) mm lies outside the volume; seeds are points of "
+            "the CT's "
+            "frame 'ct' in mm");
+  volume.values[5] = std::nanf("");
+  EXPECT_NE(message_of(volume, {}).find("is not a finite number"), std::string::npos);
+}
+
+// For timing, as it takes longer than a test should: --gtest_also_run_disabled_tests.
+TEST(LevelSet, DISABLED_WholeFemurInSeconds) {
+  HollowBone bone;
+  bone.low = {-8, -5, -250};
+  bone.high = {8, 5, 200};
+  bone.radius_high_mm = 32;
+  const Vector3d normal = Vector3d(0.5, 0.2, 1).normalized();
+  const auto cut = [&](const Vector3d& p) { return 3 - std::abs(normal.dot(p)); };
+  const Volume volume = phantom::scan(
+      phantom::ct_grid({130, 110, 470}), [&](const Vector3d& p) { return bone.hu(p, cut(p)); }, 0.5, 30, 2);
+  List<Seeds> seeds;
+  seeds.add("proximal", Seeds{"proximal", {bone.seed(60)}, false});
+  seeds.add("distal", Seeds{"distal", {bone.seed(-60)}});
+  List<SignedField> fields;
+  const double seconds = timed([&] { fields = level_set_fields(volume, seeds); });
+  std::printf("130x110x470, two fragments: %.2f s\n", seconds);
+  RecordProperty("milliseconds", int(1000 * seconds));
+  ASSERT_EQ(fields.size(), 1u);
+  EXPECT_EQ(fields.name(0), "distal");
+  const auto truth = [&](const Vector3d& p) { return std::max(bone.outer(p), normal.dot(p) + 3); };
+  const auto accuracy = phantom::compare(fields[0], truth, [&](const Vector3d& p) { return normal.dot(p) < -10; });
+  phantom::print("distal wall", accuracy);
+  EXPECT_GT(accuracy.dice, 0.97);
+  EXPECT_LT(std::abs(accuracy.bias_mm), 0.1);
+}
+
+}  // namespace level_set_test

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cameras that were calibrated in another unit than mm. A camera's matrix counts pixels, so only its place depends on
+// the unit: 10 times that of the file for cm.
+#include <gtest/gtest.h>
+
+#include "tests/plugins/toolbox/exchange/values.hpp"
+#include "marrow/toolbox/files/samples_out.hpp"
+
+namespace camera_scale_test {
+
+using namespace marrow::test;
+
+/// A source that is 88 of the file's units from the origin: sqrt(2^2 + 8.9^2 + 87.53^2) = 88.004.
+const std::string kXmalab =
+    "image size\n64,48\n\ncamera matrix\n300,0,32\n0,300,24\n0,0,1\n\nrotation\n0,-1,0\n1,0,0\n0,0,1\n\n"
+    "translation\n2\n-8.9\n87.53\n\n";
+const std::string kDoubt =
+    "/cm.txt: the X-ray source is 88 mm from the world's origin, where devices have 200 to 5000; looks like cm: give "
+    "scale: 10\n";
+
+/// RTK's geometry with its lengths in mm, or in cm.
+std::string rtk(bool in_cm) {
+  const std::string zero = in_cm ? "" : "0";
+  return "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<RTKThreeDCircularGeometry version=\"3\">\n"
+         "<SourceToIsocenterDistance>100" +
+         zero +
+         "</SourceToIsocenterDistance>\n"
+         "<SourceToDetectorDistance>150" +
+         zero +
+         "</SourceToDetectorDistance>\n"
+         "<Projection><GantryAngle>30</GantryAngle><ProjectionOffsetX>2" +
+         zero +
+         "</ProjectionOffsetX></Projection>\n"
+         "</RTKThreeDCircularGeometry>\n";
+}
+
+class CameraScale : public testing::Test {
+ protected:
+  CameraScale() {
+    put(folder / "cm.txt", kXmalab);
+    const std::string pixels(64 * 48, '\1');
+    put(folder / "a.png", marrow::files::png_of(64, 48, 1, marrow::files::Sample::u8, pixels.data()));
+  }
+  /// What the node gives, and in `said` what it says.
+  shipped::Outputs call(const std::string& node, const shipped::Options& options) {
+    marrow::Context::Hooks hooks;
+    said.clear();
+    hooks.log = [&](std::string_view text, marrow::LogLevel) { said += std::string(text) + "\n"; };
+    const shipped::Outputs outputs = shipped::call(node, {}, options, marrow::Context(hooks));
+    said = without_folder(said, folder.path());
+    return outputs;
+  }
+  std::string at(const std::string& name) const { return (folder / name).string(); }
+  TemporaryFolder folder;
+  std::string said;
+  const Eigen::Vector3d kInMm{20, -89, 875.3};
+};
+
+TEST_F(CameraScale, OfOneCamera) {
+  const auto as_mm = call("read.camera", {{"path", at("cm.txt")}}).at("camera").as<marrow::Camera>();
+  EXPECT_EQ(as_mm.camera_from_world.translation_mm, Eigen::Vector3d(2, -8.9, 87.53));
+  EXPECT_EQ(said, kDoubt);
+  const auto scaled = call("read.camera", {{"path", at("cm.txt")}, {"scale", 10.0}}).at("camera").as<marrow::Camera>();
+  EXPECT_LT((scaled.camera_from_world.translation_mm - kInMm).norm(), 1e-12);
+  EXPECT_EQ(scaled.intrinsics, as_mm.intrinsics);
+  EXPECT_EQ(said, "");
+}
+
+TEST_F(CameraScale, NamesTheUnitThatItLooksLike) {
+  const auto doubt = [&](double scale) {
+    call("read.camera", {{"path", at("cm.txt")}, {"scale", scale}});
+    return said;
+  };
+  EXPECT_NE(doubt(0.01).find("is 0.88 mm from the world's origin, where devices have 200 to 5000; looks like m: give "
+                             "scale: 10\n"),
+            std::string::npos)
+      << said;
+  EXPECT_NE(
+      doubt(0.2).find("is 17.6 mm from the world's origin, where devices have 200 to 5000; looks like inches: give "
+                      "scale: 5.08\n"),
+      std::string::npos)
+      << said;
+  EXPECT_NE(doubt(1e4).find("is 8.8e+05 mm from the world's origin, where devices have 200 to 5000; looks like "
+                            "micrometres: give scale: 10\n"),
+            std::string::npos)
+      << said;
+  EXPECT_EQ(doubt(2.3), "");    // 202 mm
+  EXPECT_EQ(doubt(56.8), "");   // 4999 mm
+  EXPECT_NE(doubt(2.27), "");   // 199.8 mm
+  EXPECT_NE(doubt(56.83), "");  // 5001 mm
+  // Where a camera is the world itself, its distance says nothing.
+  put(folder / "cm.txt", with(kXmalab, "2\n-8.9\n87.53", "0\n0\n0"));
+  EXPECT_EQ(doubt(1), "");
+}
+
+TEST_F(CameraScale, OfViews) {
+  const shipped::Options one = {{"name", "ap"}, {"image", at("a.png")}, {"camera", at("cm.txt")}};
+  call("read.view", one);
+  EXPECT_EQ(said, "view 'ap': " + kDoubt);
+  shipped::Options scaled = one;
+  scaled["scale"] = 10.0;
+  const auto view = call("read.view", scaled).at("view").as<marrow::View>();
+  EXPECT_LT((view.camera.camera_from_world.translation_mm - kInMm).norm(), 1e-12);
+  EXPECT_EQ(said, "");
+  const shipped::Options all = {{"names", std::vector<std::string>{"ap"}},
+                                {"images", std::vector<std::string>{at("a.png")}},
+                                {"cameras", std::vector<std::string>{at("cm.txt")}},
+                                {"scale", 10.0}};
+  const auto views = call("read.views", all).at("views").as_list<marrow::View>();
+  EXPECT_LT((views[0].camera.camera_from_world.translation_mm - kInMm).norm(), 1e-12);
+  EXPECT_EQ(said, "");
+  call("read.sequence", {{"names", std::vector<std::string>{"ap"}},
+                         {"images", std::vector<std::string>{at("a.png")}},
+                         {"cameras", std::vector<std::string>{at("cm.txt")}}});
+  EXPECT_EQ(said, "view 'ap': " + kDoubt);
+}
+
+TEST_F(CameraScale, OfACase) {
+  put(folder / "case/cm.txt", kXmalab);
+  put(folder / "case/a.png", bytes_of(folder / "a.png"));
+  put(folder / "case/ct.mha",
+      "ObjectType = Image\nNDims = 3\nDimSize = 2 2 2\nElementType = MET_SHORT\nElementSpacing = 1 1 1\nBinaryData = "
+      "True\n"
+      "ElementDataFile = LOCAL\n" +
+          std::string(16, '\0'));
+  const auto text = [](const std::string& camera) {
+    return "marrow-case: 1\nct: ct.mha\nviews:\n  - {name: ap, image: a.png, camera: " + camera +
+           "}\nfragments:\n  distal: {seeds: [[0.5, 0.5, 0.5]]}\n";
+  };
+  put(folder / "case/case.yaml", text("cm.txt"));
+  call("read.case", {{"path", at("case")}});
+  EXPECT_EQ(said, "/case" + kDoubt);
+  put(folder / "case/case.yaml", text("{file: cm.txt, scale: 10}"));
+  const auto views = call("read.case", {{"path", at("case")}}).at("views").as_list<marrow::View>();
+  EXPECT_LT((views[0].camera.camera_from_world.translation_mm - kInMm).norm(), 1e-12);
+  EXPECT_EQ(said, "");
+  put(folder / "case/case.yaml", text("{file: cm.txt, scale: 0}"));
+  EXPECT_NE(shipped::refusal("read.case", {}, {{"path", at("case")}})
+                .find("scale: expected a factor of at least 1e-6, such as 10 for cm"),
+            std::string::npos);
+}
+
+TEST_F(CameraScale, OfAGeometryWhoseOptionsAreInMm) {
+  put(folder / "mm.xml", rtk(false));
+  put(folder / "cm.xml", rtk(true));
+  shipped::Options options = {{"names", std::vector<std::string>{"ap"}},
+                              {"image_size_px", std::vector<double>{64, 48}},
+                              {"pixel_mm", std::vector<double>{0.5, 0.4}},
+                              {"corner_mm", std::vector<double>{-15, -10}},
+                              {"mirror", "upside_down"}};
+  options["path"] = at("mm.xml");
+  const auto in_mm = call("read.cameras", options).at("cameras").as_list<marrow::Camera>()[0];
+  options["path"] = at("cm.xml");
+  call("read.cameras", options);
+  EXPECT_EQ(said,
+            "view 'ap': /cm.xml: the X-ray source is 100 mm from the world's origin, where devices have 200 to 5000; "
+            "looks like cm: give scale: 10\n");
+  options["scale"] = 10.0;
+  const auto scaled = call("read.cameras", options).at("cameras").as_list<marrow::Camera>()[0];
+  EXPECT_LT((scaled.intrinsics - in_mm.intrinsics).norm(), 1e-9);
+  EXPECT_LT((scaled.camera_from_world.translation_mm - in_mm.camera_from_world.translation_mm).norm(), 1e-9);
+  EXPECT_EQ(said, "");
+}
+
+TEST_F(CameraScale, IsRefusedForCamerasInMm) {
+  put(folder / "own.yaml",
+      "marrow-camera: 1\nwidth_px: 64\nheight_px: 48\nintrinsics: [[300, 0, 32], [0, 300, 24], [0, 0, 1]]\n"
+      "camera_from_world:\n  target: camera\n  source: world\n  rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n"
+      "  translation_mm: [1, 2, 90]\n");
+  EXPECT_EQ(
+      without_folder(shipped::refusal("read.camera", {}, {{"path", at("own.yaml")}, {"scale", 10.0}}), folder.path()),
+      "/own.yaml: scale is not for marrow's cameras, whose lengths are in mm; leave it out");
+  const marrow::Camera any{64, 48, Eigen::Vector3d(300, 300, 1).asDiagonal(), {"camera", "world"}};
+  EXPECT_EQ(
+      shipped::refusal("read.view", {{"camera", shipped::item(any)}},
+                       {{"name", "ap"}, {"image", at("a.png")}, {"scale", 10.0}}),
+      "view 'ap': its camera is wired; projection, pixel_mm, corner_mm and scale are for a camera file: leave them "
+      "out");
+}
+
+}  // namespace camera_scale_test

@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "tests/plugins/toolbox/exchange/values.hpp"
+#include "marrow/toolbox/exchange/written_files.hpp"
+
+namespace markups_test {
+
+using namespace marrow::test;
+using marrow::exchange::FcsvFile;
+using marrow::exchange::MarkupsFile;
+
+// As 3D Slicer 5 saves two points, shortened.
+const std::string kJson = R"({
+    "@schema": "https://github.com/Slicer/Slicer/markups-schema-v1.0.3.json#",
+    "markups": [
+        {
+            "type": "Fiducial",
+            "coordinateSystem": "LPS",
+            "coordinateUnits": "mm",
+            "controlPoints": [
+                {
+                    "id": "1",
+                    "label": "distal-1",
+                    "position": [-53.388409961685827, 73.5, 0.25],
+                    "orientation": [-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0],
+                    "positionStatus": "defined"
+                },
+                {
+                    "id": "2",
+                    "label": "distal-2",
+                    "position": [4e1, -5, 6],
+                    "positionStatus": "defined"
+                },
+                {
+                    "id": "3",
+                    "label": "not placed yet",
+                    "position": [0.0, 0.0, 0.0],
+                    "positionStatus": "undefined"
+                }
+            ]
+        }
+    ]
+}
+)";
+
+const std::string kFcsv =
+    "# Markups fiducial file version = 4.13\n# CoordinateSystem = LPS\n"
+    "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n"
+    "1,-53.388409961685827,73.5,0.25,0,0,0,1,1,1,0,distal-1,,,2,0\n"
+    "2,40,-5,6,0,0,0,1,1,1,0,\"hip, \"\"left\"\"\",a text,\n";
+
+marrow::List<marrow::Landmarks> landmarks_at(const std::filesystem::path& path, shipped::Options options = {}) {
+  options["path"] = path.string();
+  return shipped::call("read.landmarks", {}, options).at("landmarks").as_list<marrow::Landmarks>();
+}
+
+marrow::List<marrow::Seeds> seeds_at(const std::filesystem::path& path, shipped::Options options = {}) {
+  options["path"] = path.string();
+  return shipped::call("read.seeds", {}, options).at("seeds").as_list<marrow::Seeds>();
+}
+
+const Eigen::Vector3d kFirst(-53.388409961685827, 73.5, 0.25);
+
+TEST(Markups, JsonAsLandmarks) {
+  const TemporaryFolder folder;
+  put(folder / "a.mrk.json", kJson);
+  const auto landmarks = landmarks_at(folder / "a.mrk.json", {{"fragment", "distal"}});
+  EXPECT_EQ(landmarks.names(), std::vector<std::string>{"distal"});
+  ASSERT_EQ(landmarks[0].points.size(), 2u) << "the third is not placed";
+  EXPECT_EQ(landmarks[0].points[0].name, "distal-1");
+  EXPECT_EQ(landmarks[0].points[0].model_mm, kFirst);
+  EXPECT_EQ(landmarks[0].points[1].model_mm, Eigen::Vector3d(40, -5, 6));
+  EXPECT_TRUE(landmarks[0].seen.empty());
+  EXPECT_EQ(landmarks_at(folder / "a.mrk.json").names(), std::vector<std::string>{"bone"});
+}
+
+TEST(Markups, FcsvAsLandmarks) {
+  const TemporaryFolder folder;
+  put(folder / "a.FCSV", kFcsv);
+  const auto landmarks = landmarks_at(folder / "a.FCSV");
+  ASSERT_EQ(landmarks[0].points.size(), 2u);
+  EXPECT_EQ(landmarks[0].points[0].model_mm, kFirst);
+  EXPECT_EQ(landmarks[0].points[1].name, "hip, \"left\"");
+}
+
+// RAS has the first two axes the other way round.
+TEST(Markups, RasBecomesLps) {
+  const TemporaryFolder folder;
+  const Eigen::Vector3d turned(53.388409961685827, -73.5, 0.25);
+  put(folder / "a.mrk.json", with(kJson, "\"LPS\"", "\"RAS\""));
+  EXPECT_EQ(landmarks_at(folder / "a.mrk.json")[0].points[0].model_mm, turned);
+  for (const char* system : {"RAS", "0"}) {
+    put(folder / "a.fcsv", with(kFcsv, "= LPS", std::string("= ") + system));
+    EXPECT_EQ(landmarks_at(folder / "a.fcsv")[0].points[0].model_mm, turned) << system;
+  }
+  put(folder / "a.fcsv", with(kFcsv, "= LPS", "= 1"));
+  EXPECT_EQ(landmarks_at(folder / "a.fcsv")[0].points[0].model_mm, kFirst);
+}
+
+TEST(Markups, LabelsOfSeedsNameTheirFragments) {
+  const TemporaryFolder folder;
+  put(folder / "a.mrk.json", with(kJson, "distal-2", "proximal_7"));
+  const auto seeds = seeds_at(folder / "a.mrk.json");
+  EXPECT_EQ(seeds.names(), (std::vector<std::string>{"distal", "proximal"}));
+  EXPECT_EQ(seeds[0].fragment, "distal");
+  EXPECT_TRUE(seeds[0].wanted);
+  EXPECT_EQ(seeds[0].points_mm, std::vector<Eigen::Vector3d>{kFirst});
+  EXPECT_EQ(seeds[1].points_mm, (std::vector<Eigen::Vector3d>{{40, -5, 6}}));
+  const auto together = seeds_at(folder / "a.mrk.json", {{"fragment", "femur"}});
+  EXPECT_EQ(together.names(), std::vector<std::string>{"femur"});
+  EXPECT_EQ(together[0].points_mm.size(), 2u);
+}
+
+TEST(Markups, WhatIsWrittenIsReadBackExactly) {
+  const TemporaryFolder folder;
+  const marrow::Landmarks landmarks{{{"head", {1.0 / 3, -1e-7, 12345.678}},
+                                     {"comma, \"quote\"", {0.1, -0.2, 0.3}},
+                                     {"H\xc3\xbc"
+                                      "fte",
+                                      {4, 5, 6}}},
+                                    {},
+                                    {}};
+  const marrow::Seeds seeds{"distal part", {{1.0 / 7, 2, 3}, {-4, 5e-9, 6}}, true};
+  written_by<MarkupsFile>("write.markups", "landmarks", landmarks, folder / "l.mrk.json");
+  written_by<FcsvFile>("write.fcsv", "landmarks", landmarks, folder / "l.fcsv");
+  written_by<MarkupsFile>("write.markups", "seeds", seeds, folder / "s.mrk.json");
+  written_by<FcsvFile>("write.fcsv", "seeds", seeds, folder / "s.fcsv");
+  for (const char* name : {"l.mrk.json", "l.fcsv"})
+    EXPECT_EQ(marrow::hash_of(landmarks_at(folder / name)[0]), marrow::hash_of(landmarks)) << name;
+  for (const char* name : {"s.mrk.json", "s.fcsv"}) {
+    const auto read = seeds_at(folder / name);
+    ASSERT_EQ(read.names(), std::vector<std::string>{"distal part"}) << name;
+    EXPECT_EQ(marrow::hash_of(read[0]), marrow::hash_of(seeds)) << name;
+  }
+  EXPECT_NE(bytes_of(folder / "s.mrk.json").find("\"coordinateSystem\": \"LPS\""), std::string::npos);
+  EXPECT_NE(bytes_of(folder / "s.fcsv").find("# CoordinateSystem = LPS\n"), std::string::npos);
+  EXPECT_TRUE(shipped::declares("write.markups", marrow::exactly_one({"in.landmarks", "in.seeds"})));
+}
+
+TEST(Markups, DiagnosesThatThereIsNothingToWrite) {
+  for (const char* node : {"write.markups", "write.fcsv"})
+    EXPECT_EQ(shipped::refusal(node, {}), "the node that is wired to 'landmarks' or 'seeds' gave none");
+}
+
+TEST(Markups, DiagnosesFaultsOfJson) {
+  const TemporaryFolder folder;
+  const auto expect = [&](const std::string& text, const std::string& said) {
+    put(folder / "a.mrk.json", text);
+    EXPECT_REFUSED(landmarks_at(folder / "a.mrk.json"), "a.mrk.json", said);
+  };
+  expect(kJson.substr(0, kJson.find("4e1")),
+         "a.mrk.json:19: is no JSON from here on; it is cut off or damaged: save the markups again");
+  expect("[1]", "expected 3D Slicer's markups, got '[1]'");
+  expect(R"({"ROIs": []})", "markups: is missing; expected 3D Slicer's markups, saved as .mrk.json");
+  expect(R"({"markups": 3})", "markups: expected a list, got '3'");
+  expect(R"({"markups": []})", "markups: there is no point in it; place the points in 3D Slicer, and save");
+  expect(R"({"markups": [7]})", "markups[0]: expected an object, got '7'");
+  expect(R"({"markups": [{"controlPoints": [5]}]})", "markups[0].controlPoints[0]: expected an object, got '5'");
+  expect(R"({"markups": [{"controlPoints": {}}]})", "markups[0].controlPoints: expected a list, got '{}'");
+  expect(with(kJson, "schema-v1.0.3", "schema-v2.0.0"),
+         "@schema: expected a version 1 of 3D Slicer's markups, got 'http");
+  expect(with(kJson, "\"LPS\"", "\"IJK\""), "markups[0].coordinateSystem: expected LPS or RAS, got 'IJK'");
+  expect(with(kJson, "\"LPS\"", "1"), "markups[0].coordinateSystem: expected a text, got '1'");
+  expect(with(kJson, "\"mm\"", "\"um\""),
+         "markups[0].coordinateUnits: expected mm, got '\"um\"'; save the points in mm");
+  expect(with(kJson, "controlPoints", "points"), "markups[0].controlPoints: is missing; the list has no points; is it");
+  expect(with(kJson, "[4e1, -5, 6]", "[4e1, -5]"), "controlPoints[1].position: expected 3 coordinates, got 2");
+  expect(with(kJson, "4e1", "4e9"),
+         "markups[0].controlPoints[1].position[0]: expected a coordinate in mm of at most 1 km");
+  expect(with(kJson, "4e1", "4e999"),
+         "holds a number too large to be one; it is damaged: save the markups again in 3D");
+  expect(with(kJson, "4e1", "null"), "controlPoints[1].position[0]: expected a number, got 'null'");
+  expect(with(kJson, "4e1", "NaN"), "a.mrk.json:19: is no JSON from here on");
+  expect(with(kJson, "\"position\": [4e1", "\"place\": [4e1"),
+         "markups[0].controlPoints[1].position: is missing; each control point needs its three coordinates");
+  expect(with(kJson, "distal-2", "distal-1"), "point 2: its label 'distal-1' is that of point 1; give each its own");
+  expect(with(kJson, "distal-2", ""), "point 2: it has no label; give each point its landmark's name in 3D Slicer");
+  expect(with(kJson, "distal-2", "a\\nb"), "point 2: its label 'a\\x0ab'");
+  expect(std::string(200000, '['), "is no JSON from here on");
+}
+
+TEST(Markups, DiagnosesFaultsOfFcsv) {
+  const TemporaryFolder folder;
+  const auto expect = [&](const std::string& text, const std::string& said) {
+    put(folder / "a.fcsv", text);
+    EXPECT_REFUSED(landmarks_at(folder / "a.fcsv"), "a.fcsv", said);
+  };
+  expect(with(kFcsv, "4.13", "3.6"), "a.fcsv:1: expected a version 4 or 5 of 3D Slicer's file, got '3.6'");
+  expect(with(kFcsv, "= LPS", "= 2"), "a.fcsv:2: expected the coordinate system LPS or RAS (also 1 or 0), got '2'");
+  expect(with(kFcsv, "# CoordinateSystem = LPS\n", ""),
+         "a.fcsv:3: no line '# CoordinateSystem = ' came before; add it, with LPS or RAS after the sign");
+  expect("1,2,3\n", "a.fcsv:1: expected 3D Slicer's '# Markups fiducial file version = ' first");
+  expect(with(kFcsv, ",label,", ",name,"), "a.fcsv:3: there is no column 'label'; expected id,x,y,z");
+  expect(with(kFcsv, "id,x,y", "id,y,x"), "a.fcsv:3: the columns x, y, z do not follow each other; expected id,x,y,z");
+  expect(with(kFcsv, "2,40,-5,6,0,0,0,1,1,1,0,", "2,40,-5,"), "a.fcsv:5: expected at least 12 cells, got 6");
+  expect(with(kFcsv, "2,40", "2,nan"), "a.fcsv:5: expected a coordinate in mm of at most 1 km, got 'nan'");
+  expect(with(kFcsv, "2,40", "2,4e7"), "a.fcsv:5: expected a coordinate in mm of at most 1 km, got '4e7'");
+  expect(with(kFcsv, "2,40", "2,4O"), "a.fcsv:5: expected a coordinate in mm of at most 1 km, got '4O'");
+  expect(with(kFcsv, "\"\"left\"\"\"", "left"),
+         "a.fcsv:5: a quotation mark is not closed; the file is cut off or damaged");
+  expect(kFcsv.substr(0, kFcsv.find("1,-53")), "there is no point in it; expected 3D Slicer's list of fiducials");
+}
+
+const std::string kHeader = kFcsv.substr(0, kFcsv.find("1,-53"));
+
+// 3D Slicer under a locale with decimal commas, and tables saved there: 12.5 becomes two cells, and what follows moves.
+TEST(Markups, DecimalCommasAreNoCells) {
+  const TemporaryFolder folder;
+  const auto expect = [&](const std::string& row, const std::string& said) {
+    put(folder / "a.fcsv", kHeader + row + "\n");
+    EXPECT_REFUSED(landmarks_at(folder / "a.fcsv"), "a.fcsv", said);
+    EXPECT_REFUSED(seeds_at(folder / "a.fcsv"), "a.fcsv", said);
+  };
+  const std::string advice =
+      "; a number with a decimal comma makes two cells: write 12.5, not 12,5, and a text with commas in quotation "
+      "marks";
+  const std::string expected = "a.fcsv:4: expected 14 cells, one for each of the columns, got ";
+  expect("1,12,5,30,1,-7,2,0,0,0,1,1,1,0,distal-1,,", expected + "17" + advice);
+  expect("1,12,5,30,-7,0,0,0,1,1,1,0,distal-1,,", expected + "15" + advice);
+  expect("1,12,5,30,1,-7,0,0,0,1,1,1,0,distal-1,,", expected + "16" + advice);
+  expect("1,12,5,30,1,-7,2,0,0,0,1,1,1,0,distal-1,,,2,0", expected + "19" + advice);  // of 3D Slicer 5
+  expect("1,12,5,30,-7,0,0,0,1,1,1,0,distal-1,,,2,0", expected + "17" + advice);
+  expect("1,12,5,30,-7,0,0,0,1,1,1,0,distal-1", expected + "13" + advice);  // and without the last two cells
+  expect("1,12.5,30,-7,0,0,0,1,1,1,0,left, not right,,", expected + "15" + advice);
+  // As many cells as columns, because as many are missing at the end as there are decimal commas.
+  const std::string moved =
+      "a.fcsv:4: the cells do not stand below their columns: those of the orientation or of vis, sel and lock hold "
+      "other "
+      "numbers" +
+      advice;
+  expect("1,10,5,20,30,0,0,0,1,1,1,0,d-1,", moved);
+  expect("1,10,5,20,5,30,0,0,0,1,1,1,0,d-1", moved);
+  expect("1,10,5,20,5,30,0,0,0,1,1,1,0,d-1,2,0", moved);
+}
+
+TEST(Markups, RowsOfOtherLengthsThatAreSound) {
+  const TemporaryFolder folder;
+  const auto first_of = [&](const std::string& rows) {
+    put(folder / "a.fcsv", kHeader + rows);
+    return landmarks_at(folder / "a.fcsv")[0].points.at(0);
+  };
+  const Eigen::Vector3d at(12.5, 30.1, -7.2);
+  for (const char* row : {"1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch,,,2,0", "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch,,,,2,0",
+                          "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,1, , ,  2,0", "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch",
+                          "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch,", "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,7,,"})
+    EXPECT_EQ(first_of(std::string(row) + "\n").model_mm, at) << row;
+  // On Windows 3D Slicer 5 leaves a carriage return inside of its lines.
+  EXPECT_EQ(first_of("1,12.5,30.1,-7.2,0,0,0,1,1,1,0,\"hip, left\",,\r,2,0\n").name, "hip, left");
+  // The fifteenth cell says whether a point is placed: 2. The others are listed only, and lie at (0, 0, 0).
+  const auto placed = first_of("1,0,0,0,0,0,0,1,1,1,0,later,,,0,0\n2,12.5,30.1,-7.2,0,0,0,1,1,1,0,now,,,2,0\n");
+  EXPECT_EQ(placed.name, "now");
+  put(folder / "b.fcsv", with(kFcsv, "= LPS\n", "= LPS,,,,\n"));  // tables fill each line up
+  EXPECT_EQ(landmarks_at(folder / "b.fcsv")[0].points[0].model_mm, kFirst);
+}
+
+// The values are those of the files' texts.
+TEST(Markups, FilesOfOthersWithDecimalCommas) {
+  MARROW_NEED_DATA(data, "strangers/text");
+  EXPECT_SAYS(seeds_at(data / "decimal_comma.fcsv"), "a number with a decimal comma makes two cells");
+  EXPECT_SAYS(landmarks_at(data / "decimal_comma_one.fcsv"), "a number with a decimal comma makes two cells");
+  EXPECT_EQ(landmarks_at(data / "extra_cells.fcsv")[0].points.at(0).model_mm, Eigen::Vector3d(12.5, 30.1, -7.2));
+}
+
+TEST(Markups, DiagnosesSeedsWithoutAFragment) {
+  const TemporaryFolder folder;
+  put(folder / "a.mrk.json", with(kJson, "distal-2", ""));
+  EXPECT_SAYS(seeds_at(folder / "a.mrk.json"),
+              "a.mrk.json: point 2: it has no label; give it its fragment's name in 3D Slicer, or give fragment");
+  put(folder / "s.yaml", "marrow-seeds: 1\nfragments:\n  proximal: {seeds: [[1, 2, 3]]}\n");
+  EXPECT_SAYS(seeds_at(folder / "s.yaml", {{"fragment", "femur"}}),
+              "s.yaml: names its fragments itself; fragment is only for files of 3D Slicer, so leave it out");
+  EXPECT_SAYS(landmarks_at(folder / "a.mrk.json", {{"fragment", ""}}), "fragment");
+}
+
+}  // namespace markups_test

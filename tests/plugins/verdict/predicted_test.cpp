@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/plugins/evaluate/listener.hpp"
+#include "shipped.hpp"
+
+namespace predicted_test {
+
+using marrow::Judgement, marrow::Verdict;
+using Texts = std::vector<std::string>;
+
+/// A box of 20 x 20 x 100 mm about the origin.
+marrow::Mesh box() {
+  marrow::Mesh mesh;
+  for (const double z : {-50, 50})
+    for (const double y : {-10, 10})
+      for (const double x : {-10, 10}) mesh.vertices_mm.emplace_back(x, y, z);
+  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return mesh;
+}
+
+/// A pose with standard deviations about (degrees) and along (mm) the box's axes.
+marrow::Pose pose_with(const marrow::Vector6d& deviations) {
+  marrow::Pose pose;
+  pose.world_from_model.rotation = marrow::rotation_from_vector({0.1, -0.7, 1.3});
+  pose.world_from_model.translation_mm = {10, -20, 800};
+  pose.covariance = marrow::Matrix6d::Zero();
+  for (int i = 0; i < 6; ++i)
+    (*pose.covariance)(i, i) = std::pow(i < 3 ? marrow::radians(deviations[i]) : deviations[i], 2);
+  return pose;
+}
+
+Verdict verdict_of(const marrow::Pose& pose, const shipped::Options& options = {}) {
+  const auto outputs =
+      shipped::call("verdict.predicted", {{"pose", shipped::item(pose)}, {"model", shipped::item(box())}}, options);
+  return outputs.at("verdict").as<Verdict>();
+}
+
+double figure(const Verdict& verdict, const std::string& name) {
+  for (const marrow::Metric& one : verdict.figures)
+    if (one.name == name) return one.value;
+  return std::nan("");
+}
+
+TEST(VerdictPredicted, APoseThatIsKnownWellIsTrusted) {
+  const Verdict verdict = verdict_of(pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1}));
+  EXPECT_EQ(verdict.judgement, Judgement::trusted);
+  EXPECT_EQ(verdict.failure_probability, 0);
+  ASSERT_EQ(verdict.reasons.size(), 1u);
+  EXPECT_EQ(verdict.reasons[0],
+            "the bone's surface is known to 0.2 mm, and the rotation about the long axis to 0.5 degrees");
+  EXPECT_EQ(verdict.remedies, Texts{});
+}
+
+TEST(VerdictPredicted, TheProbabilityIsThatOfTheNormalDistribution) {
+  // A rotation about the long axis with a deviation of 5 degrees is off by more than 5 degrees with probability 0.317.
+  // It moves the box's surface by less than 2 mm, unless it is above 8 degrees.
+  Verdict verdict = verdict_of(pose_with({0, 0, 5, 0, 0, 0}));
+  EXPECT_EQ(verdict.judgement, Judgement::doubtful);
+  EXPECT_NEAR(verdict.failure_probability, 0.317, 0.015) << "10000 draws: three standard deviations";
+  EXPECT_NEAR(figure(verdict, "predicted_axial_deg"), 5, 0.5);
+  // A shift moves every point by as much: above 2 mm with the same probability.
+  verdict = verdict_of(pose_with({0, 0, 0, 0, 0, 2}));
+  EXPECT_NEAR(verdict.failure_probability, 0.317, 0.015);
+  EXPECT_NEAR(figure(verdict, "predicted_mtre_mm"), 2, 0.2);
+  EXPECT_EQ(figure(verdict, "predicted_axial_deg"), 0);
+}
+
+TEST(VerdictPredicted, SaysWhichDirectionIsNotKnownAndWhatWouldSettleIt) {
+  Verdict verdict = verdict_of(pose_with({0, 0, 5, 0, 0, 0}));
+  char axial[80];
+  std::snprintf(axial, sizeof axial, "the rotation about the long axis is known to %.1f degrees only",
+                figure(verdict, "predicted_axial_deg"));
+  EXPECT_EQ(verdict.reasons.at(0), axial);
+  EXPECT_EQ(verdict.remedies.at(0), "another view, or a landmark off the long axis");
+  verdict = verdict_of(pose_with({0, 0, 0, 0, 0, 2}));
+  char shift[80];
+  std::snprintf(shift, sizeof shift, "the bone's surface is known to %.1f mm only",
+                figure(verdict, "predicted_mtre_mm"));
+  EXPECT_EQ(verdict.reasons, Texts{shift});
+  EXPECT_EQ(verdict.remedies, Texts{"another view, from a different direction"});
+  verdict = verdict_of(pose_with({0, 0, 40, 0, 0, 0}));
+  EXPECT_EQ(verdict.reasons.size(), 2u) << "40 degrees move the surface, too";
+  EXPECT_TRUE(verdict.reasons.at(0).starts_with("the rotation about the long axis")) << "the weightier first";
+}
+
+TEST(VerdictPredicted, IsWrongAboveHalf) {
+  const marrow::Pose pose = pose_with({0, 0, 15, 0, 0, 0});  // above 5 degrees with probability 0.74
+  EXPECT_EQ(verdict_of(pose).judgement, Judgement::wrong);
+  EXPECT_EQ(verdict_of(pose, {{"wrong_above", 0.9}}).judgement, Judgement::doubtful);
+  EXPECT_EQ(verdict_of(pose, {{"doubtful_above", 0.9}, {"wrong_above", 0.95}}).judgement, Judgement::trusted);
+  EXPECT_TRUE(shipped::declares("verdict.predicted", marrow::below("doubtful_above", "wrong_above")));
+}
+
+TEST(VerdictPredicted, WithoutPredictionItIsDoubtful) {
+  marrow::Pose pose = pose_with(marrow::Vector6d::Zero());
+  pose.covariance.reset();
+  const Verdict verdict = verdict_of(pose);
+  EXPECT_EQ(verdict.judgement, Judgement::doubtful);
+  EXPECT_TRUE(std::isnan(verdict.failure_probability));
+  EXPECT_EQ(verdict.reasons,
+            Texts{"the registration predicts no deviations, so nothing says how far the pose may be off"});
+  EXPECT_EQ(verdict.remedies, Texts{"a registration that predicts its deviations"});
+}
+
+TEST(VerdictPredicted, AnUndeterminedPoseIsWrong) {
+  const Verdict verdict = verdict_of(pose_with(marrow::Vector6d::Constant(HUGE_VAL)));
+  EXPECT_EQ(verdict.judgement, Judgement::wrong);
+  EXPECT_EQ(verdict.failure_probability, 1);
+  EXPECT_EQ(verdict.reasons, Texts{"the images do not determine the pose in every direction"});
+  EXPECT_EQ(verdict.remedies, Texts{"another view, or a landmark"});
+}
+
+TEST(VerdictPredicted, AWarningMakesItDoubtful) {
+  marrow::Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1});
+  pose.warnings = {"the search ended at its limit"};
+  const Verdict verdict = verdict_of(pose);
+  EXPECT_EQ(verdict.judgement, Judgement::doubtful);
+  EXPECT_EQ(verdict.failure_probability, 0);
+  EXPECT_EQ(verdict.reasons.at(0), "the registration warns: the search ended at its limit");
+  EXPECT_EQ(verdict.remedies, Texts{"a look at the overlay of each view"});
+}
+
+TEST(VerdictPredicted, IsTheSameEachTime) {
+  const marrow::Pose pose = pose_with({1, 1, 4, 1, 1, 1});
+  EXPECT_EQ(marrow::hash_of(verdict_of(pose)), marrow::hash_of(verdict_of(pose)));
+}
+
+TEST(VerdictPredicted, RefusesAnotherBonesSurface) {
+  marrow::Mesh mesh = box();
+  mesh.frame = "elsewhere";
+  EXPECT_EQ(shipped::refusal("verdict.predicted",
+                             {{"pose", shipped::item(pose_with({0, 0, 1, 0, 0, 1}))}, {"model", shipped::item(mesh)}}),
+            "the model is in the frame 'elsewhere', but the pose takes points in 'ct'; give the model that was "
+            "registered");
+}
+
+/// A prior that is turned by an angle about the long axis against a pose.
+marrow::Pose prior_of(const marrow::Pose& pose, double turned_deg, double deviation_deg) {
+  marrow::Pose prior = pose_with({1, 1, deviation_deg, 3, 3, 3});
+  marrow::Vector6d turn = marrow::Vector6d::Zero();
+  turn[2] = marrow::radians(turned_deg);
+  prior.world_from_model = marrow::moved(pose.world_from_model, pose.frame, turn);
+  return prior;
+}
+Verdict verdict_of(const marrow::Pose& pose, const marrow::Pose& prior, marrow::Context context = marrow::Context(),
+                   const shipped::Options& options = {}) {
+  return shipped::call(
+             "verdict.predicted",
+             {{"pose", shipped::item(pose)}, {"model", shipped::item(box())}, {"prior", shipped::item(prior)}}, options,
+             context)
+      .at("verdict")
+      .as<Verdict>();
+}
+
+TEST(VerdictPredicted, APriorThatContradictsTheImagesMakesAPoseDoubtful) {
+  // The pose is known to 3 degrees, the prior to 5: they differ by 4 = sqrt(5^2 - 3^2) degrees, give or take.
+  const marrow::Pose pose = pose_with({0.1, 0.1, 3, 0.1, 0.1, 0.1});
+  listener::Listener listener;
+  const Verdict verdict = verdict_of(pose, prior_of(pose, -20, 5), listener.context, {{"doubtful_above", 0.3}});
+  EXPECT_EQ(verdict.judgement, Judgement::doubtful);
+  EXPECT_NEAR(figure(verdict, "prior_axial_deg"), 20, 1e-6);
+  EXPECT_NEAR(figure(verdict, "prior_axial_deviations"), 5, 1e-6);
+  const std::string said =
+      "the prior contradicts the images: they are 20.0 degrees apart about the long axis, 5.0 times the deviation "
+      "expected of this difference";
+  EXPECT_EQ(verdict.reasons.at(0), said);
+  EXPECT_EQ(listener.warnings, Texts{said});
+  EXPECT_EQ(verdict.remedies.back(),
+            "a look at the markers, if the prior comes from these: has the skin slid, or one moved?");
+}
+
+TEST(VerdictPredicted, APriorThatAgreesChangesNoJudgement) {
+  const marrow::Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1});
+  listener::Listener listener;
+  const Verdict verdict = verdict_of(pose, prior_of(pose, 6, 5), listener.context);
+  EXPECT_EQ(verdict.judgement, Judgement::trusted);
+  EXPECT_NEAR(figure(verdict, "prior_axial_deviations"), 6 / std::sqrt(25 - 0.25), 1e-6);
+  EXPECT_TRUE(listener.warnings.empty());
+  // The limit is an option.
+  EXPECT_EQ(verdict_of(pose, prior_of(pose, 6, 5), marrow::Context(), {{"contradicts_above", 1.2}}).judgement,
+            Judgement::doubtful);
+}
+
+TEST(VerdictPredicted, WhereTheImagesSayNothingThereIsNothingToCompare) {
+  const marrow::Pose pose = pose_with({0.1, 0.1, 4.99, 0.1, 0.1, 0.1});
+  const Verdict verdict = verdict_of(pose, prior_of(pose, 20, 5));
+  EXPECT_TRUE(std::isnan(figure(verdict, "prior_axial_deviations")));
+  EXPECT_NEAR(figure(verdict, "prior_axial_deg"), 20, 1e-6);
+}
+
+TEST(VerdictPredicted, APriorNeedsACovariance) {
+  const marrow::Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1});
+  marrow::Pose prior = prior_of(pose, 0, 5);
+  prior.covariance.reset();
+  EXPECT_EQ(shipped::refusal(
+                "verdict.predicted",
+                {{"pose", shipped::item(pose)}, {"model", shipped::item(box())}, {"prior", shipped::item(prior)}}),
+            "the prior has no covariance; take it from a node that predicts one, such as a fit of markers");
+}
+
+TEST(VerdictPredicted, DeviationsOfZeroAreNoKnowledge) {
+  const Verdict verdict = verdict_of(pose_with(marrow::Vector6d::Zero()));
+  EXPECT_EQ(verdict.judgement, Judgement::wrong);
+  EXPECT_EQ(verdict.failure_probability, 1);
+  EXPECT_EQ(verdict.reasons, Texts{"the predicted deviations are 0, so the registration compared nothing"});
+  EXPECT_EQ(verdict.remedies, Texts{"a start nearer to the bone, and a look at the masks and edges of each view"});
+}
+
+}  // namespace predicted_test

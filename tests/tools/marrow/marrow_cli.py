@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the tests of the command line share: where things are, and how to run the program."""
+import atexit
+import contextlib
+import fcntl
+import os
+import pathlib
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
+import compiler_cache  # noqa: E402
+from sample import sample  # noqa: E402, F401
+
+SOURCE = pathlib.Path(sys.argv[1])
+BUILD = pathlib.Path(sys.argv[2])
+MARROW = BUILD / "bin" / "marrow"
+TEST_PLUGINS = BUILD / "tests" / "plugins"
+SHARED_CACHE = BUILD / "tests" / "store"  # of simulated cases, which are the same in many tests
+# A sanitizer makes everything several times slower and larger.
+IS_SANITIZED = any(name in MARROW.read_bytes() for name in (b"libasan.so", b"libtsan.so"))
+CACHE = pathlib.Path(tempfile.mkdtemp(prefix="marrow-cache-"))  # no test sees what another run left
+atexit.register(shutil.rmtree, CACHE, ignore_errors=True)
+os.environ["MARROW_CACHE"] = str(CACHE)
+compiler_cache.use(BUILD)
+
+
+def marrow(*arguments, plugins=(), cwd=None, timeout=300, extra_environment=None):
+    environment = dict(os.environ)
+    environment["MARROW_PLUGIN_PATH"] = ":".join(str(folder) for folder in plugins)
+    environment.update(extra_environment or {})
+    return subprocess.run(
+        [str(MARROW), *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        timeout=timeout,
+        env=environment,
+        errors="replace",
+    )
+
+
+def wait_until(condition, what, seconds=300):
+    """Returns when the condition holds, which may take long on a machine that has other work."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, what
+        time.sleep(0.05)
+
+
+@contextlib.contextmanager
+def another_run_makes_all(store):
+    """As long as this lasts, another run seems to make all that the store lacks: who needs any of it waits."""
+    with open(store / "claims", "r+b") as claims:
+        fcntl.fcntl(claims, 37, struct.pack("hhqqi", fcntl.F_WRLCK, os.SEEK_SET, 0, 0, 0))  # F_OFD_SETLK
+        yield
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        self.scratch = pathlib.Path(tempfile.mkdtemp(prefix="marrow-cli-"))
+
+    def tearDown(self):
+        shutil.rmtree(self.scratch, ignore_errors=True)
+
+    def write(self, name, text):
+        path = self.scratch / name
+        path.write_text(text)
+        return path
+
+
+def main():
+    unittest.main(argv=sys.argv[:1] + sys.argv[3:], verbosity=2)

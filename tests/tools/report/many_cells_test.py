@@ -1,0 +1,225 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""A page of 10,000 cells in headless Chromium: it opens, sorts and filters without a stall; the keyboard and screen
+readers reach all rows although few are drawn; and each cell has an address.
+
+    tests/tools/report/many_cells_test.py     exit code 77: skipped, with the reason
+"""
+import os
+import sys
+
+import synthetic
+from page import BrowserTest, run_tests
+
+# Both times are for a machine that does the work below in this time. On one that is slower, or busy, they are longer.
+MOST_SECONDS, MOST_BYTES, MOST_TASK_MS = 3, 20e6, 100
+WORK, WORK_MS = (
+    """const begin = performance.now(), list = [];
+    for (let i = 0, x = 1; i < 200000; ++i) list.push({id: 'cell-' + (x = x * 16807 % 2147483647), value: x});
+    list.sort((a, b) => a.value - b.value);
+    return performance.now() - begin""",
+    100,
+)
+ROWS = "return [...document.querySelectorAll('#cells tbody tr')].map((row) => row.dataset.id)"
+
+
+class ManyCellsTest(BrowserTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.data = synthetic.comparison(cases=100, starts=10, variants=10, looked_at=0)
+        cls.cells = [
+            dict(cell, id="/".join([name, cls.data["cases"][cell["case"]], cls.data["starts"][cell["start"]]]))
+            for cell in cls.data["cells"]
+            for name in [cls.data["variants"][cell["variant"]]["name"]]
+        ]
+        cls.page = cls.write("many", synthetic.as_table(cls.data))
+
+    def rows(self):
+        return self.browser.js(ROWS)
+
+    def choose_text(self, text):
+        self.choose("Text", text, "#cells")
+
+    def slowness(self):
+        """How many times as long as the limits say everything may take at the moment."""
+        return max(1, self.browser.js(WORK) / WORK_MS)
+
+    def longest_task_ms(self, steps):
+        """The longest task of the page while it takes these steps, a list of functions in JavaScript, each in a task of
+        its own. Tasks below 50 ms are not reported and count as 0."""
+        return self.browser.js(
+            """const tasks = [0], wait = (ms) => new Promise((done) => setTimeout(done, ms));
+            const watcher = new PerformanceObserver((list) => tasks.push(...list.getEntries().map((t) => t.duration)));
+            watcher.observe({entryTypes: ['longtask']});
+            return (async () => {
+              for (const step of (%s)) {
+                step();
+                await wait(5);
+              }
+              await wait(150);
+              tasks.push(...watcher.takeRecords().map((t) => t.duration));
+              watcher.disconnect();
+              return Math.max(...tasks);
+            })()"""
+            % steps
+        )
+
+    def test_it_opens_soon_and_is_small(self):
+        for _ in range(3):  # a busy machine may be late
+            seconds = self.browser.open(self.page)
+            most = MOST_SECONDS * self.slowness()
+            if seconds < most:
+                break
+        size = self.page.stat().st_size
+        print("10,000 cells: ready in %.2f s, load %.1f, %.1f MB" % (seconds, os.getloadavg()[0], size / 1e6))
+        self.assertLess(seconds, most)
+        self.assertLess(size, MOST_BYTES)
+        self.assertEqual(self.texts("#cells .count"), ["10,000 runs"])
+        failed = sum(cell["status"] == "failed" for cell in self.cells)
+        self.assertIn("%d failed" % failed, self.texts(".facts")[0])
+
+    def test_sorting_and_filtering_do_not_stall(self):
+        self.browser.open(self.page)
+        busy = "[() => {}, () => { const end = performance.now() + 120; while (performance.now() < end); }]"
+        self.eventually(lambda: self.longest_task_ms(busy) > MOST_TASK_MS, True)  # a stall is seen
+        sort = """[() => marrow.table.orders.clear(),
+            ...[...document.querySelectorAll('#cells .sort')].flatMap((b) => [() => b.click(), () => b.click()])]"""
+        filters = """[() => marrow.table.words.clear(),
+            ...[['Text', ['c', 'ca', 'case-07/3', 'shaft', '']], ['Variant', ['7', '']], ['Case', ['50', '']],
+                ['Outcome', ['missed', '']]].flatMap(([label, values]) => {
+              const fields = [...document.querySelectorAll('#cells label.field')];
+              const box = fields.find((f) => f.firstChild.textContent === label).querySelector('select, input');
+              return values.map((value) => () => {
+                box.value = value;
+                box.dispatchEvent(new Event(box.matches('select') ? 'change' : 'input'));
+              });
+            })]"""
+        scroll = """[...Array(11).keys()].map((part) => () => {
+            const rows = document.querySelector('.rows');
+            rows.scrollTop = part / 10 * rows.scrollHeight;
+          })"""
+        for name, steps in (("sorting", sort), ("filtering", filters), ("scrolling", scroll)):
+            for _ in range(8):  # a busy machine makes tasks longer
+                longest, most = self.longest_task_ms(steps), MOST_TASK_MS * self.slowness()
+                if longest < most:
+                    break
+            print("10,000 cells, %s: longest task %.0f ms, load %.1f" % (name, longest, os.getloadavg()[0]))
+            self.assertLess(longest, most, name)
+        self.assertEqual(self.texts("#cells .count"), ["10,000 runs"])
+
+    def test_rows_are_in_order(self):
+        self.browser.open(self.page)
+        finite = [cell for cell in self.cells if cell["values"][0] is not None]
+        finite.sort(key=lambda cell: cell["values"][0])
+        self.press("mTRE mm", "#cells")
+        self.assertEqual(self.rows()[:10], [cell["id"] for cell in finite[:10]])
+        self.press("mTRE mm", "#cells")
+        self.assertEqual(self.rows()[:10], [cell["id"] for cell in finite[:-11:-1]])
+        last = self.browser.js("const r = document.querySelector('.rows'); r.scrollTop = r.scrollHeight; return 0")
+        failed = [cell["id"] for cell in self.cells if cell["values"][0] is None]
+        self.eventually(lambda: self.rows()[-1:], failed[-1:])
+        self.choose_text("CASE-07/3")
+        wanted = {cell["id"] for cell in self.cells if cell["id"].endswith("/case-07/3")}
+        self.assertEqual((set(self.rows()), len(wanted)), (wanted, 10))
+        self.assertEqual(self.texts("#cells .count"), ["10 of 10,000 runs"])
+        self.choose_text("nothing is named so")
+        self.assertEqual((self.rows(), self.texts("#cells .count")), ([], ["No cell fits the filter"]))
+        self.assertEqual(last, 0)
+
+    def test_few_rows_are_drawn_and_say_which(self):
+        self.browser.open(self.page)
+        self.browser.show("cells")
+        count = lambda: self.browser.js("return document.querySelector('#cells table').getAttribute('aria-rowcount')")
+        self.assertEqual(count(), "10001")
+        self.assertLess(len(self.rows()), 60)
+        self.browser.js("const r = document.querySelector('.rows'); r.scrollTop = marrow.table.table.row_px * 5000")
+        self.eventually(lambda: self.cells[5000]["id"] in self.rows(), True)
+        self.assertLess(len(self.rows()), 60)
+        place = self.browser.js(
+            """const row = document.querySelector('#cells [data-id="' + arguments[0] + '"]');
+            const head = document.querySelector('#cells thead th').getBoundingClientRect();
+            return [row.getAttribute('aria-rowindex'), row.getBoundingClientRect().top - head.bottom]""",
+            self.cells[5000]["id"],
+        )
+        self.assertEqual(place[0], "5002")  # counted from 1, after the heading
+        self.assertLess(abs(place[1]), 2)  # px: just below the heading, which stays
+        self.choose_text("case-07/3")
+        self.assertEqual(count(), "11")
+
+    def test_find_is_the_filter_and_keys_go_from_row_to_row(self):
+        self.browser.open(self.page)
+        find = """const how = {key: 'f', ctrlKey: true, bubbles: true, cancelable: true};
+            const event = new KeyboardEvent('keydown', how);
+            document.activeElement.dispatchEvent(event);
+            return [event.defaultPrevented, document.activeElement.type === 'search']"""
+        self.assertEqual(self.browser.js(find), [False, False], "the table is not in sight")
+        self.browser.show("cells")
+        self.assertEqual(self.browser.js(find), [True, True])
+        self.assertEqual(self.browser.js(find), [False, True], "the second time the browser's own comes")
+        focused = lambda: self.browser.js("return document.activeElement.textContent")
+        press = lambda key: self.browser.key(key, ":focus")
+        self.browser.js("document.querySelector('.rows').focus()")
+        for key, wanted in (
+            ("ARROW_DOWN", 0),
+            ("ARROW_DOWN", 1),
+            ("ARROW_DOWN", 2),
+            ("ARROW_UP", 1),
+            ("END", 9999),
+            ("ARROW_DOWN", 9999),
+            ("ARROW_UP", 9998),
+            ("HOME", 0),
+        ):
+            press(key)
+            self.assertEqual(focused(), self.cells[wanted]["id"], key)
+        press("PAGE_DOWN")
+        self.assertIn(focused(), [cell["id"] for cell in self.cells[5:40]])
+        reached = "return [...document.querySelectorAll('#cells tbody button')].filter((b) => b.tabIndex === 0).length"
+        self.assertEqual(self.browser.js(reached), 1, "the tabulator stops at one row")
+        self.browser.js("const r = document.querySelector('.rows'); r.scrollTop = r.scrollHeight / 2")
+        self.eventually(lambda: self.browser.js("return document.activeElement.className"), "scroll rows")
+        press("ARROW_DOWN")
+        self.assertIn(focused(), [cell["id"] for cell in self.cells[4900:5100]])
+        name = focused()
+        press("ENTER")
+        self.assertIn("Cell " + name, self.texts("#cell .note"))
+
+    def test_a_link_opens_a_cell(self):
+        cell = next(cell for cell in self.cells if cell["status"] == "done")
+        link = "#cell=" + cell["id"].replace(" ", "%20")
+        self.browser.open(self.page, hash=link)
+        text = self.browser.js("return document.getElementById('cell').innerText")
+        command = "marrow cell experiments/edges.yaml '%s'" % cell["id"]
+        self.assertIn(command, text)
+        self.assertIn("No pictures of this cell are in this report. This makes them, and a page that shows", text)
+        self.assertIn(command + " && marrow show 'runs/edges/pictures/%s'" % cell["id"], text)
+        failed = next(cell for cell in self.cells if cell["status"] == "failed")
+        self.browser.js("location.hash = arguments[0]", "#cell=" + failed["id"])
+        shown = lambda: failed["id"] in self.browser.js("return document.getElementById('cell').innerText")
+        self.eventually(shown, True)
+        self.assertIn("There are no pictures of this cell, because it failed.", "".join(self.texts("#cell .note")))
+        self.press("Next", "#cell")
+        after = self.cells[self.cells.index(failed) + 1]["id"].replace(" ", "%20")
+        self.eventually(lambda: self.browser.js("return location.hash"), "#cell=" + after)
+        self.press("Close", "#cell")
+        self.eventually(lambda: self.browser.js("return location.hash"), "")
+
+    def test_a_link_to_no_cell_says_so(self):
+        self.browser.open(self.page, hash="#cell=nobody/case-01/0")
+        for name in ("nobody/case-01/0", "100%/case-01/0"):
+            self.browser.js("location.hash = arguments[0]", "#cell=" + name)
+            wanted = "The link asks for the cell “%s”, which this report does not have." % name
+            self.eventually(lambda: wanted in "".join(self.texts("#cell p")), True)
+            self.assertIn("VARIANT/CASE/START, for example adaptive relaxation/case-01/0.", self.texts("#cell p")[0])
+
+    def test_the_command_names_the_folder_of_the_comparison(self):
+        data = synthetic.comparison(cases=1, starts=1, variants=2, looked_at=0)
+        data["experiment"]["out"] = "-my runs"
+        data["variants"][1]["name"] = "-b"
+        self.browser.open(self.write("out", synthetic.as_table(data)), hash="#cell=-b/case-01/0")
+        commands = self.texts("#cell .command code")
+        self.assertEqual(commands[0], "marrow cell experiments/edges.yaml --out './-my runs' -- -b/case-01/0")
+
+
+if __name__ == "__main__":
+    sys.exit(run_tests(sys.argv[1:]))

@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Modules of the pages for tests that call their functions, in a browser or in node."""
+import pathlib
+import subprocess
+
+TOOLS = pathlib.Path(__file__).resolve().parents[3] / "tools"
+
+
+def modules(**paths):
+    """A script that puts modules into variables: modules(Dom="report/page/dom.js") makes one that is called Dom."""
+    entry = "".join("export * as %s from './%s';" % item for item in paths.items())
+    bundled = subprocess.run(
+        ["esbuild", "--bundle", "--format=iife", "--global-name=modules", "--log-level=warning"],
+        cwd=TOOLS,
+        input=entry,
+        capture_output=True,
+        encoding="utf-8",
+        check=True,
+    ).stdout
+    return "%s\nconst {%s} = modules;\n" % (bundled, ", ".join(paths))

@@ -1,0 +1,451 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""Made-up data of a report, the same at every call: for the report's tests and for looking at its design.
+
+    tests/tools/report/synthetic.py comparison data.json --cases 12 --starts 5
+    tests/tools/report/synthetic.py run data.json
+"""
+import argparse
+import hashlib
+import json
+import math
+import pathlib
+import random
+import statistics
+
+import shapes
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+METRICS = [
+    {"name": "mtre_mm", "label": "mTRE", "unit": "mm", "success_below": 2.0},
+    {"name": "rotation_deg", "label": "rotation error", "unit": "deg", "success_below": None},
+    {"name": "axial_deg", "label": "axial rotation error", "unit": "deg", "success_below": None},
+]
+# name, options, range in which a start is captured (mm), median mTRE (mm), seconds, evaluations
+VARIANTS = [
+    ("adaptive relaxation", {}, 13.0, 0.42, 6.1, 1450),
+    ("canny", {"edges.uses": "edges.canny"}, 9.5, 0.55, 4.4, 1380),
+    ("gradient", {"edges.uses": "edges.gradient", "edges.high": 80}, 11.0, 0.47, 4.9, 1410),
+    ("bobyqa", {"optimizer.uses": "optimizer.bobyqa"}, 11.5, 0.40, 3.2, 610),
+]
+# Further ones, for large comparisons.
+VARIANTS += [
+    (
+        "high %d" % (60 + 5 * i),
+        {"edges.high": 60 + 5 * i},
+        10.0 + 0.4 * i,
+        0.41 + 0.02 * i,
+        4.0 + 0.2 * i,
+        1400 - 20 * i,
+    )
+    for i in range(6)
+]
+AXES = [
+    ("rotation about the frontal axis", "deg"),
+    ("rotation about the lateral axis", "deg"),
+    ("rotation about the long axis", "deg"),
+    ("shift along the frontal axis", "mm"),
+    ("shift along the lateral axis", "mm"),
+    ("shift along the long axis", "mm"),
+]
+GRAPH = {
+    "case": ("read.case", ""),
+    "bone": ("segment.level_set", "case"),
+    "model": ("mesh.marching_cubes", "bone"),
+    "edges": ("edges.adaptive_relaxation", "case"),
+    "shaft": ("shaft.hough_pairs", "edges case"),
+    "start": ("initial.shaft_axis", "model shaft case"),
+    "outline": ("project.silhouette_edges", "model case"),
+    "cost": ("similarity.contour_distance", "outline case edges model"),
+    "optimizer": ("optimizer.nelder_mead", ""),
+    "pose": ("register.multiresolution", "cost optimizer start"),
+    "errors": ("evaluate.pose_error", "pose case model"),
+    "overlay": ("render.overlay", "pose start outline case edges shaft"),
+    "landscape": ("render.landscape", "cost pose"),
+    "scene": ("render.scene", "model pose case"),
+}
+REASONS = [
+    "shaft: 0 pairs of borders in view 'lateral', got 1 edge, expected 2 or more: lower edges.low or widen the view",
+    "start: the model's axis and the shaft's differ by more than 90 degrees",
+]
+
+
+def quantile(values, fraction):
+    values = sorted(values)
+    position = fraction * (len(values) - 1)
+    low = math.floor(position)
+    return values[low] + (position - low) * (values[min(low + 1, len(values) - 1)] - values[low])
+
+
+def wilson(count, of):
+    z, rate = 1.959964, count / of
+    centre, half = rate + z * z / (2 * of), z * math.sqrt(rate * (1 - rate) / of + z * z / (4 * of * of))
+    return {
+        "count": count,
+        "of": of,
+        "rate": rate,
+        "low": max(0, (centre - half) / (1 + z * z / of)),
+        "high": min(1, (centre + half) / (1 + z * z / of)),
+    }
+
+
+def make_cell(chance, variant, case, start, far_mm, hardness):
+    _, _, reach_mm, median_mm, seconds, evaluations = VARIANTS[variant]
+    number = "%s-%d-%d" % ("abcdefghij"[variant], case + 1, start)
+    cell = {
+        "id": number,
+        "variant": variant,
+        "case": case,
+        "start": start,
+        "status": "done",
+        "tries": 1,
+        "success": False,
+        "initial_error": far_mm,
+        "seconds": seconds * math.exp(chance.gauss(0, 0.15)),
+        "evaluations": int(evaluations * math.exp(chance.gauss(0, 0.12))),
+        "cached_nodes": 4 if start else 0,
+        "values": [None] * 3,
+        "pictures": [],
+        "convergence": None,
+        "landscape": None,
+        "scene": None,
+        "folder": "cells/" + number,
+    }
+    if chance.random() < 0.012:
+        cell.update(status="failed", reason=chance.choice(REASONS), tries=2, seconds=None, evaluations=None)
+        return cell
+    captured = chance.random() < 1 / (1 + math.exp((far_mm - reach_mm) / 1.2))
+    error = (
+        median_mm * hardness * math.exp(chance.gauss(0, 0.35)) if captured else far_mm * chance.uniform(0.45, 1.1) + 2
+    )
+    cell.update(
+        values=[error, error * chance.uniform(0.5, 0.9), error * chance.uniform(0.8, 1.9)],
+        success=error < METRICS[0]["success_below"],
+    )
+    return cell
+
+
+def capture_of(cells):
+    """Success in bins of 2 mm, and up to where it is 95 % or more in each."""
+    farthest = max(cell["initial_error"] for cell in cells)
+    bins = []
+    for low in range(0, int(farthest) + 1, 2):
+        inside = [cell for cell in cells if low <= cell["initial_error"] < low + 2]
+        success = (
+            wilson(sum(cell["success"] for cell in inside), len(inside))
+            if inside
+            else {"count": 0, "of": 0, "low": 0, "high": 1}
+        )
+        bins.append({"from": low, "to": low + 2, **{key: success[key] for key in ("count", "of", "low", "high")}})
+    fails = next((item["from"] for item in bins if item["count"] < 0.95 * item["of"]), None)
+    return {"range": farthest if fails is None else fails, "is_open": fails is None, "unknown_starts": 0, "bins": bins}
+
+
+def summary_of(cells):
+    done = [cell for cell in cells if cell["status"] == "done"]
+    column = lambda values: {
+        "count": len(values),
+        "of": len(cells),
+        "median": quantile(values, 0.5),
+        "q1": quantile(values, 0.25),
+        "q3": quantile(values, 0.75),
+        "p95": quantile(values, 0.95),
+        "worst": max(values),
+        "mean": statistics.fmean(values),
+    }
+    return {
+        "runs": len(cells),
+        "failed": len(cells) - len(done),
+        "incomplete": 0,
+        "success": wilson(sum(cell["success"] for cell in cells), len(cells)),
+        "metrics": {metric["name"]: column([cell["values"][i] for cell in done]) for i, metric in enumerate(METRICS)},
+        "seconds": column([cell["seconds"] for cell in done]),
+        "evaluations": column([cell["evaluations"] for cell in done]),
+        "capture": capture_of(cells),
+    }
+
+
+def comparison_of(cells, variant, metric):
+    """Median of the pairs' differences with an interval of its order statistics, and the sign test."""
+    of = lambda which: {
+        (cell["case"], cell["start"]): cell["values"][metric]
+        for cell in cells
+        if cell["variant"] == which and cell["status"] == "done"
+    }
+    base, other = of(0), of(variant)
+    differences = sorted(other[key] - base[key] for key in other if key in base)
+    counts = {
+        "cases": len({case for case, _ in base} | {case for case, _ in other}),
+        "of_cases": len({cell["case"] for cell in cells}),
+        "runs": len({(cell["case"], cell["start"]) for cell in cells}),
+        "pairs": len(differences),
+        "runs_variant_lost": len(set(base) - set(other)),
+        "runs_baseline_lost": len(set(other) - set(base)),
+    }
+    count, spread = len(differences), 0.98 * math.sqrt(len(differences))
+    worse = sum(value > 0 for value in differences)
+    p = math.erfc(abs(worse - count / 2) / math.sqrt(count / 4) / math.sqrt(2))
+    low, high = differences[max(0, int(count / 2 - spread))], differences[min(count - 1, int(count / 2 + spread))]
+    name, what = VARIANTS[variant][0], METRICS[metric]
+    verdict = "is worse than" if low > 0 else "is better than" if high < 0 else "cannot be told from"
+    middle = quantile(differences, 0.5)
+    return {
+        "variant": name,
+        "metric": what["name"],
+        **counts,
+        "difference": middle,
+        "fails_more": None,
+        "low": low,
+        "high": high,
+        "p": p,
+        "p_holm": min(1, 3 * p),
+        "sentence": (
+            "%s %s %s in %s: median difference %+.2f %s, 95 %% interval %+.2f to %+.2f, p = %.2g (Holm), %d pairs."
+            % (name, verdict, VARIANTS[0][0], what["label"], middle, what["unit"], low, high, min(1, 3 * p), count)
+        ),
+    }
+
+
+def small_motion(chance, size):
+    return [chance.gauss(0, size) for _ in range(3)], [chance.gauss(0, size) for _ in range(3)]
+
+
+def add_material(data, chance, pairs):
+    """Pictures, scene, convergence and landscapes of the first cells."""
+    mesh, views = shapes.bone(), [shapes.camera("frontal", "frontal"), shapes.camera("lateral", "lateral")]
+    entry = shapes.mesh_entry("distal", mesh)
+    data["geometries"]["distal"] = {"vertices": entry["vertices"], "triangles": entry["triangles"]}
+    by_key = {(cell["variant"], cell["case"], cell["start"]): cell for cell in data["cells"]}
+    for case, start in pairs:
+        truth = shapes.pose([chance.uniform(-8, 8) for _ in range(3)], [chance.uniform(-8, 8) for _ in range(3)])
+        begin = shapes.multiply(truth, shapes.pose(*small_motion(chance, 6)))
+        greys = []
+        for view in views:
+            greys.append(shapes.xray(shapes.thickness(mesh, truth, view), view, "%d %d" % (case, start)))
+            data["pictures"]["xray %d %d %s" % (case, start, view["name"])] = shapes.png(256, 256, greys[-1], 1)
+        for variant in range(len(data["variants"])):
+            cell = by_key[variant, case, start]
+            if cell["status"] == "failed":
+                continue
+            result = shapes.multiply(truth, shapes.pose(*small_motion(chance, 0.45 * min(8, cell["values"][0]))))
+            for view, grey in zip(views, greys):
+                name = "%s %s" % (cell["id"], view["name"])
+                data["pictures"][name] = shapes.png(
+                    256, 256, shapes.overlay(grey, shapes.thickness(mesh, result, view), view, (255, 190, 40)), 3
+                )
+                data["pictures"][name + " edges"] = shapes.png(
+                    256, 256, bytearray(255 if value > 150 else value // 3 for value in grey), 1
+                )
+                cell["pictures"] += [
+                    {"name": "overlay/distal/" + view["name"], "picture": name},
+                    {"name": "edges/" + view["name"], "picture": name + " edges"},
+                ]
+            cell["scene"] = "scene " + cell["id"]
+            data["scenes"][cell["scene"]] = {
+                "meshes": [{"name": "distal", "geometry": "distal"}],
+                "poses": [
+                    {"mesh": 0, "name": name, "world_from_model": shapes.flat(matrix)}
+                    for name, matrix in (("result", result), ("truth", truth), ("start", begin))
+                ],
+                "views": [dict(view, image="xray %d %d %s" % (case, start, view["name"])) for view in views],
+            }
+            steps = cell["evaluations"]
+            cell["convergence"] = [
+                [int(steps * i / 40), 0.4 + 6 * math.exp(-i / (5 + variant)) + 0.4 * (variant % 2)] for i in range(41)
+            ]
+            cell["landscape"] = [
+                {
+                    "axis": axis,
+                    "unit": unit,
+                    "offsets": [round(0.5 * i - 5, 2) for i in range(21)],
+                    "costs": [
+                        0.4
+                        + 0.4 * (variant % 2)
+                        + min(
+                            4.0,
+                            (0.02 if "long" in axis else 0.12) * (0.5 * i - 5 - 0.1 * variant) ** 2
+                            + 0.1 * math.sin(2 * i) ** 2,
+                        )
+                        for i in range(21)
+                    ],
+                }
+                for axis, unit in AXES
+            ]
+
+
+def experiment(kind):
+    pipeline = ROOT / "pipelines" / "femur.yaml"
+    return {
+        "name": "edge detectors on the femur",
+        "file": "experiments/edges.yaml",
+        "help": (
+            "Does the edge detector or the optimizer change how far a start may lie and how close the result comes?"
+        ),
+        "text": "marrow: 1\npipeline: ../pipelines/femur.yaml\nvariants:\n  canny: {edges.uses: edges.canny}\n",
+        "pipeline_text": pipeline.read_text(),
+        "seed": 7,
+        "started": "2025-01-01T10:00:00",
+        "finished": "2025-01-01T10:41:12",
+        "command": (
+            "marrow compare experiments/edges.yaml --seed 7"
+            if kind == "comparison"
+            else "marrow run pipelines/femur.yaml case=case-01 --seed 7"
+        ),
+        "folder": "runs/edges",
+        "machine": {"cpu": "Example CPU", "cores": 2, "cpu_level": "x86-64-v3"},
+        "plugins": [
+            {"file": "libmarrow_edges.so", "build_id": "0123456789abcdef"},
+            {"file": "libmarrow_optimizer.so", "build_id": "fedcba9876543210"},
+        ],
+        "starts_protocol": "Drawn about the truth: directions uniform, mTRE uniform up to 20 mm.",
+        "success_rule": "mTRE below 2 mm.",
+        "time_rule": "2 jobs in parallel: times are not to be compared.",
+    }
+
+
+def graph(variants):
+    nodes, edges = [], []
+    for name, (uses, inputs) in GRAPH.items():
+        differs = {
+            variant["name"]: ", ".join(
+                value if key.endswith("uses") else "%s = %s" % (key.split(".")[1], value)
+                for key, value in variant["options"].items()
+                if key.split(".")[0] == name
+            )
+            for variant in variants
+        }
+        nodes.append(
+            {
+                "id": name,
+                "uses": uses,
+                "options": {"low": 50, "high": 75} if name == "edges" else {},
+                "differs": {key: value for key, value in differs.items() if value},
+            }
+        )
+        edges += [{"from": source, "to": name, "port": source} for source in inputs.split()]
+    return {"nodes": nodes, "edges": edges}
+
+
+def comparison(cases=12, starts=5, variants=4, looked_at=3):
+    chance = random.Random("comparison %d %d" % (cases, starts))
+    data = {
+        "marrow": "0.1.0",
+        "format": 1,
+        "kind": "comparison",
+        "experiment": experiment("comparison"),
+        "metrics": METRICS,
+        "initial_error": {"name": "start.mtre_mm", "unit": "mm"},
+        "variants": [
+            {"name": name, "is_baseline": i == 0, "options": options}
+            for i, (name, options, *_) in enumerate(VARIANTS[:variants])
+        ],
+        "cases": ["case-%02d" % (i + 1) for i in range(cases)],
+        "starts": [str(i) for i in range(starts)],
+        "pictures": {},
+        "geometries": {},
+        "scenes": {},
+    }
+    hardness = [math.exp(chance.gauss(0, 0.3)) for _ in range(cases)]
+    places = [(case, start, chance.uniform(0.5, 20)) for case in range(cases) for start in range(starts)]
+    data["cells"] = [
+        make_cell(chance, variant, case, start, far_mm, hardness[case])
+        for variant in range(variants)
+        for case, start, far_mm in places
+    ]
+    data["summary"] = [summary_of([cell for cell in data["cells"] if cell["variant"] == i]) for i in range(variants)]
+    data["comparisons"] = [
+        comparison_of(data["cells"], variant, metric)
+        for metric in range(len(METRICS))
+        for variant in range(1, variants)
+    ]
+    data["graph"] = graph(data["variants"])
+    add_material(data, chance, [(case, start) for case, start, _ in places[:looked_at]])
+    return data
+
+
+def run(with_cube=True):
+    """One run: a cube of 40 mm under two cameras of unlike focal lengths, its corners marked in the X-rays."""
+    data = comparison(cases=1, starts=1, variants=1, looked_at=1)
+    data.update(kind="run", experiment=experiment("run"), summary=[], comparisons=[])
+    cell, mesh = data["cells"][0], shapes.cube()
+    if not with_cube:
+        return data
+    views = [
+        shapes.camera("frontal", "frontal", 360, 240, (1500.0, 1420.0), (171.3, 128.6)),
+        shapes.camera("lateral", "lateral", 300, 300, (1500.0, 1500.0), (149.5, 149.5)),
+    ]
+    matrix = shapes.pose([25, -18, 40], [4, -7, 3])
+    for view in views:
+        pixels = bytearray(view["width_px"] * view["height_px"])
+        for vertex in mesh[0]:
+            u, v, _ = shapes.project(view, shapes.apply(matrix, vertex))
+            pixels[round(v) * view["width_px"] + round(u)] = 255
+        view["image"] = "cube " + view["name"]
+        data["pictures"][view["image"]] = shapes.png(view["width_px"], view["height_px"], pixels, 1)
+    data["scenes"][cell["scene"]] = {
+        "meshes": [shapes.mesh_entry("cube", mesh)],
+        "views": views,
+        "poses": [{"mesh": 0, "name": "result", "world_from_model": shapes.flat(matrix)}],
+    }
+    return data
+
+
+FIELDS = ["variant", "case", "start", "status", "success", "tries", "initial_error", "seconds", "evaluations"]
+FIELDS += ["cached_nodes", "reason", "absent", "verdict", "failure_probability"]
+MATERIAL = ["pictures", "convergence", "landscape", "scene", "verdicts", "poses"]
+
+
+def as_table(data):
+    """The same comparison with its cells as a table, as the program writes it. The cells' ids become
+    VARIANT/CASE/START."""
+    texts, cells = {None: None}, data.pop("cells")
+    place = lambda text: texts.setdefault(text, len(texts) - 1)
+    value = lambda cell, name: (
+        place(cell.get(name)) if name in ("status", "reason", "absent", "verdict") else cell.get(name)
+    )
+    data["cell_table"] = {
+        "fields": FIELDS,
+        "rows": [[value(cell, name) for name in FIELDS] + cell["values"] for cell in cells],
+        "texts": list(texts)[1:],
+    }
+    material = lambda cell: {key: cell[key] for key in MATERIAL if cell.get(key)}
+    data["materials"] = [
+        {"variant": cell["variant"], "case": cell["case"], "start": cell["start"], **material(cell)}
+        for cell in cells
+        if material(cell)
+    ]
+    return data
+
+
+def put_beside(data, folder, places):
+    """Moves what is known of these cases and starts into files of a folder; the page without them."""
+    folder.mkdir()
+    data["parts"] = []
+    for case, start in places:
+        materials = [one for one in data["materials"] if (one["case"], one["start"]) == (case, start)]
+        data["materials"] = [one for one in data["materials"] if one not in materials]
+        scenes = {one["scene"]: data["scenes"].pop(one["scene"]) for one in materials if "scene" in one}
+        names = [entry["picture"] for one in materials for entry in one["pictures"]]
+        names += {view["image"] for scene in scenes.values() for view in scene["views"]}
+        pictures = {name: data["pictures"].pop(name) for name in names}
+        text = json.dumps({"materials": materials, "pictures": pictures, "geometries": {}, "scenes": scenes})
+        name = hashlib.sha256(text.encode()).hexdigest()[:16] + ".js"
+        (folder / name).write_text('Parts.take("%s",\n%s\n);\n' % (name, text))
+        kinds = ["pictures", "scene", "convergence", "landscape"]
+        data["parts"].append({"case": case, "start": start, "file": name, "bytes": len(text), "kinds": kinds})
+    return data
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("kind", choices=["comparison", "run"])
+    parser.add_argument("data", type=pathlib.Path)
+    parser.add_argument("--cases", type=int, default=12)
+    parser.add_argument("--starts", type=int, default=5)
+    arguments = parser.parse_args()
+    data = comparison(arguments.cases, arguments.starts) if arguments.kind == "comparison" else run(with_cube=False)
+    arguments.data.write_text(json.dumps(data))
+
+
+if __name__ == "__main__":
+    main()

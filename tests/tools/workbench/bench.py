@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the tests of `marrow open` share: a server on a folder of its own, and a browser that shows it."""
+import atexit
+import http.client
+import json
+import os
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import unittest
+
+SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
+MARROW = BUILD / "bin" / "marrow"
+os.environ["MARROW_CACHE"] = tempfile.mkdtemp(prefix="marrow-cache-")  # not the store of who runs the tests
+atexit.register(shutil.rmtree, os.environ["MARROW_CACHE"], ignore_errors=True)
+sys.path.insert(0, str(SOURCE / "tests" / "tools" / "report"))
+sys.path.insert(0, str(SOURCE / "tests"))
+import browser as chromium  # noqa: E402
+from sample import sample  # noqa: E402
+
+SMALL = ["--set", "ct.spacing_mm=[1.2, 1.2, 1.5]", "--set", "ct.range_mm=[0, 300]"]  # 0.8 s instead of 5 s to make
+
+
+def simulate(folder, *arguments, pipeline=SOURCE / "pipelines" / "simulate.yaml"):
+    """The folder of what a simulation makes. The same one is made once for all tests."""
+    environment = {**os.environ, "MARROW_CACHE": str(BUILD / "tests" / "store")}
+    command = [MARROW, "run", pipeline, "--out", folder, "--quiet", *arguments]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment)
+    return folder / "outputs"
+
+
+class Server:
+    """`marrow open` on a folder. A client without a browser: it has the cookie, and asks as a page does."""
+
+    def __init__(self, folder, *arguments):
+        environment = {**os.environ, "MARROW_CACHE": str(pathlib.Path(folder).parent / "store")}
+        self.process = subprocess.Popen(
+            [MARROW, "open", folder, "--no-browser", *map(str, arguments)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=environment,
+        )
+        for line in self.process.stdout:
+            found = re.search(r"http://127\.0\.0\.1:(\d+)/\?token=(\w+)", line)
+            if found:
+                break
+        else:
+            raise AssertionError("it printed no address: " + self.process.stderr.read())
+        self.address, self.port, self.token = found.group(0), int(found.group(1)), found.group(2)
+        self.cookie = None
+
+    def ask(self, method, path, body=None, **headers):
+        """(status, headers, bytes) of the answer. Headers that are None are left out."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=600)
+        sent = {"Host": "127.0.0.1:%d" % self.port, "Cookie": self.cookie}
+        if method != "GET":
+            sent.update({"Content-Type": "application/json", "X-Marrow": "1"})
+        sent.update({name.replace("_", "-"): value for name, value in headers.items()})
+        connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
+        data = body if isinstance(body, (bytes, type(None))) else json.dumps(body).encode()
+        if method != "GET":
+            sent.setdefault("Content-Length", str(len(data or b"")))
+        for name, value in sent.items():
+            if value is not None:
+                connection.putheader(name, value)
+        connection.endheaders(data)
+        answer = connection.getresponse()
+        result = answer.status, answer.headers, answer.read()
+        connection.close()
+        return result
+
+    def enter(self):
+        """Hands in the token, as the browser does that opens the address."""
+        status, headers, _ = self.ask("GET", "/?token=" + self.token)
+        assert status == 302, status
+        self.cookie = headers["Set-Cookie"].split(";")[0]
+
+    def json(self, method, path, body=None):
+        status, _, content = self.ask(method, path, body)
+        answer = json.loads(content)
+        assert status == 200, answer
+        return answer
+
+    def finish(self, job):
+        """Waits for a job, and returns its state."""
+        while True:
+            state = self.json("GET", "/api/job?job=%s&since=0" % job)
+            if state["state"] != "running":
+                return state
+
+    def close(self):
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGTERM)
+        try:
+            self.process.wait(200)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            raise
+        finally:
+            self.process.stdout.close()
+            self.process.stderr.close()
+
+
+class BenchTest(unittest.TestCase):
+    """Each test has a folder of its own. setUp() may be extended to fill it before open() is called."""
+
+    def setUp(self):
+        self.scratch = pathlib.Path(tempfile.mkdtemp(prefix="marrow-open-"))
+        self.addCleanup(shutil.rmtree, self.scratch, ignore_errors=True)
+        self.folder = self.scratch / "folder"
+        self.folder.mkdir()
+
+    def open(self, *arguments, folder=None):
+        server = Server(folder or self.folder, *arguments)
+        self.addCleanup(server.close)
+        return server
+
+
+class PageTest(BenchTest):
+    """The same with a browser."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.browser = chromium.Browser()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.close()
+
+    def show(self, server, page="home", width_px=1440, height_px=900, theme="light"):
+        """Opens the server's address, and waits for the page."""
+        driver = self.browser.driver
+        driver.execute_cdp_cmd(
+            "Emulation.setDeviceMetricsOverride",
+            {"width": width_px, "height": height_px, "deviceScaleFactor": 1, "mobile": False},
+        )
+        driver.execute_cdp_cmd(
+            "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]}
+        )
+        driver.get(server.address + ("" if page == "home" else "#" + page))
+        self.wait_for_page(page.split("=")[0])
+
+    def wait_for_page(self, name, seconds=120):
+        self.browser.wait("return document.documentElement.dataset.ready === '%s'" % name, seconds)
+
+
+def named_tests(suite):
+    """The ids of the tests in a suite of unittest, as they are given on the command line: Class.test."""
+    for one in suite:
+        if isinstance(one, unittest.TestSuite):
+            yield from named_tests(one)
+        else:
+            yield ".".join(one.id().split(".")[-2:])
+
+
+def main(part=5):
+    """Runs the tests that the command line names; without names, one of `part` of them, another each day."""
+    missing = chromium.missing()
+    if missing:
+        print("skipped:", missing)
+        sys.exit(77)
+    names = sys.argv[3:]
+    if not names:
+        every = list(named_tests(unittest.defaultTestLoader.loadTestsFromModule(sys.modules["__main__"])))
+        names = sample(every, max(3, len(every) // part))
+    unittest.main(argv=sys.argv[:1] + names, verbosity=2)
