@@ -5,6 +5,7 @@
 
 #include <set>
 
+#include "marrow/runtime/plugins/manifest.hpp"
 #include "tests/framework/runtime/library_fixture.hpp"
 
 namespace library_test {
@@ -34,8 +35,7 @@ class LibraryTest : public library_fixture::LibraryTest {
     nlohmann::json document = nlohmann::json::parse(text_of(manifest));
     invent(document);
     document.erase("checksum");
-    document["checksum"] = marrow::hash_of(document.dump()).hex();
-    std::ofstream(manifest) << document.dump(1);
+    std::ofstream(manifest) << marrow::with_checksum(document);
     return file;
   }
   /// That an invented manifest is found out before anything of the library is called.

@@ -88,8 +88,7 @@ marrow::LibraryInfo library() {
 std::string sealed(json document) {
   if (!document.is_object()) return document.dump();
   document.erase("checksum");
-  const std::string text = document.dump();
-  return "{\"checksum\":\"" + marrow::hash_of(text).hex() + (document.empty() ? "\"" : "\",") + text.substr(1);
+  return marrow::with_checksum(document);
 }
 
 void expect_refused(const std::string& text, const std::string& reason) {
@@ -140,6 +139,15 @@ TEST(Manifest, IsShallowAndSmall) {
   const std::string text = marrow::manifest_text(library());
   for (std::size_t size = 0; size + 2 < text.size(); size += 7)
     expect_refused(text.substr(0, size), "it is damaged: its text");
+}
+TEST(Manifest, EveryByteIsCovered) {
+  const std::string text = marrow::manifest_text(library());
+  expect_refused(text + " ", "it was edited by hand");
+  expect_refused(" " + text, "it was edited by hand");
+  json document = json::parse(text);
+  expect_refused(document.dump(1), "it was edited by hand");
+  document.erase("checksum");
+  expect_refused(document.dump(), "it is damaged: it has no checksum");
 }
 TEST(Manifest, OptionTypesExist) {
   expect_refused([](json& j) { j["nodes"][0]["options"][0]["type"] = "quaternion"; },

@@ -10,6 +10,7 @@
 
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/plugins/contract.hpp"
+#include "marrow/runtime/plugins/library_index.hpp"
 #include "marrow/runtime/plugins/python_file.hpp"
 
 namespace marrow {
@@ -35,7 +36,7 @@ Catalogue::Catalogue(std::vector<fs::path> folders) : folders_(std::move(folders
 }
 
 void Catalogue::find_libraries() {
-  const Digest framework = file_digest(framework_file());
+  std::optional<Digest> framework;
   const auto refuse = [&](const fs::path& file, const std::string& reason) {
     libraries_.push_back({});
     libraries_.back().file = file;
@@ -49,13 +50,18 @@ void Catalogue::find_libraries() {
     if (error && error != std::errc::no_such_file_or_directory)
       refuse(folder, "cannot be searched for libraries: " + error.message());
     std::sort(files.begin(), files.end());
+    LibraryIndex index(folder);
+    const std::size_t first = libraries_.size();
     for (const fs::path& file : files) {
       try {
-        libraries_.push_back(library_info(file, framework));
+        std::optional<LibraryInfo> known = index.find(file);
+        if (!known && !framework) framework = file_digest(framework_file());
+        libraries_.push_back(known ? std::move(*known) : library_info(file, *framework));
       } catch (const Error& error) {
         refuse(file, error.what());
       }
     }
+    index.keep(std::span(libraries_).subspan(first));
   }
 }
 

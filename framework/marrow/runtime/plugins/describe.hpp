@@ -8,8 +8,7 @@ namespace MARROW_EXPORT marrow {
 
 class WorkerReports;
 
-/// The worker's side of describe_library(): {"do": "describe", "library": ...}. The answer is the library's manifest as
-/// a text.
+/// The worker's side of describe_library(): {"do": "describe", "library": ...}. The answer is the library_json().
 nlohmann::json answer_describe(const nlohmann::json& request, WorkerReports& reports);
 
 }  // namespace marrow

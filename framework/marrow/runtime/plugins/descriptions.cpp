@@ -5,16 +5,15 @@
 #include "marrow/base/framework_file.hpp"
 
 #include <sys/stat.h>
-#include <unistd.h>
-
-#include <cstdlib>
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/regular_file.hpp"
 #include "marrow/base/text_file.hpp"
+#include "marrow/runtime/plugins/library_index.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
 #include "marrow/runtime/plugins/manifest.hpp"
+#include "marrow/runtime/plugins/own_cache.hpp"
 #include "marrow/runtime/plugins/python_file.hpp"
 #include "marrow/runtime/plugins/searched_folders.hpp"
 #include "marrow/runtime/plugins/trust.hpp"
@@ -24,50 +23,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path manifest_beside(const fs::path& library) { return fs::path(library).replace_extension(".json"); }
-
-/// The folder that an environment variable names. Empty if the variable is not set, is empty or is a relative path,
-/// which would depend on where the program happens to run.
-fs::path folder_of(const char* variable) {
-  const char* text = std::getenv(variable);
-  return text && text[0] == '/' ? fs::path(text) : fs::path();
-}
-
-/// Empty if there is none: without a home folder nothing is kept.
-fs::path cache_folder() {
-  if (const fs::path cache = folder_of("XDG_CACHE_HOME"); !cache.empty()) return cache / "marrow" / "libraries";
-  if (const fs::path home = folder_of("HOME"); !home.empty()) return home / ".cache" / "marrow" / "libraries";
-  return {};
-}
-
-/// Whether a folder belongs to the user alone. A folder that an older version made readable for all is made private.
-bool is_own(const fs::path& folder) {
-  struct stat status {};
-  if (stat(folder.c_str(), &status) != 0 || !S_ISDIR(status.st_mode) || status.st_uid != geteuid()) return false;
-  if ((status.st_mode & 077) && chmod(folder.c_str(), 0700) != 0) return false;
-  return changeable_by_others(folder).empty();
-}
-
-/// Makes the folder for the user alone. Nobody else may be able to change the folders above it.
-bool make_own(const fs::path& folder) {
-  std::error_code error;
-  if (fs::exists(folder, error)) return is_own(folder);
-  const fs::path parent = folder.parent_path();
-  if (!fs::exists(parent, error) && !make_own(parent)) return false;
-  if (!changeable_by_others(parent).empty()) return false;
-  return (mkdir(folder.c_str(), 0700) == 0 || errno == EEXIST) && is_own(folder);
-}
-
-/// The file of a library's description in the cache. Its name depends on the framework too, because a newer framework
-/// may accept what an older one refused. Empty if nothing can be kept.
-fs::path cached_file(const Digest& library, const Digest& framework, bool make) {
-  const fs::path folder = cache_folder();
-  if (folder.empty() || !(make ? make_own(folder) : is_own(folder))) return {};
+/// The name of a library's description in the cache. It depends on the framework too, because a newer framework may
+/// accept what an older one refused.
+std::string name_in_cache(const Digest& library, const Digest& framework) {
   Hasher name;
   name.add(library);
   name.add(framework);
   name.add(search_digest());
-  return folder / (name.digest().hex() + ".json");
+  return name.digest().hex() + ".json";
 }
 
 /// Why a description does not belong to this very library and to the linked libraries that are here now; empty if it
@@ -137,28 +100,19 @@ bool is_manifest(const fs::path& file) {
 
 }  // namespace
 
-std::optional<LibraryInfo> kept_description(const Digest& name, const Digest& framework) {
-  const fs::path file = cached_file(name, framework, false);
-  if (file.empty()) return std::nullopt;
-  try {
-    const RegularFile source(file);
-    if (source.status().st_uid != geteuid()) return std::nullopt;
-    return manifest_from_text(read_text(source, kMostManifest_bytes));
-  } catch (const Error&) {
-    // This is only a cache: the library is described anew, and that description is kept instead.
-    return std::nullopt;
-  }
+fs::path manifest_beside(const fs::path& library) { return fs::path(library).replace_extension(".json"); }
+
+std::optional<LibraryInfo> kept_description(const Digest& name, const Digest& framework) try {
+  const std::optional<std::string> text = own_cached_text(name_in_cache(name, framework), kMostManifest_bytes);
+  return text ? std::optional(manifest_from_text(*text)) : std::nullopt;
+} catch (const Error&) {  // the library is described anew, and that description is kept instead
+  return std::nullopt;
 }
 
 void keep_description(const LibraryInfo& info, const Digest& name, const Digest& framework) {
   // The reason may be outside of the library, such as another library that it needs, and may be gone next time.
   if (info.refused.starts_with("cannot be")) return;
-  try {
-    if (const fs::path file = cached_file(name, framework, true); !file.empty())
-      write_text(file, manifest_text(info), 0600);
-  } catch (const Error&) {
-    // This is only a cache: the library is described again next time.
-  }
+  keep_in_own_cache(name_in_cache(name, framework), manifest_text(info));
 }
 
 LibraryInfo library_info(const fs::path& file, const Digest& framework) {
@@ -181,9 +135,8 @@ LibraryInfo library_info(const fs::path& file, const Digest& framework) {
 }
 
 void forget_description(const LibraryInfo& library) {
-  const fs::path file = cached_file(library.digest, file_digest(framework_file()), false);
-  std::error_code error;
-  if (!file.empty()) fs::remove(file, error);
+  forget_in_own_cache(name_in_cache(library.digest, file_digest(framework_file())));
+  LibraryIndex::forget(library.file.parent_path());
 }
 
 std::string cure_of_description(const fs::path& library) {
@@ -202,7 +155,7 @@ void write_manifest(const LibraryInfo& info) {
   if (fs::exists(fs::symlink_status(manifest, error)) && !is_manifest(manifest))
     throw Error(manifest.string() + " is there already and is no manifest that marrow wrote; move it away, or rename " +
                 info.file.string());
-  write_text(manifest, manifest_text(info), 0644);
+  write_text_file(manifest, manifest_text(info), Kinds::files, 0644);
 }
 
 }  // namespace marrow

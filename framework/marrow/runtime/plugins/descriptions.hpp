@@ -15,6 +15,9 @@ std::optional<LibraryInfo> kept_description(const Digest& name, const Digest& fr
 /// Keeps a description in the user's cache, unless it is a refusal whose reason may be gone next time.
 void keep_description(const LibraryInfo& info, const Digest& name, const Digest& framework);
 
+/// Where the manifest of a library is, if it has one.
+std::filesystem::path manifest_beside(const std::filesystem::path& library);
+
 /// What a person can do about a wrong description.
 std::string cure_of_description(const std::filesystem::path& library);
 

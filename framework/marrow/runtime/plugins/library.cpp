@@ -14,6 +14,7 @@
 
 #include "marrow/base/elf_file.hpp"
 #include "marrow/base/framework_file.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/process_state.hpp"
 #include "marrow/base/regular_file.hpp"
 #include "marrow/base/thread_state.hpp"
@@ -45,26 +46,26 @@ std::string stamp_mismatch(const AbiStamp& theirs) {
   if (std::strncmp(theirs.compiler, ours.compiler, sizeof ours.compiler) != 0)
     return differs("compiler", theirs.compiler, ours.compiler, rebuild);
   if (theirs.eigen_max_align != ours.eigen_max_align)
-    return differs("EIGEN_MAX_ALIGN_BYTES", std::to_string(theirs.eigen_max_align),
-                   std::to_string(ours.eigen_max_align),
+    return differs("EIGEN_MAX_ALIGN_BYTES", formatted("{}", theirs.eigen_max_align),
+                   formatted("{}", ours.eigen_max_align),
                    "leave out -march=native, -mavx and the like, which change how Eigen aligns memory");
   if (theirs.glibcxx_debug != ours.glibcxx_debug)
     return differs("_GLIBCXX_DEBUG (debug mode)", theirs.glibcxx_debug ? "on" : "off",
                    ours.glibcxx_debug ? "on" : "off", "debug mode changes the layout of every container");
   if (theirs.sanitizers != ours.sanitizers)
-    return differs("sanitizers", std::to_string(theirs.sanitizers), std::to_string(ours.sanitizers), rebuild);
+    return differs("sanitizers", formatted("{}", theirs.sanitizers), formatted("{}", ours.sanitizers), rebuild);
   if (theirs.fast_math != ours.fast_math)
     return differs("-ffast-math", theirs.fast_math ? "on" : "off", ours.fast_math ? "on" : "off",
                    "leave out -ffast-math and -Ofast: they change the results of other nodes, and NaN is not seen");
   if (theirs.cxx_standard / 100 != ours.cxx_standard / 100)
-    return differs("C++ standard", std::to_string(theirs.cxx_standard), std::to_string(ours.cxx_standard),
+    return differs("C++ standard", formatted("{}", theirs.cxx_standard), formatted("{}", ours.cxx_standard),
                    "use -std=c++20");
   if (theirs.cxx11_abi != ours.cxx11_abi)
-    return differs("_GLIBCXX_USE_CXX11_ABI", std::to_string(theirs.cxx11_abi), std::to_string(ours.cxx11_abi), rebuild);
+    return differs("_GLIBCXX_USE_CXX11_ABI", formatted("{}", theirs.cxx11_abi), formatted("{}", ours.cxx11_abi),
+                   rebuild);
   if (theirs.eigen_version != ours.eigen_version || theirs.opencv_version != ours.opencv_version)
-    return differs(
-        "Eigen and OpenCV", std::to_string(theirs.eigen_version) + " and " + std::to_string(theirs.opencv_version),
-        std::to_string(ours.eigen_version) + " and " + std::to_string(ours.opencv_version), "use the same versions");
+    return differs("Eigen and OpenCV", formatted("{} and {}", theirs.eigen_version, theirs.opencv_version),
+                   formatted("{} and {}", ours.eigen_version, ours.opencv_version), "use the same versions");
   if (theirs.headers != ours.headers) return "was built against other headers; rebuild it with this marrow's headers";
   return "";
 }
@@ -77,13 +78,13 @@ const PluginEntry& checked_entry(void* handle) {
   if (!entry || std::memcmp(entry->magic, "marrow!", 8) != 0)
     throw Error("is no marrow plugin: its entry has another magic");
   if (entry->api_major != MARROW_API_MAJOR || entry->api_minor > MARROW_API_MINOR)
-    throw Error("was built for plugin interface " + std::to_string(entry->api_major) + "." +
-                std::to_string(entry->api_minor) +
-                ", this marrow has " MARROW_TEXT(MARROW_API_MAJOR) "." MARROW_TEXT(
-                    MARROW_API_MINOR) "; rebuild it with this marrow's headers");
+    throw Error(
+        formatted("was built for plugin interface {}.{}, this marrow has {}.{}; rebuild it with this marrow's headers",
+                  entry->api_major, entry->api_minor, MARROW_API_MAJOR, MARROW_API_MINOR));
   if (entry->size != sizeof(PluginEntry))
-    throw Error("was built against other headers (its entry has " + std::to_string(entry->size) + " bytes, expected " +
-                std::to_string(sizeof(PluginEntry)) + "); rebuild it with this marrow's headers");
+    throw Error(formatted(
+        "was built against other headers (its entry has {} bytes, expected {}); rebuild it with this marrow's headers",
+        entry->size, sizeof(PluginEntry)));
   const std::string mismatch = stamp_mismatch(entry->stamp);
   if (!mismatch.empty()) throw Error(mismatch);
   return *entry;
@@ -162,10 +163,10 @@ LibraryInfo describe_here(const fs::path& file) {
 }
 
 /// What a library says about itself is checked as strictly as a manifest.
-LibraryInfo described(const std::string& text) {
+LibraryInfo described(const nlohmann::json& answer) {
   LibraryInfo info;
   try {
-    info = manifest_from_text(text);
+    info = library_from_json(answer);
   } catch (const Error& error) {
     info.refused = std::string("describes itself in a way that cannot be used: ") + error.what();
   }
@@ -180,9 +181,9 @@ LibraryInfo describe_apart(const fs::path& file) {
   const WorkerEnd end = worker.wait({kDescribeLimit_s, kDescribeLimit_mb}, nullptr, nullptr);
   LibraryInfo info;
   if (end.is_late)
-    info.refused = "did not say what it holds within " + std::to_string(kDescribeLimit_s) + " s of being loaded";
+    info.refused = formatted("did not say what it holds within {} s of being loaded", kDescribeLimit_s);
   else if (end.is_out_of_memory)
-    info.refused = "takes more than " + std::to_string(kDescribeLimit_mb) + " MB of memory to be loaded";
+    info.refused = formatted("takes more than {} MB of memory to be loaded", kDescribeLimit_mb);
   else if (end.signal == SIGKILL)
     info.refused = "cannot be described: " + killed_from_outside("the process that loaded it");
   else if (end.signal)
@@ -191,10 +192,8 @@ LibraryInfo describe_apart(const fs::path& file) {
     info.refused = "ended the process that loaded it";
   else if (!end.failed.empty())
     info.refused = "cannot be described: " + end.failed;
-  else if (!end.answer.is_string())
-    info.refused = "describes itself in a way that cannot be used";
   else
-    return described(end.answer.get<std::string>());
+    return described(end.answer);
   return info;
 }
 
@@ -223,10 +222,10 @@ void expect_described(const LibraryInfo& described, const LibraryInfo& registere
   const Versions before = versions_of(described.linked), now = versions_of(registered.linked);
   for (const auto& library : now)
     if (const auto& [name, size, content] = library; found.empty() && !before.count(library))
-      found = "it loads another " + name + " (" + std::to_string(size) + " bytes)";
+      found = formatted("it loads another {} ({} bytes)", name, size);
   for (const auto& library : before)
     if (const auto& [name, size, content] = library; found.empty() && !now.count(library))
-      found = "it does not load " + name + " of " + std::to_string(size) + " bytes";
+      found = formatted("it does not load {} of {} bytes", name, size);
   if (found.empty()) return;
   forget_description(described);
   throw Error("is not what its description says: " + found + "; " + cure_of_description(described.file));
@@ -254,7 +253,7 @@ std::unique_ptr<Plugin> load_library(const LibraryInfo& described) {
 }
 
 nlohmann::json answer_describe(const nlohmann::json& request, WorkerReports&) {
-  return manifest_text(describe_here(bytes_of_json(request.at("library"))));
+  return library_json(describe_here(bytes_of_json(request.at("library"))));
 }
 
 LibraryInfo describe_library(const fs::path& file) {

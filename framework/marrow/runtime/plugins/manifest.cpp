@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/plugins/manifest.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/runtime/node/declaration.hpp"
 
 #include <algorithm>
@@ -17,7 +18,9 @@ namespace marrow {
 namespace {
 
 using nlohmann::json;
-constexpr int kManifestVersion = 5;  // 5: with the names of figures
+constexpr int kManifestVersion = 6;  // 6: the checksum is of the text that follows it
+constexpr std::string_view kChecksum = "{\"checksum\": \"";
+constexpr std::size_t kDigits = 32;  // of a checksum
 constexpr const char* kOptionTypes[] = {"boolean", "integer", "number", "text", "path", "numbers", "texts", "paths"};
 constexpr const char* kApart[] = {"no", "parses", "computes"};
 constexpr std::int64_t kMostBytes_of_value = 1 << 30;
@@ -75,8 +78,7 @@ class JsonObject {
  public:
   JsonObject(const json& object, std::string name, std::size_t count) : object_(object), name_(std::move(name)) {
     if (!object.is_object()) damaged(name_ + " is not an object");
-    if (object.size() != count)
-      damaged(name_ + " has " + std::to_string(object.size()) + " fields, expected " + std::to_string(count));
+    if (object.size() != count) damaged(formatted("{} has {} fields, expected {}", name_, object.size(), count));
   }
   const json& at(const char* key) const {
     const auto found = object_.find(key);
@@ -179,7 +181,7 @@ OptionInfo option_from(const json& j) {
   option.replaces = fields.texts("replaces");
   const auto* numbers = std::get_if<std::vector<double>>(&option.default_value);
   if (option.length && (!numbers || numbers->size() != option.length))
-    damaged("the default of '" + option.name + "' does not have " + std::to_string(option.length) + " numbers");
+    damaged(formatted("the default of '{}' does not have {} numbers", option.name, option.length));
   if (j.contains("minimum")) option.minimum = fields.number("minimum");
   if (j.contains("maximum")) option.maximum = fields.number("maximum");
   return option;
@@ -272,7 +274,7 @@ SearchedFolder searched_from(const json& j) {
 }
 
 json parsed(const std::string& text) {
-  if (text.size() > kMostManifest_bytes) damaged("it has " + std::to_string(text.size()) + " bytes");
+  if (text.size() > kMostManifest_bytes) damaged(formatted("it has {} bytes", text.size()));
   try {
     return parse_json(text, "its text");
   } catch (const Error& error) {
@@ -280,37 +282,16 @@ json parsed(const std::string& text) {
   }
 }
 
-/// Checks the version and the checksum. Removes the checksum from the document, because it does not cover itself.
-void check(json& j) {
+/// Checks the version, and the checksum of a text.
+void check(const std::string& text, const json& j) {
   if (!j.is_object()) damaged("it is not an object");
   if (!j.contains("marrow_manifest") || j["marrow_manifest"] != kManifestVersion)
     throw Error("it was written by another version of marrow");
-  if (!j.contains("checksum") || !j["checksum"].is_string()) damaged("it has no checksum");
-  const std::string checksum = j["checksum"].get<std::string>();
-  j.erase("checksum");
-  if (hash_of(j.dump()).hex() != checksum) throw Error("it was edited by hand");
-}
-
-/// The first difference between two documents. `path` names the place.
-std::string difference(const json& described, const json& registered, const std::string& path) {
-  if (described == registered) return "";
-  const bool lists = described.is_array() && registered.is_array() && described.size() == registered.size();
-  for (std::size_t i = 0; lists && i < described.size(); ++i) {
-    const bool named = described[i].is_object() && described[i].contains("name");
-    const std::string name = named ? described[i]["name"].get<std::string>() : std::to_string(i + 1);
-    if (std::string found = difference(described[i], registered[i], path + "/" + name); !found.empty()) return found;
-  }
-  if (described.is_object() && registered.is_object())
-    for (const json* side : {&described, &registered})
-      for (const auto& [key, value] : side->items()) {
-        const json before = described.value(key, json()), now = registered.value(key, json());
-        if (std::string found = difference(before, now, path + "/" + key); !found.empty()) return found;
-      }
-  const auto shown = [](const json& j) -> std::string {
-    if (j.is_array()) return std::to_string(j.size()) + " of them";
-    return j.is_null() ? "none" : j.is_object() ? "it" : j.dump();
-  };
-  return path.substr(1) + ": the library has " + shown(registered) + ", its description has " + shown(described);
+  if (!j.contains("checksum")) damaged("it has no checksum");
+  const std::string_view checked = std::string_view(text).substr(std::min(text.size(), kChecksum.size() + kDigits));
+  if (!text.starts_with(kChecksum) ||
+      hash_of_bytes(checked.data(), checked.size()).hex() != text.substr(kChecksum.size(), kDigits))
+    throw Error("it was edited by hand");
 }
 
 }  // namespace
@@ -327,7 +308,7 @@ json json_of(const NodeInfo& node) {
   return j;
 }
 
-std::string manifest_text(const LibraryInfo& info) {
+json library_json(const LibraryInfo& info) {
   json j = {{"marrow_manifest", kManifestVersion}, {"library", info.digest.hex()}, {"refused", info.refused}};
   j["linked"] = j["searched"] = j["kinds"] = j["nodes"] = j["writers"] = json::array();
   for (const LinkedLibrary& library : info.linked)
@@ -337,21 +318,32 @@ std::string manifest_text(const LibraryInfo& info) {
   for (const KindInfo& kind : info.kinds) j["kinds"].push_back(json_of(kind));
   for (const NodeInfo& node : info.nodes) j["nodes"].push_back(json_of(node));
   for (const WriterInfo& writer : info.writers) j["writers"].push_back(json_of(writer));
-  j["checksum"] = hash_of(j.dump()).hex();
-  return j.dump(1) + "\n";
+  return j;
 }
+
+std::string with_checksum(const json& document) {
+  const std::string text = "\"" + std::string(document.empty() ? "" : ",") + document.dump(1).substr(1) + "\n";
+  return std::string(kChecksum) + hash_of_bytes(text.data(), text.size()).hex() + text;
+}
+
+std::string manifest_text(const LibraryInfo& info) { return with_checksum(library_json(info)); }
 
 LibraryInfo manifest_from_text(const std::string& text) {
   JsonDocument document(parsed(text));
-  check(document.value());
-  const JsonObject fields(document.value(), "it", 8);
+  check(text, document.value());
+  document.value().erase("checksum");
+  return library_from_json(document.value());
+}
+
+LibraryInfo library_from_json(const json& j) {
+  const JsonObject fields(j, "it", 8);
   LibraryInfo info;
   const std::optional<Digest> digest = digest_of_hex(fields.text("library"));
   if (!digest) damaged("the library's digest is not 32 hexadecimal digits");
   info.digest = *digest;
   info.refused = fields.text("refused");
   if (fields.list("linked").size() > kMostLinked)
-    damaged("it names more than " + std::to_string(kMostLinked) + " linked libraries");
+    damaged(formatted("it names more than {} linked libraries", kMostLinked));
   for (const json& library : fields.list("linked")) info.linked.push_back(linked_from(library));
   for (const json& folder : fields.list("searched")) info.searched.push_back(searched_from(folder));
   std::set<std::string> kinds, names;
@@ -370,32 +362,9 @@ LibraryInfo manifest_from_text(const std::string& text) {
 }
 
 LibraryInfo info_of_nodes(const json& nodes) {
-  json j = json::parse(manifest_text({}));
-  j.erase("checksum");
+  json j = library_json({});
   j["nodes"] = nodes;
-  j["checksum"] = hash_of(j.dump()).hex();
-  return manifest_from_text(j.dump());
-}
-
-std::string difference(const LibraryInfo& described, const LibraryInfo& registered) {
-  const auto document = [](const LibraryInfo& info) {
-    json j = {{"kinds", json::object()}, {"nodes", json::object()}, {"writers", json::object()}};
-    for (const KindInfo& kind : info.kinds) j["kinds"][kind.name] = json_of(kind);
-    for (const NodeInfo& node : info.nodes) j["nodes"][node.name] = json_of(node);
-    for (const WriterInfo& writer : info.writers) j["writers"][writer.type.id] = json_of(writer);
-    return j;
-  };
-  std::string found = difference(document(described), document(registered), "");
-  const auto names = [](const LibraryInfo& info) {
-    std::vector<std::string> result;
-    for (const KindInfo& kind : info.kinds) result.push_back(kind.name);
-    for (const NodeInfo& node : info.nodes) result.push_back(node.name);
-    for (const WriterInfo& writer : info.writers) result.push_back(writer.type.id);
-    return result;
-  };
-  if (found.empty() && names(described) != names(registered))
-    found = "the order or number of its kinds, nodes and writers is another in its description";
-  return found;
+  return library_from_json(j);
 }
 
 }  // namespace marrow

@@ -9,12 +9,20 @@
 namespace MARROW_EXPORT_TO_TESTS marrow {
 
 nlohmann::json json_of(const NodeInfo& node);
-/// The text of a manifest: the whole description, with a checksum by which an edited manifest is noticed.
-std::string manifest_text(const LibraryInfo& info);
+
+/// The whole description, for a manifest and for other processes.
+nlohmann::json library_json(const LibraryInfo& info);
+/// Every type, range and default is checked, so that a library could have registered what is returned. Throws Error,
+/// with a text that begins with "it", for any other document.
+LibraryInfo library_from_json(const nlohmann::json& document);
+
 constexpr std::size_t kMostManifest_bytes = 4 << 20;
-/// Reads the text of a manifest. Every type, range and default is checked, so that a library could have registered what
-/// is returned. Throws Error, with a text that begins with "it", for any other text.
+/// The text of a manifest.
+std::string manifest_text(const LibraryInfo& info);
+/// Reads the text of a manifest. Throws as library_from_json() does.
 LibraryInfo manifest_from_text(const std::string& text);
+/// The text of an object, with a checksum of the text that follows the checksum. By it an edited manifest is noticed.
+std::string with_checksum(const nlohmann::json& document);
 
 /// What a process that is no library says about its nodes, a list of json_of(). It is checked as strictly as a
 /// manifest.

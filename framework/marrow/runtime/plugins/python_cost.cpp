@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Costs written in Python: a process makes the cost once, and gets the poses in batches.
+#include "marrow/base/number_text.hpp"
 #include "marrow/runtime/plugins/python_functions.hpp"
 
 namespace marrow {
@@ -20,8 +21,7 @@ class PythonCost : public Cost {
     const json answer = function_.ask({{"do", "cost"}, {"poses", poses}});
     auto values = answer.at("values").get<std::vector<double>>();
     if (values.size() != world_from_model.size())
-      throw Error(function_.name() + " gave " + std::to_string(values.size()) + " costs for " +
-                  std::to_string(world_from_model.size()) + " poses");
+      throw Error(formatted("{} gave {} costs for {} poses", function_.name(), values.size(), world_from_model.size()));
     return values;
   }
   /// It has one resolution only.

@@ -12,6 +12,7 @@
 #include <mutex>
 #include <set>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/regular_file.hpp"
 #include "marrow/runtime/plugins/descriptions.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
@@ -49,10 +50,8 @@ bool is_newer(const std::string& file, const timespec& time) {
 }
 
 std::string why_refused(const WorkerEnd& end) {
-  if (end.is_late)
-    return "did not say what it holds within " + std::to_string(kPythonDescribeLimit_s) + " s of being imported";
-  if (end.is_out_of_memory)
-    return "takes more than " + std::to_string(kPythonDescribeLimit_mb) + " MB of memory to be imported";
+  if (end.is_late) return formatted("did not say what it holds within {} s of being imported", kPythonDescribeLimit_s);
+  if (end.is_out_of_memory) return formatted("takes more than {} MB of memory to be imported", kPythonDescribeLimit_mb);
   if (end.signal == SIGKILL) return "cannot be described: " + killed_from_outside("the process that imported it");
   if (end.signal) return std::string("crashed while it was imported (") + strsignal(end.signal) + ")";
   if (end.died) return "ended the process that imported it";

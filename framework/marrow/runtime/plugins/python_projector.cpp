@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/plugins/python_functions.hpp"
 
@@ -92,8 +93,7 @@ class PythonProjector : public RadiographProjector {
       throw Error(function_.name() + " gave no radiograph");
     const cv::Mat& made = outputs[0].as<Image>().pixels;
     if (made.type() != CV_32F || made.total() != pixels.size() || !made.isContinuous())
-      throw Error(function_.name() + " gave " + std::to_string(made.total()) + " values for " +
-                  std::to_string(pixels.size()) + " pixels");
+      throw Error(formatted("{} gave {} values for {} pixels", function_.name(), made.total(), pixels.size()));
     for (std::size_t i = 0; i < pixels.size(); ++i)
       if (is_seen(pixels[i])) values[i] = made.ptr<float>()[i];
     return values;

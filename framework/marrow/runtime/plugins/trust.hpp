@@ -2,7 +2,10 @@
 #pragma once
 #include <sys/types.h>
 
+#include <array>
+#include <cstdint>
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -26,5 +29,19 @@ std::filesystem::path trusted_path(const std::filesystem::path& library);
 /// Files of the system are those that marrow itself needs. The user `also` is trusted, too: who owns the interpreter of
 /// Python nodes could change that as well.
 std::string untrusted_among(const std::vector<std::filesystem::path>& files, uid_t also = 0);
+
+/// Whether MARROW_TRUST_ALL_PLUGINS is 1.
+bool all_are_trusted();
+
+/// What the trust in some files rests on, besides their own owners and modes.
+struct TrustedFiles {
+  std::set<std::string> folders;                  ///< the folders of both ends of each path, without links
+  std::set<std::array<std::uint32_t, 2>> groups;  ///< groups that may write, each with its owner
+
+  /// Returns whether nobody else could change the file.
+  bool add(const std::filesystem::path& file);
+};
+/// Whether nobody else could change the folders, and each group is still the private group of its owner.
+bool is_still_trusted(const TrustedFiles& files);
 
 }  // namespace marrow

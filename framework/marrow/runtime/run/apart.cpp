@@ -49,7 +49,7 @@ json request_of(const Catalogue& catalogue, const PipelineNode& node, bool has_i
   const LibraryInfo& library = *catalogue.library_of(node.info.name);
   json request = {{"do", "call"},
                   {"library", json_of_bytes(library.file.string())},
-                  {"manifest", manifest_text(library)},
+                  {"manifest", library_json(library)},
                   {"node", node.info.name},
                   {"options", json::array()},
                   {"has_inputs", has_inputs},
@@ -66,7 +66,7 @@ json request_of(const Catalogue& catalogue, const PipelineNode& node, bool has_i
 std::string file_of(const PipelineNode& node, const Worker& worker) {
   if (!worker.at().empty()) return worker.at();
   const std::vector<std::string> paths = paths_of(node);
-  return paths.at(0) + (paths.size() > 1 ? " or another of its " + std::to_string(paths.size()) + " files" : "");
+  return paths.at(0) + (paths.size() > 1 ? formatted(" or another of its {} files", paths.size()) : "");
 }
 
 /// Finds the Content of marrow's own types, and of the other types of a node's outputs.
@@ -189,8 +189,8 @@ std::vector<Value> handed_over(Worker& worker, const SharedMemory& made, const C
 
 void expect_outputs(const std::vector<Value>& values, const std::vector<PortInfo>& outputs) {
   if (values.size() != outputs.size())
-    throw Error("the process that was started for it handed over " + std::to_string(values.size()) +
-                " values, expected " + std::to_string(outputs.size()));
+    throw Error(formatted("the process that was started for it handed over {} values, expected {}", values.size(),
+                          outputs.size()));
   for (std::size_t i = 0; i < values.size(); ++i)
     if (!(values[i].type == outputs[i].type) || (!values[i].is_absent() && values[i].axis != outputs[i].axis))
       throw Error("the process that was started for it handed over a '" + values[i].type.id + "', expected a '" +
@@ -199,13 +199,15 @@ void expect_outputs(const std::vector<Value>& values, const std::vector<PortInfo
 
 std::string failure_of(const std::string& file, const WorkerEnd& end, const CallLimits& limits) {
   if (end.is_out_of_memory)
-    return file + ": to read it takes more than " + std::to_string(std::lround(limits.memory_mb)) +
-           " MB of memory, which is more than a file of its size should; where the file is good, raise the limit with "
-           "--file-memory";
+    return formatted(
+        "{}: to read it takes more than {} MB of memory, which is more than a file of its size should; where the file "
+        "is good, raise the limit with --file-memory",
+        file, std::lround(limits.memory_mb));
   if (end.signal == SIGXCPU)
-    return file + ": to read it takes more than " + short_number(limits.processor_s) +
-           " s, which is more than a file of its size should; where the file is good, raise the limit with "
-           "--file-seconds";
+    return formatted(
+        "{}: to read it takes more than {:.3g} s, which is more than a file of its size should; where the file is "
+        "good, raise the limit with --file-seconds",
+        file, limits.processor_s);
   if (end.signal == SIGKILL)
     return file + ": it was not read to its end: " + killed_from_outside("the process that read it") +
            "; nothing is known against the file";
@@ -213,10 +215,10 @@ std::string failure_of(const std::string& file, const WorkerEnd& end, const Call
     return file + ": to read it crashed the process that was started for it (" + strsignal(end.signal) +
            "); the file is damaged, or of a kind that its reader cannot take: copy or export it again";
   if (end.is_late)
-    return file + ": to read it takes more than " + short_number(limits.seconds) +
-           " s by the clock, which is more than a file of its size should; where the machine has much other work, try "
-           "again, or "
-           "raise the limit with --file-seconds";
+    return formatted(
+        "{}: to read it takes more than {:.3g} s by the clock, which is more than a file of its size should; where the "
+        "machine has much other work, try again, or raise the limit with --file-seconds",
+        file, limits.seconds);
   if (end.died)
     return file + ": could not be read: the process that was started for it " + without_place(end.failed, file);
   return end.failed;

@@ -107,7 +107,7 @@ void now_reading(const std::filesystem::path& file) {
 }
 
 json answer_call(const json& request, WorkerReports& reports) {
-  LibraryInfo library = manifest_from_text(request.at("manifest"));
+  LibraryInfo library = library_from_json(request.at("manifest"));
   library.file = bytes_of_json(request.at("library"));
   const std::unique_ptr<Plugin> plugin = load_library(library);
   const NodeDefinition& node = find_node(*plugin, request.at("node"));

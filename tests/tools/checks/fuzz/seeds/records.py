@@ -173,7 +173,7 @@ def store_seeds():
 
 def manifest_seeds():
     kind = {"id": "metrics", "version": 1, "size": 24, "function": False}
-    port = {"name": "a", "help": "first", "type": kind, "optional": False, "axis": ""}
+    port = {"name": "a", "help": "first", "type": kind, "optional": False, "axis": "", "figures": []}
     defaults = {
         "boolean": True,
         "integer": 3,
@@ -194,6 +194,7 @@ def manifest_seeds():
             "default": value,
             "choices": ["one", "two"] if name == "text" else [],
             "length": 0,
+            "replaces": [],
         }
         for name, value in defaults.items()
     ]
@@ -205,16 +206,18 @@ def manifest_seeds():
         "inputs": [port],
         "outputs": [dict(port, axis="side")],
         "options": options,
+        "relations": [{"type": "distinct", "names": ["text", "path"]}],
+        "traits": ["fast"],
     }
     manifest = {
-        "marrow_manifest": 4,
+        "marrow_manifest": 6,
         "library": "0123456789abcdef0123456789abcdef",
         "refused": "",
         "linked": [{"path": "/usr/lib/a.so", "size": 5}],
         "searched": [{"path": "/usr/lib", "names": ["a"]}],
         "kinds": [],
         "nodes": [node],
-        "writers": [{"type": kind, "extension": "json", "help": "h"}],
+        "writers": [{"type": kind, "extension": ".json", "help": "h"}],
         "checksum": "0" * 32,
     }
     files = {
