@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstdio>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/process_identity.hpp"
 
 namespace marrow {
@@ -19,7 +20,7 @@ constexpr const char* kMark = ".tmp-";
 
 std::string mark_of_temporary() {
   static std::atomic<std::uint64_t> number{0};
-  return kMark + this_process() + "-" + std::to_string(number++);
+  return formatted("{}{}-{}", kMark, this_process(), number++);
 }
 
 }  // namespace

@@ -2,8 +2,9 @@
 #include "marrow/base/characters.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <iterator>
+
+#include "marrow/base/number_text.hpp"
 
 namespace marrow {
 namespace {
@@ -65,14 +66,13 @@ bool is_unseen(char32_t code) {
 std::string odd_character_in(std::string_view name) {
   while (!name.empty()) {
     const Character character = first_character(name);
-    char code[16];
-    std::snprintf(code, sizeof code, "U+%04X", unsigned(character.code));
+    const std::string code = formatted("U+{:04X}", std::uint32_t(character.code));
     if (!character.is_valid) return "bytes that are no UTF-8";
     if (is_control(character.code)) return "a control character";
-    if (is_unseen(character.code)) return code + std::string(", which cannot be seen");
-    if (is_blank_but_no_space(character.code)) return code + std::string(", a blank that is no space");
+    if (is_unseen(character.code)) return code + ", which cannot be seen";
+    if (is_blank_but_no_space(character.code)) return code + ", a blank that is no space";
     if (is_mark_of_a_letter(character.code))
-      return code + std::string(", a mark of the letter before it; type the letter with its mark as one character");
+      return code + ", a mark of the letter before it; type the letter with its mark as one character";
     name.remove_prefix(character.size);
   }
   return "";

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <tuple>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 
 namespace marrow {
@@ -85,21 +86,20 @@ std::vector<Diagnostic> Diagnostics::sorted() const {
 }
 
 std::string Diagnostics::text() const {
-  std::ostringstream out;
+  std::string all;
   const std::vector<Diagnostic> items = sorted();
   for (std::size_t i = 0; i < items.size() && i < kMostShown; ++i) {
     const Diagnostic& item = items[i];
-    out << cut(printable(item.place.file), kMostInMessage);
-    if (item.place.line) out << ':' << item.place.line << ':' << item.place.column;
-    out << ": error: " << printable_lines(item.message) << '\n';
+    all += cut(printable(item.place.file), kMostInMessage);
+    if (item.place.line) all += formatted(":{}:{}", item.place.line, item.place.column);
+    all += ": error: " + printable_lines(item.message) + "\n";
     const auto source = sources_.find(item.place.file);
     if (item.place.line && source != sources_.end())
-      out << quoted_line(line_of(source->second, item.place.line), item.place.column);
-    if (!item.hint.empty()) out << "  hint: " << printable_lines(item.hint) << '\n';
+      all += quoted_line(line_of(source->second, item.place.line), item.place.column);
+    if (!item.hint.empty()) all += "  hint: " + printable_lines(item.hint) + "\n";
   }
-  if (size() > kMostShown)
-    out << "and " << size() - kMostShown << (size() == kMostShown + 1 ? " more fault\n" : " more faults\n");
-  return out.str();
+  if (size() > kMostShown) all += formatted("and {}\n", counted(size() - kMostShown, "more fault"));
+  return all;
 }
 
 }  // namespace marrow

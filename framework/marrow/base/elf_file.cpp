@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow {
 namespace {
@@ -35,7 +36,7 @@ std::string machine_name(int machine) {
     case EM_PPC64:
       return "64 bit PowerPC";
     default:
-      return "ELF machine " + std::to_string(machine);
+      return formatted("ELF machine {}", machine);
   }
 }
 
@@ -43,8 +44,9 @@ std::string machine_name(int machine) {
 /// overflow.
 void expect_inside(const RegularFile& file, std::uint64_t offset, std::uint64_t bytes) {
   if (offset <= file.size() && bytes <= file.size() - offset) return;
-  throw Error("is truncated: its ELF header speaks of " + std::to_string(bytes) + " bytes from byte " +
-              std::to_string(offset) + " on, the file has " + std::to_string(file.size()) + "; build or copy it again");
+  throw Error(formatted(
+      "is truncated: its ELF header speaks of {} bytes from byte {} on, the file has {}; build or copy it again", bytes,
+      offset, file.size()));
 }
 
 void check_header(const RegularFile& file, const Elf64_Ehdr& header) {
@@ -55,8 +57,7 @@ void check_header(const RegularFile& file, const Elf64_Ehdr& header) {
   if (kMachine != EM_NONE && header.e_machine != kMachine)
     throw Error("was built for " + machine_name(header.e_machine) + ", this machine is " + machine_name(kMachine) +
                 rebuild);
-  if (header.e_type != ET_DYN)
-    throw Error("is not a shared library (its ELF type is " + std::to_string(header.e_type) + ")");
+  if (header.e_type != ET_DYN) throw Error(formatted("is not a shared library (its ELF type is {})", header.e_type));
   if (header.e_phnum == 0 || header.e_phentsize != sizeof(Elf64_Phdr))
     throw Error("is not a shared library (its ELF header describes no program segments)");
   expect_inside(file, header.e_phoff, std::uint64_t(header.e_phentsize) * header.e_phnum);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/base/file_names.hpp"
 
-#include <cstdio>
 #include <map>
 #include <set>
 
 #include "marrow/base/characters.hpp"
 #include "marrow/base/hash.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 
 namespace marrow {
@@ -18,11 +18,7 @@ constexpr std::size_t kMostInFileName = 200;  // with an extension and a tempora
 /// As in URLs. `text` may have several bytes.
 std::string percent_encoded(std::string_view text) {
   std::string result;
-  for (const unsigned char byte : text) {
-    char code[4];
-    std::snprintf(code, sizeof code, "%%%02X", byte);
-    result += code;
-  }
+  for (const unsigned char byte : text) result += formatted("%{:02X}", byte);
   return result;
 }
 
@@ -30,7 +26,7 @@ std::string percent_encoded(std::string_view text) {
 
 std::string fault_of_name(const std::string& name) {
   if (name.empty()) return "it is empty";
-  if (name.size() > kMostNameBytes) return "it has " + std::to_string(name.size()) + " bytes";
+  if (name.size() > kMostNameBytes) return formatted("it has {} bytes", name.size());
   if (name.find('/') != std::string::npos) return "it holds '/'";
   if (name.find('\\') != std::string::npos) return "it holds '\\'";
   if (const std::string odd = odd_character_in(name); !odd.empty()) return "it holds " + odd;
@@ -75,7 +71,7 @@ std::vector<std::string> distinct_names(const std::vector<std::string>& names) {
     std::string distinct = name;
     if (!seen.insert(name).second) {
       int& number = last.try_emplace(name, 1).first->second;
-      do distinct = name + " (" + std::to_string(++number) + ")";
+      do distinct = formatted("{} ({})", name, ++number);
       while (!given.insert(distinct).second);
     }
     result.push_back(distinct);

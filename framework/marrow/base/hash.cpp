@@ -4,17 +4,13 @@
 #include <xxhash.h>
 
 #include <charconv>
-#include <cstdio>
 #include <new>
+
+#include "marrow/base/number_text.hpp"
 
 namespace marrow {
 
-std::string Digest::hex() const {
-  char text[33];
-  std::snprintf(text, sizeof text, "%016llx%016llx", static_cast<unsigned long long>(high),
-                static_cast<unsigned long long>(low));
-  return text;
-}
+std::string Digest::hex() const { return formatted("{:016x}{:016x}", high, low); }
 
 std::optional<Digest> digest_of_hex(const std::string& text) {
   Digest digest;

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow {
 namespace {
@@ -32,7 +33,7 @@ std::string place_in(const std::string& text, std::size_t byte) {
   const std::size_t at = std::min(byte ? byte - 1 : 0, text.size());
   const auto line = 1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(at), '\n');
   const std::size_t before = at ? text.rfind('\n', at - 1) : std::string::npos;
-  return std::to_string(line) + ":" + std::to_string(before == std::string::npos ? at + 1 : at - before);
+  return formatted("{}:{}", line, before == std::string::npos ? at + 1 : at - before);
 }
 
 /// Clears the leaves first, because the destructor of an empty list or object does not allocate.
@@ -48,7 +49,7 @@ JsonDocument::~JsonDocument() { take_apart(value_); }
 
 nlohmann::json parse_json(const std::string& text, const std::string& what) {
   if (levels_of(text) > kMostLevels)
-    throw Error(what + ": lists and objects are nested more than " + std::to_string(kMostLevels) + " deep");
+    throw Error(formatted("{}: lists and objects are nested more than {} deep", what, kMostLevels));
   try {
     return nlohmann::json::parse(text);
   } catch (const nlohmann::json::parse_error& fault) {
@@ -59,7 +60,7 @@ nlohmann::json parse_json(const std::string& text, const std::string& what) {
 }
 
 std::int64_t integer_of(const nlohmann::json& value, std::int64_t least, std::int64_t most, const std::string& what) {
-  const std::string expected = "expected a whole number from " + std::to_string(least) + " to " + std::to_string(most);
+  const std::string expected = formatted("expected a whole number from {} to {}", least, most);
   if (!value.is_number_integer()) throw Error(what + ": " + expected);
   const bool is_huge = value.is_number_unsigned() && value.get<std::uint64_t>() > std::uint64_t(INT64_MAX);
   const std::int64_t number = is_huge ? 0 : value.get<std::int64_t>();

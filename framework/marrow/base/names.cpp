@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 
 namespace marrow {
@@ -35,7 +36,7 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 
 std::string fault_of_item_name(const std::string& name) {
   if (name.empty()) return "is empty";
-  if (name.size() > 100) return "has " + std::to_string(name.size()) + " bytes; at most 100 are taken";
+  if (name.size() > 100) return formatted("has {} bytes; at most 100 are taken", name.size());
   return printable(name) == name ? "" : "holds a character that cannot be printed";
 }
 

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/base/printable.hpp"
 
-#include <cstdio>
-
 #include "marrow/base/characters.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow {
 namespace {
@@ -13,18 +12,17 @@ std::string printable(std::string_view text, const char* after_line_break) {
   result.reserve(text.size());
   while (!text.empty()) {
     const Character character = first_character(text);
-    char written[16] = "";
     if (text[0] == '\n' && after_line_break) {
       result += '\n';
       if (text.size() > 1) result += after_line_break;
     } else if (!character.is_valid || (is_control(character.code) && character.size == 1)) {
-      std::snprintf(written, sizeof written, "\\x%02x", static_cast<unsigned char>(text[0]));
+      result += formatted("\\x{:02x}", static_cast<unsigned char>(text[0]));
     } else if (is_control(character.code) || is_unseen(character.code)) {
-      std::snprintf(written, sizeof written, character.code > 0xFFFF ? "\\U%08x" : "\\u%04x", unsigned(character.code));
+      const auto code = std::uint32_t(character.code);
+      result += code > 0xFFFF ? formatted("\\U{:08x}", code) : formatted("\\u{:04x}", code);
     } else {
       result += text.substr(0, character.size);
     }
-    result += written;
     text.remove_prefix(character.size);
   }
   return result;

@@ -8,7 +8,6 @@
 #include <cctype>
 #include <cerrno>
 #include <charconv>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -17,6 +16,7 @@
 #include <sstream>
 
 #include "marrow/base/hash.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow {
 namespace {
@@ -35,8 +35,8 @@ struct Stat {
 /// Nothing if /proc is not there, or shows another namespace's processes: then its numbers mean other processes.
 std::optional<Stat> stat_of(pid_t process) {
   std::error_code error;
-  if (fs::read_symlink("/proc/self", error) != std::to_string(getpid()) || error) return std::nullopt;
-  std::ifstream file("/proc/" + std::to_string(process) + "/stat");
+  if (fs::read_symlink("/proc/self", error) != formatted("{}", getpid()) || error) return std::nullopt;
+  std::ifstream file(formatted("/proc/{}/stat", process));
   std::string text;
   std::getline(file, text);
   const std::size_t name_end = text.rfind(')');  // the program's name may have spaces
@@ -75,10 +75,8 @@ std::string place_of_processes() {
 }
 
 std::string make_identity() {
-  std::array<char, 48> numbers{};
   const std::optional<Stat> stat = stat_of(getpid());
-  std::snprintf(numbers.data(), numbers.size(), ".%08d.%012llu", int(getpid()), stat ? stat->start : 0ull);
-  return place_of_processes() + numbers.data();
+  return formatted("{}.{:08}.{:012}", place_of_processes(), getpid(), stat ? stat->start : 0ull);
 }
 
 /// The parts of an identity.

@@ -9,12 +9,14 @@
 #include <fstream>
 #include <string>
 
+#include "marrow/base/number_text.hpp"
+
 namespace marrow {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string proc_folder(pid_t process) { return "/proc/" + std::to_string(process); }
+std::string proc_folder(pid_t process) { return formatted("/proc/{}", process); }
 
 void add_children(pid_t process, std::vector<pid_t>& found) {
   std::error_code error;

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "marrow/base/characters.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 
 namespace marrow {
@@ -62,8 +63,8 @@ class Survey : public YAML::EventHandler {
     if (found == anchored_.end()) refuse(mark, "an alias names a list or map that it is in itself");
     repeated_ += found->second.values;
     if (repeated_ > kMostRepeated)
-      refuse(mark, "aliases repeat more than " + std::to_string(kMostRepeated) +
-                       " values; write out what is meant, or less of it");
+      refuse(mark,
+             formatted("aliases repeat more than {} values; write out what is meant, or less of it", kMostRepeated));
     count(mark, found->second);
   }
 
@@ -89,8 +90,7 @@ class Survey : public YAML::EventHandler {
   void enter(const YAML::Mark& mark, YAML::anchor_t anchor) {
     expect_no_anchor(mark, anchor);
     if (anchor) unnamed_.emplace(anchor, mark);
-    if (++values_ > limits_.most_values)
-      refuse(mark, "it has more than " + std::to_string(limits_.most_values) + " values");
+    if (++values_ > limits_.most_values) refuse(mark, formatted("it has more than {} values", limits_.most_values));
   }
   void add(const YAML::Mark& mark, YAML::anchor_t anchor) {
     enter(mark, anchor);
@@ -119,7 +119,7 @@ class Survey : public YAML::EventHandler {
   }
   void check_levels(const YAML::Mark& mark, std::size_t below) const {
     if (open_.size() + below > kMostLevels)
-      refuse(mark, "lists and maps are nested more than " + std::to_string(kMostLevels) + " deep");
+      refuse(mark, formatted("lists and maps are nested more than {} deep", kMostLevels));
   }
 
   const std::string& text_;
@@ -164,7 +164,7 @@ YAML::Node parse_yaml(const std::string& text, const YamlLimits& limits) {
 std::string yaml_described(const YAML::Node& node) {
   if (!node.IsDefined() || node.IsNull()) return "nothing";
   if (node.IsMap()) return "a map";
-  if (node.IsSequence()) return "a list of " + std::to_string(node.size());
+  if (node.IsSequence()) return formatted("a list of {}", node.size());
   if (is_plain(node)) return in_quotes(node.Scalar());
   const std::string text = node.Scalar().substr(0, 40);
   return "the quoted text \"" + printable(text) + "\"";
@@ -219,7 +219,7 @@ std::vector<YamlKey> yaml_keys(const YAML::Node& map, const std::string& what, s
       faults.push_back({mark, "merge keys (<<) are not supported", "repeat the entries"});
     else if (!is_new)
       faults.push_back(
-          {mark, shown + " is given twice in " + what, "the first is at line " + std::to_string(twin->second)});
+          {mark, shown + " is given twice in " + what, formatted("the first is at line {}", twin->second)});
     else if (const std::string odd = odd_character_in(name); !odd.empty())
       faults.push_back({mark, "the key " + shown + " in " + what + " holds " + odd, "write it without"});
     else

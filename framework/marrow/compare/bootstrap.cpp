@@ -8,6 +8,7 @@
 
 #include "beta.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/quantile.hpp"
 #include "marrow/domain/random.hpp"
 #include "normal.hpp"
@@ -17,7 +18,7 @@ namespace marrow::compare {
 namespace {
 
 ValuesOfCases checked_and_sorted(ValuesOfCases cases, const BootstrapSettings& settings) {
-  if (cases.size() < 2) throw Error("an interval over cases needs at least two, got " + std::to_string(cases.size()));
+  if (cases.size() < 2) throw Error(formatted("an interval over cases needs at least two, got {}", cases.size()));
   for (std::vector<double>& values : cases) {
     if (values.empty()) throw Error("a case has no values; leave it out");
     check_finite(values, "value");

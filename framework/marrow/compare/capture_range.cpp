@@ -15,16 +15,17 @@ constexpr std::size_t kMostBins = 100;  // the last one holds all starts that ar
 }  // namespace
 
 CaptureRange capture_range(const std::vector<StartOutcome>& outcomes, double bin_width, double least_rate) {
-  if (!(bin_width > 0)) throw Error("the width of a bin is " + formatted("{:f}", bin_width) + "; give a positive one");
+  if (!(bin_width > 0)) throw Error(formatted("the width of a bin is {:f}; give a positive one", bin_width));
   if (!(least_rate >= 0 && least_rate <= 1))
-    throw Error("the success rate is " + formatted("{:f}", least_rate) + "; give a fraction from 0 to 1, such as 0.95");
+    throw Error(formatted("the success rate is {:f}; give a fraction from 0 to 1, such as 0.95", least_rate));
   CaptureRange capture;
   std::vector<CaseRate> rates;
   double farthest = 0;
   for (const StartOutcome& outcome : outcomes) {
     if (!(outcome.error >= 0 && std::isfinite(outcome.error)))
-      throw Error("the error of a start is " + formatted("{:f}", outcome.error) +
-                  ", which is no distance; leave runs out whose start is not known");
+      throw Error(
+          formatted("the error of a start is {:f}, which is no distance; leave runs out whose start is not known",
+                    outcome.error));
     farthest = std::max(farthest, outcome.error);
     const std::size_t bin = std::size_t(std::min(outcome.error / bin_width, double(kMostBins - 1)));
     while (capture.bins.size() <= bin) {
@@ -33,7 +34,7 @@ CaptureRange capture_range(const std::vector<StartOutcome>& outcomes, double bin
     }
     rates.resize(capture.bins.size());
     const std::size_t number = std::size_t(&outcome - outcomes.data());
-    rates[bin].add(outcome.case_name.empty() ? " " + std::to_string(number) : outcome.case_name, outcome.success);
+    rates[bin].add(outcome.case_name.empty() ? formatted(" {}", number) : outcome.case_name, outcome.success);
   }
   if (!capture.bins.empty()) capture.bins.back().to = std::max(capture.bins.back().to, farthest);
   capture.is_open = !outcomes.empty();

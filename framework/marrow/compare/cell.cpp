@@ -73,8 +73,7 @@ std::optional<marrow::Metric> figure(const Pipeline& pipeline, const RunResult& 
   for (const marrow::Metric& metric : value.as<Metrics>().items) {
     known.push_back(metric.name);
     if (metric.name != name) continue;
-    if (!std::isfinite(metric.value))
-      throw Error("'" + path + "' is " + formatted("{:f}", metric.value) + ", not a finite number");
+    if (!std::isfinite(metric.value)) throw Error(formatted("'{}' is {:f}, not a finite number", path, metric.value));
     return metric;
   }
   throw UnknownName("'" + path + "': there is no figure '" + name + "'; " + suggestion(name, known), "");

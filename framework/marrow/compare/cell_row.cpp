@@ -4,6 +4,7 @@
 
 #include "marrow/base/hash.hpp"
 #include "marrow/base/json_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/compare/cell.hpp"
 
 namespace marrow::compare {
@@ -24,8 +25,7 @@ int count(const json& j, const std::string& what) { return int(integer_of(j, 0, 
 
 const json& list_of(const json& row, const char* key, std::size_t size) {
   const json& list = row.at(key);
-  if (!list.is_array() || list.size() != size)
-    throw Error(std::string("'") + key + "' must be a list of " + std::to_string(size));
+  if (!list.is_array() || list.size() != size) throw Error(formatted("'{}' must be a list of {}", key, size));
   return list;
 }
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
 #include "marrow/base/number_text.hpp"
@@ -22,8 +21,6 @@ std::array<double, 3> draw_vector(Random& random, double most) {
 
 }  // namespace
 
-std::string number_text(double value) { return formatted("{:.6g}", value); }
-
 std::vector<InputValue> draw_inputs(const std::vector<DrawnInput>& inputs, std::uint64_t seed) {
   Random random(seed);
   std::vector<InputValue> values;
@@ -39,7 +36,7 @@ std::vector<Start> draw_starts(const StartProtocol& protocol) {
   Random random(protocol.seed);
   std::vector<Start> starts;
   for (std::size_t i = 0; i < protocol.count; ++i) {
-    Start start{std::to_string(i), draw_vector(random, protocol.rotation_deg), {}};
+    Start start{formatted("{}", i), draw_vector(random, protocol.rotation_deg), {}};
     start.translation_mm = draw_vector(random, protocol.translation_mm);
     if (protocol.distance_mm > 0) start.distance_mm = protocol.distance_mm * random.uniform();
     starts.push_back(std::move(start));

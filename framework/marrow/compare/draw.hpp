@@ -10,9 +10,6 @@
 namespace MARROW_EXPORT_TO_TESTS marrow {
 namespace compare {
 
-/// A number as people read it, with six digits. Where it is read again, exact_number() keeps all of them.
-std::string number_text(double value);
-
 /// The values of the drawn inputs, in their order.
 std::vector<InputValue> draw_inputs(const std::vector<DrawnInput>& inputs, std::uint64_t seed);
 

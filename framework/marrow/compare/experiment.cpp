@@ -24,7 +24,7 @@ std::optional<std::size_t> place_of_name(const std::vector<Named>& all, const st
 
 void add_seeded(const SeededInputs& seeded, std::uint64_t seed, std::vector<InputValue>& inputs) {
   for (InputValue& input : draw_inputs(seeded.drawn, seed)) inputs.push_back(std::move(input));
-  for (const auto& [name, place] : seeded.taking_seed) inputs.push_back({name, std::to_string(seed), place});
+  for (const auto& [name, place] : seeded.taking_seed) inputs.push_back({name, formatted("{}", seed), place});
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "folder_search.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/file_names.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/plain_path.hpp"
 #include "marrow/base/printable.hpp"
 
@@ -103,7 +104,7 @@ class CaseReader {
       has_more_ = true;
     }
     for (const std::uint64_t seed : seeds)
-      if (!add({"seed-" + std::to_string(seed), {}, are_simulated, seed}, place)) return;
+      if (!add({formatted("seed-{}", seed), {}, are_simulated, seed}, place)) return;
   }
 
   void add_folders(const std::string& pattern, const Place& place) {
@@ -187,7 +188,7 @@ class CaseReader {
     } else if (entry.value.IsSequence() && entry.value.size() > 0) {
       for (const YAML::Node& item : entry.value) {
         const auto seed = yaml_.integer(item, yaml_.place(item), "a seed");
-        if (seed && *seed < 0) yaml_.fault(yaml_.place(item), "a seed must be 0 or more, got " + std::to_string(*seed));
+        if (seed && *seed < 0) yaml_.fault(yaml_.place(item), formatted("a seed must be 0 or more, got {}", *seed));
         if (seed && *seed >= 0) seeds.push_back(std::uint64_t(*seed));
       }
       return seeds;

@@ -3,6 +3,7 @@
 
 #include "axis_maker.hpp"
 #include "figure_path.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/compare/cell.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/run/output_faults.hpp"
@@ -90,7 +91,7 @@ void FigureChecker::add_items(std::size_t variant, const Pipeline& pipeline, con
   for (std::size_t i = 0; i < axes.size(); ++i)
     for (const AxisMaker& maker : quick_makers(pipeline, output.source, axes[i])) {
       if (alike.empty()) alike = histories(pipeline, "");
-      const std::string made_from = alike[std::size_t(maker.node)].hex() + std::to_string(maker.output);
+      const std::string made_from = formatted("{}{}", alike[std::size_t(maker.node)].hex(), maker.output);
       if (!known_items_.insert(item.path + "\n" + axes[i] + "\n" + made_from).second) continue;
       item.item = parts[i + 1];
       item.axis = axes[i];

@@ -14,19 +14,20 @@ namespace {
 std::string note_of_comparisons(const Experiment& experiment) {
   const auto [comparisons, cases, fewest] = comparison_counts(experiment);
   if (cases >= fewest) return "";
-  return counted(cases, experiment.tune ? "held-out case" : "case") + " cannot show a difference" +
-         (comparisons == 1 ? "" : " among " + std::to_string(comparisons) + " comparisons") +
-         ": even if all go the same way, p stays above 0.05" + (comparisons == 1 ? "" : " after Holm's correction") +
-         "; it takes at least " + std::to_string(fewest);
+  return formatted(
+      "{} cannot show a difference{}: even if all go the same way, p stays above 0.05{}; it takes at least {}",
+      counted(cases, experiment.tune ? "held-out case" : "case"),
+      comparisons == 1 ? "" : formatted(" among {} comparisons", comparisons),
+      comparisons == 1 ? "" : " after Holm's correction", fewest);
 }
 
 /// Why the rule cannot be met at its last look, whatever the cells give; else empty.
 std::string fault_of_last_look(const StopRule& rule, std::size_t starts) {
   const double level = StopPlan(rule).level_at(rule.most_cases);
-  const std::string fewest = std::to_string(fewest_cases(level));
+  const std::string fewest = formatted("{}", fewest_cases(level));
   if (rule.goal == StopRule::Goal::difference)
     return rule.most_cases < fewest_cases(level)
-               ? "p must be below " + formatted("{:.2g}", level) + ", which takes at least " + fewest + " cases"
+               ? formatted("p must be below {:.2g}, which takes at least {} cases", level, fewest)
                : "";
   if (rule.metric) {
     const std::vector<double> equal(rule.most_cases, 0.0);  // as narrow as an interval can be
@@ -35,12 +36,13 @@ std::string fault_of_last_look(const StopRule& rule, std::size_t starts) {
                : "there is no interval of a median with its confidence, which takes at least " + fewest + " cases";
   }
   CaseRate best;  // all runs independent
-  for (std::size_t run = 0; run < rule.most_cases * starts; ++run) best.add(std::to_string(run), true);
+  for (std::size_t run = 0; run < rule.most_cases * starts; ++run) best.add(formatted("{}", run), true);
   const Interval narrowest = best.exact_interval(1 - level);
   const double width = narrowest.upper - narrowest.lower;
-  return width > rule.width ? "the interval of a success rate is at least " + formatted("{:.2g}", width) +
-                                  " wide, even if every run is a success"
-                            : "";
+  return width > rule.width
+             ? formatted("the interval of a success rate is at least {:.2g} wide, even if every run is a success",
+                         width)
+             : "";
 }
 
 }  // namespace

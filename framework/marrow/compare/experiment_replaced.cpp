@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "marrow/base/number_text.hpp"
+
 namespace marrow::compare {
 namespace {
 
@@ -43,8 +45,8 @@ void refuse_replaced(StrictYaml& yaml, const std::string& what, const SetBySecti
     for (const Named& other : later.names)
       if (one.name == other.name)
         yaml.fault(one.place,
-                   what + " '" + one.name + "' is set by " + first.section + " and by " + later.section + " in line " +
-                       std::to_string(other.place.line) + ", whose values would replace this one",
+                   formatted("{} '{}' is set by {} and by {} in line {}, whose values would replace this one", what,
+                             one.name, first.section, later.section, other.place.line),
                    "leave one of them out");
 }
 

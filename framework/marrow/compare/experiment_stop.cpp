@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "draw.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -25,13 +26,13 @@ void StopReader::read(const YamlEntry& section) {
     if (entry.key == "width") {
       width_ = Named{entry.key, entry.place};
       rule_.width = yaml_.number(entry.value, entry.place, entry.key).value_or(1);
-      if (!(rule_.width > 0)) yaml_.fault(entry.place, "'width' must be above 0, got " + number_text(rule_.width));
+      if (!(rule_.width > 0)) yaml_.fault(entry.place, "'width' must be above 0, got " + short_number(rule_.width, 6));
     }
     if (entry.key == "alpha") {
       alpha_ = Named{entry.key, entry.place};
       rule_.alpha = yaml_.number(entry.value, entry.place, entry.key).value_or(0.05);
       if (!(rule_.alpha >= 0.001 && rule_.alpha <= 0.5))
-        yaml_.fault(entry.place, "'alpha' must be 0.001 to 0.5, got " + number_text(rule_.alpha));
+        yaml_.fault(entry.place, "'alpha' must be 0.001 to 0.5, got " + short_number(rule_.alpha, 6));
     }
     if (entry.key == "most_cases") {
       most_place_ = entry.place;
@@ -87,7 +88,7 @@ void StopReader::find_figure(const Experiment& experiment, StopRule& rule) {
                        "add  success: {" + (names.size() > 1 ? names[0] : "FIGURE") + ": 2}");
   if (rule.width > 1)
     yaml_.fault(width_ ? width_->place : asked.place,
-                "the interval of a success rate is never wider than 1, got " + number_text(rule.width));
+                "the interval of a success rate is never wider than 1, got " + short_number(rule.width, 6));
 }
 
 void StopReader::find_variant(const Experiment& experiment, StopRule& rule) {
@@ -117,19 +118,16 @@ void StopReader::check_cases(const Experiment& experiment, const StopRule& rule,
     return yaml_.fault(place_, "'stop' needs cases that are made from seeds, because only these can become more",
                        "use  cases: {simulate: ...}  or  {seeds: 1..20}");
   if (rule.most_cases < rule.first_cases)
-    return yaml_.fault(most_place_, "'most_cases' is " + std::to_string(rule.most_cases) + ", but there are " +
-                                        std::to_string(rule.first_cases) + " cases already");
+    return yaml_.fault(most_place_, formatted("'most_cases' is {}, but there are {} cases already", rule.most_cases,
+                                              rule.first_cases));
   if (const std::size_t looks = rule.looks().size(); looks > kMostLooks)
-    yaml_.fault(
-        place_,
-        "the rule makes " + std::to_string(looks) + " looks, at most " + std::to_string(kMostLooks) + " are possible",
-        "look at more cases at once, as  look_every: " +
-            std::to_string((rule.most_cases - rule.first_cases) / (kMostLooks - 1) + 1));
+    yaml_.fault(place_, formatted("the rule makes {} looks, at most {} are possible", looks, kMostLooks),
+                formatted("look at more cases at once, as  look_every: {}",
+                          (rule.most_cases - rule.first_cases) / (kMostLooks - 1) + 1));
   const double cells = double(experiment.variants.size()) * double(rule.most_cases) * double(starts);
   if (cells > double(kMostCells))
-    yaml_.fault(most_place_, "with " + std::to_string(rule.most_cases) + " cases there would be " +
-                                 std::to_string(std::size_t(cells)) + " cells, at most " + std::to_string(kMostCells) +
-                                 " can be compared");
+    yaml_.fault(most_place_, formatted("with {} cases there would be {} cells, at most {} can be compared",
+                                       rule.most_cases, std::size_t(cells), kMostCells));
 }
 
 }  // namespace marrow::compare

@@ -37,8 +37,8 @@ void read_ends(StrictYaml& yaml, const YAML::Node& node, const Place& place, Swe
   for (std::size_t i = 0; i < 2; ++i)
     option.range[i] = yaml.number(node[i], yaml.place(node[i]), option.key).value_or(option.range[i]);
   if (!(option.range[0] < option.range[1]) || !std::isfinite(option.range[1] - option.range[0]))
-    yaml.fault(place, "the range of '" + option.key + "' must end above its beginning, got " +
-                          number_text(option.range[0]) + " to " + number_text(option.range[1]));
+    yaml.fault(place, formatted("the range of '{}' must end above its beginning, got {:.6g} to {:.6g}", option.key,
+                                option.range[0], option.range[1]));
 }
 
 }  // namespace
@@ -65,7 +65,7 @@ SweptOption swept_option_of(StrictYaml& yaml, const YamlEntry& entry) {
     read_ends(yaml, entry.value, entry.place, option);
   }
   if (option.is_log && !(option.range[0] > 0))
-    yaml.fault(entry.place, "a range with a log scale must begin above 0, got " + number_text(option.range[0]));
+    yaml.fault(entry.place, "a range with a log scale must begin above 0, got " + short_number(option.range[0], 6));
   return option;
 }
 
@@ -95,14 +95,14 @@ void SweepReader::check(const YamlEntry& section) {
                        "'sweep' must say either how fine its grid is or how many of Sobol's points it takes",
                        "add  grid: 5  for 5 values of each option, or  sobol: 32");
   if (options_.size() > kMostSobolDimensions)
-    return yaml_.fault(section.place, "'sweep' has " + std::to_string(options_.size()) + " options, at most " +
-                                          std::to_string(kMostSobolDimensions) + " are possible");
+    return yaml_.fault(section.place, formatted("'sweep' has {} options, at most {} are possible", options_.size(),
+                                                kMostSobolDimensions));
   if (grid_ && std::pow(double(grid_), double(options_.size())) > double(kMostVariants))
-    return yaml_.fault(section.place,
-                       "a grid of " + std::to_string(grid_) + " values of " + std::to_string(options_.size()) +
-                           " options makes more than the " + std::to_string(kMostVariants) +
-                           " variants that can be compared",
-                       "take fewer values, or Sobol's points, as  sobol: 64");
+    return yaml_.fault(
+        section.place,
+        formatted("a grid of {} values of {} options makes more than the {} variants that can be compared", grid_,
+                  options_.size(), kMostVariants),
+        "take fewer values, or Sobol's points, as  sobol: 64");
   is_good_ = true;
 }
 
@@ -129,9 +129,8 @@ void SweepReader::apply(Experiment& experiment) {
   if (before.empty()) before.push_back({"", place_, {}});
   if (before.size() * all.size() > kMostVariants) {
     yaml_.fault(place_,
-                std::to_string(before.size()) + " variants at " + std::to_string(all.size()) + " points are " +
-                    std::to_string(before.size() * all.size()) + ", at most " + std::to_string(kMostVariants) +
-                    " can be compared",
+                formatted("{} variants at {} points are {}, at most {} can be compared", before.size(), all.size(),
+                          before.size() * all.size(), kMostVariants),
                 "take fewer points");
     return;
   }
@@ -143,7 +142,7 @@ void SweepReader::apply(Experiment& experiment) {
       more.swept_from = variant.name;
       for (std::size_t o = 0; o < options_.size(); ++o) {
         if (!more.name.empty()) more.name += '+';
-        more.name += number_text(point[o]);
+        more.name += short_number(point[o], 6);
         more.overrides.push_back({options_[o].key, exact_number(point[o]), options_[o].place});
       }
       if (!check_name(yaml_, more.name, variant.place, "a variant's name")) return;

@@ -108,17 +108,15 @@ class Reader {
                       starts = experiment_.protocol ? experiment_.protocol->count : 1;
     if (variants > kMostVariants) {
       yaml_.fault(variants_place_,
-                  "there are " + std::to_string(variants) + " variants, at most " + std::to_string(kMostVariants) +
-                      " can be compared",
+                  formatted("there are {} variants, at most {} can be compared", variants, kMostVariants),
                   "make several experiments of them");
       return true;
     }
     if (double(variants) * double(cases) * double(starts) <= double(kMostCells)) return false;
     const std::string cells = formatted("{:.0f}", double(variants) * double(cases) * double(starts));
     yaml_.fault(start,
-                std::to_string(variants) + " variants, " + std::to_string(cases) + " cases and " +
-                    std::to_string(starts) + " starts are " + cells + " cells, at most " + std::to_string(kMostCells) +
-                    " can be compared",
+                formatted("{} variants, {} cases and {} starts are {} cells, at most {} can be compared", variants,
+                          cases, starts, cells, kMostCells),
                 "take fewer of them, or make several experiments");
     return true;
   }
@@ -128,8 +126,7 @@ class Reader {
     if (entry.key == "experiment") {
       const auto version = yaml_.integer(entry.value, entry.place, "experiment");
       if (version && *version != 1)
-        yaml_.fault(entry.place,
-                    "this file is of format " + std::to_string(*version) + ", this program reads format 1");
+        yaml_.fault(entry.place, formatted("this file is of format {}, this program reads format 1", *version));
     }
     if (entry.key == "name") {
       experiment_.name = text();
@@ -238,16 +235,16 @@ class Reader {
     if (count > double(kMostVariants)) {
       const std::string variants = count < 1e15 ? formatted("{:.0f}", count) : formatted("{:.0e}", count);
       yaml_.fault(matrix_place_,
-                  std::string("the matrix makes ") + variants + " variants, at most " + std::to_string(kMostVariants) +
-                      " can be compared",
+                  formatted("the matrix makes {} variants, at most {} can be compared", variants, kMostVariants),
                   "leave values out, or name the combinations that matter under  variants:");
       return true;
     }
     if (longest <= kMostNameBytes) return false;
-    yaml_.fault(matrix_place_,
-                "the matrix makes a variant's name of " + std::to_string(longest) +
-                    " bytes of its values; as a folder's name it may have " + std::to_string(kMostNameBytes),
-                "name the combinations under  variants:");
+    yaml_.fault(
+        matrix_place_,
+        formatted("the matrix makes a variant's name of {} bytes of its values; as a folder's name it may have {}",
+                  longest, kMostNameBytes),
+        "name the combinations under  variants:");
     return true;
   }
 
@@ -260,7 +257,7 @@ class Reader {
       if (taken.insert(in_small_letters(variant.name)).second) continue;
       const std::string name = variant.name;
       int& number = last[in_small_letters(name)];
-      do variant.name = name + "-" + std::to_string(++number);
+      do variant.name = formatted("{}-{}", name, ++number);
       while (last.contains(in_small_letters(variant.name)) || !taken.insert(in_small_letters(variant.name)).second);
     }
   }
@@ -303,8 +300,8 @@ class Reader {
     if (!entry.value.IsSequence()) return yaml_.fault(entry.place, "'metrics' must be a list", hint);
     if (entry.value.size() == 0) return yaml_.fault(entry.place, "'metrics' names no figure", hint);
     if (entry.value.size() > kMostMetrics)
-      return yaml_.fault(entry.place, "'metrics' names " + std::to_string(entry.value.size()) + " figures, at most " +
-                                          std::to_string(kMostMetrics) + " can be compared");
+      return yaml_.fault(entry.place, formatted("'metrics' names {} figures, at most {} can be compared",
+                                                entry.value.size(), kMostMetrics));
     for (const YAML::Node& item : entry.value) {
       const Place place = yaml_.place(item);
       const MetricChoice metric = read_metric(item, place);
@@ -357,8 +354,8 @@ class Reader {
       if (metric.path != path) continue;
       metric.limit = value;
       if (metric.better == MetricChoice::Better::nearest_zero && value <= 0)
-        yaml_.fault(place, "the limit of '" + path + "' is " + number_text(value) +
-                               ", but its magnitude counts, which is never below 0");
+        yaml_.fault(place, formatted("the limit of '{}' is {:.6g}, but its magnitude counts, which is never below 0",
+                                     path, value));
       return;
     }
     yaml_.fault(place, "'" + path + "' is not among the metrics", suggestion(path, paths));

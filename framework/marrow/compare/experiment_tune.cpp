@@ -125,8 +125,8 @@ void TuneReader::check_keys(const YamlEntry& section) {
   is_given_ = true;
   if (rule_.options.empty()) return yaml_.fault(section.place, "'tune' names no option", kTuneExample);
   if (rule_.options.size() > kMostOptions)
-    return yaml_.fault(section.place, "'tune' has " + std::to_string(rule_.options.size()) + " options, at most " +
-                                          std::to_string(kMostOptions) + " are possible");
+    return yaml_.fault(section.place,
+                       formatted("'tune' has {} options, at most {} are possible", rule_.options.size(), kMostOptions));
   if (!has_optimizer_) return yaml_.fault(section.place, "'tune' does not name its optimizer", kOptimizerHint);
   if (!rule_.points)
     return yaml_.fault(section.place, "'tune' does not say how many points may be tried", "add  points: 40");
@@ -200,20 +200,20 @@ void TuneReader::find_failed_as(const MetricChoice& metric, TuneRule& rule) {
   const bool is_success = metric.limit && (higher ? rule.failed_as > *metric.limit : rule.failed_as < *metric.limit);
   if (is_success)
     yaml_.fault(failed_as_place_,
-                "a failed run would count as " + number_text(rule.failed_as) + ", which is a success: the limit of " +
-                    metric.path + " is " + number_text(*metric.limit),
+                formatted("a failed run would count as {:.6g}, which is a success: the limit of {} is {:.6g}",
+                          rule.failed_as, metric.path, *metric.limit),
                 "let  failed_as  be a value that is no success");
 }
 
 void TuneReader::check_cases(const Experiment& experiment, const TuneRule& rule, std::size_t starts) {
   if (rule.training_cases >= experiment.cases.size())
-    return yaml_.fault(cases_place_, std::to_string(rule.training_cases) + " training cases of " +
-                                         std::to_string(experiment.cases.size()) + " leave none that is held out");
+    return yaml_.fault(cases_place_, formatted("{} training cases of {} leave none that is held out",
+                                               rule.training_cases, experiment.cases.size()));
   const double cells = double(rule.points) * double(rule.training_cases) * double(starts);
   if (cells > double(kMostCells))
     yaml_.fault(place_,
-                number_text(cells) + " cells for training are more than the " + std::to_string(kMostCells) +
-                    " that can be compared",
+                formatted("{} cells for training are more than the {} that can be compared", short_number(cells, 6),
+                          kMostCells),
                 "take fewer points, training cases or starts");
 }
 

@@ -5,6 +5,7 @@
 
 #include "draw.hpp"
 #include "marrow/base/file_names.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/plain_path.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/given_value.hpp"
@@ -59,8 +60,7 @@ std::uint64_t count_of(StrictYaml& yaml, const YamlEntry& entry, std::int64_t le
   const auto value = yaml.integer(entry.value, entry.place, entry.key);
   if (!value) return std::uint64_t(least);
   if (*value >= least && *value <= most) return std::uint64_t(*value);
-  yaml.fault(entry.place, "'" + entry.key + "' must be " + std::to_string(least) + " to " + std::to_string(most) +
-                              ", got " + std::to_string(*value));
+  yaml.fault(entry.place, formatted("'{}' must be {} to {}, got {}", entry.key, least, most, *value));
   return std::uint64_t(least);
 }
 
@@ -68,7 +68,7 @@ double limit_of(StrictYaml& yaml, const YamlEntry& entry, double most) {
   const auto value = yaml.number(entry.value, entry.place, entry.key);
   if (!value) return 0;
   if (*value >= 0 && *value <= most) return *value;
-  yaml.fault(entry.place, "'" + entry.key + "' must be 0 to " + number_text(most) + ", got " + number_text(*value));
+  yaml.fault(entry.place, formatted("'{}' must be 0 to {:.6g}, got {:.6g}", entry.key, most, *value));
   return 0;
 }
 

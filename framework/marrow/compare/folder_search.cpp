@@ -7,6 +7,7 @@
 #include <climits>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -19,13 +20,13 @@ bool is_pattern(const std::string& name) { return name.find_first_of("*?[\\") !=
 
 void FolderSearch::look() {
   if (++looked_at_ > kMostLookedAt)
-    throw Error("the search goes through more than " + std::to_string(kMostLookedAt) +
-                " files and folders; do links lead in a circle?");
+    throw Error(
+        formatted("the search goes through more than {} files and folders; do links lead in a circle?", kMostLookedAt));
 }
 
 std::vector<fs::path> FolderSearch::matches(const fs::path& folder, const fs::path& pattern) {
   if (const std::size_t size = (folder / pattern).native().size(); size >= PATH_MAX)
-    throw Error("the path has " + std::to_string(size) + " bytes, more than any path may have");
+    throw Error(formatted("the path has {} bytes, more than any path may have", size));
   std::vector<fs::path> found{pattern.is_absolute() ? pattern.root_path() : folder};
   for (const fs::path& part : pattern.relative_path()) {
     if (part.empty()) continue;  // the part after a slash at the end

@@ -16,7 +16,7 @@ namespace marrow::compare {
 Interval order_statistic_interval(std::vector<double> values, double level) {
   check_numbers(values, "value");
   if (!(level > 0 && level < 1))
-    throw Error("the level is " + formatted("{:f}", level) + "; give a fraction between 0 and 1, such as 0.05");
+    throw Error(formatted("the level is {:f}; give a fraction between 0 and 1, such as 0.05", level));
   std::sort(values.begin(), values.end());
   const std::size_t n = values.size();
   // Twice the probability that fewer than j of n values are below the median; its terms are those of a fair coin.

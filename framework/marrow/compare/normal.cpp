@@ -11,8 +11,7 @@ namespace marrow::compare {
 
 void check_confidence(double confidence) {
   if (!(confidence > 0 && confidence < 1))
-    throw Error("the confidence is " + formatted("{:f}", confidence) +
-                "; give a fraction between 0 and 1, such as 0.95");
+    throw Error(formatted("the confidence is {:f}; give a fraction between 0 and 1, such as 0.95", confidence));
 }
 
 double upper_tail(double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); }

@@ -36,8 +36,9 @@ struct NoisyDifference {
 
 void check_value(const Pair& pair, double value, const char* of) {
   if (!std::isfinite(value))
-    throw Error("case '" + pair.case_name + "': got " + formatted("{:f}", value) + " for the " + of +
-                ", expected a finite number; give a run without a figure as one without a value");
+    throw Error(formatted(
+        "case '{}': got {:f} for the {}, expected a finite number; give a run without a figure as one without a value",
+        pair.case_name, value, of));
 }
 
 std::map<std::string, CaseOfPairs> pairs_by_case(const std::vector<Pair>& pairs, Tally& runs) {

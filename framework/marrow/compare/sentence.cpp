@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <optional>
 
@@ -14,20 +13,6 @@ namespace {
 
 bool shows_zero(const std::string& number) { return number.find_first_of("123456789") == std::string::npos; }
 
-/// The number with a decimal point in every locale, and without a minus sign before zero.
-std::string fixed(double value, int decimals) {
-  char text[400];  // the largest double has 309 digits before the point
-  const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::fixed, decimals).ptr;
-  const std::string result(text, end);
-  return result[0] == '-' && shows_zero(result) ? result.substr(1) : result;
-}
-
-/// A number with as few digits as it needs: "95", "99.9", "0.05".
-std::string plain(double value) {
-  char text[40];
-  return {text, std::to_chars(text, text + sizeof text, value, std::chars_format::general, 6).ptr};
-}
-
 /// The number of decimals with which one unit of the last place is at most `largest_unit`.
 int decimals_for(double largest_unit) {
   int decimals = 0;
@@ -40,14 +25,9 @@ std::string p_text(double p, double alpha) {
   if (p < 0.001) return "p < 0.001";
   if (p >= 0.995) return "p = 1";
   int decimals = p >= 0.0995 ? 2 : p >= 0.00995 ? 3 : 4;
-  const auto shown = [&] {
-    const std::string text = fixed(p, decimals);
-    double value = 0;
-    std::from_chars(text.data(), text.data() + text.size(), value);
-    return value;
-  };
+  const auto shown = [&] { return parsed_number(fixed_number(p, decimals)).value(); };
   while (decimals < 6 && p != alpha && (shown() == alpha || (shown() < alpha) != (p < alpha))) ++decimals;
-  return "p = " + fixed(p, decimals);
+  return "p = " + fixed_number(p, decimals);
 }
 
 /// What decides how many decimals are shown: the interval's width; if one bound is infinite, twice the other side's;
@@ -93,12 +73,12 @@ struct Directed {
   }
 
   std::string amount(int decimals) const {
-    const std::string number = fixed(difference, decimals);
+    const std::string number = fixed_number(difference, decimals);
     const std::string text = number + (metric.unit.empty() ? "" : " " + metric.unit);
     return shows_zero(number) ? text : text + (is_worse ? " worse" : " better");
   }
   std::string bound(double value, int decimals) const {
-    if (std::isfinite(value)) return fixed(value, decimals);
+    if (std::isfinite(value)) return fixed_number(value, decimals);
     return "a failure of " + ((value > 0) == is_worse ? variant : std::string("the baseline"));
   }
   std::string range(int decimals) const {
@@ -107,7 +87,7 @@ struct Directed {
     const auto with_unit = [&](double value) {
       return bound(value, decimals) + (std::isfinite(value) ? unit : std::string());
     };
-    return plain(100 * interval.confidence) + " % interval " + with_unit(interval.lower) + " to " +
+    return short_number(100 * interval.confidence, 6) + " % interval " + with_unit(interval.lower) + " to " +
            with_unit(interval.upper);
   }
 };
@@ -115,16 +95,16 @@ struct Directed {
 /// Whose runs failed; empty if none did.
 std::string failures_text(const std::string& variant, const Tally& runs) {
   if (runs.all() == runs.both) return "";
-  return "; of " + counted(runs.all(), "run") + ", only " + variant + " failed in " +
-         std::to_string(runs.variant_lost) + ", only the baseline in " + std::to_string(runs.reference_lost) +
-         ", both in " + std::to_string(runs.neither);
+  return formatted("; of {}, only {} failed in {}, only the baseline in {}, both in {}", counted(runs.all(), "run"),
+                   variant, runs.variant_lost, runs.reference_lost, runs.neither);
 }
 
 /// What a sentence says first if the median itself is a failure: who fails more, and in how many cases.
 std::string more_failures(const Comparison& comparison, bool variant_fails) {
-  return (variant_fails ? "fails more often than the baseline, in " : "the baseline fails more often, in ") +
-         std::to_string(variant_fails ? comparison.cases.variant_lost : comparison.cases.reference_lost) + " of " +
-         counted(comparison.compared(), "case");
+  return formatted("{}{} of {}",
+                   variant_fails ? "fails more often than the baseline, in " : "the baseline fails more often, in ",
+                   variant_fails ? comparison.cases.variant_lost : comparison.cases.reference_lost,
+                   counted(comparison.compared(), "case"));
 }
 
 std::string of_both(const std::string& variant, const Metric& metric, const Comparison& comparison) {
@@ -140,9 +120,9 @@ std::string doubts(const Comparison& comparison, const CorrectedP& corrected, do
                    bool is_shown) {
   const std::size_t fewest = fewest_cases(alpha, corrected.comparisons);
   if (!is_shown && comparison.compared() < fewest)
-    return "; fewer than " + std::to_string(fewest) + " cases cannot reach p < " + plain(alpha) +
-           (corrected.comparisons > 1 ? " with " + std::to_string(corrected.comparisons) + " comparisons" : "") +
-           (has_interval ? "" : ", and no interval is given");
+    return formatted("; fewer than {} cases cannot reach p < {}{}{}", fewest, short_number(alpha, 6),
+                     corrected.comparisons > 1 ? formatted(" with {} comparisons", corrected.comparisons) : "",
+                     has_interval ? "" : ", and no interval is given");
   if (is_shown || corrected.p >= alpha) return "";
   const bool contains_zero = comparison.interval.lower <= 0 && comparison.interval.upper >= 0;
   return std::string(contains_zero ? "; the interval contains 0" : "; the ranks and the median do not agree") +
@@ -153,7 +133,7 @@ std::string doubts(const Comparison& comparison, const CorrectedP& corrected, do
 
 std::size_t fewest_cases(double alpha, std::size_t comparisons) {
   if (!(alpha > 0 && alpha < 1))
-    throw Error("alpha is " + plain(alpha) + "; give a fraction between 0 and 1, such as 0.05");
+    throw Error(formatted("alpha is {:.6g}; give a fraction between 0 and 1, such as 0.05", alpha));
   if (!comparisons) throw Error("there are no comparisons; give at least one");
   std::size_t cases = 1;
   for (double least_p = double(comparisons); least_p >= alpha; least_p /= 2) ++cases;
@@ -162,7 +142,7 @@ std::size_t fewest_cases(double alpha, std::size_t comparisons) {
 
 bool difference_shown(const Comparison& comparison, double p_after_holm, double alpha) {
   if (!(p_after_holm >= 0 && p_after_holm <= 1))
-    throw Error("p is " + plain(p_after_holm) + "; expected a number from 0 to 1");
+    throw Error(formatted("p is {:.6g}; expected a number from 0 to 1", p_after_holm));
   if (p_after_holm >= alpha) return false;
   const bool ranks_positive = comparison.test.positive_ranks > comparison.test.negative_ranks;
   if (comparison.side_of_failures == (ranks_positive ? 1 : -1)) return true;
@@ -184,12 +164,12 @@ std::string sentence(const std::string& variant, const Metric& metric, const Com
   text += is_failure ? more_failures(comparison, directed.is_worse) : directed.amount(decimals);
   if (has_interval && interval.lower < kInfinite) {
     text += ", " + directed.range(decimals);
-    if (is_failure || shows_zero(fixed(directed.difference, decimals)))
+    if (is_failure || shows_zero(fixed_number(directed.difference, decimals)))
       text += directed.is_worse ? " (positive is worse)" : " (positive is better)";
   }
   const std::size_t all = comparison.cases.all();
   if (!is_failure || comparison.cases.neither)
-    text += ", " + (comparison.cases.neither ? std::to_string(comparison.compared()) + " of " : std::string()) +
+    text += ", " + (comparison.cases.neither ? formatted("{} of ", comparison.compared()) : std::string()) +
             counted(all, "case");
   text += ", " + p_text(corrected.p, alpha) + failures_text(variant, comparison.runs);
   if (is_failure) text += of_both(variant, metric, comparison);

@@ -81,15 +81,16 @@ double spent(double share, double alpha, Spending spending) {
 
 std::vector<double> levels_of_looks(const std::vector<double>& information, double alpha, Spending spending) {
   if (!(alpha >= 0.001 && alpha <= 0.5))
-    throw Error("alpha is " + formatted("{:f}", alpha) + "; give a fraction from 0.001 to 0.5, such as 0.05");
+    throw Error(formatted("alpha is {:f}; give a fraction from 0.001 to 0.5, such as 0.05", alpha));
   if (information.empty()) throw Error("there are no looks; give at least one");
   WatchedMotion motion;
   std::vector<double> levels;
   double before = 0;
   for (const double share : information) {
     if (!(share > before && share <= 1))
-      throw Error("look " + std::to_string(levels.size() + 1) + " has seen the share " + formatted("{:f}", share) +
-                  " of the cases; expected more than at the look before, and at most 1");
+      throw Error(formatted(
+          "look {} has seen the share {:f} of the cases; expected more than at the look before, and at most 1",
+          levels.size() + 1, share));
     const double chance = spent(share, alpha, spending) - spent(before, alpha, spending);
     levels.push_back(2 * upper_tail(motion.bound_at(share, chance)));
     before = share;
@@ -99,9 +100,10 @@ std::vector<double> levels_of_looks(const std::vector<double>& information, doub
 
 std::vector<std::size_t> looks_at(std::size_t first, std::size_t every, std::size_t most) {
   if (!first || !every || most < first)
-    throw Error("looks begin at " + std::to_string(first) + " cases and end at " + std::to_string(most) +
-                ", one every " + std::to_string(every) +
-                "; expected at least 1 for each, and an end not before the beginning");
+    throw Error(
+        formatted("looks begin at {} cases and end at {}, one every {}; expected at least 1 for each, and an end not "
+                  "before the beginning",
+                  first, most, every));
   std::vector<std::size_t> looks;
   for (std::size_t cases = first; cases < most; cases += every) looks.push_back(cases);
   looks.push_back(most);

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/compare/paired.hpp"
 #include "normal.hpp"
 #include "value_checks.hpp"
@@ -78,8 +79,9 @@ SignedRank signed_rank_test(const std::vector<double>& differences, SignedRankMe
   result.negative_ranks = 0.5 * static_cast<double>(doubled_total - ranks.doubled_positive);
   const bool few = ranks.doubled.size() <= most_exact_cases;
   if (method == SignedRankMethod::exact && !few)
-    throw Error("the exact signed-rank test takes at most " + std::to_string(most_exact_cases) +
-                " differences that are not 0, got " + std::to_string(ranks.doubled.size()) + "; use automatic");
+    throw Error(
+        formatted("the exact signed-rank test takes at most {} differences that are not 0, got {}; use automatic",
+                  most_exact_cases, ranks.doubled.size()));
   result.exact = method == SignedRankMethod::exact || (method == SignedRankMethod::automatic && few);
   result.p = result.exact ? exact_p(ranks.doubled, doubled_smaller)
                           : normal_p(ranks, 0.5 * static_cast<double>(doubled_smaller));

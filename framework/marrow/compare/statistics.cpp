@@ -16,8 +16,8 @@ Interval wilson_interval(std::size_t successes, std::size_t trials, double confi
   check_confidence(confidence);
   if (trials == 0) throw Error("a success rate of no trials has no interval; give at least one trial");
   if (successes > trials)
-    throw Error("got " + std::to_string(successes) + " successes of " + std::to_string(trials) +
-                " trials; expected at most as many successes as trials");
+    throw Error(
+        formatted("got {} successes of {} trials; expected at most as many successes as trials", successes, trials));
   return score_interval(static_cast<double>(successes) / static_cast<double>(trials), static_cast<double>(trials),
                         confidence);
 }
@@ -40,8 +40,8 @@ Summary summarise(const std::vector<double>& values, bool higher_is_better) {
 std::vector<double> holm(const std::vector<double>& p_values) {
   for (std::size_t i = 0; i < p_values.size(); ++i)
     if (!(p_values[i] >= 0 && p_values[i] <= 1))
-      throw Error("p-value " + std::to_string(i + 1) + " of " + std::to_string(p_values.size()) + " is " +
-                  formatted("{:f}", p_values[i]) + "; expected a number from 0 to 1");
+      throw Error(
+          formatted("p-value {} of {} is {:f}; expected a number from 0 to 1", i + 1, p_values.size(), p_values[i]));
   std::vector<std::size_t> order(p_values.size());
   std::iota(order.begin(), order.end(), std::size_t(0));
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return p_values[a] < p_values[b]; });

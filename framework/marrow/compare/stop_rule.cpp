@@ -23,36 +23,34 @@ Look begin_look(const StopPlan& plan, std::size_t cases) {
   return look;
 }
 
-std::string short_text(double value) { return formatted("{:.3g}", value); }
-
 /// What follows from the look.
 std::string end(const StopRule& rule, const Look& look) {
   if (look.is_met) return "; the rule says stop";
   if (look.is_last()) return "; this was the last look";
-  return "; --more-cases goes on, with " + std::to_string(rule.look_every) + " cases a look";
+  return formatted("; --more-cases goes on, with {} cases a look", rule.look_every);
 }
 
 /// A number, or the failure that an infinite one stands for.
-std::string value_text(double value) { return std::isfinite(value) ? short_text(value) : "a failure"; }
+std::string value_text(double value) { return std::isfinite(value) ? short_number(value) : "a failure"; }
 
 std::string holds(const StopRule& rule) {
-  return ", which holds with " + short_text(100 * (1 - rule.alpha)) + " % confidence over all looks";
+  return formatted(", which holds with {:.3g} % confidence over all looks", 100 * (1 - rule.alpha));
 }
 
 /// What holds after any look.
 std::string meaning(const StopRule& rule, const Look& look, const std::string& unit) {
   const bool ends_in_failure = std::isinf(look.interval.upper);
-  return value_text(look.interval.lower) + (ends_in_failure && std::isfinite(look.interval.lower) ? unit : "") +
-         " to " + value_text(look.interval.upper) + (ends_in_failure ? "" : unit) + ", which holds with " +
-         short_text(100 * (1 - rule.alpha)) + " % confidence over all looks";
+  return formatted("{}{} to {}{}, which holds with {:.3g} % confidence over all looks", value_text(look.interval.lower),
+                   ends_in_failure && std::isfinite(look.interval.lower) ? unit : "", value_text(look.interval.upper),
+                   ends_in_failure ? "" : unit, 100 * (1 - rule.alpha));
 }
 
 std::string text_of_width(const StopRule& rule, const Look& look, const LookNames& names, const std::string& unit) {
   const std::string interval = "interval of " + names.figure;
   if (!std::isfinite(look.width())) return names.variant + ": too few cases for an " + interval + end(rule, look);
-  return "the widest " + interval + " is " + short_text(look.width()) + unit + " wide, " +
-         (look.is_met ? "not more than " : "more than ") + short_text(rule.width) + unit + end(rule, look) +
-         ". It is " + names.variant + "'s, " + meaning(rule, look, unit);
+  return formatted("the widest {} is {:.3g}{} wide, {}{:.3g}{}{}. It is {}'s, {}", interval, look.width(), unit,
+                   look.is_met ? "not more than " : "more than ", rule.width, unit, end(rule, look), names.variant,
+                   meaning(rule, look, unit));
 }
 
 /// Why a difference is not shown although p is below the level; empty if it is not, or is shown.
@@ -64,10 +62,10 @@ std::string doubt(const Look& look) {
 
 std::string text_of_difference(const StopRule& rule, const Look& look, const LookNames& names,
                                const std::string& unit) {
-  const std::string text = names.variant + (look.is_met ? " differs from " : " is not shown to differ from ") +
-                           names.baseline + " in " + names.figure + ": p = " + short_text(look.p) +
-                           (look.p < look.level ? ", below " : ", not below ") + short_text(look.level) + doubt(look) +
-                           end(rule, look);
+  const std::string text =
+      formatted("{}{}{} in {}: p = {:.3g}{}{:.3g}{}{}", names.variant,
+                look.is_met ? " differs from " : " is not shown to differ from ", names.baseline, names.figure, look.p,
+                look.p < look.level ? ", below " : ", not below ", look.level, doubt(look), end(rule, look));
   if (std::isinf(look.interval.lower) && look.interval.upper == -look.interval.lower) return text;  // too few cases
   if (std::isinf(look.interval.lower) && look.interval.upper == look.interval.lower)
     return text + ". The median difference is a failure" + holds(rule);
@@ -87,7 +85,7 @@ StopPlan::StopPlan(const StopRule& rule) : rule_(rule), looks_(rule.looks()) {
 
 std::size_t StopPlan::number_of(std::size_t cases) const {
   const auto found = std::find(looks_.begin(), looks_.end(), cases);
-  if (found == looks_.end()) throw Error("the rule has no look at " + std::to_string(cases) + " cases");
+  if (found == looks_.end()) throw Error(formatted("the rule has no look at {} cases", cases));
   return std::size_t(found - looks_.begin());
 }
 
@@ -120,10 +118,9 @@ Look look_at_difference(const StopPlan& plan, std::size_t cases, const std::vect
 
 std::string sentence(const StopRule& rule, const Look& look, const LookNames& names) {
   const std::string unit = names.unit.empty() ? "" : " " + names.unit;
-  return "look " + std::to_string(look.number) + " of " + std::to_string(look.looks) + ", " +
-         std::to_string(look.cases) + " cases: " +
-         (rule.goal == StopRule::Goal::width ? text_of_width(rule, look, names, unit)
-                                             : text_of_difference(rule, look, names, unit));
+  return formatted("look {} of {}, {} cases: {}", look.number, look.looks, look.cases,
+                   rule.goal == StopRule::Goal::width ? text_of_width(rule, look, names, unit)
+                                                      : text_of_difference(rule, look, names, unit));
 }
 
 }  // namespace marrow::compare

@@ -13,9 +13,9 @@ void check_each(const std::vector<double>& values, const std::string& what, bool
   if (values.empty()) throw Error("there are no " + what + "s; give at least one");
   for (std::size_t i = 0; i < values.size(); ++i)
     if (std::isnan(values[i]) || (std::isinf(values[i]) && !may_be_infinite))
-      throw Error(what + " " + std::to_string(i + 1) + " of " + std::to_string(values.size()) + " is " +
-                  formatted("{:f}", values[i]) +
-                  ", which is no number to compare; count its run as failed, and give the rest");
+      throw Error(
+          formatted("{} {} of {} is {:f}, which is no number to compare; count its run as failed, and give the rest",
+                    what, i + 1, values.size(), values[i]));
 }
 
 }  // namespace
@@ -26,8 +26,7 @@ void check_numbers(const std::vector<double>& values, const std::string& what) {
 
 void check_resamples(std::size_t resamples) {
   if (resamples < 1000)
-    throw Error("got " + std::to_string(resamples) +
-                " resamples; the bounds need at least 1000 (10000 is the default)");
+    throw Error(formatted("got {} resamples; the bounds need at least 1000 (10000 is the default)", resamples));
 }
 
 }  // namespace marrow::compare

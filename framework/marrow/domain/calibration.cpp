@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow {
 namespace {
@@ -90,10 +91,10 @@ void check_distortion(const Eigen::Matrix3d& intrinsics, const RadialDistortion&
     const double radius = std::sqrt(largest) * i / kSteps, seen = radius * distortion.factor(radius * radius);
     if (!(seen > before) || !(seen < 2 * std::sqrt(largest)))
       throw Error(
-          what + ": the radial distortion folds the image or more than doubles it, " +
-          std::to_string(int(100.0 * i / kSteps)) +
-          " % of the way to its corner; check that its terms are of normalised coordinates (pixels from the principal "
-          "point over the focal length), as OpenCV gives them");
+          formatted("{}: the radial distortion folds the image or more than doubles it, {} % of the way to its corner; "
+                    "check that its terms are of normalised coordinates (pixels from the principal point over the "
+                    "focal length), as OpenCV gives them",
+                    what, int(100.0 * i / kSteps)));
     before = seen;
   }
 }
@@ -159,10 +160,10 @@ cv::Mat1b original_mask(const cv::Mat1b& straight, const Eigen::Matrix3d& intrin
 
 void apply_calibration(View& view, const Calibration& calibration) {
   if (view.image.width() != calibration.width_px || view.image.height() != calibration.height_px)
-    throw Error("view '" + view.name + "': the image has " + std::to_string(view.image.width()) + " x " +
-                std::to_string(view.image.height()) + " pixels, but the calibration is of images of " +
-                std::to_string(calibration.width_px) + " x " + std::to_string(calibration.height_px) +
-                "; calibrate with images as they are used, neither cropped nor resized");
+    throw Error(
+        formatted("view '{}': the image has {} x {} pixels, but the calibration is of images of {} x {}; calibrate "
+                  "with images as they are used, neither cropped nor resized",
+                  view.name, view.image.width(), view.image.height(), calibration.width_px, calibration.height_px));
   view.camera.intrinsics = calibration.intrinsics;
   remove_distortion(view, calibration.distortion);
 }

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow {
 namespace {
@@ -51,11 +52,10 @@ double pixel_size_at_mm(const Camera& camera, const Eigen::Vector3d& world_mm) {
 
 void check_camera(const Camera& camera, const std::string& what) {
   if (camera.width_px <= 0 || camera.height_px <= 0)
-    throw Error(what + ": image size " + std::to_string(camera.width_px) + " x " + std::to_string(camera.height_px) +
-                " pixels is not positive");
+    throw Error(formatted("{}: image size {} x {} pixels is not positive", what, camera.width_px, camera.height_px));
   if (camera.width_px > kLargestSide_px || camera.height_px > kLargestSide_px)
-    throw Error(what + ": image size " + std::to_string(camera.width_px) + " x " + std::to_string(camera.height_px) +
-                " pixels; expected at most " + std::to_string(kLargestSide_px) + " each way");
+    throw Error(formatted("{}: image size {} x {} pixels; expected at most {} each way", what, camera.width_px,
+                          camera.height_px, kLargestSide_px));
   if (!camera.intrinsics.allFinite() || !(camera.intrinsics(0, 0) > 0) || !(camera.intrinsics(1, 1) > 0))
     throw Error(what + ": the camera matrix needs positive focal lengths in its first two diagonal places");
   if (camera.intrinsics(1, 0) != 0 || camera.intrinsics.row(2) != Eigen::RowVector3d(0, 0, 1))
@@ -65,7 +65,7 @@ void check_camera(const Camera& camera, const std::string& what) {
 }
 
 void check_view(const View& view) {
-  const auto size = [](int width, int height) { return std::to_string(width) + " x " + std::to_string(height); };
+  const auto size = [](int width, int height) { return formatted("{} x {}", width, height); };
   const std::string what = "view '" + view.name + "'";
   if (view.image.pixels.empty()) throw Error(what + ": the image is empty");
   check_camera(view.camera, what);

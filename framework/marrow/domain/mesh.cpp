@@ -31,8 +31,8 @@ void check_mesh(const Mesh& mesh, const std::string& what) {
   for (const auto& t : mesh.triangles)
     for (std::uint32_t corner : t)
       if (corner >= mesh.vertices_mm.size())
-        throw Error(what + ": a triangle names vertex " + std::to_string(corner) + ", but there are only " +
-                    std::to_string(mesh.vertices_mm.size()));
+        throw Error(
+            formatted("{}: a triangle names vertex {}, but there are only {}", what, corner, mesh.vertices_mm.size()));
   for (const auto& vertex : mesh.vertices_mm)
     if (!vertex.allFinite())
       throw Error(what + ": a vertex is not finite");

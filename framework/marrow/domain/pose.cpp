@@ -26,25 +26,25 @@ Matrix6d correlations(const Matrix6d& covariance) {
 void check_covariance(const Matrix6d& covariance, const std::string& what) {
   constexpr const char* kRemedy = "; a covariance is symmetric and has no negative eigenvalue";
   const auto place = [](Eigen::Index row, Eigen::Index column) {
-    return "row " + std::to_string(row + 1) + ", column " + std::to_string(column + 1);
+    return formatted("row {}, column {}", row + 1, column + 1);
   };
   for (Eigen::Index i = 0; i < 6; ++i)
     if (covariance(i, i) < 0)
-      throw Error(what + ": the covariance has the negative variance " + formatted("{:g}", covariance(i, i)) + " in " +
-                  place(i, i) + kRemedy);
+      throw Error(formatted("{}: the covariance has the negative variance {:g} in {}{}", what, covariance(i, i),
+                            place(i, i), kRemedy));
   if (!covariance.allFinite()) return;
   const Matrix6d scaled = correlations(covariance);
   Eigen::Index row = 0, column = 0;
   if (const double apart = (scaled - scaled.transpose()).cwiseAbs().maxCoeff(&row, &column); apart > kRounding) {
     if (row > column) std::swap(row, column);
-    throw Error(what + ": the covariance is not symmetric: " + formatted("{:g}", covariance(row, column)) + " in " +
-                place(row, column) + ", but " + formatted("{:g}", covariance(column, row)) + " in " +
-                place(column, row) + kRemedy);
+    throw Error(formatted("{}: the covariance is not symmetric: {:g} in {}, but {:g} in {}{}", what,
+                          covariance(row, column), place(row, column), covariance(column, row), place(column, row),
+                          kRemedy));
   }
   const double least = eigen_of_symmetric<6>(0.5 * (scaled + scaled.transpose())).values[0];
   if (least < -kRounding)
-    throw Error(what + ": the covariance has a negative eigenvalue (" + formatted("{:g}", least) +
-                " times its variances)" + kRemedy);
+    throw Error(
+        formatted("{}: the covariance has a negative eigenvalue ({:g} times its variances){}", what, least, kRemedy));
 }
 
 void check_pose(const Pose& pose, const std::string& what) {

@@ -9,9 +9,7 @@
 namespace marrow {
 namespace {
 
-std::string size_text(const Grid& grid) {
-  return std::to_string(grid.size[0]) + " x " + std::to_string(grid.size[1]) + " x " + std::to_string(grid.size[2]);
-}
+std::string size_text(const Grid& grid) { return formatted("{} x {} x {}", grid.size[0], grid.size[1], grid.size[2]); }
 
 /// The largest distance between voxels of the same index. It is that of a corner, because places are linear in indices.
 double farthest_apart_mm(const Grid& a, const Grid& b) {
@@ -37,8 +35,9 @@ void check_same_grid(const Grid& field, const Grid& volume) {
                 " voxels" + kRemedy);
   const double apart_mm = farthest_apart_mm(field, volume);
   if (!(apart_mm <= kMost_voxels * volume.spacing_mm.minCoeff()))
-    throw Error("the field does not lie where the volume lies: voxels of the same index are up to " +
-                formatted("{:.3g}", apart_mm) + " mm apart" + kRemedy);
+    throw Error(
+        formatted("the field does not lie where the volume lies: voxels of the same index are up to {:.3g} mm apart{}",
+                  apart_mm, kRemedy));
 }
 
 void check_lies_in(const Mesh& mesh, const Grid& grid, const std::string& what, const std::string& of) {
@@ -53,8 +52,7 @@ void check_lies_in(const Mesh& mesh, const Grid& grid, const std::string& what, 
   });
   const double share = double(inside) / double(std::max<std::size_t>(1, mesh.vertices_mm.size()));
   if (!(share >= kLeastShare))
-    throw Error("only " + formatted("{:.0f}", 100 * share) + " % of " + what + " lies in " + of +
-                "; give those that belong together");
+    throw Error(formatted("only {:.0f} % of {} lies in {}; give those that belong together", 100 * share, what, of));
 }
 
 }  // namespace marrow

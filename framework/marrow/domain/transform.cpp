@@ -26,8 +26,9 @@ void check_rigid(const RigidTransform& t, const std::string& what) {
     throw Error(what + ": the transform has a number that is not finite");
   const double defect = (t.rotation.transpose() * t.rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (defect > 1e-6 || t.rotation.determinant() < 0)
-    throw Error(what + ": not a rotation (off orthonormal by " + formatted("{:f}", defect) + ", determinant " +
-                formatted("{:f}", t.rotation.determinant()) + "); a rotation is orthonormal with determinant +1");
+    throw Error(formatted(
+        "{}: not a rotation (off orthonormal by {:f}, determinant {:f}); a rotation is orthonormal with determinant +1",
+        what, defect, t.rotation.determinant()));
 }
 
 Eigen::Matrix3d rotation_from_vector(const Eigen::Vector3d& rotation_rad) {

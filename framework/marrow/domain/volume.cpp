@@ -13,8 +13,6 @@ namespace {
 
 constexpr double kFinest_mm = 0.001, kCoarsest_mm = 100, kFarthestOrigin_mm = 1e6;
 
-std::string shortest(double number) { return formatted("{:.6g}", number); }
-
 }  // namespace
 
 float sample_trilinear(const Grid& grid, const std::vector<float>& values, const Eigen::Vector3d& index) {
@@ -42,28 +40,27 @@ void check_volume(const Volume& volume, const std::string& what) {
   const Grid& grid = volume.grid;
   for (int k = 0; k < 3; ++k) {
     if (grid.size[k] <= 0)
-      throw Error(what + ": the volume is empty (size " + std::to_string(grid.size[0]) + " x " +
-                  std::to_string(grid.size[1]) + " x " + std::to_string(grid.size[2]) + ")");
+      throw Error(
+          formatted("{}: the volume is empty (size {} x {} x {})", what, grid.size[0], grid.size[1], grid.size[2]));
     if (!(grid.spacing_mm[k] > 0) || !std::isfinite(grid.spacing_mm[k]))
-      throw Error(what + ": voxel spacing " + formatted("{:f}", grid.spacing_mm[k]) + " mm is not a positive length");
+      throw Error(formatted("{}: voxel spacing {:f} mm is not a positive length", what, grid.spacing_mm[k]));
     if (grid.spacing_mm[k] < kFinest_mm || grid.spacing_mm[k] > kCoarsest_mm)
-      throw Error(what + ": voxel spacing " + shortest(grid.spacing_mm[k]) + " mm; expected " + shortest(kFinest_mm) +
-                  " to " + shortest(kCoarsest_mm) + " mm: is it in another unit?");
+      throw Error(formatted("{}: voxel spacing {:.6g} mm; expected {:.6g} to {:.6g} mm: is it in another unit?", what,
+                            grid.spacing_mm[k], kFinest_mm, kCoarsest_mm));
   }
   if (volume.values.size() != grid.count())
-    throw Error(what + ": " + std::to_string(grid.count()) + " voxels expected from its size, got " +
-                std::to_string(volume.values.size()));
+    throw Error(formatted("{}: {} voxels expected from its size, got {}", what, grid.count(), volume.values.size()));
   if (grid.origin_mm.cwiseAbs().maxCoeff() > kFarthestOrigin_mm)
-    throw Error(what + ": the volume begins " + shortest(grid.origin_mm.cwiseAbs().maxCoeff()) +
-                " mm from the origin; expected at most 1 km");
+    throw Error(formatted("{}: the volume begins {:.6g} mm from the origin; expected at most 1 km", what,
+                          grid.origin_mm.cwiseAbs().maxCoeff()));
   check_rigid({grid.frame, "grid", grid.direction, grid.origin_mm}, what);
   const auto bad = std::find_if(volume.values.begin(), volume.values.end(), [](float v) { return !std::isfinite(v); });
   if (bad != volume.values.end()) {
     const std::size_t at = std::size_t(bad - volume.values.begin());
     const std::size_t row = std::size_t(grid.size[0]), slice = row * grid.size[1];
-    throw Error(what + ": voxel (" + std::to_string(at % row) + ", " + std::to_string(at % slice / row) + ", " +
-                std::to_string(at / slice) +
-                ") is not a finite number; replace NaN and infinities (with -1000 HU for air)");
+    throw Error(
+        formatted("{}: voxel ({}, {}, {}) is not a finite number; replace NaN and infinities (with -1000 HU for air)",
+                  what, at % row, at % slice / row, at / slice));
   }
 }
 

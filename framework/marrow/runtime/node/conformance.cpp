@@ -5,7 +5,6 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <deque>
 #include <stdexcept>
 #include <thread>
@@ -127,7 +126,7 @@ Check threads_check(const Kept& suite) {
             auto one = good_call(*suite, subject, inputs, 1);
             for (const int threads : {2, 7}) {
               auto other = good_call(*suite, subject, inputs, threads);
-              expect(keys_of(one) == keys_of(other), std::to_string(threads) + " threads gave other outputs than 1");
+              expect(keys_of(one) == keys_of(other), formatted("{} threads gave other outputs than 1", threads));
             }
             return 0.0;
           }};
@@ -179,7 +178,7 @@ void expect_reason(const std::string& refusal) {
   expect(refusal.size() > 10, "it refuses without saying why: '" + refusal + "'");
 }
 
-std::string digits(double value) { return formatted("{:.3g}", value); }
+std::string digits(double value) { return short_number(value); }
 
 std::filesystem::path files_folder() {
   if (known_files_folder().empty()) throw Error("this check writes files, so only 'marrow conformance' can run it");

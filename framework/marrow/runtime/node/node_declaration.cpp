@@ -2,6 +2,7 @@
 #include <array>
 #include <cstddef>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/runtime/node/declaration.hpp"
 #include "marrow/runtime/node/node_builder.hpp"
 #include "marrow/runtime/node/node_json.hpp"
@@ -81,8 +82,7 @@ NodeDeclaration::NodeDeclaration(NodeDefinition& node, Function function, Call c
 
 NodeDeclaration::~NodeDeclaration() {
   if (const std::size_t ports = node_.info.inputs.size(); named_inputs_ != ports)
-    node_.faults.push_back("the function takes " + std::to_string(ports) + " inputs, but .in() names " +
-                           std::to_string(named_inputs_));
+    node_.faults.push_back(marrow::formatted("the function takes {} inputs, but .in() names {}", ports, named_inputs_));
   check_declaration(node_);
 }
 

@@ -88,8 +88,7 @@ std::optional<OptionValue> read_option(
   }
   if (!good) return std::nullopt;
   if (info.length && numbers.size() != info.length) {
-    yaml.fault(where,
-               what + ": expected " + std::to_string(info.length) + " numbers, got " + std::to_string(numbers.size()));
+    yaml.fault(where, formatted("{}: expected {} numbers, got {}", what, info.length, numbers.size()));
     return std::nullopt;
   }
   if (info.type == OptionType::numbers) return numbers;

@@ -23,8 +23,6 @@ double number_of(const OptionValue& value) {
   return whole ? double(*whole) : std::get<double>(value);
 }
 
-std::string number_text(double value) { return formatted("{:.10g}", value); }
-
 std::size_t length_of(const OptionValue& value) {
   if (const auto* numbers = std::get_if<std::vector<double>>(&value)) return numbers->size();
   return std::get<std::vector<std::string>>(value).size();
@@ -39,7 +37,7 @@ bool is_empty(const OptionValue& value) {
 std::optional<std::string> twice(const OptionValue& value) {
   std::vector<std::string> items;
   if (const auto* numbers = std::get_if<std::vector<double>>(&value))
-    for (const double number : *numbers) items.push_back(number_text(number));
+    for (const double number : *numbers) items.push_back(short_number(number, 10));
   else
     items = std::get<std::vector<std::string>>(value);
   std::sort(items.begin(), items.end());
@@ -66,24 +64,24 @@ std::optional<BrokenRelation> broken(const RelationInfo& relation, const NodeInf
                  high = number_of(option_value_of(info, options, names[1]));
     const bool allows_equal = relation.type == RelationType::not_above;
     if (low < high || (allows_equal && low == high)) return std::nullopt;
-    return BrokenRelation{"option " + in_quotes(names[0]) + " of " + uses + " is " + number_text(low) +
-                              (allows_equal ? ", which is above" : ", which is not below") + " option " +
-                              in_quotes(names[1]) + " (" + number_text(high) + ")",
-                          ""};
+    return BrokenRelation{
+        formatted("option {} of {} is {:.10g}{} option {} ({:.10g})", in_quotes(names[0]), uses, low,
+                  allows_equal ? ", which is above" : ", which is not below", in_quotes(names[1]), high),
+        ""};
   }
   if (relation.type == RelationType::as_many_or_none) {
     const std::size_t count = length_of(option_value_of(info, options, names[0])),
                       like = length_of(option_value_of(info, options, names[1]));
     if (count == 0 || count == like) return std::nullopt;
-    return BrokenRelation{"option " + in_quotes(names[0]) + " of " + uses + " has " + std::to_string(count) + " item" +
-                              (count == 1 ? "" : "s") + ", but " + in_quotes(names[1]) + " has " + std::to_string(like),
+    return BrokenRelation{formatted("option {} of {} has {}, but {} has {}", in_quotes(names[0]), uses,
+                                    counted(count, "item"), in_quotes(names[1]), like),
                           "give one for each, or none"};
   }
   if (relation.type == RelationType::same_length) {
     std::vector<std::string> parts;
     bool is_same = true;
     for (const std::string& name : names) {
-      parts.push_back(in_quotes(name) + " (" + std::to_string(length_of(option_value_of(info, options, name))) + ")");
+      parts.push_back(formatted("{} ({})", in_quotes(name), length_of(option_value_of(info, options, name))));
       is_same = is_same &&
                 length_of(option_value_of(info, options, name)) == length_of(option_value_of(info, options, names[0]));
     }

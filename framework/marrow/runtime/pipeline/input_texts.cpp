@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 
 namespace marrow {
@@ -28,9 +29,9 @@ std::optional<std::string> InputTexts::put_into(const std::string& text, const P
     while (end < text.size() && (std::isalnum(static_cast<unsigned char>(text[end])) || text[end] == '_')) ++end;
     const std::string* value = value_of(text.substr(i + 1, end - i - 1), place);
     if (value && (bytes_ += value->size()) > kMostInputBytes) {
-      diagnostics_.add(
-          place, "the values of inputs make the pipeline longer than " + std::to_string(kMostInputBytes / 1000) + " kB",
-          "give shorter values, or name them less often");
+      diagnostics_.add(place,
+                       formatted("the values of inputs make the pipeline longer than {} kB", kMostInputBytes / 1000),
+                       "give shorter values, or name them less often");
       return std::nullopt;
     }
     known = known && value;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/may_fail.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
@@ -36,7 +37,7 @@ void check_picks(const Pipeline& pipeline, const Reference& source, Diagnostics&
   if (source.items.size() > axes)
     diagnostics.add(source.place,
                     in_quotes(source.text) + " picks " + in_quotes(source.items[axes]) + ", but " +
-                        (axes ? "there are only " + std::to_string(axes) + " axes to pick along" : "it is no list"));
+                        (axes ? formatted("there are only {} axes to pick along", axes) : "it is no list"));
 }
 
 void find_axes(Pipeline& pipeline, std::size_t index, Diagnostics& diagnostics) {

@@ -5,6 +5,7 @@
 
 #include <set>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 
 namespace marrow {
@@ -27,7 +28,7 @@ const Place* place_of(const WrittenNode& node, const std::string& option) {
 std::string in_brackets(const Place* place) {
   if (!place) return " (its default)";
   if (place->file.empty()) return " (on the command line)";
-  return " (" + place->file + ":" + std::to_string(place->line) + ")";
+  return formatted(" ({}:{})", place->file, place->line);
 }
 
 class Replaced {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/pipeline/pipeline_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/runtime/node/option_yaml.hpp"
 
 #include <algorithm>
@@ -55,8 +56,7 @@ class PipelineReader {
         versioned = true;
         const auto version = yaml_.integer(entry.value, entry.place, "marrow");
         if (version && *version != 1)
-          yaml_.fault(entry.place,
-                      "this file is of format " + std::to_string(*version) + ", this program reads format 1");
+          yaml_.fault(entry.place, formatted("this file is of format {}, this program reads format 1", *version));
       }
       if (entry.key == "name") {
         has_name = true;
@@ -236,8 +236,8 @@ class PipelineReader {
   void set_at_most(WrittenRepetition& repetition, const std::optional<std::int64_t>& passes) {
     constexpr std::int64_t kMostPasses = 1'000'000;
     if (passes && (*passes < 1 || *passes > kMostPasses))
-      diagnostics_.add(repetition.at_most_place, "'at_most' is " + std::to_string(*passes) +
-                                                     ", but must be a number of passes from 1 to 1000000");
+      diagnostics_.add(repetition.at_most_place,
+                       formatted("'at_most' is {}, but must be a number of passes from 1 to 1000000", *passes));
     else if (passes)
       repetition.at_most = int(*passes);
   }

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/camera.hpp"
 #include "marrow/domain/mesh.hpp"
 #include "marrow/domain/pose.hpp"
@@ -16,24 +17,23 @@ namespace {
 std::string fault_of_grid(const Grid& grid, std::size_t values) {
   const bool is_possible = std::all_of(grid.size.begin(), grid.size.end(), [](int size) { return size >= 0; });
   if (is_possible && values == grid.count()) return "";
-  return "its grid has " + std::to_string(grid.size[0]) + " x " + std::to_string(grid.size[1]) + " x " +
-         std::to_string(grid.size[2]) + " voxels, but there are " + std::to_string(values) + " values";
+  return formatted("its grid has {} x {} x {} voxels, but there are {} values", grid.size[0], grid.size[1],
+                   grid.size[2], values);
 }
 
 std::string fault_of_mesh(const Mesh& mesh) {
   for (const auto& triangle : mesh.triangles)
     for (const std::uint32_t vertex : triangle)
       if (vertex >= mesh.vertices_mm.size())
-        return "a triangle has the vertex " + std::to_string(vertex) + ", but there are " +
-               std::to_string(mesh.vertices_mm.size()) + " vertices, counted from 0";
+        return formatted("a triangle has the vertex {}, but there are {} vertices, counted from 0", vertex,
+                         mesh.vertices_mm.size());
   return "";
 }
 
 std::string fault_of_view(const View& view) {
   if (view.mask.empty() || view.mask.size() == view.image.pixels.size()) return "";
-  return "its mask has " + std::to_string(view.mask.cols) + " x " + std::to_string(view.mask.rows) +
-         " pixels, its image " + std::to_string(view.image.pixels.cols) + " x " +
-         std::to_string(view.image.pixels.rows);
+  return formatted("its mask has {} x {} pixels, its image {} x {}", view.mask.cols, view.mask.rows,
+                   view.image.pixels.cols, view.image.pixels.rows);
 }
 
 std::string fault_of_pose(const Pose& pose) {

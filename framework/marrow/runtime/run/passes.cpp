@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/runtime/node/mapping.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
@@ -40,7 +41,7 @@ Pipeline with_constants(Pipeline body, const std::vector<std::string>& constant_
   body.outputs.clear();
   for (const Reference& source : used) {
     if (source.node < 0 || !contains(constant_nodes, body.nodes[std::size_t(source.node)].id)) continue;
-    body.outputs.push_back({std::to_string(body.outputs.size()), source});
+    body.outputs.push_back({formatted("{}", body.outputs.size()), source});
   }
   return body;
 }
@@ -91,8 +92,9 @@ void Passes::prepare() {
     const std::vector<std::string> names = names_along(call_.inputs[i], repetition_.axis);
     is_sliced_[i] = !names.empty();
     if (!names.empty() && !names_.empty() && names != names_)
-      throw Error("its inputs do not go in step along '" + repetition_.axis + "': there are lists of " +
-                  std::to_string(names_.size()) + " and " + std::to_string(names.size()) + " items, or of other names");
+      throw Error(
+          formatted("its inputs do not go in step along '{}': there are lists of {} and {} items, or of other names",
+                    repetition_.axis, names_.size(), names.size()));
     if (!names.empty()) names_ = names;
   }
   find_constant_nodes();
@@ -170,13 +172,13 @@ bool Passes::has_next() {
   if (!repetition_.is_loop && pass_ >= names_.size()) return false;
   if (repetition_.at_most && pass_ >= std::size_t(repetition_.at_most)) {
     record_->end = pass_ == 1 ? "there was one pass, which is the limit"
-                              : "there were " + std::to_string(pass_) + " passes, which is the limit";
+                              : formatted("there were {} passes, which is the limit", pass_);
     return false;
   }
   return true;
 }
 
-std::string Passes::name_of_pass() const { return repetition_.is_loop ? std::to_string(pass_ + 1) : names_[pass_]; }
+std::string Passes::name_of_pass() const { return repetition_.is_loop ? formatted("{}", pass_ + 1) : names_[pass_]; }
 
 std::unique_ptr<Passes::Run> Passes::next_pass() {
   is_first_ = false;

@@ -49,7 +49,7 @@ json json_of_input(const Value& value, std::vector<std::shared_ptr<const SharedI
   const std::shared_ptr<const SharedInput> shared = SharedInputs::all().share(value);
   kept.push_back(shared);
   return {{"type", value.type.id},
-          {"memory", "/proc/" + std::to_string(getpid()) + "/fd/" + std::to_string(shared->memory.descriptor())},
+          {"memory", formatted("/proc/{}/fd/{}", getpid(), shared->memory.descriptor())},
           {"number", shared->number},
           {"samples_bytes", shared->samples_bytes}};
 }
@@ -98,8 +98,6 @@ WorkerEnd wait_for(PythonProcess& process, const WorkerLimits& limits, Context& 
   }
 }
 
-std::string short_text(double number) { return formatted("{:.6g}", number); }
-
 /// How the node is declared in its file.
 std::string decorator_of(const NodeInfo& node) {
   const TypeInfo type = makes_function(node) ? node.outputs[0].type : TypeInfo{};
@@ -114,10 +112,9 @@ std::string failure_of_call(const fs::path& file, const NodeInfo& node, const Wo
                             const WorkerLimits& limits) {
   const std::string name = file.filename().string(),
                     ended = " and its process was ended; if it needs more, give it more in " + decorator_of(node);
-  if (end.is_late)
-    return name + " took longer than " + short_text(limits.seconds) + " s," + ended + "(..., seconds=...)";
+  if (end.is_late) return formatted("{} took longer than {:.6g} s,{}(..., seconds=...)", name, limits.seconds, ended);
   if (end.is_out_of_memory && end.died)
-    return name + " used more than " + short_text(limits.memory_mb) + " MB of memory," + ended + "(..., memory_mb=...)";
+    return formatted("{} used more than {:.6g} MB of memory,{}(..., memory_mb=...)", name, limits.memory_mb, ended);
   if (end.signal == SIGKILL) return killed_from_outside("the process of " + name);
   if (end.signal) return name + " crashed its process (" + strsignal(end.signal) + "); the next call starts a new one";
   if (end.died && end.failed.starts_with("ended"))

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/run/stopped_nodes.hpp"
 
+#include "marrow/base/number_text.hpp"
+
 namespace marrow {
 
 using Status = NodeRecord::Status;
@@ -8,7 +10,7 @@ using Status = NodeRecord::Status;
 bool NodeRecord::was_stopped() const { return status == Status::not_run && calls + cached == 0; }
 
 std::string not_run_text(int nodes) {
-  return std::to_string(nodes) + (nodes == 1 ? " node was" : " nodes were") + " not run because of it";
+  return formatted("{} not run because of it", counted(nodes, "node was", "nodes were"));
 }
 
 void count_stopped_nodes(const Pipeline& pipeline, std::vector<NodeRecord>& records) {
