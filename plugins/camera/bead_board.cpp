@@ -110,8 +110,8 @@ Metrics report_of(const CalibrationResult& fit, const Outliers& outliers) {
     add(std::string("principal_") + axes[i] + "_deviation", c.principal_deviation_px[i], "px");
   }
   for (std::size_t i = 0; i < 3; ++i) {
-    add("k" + std::to_string(i + 1), c.distortion.k[i], "");
-    add("k" + std::to_string(i + 1) + "_deviation", c.distortion_deviation[i], "");
+    add(formatted("k{}", i + 1), c.distortion.k[i], "");
+    add(formatted("k{}_deviation", i + 1), c.distortion_deviation[i], "");
   }
   return report;
 }
@@ -149,15 +149,15 @@ Picture picture_of(const Image& image, const ViewPoints& points, const calibrati
 
 void check_images(const List<Image>& images) {
   if (images.size() < 3)
-    throw Error(std::to_string(images.size()) +
-                " images of the board are given; at least 3 are needed, and 8 are better, with the board tilted "
-                "differently in each");
+    throw Error(
+        formatted("{} images of the board are given; at least 3 are needed, and 8 are better, with the board tilted "
+                  "differently in each",
+                  images.size()));
   for (std::size_t i = 1; i < images.size(); ++i)
     if (images[i].pixels.size() != images[0].pixels.size())
-      throw Error("image '" + images.name(i) + "' has " + std::to_string(images[i].width()) + " x " +
-                  std::to_string(images[i].height()) + " pixels, '" + images.name(0) + "' " +
-                  std::to_string(images[0].width()) + " x " + std::to_string(images[0].height()) +
-                  "; one calibration is for one size");
+      throw Error(formatted("image '{}' has {} x {} pixels, '{}' {} x {}; one calibration is for one size",
+                            images.name(i), images[i].width(), images[i].height(), images.name(0), images[0].width(),
+                            images[0].height()));
 }
 
 BeadBoardResult bead_board(const List<Image>& images, const BeadBoardOptions& options, Context& context) {

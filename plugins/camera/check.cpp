@@ -139,8 +139,6 @@ Picture draw(const View& view, const SeenPoints& points, const Mesh* mesh, const
   return {with_legend(panel.pixels, legend)};
 }
 
-std::string text(double value) { return formatted("{:.3g}", value); }
-
 /// The warnings about one view, the most probable first. `mistake`: the sentence that explains its points, if any.
 std::vector<std::string> warnings_of(const View& view, const InView& points, const Mesh* mesh, const Options& options,
                                      double error, const std::optional<std::string>& mistake) {
@@ -154,17 +152,17 @@ std::vector<std::string> warnings_of(const View& view, const InView& points, con
   if (mistake || points.all.pixels.empty() || error <= options.warn_above_px) return warnings;
   const auto refit = calibration::refit_pose(view.camera, points.known);
   if (refit && refit->error_px < error / 3)
-    warnings.push_back("the points are " + text(error) + " px off, but only " + text(refit->error_px) +
-                       " px if the camera is turned by " + text(refit->turn_deg) + " degrees and moved by " +
-                       text(refit->shift_mm) +
-                       " mm: its inner parameters are right, its pose is not, or the object has moved");
+    warnings.push_back(
+        formatted("the points are {:.3g} px off, but only {:.3g} px if the camera is turned by {:.3g} degrees and "
+                  "moved by {:.3g} mm: its inner parameters are right, its pose is not, or the object has moved",
+                  error, refit->error_px, refit->turn_deg, refit->shift_mm));
   else
-    warnings.push_back("the points are " + text(error) + " px off" +
-                       (refit
-                            ? ", and still " + text(refit->error_px) +
-                                  " px with the best pose: focal length, principal point, distortion or the "
-                                  "points themselves are wrong"
-                            : std::string(", more than the ") + text(options.warn_above_px) + " px of warn_above_px"));
+    warnings.push_back(formatted("the points are {:.3g} px off{}", error,
+                                 refit
+                                     ? formatted(", and still {:.3g} px with the best pose: focal length, principal "
+                                                 "point, distortion or the points themselves are wrong",
+                                                 refit->error_px)
+                                     : formatted(", more than the {:.3g} px of warn_above_px", options.warn_above_px)));
   return warnings;
 }
 
@@ -194,8 +192,9 @@ void check_directions(const List<View>& views, Context& context, int& warnings) 
       };
       const double angle = degrees(std::acos(std::min(1.0, std::abs(axis(i).dot(axis(k))))));
       if (angle > 10) continue;
-      context.warn("views '" + views.name(k) + "' and '" + views.name(i) + "' look along nearly the same line (" +
-                   text(angle) + " degrees apart); is one camera given twice?");
+      context.warn(formatted(
+          "views '{}' and '{}' look along nearly the same line ({:.3g} degrees apart); is one camera given twice?",
+          views.name(k), views.name(i), angle));
       ++warnings;
     }
 }
@@ -228,7 +227,7 @@ Checked check(const List<View>& views, const Mesh* mesh, const Options& options,
     const auto sentences = warnings_of(view, seen, mesh, options, error, mistakes[i]);
     for (const std::string& sentence : sentences) context.warn("view '" + view.name + "': " + sentence);
     warnings += int(sentences.size());
-    const std::string verdict = seen.all.pixels.empty() ? "" : ": " + text(error) + " px";
+    const std::string verdict = seen.all.pixels.empty() ? "" : formatted(": {:.3g} px", error);
     checked.pictures.add(view.name,
                          draw(view, seen.all, mesh, verdict + (sentences.empty() ? "" : ", see warnings"), options));
   }

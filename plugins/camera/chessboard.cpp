@@ -6,6 +6,7 @@
 #include <marrow/plugin.hpp>
 #include <opencv2/calib3d.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/camera/determined.hpp"
 #include "marrow/toolbox/calibration/calibrate.hpp"
 #include "marrow/toolbox/calibration/chessboard.hpp"
@@ -30,9 +31,7 @@ struct Seen {
   std::vector<Eigen::Vector2d> pixels;
 };
 
-std::string size_of(const cv::Mat& pixels) {
-  return std::to_string(pixels.cols) + " x " + std::to_string(pixels.rows) + " pixels";
-}
+std::string size_of(const cv::Mat& pixels) { return formatted("{} x {} pixels", pixels.cols, pixels.rows); }
 
 /// What OpenCV's calibration finds. The last three terms of its distortion are not used or not always.
 struct Fit {
@@ -111,13 +110,13 @@ Metrics report_of(const Fit& fit, const Calibration& c, std::size_t photographs)
     report.items.push_back({std::string("principal_") + axes[i], c.intrinsics(i, 2), "px"});
     report.items.push_back({std::string("principal_") + axes[i] + "_deviation", c.principal_deviation_px[i], "px"});
   }
-  for (std::size_t i = 0; i < 3; ++i) report.items.push_back({"k" + std::to_string(i + 1), c.distortion.k[i], ""});
+  for (std::size_t i = 0; i < 3; ++i) report.items.push_back({formatted("k{}", i + 1), c.distortion.k[i], ""});
   return report;
 }
 
 Result chessboard(const List<Picture>& boards, const List<Picture>* placed, const Options& options, Context& context) {
   calibration::check_chessboard(options, "camera.chessboard");
-  const std::string board = std::to_string(options.columns) + " x " + std::to_string(options.rows) + " inner corners";
+  const std::string board = formatted("{} x {} inner corners", options.columns, options.rows);
   std::vector<Seen> seen;
   cv::Size size;
   const auto look_at = [&](const std::string& name, const Picture& photograph) {
@@ -125,9 +124,8 @@ Result chessboard(const List<Picture>& boards, const List<Picture>* placed, cons
     if (photograph.pixels.empty() || photograph.pixels.type() != CV_8UC3)
       throw Error("photograph '" + name + "' is not a colour picture of 8 bits");
     if (size.area() > 0 && photograph.pixels.size() != size)
-      throw Error("photograph '" + name + "' has " + size_of(photograph.pixels) + ", those before it " +
-                  std::to_string(size.width) + " x " + std::to_string(size.height) +
-                  "; one calibration is for one size");
+      throw Error(formatted("photograph '{}' has {}, those before it {} x {}; one calibration is for one size", name,
+                            size_of(photograph.pixels), size.width, size.height));
     size = photograph.pixels.size();
     seen.push_back({name, calibration::find_corners(photograph, options)});
     return !seen.back().pixels.empty();
@@ -139,9 +137,10 @@ Result chessboard(const List<Picture>& boards, const List<Picture>* placed, cons
       seen.pop_back();
     }
   if (seen.size() < 3)
-    throw Error(std::to_string(seen.size()) + " of " + std::to_string(boards.size()) +
-                " photographs show a chessboard with " + board +
-                "; at least 3 are needed, and 10 are better, with the board tilted differently in each");
+    throw Error(
+        formatted("{} of {} photographs show a chessboard with {}; at least 3 are needed, and 10 are better, with the "
+                  "board tilted differently in each",
+                  seen.size(), boards.size(), board));
   const std::size_t first_placed = seen.size();
   for (std::size_t i = 0; placed && i < placed->size(); ++i)
     if (!look_at(placed->name(i), (*placed)[i]))

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "camera_files.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/runtime/node/types.hpp"
 
 namespace marrow::conformance {
@@ -69,7 +70,7 @@ cv::Mat board_image(int number) {
 
 Value images_of(const std::vector<cv::Mat>& pixels) {
   List<Image> list;
-  for (std::size_t i = 0; i < pixels.size(); ++i) list.add(std::to_string(i + 1), Image{pixels[i]});
+  for (std::size_t i = 0; i < pixels.size(); ++i) list.add(formatted("{}", i + 1), Image{pixels[i]});
   return Value::of<Image>(list, "view");
 }
 
@@ -130,7 +131,7 @@ Picture chessboard_picture(int number) {
 Value chessboards() {
   static const Value kPictures = [] {
     List<Picture> list;
-    for (int i = 0; i < 5; ++i) list.add(std::to_string(i), chessboard_picture(i));
+    for (int i = 0; i < 5; ++i) list.add(formatted("{}", i), chessboard_picture(i));
     return Value::of<Picture>(list, "photograph");
   }();
   return kPictures;
@@ -216,7 +217,7 @@ double principal_point(const Subject& subject) {
 
 double board_error(const Subject& subject) {
   const List<Camera> cameras = cameras_of(subject, "images");
-  expect(cameras.size() == 8, "it gives " + std::to_string(cameras.size()) + " cameras for 8 images");
+  expect(cameras.size() == 8, formatted("it gives {} cameras for 8 images", cameras.size()));
   double sum = 0;
   for (std::size_t i = 0; i < 8; ++i)
     for (const Bead& bead : board_beads())
@@ -228,7 +229,7 @@ double board_error(const Subject& subject) {
 /// -cos p cos s, sin s), with the primary angle p and the secondary angle s.
 double arm_direction(const Subject& subject) {
   const List<Camera> cameras = cameras_of(subject, "paths");
-  expect(cameras.size() == 2, "it gives " + std::to_string(cameras.size()) + " cameras for 2 files");
+  expect(cameras.size() == 2, formatted("it gives {} cameras for 2 files", cameras.size()));
   double worst = 0;
   for (const auto& [number, p, s] :
        {std::tuple<std::size_t, double, double>{0, 0, 0}, {1, radians(-30), radians(20)}}) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/quantile.hpp"
 #include "marrow/runtime/node/types.hpp"
 
@@ -104,7 +105,7 @@ std::vector<double> distances(const EdgeMap& map, const Shape& shape) {
     const double distance = shape.distance_px(pixel.u_px, pixel.v_px);
     if (std::abs(distance) <= kNear_px) found.push_back(distance);
   }
-  expect(found.size() >= 100, "it finds " + std::to_string(found.size()) + " pixels of an edge that is hundreds long");
+  expect(found.size() >= 100, formatted("it finds {} pixels of an edge that is hundreds long", found.size()));
   return found;
 }
 

@@ -5,15 +5,16 @@
 
 #include "marrow/domain/calibration.hpp"
 
+#include "marrow/base/number_text.hpp"
+
 namespace {
 
 using marrow::Calibration;
 
 marrow::Metrics calibration_error(const Calibration& found, const Calibration& truth) {
   if (found.width_px != truth.width_px || found.height_px != truth.height_px)
-    throw marrow::Error("the calibration is of images of " + std::to_string(found.width_px) + " x " +
-                        std::to_string(found.height_px) + " pixels, the truth of " + std::to_string(truth.width_px) +
-                        " x " + std::to_string(truth.height_px));
+    throw marrow::Error(marrow::formatted("the calibration is of images of {} x {} pixels, the truth of {} x {}",
+                                          found.width_px, found.height_px, truth.width_px, truth.height_px));
   const auto focal_error = [&](int i) {
     return 100 * std::abs(found.intrinsics(i, i) - truth.intrinsics(i, i)) / truth.intrinsics(i, i);
   };

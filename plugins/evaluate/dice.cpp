@@ -3,6 +3,8 @@
 // the voxels of the field.
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
+
 namespace {
 
 using namespace marrow;
@@ -53,7 +55,7 @@ Metrics dice(const SignedField& field, const SignedField& reference, Context& co
         "neither the field nor the reference has an inside, so there is nothing to compare; inside is where values are "
         "negative");
   if (beyond > 0)
-    context.warn(std::to_string(beyond) + " voxels of the reference lie outside the field's grid and count as missed");
+    context.warn(formatted("{} voxels of the reference lie outside the field's grid and count as missed", beyond));
   Metrics metrics;
   metrics.items = {{"dice", 2 * common / (volume + other), ""},
                    {"jaccard", common / (volume + other - common), ""},

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/quantile.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 
@@ -27,8 +28,8 @@ double value_of(const Metrics& metrics, const std::string& name, const std::stri
 
 Metrics frames(const List<Metrics>& metrics, const List<TrackState>* states, const Options& options) {
   if (states && states->names() != metrics.names())
-    throw Error("the states are of other frames than the figures: " + std::to_string(states->size()) + " and " +
-                std::to_string(metrics.size()));
+    throw Error(
+        formatted("the states are of other frames than the figures: {} and {}", states->size(), metrics.size()));
   Metrics result;
   std::vector<bool> counts(metrics.size(), true);
   if (states)

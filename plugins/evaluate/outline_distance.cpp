@@ -7,10 +7,12 @@
 #include <marrow/plugin.hpp>
 #include <vector>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/quantile.hpp"
 
 namespace {
 
+using marrow::formatted;
 using marrow::quantile;
 
 /// Finds the nearest edge pixel with a gradient of similar direction. Edge pixels are sorted into square cells. The
@@ -78,9 +80,8 @@ void check_edges(const marrow::View& view, const marrow::EdgeMap* edges) {
   if (!edges)
     throw marrow::Error(what + ": there is no edge map of that name; make the edges from the same list of views");
   if (edges->width_px != view.camera.width_px || edges->height_px != view.camera.height_px)
-    throw marrow::Error(what + ": the edge map is for " + std::to_string(edges->width_px) + " x " +
-                        std::to_string(edges->height_px) + " pixels, the image has " +
-                        std::to_string(view.camera.width_px) + " x " + std::to_string(view.camera.height_px));
+    throw marrow::Error(formatted("{}: the edge map is for {} x {} pixels, the image has {} x {}", what,
+                                  edges->width_px, edges->height_px, view.camera.width_px, view.camera.height_px));
   if (edges->pixels.empty())
     throw marrow::Error(
         what + ": the edge map is empty, so there is nothing to measure to; lower the edge detector's thresholds");
@@ -156,8 +157,9 @@ marrow::Metrics outline_distance(const marrow::Pose& pose, const marrow::Outline
   }
   if (all.px.empty())
     throw marrow::Error(
-        "the outline is outside the image in every view (" + std::to_string(views.size()) +
-        "), so there is no distance; check the pose and that the cameras and the model use the same world frame");
+        formatted("the outline is outside the image in every view ({}), so there is no distance; check the pose and "
+                  "that the cameras and the model use the same world frame",
+                  views.size()));
   marrow::Metrics metrics;
   report("", all, metrics);
   metrics.items.insert(metrics.items.end(), per_view.items.begin(), per_view.items.end());

@@ -26,11 +26,12 @@ double source_to_detector_mm(const Options& options, std::size_t view, std::size
   const std::vector<double>& given = options.source_to_detector_mm;
   if (given.empty()) return 0;
   if (given.size() != 1 && given.size() != views)
-    throw Error("source_to_detector_mm has " + std::to_string(given.size()) + " numbers, but there are " +
-                std::to_string(views) + " views; give one for all, or one for each");
+    throw Error(
+        formatted("source_to_detector_mm has {} numbers, but there are {} views; give one for all, or one for each",
+                  given.size(), views));
   const double distance = given[given.size() == 1 ? 0 : view];
   if (!(distance > 0))
-    throw Error("source_to_detector_mm: each number must be positive, got " + formatted("{:f}", distance));
+    throw Error(formatted("source_to_detector_mm: each number must be positive, got {:f}", distance));
   return distance;
 }
 

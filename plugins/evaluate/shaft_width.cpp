@@ -81,9 +81,10 @@ void check_sides(const std::vector<Sight>& sights) {
     }
   const std::string angle = marrow::formatted("{:.1f}", widest_deg);
   if (widest_deg < 10)
-    throw marrow::Error("the " + std::to_string(sights.size()) +
-                        " views see the shaft from nearly the same side: the planes of its axis meet at " + angle +
-                        " degrees, where 10 are needed; use views farther apart");
+    throw marrow::Error(
+        marrow::formatted("the {} views see the shaft from nearly the same side: the planes of its axis meet at {} "
+                          "degrees, where 10 are needed; use views farther apart",
+                          sights.size(), angle));
 }
 
 /// A plane {X : n . X = o} touches the bone if n . (point + t direction) + distance_v + slope_v t = o for all t. So
@@ -143,9 +144,10 @@ std::optional<marrow::Metrics> shaft_width(const List<ShaftLines>& lines, const 
     const double width_mm = diameter_mm(bone, sights[i], Eigen::Index(i));
     const auto holds = [&](const Possible& one) { return width_mm >= one.least_mm && width_mm <= one.most_mm; };
     if (std::none_of(possible.begin(), possible.end(), holds))
-      context.warn("view '" + lines.name(i) + "': the borders are " + std::to_string(int(std::lround(width_mm))) +
-                   " mm apart at the depth where the views have the axis, which is no shaft's width (" +
-                   range(possible) + "); one view's pair is another thing than the other's");
+      context.warn(
+          marrow::formatted("view '{}': the borders are {} mm apart at the depth where the views have the axis, which "
+                            "is no shaft's width ({}); one view's pair is another thing than the other's",
+                            lines.name(i), int(std::lround(width_mm)), range(possible)));
     metrics.items.push_back({lines.name(i) + "_width_mm", width_mm, "mm"});
     metrics.items.push_back({lines.name(i) + "_magnification", lines[i].width_mm / width_mm, ""});
   }

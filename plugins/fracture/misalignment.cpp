@@ -66,8 +66,8 @@ Eigen::Vector3d shaft_of(const FragmentFrame& distal, const FragmentFrame& proxi
 Eigen::Vector3d fracture_in_ct_mm(const List<Mesh>* models, const Options& options) {
   if (!options.fracture_mm.empty()) {
     if (options.fracture_mm.size() != 3)
-      throw Error("'fracture_mm' takes one point of the CT, as [x, y, z], got " +
-                  std::to_string(options.fracture_mm.size()) + " numbers");
+      throw Error(formatted("'fracture_mm' takes one point of the CT, as [x, y, z], got {} numbers",
+                            options.fracture_mm.size()));
     return Eigen::Vector3d::Map(options.fracture_mm.data());
   }
   const Mesh *moved = models ? models->find(options.moved) : nullptr,

@@ -99,13 +99,13 @@ Stop stop_of(const GuideState& state, const Remaining& remaining, const std::str
     return {true, "the fragment is in its place as far as the images show: " + remaining.in_words()};
   constexpr int kMostStops = 4;
   if (state.stops >= kMostStops)
-    return {true, "the robot stopped " + std::to_string(kMostStops) + " times in a row: " + report.stopped + "; " +
-                      remaining.in_words()};
+    return {true,
+            formatted("the robot stopped {} times in a row: {}; {}", kMostStops, report.stopped, remaining.in_words())};
   if (brings_nothing(state.errors, deviation))
     return {true, "the way has not become shorter in two pairs of images: " + remaining.in_words()};
   if (state.pairs >= options.max_pairs)
     return {true,
-            std::to_string(state.pairs) + " pairs of images are taken, no more are allowed: " + remaining.in_words()};
+            formatted("{} pairs of images are taken, no more are allowed: {}", state.pairs, remaining.in_words())};
   return {false, remaining.in_words()};
 }
 
@@ -234,7 +234,7 @@ Result closed_loop(const List<Pose>& poses, const GuideState& before, const Robo
   }
   result.motion.world_from_model = command.told;
   result.predicted = predicted(poses, models, command.expected, command.step, command.hand_eye, options);
-  context.info("pair " + std::to_string(state.pairs) + ": " + result.stop.reason);
+  context.info(formatted("pair {}: {}", state.pairs, result.stop.reason));
   result.metrics.items = {
       {"pairs", double(state.pairs), ""},
       {"images", double(state.images), ""},

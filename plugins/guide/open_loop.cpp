@@ -30,8 +30,8 @@ struct Place {
 
 std::vector<robot::Station> stations_of(const List<Pose>& hands, const List<Pose>& targets) {
   if (hands.names() != targets.names())
-    throw Error("poses of the hand and of the target are not of the same stations: there are " +
-                std::to_string(hands.size()) + " and " + std::to_string(targets.size()));
+    throw Error(formatted("poses of the hand and of the target are not of the same stations: there are {} and {}",
+                          hands.size(), targets.size()));
   std::vector<robot::Station> stations;
   for (std::size_t i = 0; i < hands.size(); ++i) {
     check_pose(hands[i], "the hand at " + hands.name(i));

@@ -21,18 +21,19 @@ Pose target(const View& view, const Options& options, Context& context) {
   const auto discs = calibration::find_beads(view.image, {});
   constexpr std::size_t kFewest = 6;
   if (discs.size() < kFewest)
-    throw Error("the target is not seen in view '" + view.name + "': it shows " + std::to_string(discs.size()) +
-                " round dark discs, at least " + std::to_string(kFewest) +
-                " are needed; bring the robot's hand into the beam");
+    throw Error(
+        formatted("the target is not seen in view '{}': it shows {} round dark discs, at least {} are needed; bring "
+                  "the robot's hand into the beam",
+                  view.name, discs.size(), kFewest));
   const calibration::ViewPoints points =
       calibration::match_board(board, discs, view.camera.width_px, view.camera.height_px, view.name);
   const calibration::BoardPose found = calibration::board_pose(points, view.camera);
   context.info(formatted("{} beads, residual {:.3f} px", points.pixels.size(), found.residual_px));
   if (found.residual_px > options.max_residual_px)
-    throw Error("the target does not fit view '" + view.name +
-                formatted("': its beads are {:.2f} px off where its pose shows them, at most {:.2f} px are allowed",
-                          found.residual_px, options.max_residual_px) +
-                "; is it this target, and the camera of this image?");
+    throw Error(
+        formatted("the target does not fit view '{}': its beads are {:.2f} px off where its pose shows them, at most "
+                  "{:.2f} px are allowed; is it this target, and the camera of this image?",
+                  view.name, found.residual_px, options.max_residual_px));
   Pose pose;
   RigidTransform camera_from_target = found.camera_from_board;
   camera_from_target.source = "target";

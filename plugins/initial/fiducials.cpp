@@ -82,14 +82,16 @@ Pose fiducials(const Mesh& model, const Landmarks& landmarks, const Options& opt
   pose.cost = std::sqrt(residuals.squares / count);
   const double deviation_mm = options.noise_mm > 0 ? options.noise_mm : std::sqrt(residuals.squares / (3 * count - 6));
   pose.covariance = covariance_of(pairs, pose.frame, deviation_mm);
-  context.info("fiducial registration error " + short_number(pose.cost) + " mm over " +
-               std::to_string(pairs.names.size()) + " points, localisation error " +
-               short_number(std::sqrt(3.0) * deviation_mm) + " mm; predicted error of the fragment's centroid " +
-               short_number(std::sqrt(pose.covariance->bottomRightCorner<3, 3>().trace())) + " mm");
+  context.info(
+      formatted("fiducial registration error {} mm over {} points, localisation error {} mm; predicted error of the "
+                "fragment's centroid {} mm",
+                short_number(pose.cost), pairs.names.size(), short_number(std::sqrt(3.0) * deviation_mm),
+                short_number(std::sqrt(pose.covariance->bottomRightCorner<3, 3>().trace()))));
   if (pose.cost > options.warn_above_mm) {
-    pose.warnings.push_back("the tracked points do not fit those in the CT: they are off by " +
-                            short_number(pose.cost) + " mm, '" + residuals.farthest + "' by " +
-                            short_number(residuals.largest) + " mm; are two names exchanged, or did a marker move?");
+    pose.warnings.push_back(
+        formatted("the tracked points do not fit those in the CT: they are off by {:.3g} mm, '{}' by {:.3g} mm; are "
+                  "two names exchanged, or did a marker move?",
+                  pose.cost, residuals.farthest, residuals.largest));
     context.warn(pose.warnings.back());
   }
   return pose;

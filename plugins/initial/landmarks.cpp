@@ -53,9 +53,8 @@ void check_enough(const std::vector<Sight>& sights) {
   }
   const std::size_t least = views.size() > 1 ? 3 : 4;
   if (names.size() < least)
-    throw Error(std::to_string(names.size()) + " landmarks are seen in " + std::to_string(views.size()) +
-                (views.size() == 1 ? " view" : " views") +
-                "; a pose takes three that are seen in two views, or four in one");
+    throw Error(formatted("{} landmarks are seen in {}; a pose takes three that are seen in two views, or four in one",
+                          names.size(), counted(views.size(), "view")));
   geometry::check_spread(points, "the landmarks that are seen");
 }
 
@@ -139,10 +138,11 @@ void check_unique(const std::vector<Candidate>& found, std::size_t sights, doubl
     const double apart = geodesic_angle_rad(other.pose.rotation, found.front().pose.rotation);
     if (apart < kSame_rad || other.squares_px - found.front().squares_px > kFactor_100 * noise_px * noise_px) continue;
     const auto rms = [&](const Candidate& one) { return short_number(std::sqrt(one.squares_px / double(sights))); };
-    throw Error("two poses explain the landmarks: they differ by " + short_number(degrees(apart)) +
-                " degrees, and leave " + rms(found.front()) + " and " + rms(other) +
-                " px. In one view, points that lie nearly in a plane look the same tilted to either side; add a view, "
-                "or a landmark that lies off that plane");
+    throw Error(
+        formatted("two poses explain the landmarks: they differ by {:.3g} degrees, and leave {} and {} px. In one "
+                  "view, points that lie nearly in a plane look the same tilted to either side; add a view, or a "
+                  "landmark that lies off that plane",
+                  degrees(apart), rms(found.front()), rms(other)));
   }
 }
 
@@ -155,9 +155,10 @@ std::string residual_warning(const std::vector<Sight>& sights, const Pose& pose,
     worst = &sight;
     largest = off;
   }
-  return "the landmarks are seen " + short_number(pose.cost) + " px from where this pose has them, '" + worst->name +
-         "' in view '" + worst->view + "' " + short_number(largest) + " px, where " + short_number(noise_px) +
-         " px were expected; are two names exchanged, or is a camera wrong?";
+  return formatted(
+      "the landmarks are seen {:.3g} px from where this pose has them, '{}' in view '{}' {:.3g} px, where {:.3g} px "
+      "were expected; are two names exchanged, or is a camera wrong?",
+      pose.cost, worst->name, worst->view, largest, noise_px);
 }
 
 Pose landmarks(const Mesh& model, const Landmarks& landmarks, const List<View>& views, const Options& options,

@@ -32,8 +32,6 @@ struct Options {
 constexpr double kWidthTolerance = 0.15;  // a pair is not the model's if the widths differ by a larger fraction
 constexpr double kLeastLength_mm = 25;    // at the bone
 
-std::string number(double value) { return marrow::formatted("{:.1f}", value); }
-
 /// Information from one view: the pair of borders, and the plane that contains the axis.
 struct Sight {
   std::string name;
@@ -173,15 +171,17 @@ std::vector<std::string> doubts(const std::vector<Sight>& sights, const std::vec
     const double seen_mm = width_px(sights[i].lines, inset_mm / pixel_mm) * pixel_mm,
                  model_mm = borders[i].width_px * pixel_mm;
     if (sights.size() > 1 && std::abs(seen_mm - model_mm) > kWidthTolerance * model_mm)
-      warnings.push_back("view '" + sights[i].name + "': the shaft's borders are " + number(seen_mm) +
-                         " mm apart, where the model is " + number(model_mm) +
-                         " mm wide; they may belong to something else");
+      warnings.push_back(
+          marrow::formatted("view '{}': the shaft's borders are {:.1f} mm apart, where the model is {:.1f} mm wide; "
+                            "they may belong to something else",
+                            sights[i].name, seen_mm, model_mm));
     const Plane model = bisecting_plane(*sights[i].camera, borders[i].left, borders[i].right);
     const double turned_deg =
         marrow::degrees(std::acos(std::clamp(std::abs(model.normal.dot(sights[i].plane.normal)), 0.0, 1.0)));
     if (turned_deg > 1)
-      warnings.push_back("view '" + sights[i].name + "': its shaft lines disagree with those of the other views by " +
-                         number(turned_deg) + " degrees");
+      warnings.push_back(
+          marrow::formatted("view '{}': its shaft lines disagree with those of the other views by {:.1f} degrees",
+                            sights[i].name, turned_deg));
   }
   return warnings;
 }

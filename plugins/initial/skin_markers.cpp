@@ -41,8 +41,8 @@ Markers markers_of(const Landmarks& landmarks, const Options& options) {
   check_names(landmarks);
   const std::size_t count = landmarks.tracked.size();
   if (options.noise_mm.size() != 1 && options.noise_mm.size() != count)
-    throw Error("noise_mm has " + std::to_string(options.noise_mm.size()) + " numbers for " + std::to_string(count) +
-                " tracked markers; give one for all, or one for each");
+    throw Error(formatted("noise_mm has {} numbers for {} tracked markers; give one for all, or one for each",
+                          options.noise_mm.size(), count));
   for (const double noise : options.noise_mm)
     if (!(noise > 0 && std::isfinite(noise)))
       throw Error("noise_mm: each number must be positive, got " + short_number(noise));
@@ -118,13 +118,14 @@ void warn_of_residuals(Pose& pose, const Markers& markers, Context& context) {
   }
   pose.cost = std::sqrt(pose.cost);
   const double ratio = std::sqrt(squares / double(3 * markers.names.size() - 6));
-  context.info("markers off by " + short_number(pose.cost) + " mm after the fit, " + short_number(ratio) +
-               " times what noise_mm says; axial rotation known to " +
-               short_number(degrees(std::sqrt((*pose.covariance)(2, 2)))) + " degrees");
+  context.info(formatted(
+      "markers off by {:.3g} mm after the fit, {:.3g} times what noise_mm says; axial rotation known to {:.3g} degrees",
+      pose.cost, ratio, degrees(std::sqrt((*pose.covariance)(2, 2)))));
   if (ratio <= kMost) return;
-  pose.warnings.push_back("the markers do not keep their places to each other: they are off by " + short_number(ratio) +
-                          " times what noise_mm says, '" + farthest + "' by " + short_number(largest) +
-                          " mm; are two names exchanged, or did a marker move?");
+  pose.warnings.push_back(
+      formatted("the markers do not keep their places to each other: they are off by {:.3g} times what noise_mm says, "
+                "'{}' by {:.3g} mm; are two names exchanged, or did a marker move?",
+                ratio, farthest, largest));
   context.warn(pose.warnings.back());
 }
 

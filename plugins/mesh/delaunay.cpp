@@ -4,6 +4,7 @@
 #include <marrow/plugin.hpp>
 
 #include "delaunay_refinement.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/mesh/signs.hpp"
 
 namespace {
@@ -101,7 +102,7 @@ Mesh delaunay(const SignedField& field, const Options& options, marrow::Context&
       mesh = marrow::surface::finish(std::move(mesh), options);
       if (surface.complete && marrow::is_manifold(mesh)) return mesh;
       fault = surface.complete ? "its parts are smaller than the triangles"
-                               : "it stopped at " + std::to_string(criteria.most_points) + " vertices";
+                               : marrow::formatted("it stopped at {} vertices", criteria.most_points);
     } catch (const std::logic_error&) {  // a condition that CGAL asserts
       fault = "CGAL's mesher came to a degenerate case";
     }

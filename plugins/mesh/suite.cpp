@@ -10,6 +10,7 @@
 #include <random>
 #include <set>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/manifold.hpp"
 #include "marrow/domain/quantile.hpp"
 #include "marrow/runtime/node/types.hpp"
@@ -150,7 +151,7 @@ int euler_number(const Mesh& mesh) {
 
 double topology(const Subject& subject, const Shape& shape) {
   const int found = euler_number(mesh_of(subject, shape.inputs));
-  expect(found == shape.euler, "Euler number " + std::to_string(found) + ", expected " + std::to_string(shape.euler));
+  expect(found == shape.euler, formatted("Euler number {}, expected {}", found, shape.euler));
   return 0;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/optimizer/nlopt_run.hpp"
 
 namespace {
@@ -11,10 +12,10 @@ void check_bounds(const marrow::MinimisationProblem& problem) {
   for (Eigen::Index i = 0; i < problem.start.size(); ++i) {
     const double range = problem.upper[i] - problem.lower[i], step = problem.initial_step[i];
     if (range > 0 && range < 2 * step)
-      throw marrow::Error("BOBYQA needs bounds that are two initial steps apart: those of coordinate " +
-                          std::to_string(i + 1) + " are " + marrow::formatted("{:g}", range) +
-                          " apart, and its step is " + marrow::formatted("{:g}", step) +
-                          "; use smaller steps or another optimizer");
+      throw marrow::Error(
+          marrow::formatted("BOBYQA needs bounds that are two initial steps apart: those of coordinate {} are {:g} "
+                            "apart, and its step is {:g}; use smaller steps or another optimizer",
+                            i + 1, range, step));
   }
 }
 
@@ -23,8 +24,8 @@ class Bobyqa : public marrow::Optimizer {
   marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
     marrow::search::check_problem(problem);
     if (problem.start.size() < 2)
-      throw marrow::Error("BOBYQA minimises functions of two or more numbers, got " +
-                          std::to_string(problem.start.size()) + "; use another optimizer");
+      throw marrow::Error(marrow::formatted(
+          "BOBYQA minimises functions of two or more numbers, got {}; use another optimizer", problem.start.size()));
     check_bounds(problem);
     return marrow::search::NloptRun(nlopt::LN_BOBYQA, problem).run();
   }

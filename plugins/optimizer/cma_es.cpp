@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <marrow/domain/decompositions.hpp>
+#include "marrow/base/number_text.hpp"
 #include "marrow/optimizer/evaluations.hpp"
 
 namespace {
@@ -128,8 +129,8 @@ class CmaEs : public marrow::Optimizer {
 
 std::shared_ptr<const marrow::Optimizer> cma_es(const Options& options) {
   if (options.population != 0 && options.population < 4)
-    throw marrow::Error("population: expected 4 or more, or 0 for the usual number, got " +
-                        std::to_string(options.population));
+    throw marrow::Error(
+        marrow::formatted("population: expected 4 or more, or 0 for the usual number, got {}", options.population));
   return std::make_shared<CmaEs>(options);
 }
 

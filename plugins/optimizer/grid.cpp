@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/optimizer/evaluations.hpp"
 
 namespace {
@@ -47,8 +48,8 @@ class GridSearch : public marrow::Optimizer {
 
 std::shared_ptr<const marrow::Optimizer> grid(const Options& options) {
   if (options.grid_points % 2 == 0)
-    throw marrow::Error("grid_points: expected an odd number, so that the middle is one of them, got " +
-                        std::to_string(options.grid_points));
+    throw marrow::Error(marrow::formatted(
+        "grid_points: expected an odd number, so that the middle is one of them, got {}", options.grid_points));
   return std::make_shared<GridSearch>(options.grid_points);
 }
 

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/functions.hpp"
 
 namespace marrow::conformance {
@@ -102,8 +103,7 @@ double evaluations_over_budget(const Subject& subject) {
         0);
     problem.max_evaluations = budget;
     const MinimisationResult result = (*optimizer).minimise(problem);
-    expect(result.evaluations == calls,
-           "it counts " + std::to_string(result.evaluations) + " evaluations of " + std::to_string(calls));
+    expect(result.evaluations == calls, formatted("it counts {} evaluations of {}", result.evaluations, calls));
     worst = std::max(worst, calls - budget);
   }
   return worst;

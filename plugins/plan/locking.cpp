@@ -36,8 +36,6 @@ struct Result {
   Verdict verdict;
 };
 
-std::string shown(double value) { return formatted("{:.2f}", value); }
-
 /// [v] with [v] w = v x w.
 Matrix3d cross(const Vector3d& v) {
   Matrix3d matrix;
@@ -73,9 +71,10 @@ void aim(const LockingOptions& options, LockingPlan::Drill& drill) {
   const Vector3d off = drill.centre_mm - options.isocentre_mm, &axis = drill.direction;
   const double along = axis.dot(off), root = along * along - off.squaredNorm() + distance * distance;
   if (!(off.norm() < distance))
-    throw Error("plan.locking: hole '" + drill.hole + "' lies " + shown(off.norm()) +
-                " mm from the isocentre, but the " + "C-arm's source is only " + shown(distance) +
-                " mm from it; check isocentre_mm and the pose");
+    throw Error(
+        formatted("plan.locking: hole '{}' lies {:.2f} mm from the isocentre, but the C-arm's source is only {:.2f} mm "
+                  "from it; check isocentre_mm and the pose",
+                  drill.hole, off.norm(), distance));
   double least = 1e9;
   for (const double s : {along + std::sqrt(root), along - std::sqrt(root)}) {
     const Vector3d w = (s * axis - off) / distance;
@@ -101,11 +100,12 @@ void doubt(const LockingOptions& options, int seen, LockingPlan::Drill& drill) {
   if (std::isnan(drill.deviation_deg))
     drill.doubts.push_back("the pose of the nail has no predicted deviations, so nothing says how far the hole is off");
   if (!(drill.most_deg <= options.max_angle_deg) && !std::isnan(drill.most_deg))
-    drill.doubts.push_back("the direction of the hole is known to " + shown(drill.most_deg) +
-                           " degrees only (95 %), and the limit is " + shown(options.max_angle_deg));
+    drill.doubts.push_back(
+        formatted("the direction of the hole is known to {:.2f} degrees only (95 %), and the limit is {:.2f}",
+                  drill.most_deg, options.max_angle_deg));
   if (!(drill.most_mm <= options.max_offset_mm) && !std::isnan(drill.most_mm))
-    drill.doubts.push_back("the place of the hole is known to " + shown(drill.most_mm) +
-                           " mm only (95 %), and the limit is " + shown(options.max_offset_mm));
+    drill.doubts.push_back(formatted("the place of the hole is known to {:.2f} mm only (95 %), and the limit is {:.2f}",
+                                     drill.most_mm, options.max_offset_mm));
   if (seen < 2) drill.doubts.push_back(seen == 0 ? "no view shows the hole" : "only one view shows the hole");
 }
 
@@ -119,8 +119,7 @@ Vector3d drills_come_from(const LockingOptions& options) {
     return {options.side == "left" ? 1.0 : -1.0, -0.5, 0};
   }
   if (options.from.size() != 3)
-    throw Error("plan.locking: from takes one direction, as [1, 0, 0], got " + std::to_string(options.from.size()) +
-                " numbers");
+    throw Error(formatted("plan.locking: from takes one direction, as [1, 0, 0], got {} numbers", options.from.size()));
   const Vector3d from = Vector3d::Map(options.from.data());
   if (!(from.norm() > 0))
     throw Error(
@@ -146,8 +145,9 @@ std::vector<std::string> doubts_about(const Pose& pose, double cost, const Locki
   std::vector<std::string> doubts;
   for (const std::string& warning : pose.warnings) doubts.push_back("the registration warns: " + warning);
   if (cost > options.max_cost)
-    doubts.push_back("the images do not show the holes where this pose has them: the cost there is " + shown(cost) +
-                     ", and the limit is " + shown(options.max_cost));
+    doubts.push_back(formatted(
+        "the images do not show the holes where this pose has them: the cost there is {:.2f}, and the limit is {:.2f}",
+        cost, options.max_cost));
   return doubts;
 }
 
@@ -173,8 +173,8 @@ Verdict judge(const LockingPlan& plan, const std::vector<std::string>& about_all
     most_deg = std::max(most_deg, drill.most_deg);
     most_mm = std::max(most_mm, drill.most_mm);
   }
-  verdict.reasons = {"the axes of the holes are known to " + shown(most_deg) + " degrees and " + shown(most_mm) +
-                     " mm (95 %)"};
+  verdict.reasons = {
+      formatted("the axes of the holes are known to {:.2f} degrees and {:.2f} mm (95 %)", most_deg, most_mm)};
   return verdict;
 }
 
@@ -198,8 +198,10 @@ Result locking(const Implant& implant, const Pose& pose, const List<View>& views
     result.plan.drills.push_back(std::move(drill));
   }
   if (seen_at_all == 0)
-    throw Error("plan.locking: no view shows any of the " + std::to_string(implant.holes.size()) +
-                " holes of the nail at its pose; take images of the nail's tip, or check the pose");
+    throw Error(
+        formatted("plan.locking: no view shows any of the {} holes of the nail at its pose; take images of the nail's "
+                  "tip, or check the pose",
+                  implant.holes.size()));
   result.verdict = judge(result.plan, about_all);
   if (cost) result.verdict.figures.push_back({"cost_at_holes", at_holes, ""});
   return result;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/project/bricks.hpp"
 #include "marrow/project/rays.hpp"
 
@@ -186,10 +187,10 @@ std::shared_ptr<const marrow::RadiographProjector> lightfield(const marrow::Volu
   const std::size_t mb = count * sizeof(std::uint16_t) >> 20;
   if (mb > std::size_t(options.max_memory_mb))
     throw marrow::Error(
-        "the integrals would take " + std::to_string(mb) + " MB, but max_memory_mb is " +
-        std::to_string(options.max_memory_mb) +
-        "; raise ray_spacing_mm or direction_spacing_deg, take a smaller max_rotation_deg, or the field of a fragment");
-  context.info("keeps " + std::to_string(count) + " integrals, " + std::to_string(mb) + " MB");
+        marrow::formatted("the integrals would take {} MB, but max_memory_mb is {}; raise ray_spacing_mm or "
+                          "direction_spacing_deg, take a smaller max_rotation_deg, or the field of a fragment",
+                          mb, options.max_memory_mb));
+  context.info(marrow::formatted("keeps {} integrals, {} MB", count, mb));
   Bricks bricks(attenuation);
   for (Field& one : fields) one.fill(bricks, attenuation.grid.spacing_mm);
   return std::make_shared<LightField>(std::move(attenuation), std::move(bricks), std::move(fields));

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "made.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/project/plane_solid.hpp"
 
 namespace marrow::conformance {
@@ -71,8 +72,7 @@ double pixels_off_mm(const RadiographProjector& projector, bool single) {
       for (int column = 0; column < some.columns; ++column) pixels.push_back(some.pixel(column, row).cast<float>());
     const std::vector<float> values =
         single ? projector.radiograph(camera, pose(), pixels) : projector.radiograph(camera, pose(), some);
-    expect(values.size() == pixels.size(),
-           "of " + std::to_string(pixels.size()) + " pixels it gives " + std::to_string(values.size()) + " values");
+    expect(values.size() == pixels.size(), formatted("of {} pixels it gives {} values", pixels.size(), values.size()));
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       const float expected = all[std::size_t(pixels[i].y()) * kSize_px + std::size_t(pixels[i].x())];
       squares += std::pow(double(values[i] - expected), 2);
@@ -172,8 +172,7 @@ PixelGrid whole() { return {0, 0, 1, kSize_px, kSize_px}; }
 std::vector<float> radiograph_of(const RadiographProjector& projector, const Camera& camera, const PixelGrid& grid,
                                  const RigidTransform& at) {
   std::vector<float> values = projector.radiograph(camera, at, grid);
-  expect(values.size() == grid.count(),
-         "of " + std::to_string(grid.count()) + " pixels it gives " + std::to_string(values.size()) + " values");
+  expect(values.size() == grid.count(), formatted("of {} pixels it gives {} values", grid.count(), values.size()));
   return values;
 }
 

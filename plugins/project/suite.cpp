@@ -11,6 +11,7 @@
 
 #include "bodies.hpp"
 #include "made.hpp"
+#include "marrow/base/number_text.hpp"
 #include "outline_checks.hpp"
 #include "radiograph_checks.hpp"
 
@@ -51,7 +52,7 @@ double differing_drawings(const Subject& subject) {
     count += differing([&] {
       std::string text;
       for (const OutlinePoint& p : projector->outline(camera, pose(), 1))
-        text += digits(double(p.u_px)) + " " + std::to_string(p.v_px) + " ";
+        text += formatted("{} {:f} ", digits(double(p.u_px)), p.v_px);
       return text;
     });
   for (const RadiographProjector* projector : made.all<RadiographProjector>())
@@ -75,7 +76,7 @@ double moved_together(const Subject& subject) {
                       same = projector->outline(other, at, 2).size();
     // A point on the border of a pixel may fall on either side.
     expect(std::abs(double(same) - double(count)) <= 2 + 0.02 * double(count),
-           "moved together, the outline has " + std::to_string(same) + " points, not " + std::to_string(count));
+           formatted("moved together, the outline has {} points, not {}", same, count));
   }
   double most = 0;
   for (const RadiographProjector* projector : made.all<RadiographProjector>()) {

@@ -4,6 +4,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/names.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/read/camera_file.hpp"
 #include "marrow/read/image_doubts.hpp"
 #include "marrow/toolbox/files/escaped_name.hpp"
@@ -210,7 +211,7 @@ void read_views(const fs::path& folder, const YamlMap& map, marrow::Case& result
   if (!views->IsSequence() || views->size() == 0)
     return map.fault("views", "views: expected a list of views, each with name, image and camera");
   if (views->size() > kMostViews)
-    return map.fault("views", "views: there are " + std::to_string(views->size()) + "; at most 1000 are read");
+    return map.fault("views", marrow::formatted("views: there are {}; at most 1000 are read", views->size()));
   for (const auto& item : *views) {
     const YamlMap view(map.file(), item, "a view", {"name", "image", "camera", "mask"});
     if (view.valid()) read_view(folder, view, result, context);

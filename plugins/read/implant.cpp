@@ -32,8 +32,7 @@ Hole hole_from(const YamlMap& map, const std::string& name) {
   }
   if (const auto diameter = map.number("diameter_mm")) {
     hole.diameter_mm = *diameter;
-    if (!(*diameter > 0))
-      map.fault("diameter_mm", "diameter_mm: expected more than 0, got " + formatted("{:f}", *diameter));
+    if (!(*diameter > 0)) map.fault("diameter_mm", formatted("diameter_mm: expected more than 0, got {:f}", *diameter));
   }
   return hole;
 }

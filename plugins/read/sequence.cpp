@@ -3,6 +3,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/names.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/read/image_doubts.hpp"
 #include "marrow/read/view_file.hpp"
 #include "marrow/toolbox/files/sequence_files.hpp"
@@ -45,11 +46,11 @@ std::vector<Image> read_images(const fs::path& path, const std::string& pattern,
     images.push_back(files::read_image_file(all[std::size_t(frame - 1)]));
     const cv::Mat &first = images.front().pixels, &now = images.back().pixels;
     if (now.size() != first.size() || now.type() != first.type())
-      throw Error(all[std::size_t(frame - 1)].string() + ": frame " + std::to_string(frame) + " has " +
-                  std::to_string(now.cols) + " x " + std::to_string(now.rows) + " pixels of " +
-                  std::to_string(8 * now.elemSize1()) + " bits, but the first one " + std::to_string(first.cols) +
-                  " x " + std::to_string(first.rows) + " of " + std::to_string(8 * first.elemSize1()) +
-                  "; all frames of a view must be alike");
+      throw Error(
+          formatted("{}: frame {} has {} x {} pixels of {} bits, but the first one {} x {} of {}; all frames of a view "
+                    "must be alike",
+                    all[std::size_t(frame - 1)].string(), frame, now.cols, now.rows, 8 * now.elemSize1(), first.cols,
+                    first.rows, 8 * first.elemSize1()));
   }
   return images;
 }
@@ -64,9 +65,8 @@ List<SequenceFrame> sequence(const List<Camera>* cameras, const Options& options
     std::vector<Image> images = read_images(options.images.at(i), pattern, options, context);
     if (i == 0) frames.resize(images.size());
     if (images.size() != frames.size())
-      throw Error("view '" + name + "' has " + std::to_string(images.size()) + " frames, but view '" +
-                  options.names.front() + "' has " + std::to_string(frames.size()) + " (" +
-                  options.images.at(i).string() + "); all views must show the same moments");
+      throw Error(formatted("view '{}' has {} frames, but view '{}' has {} ({}); all views must show the same moments",
+                            name, images.size(), options.names.front(), frames.size(), options.images.at(i).string()));
     exchange::ViewSource source{name,
                                 {},
                                 cameras ? &exchange::camera_of_view(name, *cameras) : nullptr,

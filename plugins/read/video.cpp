@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "video_picture.hpp"
 
@@ -168,8 +169,8 @@ class Video {
 Image image_of(const Video& video, const AVFrame& frame, int number) {
   const auto grey = grey_of(frame);
   if (!grey)
-    throw Error(video.what() + ": frame " + std::to_string(number) +
-                " has a kind of pixels that is not read; expected 8 to 16 bits of grey or colour");
+    throw Error(formatted("{}: frame {} has a kind of pixels that is not read; expected 8 to 16 bits of grey or colour",
+                          video.what(), number));
   return {*grey};
 }
 
@@ -187,15 +188,14 @@ std::vector<Image> read_video(const fs::path& path, const char* container, const
     images.push_back(image_of(video, *frame, count));
     const cv::Mat &first = images.front().pixels, &now = images.back().pixels;
     if (now.size() != first.size() || now.type() != first.type())
-      throw Error(path.string() + ": frame " + std::to_string(count) +
-                  " has another size or other bits than the first");
+      throw Error(formatted("{}: frame {} has another size or other bits than the first", path.string(), count));
   }
   if (const long told = video.frames_told(); range.last == 0 && count < told)
-    throw Error(path.string() + ": says that it has " + std::to_string(told) + " frames, but only " +
-                std::to_string(count) + " can be decoded; to read these, set last to " + std::to_string(count));
+    throw Error(formatted("{}: says that it has {} frames, but only {} can be decoded; to read these, set last to {}",
+                          path.string(), told, count, count));
   if (video.is_damaged())
-    throw Error(path.string() + ": frame " + std::to_string(count + 1) +
-                " is cut off or damaged; to read those before it, set last to " + std::to_string(count));
+    throw Error(formatted("{}: frame {} is cut off or damaged; to read those before it, set last to {}", path.string(),
+                          count + 1, count));
   files::frames_of(range, count, path.string());  // are there the first and the last?
   return images;
 }

@@ -40,8 +40,8 @@ void check_inputs(const List<View>& views, const List<Cost>& costs, const List<P
                   "' cannot be split into views: it compares no views, or it holds more than them, such as a prior; "
                   "give the cost of the images alone");
     if (costs[f].view_count() != views.size())
-      throw Error("the cost of '" + costs.name(f) + "' compares " + std::to_string(costs[f].view_count()) +
-                  " views, but there are " + std::to_string(views.size()) + "; make it of the same views");
+      throw Error(formatted("the cost of '{}' compares {} views, but there are {}; make it of the same views",
+                            costs.name(f), costs[f].view_count(), views.size()));
   }
 }
 
@@ -85,8 +85,8 @@ Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose
   refinement.run(context);
   check_compared(refinement, poses);
   if (!refinement.converged())
-    context.warn("the cameras still moved after " + std::to_string(options.max_iterations) +
-                 " iterations; raise max_iterations");
+    context.warn(
+        formatted("the cameras still moved after {} iterations; raise max_iterations", options.max_iterations));
   const std::string text = formatted(
       "the cameras are off against each other by about {:.3g} times what the options expect", refinement.scale());
   context.info(text);

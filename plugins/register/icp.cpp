@@ -43,8 +43,8 @@ std::string percent(std::size_t part, std::size_t whole) {
 
 void add_warnings(const marrow::match::Result& found, const Options& options, Pose& pose, const Context& context) {
   if (!found.converged)
-    pose.warnings.push_back("the pairs of points still changed after " + std::to_string(options.max_iterations) +
-                            " iterations; raise max_iterations");
+    pose.warnings.push_back(formatted("the pairs of points still changed after {} iterations; raise max_iterations",
+                                      options.max_iterations));
   if (found.paired < std::size_t(options.points) / 2)
     pose.warnings.push_back("only " + percent(found.paired, std::size_t(options.points)) +
                             " of the model's points have one of the target within reach_mm; is the start far off, or "
@@ -64,10 +64,10 @@ Result icp(const Pose& initial, const Mesh& model, const Mesh& target, const Opt
   context.check_cancelled();
   const marrow::match::Result found = marrow::match::align(points, goal, {options.max_iterations, options.reach_mm});
   if (found.paired < 3)
-    throw Error(std::to_string(found.paired) + " of " + std::to_string(points.size()) +
-                " points of the model have one of the target within " +
-                std::to_string(int(std::lround(options.reach_mm))) +
-                " mm, but three at least are needed; give a better start, or raise reach_mm");
+    throw Error(
+        formatted("{} of {} points of the model have one of the target within {} mm, but three at least are needed; "
+                  "give a better start, or raise reach_mm",
+                  found.paired, points.size(), int(std::lround(options.reach_mm))));
   Result result;
   Pose start = initial;
   if (!start.frame.is_anatomical) start.frame = fragment_frame(model);

@@ -29,7 +29,7 @@ void draw_number(Panel& panel, const marrow::LineSegment& line, std::size_t numb
   const cv::Point2d at = panel.at(upper.x(), upper.y());
   const cv::Point place(std::clamp(int(at.x) + 4, 0, std::max(0, panel.pixels.cols - 20)),
                         std::clamp(int(at.y) + 16, 16, std::max(16, panel.pixels.rows - 4)));
-  draw_text(panel.pixels, std::to_string(number), place, colour);
+  draw_text(panel.pixels, marrow::formatted("{}", number), place, colour);
 }
 
 /// The line midway between the borders.
@@ -49,10 +49,10 @@ marrow::Picture shaft(const marrow::ShaftLines& lines, const marrow::View& view,
     draw_segment(panel, pair.left, kOrange, 1);
     draw_segment(panel, pair.right, kOrange, 1);
     draw_number(panel, pair.left, i + 1, kOrange);
-    legend.push_back({"rejected " + std::to_string(i + 1) + ": " + pair.reason, kOrange});
+    legend.push_back({marrow::formatted("rejected {}: {}", i + 1, pair.reason), kOrange});
   }
   if (count < lines.rejected.size())
-    legend.push_back({std::to_string(lines.rejected.size() - count) + " more rejected pairs are not drawn", kGrey});
+    legend.push_back({marrow::formatted("{} more rejected pairs are not drawn", lines.rejected.size() - count), kGrey});
   draw_segment(panel, lines.left, kSkyBlue, 2);
   draw_segment(panel, lines.right, kSkyBlue, 2);
   draw_segment(panel, mid_line(lines), kSkyBlue, 1);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/board_views.hpp"
 #include "marrow/toolbox/robotics/robot_state.hpp"
@@ -70,7 +71,7 @@ Result stations(const RobotState& state, const Camera& camera, const View* state
   double worst = robot::condition(nominal, nominal.base_from_home);
   for (int i = 0; i < options.stations; ++i) {
     context.check_cancelled();
-    const std::string name = "station" + std::to_string(i + 1);
+    const std::string name = formatted("station{}", i + 1);
     marrow::Random random(std::uint64_t(options.station_seed), std::uint64_t(i));
     const RigidTransform told = drawn(random, options, about_mm) * nominal.base_from_home;
     robot::check_workspace(nominal, state.limits, told, "robot.stations: " + name);

@@ -13,6 +13,7 @@
 namespace {
 
 using marrow::Context;
+using marrow::formatted;
 using marrow::List;
 using marrow::Seeds;
 using marrow::SignedField;
@@ -68,8 +69,8 @@ void log_fronts(const std::vector<Front>& fronts, const List<Seeds>& seeds, int 
                 Context& context) {
   for (std::size_t f = 0; f < fronts.size(); ++f) {
     const std::string line =
-        marrow::formatted("step {}, {}: mean speed {:.3f} of F0, {} voxels in the moving band", step, seeds.name(f),
-                          fronts[f].mean_motion_mm() / (kStepsPerCycle * step_mm), fronts[f].band_voxels());
+        formatted("step {}, {}: mean speed {:.3f} of F0, {} voxels in the moving band", step, seeds.name(f),
+                  fronts[f].mean_motion_mm() / (kStepsPerCycle * step_mm), fronts[f].band_voxels());
     context.debug(line);
   }
 }
@@ -116,9 +117,8 @@ void check(const Volume& volume) {
   marrow::check_volume(volume, "volume");
   for (int size : volume.grid.size)
     if (size < 4)
-      throw marrow::Error("volume: at least 4 voxels along each axis expected, got " +
-                          std::to_string(volume.grid.size[0]) + " x " + std::to_string(volume.grid.size[1]) + " x " +
-                          std::to_string(volume.grid.size[2]));
+      throw marrow::Error(formatted("volume: at least 4 voxels along each axis expected, got {} x {} x {}",
+                                    volume.grid.size[0], volume.grid.size[1], volume.grid.size[2]));
 }
 
 List<SignedField> level_set_fields(const Volume& volume, const List<Seeds>& seeds, const Options& options,

@@ -6,6 +6,7 @@
 #include <deque>
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/segment/fragments.hpp"
 #include "marrow/segment/seed_points.hpp"
 
@@ -112,9 +113,9 @@ List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds,
     context.progress(0.4 + 0.6 * double(f) / double(seeds.size()), seeds.name(f));
     if (!growth.has_any(f))
       throw marrow::Error(
-          "seeds of fragment '" + seeds.name(f) + "': at none of them the CT reaches " +
-          std::to_string(int(options.threshold_hu)) +
-          " HU, or it belongs to another fragment; add a point in brighter bone, or lower threshold_hu");
+          marrow::formatted("seeds of fragment '{}': at none of them the CT reaches {} HU, or it belongs to another "
+                            "fragment; add a point in brighter bone, or lower threshold_hu",
+                            seeds.name(f), int(options.threshold_hu)));
     if (!seeds[f].wanted) continue;
     const marrow::field::Mask mask = marrow::field::solid(volume.grid, growth.owner(), std::uint8_t(f),
                                                           marrow::field::margin(volume.grid, options.band_mm));

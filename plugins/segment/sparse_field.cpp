@@ -15,6 +15,7 @@
 namespace {
 
 using marrow::Context;
+using marrow::formatted;
 using marrow::Grid;
 using marrow::List;
 using marrow::Seeds;
@@ -46,8 +47,7 @@ SignedField field_of(const Volume& volume, const marrow::field::Mask& mask, cons
                                          options.min_rms};
   marrow::field::Contour contour = marrow::field::geodesic(marrow::field::cut_out(volume, mask), std::move(start),
                                                            box.size, {s.x(), s.y(), s.z()}, settings);
-  const std::string line =
-      marrow::formatted("{}: {} iterations, last change {:.4f}", name, contour.iterations, contour.rms);
+  const std::string line = formatted("{}: {} iterations, last change {:.4f}", name, contour.iterations, contour.rms);
   context.debug(line);
   for (int z = 0; z < box.size[2]; ++z)
     for (int y = 0; y < box.size[1]; ++y)
@@ -67,8 +67,7 @@ List<SignedField> sparse_field(const Volume& volume, const List<Seeds>& seeds, c
                                Context& context) {
   marrow::check_volume(volume, "volume");
   for (int size : volume.grid.size)
-    if (size < 4)
-      throw marrow::Error("volume: at least 4 voxels along each axis expected, got " + std::to_string(size));
+    if (size < 4) throw marrow::Error(formatted("volume: at least 4 voxels along each axis expected, got {}", size));
   const auto owner = marrow::field::race(volume, marrow::field::seed_indices(volume, seeds, options.floor_hu),
                                          {.floor_hu = options.floor_hu});
   std::vector<SignedField> fields;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <random>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/runtime/node/types.hpp"
 
 namespace marrow::conformance {
@@ -134,7 +135,7 @@ void validate(const Inputs& inputs, const std::vector<PortInfo>&, const std::vec
 
 List<SignedField> fields_of(const Subject& subject, const Tube& tube) {
   const Value fields = subject.output(inputs_of(tube), "field");
-  expect(fields.items.size() == 2, "it gives " + std::to_string(fields.items.size()) + " fields for 2 fragments");
+  expect(fields.items.size() == 2, formatted("it gives {} fields for 2 fragments", fields.items.size()));
   return fields.as_list<SignedField>();
 }
 
@@ -205,7 +206,7 @@ std::vector<double> wall_distances(const Subject& subject, const Tube& tube) {
         if (radius > 0.5 * (kInner_mm + kOuter_mm)) distances.push_back(radius - kOuter_mm);
       }
   expect(distances.size() > 300,
-         "its surface crosses the wall " + std::to_string(distances.size()) + " times, some 1000 expected");
+         formatted("its surface crosses the wall {} times, some 1000 expected", distances.size()));
   return distances;
 }
 

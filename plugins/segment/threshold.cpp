@@ -2,12 +2,14 @@
 #include <marrow/plugin.hpp>
 #include <queue>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/segment/fragments.hpp"
 #include "marrow/segment/seed_points.hpp"
 
 namespace {
 
 using marrow::Context;
+using marrow::formatted;
 using marrow::Grid;
 using marrow::List;
 using marrow::Seeds;
@@ -73,9 +75,9 @@ void check_claims(const List<Seeds>& seeds, const Options& options, const std::v
   for (std::size_t f = 0; f < seeds.size(); ++f)
     if (!has_bone[f])
       throw marrow::Error(
-          "seeds of fragment '" + seeds.name(f) + "': at none of them the CT reaches the threshold of " +
-          std::to_string(int(options.threshold_hu)) +
-          " HU, or it belongs to another fragment; add a point in cortical bone, or lower threshold_hu");
+          formatted("seeds of fragment '{}': at none of them the CT reaches the threshold of {} HU, or it belongs to "
+                    "another fragment; add a point in cortical bone, or lower threshold_hu",
+                    seeds.name(f), int(options.threshold_hu)));
 }
 
 /// Gives the largest connected component of bright voxels to fragment 0.
@@ -110,8 +112,10 @@ List<SignedField> threshold(const Volume& volume, const List<Seeds>* seeds, cons
   for (std::size_t at = 0; at < owner.size(); ++at)
     if (volume.values[at] >= options.threshold_hu) owner[at] = kUnclaimed, any = true;
   if (!any)
-    throw marrow::Error("volume: no voxel reaches the threshold of " + std::to_string(int(options.threshold_hu)) +
-                        " HU, so there is no bone; lower threshold_hu, and check that the CT is in Hounsfield units");
+    throw marrow::Error(
+        formatted("volume: no voxel reaches the threshold of {} HU, so there is no bone; lower threshold_hu, and check "
+                  "that the CT is in Hounsfield units",
+                  int(options.threshold_hu)));
   if (!seeds) {
     claim_largest(volume.grid, owner);
     List<SignedField> bone;

@@ -5,6 +5,7 @@
 #include <marrow/base/number_text.hpp>
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/similarity/block_expansions.hpp"
 #include "marrow/similarity/blur.hpp"
 #include "marrow/similarity/edge_loss.hpp"

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <random>
 
+#include "marrow/base/number_text.hpp"
 #include "scene.hpp"
 #include "silence_checks.hpp"
 
@@ -33,8 +34,8 @@ void check_blocks(const Cost& cost, const std::vector<RigidTransform>& poses) {
   const std::size_t blocks = cost.without_each_block(truth()).size();
   for (const RigidTransform& pose : poses) {
     const std::vector<double> without = cost.without_each_block(pose);
-    expect(without.size() == blocks, "without_each_block() gives " + std::to_string(blocks) +
-                                         " values at one pose and " + std::to_string(without.size()) + " at another");
+    expect(without.size() == blocks,
+           formatted("without_each_block() gives {} values at one pose and {} at another", blocks, without.size()));
     for (const double value : without) expect(std::isfinite(value), "a value without a block is not finite");
     for (std::size_t view = 0; view < cost.view_count(); ++view)
       expect(std::isfinite(cost.value_in_view(view, pose)), "its value in one view is not finite");
@@ -48,8 +49,7 @@ void validate(const Inputs&, const std::vector<PortInfo>& ports, const std::vect
     const Cost& cost = outputs[i].as<Cost>();
     const std::vector<RigidTransform> poses = strange_poses();
     const std::vector<double> together = cost.values(poses);
-    expect(together.size() == poses.size(),
-           "of " + std::to_string(poses.size()) + " poses it gives " + std::to_string(together.size()) + " values");
+    expect(together.size() == poses.size(), formatted("of {} poses it gives {} values", poses.size(), together.size()));
     for (std::size_t k = 0; k < poses.size(); ++k) {
       const double value = cost.value(poses[k]);
       expect(std::isfinite(value), std::string("its value is ") + (std::isnan(value) ? "not a number" : "infinite") +

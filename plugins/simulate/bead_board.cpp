@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/board_views.hpp"
 
@@ -26,7 +27,7 @@ Simulated bead_board(const Options& options, Context& context) {
                    options.height_px, "pincushion_percent");
   const auto poses = phantom::draw_board_poses(board, options, context.seed());
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const std::string name = "view" + std::to_string(i + 1);
+    const std::string name = formatted("view{}", i + 1);
     simulated.images.add(name, phantom::expose_board(board, simulated.calibration, poses[i], options,
                                                      marrow::Random(context.seed(), i)()));
     simulated.cameras.add(name, {options.width_px, options.height_px, simulated.calibration.intrinsics, poses[i]});

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/simulate/photograph.hpp"
 #include "marrow/toolbox/calibration/chessboard.hpp"
@@ -50,7 +51,7 @@ Result chessboard(const phantom::CameraArm& arm, const Options& options, Context
   const Camera front = phantom::camera_at(arm, 0);
   for (int i = 0; i < options.photographs; ++i) {
     context.check_cancelled();
-    result.boards.add("board" + std::to_string(i + 1),
+    result.boards.add(formatted("board{}", i + 1),
                       photographed(inverse(front.camera_from_world) * held(options, i, context.seed()), front,
                                    seed_of(std::size_t(i))));
   }

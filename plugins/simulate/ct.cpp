@@ -74,8 +74,8 @@ Grid grid_around(const Phantom& phantom, const CtOptions& options) {
   }
   grid.origin_mm = low;
   if (!(high.z() > low.z()) || grid.size[2] < 2)
-    throw Error("simulate.ct: range_mm " + formatted("{:f}", options.range_mm[0]) + " to " +
-                formatted("{:f}", options.range_mm[1]) + " (from the distal end) holds no part of the bone");
+    throw Error(formatted("simulate.ct: range_mm {:f} to {:f} (from the distal end) holds no part of the bone",
+                          options.range_mm[0], options.range_mm[1]));
   return grid;
 }
 
@@ -367,7 +367,7 @@ class Scanner {
 Volume cluttered_scan(const ClutteredPhantom& phantom, const CtOptions& options, Context& context) {
   phantom::check_phantom(phantom, "simulate.ct");
   for (double spacing : options.spacing_mm)
-    if (!(spacing > 0)) throw Error("simulate.ct: spacing_mm must be positive, got " + formatted("{:f}", spacing));
+    if (!(spacing > 0)) throw Error(formatted("simulate.ct: spacing_mm must be positive, got {:f}", spacing));
   Volume volume;
   volume.grid = grid_around(phantom.phantom, options);
   volume.values.resize(volume.grid.count());

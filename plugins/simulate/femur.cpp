@@ -64,9 +64,10 @@ phantom::FemurShape drawn(const FemurOptions& options) {
 
 Bone femur(const FemurOptions& options, Context& context) {
   if (options.canal_diameter_mm + 4 > std::min(options.shaft_ml_mm, options.shaft_ap_mm))
-    throw Error("simulate.femur: a canal of " + formatted("{:f}", options.canal_diameter_mm) +
-                " mm leaves less than 2 mm of cortex in a shaft of " +
-                formatted("{:f}", std::min(options.shaft_ml_mm, options.shaft_ap_mm)) + " mm; make the canal narrower");
+    throw Error(
+        formatted("simulate.femur: a canal of {:f} mm leaves less than 2 mm of cortex in a shaft of {:f} mm; make the "
+                  "canal narrower",
+                  options.canal_diameter_mm, std::min(options.shaft_ml_mm, options.shaft_ap_mm)));
   const phantom::FemurShape shape = drawn(options);
   const phantom::FemurField field(shape);
   constexpr double kSteepest = 2;

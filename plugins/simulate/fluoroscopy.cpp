@@ -203,10 +203,10 @@ class XRay {
     return [this, camera_from_body, name, place](const Eigen::Vector3d& point) {
       const Eigen::Vector3d x = camera_from_body * point;
       if (!(x.z() >= kNearestMm))
-        throw Error("simulate.fluoroscopy: " + name + " reaches to " + formatted("{:f}", x.z()) +
-                    " mm from the X-ray source; it must lie in front of the source, so check the camera's distances "
-                    "and " +
-                    place);
+        throw Error(
+            formatted("simulate.fluoroscopy: {} reaches to {:f} mm from the X-ray source; it must lie in front of the "
+                      "source, so check the camera's distances and {}",
+                      name, x.z(), place));
       const Eigen::Vector2d pixel = (camera_.intrinsics * x).hnormalized();
       return phantom::RayVertex{(pixel.x() + 0.5) * kSubsamples - 0.5, (pixel.y() + 0.5) * kSubsamples - 0.5,
                                 -1 / x.z()};

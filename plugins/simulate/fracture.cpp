@@ -210,8 +210,8 @@ Vector6d motion(const std::array<double, 3>& rotation_deg, const std::array<doub
 Phantom fracture(const Bone& bone, const FractureOptions& options) {
   phantom::check_bone(bone, "simulate.fracture");
   if (!(options.height_fraction >= 0.1 && options.height_fraction <= 0.9))
-    throw Error("simulate.fracture: the height_fraction " + formatted("{:f}", options.height_fraction) +
-                " must lie in 0.1 to 0.9 of the bone's length");
+    throw Error(formatted("simulate.fracture: the height_fraction {:f} must lie in 0.1 to 0.9 of the bone's length",
+                          options.height_fraction));
   const Box box = bounds(bone.outer);
   const double z = box.low.z() + options.height_fraction * (box.high.z() - box.low.z());
   const Eigen::Vector2d at = centre_at(bone.outer, z);

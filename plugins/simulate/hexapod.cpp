@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 #include "marrow/toolbox/robotics/hexapod.hpp"
@@ -79,7 +80,7 @@ RigidTransform misplaced(const RigidTransform& platform_from_ct, const Eigen::Ve
 
 Metrics figures_of(const Vector6d& lengths_mm, double condition) {
   Metrics metrics;
-  for (int i = 0; i < 6; ++i) metrics.items.push_back({"leg" + std::to_string(i + 1), lengths_mm[i], "mm"});
+  for (int i = 0; i < 6; ++i) metrics.items.push_back({formatted("leg{}", i + 1), lengths_mm[i], "mm"});
   metrics.items.push_back({"condition", condition, ""});
   return metrics;
 }

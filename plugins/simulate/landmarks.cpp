@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 
@@ -62,15 +63,16 @@ List<Landmarks> landmarks(const phantom::Phantom& phantom, const List<Camera>* c
                   "' has no surface of its own; make it with simulate.fracture");
     const std::vector<Eigen::Vector3d> points = spread_points(fragment, views, options.count);
     if (points.empty()) {
-      context.warn("of fragment '" + fragment.name + "' the views show too little for " +
-                   std::to_string(options.count) + " landmarks in all of them; it is left out");
+      context.warn(
+          formatted("of fragment '{}' the views show too little for {} landmarks in all of them; it is left out",
+                    fragment.name, options.count));
       continue;
     }
     marrow::Random random(context.seed(), f);
     Landmarks found;
     for (const Eigen::Vector3d& point : points) {
       std::string name = "p";
-      name += std::to_string(found.points.size() + 1);
+      name += formatted("{}", found.points.size() + 1);
       const Eigen::Vector3d world = fragment.world_from_ct * point;
       const auto off = [&](double deviation) { return deviation * random.normal(); };
       found.points.push_back({name, point});
@@ -85,8 +87,10 @@ List<Landmarks> landmarks(const phantom::Phantom& phantom, const List<Camera>* c
     all.add(fragment.name, std::move(found));
   }
   if (all.empty())
-    throw Error("simulate.landmarks: all views together show too little of every fragment for " +
-                std::to_string(options.count) + " landmarks; choose fewer, or turn the cameras to a fragment");
+    throw Error(
+        formatted("simulate.landmarks: all views together show too little of every fragment for {} landmarks; choose "
+                  "fewer, or turn the cameras to a fragment",
+                  options.count));
   return all;
 }
 

@@ -6,6 +6,7 @@
 #include <marrow/plugin.hpp>
 #include <opencv2/core.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 
 namespace {
@@ -72,7 +73,7 @@ void mirror_images(List<View>& views) {
 
 /// The images of the first two views, each with the other's camera.
 void swap_images(List<View>& views) {
-  if (views.size() < 2) throw Error("swapped_views needs two views, got " + std::to_string(views.size()));
+  if (views.size() < 2) throw Error(formatted("swapped_views needs two views, got {}", views.size()));
   List<View> swapped;
   for (std::size_t i = 0; i < views.size(); ++i) {
     View view = views[i];

@@ -48,21 +48,20 @@ double metal(const NailOptions& nail, const std::vector<Hole>& holes, const Vect
 
 std::tuple<Implant, Mesh> nail(const NailOptions& options) {
   if (!(options.bore_mm + 1 < options.diameter_mm))
-    throw Error("simulate.nail: a bore of " + formatted("{:f}", options.bore_mm) +
-                " mm leaves a wall of less than 0.5 mm "
-                "in a nail of " +
-                formatted("{:f}", options.diameter_mm) + " mm; make the bore narrower");
+    throw Error(
+        formatted("simulate.nail: a bore of {:f} mm leaves a wall of less than 0.5 mm in a nail of {:f} mm; make the "
+                  "bore narrower",
+                  options.bore_mm, options.diameter_mm));
   Implant implant;
   const double radius = options.bow_radius_mm;
   for (std::size_t i = 0; i < options.hole_at_mm.size(); ++i) {
     const double at = options.hole_at_mm[i], turn = radians(options.hole_turn_deg.at(i));
     if (!(at > 0.5 * options.hole_diameter_mm && at < options.length_mm - 0.5 * options.hole_diameter_mm))
-      throw Error("simulate.nail: the hole at " + formatted("{:f}", at) +
-                  " mm from the tip does not lie within the nail, "
-                  "which is " +
-                  formatted("{:f}", options.length_mm) + " mm long");
+      throw Error(formatted(
+          "simulate.nail: the hole at {:f} mm from the tip does not lie within the nail, which is {:f} mm long", at,
+          options.length_mm));
     const Vector3d to_back(0, std::cos(at / radius), -std::sin(at / radius));
-    implant.holes.push_back({"hole-" + std::to_string(i + 1), on_arc(radius, at),
+    implant.holes.push_back({formatted("hole-{}", i + 1), on_arc(radius, at),
                              std::cos(turn) * Vector3d::UnitX() + std::sin(turn) * to_back, options.hole_diameter_mm});
   }
   const double margin = 0.5 * options.diameter_mm + 2 * options.resolution_mm;

@@ -174,13 +174,15 @@ void check_fit(const MiddleLine& line, const RigidTransform& pose, const BoneAt&
     if (options.reaming_mm > 0) {
       const double left = bone.distance_to_outer(at) - wide;
       if (left < options.min_cortex_mm)
-        throw Error("simulate.nailing: the nail does not fit in the canal: reamed to " + shown(2 * wide) +
-                    " mm, the bone keeps " + shown(left) + " mm of cortex " + where + ", and at least " +
-                    shown(options.min_cortex_mm) + " mm are needed; take a thinner nail, or one of another bow");
+        throw Error(formatted(
+            "simulate.nailing: the nail does not fit in the canal: reamed to {:.1f} mm, the bone keeps {:.1f} mm of "
+            "cortex {}, and at least {:.1f} mm are needed; take a thinner nail, or one of another bow",
+            2 * wide, left, where, options.min_cortex_mm));
     } else if (const double room = bone.distance_to_inner(at) - line.radius_mm; room < 0) {
-      throw Error("simulate.nailing: the nail does not fit in the canal: it is " + shown(2 * line.radius_mm) +
-                  " mm thick, and the canal is " + shown(-room) + " mm too narrow for it " + where +
-                  "; take a thinner nail, or ream the canal with reaming_mm");
+      throw Error(
+          formatted("simulate.nailing: the nail does not fit in the canal: it is {:.1f} mm thick, and the canal is "
+                    "{:.1f} mm too narrow for it {}; take a thinner nail, or ream the canal with reaming_mm",
+                    2 * line.radius_mm, -room, where));
     }
   }
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 
@@ -54,7 +55,7 @@ Landmarks markers_of(const Fragment& fragment, const Options& options, Random& r
   Landmarks markers;
   for (std::size_t i = 0; i < places.size(); ++i) {
     std::string name = "m";
-    name += std::to_string(i + 1);
+    name += formatted("{}", i + 1);
     Eigen::Vector3d off_mm;
     for (double& one : off_mm) one = options.noise_mm * random.normal();
     markers.points.push_back({name, places[i]});

@@ -76,9 +76,10 @@ Bone surface(const SurfaceOptions& options, Context& context) {
   }
   const Eigen::Vector3d extent = high - low;
   if (options.long_bone && extent.z() < std::max(extent.x(), extent.y()))
-    throw Error("simulate.surface: the bone's long axis must lie along z with the distal end low, but it extends " +
-                formatted("{:f}", extent.x()) + " x " + formatted("{:f}", extent.y()) + " x " +
-                formatted("{:f}", extent.z()) + " mm; turn it with rotation_deg");
+    throw Error(
+        formatted("simulate.surface: the bone's long axis must lie along z with the distal end low, but it extends "
+                  "{:f} x {:f} x {:f} mm; turn it with rotation_deg",
+                  extent.x(), extent.y(), extent.z()));
   if (!options.cortex_mm.empty()) {
     if (!options.inner.empty())
       throw Error("simulate.surface: the inner surface is given by a file and by cortex_mm; give one of them");

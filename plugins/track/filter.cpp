@@ -79,7 +79,7 @@ Frame filter(const TrackState& predicted, const Pose* pose, const Verdict* verdi
     ++state.frames_lost;
     state.surprise = surprise;
     state.note = lost;
-    context.warn("the bone is lost in frame " + std::to_string(state.frame + 1) + ": " + lost);
+    context.warn(formatted("the bone is lost in frame {}: {}", state.frame + 1, lost));
   }
   frame.pose = track::pose_of(state);
   if (pose) frame.pose.cost = pose->cost;

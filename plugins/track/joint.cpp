@@ -6,6 +6,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 
 namespace {
@@ -58,8 +59,8 @@ Metrics motion_of(const RigidTransform& proximal, const RigidTransform& distal, 
 
 List<Metrics> joint(const List<TrackState>& proximal, const List<TrackState>& distal, const Options& options) {
   if (proximal.names() != distal.names())
-    throw Error("the two bones are not followed through the same frames: there are " + std::to_string(proximal.size()) +
-                " and " + std::to_string(distal.size()));
+    throw Error(formatted("the two bones are not followed through the same frames: there are {} and {}",
+                          proximal.size(), distal.size()));
   const Eigen::Matrix3d axes = anatomical_axes(options);
   const Eigen::Vector3d centre_mm = Eigen::Vector3d::Map(options.centre_mm.data());
   List<Metrics> result;

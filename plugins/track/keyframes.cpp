@@ -4,6 +4,7 @@
 #include <map>
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/escaped_name.hpp"
 #include "marrow/toolbox/track/sequence.hpp"
 #include "marrow/toolbox/track/tra_file.hpp"
@@ -50,9 +51,10 @@ List<AutoscoperTrack> keyframes(const List<Pose>& bones, const List<SequenceFram
     if (const auto file = files.find(bone); file != files.end()) {
       track = track::read_tra_file(file->second);
       if (frames && track.world_from_bone.size() != frames->size())
-        throw Error(file->second.string() + ": has " + std::to_string(track.world_from_bone.size()) +
-                    " lines, but the sequence has " + std::to_string(frames->size()) +
-                    " frames; it needs a line for each frame that is read, with NaN where there is no keyframe");
+        throw Error(
+            formatted("{}: has {} lines, but the sequence has {} frames; it needs a line for each frame that is read, "
+                      "with NaN where there is no keyframe",
+                      file->second.string(), track.world_from_bone.size(), frames->size()));
     }
     result.add(bone, std::move(track));
   }

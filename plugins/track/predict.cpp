@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/track/motion_model.hpp"
 
 namespace {
@@ -26,8 +27,10 @@ const RigidTransform* keyframe_of(const AutoscoperTrack* keyframes, int frame) {
   if (!keyframes || keyframes->world_from_bone.empty()) return nullptr;
   const std::size_t at = std::size_t(frame), count = keyframes->world_from_bone.size();
   if (at >= count)
-    throw Error("there are keyframes for " + std::to_string(count) + " frames, but this is frame " +
-                std::to_string(at + 1) + "; give a line for each frame, with NaN where there is no keyframe");
+    throw Error(
+        formatted("there are keyframes for {} frames, but this is frame {}; give a line for each frame, with NaN where "
+                  "there is no keyframe",
+                  count, at + 1));
   return keyframes->world_from_bone[at] ? &*keyframes->world_from_bone[at] : nullptr;
 }
 

@@ -14,8 +14,9 @@ using track::Trajectory;
 
 Trajectory trajectory(const List<TrackState>& states, const List<Verdict>* verdicts) {
   if (verdicts && verdicts->names() != states.names())
-    throw Error("the verdicts are of other frames than the states: " + std::to_string(verdicts->size()) + " and " +
-                std::to_string(states.size()) + "; wire both to the same repetition");
+    throw Error(
+        formatted("the verdicts are of other frames than the states: {} and {}; wire both to the same repetition",
+                  verdicts->size(), states.size()));
   Trajectory result;
   for (std::size_t i = 0; i < states.size(); ++i) {
     result.frames.push_back(states.name(i));
@@ -38,8 +39,7 @@ constexpr const char* kAxes[] = {"frontal_deg", "lateral_deg", "axial_deg", "fro
 void write_csv(const Trajectory& trajectory, const std::string& path) {
   std::string text = "frame,name,time_s,found";
   for (int row = 1; row <= 3; ++row)
-    for (int column = 1; column <= 4; ++column)
-      text += ",m" + std::to_string(row) + std::to_string(column) + (column == 4 ? "_mm" : "");
+    for (int column = 1; column <= 4; ++column) text += formatted(",m{}{}{}", row, column, column == 4 ? "_mm" : "");
   for (const char* prefix : {",", ",deviation_"})
     for (const char* axis : kAxes) text += std::string(prefix) + axis;
   text += ",verdict,failure_probability,note\n";
@@ -52,7 +52,7 @@ void write_csv(const Trajectory& trajectory, const std::string& path) {
   };
   for (std::size_t i = 0; i < trajectory.states.size(); ++i) {
     const TrackState& state = trajectory.states[i];
-    text += std::to_string(state.frame + 1) + "," + quoted(trajectory.frames[i]);
+    text += formatted("{},{}", state.frame + 1, quoted(trajectory.frames[i]));
     add(state.time_s());
     text += state.is_found() ? ",1" : ",0";
     const RigidTransform& pose = state.now.world_from_model;

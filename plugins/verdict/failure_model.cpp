@@ -24,7 +24,7 @@ double number_within(const YamlMap& map, const std::string& key, double least, d
 }
 
 FailureModel::Term term_from(YamlFile& file, const YAML::Node& node, std::size_t number) {
-  const YamlMap map(file, node, "term " + std::to_string(number), {"figure", "scale", "weight", "absent"});
+  const YamlMap map(file, node, formatted("term {}", number), {"figure", "scale", "weight", "absent"});
   FailureModel::Term term;
   term.figure = map.text("figure").value_or("");
   term.scale = number_within(map, "scale", 1e-6, 1e6);

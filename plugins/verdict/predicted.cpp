@@ -11,6 +11,7 @@
 
 namespace {
 
+using marrow::formatted;
 using marrow::Judgement;
 using marrow::Verdict;
 using marrow::verdicts::Spread, marrow::verdicts::about_the_bones_axes;
@@ -21,9 +22,6 @@ struct Options {
   double contradicts_above = 1.8;
 };
 
-/// With one decimal.
-std::string shown(double value) { return marrow::formatted("{:.1f}", value); }
-
 /// What makes the pose uncertain, the weightier first, each with what would settle it.
 void explain(const Spread& spread, Verdict& verdict) {
   const bool is_axial_first = spread.off_axial >= spread.off_mm;
@@ -31,11 +29,11 @@ void explain(const Spread& spread, Verdict& verdict) {
     const bool is_second = is_axial != is_axial_first;
     if (is_second && (is_axial ? spread.off_axial : spread.off_mm) == 0) break;
     if (is_axial) {
-      verdict.reasons.emplace_back("the rotation about the long axis is known to " + shown(spread.axial_deg) +
-                                   " degrees only");
+      verdict.reasons.emplace_back(
+          formatted("the rotation about the long axis is known to {:.1f} degrees only", spread.axial_deg));
       verdict.remedies.emplace_back("another view, or a landmark off the long axis");
     } else {
-      verdict.reasons.emplace_back("the bone's surface is known to " + shown(spread.mtre_mm) + " mm only");
+      verdict.reasons.emplace_back(formatted("the bone's surface is known to {:.1f} mm only", spread.mtre_mm));
       verdict.remedies.emplace_back("another view, from a different direction");
     }
   }
@@ -67,8 +65,9 @@ void judge_by_deviations(const marrow::Pose& pose, const marrow::Mesh& mesh, con
                                                                              : Judgement::trusted;
   verdict.figures = {{"predicted_mtre_mm", spread.mtre_mm, "mm"}, {"predicted_axial_deg", spread.axial_deg, "deg"}};
   if (verdict.judgement != Judgement::trusted) return explain(spread, verdict);
-  verdict.reasons.emplace_back("the bone's surface is known to " + shown(spread.mtre_mm) +
-                               " mm, and the rotation about the long axis to " + shown(spread.axial_deg) + " degrees");
+  verdict.reasons.emplace_back(
+      formatted("the bone's surface is known to {:.1f} mm, and the rotation about the long axis to {:.1f} degrees",
+                spread.mtre_mm, spread.axial_deg));
 }
 
 /// A registration that warns is at best doubtful.
@@ -107,9 +106,10 @@ void judge_by_prior(const marrow::Pose& pose, const marrow::Pose& prior, const O
   verdict.figures.push_back({"prior_axial_deviations", *deviations, ""});
   if (*deviations <= options.contradicts_above) return;
   verdict.judgement = std::max(verdict.judgement, Judgement::doubtful);
-  verdict.reasons.insert(verdict.reasons.begin(), "the prior contradicts the images: they are " + shown(apart_deg) +
-                                                      " degrees apart about the long axis, " + shown(*deviations) +
-                                                      " times the deviation expected of this difference");
+  verdict.reasons.insert(verdict.reasons.begin(),
+                         formatted("the prior contradicts the images: they are {:.1f} degrees apart about the long "
+                                   "axis, {:.1f} times the deviation expected of this difference",
+                                   apart_deg, *deviations));
   verdict.remedies.emplace_back(
       "a look at the markers, if the prior comes from these: has the skin slid, or one moved?");
   context.warn(verdict.reasons.front());

@@ -41,10 +41,10 @@ Grid grid_around(const marrow::Mesh& mesh, double spacing) {
     grid.size[std::size_t(k)] = int(std::min(size, 1e6));
   }
   if (voxels > double(kMostVoxels))
-    throw marrow::Error("volume.filled_surface: with spacing_mm " + marrow::formatted("{:f}", spacing) +
-                        " the volume has " + marrow::formatted("{:f}", voxels / 1e6) +
-                        " million voxels, and at most 100 are allowed; take a larger "
-                        "spacing_mm");
+    throw marrow::Error(
+        marrow::formatted("volume.filled_surface: with spacing_mm {:f} the volume has {:f} million voxels, and at most "
+                          "100 are allowed; take a larger spacing_mm",
+                          spacing, voxels / 1e6));
   grid.origin_mm = grid.direction * low;
   return grid;
 }

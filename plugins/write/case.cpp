@@ -7,6 +7,7 @@
 #include <marrow/base/printable.hpp>
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 #include "marrow/write/picture_out.hpp"
@@ -62,7 +63,7 @@ std::vector<std::string> file_stems(const std::vector<std::string>& names) {
     std::string stem = names[i];
     for (std::size_t number = i + 1;
          !is_plain(names[i]) && (stem == names[i] || std::count(taken.begin(), taken.end(), stem)); ++number)
-      stem = "view-" + std::to_string(number);
+      stem = marrow::formatted("view-{}", number);
     taken.push_back(stem);
     stems.push_back(stem);
   }

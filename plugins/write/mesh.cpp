@@ -3,6 +3,7 @@
 #include <cstring>
 #include <marrow/plugin.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 
 namespace {
@@ -25,10 +26,10 @@ std::string in_one_line(std::string name) {
 /// Binary PLY with double coordinates, so that reading gives exactly the same numbers.
 void mesh(const marrow::Mesh& mesh, const std::string& path) {
   marrow::check_mesh(mesh, path);
-  std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment marrow, mm, frame " + in_one_line(mesh.frame) +
-                      "\nelement vertex " + std::to_string(mesh.vertices_mm.size()) +
-                      "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
-                      std::to_string(mesh.triangles.size()) + "\nproperty list uchar int vertex_indices\nend_header\n";
+  std::string bytes = marrow::formatted(
+      "ply\nformat binary_little_endian 1.0\ncomment marrow, mm, frame {}\nelement vertex {}\nproperty double "
+      "x\nproperty double y\nproperty double z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
+      in_one_line(mesh.frame), mesh.vertices_mm.size(), mesh.triangles.size());
   bytes.reserve(bytes.size() + mesh.vertices_mm.size() * 24 + mesh.triangles.size() * 13);
   for (const Eigen::Vector3d& vertex : mesh.vertices_mm)
     for (const double coordinate : vertex) append(bytes, coordinate);

@@ -22,36 +22,39 @@ constexpr double kExplained = 0.02;  ///< largest error that may remain then, as
 
 std::string text(double value) { return formatted("{:.4g}", value); }
 
-std::string size_text(double width, double height) { return text(width) + " x " + text(height); }
+std::string size_text(double width, double height) { return formatted("{:.4g} x {:.4g}", width, height); }
 
 void check_focal_length(const Camera& camera, const Device& device, std::vector<std::string>& found) {
   const double f_u = camera.intrinsics(0, 0), f_v = camera.intrinsics(1, 1);
   const double angle = 2 * degrees(std::atan(0.5 * camera.width_px / f_u));
   if (angle > kLargestAngle_deg || angle < kLeastAngle_deg)
-    found.push_back("the focal length of " + text(f_u) + " px opens an image of " + text(camera.width_px) + " px to " +
-                    text(angle) +
-                    " degrees, where X-ray devices open 5 to 30; is it in mm (it is the source-to-detector distance "
-                    "over the size of a pixel), or "
-                    "of an image of another size?");
+    found.push_back(
+        formatted("the focal length of {:.4g} px opens an image of {:.4g} px to {:.4g} degrees, where X-ray devices "
+                  "open 5 to 30; is it in mm (it is the source-to-detector distance over the size of a pixel), or of "
+                  "an image of another size?",
+                  f_u, double(camera.width_px), angle));
   if (std::abs(f_u / f_v - 1) > 0.1)
     found.push_back(
-        "the focal lengths " + text(f_u) + " and " + text(f_v) +
-        " px differ, so pixels would not be square; are width and height of a pixel exchanged or one of them wrong?");
+        formatted("the focal lengths {:.4g} and {:.4g} px differ, so pixels would not be square; are width and height "
+                  "of a pixel exchanged or one of them wrong?",
+                  f_u, f_v));
   if (device.source_to_detector_mm > 0 && device.pixel_mm > 0) {
     const double expected = device.source_to_detector_mm / device.pixel_mm;
     if (std::abs(f_u / expected - 1) > 0.05)
-      found.push_back("the focal length is " + text(f_u) + " px, but " + text(device.source_to_detector_mm) +
-                      " mm from source to detector and pixels of " + text(device.pixel_mm) + " mm make " +
-                      text(expected) + "; the pixels are scaled to the patient, or binned?");
+      found.push_back(
+          formatted("the focal length is {:.4g} px, but {:.4g} mm from source to detector and pixels of {:.4g} mm make "
+                    "{:.4g}; the pixels are scaled to the patient, or binned?",
+                    f_u, device.source_to_detector_mm, device.pixel_mm, expected));
   }
   const double pixel_mm = device.pixel_mm > 0                ? device.pixel_mm
                           : device.source_to_detector_mm > 0 ? device.source_to_detector_mm / f_u
                                                              : 0;
   if (device.detector_mm > 0 && pixel_mm > 0 &&
       std::max(camera.width_px, camera.height_px) * pixel_mm > 1.02 * device.detector_mm)
-    found.push_back("the detector is " + text(device.detector_mm) + " mm wide, smaller than the image says: " +
-                    size_text(camera.width_px * pixel_mm, camera.height_px * pixel_mm) + " mm at " + text(pixel_mm) +
-                    " mm per pixel; the size of a pixel is too large, or the image was enlarged");
+    found.push_back(
+        formatted("the detector is {:.4g} mm wide, smaller than the image says: {} mm at {:.4g} mm per pixel; the size "
+                  "of a pixel is too large, or the image was enlarged",
+                  device.detector_mm, size_text(camera.width_px * pixel_mm, camera.height_px * pixel_mm), pixel_mm));
 }
 
 void check_principal_point(const Camera& camera, std::vector<std::string>& found) {
@@ -59,20 +62,23 @@ void check_principal_point(const Camera& camera, std::vector<std::string>& found
   const Eigen::Vector2d share = principal.cwiseQuotient(size);
   for (const double factor : {0.25, 0.5, 2.0, 4.0})
     if ((share - Eigen::Vector2d::Constant(0.5 * factor)).cwiseAbs().maxCoeff() < 0.03 * factor) {
-      found.push_back("the principal point (" + text(principal.x()) + ", " + text(principal.y()) +
-                      ") lies in the middle of an image of " + size_text(factor * size.x(), factor * size.y()) +
-                      " pixels, but this one has " + size_text(size.x(), size.y()) +
-                      "; the camera matrix is that of the image before it was resized or binned");
+      found.push_back(
+          formatted("the principal point ({:.4g}, {:.4g}) lies in the middle of an image of {} pixels, but this one "
+                    "has {}; the camera matrix is that of the image before it was resized or binned",
+                    principal.x(), principal.y(), size_text(factor * size.x(), factor * size.y()),
+                    size_text(size.x(), size.y())));
       return;
     }
   if ((share.array() < 0).any() || (share.array() > 1).any())
-    found.push_back("the principal point (" + text(principal.x()) + ", " + text(principal.y()) +
-                    ") lies outside the image of " + size_text(size.x(), size.y()) +
-                    " pixels; is it in mm, or of an image before it was cropped?");
+    found.push_back(
+        formatted("the principal point ({:.4g}, {:.4g}) lies outside the image of {} pixels; is it in mm, or of an "
+                  "image before it was cropped?",
+                  principal.x(), principal.y(), size_text(size.x(), size.y())));
   else if ((share.array() - 0.5).abs().maxCoeff() > 0.25)
-    found.push_back("the principal point (" + text(principal.x()) + ", " + text(principal.y()) +
-                    ") lies far from the middle of the image of " + size_text(size.x(), size.y()) +
-                    " pixels; are its two numbers exchanged, or was the image cropped?");
+    found.push_back(
+        formatted("the principal point ({:.4g}, {:.4g}) lies far from the middle of the image of {} pixels; are its "
+                  "two numbers exchanged, or was the image cropped?",
+                  principal.x(), principal.y(), size_text(size.x(), size.y())));
 }
 
 void check_object(const Camera& camera, const std::vector<Eigen::Vector3d>& object_mm,
@@ -92,18 +98,18 @@ void check_object(const Camera& camera, const std::vector<Eigen::Vector3d>& obje
   const double distance = (source_position_mm(camera) - box.center()).norm();
   const double extent = object_mm.size() > 1 ? box.diagonal().norm() : 0;
   if (object_mm.size() > 1 && (extent < kSmallest_mm || extent > kLargest_mm))
-    found.push_back("the object is " + text(extent) + " mm large; are its coordinates in " +
-                    (extent < kSmallest_mm ? "metres or centimetres?" : "a smaller unit than mm?"));
+    found.push_back(formatted("the object is {:.4g} mm large; are its coordinates in {}", extent,
+                              extent < kSmallest_mm ? "metres or centimetres?" : "a smaller unit than mm?"));
   if (distance < kNearest_mm || distance > kFarthest_mm)
-    found.push_back("the object is " + text(distance) +
-                    " mm from the X-ray source, where C-arms have 300 to 1500; the camera's translation, or the "
-                    "object, seems to be in another unit than mm" +
-                    files::likely_unit(distance, kNearest_mm, kFarthest_mm, 1));
+    found.push_back(
+        formatted("the object is {:.4g} mm from the X-ray source, where C-arms have 300 to 1500; the camera's "
+                  "translation, or the object, seems to be in another unit than mm{}",
+                  distance, files::likely_unit(distance, kNearest_mm, kFarthest_mm, 1)));
   if (behind > 0)
-    found.push_back(text(double(behind)) + " of " + text(double(object_mm.size())) +
-                    " points of the object lie behind the X-ray source; is the camera's pose given the other way round "
-                    "(world from camera), or "
-                    "does its z axis run away from the detector?");
+    found.push_back(
+        formatted("{:.4g} of {:.4g} points of the object lie behind the X-ray source; is the camera's pose given the "
+                  "other way round (world from camera), or does its z axis run away from the detector?",
+                  double(behind), double(object_mm.size())));
   else if (outside == object_mm.size())
     found.push_back("the object is projected wholly outside the image; is the camera that of another image?");
 }
@@ -280,9 +286,9 @@ class Explanations {
   }
   std::string sentence(std::size_t view, std::size_t mistake) const {
     const double error_px = troubles_[view].error_px;
-    return "the reprojection error is " +
-           (std::isfinite(error_px) ? text(error_px) + " px" : std::string("without bound")) + ", and only " +
-           text(left_px_[view][mistake]) + " px if " + mistakes_[mistake].sentence;
+    return formatted("the reprojection error is {}, and only {:.4g} px if {}",
+                     std::isfinite(error_px) ? text(error_px) + " px" : std::string("without bound"),
+                     left_px_[view][mistake], mistakes_[mistake].sentence);
   }
 
   const std::vector<Mistake> mistakes_;

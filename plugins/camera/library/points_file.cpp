@@ -2,16 +2,17 @@
 #include "marrow/camera/points_file.hpp"
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 
 namespace marrow::files {
 namespace {
 
 std::optional<KnownPoint> point_from(YamlFile& file, const YAML::Node& node, std::size_t number) {
-  const YamlMap map(file, node, "point " + std::to_string(number), {"name", "at_mm", "seen_px"});
+  const YamlMap map(file, node, formatted("point {}", number), {"name", "at_mm", "seen_px"});
   if (!map.valid()) return std::nullopt;
   KnownPoint point;
-  point.name = map.has("name") ? map.text("name").value_or("") : std::to_string(number);
+  point.name = map.has("name") ? map.text("name").value_or("") : formatted("{}", number);
   if (map.has("at_mm")) point.world_mm = map.vector3("at_mm");
   const auto seen = map.required("seen_px");
   if (!seen) return std::nullopt;

@@ -9,8 +9,8 @@
 #include <marrow/domain/quantile.hpp>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
-#include <sstream>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/image/grey_range.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
 #include "usable.hpp"
@@ -49,11 +49,9 @@ Prepared prepare(const View& view, double sigma_px, bool logarithm, const Contex
   if (type == CV_32FC1 && !cv::checkRange(grey))
     throw Error(what + ": the image holds pixels that are not finite (NaN or infinity)");
   const GreyRange range = grey_range(grey);
-  if (range.least == range.greatest) {
-    std::ostringstream text;
-    text << what << ": all pixels have the same value " << range.least << ", so there is no edge; check the image file";
-    throw Error(text.str());
-  }
+  if (range.least == range.greatest)
+    throw Error(formatted("{}: all pixels have the same value {:g}, so there is no edge; check the image file", what,
+                          range.least));
   if (logarithm && range.greatest <= 0)
     throw Error(what + ": the image has no positive grey value, so its logarithm cannot be taken");
   warn_of_greys(view, context);
@@ -63,8 +61,9 @@ Prepared prepare(const View& view, double sigma_px, bool logarithm, const Contex
   Prepared prepared;
   prepared.usable = usable_pixels(view, grey, smallest, largest, int(std::ceil(3 * sigma_px)));
   if (cv::countNonZero(prepared.usable) == 0)
-    throw Error(what + ": no pixel is left to search for edges (mask, image border and smoothing take all of " +
-                std::to_string(grey.cols) + " x " + std::to_string(grey.rows) + ")");
+    throw Error(
+        formatted("{}: no pixel is left to search for edges (mask, image border and smoothing take all of {} x {})",
+                  what, grey.cols, grey.rows));
   prepared.whole_numbers = type != CV_32FC1;
   prepared.range = float(largest - smallest);
   prepared.logarithm = logarithm;

@@ -5,14 +5,15 @@
 #include <opencv2/calib3d.hpp>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::calibration {
 
 BoardPose board_pose(const ViewPoints& points, const Camera& camera) {
   constexpr std::size_t kFewest = 6;
   if (points.pixels.size() < kFewest)
-    throw Error("view '" + points.name + "' shows " + std::to_string(points.pixels.size()) +
-                " beads of the target; its pose needs " + std::to_string(kFewest) + " or more");
+    throw Error(formatted("view '{}' shows {} beads of the target; its pose needs {} or more", points.name,
+                          points.pixels.size(), kFewest));
   std::vector<cv::Point3d> board;
   std::vector<cv::Point2d> pixels;
   for (std::size_t i = 0; i < points.pixels.size(); ++i) {

@@ -39,9 +39,10 @@ Axis axis_of_planes(const std::vector<Plane>& planes) {
   const double angle_deg = degrees(2 * std::atan(spread));
   if (angle_deg < 10) {
     const std::string text = formatted("{:.1f}", angle_deg);
-    throw Error("the " + std::to_string(planes.size()) +
-                " views see the shaft from nearly the same side: the planes of its " + "axis meet at " + text +
-                " degrees, where 10 are needed; use views farther apart, or a single one");
+    throw Error(
+        formatted("the {} views see the shaft from nearly the same side: the planes of its axis meet at {} degrees, "
+                  "where 10 are needed; use views farther apart, or a single one",
+                  planes.size(), text));
   }
   Axis axis;
   axis.direction = squares.vectors.col(0);

@@ -22,9 +22,9 @@ using marrow::Mesh;
 void check_grid(const marrow::SignedField& field) {
   const auto& size = field.grid.size;
   if (size[0] <= 0 || size[1] <= 0 || size[2] <= 0 || field.values_mm.size() != field.grid.count())
-    throw Error("field: " + std::to_string(field.values_mm.size()) + " values do not fill a grid of " +
-                std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " + std::to_string(size[2]) +
-                " voxels; wire the output of a segment node");
+    throw Error(
+        formatted("field: {} values do not fill a grid of {} x {} x {} voxels; wire the output of a segment node",
+                  field.values_mm.size(), size[0], size[1], size[2]));
   marrow::check_rigid({field.grid.frame, "grid", field.grid.direction, field.grid.origin_mm}, "field");
 }
 
@@ -42,8 +42,9 @@ void check_values(bool all_finite, bool any_inside, bool any_outside) {
 
 void check_vertex_count(std::size_t count) {
   if (count > 0x7fffffff)
-    throw Error("field: its surface has " + std::to_string(count) +
-                " vertices, more than a mesh can index; the field is noise or the grid far too fine");
+    throw Error(formatted(
+        "field: its surface has {} vertices, more than a mesh can index; the field is noise or the grid far too fine",
+        count));
 }
 
 void check_field(const marrow::SignedField& field) {
@@ -153,17 +154,19 @@ void check_stable(const Taubin& taubin, const std::string& what) {
   // factor of k = 2 is at least -1 as long as (2 - pass_band) lambda^2 + pass_band lambda <= 1.
   const double most_lambda = (std::sqrt(band * band + 4 * (2 - band)) - band) / (2 * (2 - band));
   if (!(lambda <= most_lambda))
-    throw Error(what + ": with lambda " + formatted("{:g}", lambda) + " and pass_band " + formatted("{:g}", band) +
-                " the shortest waves grow with each step, and tear the surface apart; give a lambda of at most " +
-                formatted("{:.3f}", std::floor(1000 * most_lambda) / 1000));
+    throw Error(
+        formatted("{}: with lambda {:g} and pass_band {:g} the shortest waves grow with each step, and tear the "
+                  "surface apart; give a lambda of at most {:.3f}",
+                  what, lambda, band, std::floor(1000 * most_lambda) / 1000));
   // The factor is largest at k = pass_band / 2.
   constexpr double kMostGrowth = 1.15;
   const double growth = 1 + lambda * lambda / (1 - lambda * band) * band * band / 4;
   const double most_iterations = std::floor(std::log(kMostGrowth) / std::log(growth));
   if (taubin.iterations > most_iterations)
-    throw Error(what + ": " + std::to_string(taubin.iterations) +
-                " iterations inflate waves of the surface by more than 15 %; give at most " +
-                formatted("{:.0f}", most_iterations) + ", or a smaller pass_band or lambda");
+    throw Error(
+        formatted("{}: {} iterations inflate waves of the surface by more than 15 %; give at most {:.0f}, or a smaller "
+                  "pass_band or lambda",
+                  what, taubin.iterations, most_iterations));
 }
 
 void smooth(Mesh& mesh, const Taubin& taubin) {

@@ -11,6 +11,8 @@
 #include <optional>
 #include <string>
 
+#include "marrow/base/number_text.hpp"
+
 namespace marrow::search {
 
 /// Throws Error unless there are coordinates, start and steps are finite, steps are positive and as many as
@@ -24,19 +26,17 @@ inline void check_problem(const MinimisationProblem& problem) {
     throw Error("the optimizer needs a finite start and one positive initial step per coordinate");
   for (const auto* bound : {&problem.lower, &problem.upper}) {
     if (bound->size() && bound->size() != n)
-      throw Error("the optimizer got bounds for " + std::to_string(bound->size()) + " of " + std::to_string(n) +
-                  " coordinates");
+      throw Error(formatted("the optimizer got bounds for {} of {} coordinates", bound->size(), n));
     if (bound->array().isNaN().any()) throw Error("the optimizer got a bound that is not a number");
   }
   if ((problem.lower.size() && (problem.lower.array() > problem.start.array()).any()) ||
       (problem.upper.size() && (problem.upper.array() < problem.start.array()).any()))
     throw Error("the optimizer's start lies outside the bounds");
   if (problem.max_evaluations < 1)
-    throw Error("the optimizer needs at least one evaluation, got max_evaluations = " +
-                std::to_string(problem.max_evaluations));
+    throw Error(
+        formatted("the optimizer needs at least one evaluation, got max_evaluations = {}", problem.max_evaluations));
   if (!(problem.step_tolerance > 0) || !std::isfinite(problem.step_tolerance))
-    throw Error("the optimizer needs a positive, finite step_tolerance, got " +
-                formatted("{:g}", problem.step_tolerance));
+    throw Error(formatted("the optimizer needs a positive, finite step_tolerance, got {:g}", problem.step_tolerance));
 }
 
 /// Evaluates a problem in scaled coordinates y = (x - start) / initial_step. Refers to the problem, which must outlive
@@ -94,8 +94,9 @@ class Evaluations {
       result_.stopped_because = "the budget of evaluations is spent";
     }
     if (!std::isfinite(result_.value))
-      throw Error("the optimizer found no least value: the function is not finite at any of the " +
-                  std::to_string(result_.evaluations) + " points that were tried");
+      throw Error(formatted(
+          "the optimizer found no least value: the function is not finite at any of the {} points that were tried",
+          result_.evaluations));
     return result_;
   }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/same_place.hpp"
 
 namespace marrow::rays {
@@ -111,8 +112,7 @@ Attenuation attenuation_of(const Volume& volume, const SignedField* field, const
   if (field) {
     check_same_grid(field->grid, volume.grid);
     if (field->values_mm.size() != field->grid.count())
-      throw Error("the field has " + std::to_string(field->values_mm.size()) + " values for " +
-                  std::to_string(field->grid.count()) + " voxels");
+      throw Error(formatted("the field has {} values for {} voxels", field->values_mm.size(), field->grid.count()));
   }
   Attenuation attenuation;
   attenuation.grid = volume.grid;

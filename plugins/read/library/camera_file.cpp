@@ -2,6 +2,7 @@
 #include "marrow/read/camera_file.hpp"
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/read/projections.hpp"
 #include "marrow/toolbox/exchange/plastimatch_camera.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
@@ -27,8 +28,8 @@ void check_needed(const std::filesystem::path& path, const CameraReading& readin
 int only_projection(const std::filesystem::path& path) {
   const std::size_t count = count_projections(path);
   if (count == 1) return 0;
-  throw Error(path.string() + ": has " + std::to_string(count) +
-              " projections; say by its number, counted from 0, which one is meant (projection)");
+  throw Error(formatted("{}: has {} projections; say by its number, counted from 0, which one is meant (projection)",
+                        path.string(), count));
 }
 
 }  // namespace
@@ -58,9 +59,8 @@ DistortedCamera read_camera(const std::filesystem::path& path, const CameraReadi
   if (reading.size.size_px.empty()) return found;
   const Eigen::Vector2i size = size_px(reading.size, path.string());
   if (size.x() != found.camera.width_px || size.y() != found.camera.height_px)
-    throw Error(path.string() + ": this camera is of images of " + std::to_string(found.camera.width_px) + " x " +
-                std::to_string(found.camera.height_px) + " pixels, but the image has " + std::to_string(size.x()) +
-                " x " + std::to_string(size.y()));
+    throw Error(formatted("{}: this camera is of images of {} x {} pixels, but the image has {} x {}", path.string(),
+                          found.camera.width_px, found.camera.height_px, size.x(), size.y()));
   return found;
 }
 

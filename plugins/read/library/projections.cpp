@@ -22,9 +22,9 @@ std::vector<Camera> cameras_of(const std::vector<Projection>& all, std::vector<i
   std::vector<Camera> cameras;
   for (const int number : numbers) {
     if (number < 0 || std::size_t(number) >= all.size())
-      throw Error(what + ": has " + std::to_string(all.size()) +
-                  " projections, counted from 0; there is no projection " + std::to_string(number));
-    cameras.push_back(camera(all[std::size_t(number)], what + ": projection " + std::to_string(number)));
+      throw Error(
+          formatted("{}: has {} projections, counted from 0; there is no projection {}", what, all.size(), number));
+    cameras.push_back(camera(all[std::size_t(number)], formatted("{}: projection {}", what, number)));
   }
   return cameras;
 }
@@ -39,7 +39,7 @@ Projections projections_in(const std::filesystem::path& path) {
 
 int projection_number(double number, const std::string& what) {
   if (!(number >= 0 && number <= 1e6) || number != double(int(number)))
-    throw Error(what + ": projections: expected whole numbers from 0, got " + formatted("{:f}", number));
+    throw Error(formatted("{}: projections: expected whole numbers from 0, got {:f}", what, number));
   return int(number);
 }
 

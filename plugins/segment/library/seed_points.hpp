@@ -23,8 +23,7 @@ inline std::vector<std::vector<Eigen::Vector3d>> seed_indices(const marrow::Volu
     throw Error(
         "seeds: there are none; give at least one fragment with one point inside its bone (seeds in case.yaml)");
   if (seeds.size() > kMostFragments)
-    throw Error("seeds: at most " + std::to_string(kMostFragments) + " fragments expected, got " +
-                std::to_string(seeds.size()));
+    throw Error(formatted("seeds: at most {} fragments expected, got {}", kMostFragments, seeds.size()));
   std::vector<std::vector<Eigen::Vector3d>> indices(seeds.size());
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     const std::string fragment = "seeds of fragment '" + seeds.name(f) + "'";

@@ -7,6 +7,8 @@
 #include <marrow/domain/central_rays.hpp>
 #include <tuple>
 
+#include "marrow/base/number_text.hpp"
+
 namespace marrow::shaft {
 namespace {
 
@@ -17,9 +19,8 @@ void check_inputs(const EdgeMap& edges, const View& view) {
   if (type != CV_8UC1 && type != CV_16UC1 && type != CV_32FC1)
     throw Error(what + "the image must have one channel of 8 or 16 bit whole numbers or 32 bit floats");
   if (edges.width_px != view.camera.width_px || edges.height_px != view.camera.height_px)
-    throw Error(what + "the edge map is for " + std::to_string(edges.width_px) + " x " +
-                std::to_string(edges.height_px) + " pixels, the view has " + std::to_string(view.camera.width_px) +
-                " x " + std::to_string(view.camera.height_px) + "; wire the edges of this view");
+    throw Error(formatted("{}the edge map is for {} x {} pixels, the view has {} x {}; wire the edges of this view",
+                          what, edges.width_px, edges.height_px, view.camera.width_px, view.camera.height_px));
   if (edges.pixels.empty())
     throw Error(what +
                 "the edge map is empty, so there is no shaft in it; look at the image, and lower the "

@@ -232,7 +232,7 @@ LineSegment segment_of(const Border& border, const Stretch& stretch) {
 }
 
 [[noreturn]] void refuse(const View& view, const std::vector<Border>& borders, const std::vector<Pair>& pairs) {
-  std::string message = "view '" + view.name + "': no shaft pair found: " + std::to_string(borders.size()) + " lines";
+  std::string message = formatted("view '{}': no shaft pair found: {} lines", view.name, borders.size());
   if (pairs.empty()) message += ", none of which run side by side";
   for (std::size_t i = 0; i < std::min<std::size_t>(pairs.size(), 3); ++i)
     message += (i ? "; the next because " : ", best candidate rejected because ") + pairs[i].reason;

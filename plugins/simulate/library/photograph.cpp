@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/simulate/mesh_rays.hpp"
 
@@ -217,8 +218,8 @@ class Photographer {
     const FirstMet met = first_met(bundle_of(facets_, grid_.columns, grid_.rows, [&](const Eigen::Vector3d& p) {
       const Eigen::Vector3d seen = camera_.camera_from_world * p;
       if (!(seen.z() > kNearest_mm))
-        throw Error("a photographed body reaches behind the camera or closer than " + std::to_string(int(kNearest_mm)) +
-                    " mm to it");
+        throw Error(
+            formatted("a photographed body reaches behind the camera or closer than {} mm to it", int(kNearest_mm)));
       const Eigen::Vector2d ray = grid_.ray_at((camera_.intrinsics * seen / seen.z()).head<2>());
       return RayVertex{ray.x(), ray.y(), -1 / seen.z()};
     }));

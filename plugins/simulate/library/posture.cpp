@@ -2,13 +2,14 @@
 #include "marrow/simulate/posture.hpp"
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::phantom {
 
 ClutteredPhantom in_posture(ClutteredPhantom phantom, const Posture* posture) {
   if (!posture) return phantom;
   const auto counts = [](std::size_t fragments, std::size_t bodies) {
-    return std::to_string(fragments) + " fragments and " + std::to_string(bodies) + " bodies";
+    return formatted("{} fragments and {} bodies", fragments, bodies);
   };
   auto& fragments = phantom.phantom.fragments;
   if (posture->world_from_ct.size() != fragments.size() || posture->bodies.size() != phantom.bodies.size())

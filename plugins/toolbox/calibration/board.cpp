@@ -49,7 +49,7 @@ void add_beads(const YamlMap& side, const std::string& key, int index, Board& bo
   const auto diameter = group.number("diameter_mm");
   if (diameter && !(*diameter > 0 && *diameter < 100))
     group.fault("diameter_mm",
-                "diameter_mm: expected a length above 0 and below 100 mm, got " + formatted("{:f}", *diameter));
+                formatted("diameter_mm: expected a length above 0 and below 100 mm, got {:f}", *diameter));
   for (const Eigen::Vector3d& point : group.points("at_mm"))
     board.beads.push_back({point, diameter.value_or(0), index, key == "landmarks"});
 }
@@ -57,18 +57,19 @@ void add_beads(const YamlMap& side, const std::string& key, int index, Board& bo
 void check_side(const Board& board, int side, const std::string& what) {
   const std::vector<int> all = board.of_side(side), landmarks = board.of_side(side, true);
   if (landmarks.size() < 4)
-    throw Error(what + ": has " + std::to_string(landmarks.size()) +
-                " landmarks; a side is found in an image by at least 4, so make 4 of its beads larger than the others");
+    throw Error(
+        formatted("{}: has {} landmarks; a side is found in an image by at least 4, so make 4 of its beads larger than "
+                  "the others",
+                  what, landmarks.size()));
   if (landmarks.size() > 8)
-    throw Error(what + ": has " + std::to_string(landmarks.size()) +
-                " landmarks; 4 to 8 are enough, list the rest as beads");
-  if (all.size() < 8) throw Error(what + ": has " + std::to_string(all.size()) + " beads; at least 8 are needed");
+    throw Error(formatted("{}: has {} landmarks; 4 to 8 are enough, list the rest as beads", what, landmarks.size()));
+  if (all.size() < 8) throw Error(formatted("{}: has {} beads; at least 8 are needed", what, all.size()));
   const Flat plane = flat_of(board, side);
   for (int i : all) {
     const double height = std::abs(plane.normal.dot(board.beads[std::size_t(i)].centre_mm - plane.centre));
     if (height > kFlat_mm)
-      throw Error(what + ": bead " + std::to_string(i + 1) + " lies " + millimetres(height) +
-                  " out of the side's plane, at most " + millimetres(kFlat_mm) + " expected; check its coordinates");
+      throw Error(formatted("{}: bead {} lies {} out of the side's plane, at most {} expected; check its coordinates",
+                            what, i + 1, millimetres(height), millimetres(kFlat_mm)));
   }
 }
 
@@ -78,14 +79,16 @@ void check_sizes_and_places(const Board& board, const std::string& what) {
     (bead.landmark ? smallest_landmark = std::min(smallest_landmark, bead.diameter_mm)
                    : largest_bead = std::max(largest_bead, bead.diameter_mm));
   if (smallest_landmark < kLandmarkRatio * largest_bead)
-    throw Error(what + ": landmarks of " + millimetres(smallest_landmark) + " are not told apart from beads of " +
-                millimetres(largest_bead) + "; expected at least 1.3 times their diameter");
+    throw Error(
+        formatted("{}: landmarks of {:.3g} mm are not told apart from beads of {:.3g} mm; expected at least 1.3 times "
+                  "their diameter",
+                  what, smallest_landmark, largest_bead));
   for (std::size_t i = 0; i < board.beads.size(); ++i)
     for (std::size_t k = 0; k < i; ++k)
       if ((board.beads[i].centre_mm - board.beads[k].centre_mm).norm() <
           0.5 * (board.beads[i].diameter_mm + board.beads[k].diameter_mm))
-        throw Error(what + ": beads " + std::to_string(k + 1) + " and " + std::to_string(i + 1) +
-                    " (counted as the file lists them) overlap; a bead is given twice?");
+        throw Error(formatted("{}: beads {} and {} (counted as the file lists them) overlap; a bead is given twice?",
+                              what, k + 1, i + 1));
 }
 
 void check_sides(const Board& board, const std::string& what) {
@@ -94,8 +97,10 @@ void check_sides(const Board& board, const std::string& what) {
   const double tilt = std::acos(std::min(1.0, std::abs(first.normal.dot(second.normal))));
   if (tilt > 0.1) throw Error(what + ": the two sides are not parallel; check their coordinates");
   if (thickness < kLeastThickness_mm)
-    throw Error(what + ": the two sides are " + millimetres(thickness) + " apart; at least " +
-                millimetres(kLeastThickness_mm) + " are needed to tell the focal length from the distance");
+    throw Error(
+        formatted("{}: the two sides are {:.3g} mm apart; at least {:.3g} mm are needed to tell the focal length from "
+                  "the distance",
+                  what, thickness, kLeastThickness_mm));
   for (int side : {0, 1})
     if (can_be_mistaken(board, side, side))
       throw Error(what + ": side '" + board.sides[std::size_t(side)] +
@@ -144,8 +149,7 @@ Board read_board_file(const std::filesystem::path& path) {
   }
   file.finish();
   if (board.beads.size() > kMostBeads)
-    throw Error(path.string() + ": has " + std::to_string(board.beads.size()) +
-                " beads; at most 1000 can be told apart");
+    throw Error(formatted("{}: has {} beads; at most 1000 can be told apart", path.string(), board.beads.size()));
   for (int side : {0, 1}) check_side(board, side, path.string() + ": side '" + board.sides[std::size_t(side)] + "'");
   check_sizes_and_places(board, path.string());
   check_sides(board, path.string());

@@ -7,6 +7,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/quantile.hpp"
 
@@ -214,8 +215,8 @@ CalibrationResult calibrate(const std::vector<ViewPoints>& views, int width_px, 
   std::vector<std::vector<cv::Point2f>> pixels(views.size());
   for (std::size_t n = 0; n < views.size(); ++n) {
     if (views[n].board_mm.size() < kLeastPoints)
-      throw Error("view '" + views[n].name + "': " + std::to_string(views[n].board_mm.size()) +
-                  " beads are seen; at least 8 are needed");
+      throw Error(
+          formatted("view '{}': {} beads are seen; at least 8 are needed", views[n].name, views[n].board_mm.size()));
     for (const auto& p : views[n].board_mm) points[n].emplace_back(float(p.x()), float(p.y()), float(p.z()));
     for (const auto& p : views[n].pixels) pixels[n].emplace_back(float(p.x()), float(p.y()));
   }

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::calibration {
 namespace {
@@ -26,7 +27,7 @@ bool first_square_is_black(const cv::Mat1b& grey, const std::vector<cv::Point2f>
 }  // namespace
 
 void check_chessboard(const Chessboard& board, const std::string& what) {
-  const std::string size = std::to_string(board.columns) + " x " + std::to_string(board.rows);
+  const std::string size = formatted("{} x {}", board.columns, board.rows);
   if (board.columns < 3 || board.rows < 3)
     throw Error(what + ": a chessboard with " + size + " inner corners is too small; give at least 3 x 3");
   if ((board.columns + board.rows) % 2 == 0)

@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::calibration {
 namespace {
@@ -216,9 +217,10 @@ ViewPoints match_by_camera(const Board& board, const Points& discs, ViewPoints p
     const CalibrationResult camera = calibrate({points}, width_px, height_px, model);
     const double rms = root_mean_square(camera.views[0].residuals_px);
     if (rms > kReach * width_px)
-      throw Error("view '" + points.name + "': the board's two sides are found but do not fit one camera (" +
-                  std::to_string(int(rms)) +
-                  " px off); check the distance and the position of the sides in the board's file");
+      throw Error(
+          formatted("view '{}': the board's two sides are found but do not fit one camera ({} px off); check the "
+                    "distance and the position of the sides in the board's file",
+                    points.name, int(rms)));
     Points predicted;
     for (const Bead& bead : board.beads)
       predicted.push_back(seen_at(camera.calibration, camera.views[0].camera_from_world, bead.centre_mm));
@@ -239,11 +241,10 @@ ViewPoints match_board(const Board& board, const std::vector<BeadImage>& images,
     const std::vector<int> beads = board.of_side(side);
     const SideFound found = find_side(side_of(board, side), discs, landmarks, width_px, height_px);
     if (found.hits.size() < kLeastBeads || !are_enough(found.hits.size(), found.in_image, kLeastFound))
-      throw Error(
-          "view '" + view + "': side '" + board.sides[std::size_t(side)] + "' of the board is not found: among " +
-          std::to_string(discs.size()) + " dark discs, the best match explains " + std::to_string(found.hits.size()) +
-          " of its " + std::to_string(beads.size()) +
-          " beads; at least 4 of its landmarks must be seen whole, not hidden by another bead or cut by the border");
+      throw Error(formatted(
+          "view '{}': side '{}' of the board is not found: among {} dark discs, the best match explains {} of its {} "
+          "beads; at least 4 of its landmarks must be seen whole, not hidden by another bead or cut by the border",
+          view, board.sides[std::size_t(side)], discs.size(), found.hits.size(), beads.size()));
     for (const Hit& hit : found.hits) hits.push_back({beads[std::size_t(hit.point)], hit.disc});
   }
   // A disc that both sides claim is left out here. The camera decides about it.

@@ -7,6 +7,7 @@
 #include <marrow/domain/quantile.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
 #include "plain_letters.hpp"
 
@@ -53,8 +54,8 @@ Contrast contrast_of(const std::string& name) {
 Panel make_panel(const View& view, const cv::Rect& part, int size_px, Contrast contrast) {
   check_view(view);
   if (view.image.pixels.channels() != 1)
-    throw Error("view '" + view.name + "': the image has " + std::to_string(view.image.pixels.channels()) +
-                " channels; an X-ray has one");
+    throw Error(
+        formatted("view '{}': the image has {} channels; an X-ray has one", view.name, view.image.pixels.channels()));
   const cv::Mat grey = stretched(view.image.pixels(part), view.mask.empty() ? view.mask : view.mask(part), contrast);
   Panel panel;
   panel.corner_px = part.tl();

@@ -36,10 +36,10 @@ Eigen::Vector2i size_px(const ImageSize& size, const std::string& what) {
     throw Error(what +
                 ": does not say how many pixels the image has; wire the image, or give size_px: [width, height]");
   if (size.size_px.size() != 2)
-    throw Error(what + ": size_px: expected [width, height], got " + std::to_string(size.size_px.size()) + " numbers");
+    throw Error(formatted("{}: size_px: expected [width, height], got {} numbers", what, size.size_px.size()));
   for (const double side : size.size_px)
     if (!(side >= 1 && side <= kLargestSide_px) || side != std::floor(side))
-      throw Error(what + ": size_px: expected 1 to 65536 pixels each way, got " + formatted("{:f}", side));
+      throw Error(formatted("{}: size_px: expected 1 to 65536 pixels each way, got {:f}", what, side));
   return {int(size.size_px[0]), int(size.size_px[1])};
 }
 
@@ -47,11 +47,11 @@ Eigen::Vector2d pixel_mm(const std::vector<double>& numbers, const std::string& 
   if (numbers.empty())
     throw Error(what + ": needs the size of a pixel on the detector; give pixel_mm: [width, height]");
   if (numbers.size() > 2)
-    throw Error(what + ": pixel_mm: expected [width, height], or one number for square pixels, got " +
-                std::to_string(numbers.size()));
+    throw Error(formatted("{}: pixel_mm: expected [width, height], or one number for square pixels, got {}", what,
+                          numbers.size()));
   for (const double side : numbers)
     if (!(side >= 1e-6 && side <= 1000))
-      throw Error(what + ": pixel_mm: expected a size in mm between 1e-6 and 1000, got " + formatted("{:f}", side));
+      throw Error(formatted("{}: pixel_mm: expected a size in mm between 1e-6 and 1000, got {:f}", what, side));
   return {numbers.front(), numbers.back()};
 }
 
@@ -60,8 +60,9 @@ Eigen::Vector2d corner_mm(const ImageSize& size, const std::string& what) {
     return -0.5 *
            (size_px(size, what).cast<double>() - Eigen::Vector2d::Ones()).cwiseProduct(pixel_mm(size.pixel_mm, what));
   if (size.corner_mm.size() != 2)
-    throw Error(what + ": corner_mm: expected [u, v], the place of the first pixel's centre on the detector, got " +
-                std::to_string(size.corner_mm.size()) + " numbers");
+    throw Error(formatted(
+        "{}: corner_mm: expected [u, v], the place of the first pixel's centre on the detector, got {} numbers", what,
+        size.corner_mm.size()));
   return {size.corner_mm[0], size.corner_mm[1]};
 }
 

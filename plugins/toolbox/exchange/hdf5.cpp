@@ -71,8 +71,7 @@ std::vector<std::string> Hdf5Reader::names_in(const std::string& key) const {
   const Hdf5Id group(H5Gopen2(file_, key.c_str(), H5P_DEFAULT), H5Gclose);
   H5G_info_t info{};
   if (!group.is_open() || H5Gget_info(group, &info) < 0) refuse(key, "expected a group; the file is damaged");
-  if (info.nlinks > kMostNames)
-    refuse(key, "has " + std::to_string(info.nlinks) + " items; at most " + std::to_string(kMostNames) + " are read");
+  if (info.nlinks > kMostNames) refuse(key, formatted("has {} items; at most {} are read", info.nlinks, kMostNames));
   for (hsize_t i = 0; i < info.nlinks; ++i) {
     std::array<char, 256> name{};
     const ssize_t length =
@@ -93,14 +92,12 @@ std::vector<double> Hdf5Reader::numbers(const std::string& key, std::size_t coun
   const H5T_class_t kind = H5Tget_class(type);
   if (kind != H5T_FLOAT && kind != H5T_INTEGER) refuse(key, "expected numbers, got another type");
   const hssize_t found = H5Sget_simple_extent_npoints(space);
-  if (found != hssize_t(count))
-    refuse(key, "expected " + std::to_string(count) + (count == 1 ? " number" : " numbers") + ", got " +
-                    std::to_string(found));
+  if (found != hssize_t(count)) refuse(key, formatted("expected {}, got {}", counted(count, "number"), found));
   std::vector<double> values(count);
   if (H5Dread(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0)
     refuse(key, "cannot be read; the file is damaged");
   for (const double value : values)
-    if (!std::isfinite(value)) refuse(key, "expected finite numbers, got " + formatted("{:f}", value));
+    if (!std::isfinite(value)) refuse(key, formatted("expected finite numbers, got {:f}", value));
   return values;
 }
 

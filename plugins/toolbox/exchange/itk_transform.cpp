@@ -27,7 +27,7 @@ struct Lines {
   std::size_t type_line = 0, parameters_line = 0, fixed_line = 0;
 
   [[noreturn]] void refuse(std::size_t line, const std::string& what) const {
-    throw Error(path.string() + ":" + std::to_string(line) + ": " + what);
+    throw Error(formatted("{}:{}: {}", path.string(), line, what));
   }
 };
 
@@ -88,8 +88,7 @@ std::vector<double> numbers_of(const Lines& lines, const std::string& text, std:
 }
 
 void expect_count(const Lines& lines, std::size_t line, std::size_t expected, std::size_t got, const char* what) {
-  if (got != expected)
-    lines.refuse(line, lines.type + " has " + std::to_string(expected) + " " + what + ", got " + std::to_string(got));
+  if (got != expected) lines.refuse(line, formatted("{} has {} {}, got {}", lines.type, expected, what, got));
 }
 
 /// The type without the kind of its numbers: "AffineTransform" of "AffineTransform_double_3_3".

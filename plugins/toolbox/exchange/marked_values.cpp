@@ -5,6 +5,7 @@
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/names.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 
 namespace marrow::exchange {
@@ -19,7 +20,7 @@ std::string without_number(const std::string& label) {
 }
 
 [[noreturn]] void refuse(const std::filesystem::path& path, std::size_t index, const std::string& what) {
-  throw Error(path.string() + ": point " + std::to_string(index + 1) + ": " + what);
+  throw Error(formatted("{}: point {}: {}", path.string(), index + 1, what));
 }
 
 void check_label(const std::filesystem::path& path, std::size_t index, const std::string& name,
@@ -46,8 +47,8 @@ Landmarks read_marked_landmarks(const std::filesystem::path& path) {
                                     [&](const auto& known) { return known.name == point.label; });
     if (other != landmarks.points.end())
       refuse(path, index,
-             "its label '" + printable(point.label) + "' is that of point " +
-                 std::to_string(other - landmarks.points.begin() + 1) + "; give each its own");
+             formatted("its label '{}' is that of point {}; give each its own", printable(point.label),
+                       other - landmarks.points.begin() + 1));
     landmarks.points.push_back({point.label, point.at_mm});
   }
   return landmarks;
@@ -80,7 +81,7 @@ std::vector<MarkedPoint> marked_points(const Landmarks& landmarks) {
 std::vector<MarkedPoint> marked_points(const Seeds& seeds) {
   std::vector<MarkedPoint> points;
   for (const Eigen::Vector3d& point : seeds.points_mm)
-    points.push_back(finite(seeds.fragment + "-" + std::to_string(points.size() + 1), point));
+    points.push_back(finite(formatted("{}-{}", seeds.fragment, points.size() + 1), point));
   return points;
 }
 

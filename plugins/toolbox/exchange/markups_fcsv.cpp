@@ -22,7 +22,7 @@ struct Line {
   const std::filesystem::path& path;
   std::size_t number = 0;
   [[noreturn]] void refuse(const std::string& what) const {
-    throw Error(path.string() + ":" + std::to_string(number) + ": " + what);
+    throw Error(formatted("{}:{}: {}", path.string(), number, what));
   }
 };
 
@@ -147,21 +147,21 @@ bool may_be_shifted(const std::vector<std::string>& cells, const Header& header,
 std::optional<MarkedPoint> point_of(const std::string& text, const Header& header, const Line& line) {
   const std::vector<std::string> cells = cells_of(text, line);
   if (const std::size_t least = std::max(header.label, header.x + 2) + 1; cells.size() < least)
-    line.refuse("expected at least " + std::to_string(least) + " cells, got " + std::to_string(cells.size()));
+    line.refuse(formatted("expected at least {} cells, got {}", least, cells.size()));
   const auto status = status_of(cells, header);
   if (may_be_shifted(cells, header, status.has_value()))
-    line.refuse((cells.size() == header.columns + (status ? 2 : 0)
-                     ? "the cells do not stand below their columns: those of the orientation or of vis, sel and lock "
-                       "hold other numbers"
-                     : "expected " + std::to_string(header.columns) + " cells, one for each of the columns, got " +
-                           std::to_string(cells.size())) +
-                "; a number with a decimal comma makes two cells: write 12.5, not 12,5, and a text with commas in "
-                "quotation marks");
+    line.refuse(
+        (cells.size() == header.columns + (status ? 2 : 0)
+             ? "the cells do not stand below their columns: those of the orientation or of vis, sel and lock "
+               "hold other numbers"
+             : formatted("expected {} cells, one for each of the columns, got {}", header.columns, cells.size())) +
+        "; a number with a decimal comma makes two cells: write 12.5, not 12,5, and a text with commas in "
+        "quotation marks");
   constexpr double kPlaced = 2;
   if (status && *status != kPlaced) return std::nullopt;
   Eigen::Vector3d at_mm;
   for (int i = 0; i < 3; ++i) at_mm[i] = coordinate(cells[header.x + std::size_t(i)], line);
-  return MarkedPoint{cells[header.label], in_lps(at_mm, *header.is_ras)};
+  return MarkedPoint{cells[header.label], in_lps(at_mm, header.is_ras.value())};
 }
 
 /// In small or capital letters.
@@ -208,7 +208,7 @@ std::string markups_fcsv(const std::vector<MarkedPoint>& points) {
   std::string text = "# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n# columns = ";
   text += std::string(kColumns) + "\n";
   for (std::size_t i = 0; i < points.size(); ++i) {
-    text += std::to_string(i + 1);
+    text += formatted("{}", i + 1);
     for (const double coordinate : points[i].at_mm) text += "," + files::number(coordinate);
     text += ",0,0,0,1,1,1,0," + quoted(points[i].label) + ",,\n";
   }

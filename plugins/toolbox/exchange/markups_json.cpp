@@ -6,6 +6,7 @@
 
 #include "markups_file.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 
@@ -18,7 +19,7 @@ using nlohmann::json;
 struct Place {
   std::string file, key;
   Place at(const std::string& name) const { return {file, key.empty() ? name : key + "." + name}; }
-  Place at(std::size_t index) const { return {file, key + "[" + std::to_string(index) + "]"}; }
+  Place at(std::size_t index) const { return {file, formatted("{}[{}]", key, index)}; }
   [[noreturn]] void refuse(const std::string& what) const { throw Error(file + ": " + key + ": " + what); }
 };
 
@@ -33,8 +34,8 @@ json parsed(const std::string& text, const std::string& file) {
   } catch (const json::parse_error& error) {
     const std::size_t end = std::min(error.byte, text.size());
     const auto line = 1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(end), '\n');
-    throw Error(file + ":" + std::to_string(line) +
-                ": is no JSON from here on; it is cut off or damaged: save the markups again in 3D Slicer");
+    throw Error(formatted(
+        "{}:{}: is no JSON from here on; it is cut off or damaged: save the markups again in 3D Slicer", file, line));
   } catch (const json::out_of_range&) {
     throw Error(file + ": holds a number too large to be one; it is damaged: save the markups again in 3D Slicer");
   }
@@ -58,7 +59,7 @@ const json& list_at(const json& object, const std::string& key, const Place& pla
 Eigen::Vector3d position_of(const json& point, const Place& place) {
   const json& numbers = list_at(point, "position", place, "each control point needs its three coordinates");
   const Place at = place.at("position");
-  if (numbers.size() != 3) at.refuse("expected 3 coordinates, got " + std::to_string(numbers.size()));
+  if (numbers.size() != 3) at.refuse(formatted("expected 3 coordinates, got {}", numbers.size()));
   Eigen::Vector3d position;
   for (std::size_t i = 0; i < 3; ++i) {
     if (!numbers[i].is_number()) at.at(i).refuse("expected a number, got " + shown(numbers[i]));
@@ -110,7 +111,7 @@ std::string markups_json(const std::vector<MarkedPoint>& points) {
                        {"coordinateUnits", "mm"},
                        {"controlPoints", ordered_json::array()}};
   for (const MarkedPoint& point : points)
-    list["controlPoints"].push_back({{"id", std::to_string(list["controlPoints"].size() + 1)},
+    list["controlPoints"].push_back({{"id", formatted("{}", list["controlPoints"].size() + 1)},
                                      {"label", point.label},
                                      {"position", {point.at_mm.x(), point.at_mm.y(), point.at_mm.z()}},
                                      {"positionStatus", "defined"}});

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
@@ -32,9 +33,7 @@ class ObjReader {
   }
 
  private:
-  [[noreturn]] void refuse(const std::string& what) const {
-    throw Error(what_ + ":" + std::to_string(line_) + ": " + what);
-  }
+  [[noreturn]] void refuse(const std::string& what) const { throw Error(formatted("{}:{}: {}", what_, line_, what)); }
   static std::string shown(std::string_view word) { return in_quotes(printable(word.substr(0, 40))); }
 
   /// The next line with those that continue it. A comment or a name may end with \ as well, as a folder's name does.
@@ -112,12 +111,11 @@ class ObjReader {
         refuse("expected the numbers of vertices, got " + shown(word));
       const long long known = (long long)(points.size());
       if (index == 0 || index > known || index < -known)
-        refuse("the face names vertex " + std::to_string(index) + "; there are " + std::to_string(known) +
-               " before it, counted from 1");
+        refuse(formatted("the face names vertex {}; there are {} before it, counted from 1", index, known));
       corners.push_back(std::uint32_t(index > 0 ? index - 1 : known + index));
       ++count;
     }
-    if (count < 3) refuse("a face needs at least 3 vertices, got " + std::to_string(count));
+    if (count < 3) refuse(formatted("a face needs at least 3 vertices, got {}", count));
     counts.push_back(count);
   }
 
@@ -143,7 +141,7 @@ std::string obj_text(const Mesh& mesh) {
   }
   for (const auto& triangle : mesh.triangles) {
     text += "f";
-    for (const std::uint32_t corner : triangle) text += " " + std::to_string(corner + 1);
+    for (const std::uint32_t corner : triangle) text += formatted(" {}", corner + 1);
     text += "\n";
   }
   return text;

@@ -42,8 +42,8 @@ class Text {
       const std::string line = next();
       const std::vector<double> row = numbers_in(line);
       if (row.size() != std::size_t(Columns))
-        fail("expected " + what + ", " + std::to_string(Columns) + (Columns == 1 ? " number" : " numbers") + ", got " +
-             in_quotes(printable(line.substr(0, 60))));
+        fail(formatted("expected {}, {}, got {}", what, counted(Columns, "number"),
+                       in_quotes(printable(line.substr(0, 60)))));
       for (int c = 0; c < Columns; ++c) matrix(r, c) = row[std::size_t(c)];
     }
     return matrix;
@@ -54,7 +54,7 @@ class Text {
            "; plastimatch drr writes this file whole");
   }
   [[noreturn]] void fail(const std::string& text) const {
-    throw Error(path_.string() + ":" + std::to_string(line_) + ": " + text);
+    throw Error(formatted("{}:{}: {}", path_.string(), line_, text));
   }
 
  private:
@@ -97,8 +97,9 @@ Camera read_plastimatch_camera(const std::filesystem::path& path, const ImageSiz
   const Matrix34 product = intrinsic * extrinsic;
   for (int r = 0; r < 3; ++r)  // the file has 9 digits
     if (!((product.row(r) - matrix.row(r)).norm() <= 1e-5 * matrix.row(r).norm()))
-      throw Error(what + ": row " + std::to_string(r + 1) +
-                  " of its matrix is not that of Intrinsic times Extrinsic; one of them was changed: write it again");
+      throw Error(formatted(
+          "{}: row {} of its matrix is not that of Intrinsic times Extrinsic; one of them was changed: write it again",
+          what, r + 1));
   if (!((nearest - extrinsic.topLeftCorner<3, 3>()).cwiseAbs().maxCoeff() < 1e-4) || nearest.determinant() < 0)
     throw Error(what + ": its extrinsic matrix is no rotation and translation; it is damaged: write it again");
   if (!(k(2, 2) > 0) || !(k(0, 0) > 0) || !(k(1, 1) > 0) || k(1, 0) != 0 || k(2, 0) != 0 || k(2, 1) != 0)

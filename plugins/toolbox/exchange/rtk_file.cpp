@@ -44,7 +44,7 @@ class RtkReader {
   }
 
  private:
-  std::string place() const { return what_ + ":" + std::to_string(XML_GetCurrentLineNumber(parser_.get())) + ": "; }
+  std::string place() const { return formatted("{}:{}: ", what_, XML_GetCurrentLineNumber(parser_.get())); }
   /// Notes the first fault, and stops. No exception may pass through the parser.
   void refuse(const std::string& text) {
     if (fault_.empty()) fault_ = place() + text;
@@ -89,7 +89,7 @@ class RtkReader {
     if (name == "Matrix") {
       matrix_ = numbers();
       if (matrix_->size() != 12)
-        refuse("Matrix: expected 12 numbers of at most 1e7, got " + std::to_string(matrix_->size()));
+        refuse(formatted("Matrix: expected 12 numbers of at most 1e7, got {}", matrix_->size()));
       return;
     }
     const std::string known = name == "Angle" ? "GantryAngle" : name;  // its older name
@@ -126,9 +126,10 @@ class RtkReader {
     for (int i = 0; i < 12 && fault_.empty(); ++i) {
       const double got = (*matrix_)[std::size_t(i)], wanted = expected(i / 4, i % 4);
       if (!(std::abs(got - wanted) <= 1e-3 + 1e-9 * std::abs(wanted)))
-        refuse("Matrix: row " + std::to_string(i / 4 + 1) + ", column " + std::to_string(i % 4 + 1) + " is " +
-               formatted("{:f}", got) + ", but the angles and distances give " + formatted("{:f}", wanted) +
-               "; one of them was changed: write it again with RTK");
+        refuse(
+            formatted("Matrix: row {}, column {} is {:f}, but the angles and distances give {:f}; one of them was "
+                      "changed: write it again with RTK",
+                      i / 4 + 1, i % 4 + 1, got, wanted));
     }
   }
 

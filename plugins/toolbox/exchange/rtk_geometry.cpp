@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 #include "rtk_file.hpp"
 
@@ -87,7 +88,7 @@ Camera camera_of(const RtkProjection& projection, const ImageSize& size, Mirror 
 std::string rtk_geometry(const std::vector<Camera>& cameras, const Eigen::Vector2d& pixel_mm) {
   std::string text = "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<RTKThreeDCircularGeometry version=\"3\">\n";
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    const RtkProjection p = projection_of(cameras[i], pixel_mm, "camera " + std::to_string(i + 1));
+    const RtkProjection p = projection_of(cameras[i], pixel_mm, formatted("camera {}", i + 1));
     text += "  <Projection>\n";
     for (const auto& [name, member] : kRtkElements)
       text += "    <" + std::string(name) + ">" + files::number(p.*member) + "</" + name + ">\n";

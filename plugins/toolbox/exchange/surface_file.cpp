@@ -43,7 +43,7 @@ bool seems_to_face_inwards(const Mesh& mesh) {
 }
 
 std::string edges_text(std::size_t count, const std::string& rest) {
-  return count == 0 ? "" : (count == 1 ? "; 1 edge belongs" : "; " + std::to_string(count) + " edges belong") + rest;
+  return count == 0 ? "" : (count == 1 ? "; 1 edge belongs" : formatted("; {} edges belong", count)) + rest;
 }
 
 void warn_of_open(const Mesh& mesh, const SurfaceShape& shape, const std::string& what, const Context& context) {
@@ -70,10 +70,10 @@ void check_closed(Mesh& mesh, SurfaceShape& shape, const std::string& what, cons
   turn(mesh, shape, others);
   const std::size_t turned = volume_mm3 < 0 ? count - others.size() : others.size();
   if (turned == 0) return;
-  const std::string which = turned == count
-                                ? formatted("all its triangles faced inwards (enclosed volume {:.6g} mm3)", volume_mm3)
-                                : std::to_string(turned) + " of its " + std::to_string(count) +
-                                      " closed parts faced inwards without being a cavity in another part";
+  const std::string which =
+      turned == count
+          ? formatted("all its triangles faced inwards (enclosed volume {:.6g} mm3)", volume_mm3)
+          : formatted("{} of its {} closed parts faced inwards without being a cavity in another part", turned, count);
   context.warn(what + ": " + which +
                ", so they were turned; if the surface was mirrored on its way here, it is still a mirror image");
 }

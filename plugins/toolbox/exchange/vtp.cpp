@@ -18,6 +18,7 @@
 #include <stdexcept>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
@@ -91,8 +92,9 @@ void check_claims(const std::string& bytes, const std::string& what) {
                            "NumberOfTuples", "NumberOfComponents"}) {
     const double count = claimed(bytes, end, name);
     if (!(count <= kMostPerByte * double(bytes.size()) && count < 4e9))
-      throw Error(what + ": its " + name + " is negative, or more than a file of " + std::to_string(bytes.size()) +
-                  " bytes can hold; it is damaged: export it again");
+      throw Error(
+          formatted("{}: its {} is negative, or more than a file of {} bytes can hold; it is damaged: export it again",
+                    what, name, bytes.size()));
   }
 }
 
@@ -134,8 +136,8 @@ FilePolygons polygons_of(vtkPolyData& data, const std::string& what) {
     faces.GetCellAtId(cell, count, corner);
     for (vtkIdType i = 0; i < count; ++i) {
       if (corner[i] < 0 || std::size_t(corner[i]) >= points.size())
-        throw Error(what + ": a face names point " + std::to_string(corner[i]) + "; there are " +
-                    std::to_string(points.size()) + ", counted from 0");
+        throw Error(
+            formatted("{}: a face names point {}; there are {}, counted from 0", what, corner[i], points.size()));
       corners.push_back(std::uint32_t(corner[i]));
     }
     counts.push_back(std::uint32_t(count));

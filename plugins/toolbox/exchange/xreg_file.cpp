@@ -2,7 +2,6 @@
 #include "marrow/toolbox/exchange/xreg_file.hpp"
 
 #include <cmath>
-#include <cstdio>
 
 #include "hdf5.hpp"
 #include "marrow/base/error.hpp"
@@ -18,23 +17,19 @@ constexpr const char *kPositiveZ = "origin-at-focal-pt-det-pos-z", *kNegativeZ =
                      *kOnDetector = "origin-on-det";
 constexpr int kMostProjections = 10000;
 
-std::string group_of(int projection) {
-  char name[24];
-  std::snprintf(name, sizeof name, "proj-%03d", projection);
-  return name;
-}
+std::string group_of(int projection) { return formatted("proj-{:03}", projection); }
 
 int side_px(const Hdf5Reader& file, const std::string& key) {
   const double side = file.number(key);
   if (!(side >= 1 && side <= 65536) || side != std::floor(side))
-    file.refuse(key, "expected 1 to 65536 pixels, got " + formatted("{:f}", side));
+    file.refuse(key, formatted("expected 1 to 65536 pixels, got {:f}", side));
   return int(side);
 }
 
 double spacing_mm(const Hdf5Reader& file, const std::string& key) {
   const double spacing = file.number(key);
   if (!(spacing >= 1e-6 && spacing <= 1000))
-    file.refuse(key, "expected the size of a pixel in mm, between 1e-6 and 1000, got " + formatted("{:f}", spacing));
+    file.refuse(key, formatted("expected the size of a pixel in mm, between 1e-6 and 1000, got {:f}", spacing));
   return spacing;
 }
 
@@ -42,7 +37,7 @@ template <int Size>
 Eigen::Matrix<double, Size, Size> matrix(const Hdf5Reader& file, const std::string& key) {
   const std::vector<double> values = file.numbers(key, std::size_t(Size * Size));
   for (const double value : values)
-    if (std::abs(value) > 1e9) file.refuse(key, "expected numbers of at most 1e9, got " + formatted("{:f}", value));
+    if (std::abs(value) > 1e9) file.refuse(key, formatted("expected numbers of at most 1e9, got {:f}", value));
   return Eigen::Map<const Eigen::Matrix<double, Size, Size, Eigen::RowMajor>>(values.data());
 }
 
@@ -76,7 +71,7 @@ std::vector<XregProjection> read_xreg(const std::filesystem::path& path) {
   if (file.has("intrinsic")) return {read_camera(file, "")};
   const double count = file.number("num-projs");
   if (!(count >= 1 && count <= kMostProjections) || count != std::floor(count))
-    file.refuse("num-projs", "expected 1 to 10000 projections, got " + std::to_string(count));
+    file.refuse("num-projs", formatted("expected 1 to 10000 projections, got {:f}", count));
   std::vector<XregProjection> projections;
   for (int i = 0; i < int(count); ++i) {
     const std::string group = group_of(i);
@@ -86,8 +81,7 @@ std::vector<XregProjection> read_xreg(const std::filesystem::path& path) {
       if (const std::string fault = fault_of_item_name(name); !fault.empty()) file.refuse(key, "its name " + fault);
       const std::vector<double> pixel = file.numbers(key, 2);
       if (std::max(std::abs(pixel[0]), std::abs(pixel[1])) > 1e6)
-        file.refuse(key, "expected a column and a row of at most 1e6, got " + formatted("{:f}", pixel[0]) + ", " +
-                             formatted("{:f}", pixel[1]));
+        file.refuse(key, formatted("expected a column and a row of at most 1e6, got {:f}, {:f}", pixel[0], pixel[1]));
       projections.back().landmarks.push_back({name, {pixel[0], pixel[1]}});
     }
   }

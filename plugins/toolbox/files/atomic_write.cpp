@@ -10,6 +10,7 @@
 #include <new>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::files {
 
@@ -24,8 +25,7 @@ void write_atomically(const fs::path& path, const std::function<void(const fs::p
   // replace_filename() is avoided: if it runs out of memory, GCC 12 leaves a path that cannot be destroyed.
   // With a number, because another thread may write a file of the same name.
   static std::atomic<unsigned> count{0};
-  const fs::path temporary =
-      folder / (".part" + std::to_string(::getpid()) + "-" + std::to_string(++count) + "-" + path.filename().string());
+  const fs::path temporary = folder / formatted(".part{}-{}-{}", ::getpid(), ++count, path.filename().string());
   try {
     fill(temporary);
     // A folder may only be replaced by a folder. rename() needs the old one to be removed first.

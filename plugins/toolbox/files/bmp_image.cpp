@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "samples.hpp"
 
 namespace marrow::files {
@@ -30,8 +31,8 @@ class BmpBytes {
   }
   const std::uint8_t* part(std::size_t at, std::size_t count) const {
     if (at > bytes_.size() || count > bytes_.size() - at)
-      throw Error(what_ + ": is cut off or damaged: " + std::to_string(at + count) + " bytes expected, got " +
-                  std::to_string(bytes_.size()) + "; copy or export it again");
+      throw Error(formatted("{}: is cut off or damaged: {} bytes expected, got {}; copy or export it again", what_,
+                            at + count, bytes_.size()));
     return reinterpret_cast<const std::uint8_t*>(bytes_.data()) + at;
   }
   const std::string& what() const { return what_; }
@@ -42,8 +43,8 @@ class BmpBytes {
 };
 
 [[noreturn]] void refuse_kind(const BmpBytes& bytes, const BmpHeader& header) {
-  throw Error(bytes.what() + ": is a BMP of " + std::to_string(header.bits) + " bits stored by method " +
-              std::to_string(header.compression) + ", which is not read; save it as PNG");
+  throw Error(formatted("{}: is a BMP of {} bits stored by method {}, which is not read; save it as PNG", bytes.what(),
+                        header.bits, header.compression));
 }
 
 /// Checks where the bits of red, green, blue and opacity are, and whether there is an opacity.
@@ -87,8 +88,9 @@ void read_bmp_row(const BmpBytes& bytes, const BmpHeader& header, const std::uin
       const std::uint32_t shift = 8 - bits - std::uint32_t(u * bits % 8), index = *pixel >> shift & ((1u << bits) - 1);
       const std::size_t place = header.palette + index * header.palette_step;
       if (place + header.palette_step > header.pixels)
-        throw Error(bytes.what() + ": is damaged: a pixel has the colour " + std::to_string(index) +
-                    ", which its palette does not have; copy or export it again");
+        throw Error(formatted(
+            "{}: is damaged: a pixel has the colour {}, which its palette does not have; copy or export it again",
+            bytes.what(), index));
       pixel = bytes.part(place, header.palette_step);
     }
     for (std::size_t k = 0; k < 3; ++k) *to++ = pixel[2 - k];  // blue is the first

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/plain_text.hpp"
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
@@ -56,13 +57,13 @@ class XmalabText {
       at = stop;
     }
     if (values.size() != count || at != end)
-      fail("expected " + std::to_string(count) + " numbers, got '" + line.substr(0, 60) + "'");
+      fail(formatted("expected {} numbers, got '{}'", count, line.substr(0, 60)));
     return values;
   }
 
   [[noreturn]] void fail(const std::string& text) const {
-    throw Error(path_.string() + ":" + std::to_string(line_number_) + ": " + text +
-                "; an XMALab camera has the blocks image size, camera matrix, rotation, translation");
+    throw Error(formatted("{}:{}: {}; an XMALab camera has the blocks image size, camera matrix, rotation, translation",
+                          path_.string(), line_number_, text));
   }
 
  private:

@@ -5,6 +5,7 @@
 
 #include "byte_stream.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "samples.hpp"
 
 namespace marrow::files {
@@ -192,10 +193,9 @@ class DicomWalk {
   void check_fits(const Next& element, std::uint64_t end) const {
     if (element.length <= end - at_) return;
     if (element.tag == kPixels)
-      throw Error(what() + ": is cut off: " + std::to_string(element.length) + " bytes of pixels expected, got " +
-                  std::to_string(end - at_) + "; copy or export it again");
-    damaged("an element claims " + std::to_string(element.length) + " bytes where " + std::to_string(end - at_) +
-            " are left");
+      throw Error(formatted("{}: is cut off: {} bytes of pixels expected, got {}; copy or export it again", what(),
+                            element.length, end - at_));
+    damaged(formatted("an element claims {} bytes where {} are left", element.length, end - at_));
   }
 
   void meta_data() {
@@ -341,11 +341,9 @@ const DicomElement* find_element(const std::filesystem::path& path, const DicomE
   const DicomElement* found = nullptr;
   for (const DicomElement& element : elements) {
     if (element.tag != tag) continue;
-    if (found) {
-      char text[16];
-      std::snprintf(text, sizeof text, "(%04x,%04x)", tag >> 16, tag & 0xFFFF);
-      throw Error(path.string() + ": gives the element " + text + " twice; it is damaged: copy or export it again");
-    }
+    if (found)
+      throw Error(formatted("{}: gives the element ({:04x},{:04x}) twice; it is damaged: copy or export it again",
+                            path.string(), tag >> 16, tag & 0xFFFF));
     found = &element;
   }
   return found;

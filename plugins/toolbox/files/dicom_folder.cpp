@@ -8,6 +8,7 @@
 #include "dicom_object.hpp"
 #include "header_lines.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "samples.hpp"
 
 namespace marrow::files {
@@ -97,14 +98,14 @@ Content content_of(const fs::path& folder, const fs::path& root) {
 std::string listed(const std::vector<std::string>& lines) {
   std::string text;
   for (std::size_t i = 0; i < std::min(kMostNamed, lines.size()); ++i) text += "\n    " + lines[i];
-  if (lines.size() > kMostNamed) text += "\n    and " + std::to_string(lines.size() - kMostNamed) + " more";
+  if (lines.size() > kMostNamed) text += formatted("\n    and {} more", lines.size() - kMostNamed);
   return text;
 }
 
 std::string why_not_dicom(const fs::path& path) {
   const std::uint64_t bytes = InputFile(path, true).size();
   return bytes == 0    ? "it is empty"
-         : bytes < 132 ? "it has " + std::to_string(bytes) + " bytes, at least 132 expected"
+         : bytes < 132 ? formatted("it has {} bytes, at least 132 expected", bytes)
                        : "it has no 'DICM' at byte 128";
 }
 
@@ -126,18 +127,18 @@ void sort_out_others(const fs::path& folder, const Content& content, SeriesFiles
     throw Error((folder / doubtful[0]).string() +
                 "; if it is a slice, it is damaged at its start: fetch it again; if not, remove it from the folder");
   if (doubtful.size() > 1)
-    throw Error(folder.string() + ": holds " + std::to_string(doubtful.size()) +
-                " files beside the slices that are no whole DICOM files; those that are slices are damaged at their "
-                "start: fetch them again, and remove the others from the folder:" +
-                listed(doubtful));
+    throw Error(
+        formatted("{}: holds {} files beside the slices that are no whole DICOM files; those that are slices are "
+                  "damaged at their start: fetch them again, and remove the others from the folder:{}",
+                  folder.string(), doubtful.size(), listed(doubtful)));
 }
 
 /// "1.2.3 (CT, 12 slices, thin)"
 std::string described(const std::string& uid, const std::vector<const DicomObject*>& objects) {
   const DicomObject& first = *objects[0];
-  return uid + " (" + first.modality + ", " + std::to_string(objects.size()) +
-         (first.modality == "CT" ? " slices" : " files") + (first.description.empty() ? "" : ", " + first.description) +
-         ")";
+  return formatted("{} ({}, {}{}{})", uid, first.modality, objects.size(),
+                   first.modality == "CT" ? " slices" : " files",
+                   first.description.empty() ? "" : ", " + first.description);
 }
 
 std::string chosen_series(const fs::path& folder, const std::vector<DicomObject>& objects, const std::string& wanted) {
@@ -156,8 +157,8 @@ std::string chosen_series(const fs::path& folder, const std::vector<DicomObject>
     throw Error(folder.string() + ": holds no series " + wanted + "; it holds:" + lines(all));
   if (!wanted.empty()) return wanted;
   if (possible.size() > 1)
-    throw Error(folder.string() + ": holds " + std::to_string(possible.size()) +
-                " series; name one with series_uid:" + lines(possible));
+    throw Error(formatted("{}: holds {} series; name one with series_uid:{}", folder.string(), possible.size(),
+                          lines(possible)));
   if (possible.empty() && all.size() > 1)
     throw Error(folder.string() + ": holds no slice of a CT; its DICOM files are of these series:" + lines(all));
   return possible.empty() ? (all.empty() ? "" : all.begin()->first) : possible.begin()->first;
@@ -197,7 +198,7 @@ void check_folders_below(const fs::path& root, const Content& content, const std
     if (doubtful.empty()) continue;
     std::string names = doubtful[0];
     for (std::size_t i = 1; i < std::min(kMostNamed, doubtful.size()); ++i) names += ", " + doubtful[i];
-    if (doubtful.size() > kMostNamed) names += " and " + std::to_string(doubtful.size() - kMostNamed) + " more";
+    if (doubtful.size() > kMostNamed) names += formatted(" and {} more", doubtful.size() - kMostNamed);
     throw Error(folder.string() + ": this folder inside the series' folder holds files that may be slices (" + names +
                 "), and only one folder is read; move them beside the other slices, or this folder elsewhere");
   }

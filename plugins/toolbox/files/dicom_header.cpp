@@ -7,6 +7,7 @@
 
 #include "header_lines.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::files {
 namespace {
@@ -67,11 +68,7 @@ std::optional<std::vector<double>> binary_numbers(const std::string& bytes, Dico
 
 }  // namespace
 
-std::string DicomTag::text() const {
-  char numbers[16];
-  std::snprintf(numbers, sizeof numbers, " (%04x,%04x)", group, element);
-  return name + std::string(numbers);
-}
+std::string DicomTag::text() const { return formatted("{} ({:04x},{:04x})", name, group, element); }
 
 /// Looks for the element in a functional group, then in the sequences inside it.
 const DicomElement* DicomHeader::find_inside(const DicomElements& elements, std::uint32_t tag) const {
@@ -99,8 +96,8 @@ const DicomElement* DicomHeader::find(const DicomTag& tag) const {
 
 std::string DicomHeader::bytes_of(const DicomElement& element, const DicomTag& tag) const {
   if (element.value.bytes > kLongestText)
-    throw Error(path().string() + ": " + tag.text() + " has " + std::to_string(element.value.bytes) +
-                " bytes; at most " + std::to_string(kLongestText) + " are read");
+    throw Error(formatted("{}: {} has {} bytes; at most {} are read", path().string(), tag.text(), element.value.bytes,
+                          kLongestText));
   return file_.text(element.value);
 }
 
@@ -121,11 +118,11 @@ std::optional<std::vector<double>> DicomHeader::numbers(const DicomTag& tag, std
   auto numbers =
       kind == DicomTag::Kind::text ? numbers_in_text(value) : binary_numbers(bytes, kind, element->big_endian);
   if (!numbers || (count > 0 && numbers->size() != count)) {
-    const std::string expected = count == 0 ? "numbers" : std::to_string(count) + (count == 1 ? " number" : " numbers");
+    const std::string expected = count == 0 ? "numbers" : counted(count, "number");
     throw Error(path().string() + ": " + tag.text() + ": expected " + expected + ", got " +
                 (kind == DicomTag::Kind::text
                      ? "'" + shown(value) + "'"
-                     : std::to_string(bytes.size()) + " bytes of such numbers or a value that is none") +
+                     : formatted("{} bytes of such numbers or a value that is none", bytes.size())) +
                 "; its header is wrong: export it again");
   }
   return numbers;

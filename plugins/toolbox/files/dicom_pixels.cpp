@@ -42,7 +42,7 @@ int whole(const DicomHeader& header, const DicomTag& tag, std::optional<int> mis
                 ", without which its pixels cannot be understood; copy or export it again");
   const double value = given ? *given : *missing;
   if (value != std::floor(value) || std::abs(value) > 1e9)
-    damaged(header.path(), tag.text() + " is " + formatted("{:f}", value) + "; expected a whole number");
+    damaged(header.path(), formatted("{} is {:f}; expected a whole number", tag.text(), value));
   return int(value);
 }
 
@@ -54,7 +54,7 @@ void read_size(const DicomHeader& header, DicomPixels& pixels) {
   pixels.frames = std::max(1, whole(header, kFrames, 1));
   pixels.channels = whole(header, kSamples);
   if (pixels.channels < 1 || pixels.channels > 4)
-    damaged(pixels.path, "its header tells of " + std::to_string(pixels.channels) + " values per pixel");
+    damaged(pixels.path, formatted("its header tells of {} values per pixel", pixels.channels));
   const std::string photometric = header.text(kPhotometric).value_or("");
   if (photometric.rfind("PALETTE", 0) == 0) pixels.channels = 3;  // one number that stands for three
   if (pixels.channels == 1 && photometric != "MONOCHROME1" && photometric != "MONOCHROME2")
@@ -76,9 +76,8 @@ void check_is_image(const DicomFile& file, const DicomHeader& header) {
 void check_groups(const DicomFile& file, const DicomPixels& pixels) {
   const DicomElement* groups = find_element(pixels.path, file.elements(), kFrameGroups);
   if (groups && groups->items.size() != std::size_t(pixels.frames))
-    damaged(pixels.path, "it has " + std::to_string(pixels.frames) + (pixels.frames == 1 ? " frame" : " frames") +
-                             ", but values for " + std::to_string(groups->items.size()) +
-                             " (PerFrameFunctionalGroupsSequence)");
+    damaged(pixels.path, formatted("it has {}, but values for {} (PerFrameFunctionalGroupsSequence)",
+                                   counted(pixels.frames, "frame"), groups->items.size()));
 }
 
 void read_bits(const DicomHeader& header, DicomPixels& pixels) {
@@ -88,9 +87,9 @@ void read_bits(const DicomHeader& header, DicomPixels& pixels) {
   const int representation = whole(header, kRepresentation);
   if ((allocated != 8 && allocated != 16 && allocated != 32) || stored < 1 || stored > allocated || high != stored - 1)
     throw Error(
-        pixels.path.string() + ": its pixels have " + std::to_string(stored) + " of " + std::to_string(allocated) +
-        " bits, the highest being " + std::to_string(high) +
-        ", which is not read; expected 8, 16 or 32 bits, the highest being the last that is stored: export it with 16");
+        formatted("{}: its pixels have {} of {} bits, the highest being {}, which is not read; expected 8, 16 or 32 "
+                  "bits, the highest being the last that is stored: export it with 16",
+                  pixels.path.string(), stored, allocated, high));
   if (representation != 0 && representation != 1) damaged(pixels.path, kRepresentation.text() + " is neither 0 nor 1");
   pixels.is_signed = representation == 1;
   const auto slope = header.number(kSlope), intercept = header.number(kIntercept);
@@ -130,9 +129,10 @@ void check_padding(const DicomPixels& pixels, const std::vector<std::byte>& byte
     std::uint16_t word;
     std::memcpy(&word, bytes.data() + at, 2);
     if (word == *pixels.padding_beyond_bits)
-      throw Error(pixels.path.string() + ": has pixels of the value " + std::to_string(word) +
-                  " (PixelPaddingValue), which the " + std::to_string(pixels.bits_stored) +
-                  " bits that its pixels have cannot hold; export it again");
+      throw Error(
+          formatted("{}: has pixels of the value {} (PixelPaddingValue), which the {} bits that its pixels have cannot "
+                    "hold; export it again",
+                    pixels.path.string(), word, pixels.bits_stored));
   }
 }
 
@@ -170,8 +170,8 @@ std::vector<std::size_t> parts_by_jpeg_start(const DicomFile& file, const DicomP
 void find_frames(const DicomFile& file, DicomPixels& pixels) {
   const std::size_t parts = pixels.frame_parts.size(), frames = std::size_t(pixels.frames);
   if (parts < frames)
-    damaged(pixels.path, "its header tells of " + std::to_string(frames) + " frames, but there are " +
-                             std::to_string(parts) + " parts of compressed pixels");
+    damaged(pixels.path,
+            formatted("its header tells of {} frames, but there are {} parts of compressed pixels", frames, parts));
   if (parts == frames)
     for (std::size_t i = 0; i <= frames; ++i) pixels.first_part_of_frame.push_back(i);
   else if (frames == 1)
@@ -180,8 +180,10 @@ void find_frames(const DicomFile& file, DicomPixels& pixels) {
     pixels.first_part_of_frame = parts_by_table(file, pixels);
   if (pixels.first_part_of_frame.empty()) pixels.first_part_of_frame = parts_by_jpeg_start(file, pixels);
   if (pixels.first_part_of_frame.empty())
-    throw Error(pixels.path.string() + ": does not say which of its " + std::to_string(parts) +
-                " parts of compressed pixels make up a frame; convert it: gdcmconv --raw IN OUT");
+    throw Error(
+        formatted("{}: does not say which of its {} parts of compressed pixels make up a frame; convert it: gdcmconv "
+                  "--raw IN OUT",
+                  pixels.path.string(), parts));
 }
 
 /// Whether the bytes after the pixels are only filling: one byte to make the length even, or up to 512 zeros. Anything
@@ -200,8 +202,8 @@ void check_plain(const DicomFile& file, const DicomPixels& pixels) {
       double(pixels.rows) * pixels.columns * pixels.frames * pixels.bits_allocated / 8 * (pixels.is_plain_rgb ? 3 : 1);
   const bool is_too_much = pixels.channels == 1 && held > expected && !is_filled(file, std::uint64_t(expected));
   if (expected > held || is_too_much)
-    damaged(pixels.path, "its header tells of " + std::to_string(std::int64_t(expected)) +
-                             " bytes of pixels, but there are " + std::to_string(std::int64_t(held)));
+    damaged(pixels.path, formatted("its header tells of {} bytes of pixels, but there are {}", std::int64_t(expected),
+                                   std::int64_t(held)));
 }
 
 CodedImage coded_frame(const DicomPixels& pixels, const InputFile& file, int frame) {

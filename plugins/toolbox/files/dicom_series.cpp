@@ -100,11 +100,9 @@ std::string note_about(const std::vector<std::string>& passed_over) {
   if (passed_over.empty()) return {};
   std::string note = "passed over what is no slice of the series: ";
   for (std::size_t i = 0; i < std::min(kMost, passed_over.size()); ++i) note += (i ? ", " : "") + passed_over[i];
-  if (passed_over.size() > kMost) note += " and " + std::to_string(passed_over.size() - kMost) + " more";
+  if (passed_over.size() > kMost) note += formatted(" and {} more", passed_over.size() - kMost);
   return note;
 }
-
-std::string millimetres(double length) { return formatted("{:.4g} mm", length); }
 
 /// If one slice says how its values become HU and another one does not, the latter is damaged.
 void check_same_scaling(const DicomPixels& slice, const DicomPixels& first) {
@@ -122,7 +120,7 @@ void check_same_scaling(const DicomPixels& slice, const DicomPixels& first) {
 void check_same_pixels(const DicomPixels& slice, const DicomPixels& first) {
   if (slice.is_signed == first.is_signed && slice.bits_stored == first.bits_stored) return;
   const auto kind = [](const DicomPixels& pixels) {
-    return std::to_string(pixels.bits_stored) + " bits " + (pixels.is_signed ? "with" : "without") + " a sign";
+    return formatted("{} bits {} a sign", pixels.bits_stored, pixels.is_signed ? "with" : "without");
   };
   throw Error(slice.path.string() + ": its pixels have " + kind(slice) + ", those of " + first.path.string() + " " +
               kind(first) + "; slices of one series have the same: export the series again");
@@ -177,12 +175,15 @@ void check_places(const std::filesystem::path& folder, const std::vector<Slice>&
     along_mm = std::max(along_mm, std::abs(along - spacing_mm * double(i)));
   }
   if (farthest_from_mean(sideways) > kFarthestOff_mm)
-    throw Error(folder.string() + ": the slices are shifted sideways, by up to " + millimetres(longest(sideways)) +
-                " (a tilted gantry); resample the series to a straight grid first");
+    throw Error(
+        formatted("{}: the slices are shifted sideways, by up to {:.4g} mm (a tilted gantry); resample the series to a "
+                  "straight grid first",
+                  folder.string(), longest(sideways)));
   if (along_mm > kFarthestOff_mm)
-    throw Error(folder.string() + ": the slices are unevenly spaced; some lie up to " + millimetres(along_mm) +
-                " from where even ones of " + millimetres(spacing_mm) +
-                " would; resample the series to an even grid first");
+    throw Error(
+        formatted("{}: the slices are unevenly spaced; some lie up to {:.4g} mm from where even ones of {:.4g} mm "
+                  "would; resample the series to an even grid first",
+                  folder.string(), along_mm, spacing_mm));
 }
 
 /// Throws Error if two slices lie at the same place, or if one is missing between two. Where slices are closer than
@@ -200,8 +201,10 @@ void check_gaps(const std::filesystem::path& folder, const std::vector<Slice>& s
     if (gaps[i] < 1e-3)
       throw Error(folder.string() + ": " + between + " lie at the same place; the series has a slice twice");
     if (gaps[i] > 1.5 * *middle + 1e-3)
-      throw Error(folder.string() + ": " + millimetres(gaps[i]) + " between " + between + ", " + millimetres(*middle) +
-                  " between most slices; a slice is missing or the series is unevenly spaced");
+      throw Error(
+          formatted("{}: {:.4g} mm between {}, {:.4g} mm between most slices; a slice is missing or the series is "
+                    "unevenly spaced",
+                    folder.string(), gaps[i], between, *middle));
   }
 }
 

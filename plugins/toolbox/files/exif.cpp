@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::files {
 namespace {
@@ -35,8 +36,10 @@ std::uint32_t orientation_of(std::string_view exif) {
 
 void check_not_turned(const std::string& what, std::string_view exif) {
   if (const auto orientation = orientation_of(exif); orientation >= 2 && orientation <= 8)
-    throw Error(what + ": is to be shown turned or mirrored (Exif Orientation " + std::to_string(orientation) +
-                "), but its pixels are not; save it turned, without Orientation");
+    throw Error(
+        formatted("{}: is to be shown turned or mirrored (Exif Orientation {}), but its pixels are not; save it "
+                  "turned, without Orientation",
+                  what, orientation));
 }
 
 }  // namespace marrow::files

@@ -120,10 +120,10 @@ std::vector<double> HeaderFields::numbers(const std::string& key, std::size_t co
   std::vector<double> numbers;
   for (const std::string& word : words_of(text(key))) {
     const auto number = number_of(word);
-    if (!number || numbers.size() == count) refuse(key, std::to_string(count) + " numbers");
+    if (!number || numbers.size() == count) refuse(key, formatted("{} numbers", count));
     numbers.push_back(*number);
   }
-  if (numbers.size() != count) refuse(key, std::to_string(count) + " numbers");
+  if (numbers.size() != count) refuse(key, formatted("{} numbers", count));
   return numbers;
 }
 

@@ -6,6 +6,7 @@
 #include "dicom_pixels.hpp"
 #include "file_format.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/sequence_files.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/files/xray_header.hpp"
@@ -18,15 +19,13 @@ namespace fs = std::filesystem;
 
 void check_one_channel(int channels, const fs::path& path) {
   if (channels != 1)
-    throw Error(path.string() + ": has " + std::to_string(channels) +
-                " channels; an X-ray image has one: save it as grey levels");
+    throw Error(
+        formatted("{}: has {} channels; an X-ray image has one: save it as grey levels", path.string(), channels));
 }
 
 void check_frame(int frame, long long frames, const fs::path& path, const std::string& several) {
-  if (frames != 1 && frame == 0) throw Error(path.string() + ": has " + std::to_string(frames) + several);
-  if (frame > frames)
-    throw Error(path.string() + ": has " + std::to_string(frames) + " frames; there is no frame " +
-                std::to_string(frame));
+  if (frames != 1 && frame == 0) throw Error(formatted("{}: has {}{}", path.string(), frames, several));
+  if (frame > frames) throw Error(formatted("{}: has {} frames; there is no frame {}", path.string(), frames, frame));
 }
 
 void check_finite(const Image& image, const fs::path& path) {

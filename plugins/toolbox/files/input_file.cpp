@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/plain_text.hpp"
 #include "marrow/runtime/node/reading.hpp"
 
@@ -65,8 +66,7 @@ std::string InputFile::text(std::uint64_t at, std::size_t count) const {
 std::string read_bytes(const std::filesystem::path& path, std::uint64_t most, bool may_be_empty) {
   const InputFile file(path, may_be_empty);
   if (file.size() > most)
-    throw Error(path.string() + ": has " + std::to_string(file.size()) + " bytes; at most " + std::to_string(most) +
-                " are read");
+    throw Error(formatted("{}: has {} bytes; at most {} are read", path.string(), file.size(), most));
   return file.text(0, std::size_t(file.size()));
 }
 

@@ -4,6 +4,7 @@
 #include "jpeg_stream.hpp"
 #include "libjpeg.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "samples.hpp"
 
 namespace marrow::files {
@@ -25,8 +26,9 @@ void check_segments(const std::string& what, const std::string& bytes) {
       throw Error(what +
                   ": is a JPEG of a kind that is not read (lossless, or with arithmetic coding); save it as PNG");
     if (const int bits = segments.byte(0); bits != 8)
-      throw Error(what + ": is a JPEG of " + std::to_string(bits) +
-                  " bits, of which only those of 8 are read; save it as PNG, which keeps all bits");
+      throw Error(
+          formatted("{}: is a JPEG of {} bits, of which only those of 8 are read; save it as PNG, which keeps all bits",
+                    what, bits));
     return;
   }
 }
@@ -79,8 +81,8 @@ Samples read_jpeg(const std::filesystem::path& path) {
   samples.components = reader.state.num_components;
   check_size(what, {samples.size[0], samples.size[1], samples.components}, bytes.size());
   if (samples.components != 1 && samples.components != 3)
-    throw Error(what + ": has " + std::to_string(samples.components) +
-                " colours, as for printing; an X-ray image is grey: save it as grey levels");
+    throw Error(formatted("{}: has {} colours, as for printing; an X-ray image is grey: save it as grey levels", what,
+                          samples.components));
   const std::size_t row_bytes = std::size_t(samples.size[0]) * std::size_t(samples.components);
   samples.bytes.resize(row_bytes * std::size_t(samples.size[1]));
   if (!read_jpeg_rows(reader.state, reader.failure, samples.bytes.data(), row_bytes)) fail(reader.failure.text);

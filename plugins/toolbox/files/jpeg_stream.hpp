@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "codecs.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::files {
 
@@ -46,13 +47,13 @@ inline int frame_precision(const JpegSegments& segments, const CodedImage& image
   const int precision = segments.byte(0), rows = segments.word(1), columns = segments.word(3),
             components = segments.byte(5);
   if (rows != image.rows || columns != image.columns)
-    throw CodecError("the compressed pixels are of " + std::to_string(columns) + " x " + std::to_string(rows) +
-                     ", the header says " + std::to_string(image.columns) + " x " + std::to_string(image.rows));
+    throw CodecError(formatted("the compressed pixels are of {} x {}, the header says {} x {}", columns, rows,
+                               image.columns, image.rows));
   if (components != 1)
-    throw CodecError("the compressed pixels have " + std::to_string(components) + " values each, the header says 1");
+    throw CodecError(formatted("the compressed pixels have {} values each, the header says 1", components));
   if (precision < image.bits_stored || precision > image.bits_allocated || precision < 2)
-    throw CodecError("the compressed pixels have " + std::to_string(precision) + " bits, the header says " +
-                     std::to_string(image.bits_stored) + " of " + std::to_string(image.bits_allocated));
+    throw CodecError(formatted("the compressed pixels have {} bits, the header says {} of {}", precision,
+                               image.bits_stored, image.bits_allocated));
   return precision;
 }
 

@@ -6,6 +6,7 @@
 
 #include "header_lines.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "samples.hpp"
 
 namespace marrow::files {
@@ -86,7 +87,7 @@ void check_fields(const HeaderFields& fields) {
   if (const std::string unit = in_small_letters(fields.text_or("distanceunits", "mm")); unit != "mm" && unit != "?")
     fields.refuse("distanceunits", "mm: save it with its lengths in mm");
   if (const long long count = fields.whole_number_or("elementnumberofchannels", 1); count != 1)
-    throw Error(fields.path().string() + ": has " + std::to_string(count) + " values per voxel; a CT has one");
+    throw Error(formatted("{}: has {} values per voxel; a CT has one", fields.path().string(), count));
   if (!fields.is_true_or("binarydata", false) && !fields.is_true_or("compresseddata", false))
     throw Error(fields.path().string() +
                 ": its samples are written as text, which is not read; save it with BinaryData = True");
@@ -94,7 +95,7 @@ void check_fields(const HeaderFields& fields) {
        {std::pair{"elementtointensityfunctionslope", 1.0}, std::pair{"elementtointensityfunctionoffset", 0.0}})
     if (fields.has(key) && fields.numbers(key, 1)[0] != value)
       fields.refuse(
-          key, std::to_string(int(value)) + ": samples that are to be scaled are not read; save the values themselves");
+          key, formatted("{}: samples that are to be scaled are not read; save the values themselves", int(value)));
 }
 
 /// Offset of the samples in the file that holds them.
@@ -120,7 +121,7 @@ VolumeSamples read_samples(const MetaHeader& header, const InputFile& data, std:
     if (k < 3)
       size[k] = (long long)sizes[k];
     else if (sizes[k] != 1)
-      throw Error(fields.path().string() + ": has " + std::to_string(dimensions) + " dimensions; expected one volume");
+      throw Error(formatted("{}: has {} dimensions; expected one volume", fields.path().string(), dimensions));
   }
   check_fields(fields);
   StoredSamples stored;

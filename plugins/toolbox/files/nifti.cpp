@@ -27,26 +27,27 @@ Samples::Type nifti_type(const NiftiHeader& header) {
       {768, 32, Type::u32}, {1024, 64, Type::i64}, {1280, 64, Type::u64}, {16, 32, Type::f32},  {64, 64, Type::f64}};
   const int code = header.type, bits = header.bits;
   if (code == 128 || code == 2304)
-    throw Error(header.what + ": has " + std::to_string(code == 128 ? 3 : 4) + " values per voxel; a CT has one");
+    throw Error(formatted("{}: has {} values per voxel; a CT has one", header.what, code == 128 ? 3 : 4));
   for (const Known& known : kKnown) {
     if (known.code != code) continue;
     if (known.bits != bits)
-      throw Error(header.what + ": its header says that samples are of type " + std::to_string(code) + ", which have " +
-                  std::to_string(known.bits) + " bits, and that they have " + std::to_string(bits) +
-                  " bits; it is damaged: copy or export it again");
+      throw Error(
+          formatted("{}: its header says that samples are of type {}, which have {} bits, and that they have {} bits; "
+                    "it is damaged: copy or export it again",
+                    header.what, code, known.bits, bits));
     return known.type;
   }
-  throw Error(header.what + ": its samples are of type " + std::to_string(code) +
-              ", which is not read; save it as 16 bit integers or float");
+  throw Error(formatted("{}: its samples are of type {}, which is not read; save it as 16 bit integers or float",
+                        header.what, code));
 }
 
 std::array<long long, 3> size_of(const NiftiHeader& header) {
   const long long dimensions = header.dim[0];
   if (dimensions < 1 || dimensions > 7)
-    throw Error(header.what + ": its header tells of " + std::to_string(dimensions) + " dimensions; it is damaged");
+    throw Error(formatted("{}: its header tells of {} dimensions; it is damaged", header.what, dimensions));
   for (std::size_t k = 4; k <= std::size_t(dimensions); ++k)
     if (header.dim[k] != 1)
-      throw Error(header.what + ": has " + std::to_string(dimensions) + " dimensions; expected one volume");
+      throw Error(formatted("{}: has {} dimensions; expected one volume", header.what, dimensions));
   std::array<long long, 3> size{1, 1, 1};
   for (std::size_t k = 0; k < std::min<std::size_t>(3, std::size_t(dimensions)); ++k) size[k] = header.dim[k + 1];
   return size;
@@ -84,10 +85,10 @@ NiftiAffine qform(const NiftiHeader& header) {
   auto [b, c, d] = header.quaternion;
   const double squared = b * b + c * c + d * d;
   if (squared > 1 + kRoundedQuaternion)
-    throw Error(header.what + ": the quaternion (b, c, d) of its qform has the length " +
-                formatted("{:.6g}", std::sqrt(squared)) +
-                ", but that of a rotation is at most 1; it is damaged, or was written wrongly: export it again, or set "
-                "qform_code to 0 if its sform is right");
+    throw Error(formatted(
+        "{}: the quaternion (b, c, d) of its qform has the length {:.6g}, but that of a rotation is at most 1; it is "
+        "damaged, or was written wrongly: export it again, or set qform_code to 0 if its sform is right",
+        header.what, std::sqrt(squared)));
   double a = 1 - squared;
   if (a < 1e-7) {
     const double length = std::sqrt(squared);
@@ -115,8 +116,7 @@ bool are_near(const NiftiAffine& one, const NiftiAffine& other, const NiftiHeade
 }
 
 [[noreturn]] void refuse_two_places(const NiftiHeader& header, const NiftiAffine& s, int scode, int qcode) {
-  const std::string codes =
-      "sform (code " + std::to_string(scode) + ") and its qform (code " + std::to_string(qcode) + ")";
+  const std::string codes = formatted("sform (code {}) and its qform (code {})", scode, qcode);
   if (!is_straight(s))
     throw Error(
         header.what + ": its " + codes +
@@ -150,14 +150,15 @@ void read_grid(const NiftiHeader& header, Samples& samples) {
   const double unit_mm = header.unit_mm();
   for (std::size_t k = 1; k <= 3; ++k)
     if (const double length = header.pixdim[k]; !std::isfinite(length) || !(length > 0))
-      throw Error(header.what + ": voxel spacing " + formatted("{:f}", length) + " is not a positive length");
+      throw Error(formatted("{}: voxel spacing {:f} is not a positive length", header.what, length));
   const NiftiAffine affine = affine_of(header);
   for (std::size_t k = 0; k < 3; ++k) {
     const double length = std::sqrt(dot(affine, k, k)), said = header.pixdim[k + 1];
     if (std::abs(length - said) > 1e-3 * said)  // it is not known which of the two is right
-      throw Error(header.what + ": its header says twice how large a voxel is along axis " + std::to_string(k + 1) +
-                  ": " + formatted("{:f} mm by its sform, {:f}", length * unit_mm, said * unit_mm) +
-                  " mm by its pixdim; set both to the right one, or export it again");
+      throw Error(
+          formatted("{}: its header says twice how large a voxel is along axis {}: {:f} mm by its sform, {:f} mm by "
+                    "its pixdim; set both to the right one, or export it again",
+                    header.what, k + 1, length * unit_mm, said * unit_mm));
     samples.spacing_mm[k] = length * unit_mm;
     for (std::size_t row = 0; row < 3; ++row)
       samples.direction[row * 3 + k] = (row < 2 ? -1.0 : 1.0) * affine[row][k] / length;
@@ -191,8 +192,7 @@ VolumeSamples read_nifti(const std::filesystem::path& path, bool is_placed) {
   volume.geometry.type = stored.type_of_values();
   const double begin = header.begin;
   if (!(begin >= header.least_begin && begin <= 1e9) || begin != std::floor(begin))
-    throw Error(path.string() + ": its header says that samples begin at byte " + formatted("{:f}", begin) +
-                "; it is damaged");
+    throw Error(formatted("{}: its header says that samples begin at byte {:f}; it is damaged", path.string(), begin));
   stored.count = volume.geometry.count();
   stored.big_endian = header.is_swapped;
   stored.is_packed = file.text(0, 2) == "\x1F\x8B";

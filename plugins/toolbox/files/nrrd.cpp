@@ -70,8 +70,9 @@ NrrdHeader read_nrrd_header(const InputFile& file) {
     std::string key = in_small_letters(trimmed(line->substr(0, colon)));
     if (const auto same = kSame.find(key); same != kSame.end()) key = same->second;
     if (colon == std::string::npos || line->find('\0') != std::string::npos || !kKnown.count(key))
-      throw Error(what + ":" + std::to_string(number) + ": expected a field of a NRRD header, got '" + shown(*line) +
-                  "'; it is damaged: copy or export it again");
+      throw Error(
+          formatted("{}:{}: expected a field of a NRRD header, got '{}'; it is damaged: copy or export it again", what,
+                    number, shown(*line)));
     header.fields.add(key, line->substr(colon + 1));
     if (key == "data file" && in_small_letters(header.fields.text(key).substr(0, 4)) == "list")
       return header;  // the following lines are file names
@@ -137,7 +138,7 @@ std::vector<std::array<double, 3>> vectors(const HeaderFields& fields, const std
     for (int k = 0; k < 3; ++k) {
       const std::size_t stop = k < 2 ? text.find(',', at) : end;
       const auto number = stop > end || stop < at ? std::nullopt : number_of(trimmed(text.substr(at, stop - at)));
-      if (!number) fields.refuse(key, std::to_string(count) + " times three numbers, as (1,0,0)");
+      if (!number) fields.refuse(key, formatted("{} times three numbers, as (1,0,0)", count));
       vector[std::size_t(k)] = *number;
       at = stop + 1;
     }
@@ -145,7 +146,7 @@ std::vector<std::array<double, 3>> vectors(const HeaderFields& fields, const std
     text.erase(0, end + 1);
   }
   if (!text.empty() || vectors.size() != count)
-    fields.refuse(key, std::to_string(count) + " times three numbers, as (1,0,0)");
+    fields.refuse(key, formatted("{} times three numbers, as (1,0,0)", count));
   return vectors;
 }
 
@@ -210,8 +211,8 @@ void read_grid_without_space(const HeaderFields& fields, Samples& samples) {
   for (std::size_t k = 0; k < 3; ++k)
     if (const double length = spacings[k] * (samples.size[k] - (are_nodes[k] ? 1 : 0));
         std::abs(greatest[k] - least[k] - length) > 1e-3 * std::abs(length))
-      fields.refuse("axis maxs", "'axis mins' and as many 'spacings' as there are voxels (" +
-                                     formatted("{:f}", least[k] + length) + ")");
+      fields.refuse("axis maxs",
+                    formatted("'axis mins' and as many 'spacings' as there are voxels ({:f})", least[k] + length));
 }
 
 /// The format does not allow 'spacings' together with 'space directions'. They are accepted if they agree or are NaN.
@@ -258,12 +259,11 @@ std::array<long long, 3> size_of(const HeaderFields& fields, long long dimension
       fields.refuse("sizes", "whole numbers above 0");
     const std::string kind = kinds.empty() ? "domain" : kinds[k];
     if (kind != "domain" && kind != "space" && kind != "none" && kind != "???" && kind != "stub" && kind != "scalar")
-      throw Error(fields.path().string() + ": has " + std::to_string((long long)sizes[k]) +
-                  " values per voxel; a CT has one");
+      throw Error(formatted("{}: has {} values per voxel; a CT has one", fields.path().string(), (long long)sizes[k]));
     if (k < 3) size[k] = (long long)sizes[k];
   }
   if (dimensions > 3)
-    throw Error(fields.path().string() + ": has " + std::to_string(dimensions) + " dimensions; expected one volume");
+    throw Error(formatted("{}: has {} dimensions; expected one volume", fields.path().string(), dimensions));
   return size;
 }
 

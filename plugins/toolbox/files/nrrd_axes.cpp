@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "marrow/base/number_text.hpp"
+
 namespace marrow::files {
 namespace {
 
@@ -39,14 +41,14 @@ void remove_axis(HeaderFields& fields, std::size_t axis, std::size_t axes) {
     for (const std::string& item : items) text += (text.empty() ? "" : " ") + item;
     fields.replace(key, text);
   }
-  fields.replace("dimension", std::to_string(axes - 1));
+  fields.replace("dimension", formatted("{}", axes - 1));
 }
 
 }  // namespace
 
 HeaderFields without_single_samples(HeaderFields fields) {
   std::size_t axes = items_of(fields.text_or("sizes", "")).size();
-  if (fields.text_or("dimension", "") != std::to_string(axes)) return fields;
+  if (fields.text_or("dimension", "") != formatted("{}", axes)) return fields;
   const auto remove_if = [&](std::size_t least, auto is_wanted) {
     for (std::size_t axis = axes; axis-- > 0 && axes > least;)
       if (items_of(fields.text("sizes"))[axis] == "1" && is_wanted(axis)) remove_axis(fields, axis, axes--);

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "marrow/base/number_text.hpp"
 #include "tiff_description.hpp"
 
 namespace marrow::files {
@@ -115,13 +116,13 @@ TiffDescription read_ome_description(const std::string& text) {
     const long slices = number_of(*tag, "SizeZ", 0), channels = number_of(*tag, "SizeC", kNotUnderstood),
                times = number_of(*tag, "SizeT", kNotUnderstood);
     if (channels < 1 || times < 1 || slices < 0) in_order = false;
-    if (channels > 1) several = "an OME stack of " + std::to_string(channels) + " channels";
-    if (several.empty() && times > 1) several = "an OME stack of " + std::to_string(times) + " times";
+    if (channels > 1) several = formatted("an OME stack of {} channels", channels);
+    if (several.empty() && times > 1) several = formatted("an OME stack of {} times", times);
     if (in_order) description.pages = std::uint64_t(slices) * std::uint64_t(channels) * std::uint64_t(times);
   }
   if (pixels != 1 || images > 1) description.pages = 0;
   if (images > 1)
-    description.other_pages = "an OME file of " + std::to_string(images) + " images";
+    description.other_pages = formatted("an OME file of {} images", images);
   else if (!several.empty())
     description.other_pages = several;
   else if (pixels != 1 || !in_order || !tags.is_understood())

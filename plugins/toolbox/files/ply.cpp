@@ -65,7 +65,7 @@ class HeaderReader {
 
  private:
   [[noreturn]] void expected(const std::string& line) const {
-    throw Error(what_ + ": line " + std::to_string(line_number_) + ": expected '" + line + "'");
+    throw Error(formatted("{}: line {}: expected '{}'", what_, line_number_, line));
   }
 
   void read_format(Words& line) {
@@ -130,8 +130,8 @@ class HeaderReader {
     if (element.count > 0 && least == 0)
       throw Error(what_ + ": its element '" + element.name + "' has no property; it is damaged");
     if (element.count > 0 && element.count > (bytes_.size() - header_.end) / least)
-      throw Error(what_ + ": its header claims " + std::to_string(element.count) + " of '" + element.name +
-                  "', but the file has only " + std::to_string(bytes_.size()) + " bytes");
+      throw Error(formatted("{}: its header claims {} of '{}', but the file has only {} bytes", what_, element.count,
+                            element.name, bytes_.size()));
   }
 
   const std::string& bytes_;
@@ -152,8 +152,9 @@ class Body {
     if (format_ == Format::text && !words_.is_at_end())
       throw Error(what_ + ": has more numbers than its header claims; it is damaged");
     if (format_ != Format::text && at_ != bytes_.size())
-      throw Error(what_ + ": its header claims " + std::to_string(at_) + " bytes of numbers, but the file has " +
-                  std::to_string(bytes_.size()) + " after it; it is damaged: export it again");
+      throw Error(formatted(
+          "{}: its header claims {} bytes of numbers, but the file has {} after it; it is damaged: export it again",
+          what_, at_, bytes_.size()));
   }
 
   double next(Number type) {
@@ -248,7 +249,7 @@ void read_polygon(const Property& property, Body& body, MeshBuilder& builder, co
     const double corner = body.next(property.type);
     if (!(corner >= 0) || corner >= double(index.size()) || corner != std::floor(corner)) {
       const std::string text = formatted("{:.10g}", corner);
-      throw Error(what + ": a face names vertex " + text + "; there are " + std::to_string(index.size()));
+      throw Error(formatted("{}: a face names vertex {}; there are {}", what, text, index.size()));
     }
     vertex = index[std::size_t(corner)];
   }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/samples_out.hpp"
 
@@ -80,8 +81,7 @@ std::string png_of(int width, int height, int channels, Sample sample, const voi
   Writer writer(target);
   if (!writer.info) throw std::bad_alloc();
   if (!write_rows(writer, width, height, channels, bits, rows.data()))
-    throw Error("libpng cannot write an image of " + std::to_string(width) + " x " + std::to_string(height) +
-                " pixels: " + target.fault);
+    throw Error(formatted("libpng cannot write an image of {} x {} pixels: {}", width, height, target.fault));
   return std::move(target.bytes);
 }
 

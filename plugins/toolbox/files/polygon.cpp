@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/mesh_file.hpp"
 #include "mesh_parts.hpp"
 
@@ -45,9 +46,9 @@ std::size_t start_of_fan(const std::vector<std::uint32_t>& polygon, const MeshBu
     if (polygon.size() > kMostStarts) break;
   }
   throw Error(
-      what + ": a face of " + std::to_string(polygon.size()) +
-      " corners is far from convex or flat, or crosses itself, so its triangles are not certain; save the surface as "
-      "triangles");
+      formatted("{}: a face of {} corners is far from convex or flat, or crosses itself, so its triangles are not "
+                "certain; save the surface as triangles",
+                what, polygon.size()));
 }
 
 }  // namespace

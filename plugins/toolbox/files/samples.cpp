@@ -10,6 +10,7 @@
 #include "byte_stream.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/large_memory.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::files {
 namespace {
@@ -76,11 +77,11 @@ void read_plain(const InputFile& file, const StoredSamples& stored, std::vector<
   const std::size_t width = bytes_each(stored.type);
   const std::uint64_t held = file.size() - std::min(file.size(), stored.begin);
   if (held != stored.count * width)
-    throw Error(file.path().string() + ": is " +
-                (held < stored.count * width ? "cut off or damaged: "
-                                             : "damaged, or its header tells of other samples than it holds: ") +
-                std::to_string(stored.count * width) + " bytes of samples expected, got " + std::to_string(held) +
-                "; copy or export it again");
+    throw Error(formatted("{}: is {}{} bytes of samples expected, got {}; copy or export it again",
+                          file.path().string(),
+                          held < stored.count * width ? "cut off or damaged: "
+                                                      : "damaged, or its header tells of other samples than it holds: ",
+                          stored.count * width, held));
   resize_large(values, stored.count);
   tbb::parallel_for(std::size_t(0), (stored.count + kPart - 1) / kPart, [&](std::size_t part) {
     const std::size_t first = part * kPart, count = std::min(kPart, stored.count - first);
@@ -109,8 +110,9 @@ void read_packed(const InputFile& file, const StoredSamples& stored, std::vector
   }
   expect_end(*stream, file);  // also verifies the checksum
   if (const std::uint64_t behind = stream->bytes_behind(); behind > 0)
-    throw Error(file.path().string() + ": is damaged: " + std::to_string(behind) +
-                " bytes follow the end of its compressed samples, none expected; copy or export it again");
+    throw Error(formatted(
+        "{}: is damaged: {} bytes follow the end of its compressed samples, none expected; copy or export it again",
+        file.path().string(), behind));
 }
 
 }  // namespace
@@ -124,14 +126,13 @@ void check_size(const std::string& what, const std::array<long long, 3>& size, s
                 double most_samples_per_byte) {
   for (const long long length : size)
     if (length < 1 || length > 100000)
-      throw Error(what + ": its header gives a size of " + std::to_string(length) + "; expected 1 to 100000");
+      throw Error(formatted("{}: its header gives a size of {}; expected 1 to 100000", what, length));
   const double samples = double(size[0]) * double(size[1]) * double(size[2]);
   if (samples > std::max(kFewSamples, most_samples_per_byte * double(stored_bytes)))
     throw Error(
-        what + ": its header claims " + std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " +
-        std::to_string(size[2]) + " samples, but the file has only " + std::to_string(stored_bytes) +
-        " bytes; it is cut off or its header is wrong, unless nearly all samples are alike: then save it without "
-        "compression");
+        formatted("{}: its header claims {} x {} x {} samples, but the file has only {} bytes; it is cut off or its "
+                  "header is wrong, unless nearly all samples are alike: then save it without compression",
+                  what, size[0], size[1], size[2], stored_bytes));
 }
 
 std::vector<float> read_floats(const InputFile& file, const StoredSamples& stored) {

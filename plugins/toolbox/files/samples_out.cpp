@@ -11,6 +11,7 @@
 #include <string>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 
@@ -70,12 +71,11 @@ void write_mha(const std::filesystem::path& path, const GridOut& grid, const flo
   const std::string packed = deflated(reinterpret_cast<const char*>(values), count * sizeof(float));
   std::string matrix;
   for (const auto& axis : grid.axes) matrix += listed(axis);
-  const std::string header =
-      "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = True\n"
-      "CompressedDataSize = " +
-      std::to_string(packed.size()) + "\nTransformMatrix =" + matrix + "\nOffset =" + listed(grid.origin_mm) +
-      "\nCenterOfRotation = 0 0 0\nElementSpacing =" + listed(grid.spacing_mm) + "\nDimSize =" + listed(grid.size) +
-      "\nElementType = MET_FLOAT\nElementDataFile = LOCAL\n";
+  const std::string header = formatted(
+      "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = "
+      "True\nCompressedDataSize = {}\nTransformMatrix ={}\nOffset ={}\nCenterOfRotation = 0 0 0\nElementSpacing "
+      "={}\nDimSize ={}\nElementType = MET_FLOAT\nElementDataFile = LOCAL\n",
+      packed.size(), matrix, listed(grid.origin_mm), listed(grid.spacing_mm), listed(grid.size));
   write_plainly(path, {header, packed});
 }
 
@@ -84,8 +84,8 @@ void write_float_tiff(const std::filesystem::path& path, int width, int height, 
   constexpr std::uint32_t kDirectory = 8, kFields = 10,
                           kPixels = 136;  // after the header, the directory and two unused bytes
   if (size > std::numeric_limits<std::uint32_t>::max() - kPixels)
-    throw Error(path.string() + ": an image of " + std::to_string(width) + " x " + std::to_string(height) +
-                " pixels is larger than a TIFF file can be");
+    throw Error(
+        formatted("{}: an image of {} x {} pixels is larger than a TIFF file can be", path.string(), width, height));
   std::string head("II*\0", 4);
   head.append(reinterpret_cast<const char*>(&kDirectory), sizeof kDirectory);
   head += {char(kFields), 0};

@@ -10,6 +10,7 @@
 #include "file_format.hpp"
 #include "header_lines.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 
 namespace marrow::files {
@@ -64,7 +65,7 @@ std::vector<std::string> files_in(const fs::path& folder, long depth) {
   constexpr std::size_t kMost = 5;
   std::string there;
   for (std::size_t i = 0; i < std::min(kMost, names.size()); ++i) there += (i ? ", '" : "'") + names[i] + "'";
-  if (names.size() > kMost) there += " and " + std::to_string(names.size() - kMost) + " more";
+  if (names.size() > kMost) there += formatted(" and {} more", names.size() - kMost);
   throw Error(folder.string() + ": no " +
               (pattern.empty() ? std::string("image (PNG, TIFF, DICOM, ...) is in it")
                                : "file in it fits the pattern '" + pattern + "'") +
@@ -127,10 +128,10 @@ void check_steps(const fs::path& folder, const std::vector<Numbered>& files) {
   }
   for (std::size_t i = 1; i < files.size(); ++i)
     if (files[i].number - files[i - 1].number != step)
-      throw Error(folder.string() + ": image " + std::to_string(files[i - 1].number + step) + " is missing between '" +
-                  files[i - 1].name + "' and '" + files[i].name +
-                  "'; a bone is followed in even steps of time: put a blank image of the same size there, or move the "
-                  "images behind the gap to a folder of their own");
+      throw Error(
+          formatted("{}: image {} is missing between '{}' and '{}'; a bone is followed in even steps of time: put a "
+                    "blank image of the same size there, or move the images behind the gap to a folder of their own",
+                    folder.string(), files[i - 1].number + step, files[i - 1].name, files[i].name));
 }
 
 }  // namespace
@@ -138,11 +139,9 @@ void check_steps(const fs::path& folder, const std::vector<Numbered>& files) {
 std::vector<int> frames_of(const FrameRange& range, int count, const std::string& what) {
   const int last = range.last == 0 ? count : range.last;
   for (const int frame : {range.first, last})
-    if (frame > count)
-      throw Error(what + ": has " + std::to_string(count) + " frames; there is no frame " + std::to_string(frame));
+    if (frame > count) throw Error(formatted("{}: has {} frames; there is no frame {}", what, count, frame));
   if (last < range.first)
-    throw Error(what + ": the last frame to be read, " + std::to_string(last) + ", lies before the first, " +
-                std::to_string(range.first));
+    throw Error(formatted("{}: the last frame to be read, {}, lies before the first, {}", what, last, range.first));
   std::vector<int> frames;
   for (int frame = range.first; frame <= last; frame += range.every) frames.push_back(frame);
   return frames;

@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/plain_text.hpp"
 #include "mesh_parts.hpp"
 
@@ -23,12 +24,13 @@ std::uint32_t claimed_facets(const std::string& bytes) {
 MarkedMesh read_stl_binary(const std::string& bytes, const std::string& what) {
   const std::uint32_t count = claimed_facets(bytes);
   if (bytes.size() < kStlHeader + std::size_t(count) * kStlFacet)
-    throw Error(what + ": its header claims " + std::to_string(count) + " triangles, but the file has room for " +
-                std::to_string((bytes.size() - kStlHeader) / kStlFacet) + "; it is cut off, or no STL");
+    throw Error(formatted("{}: its header claims {} triangles, but the file has room for {}; it is cut off, or no STL",
+                          what, count, (bytes.size() - kStlHeader) / kStlFacet));
   if (bytes.size() > kStlHeader + std::size_t(count) * kStlFacet)
-    throw Error(what + ": its header claims " + std::to_string(count) + " triangles, which end after " +
-                std::to_string(kStlHeader + std::size_t(count) * kStlFacet) + " bytes, but the file has " +
-                std::to_string(bytes.size()) + "; it is damaged: export it again");
+    throw Error(
+        formatted("{}: its header claims {} triangles, which end after {} bytes, but the file has {}; it is damaged: "
+                  "export it again",
+                  what, count, kStlHeader + std::size_t(count) * kStlFacet, bytes.size()));
   MeshBuilder builder(count);
   for (std::size_t i = 0; i < count; ++i) {
     float numbers[9];
@@ -86,7 +88,7 @@ MarkedMesh read_stl_text(std::string_view text, const std::string& what, SpaceMa
         throw Error(what + ": a facet is not three lines 'vertex x y z'; the file is cut off or damaged");
       corner[std::size_t(corners++)] = builder.vertex({*x, *y, *z});
     } else if (is_keyword(word, "endfacet")) {
-      if (corners != 3) throw Error(what + ": a facet has " + std::to_string(corners) + " vertices; expected 3");
+      if (corners != 3) throw Error(formatted("{}: a facet has {} vertices; expected 3", what, corners));
       builder.triangle(corner[0], corner[1], corner[2]);
       corners = 0;
       in_facet = false;

@@ -6,6 +6,7 @@
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/names.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 
@@ -45,8 +46,7 @@ YamlFile::YamlFile(std::filesystem::path path) : path_(std::move(path)) {
 
 std::string YamlFile::describe(const YAML::Mark& mark, const std::string& text) const {
   if (mark.is_null()) return path_.string() + ": " + text;
-  std::string message =
-      path_.string() + ":" + std::to_string(mark.line + 1) + ":" + std::to_string(mark.column + 1) + ": " + text;
+  std::string message = formatted("{}:{}:{}: {}", path_.string(), mark.line + 1, mark.column + 1, text);
   if (mark.line >= 0 && std::size_t(mark.line) < lines_.size())
     message += "\n    " + lines_[std::size_t(mark.line)].substr(0, 120);
   return message;
@@ -63,7 +63,7 @@ void YamlFile::finish() const {
   if (faults_.empty()) return;
   std::string all;
   for (const std::string& fault : faults_) all += (all.empty() ? "" : "\n") + fault;
-  if (more_faults_ > 0) all += "\n... and " + std::to_string(more_faults_) + " more";
+  if (more_faults_ > 0) all += formatted("\n... and {} more", more_faults_);
   throw Error(all);
 }
 
@@ -163,8 +163,8 @@ std::optional<std::vector<double>> YamlMap::numbers(const std::string& key, std:
     for (const auto& item : *value)
       if (const auto number = yaml_number(item)) numbers.push_back(*number);
   if (numbers.size() == count) return numbers;
-  fault(key, key + ": expected " + std::to_string(count) + " numbers" + (count == 3 ? " [x, y, z]" : "") + ", got " +
-                 yaml_described(*value));
+  fault(key, formatted("{}: expected {} numbers{}, got {}", key, count, count == 3 ? " [x, y, z]" : "",
+                       yaml_described(*value)));
   return std::nullopt;
 }
 
@@ -189,8 +189,7 @@ std::optional<Eigen::MatrixXd> YamlMap::matrix(const std::string& key, int rows,
     }
   }
   if (good) return matrix;
-  fault(key, key + ": expected " + std::to_string(rows) + " rows of " + std::to_string(columns) + " numbers, got " +
-                 yaml_described(*value));
+  fault(key, formatted("{}: expected {} rows of {} numbers, got {}", key, rows, columns, yaml_described(*value)));
   return std::nullopt;
 }
 

@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "samples.hpp"
 #include "tiff_pages.hpp"
 
@@ -12,14 +13,19 @@ namespace {
 void check_kind(const std::string& what, const TiffPage& page) {
   static constexpr std::uint64_t kCompressions[] = {1, 5, 8, 32773, 32946};
   if (std::find(std::begin(kCompressions), std::end(kCompressions), page.compression) == std::end(kCompressions))
-    throw Error(what + ": its pixels are compressed by method " + std::to_string(page.compression) +
-                ", which is not read; save it with LZW, Deflate or without compression (tiffcp -c lzw does it)");
+    throw Error(
+        formatted("{}: its pixels are compressed by method {}, which is not read; save it with LZW, Deflate or without "
+                  "compression (tiffcp -c lzw does it)",
+                  what, page.compression));
   if (page.fill_order != 1 || (page.orientation != 1 && page.orientation != 4))
-    throw Error(what + ": its pixels are stored in an unusual order (FillOrder " + std::to_string(page.fill_order) +
-                ", Orientation " + std::to_string(page.orientation) + "); save it anew as a plain TIFF");
+    throw Error(formatted(
+        "{}: its pixels are stored in an unusual order (FillOrder {}, Orientation {}); save it anew as a plain TIFF",
+        what, page.fill_order, page.orientation));
   if (page.predictor != 1 && !(page.predictor == 2 && page.compression != 1))
-    throw Error(what + ": its pixels are stored as differences of kind " + std::to_string(page.predictor) +
-                ", which is not read; save it without a predictor (tiffcp -c lzw:1 does it)");
+    throw Error(
+        formatted("{}: its pixels are stored as differences of kind {}, which is not read; save it without a predictor "
+                  "(tiffcp -c lzw:1 does it)",
+                  what, page.predictor));
   if (page.subfile & 5) throw Error(what + ": holds a thumbnail or a mask beside its image; save the image alone");
 }
 
@@ -32,8 +38,9 @@ Samples::Type type_of(const std::string& what, const TiffPage& page) {
   if (page.bits == 32 && page.format == 1) return Type::u32;
   if (page.bits == 32 && page.format == 2) return Type::i32;
   if (page.bits == 32 && page.format == 3) return Type::f32;
-  throw Error(what + ": its pixels have " + std::to_string(page.bits) +
-              " bits in a format that is not read; save it with 8 or 16 bits, or as float");
+  throw Error(
+      formatted("{}: its pixels have {} bits in a format that is not read; save it with 8 or 16 bits, or as float",
+                what, page.bits));
 }
 
 void read_page(const InputFile& file, const TiffPages& tiff, const TiffPage& page, std::byte* to) {
@@ -63,8 +70,8 @@ void join_planes(const TiffPage& page, std::size_t width, std::byte* pixels) {
 /// The colours of indices of 8 bits. The palette has 16 bits a value, of which screens show the upper 8.
 void look_up_colours(const std::string& what, const TiffPage& page, Samples& samples) {
   if (page.palette.size() != 3 * 256)
-    throw Error(what + ": is damaged: its palette has " + std::to_string(page.palette.size()) +
-                " values, 768 expected; copy or export it again");
+    throw Error(formatted("{}: is damaged: its palette has {} values, 768 expected; copy or export it again", what,
+                          page.palette.size()));
   std::vector<std::byte> colours(3 * samples.bytes.size());
   for (std::size_t i = 0; i < colours.size(); ++i)
     colours[i] = std::byte(page.palette[i % 3 * 256 + std::size_t(samples.bytes[i / 3])] >> 8);

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "header_lines.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::files {
 namespace {
@@ -50,7 +51,7 @@ TiffDescription of_imagej(const std::string& text) {
   TiffDescription description;
   for (const char* name : {"channels", "frames"})
     if (const long count = number_behind("\n" + text, std::string("\n") + name + "="); count > 1) {
-      description.other_pages = "an ImageJ stack of " + std::to_string(count) + " " + name;
+      description.other_pages = formatted("an ImageJ stack of {} {}", count, name);
       break;
     }
   if (const auto images = line_behind(text, "images"))
@@ -76,7 +77,7 @@ std::string of_tifffile(const std::string& text, std::uint64_t& samples) {
     at = stop == at ? at + 1 : stop;
   }
   samples = product < 1e15 ? std::uint64_t(product) : 0;
-  if (dimensions > 3) return "an array of " + std::to_string(dimensions) + " dimensions, " + shown(shape);
+  if (dimensions > 3) return formatted("an array of {} dimensions, {}", dimensions, shown(shape));
   const std::size_t key = text.find("\"axes\": \"");
   const std::string axes = key == std::string::npos ? "" : text.substr(key + 9, text.find('"', key + 9) - (key + 9));
   if (dimensions == 3 && axes.size() == 3 && (axes[0] == 'T' || axes[0] == 'C'))

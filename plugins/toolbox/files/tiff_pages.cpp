@@ -9,6 +9,7 @@
 #include <unordered_set>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "tiff_description.hpp"
 
 namespace marrow::files {
@@ -34,8 +35,8 @@ class Walk {
     try {
       follow();
     } catch (const std::out_of_range&) {
-      throw Error(what() + ": is cut off or damaged: only " + std::to_string(tiff_.pages.size()) +
-                  " pages are whole; copy or export it again");
+      throw Error(formatted("{}: is cut off or damaged: only {} pages are whole; copy or export it again", what(),
+                            tiff_.pages.size()));
     }
     if (tiff_.pages.empty()) throw Error(what() + ": has no page");
     check_pages_told();
@@ -78,8 +79,9 @@ class Walk {
       throw Error(what() + ": is stored in tiles; expected strips: save it as a plain TIFF (tiffcp -s does it)");
     if (!tiff_.pages.empty() && !page.is_like(tiff_.pages[0]))
       throw Error(
-          what() + ": page " + std::to_string(tiff_.pages.size() + 1) +
-          " has another size or kind of pixels than page 1; save pages that belong together in a file of their own");
+          formatted("{}: page {} has another size or kind of pixels than page 1; save pages that belong together in a "
+                    "file of their own",
+                    what(), tiff_.pages.size() + 1));
     tiff_.pages.push_back(std::move(page));
   }
 
@@ -99,9 +101,9 @@ class Walk {
       if (std::uint64_t* const place = place_of(page, tag)) {
         const auto numbers = numbers_of(entry);
         if (numbers.empty())
-          throw Error(what() + ": its field " + std::to_string(tag) +
-                      " has no number of a kind that is read; it is "
-                      "damaged, or save it anew as a plain TIFF");
+          throw Error(formatted(
+              "{}: its field {} has no number of a kind that is read; it is damaged, or save it anew as a plain TIFF",
+              what(), tag));
         *place = numbers[0];
         // The samples of a pixel may have different widths and formats. This is not supported: 0 is refused later.
         if (std::any_of(numbers.begin(), numbers.end(), [&](std::uint64_t n) { return n != numbers[0]; })) *place = 0;
@@ -124,8 +126,8 @@ class Walk {
     count_bytes(length);
     const std::string text = window_.text(at, length);
     if (length < count && text.find('<') != std::string::npos)  // its rest may describe the pages
-      throw Error(what() + ": its description has " + std::to_string(count) + " bytes, more than the " +
-                  std::to_string(kLongestDescription) + " that are read; save it without");
+      throw Error(formatted("{}: its description has {} bytes, more than the {} that are read; save it without", what(),
+                            count, kLongestDescription));
     TiffDescription description = read_tiff_description(text);
     if (description.is_truncated)
       throw Error(what() +
@@ -142,8 +144,8 @@ class Walk {
       throw Error(what() + ": " + description.calibration + "; save it uncalibrated (in ImageJ: Analyze, Calibrate)");
     const bool is_other = description.slope != tiff_.slope || description.intercept != tiff_.intercept;
     if (is_other && !tiff_.pages.empty() && (description.slope != 1 || description.intercept != 0))
-      throw Error(what() + ": page " + std::to_string(tiff_.pages.size() + 1) +
-                  " is calibrated otherwise than page 1; save it uncalibrated");
+      throw Error(formatted("{}: page {} is calibrated otherwise than page 1; save it uncalibrated", what(),
+                            tiff_.pages.size() + 1));
     if (tiff_.pages.empty()) tiff_.slope = description.slope, tiff_.intercept = description.intercept;
   }
 
@@ -157,15 +159,14 @@ class Walk {
       if (page.told != 0 && page.told != tiff_.pages.size()) ++different;
     }
     if (most > tiff_.pages.size())
-      throw Error(what() + ": " + (tiff_.other_pages.empty() ? "" : "is " + tiff_.other_pages + "; ") +
-                  "its description tells of " + std::to_string(most) + " pages, but it has " +
-                  std::to_string(tiff_.pages.size()) +
-                  ": the others have no directory, or are in other files; save it with a directory for each page");
+      throw Error(formatted(
+          "{}: {}its description tells of {} pages, but it has {}: the others have no directory, or are in other "
+          "files; save it with a directory for each page",
+          what(), tiff_.other_pages.empty() ? "" : "is " + tiff_.other_pages + "; ", most, tiff_.pages.size()));
     // If each page describes itself as the only one, the file was written page by page.
     if (different > 0 && single != tiff_.pages.size() && tiff_.other_pages.empty())
-      tiff_.other_pages = "a file of several stacks (its first page tells of " +
-                          std::to_string(std::max<std::uint64_t>(1, tiff_.pages[0].told)) + " of the " +
-                          std::to_string(tiff_.pages.size()) + " pages)";
+      tiff_.other_pages = formatted("a file of several stacks (its first page tells of {} of the {} pages)",
+                                    std::max<std::uint64_t>(1, tiff_.pages[0].told), tiff_.pages.size());
   }
 
   static std::uint64_t* place_of(TiffPage& page, std::uint64_t tag) {
@@ -222,8 +223,8 @@ class Walk {
     if (page.is_tiled) return;
     if (!(page.width >= 1 && page.width <= 100000 && page.height >= 1 && page.height <= 100000 &&
           page.rows_per_strip >= 1))
-      throw Error(what() + ": page " + std::to_string(tiff_.pages.size() + 1) + " has a size of " +
-                  std::to_string(page.width) + " x " + std::to_string(page.height) + " pixels; it is damaged");
+      throw Error(formatted("{}: page {} has a size of {} x {} pixels; it is damaged", what(), tiff_.pages.size() + 1,
+                            page.width, page.height));
     page.rows_per_strip = std::min(page.rows_per_strip, page.height);
     const std::uint64_t strips = (page.height + page.rows_per_strip - 1) / page.rows_per_strip *
                                  (page.planes == 2 ? std::min<std::uint64_t>(page.samples, 1000) : 1);

@@ -22,8 +22,7 @@ std::string lower_extension(const fs::path& path) { return in_small_letters(path
 VolumeSamples read_tiff_volume(const fs::path& path) {
   VolumeSamples volume{read_tiff(path), {}};
   if (volume.geometry.components != 1)
-    throw Error(path.string() + ": has " + std::to_string(volume.geometry.components) +
-                " values per voxel; a CT has one");
+    throw Error(formatted("{}: has {} values per voxel; a CT has one", path.string(), volume.geometry.components));
   if (!volume.geometry.other_pages.empty())
     throw Error(path.string() + ": is " + volume.geometry.other_pages +
                 ", whose pages are not slices of one volume; save one of them alone, or, where they are slices, save "
@@ -68,8 +67,7 @@ fs::path detached_header_in(const fs::path& folder) {
         throw Error(folder.string() + ": holds both a DICOM file ('" + other.filename().string() + "') and '" +
                     headers[0].filename().string() + "', which may be another volume; keep one volume per folder");
   if (headers.size() > 1)
-    throw Error(folder.string() + ": holds " + std::to_string(headers.size()) +
-                " .mhd or .nhdr files; keep one per folder");
+    throw Error(formatted("{}: holds {} .mhd or .nhdr files; keep one per folder", folder.string(), headers.size()));
   if (headers.empty()) return {};
   check_stays_inside(folder, headers[0]);
   return headers[0];
@@ -119,10 +117,10 @@ void make_right_handed(Volume& volume) {
 
 void check_reading(const VolumeReading& reading) {
   if (!reading.voxel_size_mm.empty() && reading.voxel_size_mm.size() != 3)
-    throw Error("voxel_size_mm: expected 3 lengths, got " + std::to_string(reading.voxel_size_mm.size()));
+    throw Error(formatted("voxel_size_mm: expected 3 lengths, got {}", reading.voxel_size_mm.size()));
   for (double length : reading.voxel_size_mm)
     if (!(length > 0) || !std::isfinite(length))
-      throw Error("voxel_size_mm: expected positive lengths, got " + formatted("{:f}", length));
+      throw Error(formatted("voxel_size_mm: expected positive lengths, got {:f}", length));
 }
 
 }  // namespace
@@ -139,8 +137,8 @@ Volume read_volume_file(const fs::path& path, const VolumeReading& reading,
       file.empty() ? read_dicom_series(path, reading.series_uid) : read_single(file, format, is_folder);
   if (tell && !samples.note.empty()) tell(samples.note);
   if (samples.geometry.dimensions < 3)
-    throw Error(file.string() + ": is one image, not a volume; expected 3 dimensions, got " +
-                std::to_string(samples.geometry.dimensions));
+    throw Error(formatted("{}: is one image, not a volume; expected 3 dimensions, got {}", file.string(),
+                          samples.geometry.dimensions));
   if (format == FileFormat::tiff && reading.voxel_size_mm.empty())
     throw Error(file.string() + ": a TIFF does not say how large its voxels are; give voxel_size_mm: [x, y, z]");
   if (!samples.geometry.spacing_field.empty() && reading.voxel_size_mm.empty())

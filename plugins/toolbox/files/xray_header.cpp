@@ -145,38 +145,36 @@ void check_motion(const DicomHeader& header, int frame, int frames) {
   if (frame == 1 || (frame == 0 && frames == 1) || !arm_moves(header)) return;
   throw Error(
       header.path().string() + ": the arm moves during this run" +
-      (frame == 0 ? " of " + std::to_string(frames) + " frames" : "") +
+      (frame == 0 ? formatted(" of {} frames", frames) : "") +
       ", and its angles are those of the first frame; use frame 1, or describe the C-arm yourself with the angles of " +
-      (frame == 0 ? "another" : "frame " + std::to_string(frame)));
+      (frame == 0 ? "another" : formatted("frame {}", frame)));
 }
 
 void check_frame(const DicomHeader& header, int frame, int frames) {
   if (frame <= frames) return;
-  throw Error(header.path().string() + ": has " + std::to_string(frames) + (frames == 1 ? " frame" : " frames") +
-              "; there is no frame " + std::to_string(frame));
+  throw Error(formatted("{}: has {}; there is no frame {}", header.path().string(), counted(frames, "frame"), frame));
 }
 
 void check_angles(const DicomHeader& header, double primary_deg, double secondary_deg) {
   if (!(std::abs(primary_deg) <= 180))
-    throw Error(header.path().string() + ": " + kPrimaryAngle.text() + " is " + formatted("{:f}", primary_deg) +
-                ", expected -180 to 180");
+    throw Error(
+        formatted("{}: {} is {:f}, expected -180 to 180", header.path().string(), kPrimaryAngle.text(), primary_deg));
   if (!(std::abs(secondary_deg) <= 90))
-    throw Error(header.path().string() + ": " + kSecondaryAngle.text() + " is " + formatted("{:f}", secondary_deg) +
-                ", expected -90 to 90");
+    throw Error(
+        formatted("{}: {} is {:f}, expected -90 to 90", header.path().string(), kSecondaryAngle.text(), secondary_deg));
 }
 
 void check_lengths(const DicomHeader& header, const CArm& arm) {
   const std::string what = header.path().string() + ": ";
   if (!(arm.source_to_isocentre_mm < arm.source_to_detector_mm))
-    throw Error(what + "the isocentre (" + formatted("{:f}", arm.source_to_isocentre_mm) +
-                " mm from the source) lies behind the detector (" + formatted("{:f}", arm.source_to_detector_mm) +
-                " mm)");
+    throw Error(formatted("{}the isocentre ({:f} mm from the source) lies behind the detector ({:f} mm)", what,
+                          arm.source_to_isocentre_mm, arm.source_to_detector_mm));
   if (!(arm.source_to_detector_mm > 100 && arm.source_to_detector_mm < 5000))
-    throw Error(what + kDistanceSourceToDetector.text() + " is " + formatted("{:f}", arm.source_to_detector_mm) +
-                " mm, which no C-arm has; give source_to_detector_mm");
+    throw Error(formatted("{}{} is {:f} mm, which no C-arm has; give source_to_detector_mm", what,
+                          kDistanceSourceToDetector.text(), arm.source_to_detector_mm));
   if (!(arm.pixel_mm.minCoeff() > 0.001 && arm.pixel_mm.maxCoeff() < 10))
-    throw Error(what + "a pixel of " + formatted("{:f}", arm.pixel_mm.x()) + " x " +
-                formatted("{:f}", arm.pixel_mm.y()) + " mm is no detector's; give pixel_mm");
+    throw Error(formatted("{}a pixel of {:f} x {:f} mm is no detector's; give pixel_mm", what, arm.pixel_mm.x(),
+                          arm.pixel_mm.y()));
 }
 
 /// Whether higher scaled values mean less radiation. The header's sign refers to stored values; a negative slope
@@ -185,8 +183,7 @@ bool is_inverted(const DicomHeader& header) {
   const auto sign = header.number(kIntensitySign);
   if (!sign) return header.text(kPhotometric).value_or("") == "MONOCHROME1";
   if (*sign != 1 && *sign != -1)
-    throw Error(header.path().string() + ": " + kIntensitySign.text() + " is " + std::to_string(int(*sign)) +
-                ", expected 1 or -1");
+    throw Error(formatted("{}: {} is {}, expected 1 or -1", header.path().string(), kIntensitySign.text(), int(*sign)));
   return (*sign < 0) != (header.number(kSlope).value_or(1) < 0);
 }
 
@@ -268,8 +265,9 @@ void check_all_same(const DicomFile& file, int frames, const XrayGeometry& first
     shown += text;
   }
   if (same) return;
-  throw Error(file.path().string() + ": has " + std::to_string(frames) + " frames with a geometry each (" + shown +
-              (frames > kMostShown ? "; ..." : "") + "); name the one that the image is of with frame (from 1)");
+  throw Error(
+      formatted("{}: has {} frames with a geometry each ({}{}); name the one that the image is of with frame (from 1)",
+                file.path().string(), frames, shown, frames > kMostShown ? "; ..." : ""));
 }
 
 }  // namespace
@@ -295,9 +293,10 @@ XrayPixels read_xray_pixels(const std::filesystem::path& path, int frame) {
     const DicomPixels stored = read_dicom_pixels(file, frame);
     constexpr int kMostBits = 24;  // which a float holds
     if (!stored.is_signed && stored.bits_stored > kMostBits)
-      throw Error(path.string() + ": dark is air in this image of " + std::to_string(stored.bits_stored) +
-                  " bits, and such pixels are inverted up to " + std::to_string(kMostBits) +
-                  " bits only; export it with 16 bits");
+      throw Error(
+          formatted("{}: dark is air in this image of {} bits, and such pixels are inverted up to {} bits only; export "
+                    "it with 16 bits",
+                    path.string(), stored.bits_stored, kMostBits));
     pixels.inverted_from = sum_of_limits(stored);
   }
   const auto primary = header.number(kPrimaryAngle), secondary = header.number(kSecondaryAngle);

@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
+
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::files {
 namespace {
@@ -107,8 +108,7 @@ void put_convergence(YAML::Emitter& out, const std::vector<Pose::Progress>& step
 std::string number(double value) {
   if (std::isnan(value)) return ".nan";
   if (std::isinf(value)) return value < 0 ? "-.inf" : ".inf";
-  char text[32];
-  return std::string(text, std::to_chars(text, text + sizeof text, value).ptr);
+  return shortest_number(value);
 }
 
 void put_vector(YAML::Emitter& out, const Eigen::Ref<const Eigen::VectorXd>& values) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/c_arm.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 
@@ -152,7 +153,7 @@ Seeds seeds_from(const YamlMap& map, const std::string& fragment) {
 void check_version(const YamlMap& map, const std::string& key) {
   const auto version = map.integer(key);
   if (version && *version != 1)
-    map.fault(key, key + ": this program reads version 1, the file is of version " + std::to_string(*version));
+    map.fault(key, formatted("{}: this program reads version 1, the file is of version {}", key, *version));
 }
 
 namespace {

@@ -12,8 +12,10 @@ namespace marrow::geometry {
 Eigen::Vector3d unit_axis(const Eigen::Vector3d& axis, const std::string& what, const std::string& hole) {
   const double length = axis.norm();
   if (!(length > 1e-9) || !std::isfinite(length))
-    throw Error(what + ": the axis of hole '" + hole + "' has the length " + formatted("{:f}", length) +
-                ", so it has no direction; give the direction of the hole, such as [1, 0, 0]");
+    throw Error(
+        formatted("{}: the axis of hole '{}' has the length {:f}, so it has no direction; give the direction of the "
+                  "hole, such as [1, 0, 0]",
+                  what, hole, length));
   return axis / length;
 }
 
@@ -24,8 +26,8 @@ void check_implant(const Implant& implant, const std::string& what) {
                 ": the surface is open or not consistently oriented, so it has no inside; close its holes (each "
                 "edge must be shared by exactly two triangles)");
   if (!(enclosed_volume_mm3(implant.surface) > 0))
-    throw Error(what + ": the triangles face inward (enclosed volume " +
-                formatted("{:f}", enclosed_volume_mm3(implant.surface)) + " mm3); reverse their order");
+    throw Error(formatted("{}: the triangles face inward (enclosed volume {:f} mm3); reverse their order", what,
+                          enclosed_volume_mm3(implant.surface)));
   if (implant.holes.empty())
     throw Error(what + ": the implant has no holes, so there is nothing to lock; give each hole's centre and axis");
   std::set<std::string> names;
@@ -33,11 +35,11 @@ void check_implant(const Implant& implant, const std::string& what) {
     if (!names.insert(hole.name).second) throw Error(what + ": two holes are named '" + hole.name + "'; rename one");
     if (!hole.centre_mm.allFinite()) throw Error(what + ": the centre of hole '" + hole.name + "' is not finite");
     if (std::abs(unit_axis(hole.axis, what, hole.name).dot(hole.axis) - 1) > 1e-6)
-      throw Error(what + ": the axis of hole '" + hole.name + "' must have length 1, got " +
-                  formatted("{:f}", hole.axis.norm()));
+      throw Error(
+          formatted("{}: the axis of hole '{}' must have length 1, got {:f}", what, hole.name, hole.axis.norm()));
     if (!(hole.diameter_mm > 0) || !std::isfinite(hole.diameter_mm))
-      throw Error(what + ": the diameter of hole '" + hole.name + "' must be above 0 mm, got " +
-                  formatted("{:f}", hole.diameter_mm));
+      throw Error(
+          formatted("{}: the diameter of hole '{}' must be above 0 mm, got {:f}", what, hole.name, hole.diameter_mm));
   }
 }
 

@@ -47,7 +47,7 @@ bool lie_on_a_line(const std::vector<Eigen::Vector3d>& points_mm) {
 
 void check_spread(const std::vector<Eigen::Vector3d>& points_mm, const std::string& what) {
   if (points_mm.size() < 3)
-    throw Error(what + " are " + std::to_string(points_mm.size()) + ", but a pose takes three at least");
+    throw Error(formatted("{} are {}, but a pose takes three at least", what, points_mm.size()));
   if (lie_on_a_line(points_mm))
     throw Error(what + " lie on one line, so the rotation about it is not determined; add one aside of it");
 }
@@ -71,9 +71,10 @@ RigidTransform fit_rigid(const std::vector<Eigen::Vector3d>& from_mm, const std:
                  mirrored = root_mean_square_mm(orthogonal, from_mm, to_mm);
     const double size = root_mean_square_mm(Eigen::Matrix3d::Zero(), from_mm, to_mm);
     if (turned > 0.05 * size && mirrored < 0.2 * turned)
-      throw Error(what + " are the mirror image of those in the CT: a reflection leaves " + short_number(mirrored) +
-                  " mm, a rotation " + short_number(turned) +
-                  " mm; check for an axis of the wrong sign, or a left-handed frame");
+      throw Error(
+          formatted("{} are the mirror image of those in the CT: a reflection leaves {:.3g} mm, a rotation {:.3g} mm; "
+                    "check for an axis of the wrong sign, or a left-handed frame",
+                    what, mirrored, turned));
   }
   return fit;
 }

@@ -9,6 +9,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "marrow/base/number_text.hpp"
+
 namespace marrow::image {
 namespace {
 
@@ -69,18 +71,18 @@ GreyRange grey_range(const cv::Mat& image) {
 
 void warn_of_greys(const View& view, const Context& context) {
   const GreyRange range = grey_range(view.image.pixels);
-  const std::string what = "view '" + view.name + "': ", of_all = " of " + std::to_string(range.all) + " pixels ";
+  const std::string what = "view '" + view.name + "': ", of_all = formatted(" of {} pixels ", range.all);
   if (range.beyond > 0)
-    context.warn(what + std::to_string(range.beyond) + of_all + (range.beyond == 1 ? "is" : "are") +
-                 " far beyond all others (" + formatted("{:g}", range.farthest) + ", the others reach from " +
-                 formatted("{:g}", range.least) + " to " + formatted("{:g}", range.greatest) +
-                 "), as defects of a detector and letters are; " + (range.beyond == 1 ? "it counts" : "they count") +
-                 " as the nearest of the others");
+    context.warn(
+        formatted("{}{}{}{} far beyond all others ({:g}, the others reach from {:g} to {:g}), as defects of a detector "
+                  "and letters are; {} as the nearest of the others",
+                  what, range.beyond, of_all, range.beyond == 1 ? "is" : "are", range.farthest, range.least,
+                  range.greatest, range.beyond == 1 ? "it counts" : "they count"));
   if (range.dark() < 0)
-    context.warn(what + std::to_string(range.negative) + of_all + "are negative, down to " +
-                 formatted("{:g}", range.least) +
-                 ", which is taken as the grey value where no light falls; edges may be off by a fraction of a pixel, "
-                 "so give the detector's own grey values");
+    context.warn(
+        formatted("{}{}{}are negative, down to {:g}, which is taken as the grey value where no light falls; edges may "
+                  "be off by a fraction of a pixel, so give the detector's own grey values",
+                  what, range.negative, of_all, range.least));
 }
 
 }  // namespace marrow::image

@@ -82,11 +82,10 @@ void check_views(const List<View>& views) {
 
 void check_weights(const std::vector<double>& weights, std::size_t views) {
   if (!weights.empty() && weights.size() != views)
-    throw Error("weights has " + std::to_string(weights.size()) + " numbers, but there are " + std::to_string(views) +
-                " views; give one for each");
+    throw Error(formatted("weights has {} numbers, but there are {} views; give one for each", weights.size(), views));
   double sum = 0;
   for (const double weight : weights) {
-    if (!(weight >= 0)) throw Error("weights: each must be 0 or more, got " + formatted("{:f}", weight));
+    if (!(weight >= 0)) throw Error(formatted("weights: each must be 0 or more, got {:f}", weight));
     sum += weight;
   }
   if (!weights.empty() && !(sum > 0)) throw Error("weights: one at least must be above 0");
@@ -95,9 +94,9 @@ void check_weights(const std::vector<double>& weights, std::size_t views) {
 void check_edges(const List<View>& views, const List<EdgeMap>& edges) {
   if (views.size() == 0) throw Error("there is no view to compare the model with");
   if (views.size() != edges.size())
-    throw Error("there are " + std::to_string(views.size()) + " views, but edge maps of " +
-                std::to_string(edges.size()) + "; give the edges of each view");
-  const auto size = [](int width, int height) { return std::to_string(width) + " x " + std::to_string(height); };
+    throw Error(
+        formatted("there are {} views, but edge maps of {}; give the edges of each view", views.size(), edges.size()));
+  const auto size = [](int width, int height) { return formatted("{} x {}", width, height); };
   for (std::size_t i = 0; i < views.size(); ++i) {
     check_camera(views[i].camera, "view '" + views.name(i) + "'");
     if (edges[i].pixels.empty())

@@ -18,8 +18,8 @@ void check_surface(const Mesh& mesh, const std::string& what) {
                 ": the surface is open or not consistently oriented, so it has no inside; close its holes (each edge "
                 "must be shared by exactly two triangles)");
   if (!(enclosed_volume_mm3(mesh) > 0))
-    throw Error(what + ": the triangles face inward (enclosed volume " + formatted("{:f}", enclosed_volume_mm3(mesh)) +
-                " mm3); reverse their order");
+    throw Error(formatted("{}: the triangles face inward (enclosed volume {:f} mm3); reverse their order", what,
+                          enclosed_volume_mm3(mesh)));
 }
 
 void shift(Mesh& mesh, const Eigen::Vector3d& by_mm) {
@@ -32,13 +32,13 @@ void check_bone(const Bone& bone, const std::string& what) {
   check_surface(bone.outer, what + ", outer surface");
   if (!bone.inner.triangles.empty()) check_surface(bone.inner, what + ", inner surface");
   if (bone.fill_z_mm.empty() || bone.fill_z_mm.size() != bone.fill_fraction.size())
-    throw Error(what + ": the bone share needs as many positions as values, got " +
-                std::to_string(bone.fill_z_mm.size()) + " and " + std::to_string(bone.fill_fraction.size()));
+    throw Error(formatted("{}: the bone share needs as many positions as values, got {} and {}", what,
+                          bone.fill_z_mm.size(), bone.fill_fraction.size()));
   for (std::size_t i = 0; i < bone.fill_z_mm.size(); ++i) {
     if (!std::isfinite(bone.fill_z_mm[i]) || (i > 0 && bone.fill_z_mm[i] <= bone.fill_z_mm[i - 1]))
       throw Error(what + ": the positions of the bone share must grow");
     if (!(bone.fill_fraction[i] >= 0 && bone.fill_fraction[i] <= 1))
-      throw Error(what + ": the bone share must lie in 0 to 1, got " + formatted("{:f}", bone.fill_fraction[i]));
+      throw Error(formatted("{}: the bone share must lie in 0 to 1, got {:f}", what, bone.fill_fraction[i]));
   }
 }
 

@@ -138,7 +138,7 @@ HandEye estimate_hand_eye(const std::vector<Move>& moves, const RigidTransform& 
 
 HandEye solve_ax_xb(const std::vector<Move>& moves) {
   if (moves.size() < 2)
-    throw Error("the hand-eye transform needs 2 motions or more; there are " + std::to_string(moves.size()));
+    throw Error(formatted("the hand-eye transform needs 2 motions or more; there are {}", moves.size()));
   const Eigen::Index rows = 3 * Eigen::Index(moves.size());
   Eigen::Matrix3d products = Eigen::Matrix3d::Zero(), information = Eigen::Matrix3d::Zero();
   for (const Move& move : moves) {
@@ -228,8 +228,7 @@ RobotWorld refined(const RobotWorld& start, const std::vector<Station>& stations
 
 RobotWorld solve_ax_zb(const std::vector<Station>& stations) {
   const Eigen::Index count = Eigen::Index(stations.size());
-  if (count < 3)
-    throw Error("the robot's place needs 3 stations or more; there are " + std::to_string(stations.size()));
+  if (count < 3) throw Error(formatted("the robot's place needs 3 stations or more; there are {}", stations.size()));
   // sum kron(R_B, R_A) vec(R_X) = n vec(R_Z): the singular vectors of the largest singular value.
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(9, 9);
   for (const Station& station : stations)

@@ -118,8 +118,9 @@ void check_held(const Hexapod& hexapod, const RigidTransform& base_from_platform
   const double value = condition(hexapod, base_from_platform);
   if (!(value <= kMostCondition))
     throw Error(
-        begin + "the hexapod's legs do not hold the platform in this pose: " + condition_in_words(value) +
-        formatted(", at most {:.0f} is allowed; give another motion, or another shape of the hexapod", kMostCondition));
+        formatted("{}the hexapod's legs do not hold the platform in this pose: {}, at most {:.0f} is allowed; give "
+                  "another motion, or another shape of the hexapod",
+                  begin, condition_in_words(value), kMostCondition));
   // The determinant changes its sign at a singular pose.
   if (slopes_per_mm(hexapod, base_from_platform).determinant() *
           slopes_per_mm(hexapod, hexapod.base_from_home).determinant() <
@@ -137,7 +138,7 @@ void check_workspace(const Hexapod& hexapod, const HexapodLimits& limits, const 
                  middle = leg_lengths_mm(hexapod, hexapod.base_from_home),
                  angles = joint_angles_rad(hexapod, base_from_platform);
   for (Eigen::Index i = 0; i < 6; ++i) {
-    const std::string begin = what + " is outside the hexapod's workspace: leg " + std::to_string(i + 1);
+    const std::string begin = formatted("{} is outside the hexapod's workspace: leg {}", what, i + 1);
     if (std::abs(lengths[i] - middle[i]) > limits.stroke_mm)
       throw Error(begin + " would be " + in_words(lengths[i], "mm") + " long, its limits are " +
                   in_words(middle[i] - limits.stroke_mm, "mm") + " and " +
@@ -164,9 +165,10 @@ PlatformPose pose_of_legs(const Hexapod& hexapod, const Vector6d& lengths_mm, co
     }
     const Eigen::FullPivLU<Matrix6d> slopes(slopes_of(hexapod, found.base_from_platform));
     if (found.steps == kMostSteps || !slopes.isInvertible())
-      throw Error("no pose of the platform near the start has these lengths of the legs: after " +
-                  std::to_string(found.steps) + " steps a leg still differs by " +
-                  in_words(missing.cwiseAbs().maxCoeff(), "mm"));
+      throw Error(
+          formatted("no pose of the platform near the start has these lengths of the legs: after {} steps a leg still "
+                    "differs by {}",
+                    found.steps, in_words(missing.cwiseAbs().maxCoeff(), "mm")));
     Vector6d step = slopes.solve(missing);
     if (const double turn = step.head<3>().norm(); turn > kLargestTurn_rad) step *= kLargestTurn_rad / turn;
     found.base_from_platform.rotation = rotation_from_vector(step.head<3>()) * found.base_from_platform.rotation;

@@ -11,8 +11,6 @@
 namespace marrow::search {
 namespace {
 
-std::string number(double value) { return formatted("{:.3g}", value); }
-
 /// The six axes in words. Only of a bone's own axes is known which is the long one.
 std::array<std::string, 6> names_of_axes(const FragmentFrame& frame) {
   if (frame.is_anatomical)
@@ -31,9 +29,10 @@ std::string warning_between_axes(const Matrix6d& covariance, double most_deg) {
                of_axes_deg = degrees(std::sqrt(covariance.diagonal().head<3>().maxCoeff()));
   if (worst_deg <= std::max(most_deg, kLonger * of_axes_deg)) return "";
   const Eigen::Vector3d along = eigen.vectors.col(2) * (eigen.vectors.col(2).sum() < 0 ? -1 : 1);
-  return "rotation about the direction (" + number(along.x()) + ", " + number(along.y()) + ", " + number(along.z()) +
-         ") is poorly determined by these images: its predicted standard deviation is " + number(worst_deg) +
-         " degrees";
+  return formatted(
+      "rotation about the direction ({:.3g}, {:.3g}, {:.3g}) is poorly determined by these images: its predicted "
+      "standard deviation is {:.3g} degrees",
+      along.x(), along.y(), along.z(), worst_deg);
 }
 
 }  // namespace
@@ -50,13 +49,12 @@ std::vector<std::string> PredictedCovariance::warnings(double most_deg, double m
     const double sd = std::sqrt((*covariance_)(axis, axis)), shown = turn ? degrees(sd) : sd;
     if (shown <= (turn ? most_deg : most_mm)) continue;
     if (undetermined_[std::size_t(axis)])
-      warnings.push_back(axes[std::size_t(axis)] +
-                         " is not determined by these images: the cost hardly changes within " + number(kMostStep) +
-                         (turn ? " degrees" : " mm"));
+      warnings.push_back(formatted("{} is not determined by these images: the cost hardly changes within {:.3g}{}",
+                                   axes[std::size_t(axis)], kMostStep, turn ? " degrees" : " mm"));
     else
-      warnings.push_back(axes[std::size_t(axis)] +
-                         " is poorly determined by these images: its predicted standard deviation is " + number(shown) +
-                         (turn ? " degrees" : " mm"));
+      warnings.push_back(
+          formatted("{} is poorly determined by these images: its predicted standard deviation is {:.3g}{}",
+                    axes[std::size_t(axis)], shown, turn ? " degrees" : " mm"));
   }
   if (!frame_.is_anatomical && covariance_)
     if (std::string between = warning_between_axes(*covariance_, most_deg); !between.empty())

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/domain/decompositions.hpp"
 
 namespace marrow::track {
@@ -208,8 +209,8 @@ std::vector<TrackState> smoothed(std::vector<TrackState> states) {
   if (states.empty()) throw Error("there is no frame to smooth");
   for (std::size_t i = 0; i < states.size(); ++i)
     if (states[i].frame != states.front().frame + int(i))
-      throw Error("the frames to smooth do not follow each other: frame " + std::to_string(states[i].frame) +
-                  " stands where frame " + std::to_string(states.front().frame + int(i)) + " is expected");
+      throw Error(formatted("the frames to smooth do not follow each other: frame {} stands where frame {} is expected",
+                            states[i].frame, states.front().frame + int(i)));
   if (const std::optional<Matrix6d> noise = noise_of(states))
     for (TrackState& state : states)
       if (state.measured) state.measured->covariance = *noise;

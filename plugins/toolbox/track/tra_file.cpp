@@ -22,7 +22,7 @@ struct Line {
   std::size_t number;
   std::string_view text;
 
-  std::string place() const { return path.string() + ":" + std::to_string(number); }
+  std::string place() const { return formatted("{}:{}", path.string(), number); }
 };
 
 /// The 16 numbers of a line.
@@ -36,14 +36,14 @@ std::array<double, 16> numbers_of(const Line& line) {
     if (word.empty()) continue;
     const auto value = parsed_number(word);
     if (!value)
-      throw Error(line.place() + ":" + std::to_string(begin + 1) + ": expected a number, got '" +
-                  std::string(word.substr(0, 40)) + "'");
+      throw Error(formatted("{}:{}: expected a number, got '{}'", line.place(), begin + 1, word.substr(0, 40)));
     if (count < numbers.size()) numbers[count] = *value;
     ++count;
   }
   if (count != numbers.size())
-    throw Error(line.place() + ": expected the 16 numbers of a 4x4 matrix, got " + std::to_string(count) +
-                (count > numbers.size() ? "; a number with a decimal comma counts twice: write 12.5, not 12,5" : ""));
+    throw Error(
+        formatted("{}: expected the 16 numbers of a 4x4 matrix, got {}{}", line.place(), count,
+                  count > numbers.size() ? "; a number with a decimal comma counts twice: write 12.5, not 12,5" : ""));
   return numbers;
 }
 

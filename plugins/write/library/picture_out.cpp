@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/samples_out.hpp"
 
 namespace marrow::files {
@@ -14,8 +15,10 @@ void check_finite_pixels(const cv::Mat& pixels, const std::filesystem::path& pat
   for (int v = 0; v < pixels.rows; ++v)
     for (int u = 0; u < pixels.cols; ++u)
       if (!std::isfinite(pixels.at<float>(v, u)))
-        throw Error(path.string() + ": cannot be written, because pixel (" + std::to_string(u) + ", " +
-                    std::to_string(v) + ") is not a finite number; replace NaN and infinities where the image is made");
+        throw Error(
+            formatted("{}: cannot be written, because pixel ({}, {}) is not a finite number; replace NaN and "
+                      "infinities where the image is made",
+                      path.string(), u, v));
 }
 
 void write_pixels(const std::filesystem::path& path, const cv::Mat& pixels) {
@@ -34,15 +37,16 @@ void write_pixels(const std::filesystem::path& path, const cv::Mat& pixels) {
 void write_grid(const std::filesystem::path& path, const Grid& grid, const std::vector<float>& values) {
   if (grid.size[0] <= 0 || grid.size[1] <= 0 || grid.size[2] <= 0) throw Error(path.string() + ": the volume is empty");
   if (values.size() != grid.count())
-    throw Error(path.string() + ": " + std::to_string(grid.count()) + " samples expected from the grid's size, got " +
-                std::to_string(values.size()));
+    throw Error(
+        formatted("{}: {} samples expected from the grid's size, got {}", path.string(), grid.count(), values.size()));
   const auto bad = std::find_if(values.begin(), values.end(), [](float value) { return !std::isfinite(value); });
   if (bad != values.end()) {
     const std::size_t at = std::size_t(bad - values.begin()), row = std::size_t(grid.size[0]),
                       slice = row * std::size_t(grid.size[1]);
-    throw Error(path.string() + ": cannot be written, because voxel (" + std::to_string(at % row) + ", " +
-                std::to_string(at % slice / row) + ", " + std::to_string(at / slice) +
-                ") is not a finite number; replace NaN and infinities where the volume is made");
+    throw Error(
+        formatted("{}: cannot be written, because voxel ({}, {}, {}) is not a finite number; replace NaN and "
+                  "infinities where the volume is made",
+                  path.string(), at % row, at % slice / row, at / slice));
   }
   GridOut out;
   for (std::size_t k = 0; k < 3; ++k) {
