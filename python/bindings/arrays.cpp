@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::python {
 namespace {
@@ -14,7 +15,7 @@ py::module_ numpy() { return py::module_::import("numpy"); }
 std::string text_of(const std::vector<py::ssize_t>& shape) {
   std::string text;
   for (const py::ssize_t length : shape)
-    text += (text.empty() ? "" : " x ") + (length < 0 ? std::string("any") : std::to_string(length));
+    text += (text.empty() ? "" : " x ") + (length < 0 ? std::string("any") : formatted("{}", length));
   return text.empty() ? "one number" : text;
 }
 
@@ -25,8 +26,9 @@ void expect_no_mask(const py::handle& object, const std::string& what) {
   } else if (py::hasattr(object, "mask") && py::hasattr(object, "filled")) {
     const auto masked = numpy().attr("sum")(object.attr("mask")).cast<py::ssize_t>();
     if (masked > 0)
-      throw Error(what + ": " + std::to_string(masked) + (masked == 1 ? " of its values is" : " of its values are") +
-                  " masked, and a mask is not kept; give array.filled(value), which says what stands in its place");
+      throw Error(formatted(
+          "{}: {} masked, and a mask is not kept; give array.filled(value), which says what stands in its place", what,
+          counted(masked, "of its values is", "of its values are")));
   }
 }
 
@@ -70,7 +72,7 @@ bool is_true(const py::object& array) { return numpy().attr("any")(array).cast<b
 /// infinite. Fractions are rounded.
 void expect_same_numbers(const py::object& array, const py::object& converted, const std::string& what) {
   const auto kind = array.attr("dtype").attr("kind").cast<std::string>();
-  const auto bits = std::to_string(8 * converted.attr("itemsize").cast<int>());
+  const auto bits = formatted("{}", 8 * converted.attr("itemsize").cast<int>());
   if (kind == "i" || kind == "u") {
     const py::object back = converted.attr("astype")(array.attr("dtype"));
     const py::object differs = numpy().attr("not_equal")(back, array);

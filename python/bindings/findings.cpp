@@ -35,7 +35,7 @@ ShaftLines shaft_lines_of(const py::object& left, const py::object& right, doubl
   for (const py::handle& pair : rejected) {
     const auto parts = pair.cast<py::tuple>();
     if (parts.size() != 3)
-      throw Error("rejected: expected triples (left, right, reason), got " + std::to_string(parts.size()) + " items");
+      throw Error(formatted("rejected: expected triples (left, right, reason), got {} items", parts.size()));
     lines.rejected.push_back({line_of(parts[0], "left of a rejected pair"),
                               line_of(parts[1], "right of a rejected pair"), py::str(parts[2])});
   }
@@ -45,16 +45,16 @@ ShaftLines shaft_lines_of(const py::object& left, const py::object& right, doubl
 EdgeMap edge_map_of(const py::handle& pixels, int width_px, int height_px) {
   const std::vector<double> numbers = numbers_of(pixels, {-1, 5}, "pixels of the edge map");
   if (width_px < 1 || height_px < 1)
-    throw Error("EdgeMap: expected a width and a height of at least 1 px, got " + std::to_string(width_px) + " x " +
-                std::to_string(height_px));
+    throw Error(formatted("EdgeMap: expected a width and a height of at least 1 px, got {} x {}", width_px, height_px));
   EdgeMap edges{width_px, height_px, {}};
   for (std::size_t i = 0; i < numbers.size(); i += 5) {
     const double* at = numbers.data() + i;
     const bool is_inside = at[0] >= -0.5 && at[1] >= -0.5 && at[0] <= width_px - 0.5 && at[1] <= height_px - 0.5;
     if (!is_inside || !std::isfinite(at[2] + at[3] + at[4]))
-      throw Error("EdgeMap: pixel " + std::to_string(i / 5) + " is at (" + formatted("{:f}", at[0]) + ", " +
-                  formatted("{:f}", at[1]) + ") px, outside of the image of " + std::to_string(width_px) + " x " +
-                  std::to_string(height_px) + " px, or a number of it is not finite");
+      throw Error(
+          formatted("EdgeMap: pixel {} is at ({:f}, {:f}) px, outside of the image of {} x {} px, or a number of it is "
+                    "not finite",
+                    i / 5, at[0], at[1], width_px, height_px));
     edges.pixels.push_back({float(at[0]), float(at[1]), float(at[2]), float(at[3]), float(at[4])});
   }
   const auto place = [](const EdgePixel& pixel) { return std::pair(std::lround(pixel.v_px), std::lround(pixel.u_px)); };
@@ -81,7 +81,7 @@ void bind_edges(py::module_& module) {
           "gradient along u and v, and its magnitude.")
       .def("__len__", [](const EdgeMap& self) { return self.pixels.size(); })
       .def("__repr__",
-           [](const EdgeMap& self) { return "<marrow.EdgeMap of " + std::to_string(self.pixels.size()) + " pixels>"; });
+           [](const EdgeMap& self) { return formatted("<marrow.EdgeMap of {} pixels>", self.pixels.size()); });
   value_class<ShaftLines>(module, "ShaftLines", "The two outer borders of the shaft in one view.")
       .def(
           py::init(&shaft_lines_of), py::arg("left"), py::arg("right"), py::kw_only(), py::arg("width_mm"),

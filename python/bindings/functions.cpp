@@ -9,6 +9,7 @@
 
 #include "interruptible.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "values.hpp"
 
 namespace marrow::python {
@@ -45,7 +46,7 @@ bool is_one_pose(const py::handle& object) {
 std::vector<RigidTransform> poses_of(const py::object& object) {
   std::vector<RigidTransform> poses;
   for (const py::handle& one : is_mapping(object) ? object.attr("values")() : object)
-    poses.push_back(pose_of(one, "pose " + std::to_string(poses.size() + 1)));
+    poses.push_back(pose_of(one, formatted("pose {}", poses.size() + 1)));
   return poses;
 }
 
@@ -183,8 +184,8 @@ void bind_optimizer(py::module_& module) {
       .def_readonly("evaluations", &MinimisationResult::evaluations, "How often the function was asked.")
       .def_readonly("stopped_because", &MinimisationResult::stopped_because, "Why it ended, in words.")
       .def("__repr__", [](const MinimisationResult& self) {
-        return "<marrow.Minimum " + py::repr(py::float_(self.value)).cast<std::string>() + " after " +
-               std::to_string(self.evaluations) + " evaluations>";
+        return formatted("<marrow.Minimum {} after {} evaluations>",
+                         py::repr(py::float_(self.value)).cast<std::string>(), self.evaluations);
       });
   function_class<Optimizer, OptimizerValue>(module, "Optimizer", "Minimises a function of n variables.")
       .def("minimise", &minimise, py::arg("function"), py::arg("start"), py::arg("initial_step"), py::kw_only(),

@@ -2,6 +2,7 @@
 #include <pybind11/stl.h>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "values.hpp"
 
 namespace marrow::python {
@@ -30,7 +31,7 @@ void bind_mesh(py::module_& module) {
              const std::vector<double> corners = numbers_of(triangles, {-1, 3}, "triangles");
              for (const double corner : corners)
                if (corner != double(std::uint32_t(corner)))
-                 throw Error("triangles: expected indices of vertices, got " + std::to_string(corner));
+                 throw Error(formatted("triangles: expected indices of vertices, got {:f}", corner));
              for (std::size_t i = 0; i + 2 < corners.size(); i += 3)
                mesh->triangles.push_back(
                    {std::uint32_t(corners[i]), std::uint32_t(corners[i + 1]), std::uint32_t(corners[i + 2])});
@@ -53,8 +54,7 @@ void bind_mesh(py::module_& module) {
       .def_property_readonly(
           "frame", [](const Mesh& self) { return self.frame; }, "The name of the frame.")
       .def("__repr__", [](const Mesh& self) {
-        return "<marrow.Mesh of " + std::to_string(self.vertices_mm.size()) + " vertices, " +
-               std::to_string(self.triangles.size()) + " triangles>";
+        return formatted("<marrow.Mesh of {} vertices, {} triangles>", self.vertices_mm.size(), self.triangles.size());
       });
 }
 
@@ -80,9 +80,8 @@ void bind_views(py::module_& module) {
       .def_property_readonly(
           "camera_from_world", [](const Camera& self) { return array_of(self.camera_from_world); },
           "The transform from the world to the camera, 4 x 4, in mm.")
-      .def("__repr__", [](const Camera& self) {
-        return "<marrow.Camera " + std::to_string(self.width_px) + " x " + std::to_string(self.height_px) + " px>";
-      });
+      .def("__repr__",
+           [](const Camera& self) { return formatted("<marrow.Camera {} x {} px>", self.width_px, self.height_px); });
   value_class<View>(module, "View", "An X-ray image with its camera.")
       .def(
           py::init([](const py::object& image, const std::shared_ptr<Camera>& camera, const py::object& mask,
@@ -114,8 +113,7 @@ void bind_views(py::module_& module) {
           },
           "Where the image may be used: an array of uint8, or None for everywhere.")
       .def("__repr__", [](const View& self) {
-        return "<marrow.View " + self.name + ", " + std::to_string(self.image.width()) + " x " +
-               std::to_string(self.image.height()) + ">";
+        return formatted("<marrow.View {}, {} x {}>", self.name, self.image.width(), self.image.height());
       });
 }
 

@@ -3,14 +3,13 @@
 
 #include "mapped.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "values.hpp"
 
 namespace marrow::python {
 namespace {
 
-std::string text_of(const Grid& grid) {
-  return std::to_string(grid.size[0]) + " x " + std::to_string(grid.size[1]) + " x " + std::to_string(grid.size[2]);
-}
+std::string text_of(const Grid& grid) { return formatted("{} x {} x {}", grid.size[0], grid.size[1], grid.size[2]); }
 
 Grid grid_of(const std::vector<py::ssize_t>& shape, const py::handle& spacing_mm, const py::handle& origin_mm,
              const py::handle& direction, const std::string& frame) {
@@ -89,16 +88,15 @@ void bind_images(py::module_& module) {
       .def_buffer([](Image& self) { return buffer_of(self.pixels); })
       .def_property_readonly("width", &Image::width, "The number of columns.")
       .def_property_readonly("height", &Image::height, "The number of rows.")
-      .def("__repr__", [](const Image& self) {
-        return "<marrow.Image " + std::to_string(self.width()) + " x " + std::to_string(self.height()) + ">";
-      });
+      .def("__repr__",
+           [](const Image& self) { return formatted("<marrow.Image {} x {}>", self.width(), self.height()); });
   value_class<Picture>(module, "Picture", py::buffer_protocol(), "A coloured picture for people.")
       .def_property_readonly(
           "array", [](const std::shared_ptr<Picture>& self) { return array_of(self, buffer_of(self->pixels)); },
           "The pixels as a read-only numpy array [row, column, red green blue] of uint8, without a copy.")
       .def_buffer([](Picture& self) { return buffer_of(self.pixels); })
       .def("__repr__", [](const Picture& self) {
-        return "<marrow.Picture " + std::to_string(self.pixels.cols) + " x " + std::to_string(self.pixels.rows) + ">";
+        return formatted("<marrow.Picture {} x {}>", self.pixels.cols, self.pixels.rows);
       });
   auto volume = value_class<Volume>(module, "Volume", py::buffer_protocol(),
                                     "A CT volume in Hounsfield units. numpy.asarray(volume) is its samples [z, y, x].");

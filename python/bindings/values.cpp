@@ -5,6 +5,7 @@
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/names.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::python {
 namespace {
@@ -52,7 +53,7 @@ Value list_of(const std::vector<std::string>& names, const std::vector<py::objec
 std::string name_of_item(const py::handle& object, std::size_t index) {
   if (py::isinstance<View>(object)) return object.cast<const View&>().name;
   if (py::isinstance<Seeds>(object)) return object.cast<const Seeds&>().fragment;
-  return std::to_string(index + 1);
+  return formatted("{}", index + 1);
 }
 
 }  // namespace

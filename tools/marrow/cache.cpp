@@ -5,6 +5,7 @@
 
 #include "command_options.hpp"
 #include "commands.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/store/shared_store.hpp"
 
@@ -41,7 +42,7 @@ void print(const Store::Entry& entry) {
 /// The message that several keys begin with `key`, with some of them.
 std::string several(const std::string& key, const std::set<std::string>& keys) {
   constexpr std::size_t kMostShown = 5;
-  std::string text = std::to_string(keys.size()) + " keys begin with '" + key + "'; give more digits of one of them:";
+  std::string text = formatted("{} keys begin with '{}'; give more digits of one of them:", keys.size(), key);
   std::size_t shown = 0;
   for (const std::string& one : keys)
     if (shown++ < kMostShown) text += "\n" + one;

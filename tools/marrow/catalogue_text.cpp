@@ -6,8 +6,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <sstream>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/runtime/plugins/contract.hpp"
 
 namespace marrow::cli {
@@ -23,12 +23,7 @@ const char* type_name(OptionType type) {
 
 constexpr int kDigits = 10;
 
-std::string number_text(double value) {
-  std::ostringstream out;
-  out.precision(kDigits);
-  out << value;
-  return out.str();
-}
+std::string number_text(double value) { return short_number(value, kDigits); }
 
 /// A text with one of these characters is shown in quotes, also where YAML needs none.
 bool plain_scalar(const std::string& text) {
@@ -169,7 +164,7 @@ std::string range_text(const OptionInfo& option) {
     return text;
   }
   std::string text = type_name(option.type);
-  if (option.length) text = std::to_string(option.length) + " numbers";
+  if (option.length) text = formatted("{} numbers", option.length);
   const std::optional<double> least = bound_told(option, option.minimum), most = bound_told(option, option.maximum);
   if (least && most)
     text += ", " + number_text(*least) + " to " + number_text(*most);

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "marrow/base/number_text.hpp"
+
 namespace marrow::cli {
 namespace {
 
@@ -83,8 +85,7 @@ DrawnGraph drawn_graph(const Pipeline& pipeline, bool only_needed) {
 std::string passes_text(const Repetition& repetition) {
   std::string text = repetition.is_loop ? "" : "each " + repetition.axis + " in turn";
   if (repetition.at_most)
-    text += (text.empty() ? "at most " : ", at most ") + std::to_string(repetition.at_most) +
-            (repetition.at_most == 1 ? " pass" : " passes");
+    text += formatted("{}{}", text.empty() ? "at most " : ", at most ", counted(repetition.at_most, "pass", "passes"));
   if (repetition.until >= 0)
     text += ", until '" + repetition.alone.outputs[std::size_t(repetition.until)].name + "' says stop";
   return text;

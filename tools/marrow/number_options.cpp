@@ -4,15 +4,10 @@
 #include <charconv>
 
 #include "amount_bounds.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::cli {
 namespace {
-
-/// A number without trailing zeros.
-std::string text_of(double value) {
-  char text[32];
-  return std::string(text, std::to_chars(text, text + sizeof text, value, std::chars_format::fixed).ptr);
-}
 
 [[noreturn]] void refuse(const std::string& option, const std::string& text, const std::string& expected) {
   throw CLI::ValidationError(option + " is '" + text + "', but must be " + expected);
@@ -33,8 +28,8 @@ std::uint64_t whole_number(const std::string& option, const std::string& text, s
   const bool has_leading_zero = text.size() > 1 && text[0] == '0';
   if (!is_read(text, value) || has_leading_zero || value < least || value > most)
     refuse(option, text,
-           "a whole number from " + std::to_string(least) + " to " + std::to_string(most) +
-               (has_leading_zero ? ", in decimal digits without leading zeros" : ""));
+           formatted("a whole number from {} to {}{}", least, most,
+                     has_leading_zero ? ", in decimal digits without leading zeros" : ""));
   return value;
 }
 
@@ -42,7 +37,7 @@ double number(const std::string& option, const std::string& text, double least, 
               const std::string& end) {
   double value = 0;
   if (!is_read(text, value) || !(value >= least && value <= most))
-    refuse(option, text, "a number of " + unit + " from " + text_of(least) + " to " + text_of(most) + end);
+    refuse(option, text, "a number of " + unit + " from " + exact_number(least) + " to " + exact_number(most) + end);
   return value;
 }
 

@@ -18,7 +18,6 @@
 #include "marrow/runtime/run/run_folder.hpp"
 #include "marrow/runtime/run/verdict_json.hpp"
 #include "marrow/runtime/store/shared_store.hpp"
-#include "outputs_in_files.hpp"
 #include "process.hpp"
 #include "run_event.hpp"
 #include "stop_notice.hpp"

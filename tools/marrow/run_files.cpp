@@ -7,6 +7,7 @@
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/json_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/text_file.hpp"
 
 namespace marrow::cli {
@@ -80,8 +81,8 @@ RgbPixels read_png(const fs::path& file) {
   if (!png_image_begin_read_from_file(&image, file.c_str())) refuse(image.message);
   RgbPixels pixels{int(image.width), int(image.height), (image.format & PNG_FORMAT_FLAG_LINEAR) != 0, {}};
   if (std::uint64_t(image.width) * image.height > kMostPixels)
-    refuse("a picture of " + std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels, at most " +
-           std::to_string(kMostPixels / 1'000'000) + " million are read");
+    refuse(formatted("a picture of {} x {} pixels, at most {} million are read", image.width, image.height,
+                     kMostPixels / 1'000'000));
   image.format = PNG_FORMAT_RGB;
   pixels.bytes.resize(PNG_IMAGE_SIZE(image));
   if (!png_image_finish_read(&image, nullptr, pixels.bytes.data(), 0, nullptr)) refuse(image.message);

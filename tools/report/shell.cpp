@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstdio>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "report/report.hpp"
 
@@ -12,9 +12,7 @@ std::string escaped_word(const std::string& text) {
   std::string word = "$'";
   for (const char c : text) {
     const bool is_plain = c >= ' ' && c <= '~' && c != '\'' && c != '\\' && c != '!';  // ! recalls commands in bash
-    char code[5];
-    std::snprintf(code, sizeof code, "\\%03o", static_cast<unsigned char>(c));
-    word += is_plain ? std::string(1, c) : code;
+    word += is_plain ? std::string(1, c) : formatted("\\{:03o}", static_cast<unsigned char>(c));
   }
   return word + "'";
 }

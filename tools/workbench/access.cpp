@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::workbench {
 namespace {
@@ -50,11 +51,11 @@ std::string random_secret() {
 Access::Access(std::string token, std::string session) : token_(std::move(token)), session_(std::move(session)) {}
 
 std::string Access::address(const std::string& place) const {
-  return "http://127.0.0.1:" + std::to_string(port_) + "/?token=" + token_ + place;
+  return formatted("http://127.0.0.1:{}/?token={}{}", port_, token_, place);
 }
 
 std::string Access::fault(const Asked& asked, bool hands_in_token) const {
-  const std::string port = ":" + std::to_string(port_);
+  const std::string port = formatted(":{}", port_);
   if (asked.host != "127.0.0.1" + port && asked.host != "localhost" + port)
     return "this server answers only to 127.0.0.1" + port + " and localhost" + port;
   if (!asked.origin.empty() && asked.origin != "http://" + asked.host)

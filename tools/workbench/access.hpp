@@ -5,6 +5,8 @@
 #include <mutex>
 #include <string>
 
+#include "marrow/base/number_text.hpp"
+
 namespace marrow::workbench {
 
 /// What a request says about itself. Headers that it does not have are empty.
@@ -36,7 +38,7 @@ class Access {
   std::string cookie() const;
 
  private:
-  std::string cookie_name() const { return "marrow_" + std::to_string(port_); }  // cookies do not know ports
+  std::string cookie_name() const { return formatted("marrow_{}", port_); }  // cookies do not know ports
 
   std::string token_, session_;
   int port_ = 0;

@@ -4,6 +4,7 @@
 #include <cctype>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "workbench/case_text.hpp"
 #include "workbench/files_of_case.hpp"
@@ -68,7 +69,7 @@ class Planner {
     std::error_code error;
     const std::string extension = fs::is_directory(from, error) ? "" : extension_of(from);
     for (int number = 1;; ++number) {
-      const std::string name = stem + (number > 1 ? "-" + std::to_string(number) : "") + extension;
+      const std::string name = stem + (number > 1 ? formatted("-{}", number) : "") + extension;
       const auto planned =
           std::find_if(files_.begin(), files_.end(), [&](const auto& file) { return file.name == name; });
       if (planned != files_.end()) {
@@ -104,7 +105,7 @@ PlannedCase plan_case(const OpenedFolder& folder, const std::string& case_path, 
     const json given = view.value("name", json());
     const std::string name = given.is_string() ? given.get<std::string>() : given.dump(),
                       what = "view " + in_quotes(printable(name));
-    const std::string stem = plain(name, "view-" + std::to_string(++number));
+    const std::string stem = plain(name, formatted("view-{}", ++number));
     planner.take(view["image"], what + ", its image", stem);
     if (view.contains("mask") && !view["mask"].is_null())
       planner.take(view["mask"], what + ", its mask", stem + ".mask");

@@ -85,7 +85,7 @@ std::shared_ptr<const OpenCt> CtMemory::add(const std::string& content, Value va
   ct->lowest_hu = *lowest;
   ct->highest_hu = *highest;
   const std::lock_guard lock(mutex_);
-  ct->name = "ct-" + std::to_string(++count_);
+  ct->name = formatted("ct-{}", ++count_);
   open_.push_front({{content}, ct});
   std::uintmax_t bytes = 0;
   for (auto one = open_.begin(); one != open_.end();) {
@@ -127,8 +127,8 @@ std::vector<std::string> doubts_about(const OpenCt& ct) {
         angle_deg));
   const int fewest = *std::min_element(grid.size.begin(), grid.size.end());
   if (fewest < kFewSlices)
-    doubts.push_back("It has only " + std::to_string(fewest) +
-                     " slices along one of its axes. Are files of the series missing?");
+    doubts.push_back(
+        formatted("It has only {} slices along one of its axes. Are files of the series missing?", fewest));
   if (const double thick = grid.spacing_mm.maxCoeff(), thin = grid.spacing_mm.minCoeff(); thick > kThick * thin)
     doubts.push_back(
         formatted("Its voxels are {:.3g} mm long and {:.3g} mm wide, so the bone's surface is not well known along the "

@@ -17,6 +17,7 @@
 
 #include "marrow/base/descriptor.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/process_identity.hpp"
 #include "workbench/case_text.hpp"
 
@@ -202,7 +203,7 @@ void write_case_files(const fs::path& place, const PlannedCase& plan, const std:
     fs::create_directories(place);
     remove_left_over(place);
     static std::atomic<int> count = 0;
-    staging = place / (kStaging + this_process() + "-" + std::to_string(++count));
+    staging = place / (formatted("{}{}-{}", kStaging, this_process(), ++count));
     fs::remove_all(staging);
     fs::create_directory(staging);
     for (const PlannedCase::File& file : plan.files) bring(file, staging);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which files a CT is read from.
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "workbench/ct_requests.hpp"
 
@@ -19,8 +20,8 @@ FilesOfCt::FilesOfCt(const fs::path& place) {
   std::size_t count = 0;
   for (fs::recursive_directory_iterator entry(place, error), end; !error && entry != end; entry.increment(error)) {
     if (++count > kMostSlices)
-      throw Error(printable(place.string()) + ": this folder holds more than " + std::to_string(kMostSlices) +
-                  " files; choose the folder of one series");
+      throw Error(formatted("{}: this folder holds more than {} files; choose the folder of one series",
+                            printable(place.string()), kMostSlices));
     std::error_code none;
     if (entry->is_regular_file(none)) add(entry->path());
   }
@@ -33,7 +34,7 @@ void FilesOfCt::add(const fs::path& file) {
   if (error) return;  // its reader says more
   bytes += size;
   const auto time = fs::last_write_time(file, error).time_since_epoch().count();
-  description += file.filename().string() + ' ' + std::to_string(size) + ' ' + std::to_string(time) + '\n';
+  description += formatted("{} {} {}\n", file.filename().string(), size, time);
 }
 
 std::string content_of_ct(const fs::path& place, nlohmann::json ct, const FilesOfCt& files) {

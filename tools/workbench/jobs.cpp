@@ -5,6 +5,7 @@
 #include <chrono>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/reason_of_exception.hpp"
 
@@ -62,7 +63,7 @@ std::string Jobs::start(const std::string& title, const std::string& command, st
     }
   const auto job = std::make_shared<Job>(title, command);
   const auto is_over = std::make_shared<std::atomic<bool>>(false);
-  const std::string name = std::to_string(++count_);
+  const std::string name = formatted("{}", ++count_);
   std::thread thread([job, is_over, work = std::move(work)] {
     try {
       json result = work(*job);

@@ -14,6 +14,7 @@
 #include "command_options.hpp"
 #include "given_path.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
 #include "process.hpp"
@@ -42,11 +43,9 @@ struct Target {
 std::string encoded(const std::string& text) {
   std::string result;
   for (const char c : text) {
-    char code[8];
-    std::snprintf(code, sizeof code, "%%%02X", unsigned(static_cast<unsigned char>(c)));
     result += std::isalnum(static_cast<unsigned char>(c)) || c == '/' || c == '-' || c == '_' || c == '.'
                   ? std::string(1, c)
-                  : code;
+                  : formatted("%{:02X}", static_cast<unsigned char>(c));
   }
   return result;
 }

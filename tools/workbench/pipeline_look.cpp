@@ -5,6 +5,8 @@
 
 #include "marrow/base/base64.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/base/temporary_folder.hpp"
 #include "marrow/base/text_file.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/run/verdict_json.hpp"
@@ -25,24 +27,6 @@ constexpr std::size_t kMostFiles = 8;   // of one item that is written as a fold
 constexpr std::size_t kMostTriangles = 600'000;
 constexpr std::size_t kMostText = 100'000;
 
-/// A folder that is removed at the end.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (fs::temp_directory_path() / "marrow-look-XXXXXX").string();
-    if (!mkdtemp(name.data())) throw Error("no temporary folder can be made in " + fs::temp_directory_path().string());
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
 template <class Item>
 std::string bytes_text(const std::vector<Item>& items) {
   return base64({reinterpret_cast<const char*>(items.data()), items.size() * sizeof(Item)});
@@ -52,8 +36,7 @@ json mesh_json(const Mesh& mesh) {
   const std::size_t count = mesh.triangles.size();
   if (count > kMostTriangles)
     return {{"kind", "text"},
-            {"text", "a surface of " + std::to_string(count) + " triangles; at most " + std::to_string(kMostTriangles) +
-                         " are drawn here"}};
+            {"text", formatted("a surface of {} triangles; at most {} are drawn here", count, kMostTriangles)}};
   std::vector<float> vertices;
   std::vector<std::uint32_t> triangles;
   for (const auto& vertex : mesh.vertices_mm)
@@ -63,7 +46,7 @@ json mesh_json(const Mesh& mesh) {
   return {{"kind", "mesh"},
           {"vertices", bytes_text(vertices)},
           {"triangles", bytes_text(triangles)},
-          {"text", std::to_string(mesh.vertices_mm.size()) + " vertices, " + std::to_string(count) + " triangles"}};
+          {"text", formatted("{} vertices, {} triangles", mesh.vertices_mm.size(), count)}};
 }
 
 /// The three slices through the middle, from the least to the largest value in them.
@@ -167,7 +150,7 @@ void add_items(json& items, const Value& value, const std::string& place, const 
       add_items(items, value.items[i], place.empty() ? value.names[i] : place + "/" + value.names[i], catalogue);
     return;
   }
-  const TemporaryFolder folder;
+  const TemporaryFolder folder(new_temporary_folder("look"));
   json parts;
   try {
     parts = shown_item(value, folder.path(), catalogue);

@@ -7,7 +7,6 @@
 #include "marrow/runtime/run/place_of_results.hpp"
 #include "marrow/runtime/run/run_folder.hpp"
 #include "marrow/runtime/run/verdict_json.hpp"
-#include "outputs_in_files.hpp"
 #include "run_event.hpp"
 
 namespace marrow::workbench {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The frames of a sequence on the page "Place".
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/toolbox/files/sequence_files.hpp"
@@ -29,8 +30,8 @@ List<SequenceFrame> read_frames(const Workbench& workbench, const PlacedCase& pl
                            {"images", workbench.folder.inside(view.images).string()},
                            {"pattern", view.pattern},
                            {"camera", camera_file_of(workbench, placed, view.name).string()},
-                           {"first", std::to_string(first)},
-                           {"last", std::to_string(last)}};
+                           {"first", formatted("{}", first)},
+                           {"last", formatted("{}", last)}};
   return outputs_of(call, workbench, job).at("frames").as_list<SequenceFrame>();
 }
 
@@ -85,9 +86,9 @@ int count_frames(const Workbench& workbench, const PlacedCase& placed, const std
       counts.push_back(read_frames(workbench, placed, view, 1, 0, job).size());
     }
     if (counts.back() != counts.front())
-      throw Error("view " + in_quotes(printable(view.name)) + " has " + std::to_string(counts.back()) +
-                  " frames, but view " + in_quotes(printable(views.front().name)) + " has " +
-                  std::to_string(counts.front()) + "; all views must show the same moments");
+      throw Error(formatted("view {} has {} frames, but view {} has {}; all views must show the same moments",
+                            in_quotes(printable(view.name)), counts.back(), in_quotes(printable(views.front().name)),
+                            counts.front()));
   }
   return int(counts.front());
 }

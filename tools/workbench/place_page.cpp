@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The requests of the page "Place".
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "report/report.hpp"
 #include "workbench/place.hpp"
 
@@ -49,7 +50,7 @@ const json& object_in(const Request& request, const char* name) {
 int step_in(const Request& request) {
   const json step = request.body.value("step_px", json(1));
   if (!step.is_number_integer() || step < 1 || step > kCoarsest_px)
-    throw Error("'step_px' must be a whole number from 1 to " + std::to_string(kCoarsest_px));
+    throw Error(formatted("'step_px' must be a whole number from 1 to {}", kCoarsest_px));
   return step.get<int>();
 }
 

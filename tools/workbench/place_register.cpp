@@ -6,6 +6,7 @@
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/file_names.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
 #include "marrow/runtime/node/types.hpp"
@@ -111,7 +112,7 @@ std::string write_placement(const OpenedFolder& folder, const std::string& into,
   constexpr int kMost = 100'000;
   const std::string all = into + "/" + file_name_of(placed.path);
   for (int number = 1; number < kMost; ++number) {
-    const std::string name = all + "/" + std::to_string(number);
+    const std::string name = formatted("{}/{}", all, number);
     const fs::path place = folder.inside(name);
     std::error_code error;
     if (fs::exists(place)) {

@@ -5,6 +5,7 @@
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/file_names.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
@@ -32,8 +33,8 @@ AutoscoperTrack track_of(const std::string& bone, const json& poses, int frames)
     int frame = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), frame);
     if (error != std::errc() || end != text.data() + text.size() || frame < 1 || frame > frames)
-      throw Error("a keyframe of " + in_quotes(printable(bone)) + " is in frame " + in_quotes(printable(text)) +
-                  ", but the sequence has frames 1 to " + std::to_string(frames) + "; remove it");
+      throw Error(formatted("a keyframe of {} is in frame {}, but the sequence has frames 1 to {}; remove it",
+                            in_quotes(printable(bone)), in_quotes(printable(text)), frames));
     track.world_from_bone[std::size_t(frame - 1)] = placement_of(matrix);
   }
   return track;
@@ -80,7 +81,7 @@ TrackWish wish_of(const Request& request, const Workbench& workbench, const Plac
 void write_poses(const Request& request, const Workbench& workbench, const PlacedCase& placed, TrackWish& wish) {
   const json frames = request.body.value("frames", json());
   if (!frames.is_number_integer() || frames < 1 || frames > kMostFrames)
-    throw Error("'frames' must be a whole number from 1 to " + std::to_string(kMostFrames));
+    throw Error(formatted("'frames' must be a whole number from 1 to {}", kMostFrames));
   const json keyframes = request.body.value("keyframes", json::object());
   wish.placed = write_keyframes(
       workbench.folder, placed, poses_in(request, "starts"), keyframes, frames.get<int>(),

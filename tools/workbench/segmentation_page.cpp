@@ -30,7 +30,7 @@ class Segmentations {
  public:
   std::string new_name() {
     const std::lock_guard lock(mutex_);
-    return "segmentation-" + std::to_string(++count_);
+    return formatted("segmentation-{}", ++count_);
   }
   void keep(const std::string& name, std::shared_ptr<const Segmentation> segmentation) {
     const std::lock_guard lock(mutex_);

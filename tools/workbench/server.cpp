@@ -7,6 +7,7 @@
 #include <chrono>
 #include <thread>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/reason_of_exception.hpp"
 
@@ -64,8 +65,7 @@ int Request::number(const std::string& name, int least, int most) const {
   int value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || value < least || value > most)
-    throw Error("'" + name + "' must be a whole number from " + std::to_string(least) + " to " + std::to_string(most) +
-                ", got " + in_quotes(text));
+    throw Error(formatted("'{}' must be a whole number from {} to {}, got {}", name, least, most, in_quotes(text)));
   return value;
 }
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What marrow says about the cameras of a draft's views, and the pose that its landmarks give.
-#include <sstream>
 
 #include "marrow/base/number_text.hpp"
 #include "marrow/domain/pose.hpp"
@@ -58,8 +57,9 @@ json landmarks_file(const json& landmarks, const std::string& fragment) {
     for (const auto& [view, pixel] : pixels.items()) seen[view][name] = pixel;
   }
   if (points.size() < 3)
-    throw Error("a pose takes three landmarks that have a place in the CT and that two views show; " +
-                std::to_string(points.size()) + (points.size() == 1 ? " has" : " have") + " a place in the CT");
+    throw Error(formatted(
+        "a pose takes three landmarks that have a place in the CT and that two views show; {} a place in the CT",
+        counted(points.size(), "has", "have")));
   if (seen.empty()) throw Error("no view shows a landmark that has a place in the CT; mark them in the X-rays");
   return {{"marrow-landmarks", 1}, {"fragments", {{fragment, {{"points", points}, {"seen", seen}}}}}};
 }
@@ -67,23 +67,21 @@ json landmarks_file(const json& landmarks, const std::string& fragment) {
 /// All triangles between the first points, as PLY: a surface that has the same axes as the points.
 std::string surface_of(const json& points) {
   constexpr std::size_t kMost = 12;
-  std::ostringstream vertices, triangles;
-  vertices.precision(17);
+  std::string vertices, triangles;
   const std::size_t count = std::min(points.size(), kMost);
   std::size_t faces = 0;
   auto point = points.begin();
   for (std::size_t i = 0; i < count; ++i, ++point)
-    vertices << point->at(0).get<double>() << " " << point->at(1).get<double>() << " " << point->at(2).get<double>()
-             << "\n";
+    vertices += formatted("{:.17g} {:.17g} {:.17g}\n", point->at(0).get<double>(), point->at(1).get<double>(),
+                          point->at(2).get<double>());
   for (std::size_t i = 0; i < count; ++i)
     for (std::size_t k = i + 1; k < count; ++k)
-      for (std::size_t m = k + 1; m < count; ++m, ++faces) triangles << "3 " << i << " " << k << " " << m << "\n";
-  std::ostringstream text;
-  text << "ply\nformat ascii 1.0\nelement vertex " << count
-       << "\nproperty double x\nproperty double y\nproperty double z\nelement face " << faces
-       << "\nproperty list uchar int vertex_indices\nend_header\n"
-       << vertices.str() << triangles.str();
-  return text.str();
+      for (std::size_t m = k + 1; m < count; ++m, ++faces) triangles += formatted("3 {} {} {}\n", i, k, m);
+  return formatted(
+             "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n"
+             "element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+             count, faces) +
+         vertices + triangles;
 }
 
 /// The pose of landmarks, with the call that gave it.
@@ -114,8 +112,6 @@ json mirrored(json landmarks, const std::string& view, double width_px) {
   return landmarks;
 }
 
-std::string short_text(double value) { return formatted("{:.2g}", value); }
-
 /// A sentence about the view whose mirrored image fits best, if it fits at least five times as well as `residual_px`.
 std::vector<std::string> mirrored_view(const Workbench& workbench, const json& views, const json& landmarks,
                                        const std::string& fragment, double residual_px) {
@@ -135,8 +131,8 @@ std::vector<std::string> mirrored_view(const Workbench& workbench, const json& v
     }
   }
   if (best.empty()) return {};
-  return {"the image of '" + best + "' seems to be mirrored: the other way round, the landmarks fit to " +
-          short_text(least_px) + " px"};
+  return {formatted("the image of '{}' seems to be mirrored: the other way round, the landmarks fit to {:.2g} px", best,
+                    least_px)};
 }
 
 json fitted(const Workbench& workbench, const Request& request) {

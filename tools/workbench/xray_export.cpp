@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Seeds, landmarks, poses and cameras to files: marrow's own, and those of other programs, which a pipeline makes.
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/toolbox/exchange/written_files.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
@@ -112,8 +113,8 @@ PipelineCall call_for(const Workbench& workbench, const std::string& what, const
 const Value& only_item(const Value& value) {
   if (!value.is_list()) return value;
   if (value.items.size() == 1) return only_item(value.items.front());
-  throw Error("such a file holds one fragment, or one view; there are " + std::to_string(value.items.size()) +
-              ": choose one of them");
+  throw Error(
+      formatted("such a file holds one fragment, or one view; there are {}: choose one of them", value.items.size()));
 }
 
 json exported(const Workbench& workbench, const Request& request) {

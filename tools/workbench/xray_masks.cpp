@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/domain/calibration.hpp"
 #include "marrow/toolbox/files/samples_out.hpp"
@@ -69,8 +70,7 @@ std::string mask_of(int width_px, int height_px, const json& runs) {
     is_used = !is_used;
   }
   if (!runs.is_array() || mask.size() != count)
-    throw Error("the mask does not fill its image of " + std::to_string(width_px) + " x " + std::to_string(height_px) +
-                " pixels");
+    throw Error(formatted("the mask does not fill its image of {} x {} pixels", width_px, height_px));
   return mask;
 }
 

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/yaml.hpp"
 
@@ -24,14 +25,13 @@ YamlText::YamlText(std::string text) : text_(std::move(text)) {
   try {
     root_.reset(parse_yaml(text_, {.aliases = false}));
   } catch (const YAML::Exception& fault) {
-    throw Error("line " + std::to_string(fault.mark.line + 1) + ": " + printable(fault.msg) +
-                "; change it in the text");
+    throw Error(formatted("line {}: {}; change it in the text", fault.mark.line + 1, printable(fault.msg)));
   }
 }
 
 void YamlText::refuse(std::size_t at, const std::string& why) const {
-  throw Error("line " + std::to_string(1 + std::count(text_.begin(), text_.begin() + std::ptrdiff_t(at), '\n')) + ": " +
-              why + "; change it in the text");
+  throw Error(formatted("line {}: {}; change it in the text",
+                        1 + std::count(text_.begin(), text_.begin() + std::ptrdiff_t(at), '\n'), why));
 }
 
 std::size_t YamlText::line_begin(std::size_t at) const {

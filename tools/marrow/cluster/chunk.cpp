@@ -13,8 +13,10 @@
 #include "compare/cell_jobs.hpp"
 #include "compare/progress.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/remove_tree.hpp"
+#include "marrow/base/temporary_folder.hpp"
 #include "marrow/runtime/run/keys.hpp"
 #include "process.hpp"
 
@@ -30,26 +32,6 @@ struct ChunkRequest {
   std::string name;
   int jobs = 0;
   bool quiet = false;
-};
-
-/// A new folder on this host, removed at the end.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::string name = (fs::temp_directory_path() / "marrow-chunk-XXXXXX").string();
-    if (!mkdtemp(name.data())) throw Error("cannot make a folder in " + fs::temp_directory_path().string());
-    path_ = name;
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
 };
 
 struct Task {
@@ -97,7 +79,7 @@ void expect_same_cases(const Task& task, const std::set<std::size_t>& cases) {
 
 /// Runs the cells that have no row yet, and writes the rows of all. Returns false if it was stopped.
 bool make_rows(const Task& task, const Chunk& chunk) {
-  const ScratchFolder scratch;
+  const TemporaryFolder scratch(new_temporary_folder("chunk"));
   const Store store;
   compare::CellRunner runner(task.experiment, task.catalogue, task.request.no_cache ? nullptr : &store, scratch.path(),
                              task.request.threads, task.request.file_limits);
@@ -143,7 +125,7 @@ bool make_rows(const Task& task, const Chunk& chunk) {
 
 /// Makes cases before others need them. The file without rows says that this chunk is done.
 bool make_cases_only(const Task& task, const Chunk& chunk) {
-  const ScratchFolder scratch;
+  const TemporaryFolder scratch(new_temporary_folder("chunk"));
   const Store store;
   compare::CellRunner runner(task.experiment, task.catalogue, task.request.no_cache ? nullptr : &store, scratch.path(),
                              task.request.threads, task.request.file_limits);
@@ -170,8 +152,8 @@ bool do_chunk(const ClusterPlan& plan, const Chunk& chunk, bool is_of_cases, con
   if (!diagnostics.empty()) {
     print_faults(diagnostics);
     const Diagnostic first = diagnostics.sorted().front();
-    throw Error("the experiment has faults here; the first: " + first.place.file + ":" +
-                std::to_string(first.place.line) + ": " + first.message);
+    throw Error(formatted("the experiment has faults here; the first: {}:{}: {}", first.place.file, first.place.line,
+                          first.message));
   }
   expect_as_planned(plan, catalogue, experiment);
   Task task{plan, experiment, catalogue, request_of(plan, asked)};

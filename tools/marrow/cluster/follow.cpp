@@ -13,6 +13,7 @@
 #include "cluster/slurm.hpp"
 #include "compare/progress.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "process.hpp"
 
@@ -61,7 +62,7 @@ class Follower {
     submission_ = std::move(*submission);
     files_ = chunk_files(plan_.folder);
     const auto [chunks, cells] = made_of(plan_.cells, files_);
-    progress_.done(cells, std::to_string(chunks) + " chunks");
+    progress_.done(cells, formatted("{} chunks", chunks));
   }
 
   void check(const Queue& queue, const std::atomic<bool>& stop) {
@@ -93,9 +94,11 @@ class Follower {
       return;
     }
     if (now - answered_at_ > std::chrono::seconds(profile_.silence_s))
-      throw Error("the cluster has not answered for " + std::to_string(profile_.silence_s) + " s (" + queue.fault +
-                  "), so it is no longer waited for; its tasks may go on: see --status. What is done counts: " +
-                  "--gather makes tables and report of it, and the command without --on does the rest here");
+      throw Error(
+          formatted("the cluster has not answered for {} s ({}), so it is no longer waited for; its tasks may go on: "
+                    "see --status. What is done counts: --gather makes tables and report of it, and the command "
+                    "without --on does the rest here",
+                    profile_.silence_s, queue.fault));
     if (!is_silence_said_)
       std::fprintf(stderr, "marrow: the cluster does not answer (%s); it is asked again for %lld s\n",
                    printable(queue.fault).c_str(), static_cast<long long>(profile_.silence_s));
@@ -171,8 +174,7 @@ std::size_t cells_of_plan(const ClusterPlan& plan) {
 
 std::string progress_of(const ClusterPlan& plan) {
   const auto [chunks, cells] = made_of(plan.cells, chunk_files(plan.folder));
-  return std::to_string(cells) + " of " + std::to_string(cells_of_plan(plan)) + " cells in " + std::to_string(chunks) +
-         " of " + std::to_string(plan.cells.size()) + " chunks";
+  return formatted("{} of {} cells in {} of {} chunks", cells, cells_of_plan(plan), chunks, plan.cells.size());
 }
 
 int follow(const ClusterPlan& plan, const ClusterProfile& profile, bool quiet) {

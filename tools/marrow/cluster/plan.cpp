@@ -7,6 +7,7 @@
 #include "compare/cell_jobs.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/json_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/text_file.hpp"
 #include "marrow/runtime/process/worker.hpp"
 #include "marrow/runtime/run/keys.hpp"
@@ -77,10 +78,9 @@ std::string digest_of_text(const fs::path& file) { return hash_of(read_text_file
 
 /// "ID-cases-0007": as many digits as all need, so that names sort.
 void name_chunks(std::vector<Chunk>& chunks, const std::string& head) {
-  const std::size_t digits = std::to_string(chunks.size()).size();
+  const std::size_t digits = formatted("{}", chunks.size()).size();
   for (std::size_t i = 0; i < chunks.size(); ++i) {
-    const std::string number = std::to_string(i);
-    chunks[i].name = head + std::string(digits - std::min(digits, number.size()), '0') + number;
+    chunks[i].name = formatted("{}{:0{}}", head, i, digits);
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cluster/profile.hpp"
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/strict_yaml.hpp"
 
 namespace marrow::cli {
@@ -43,8 +44,7 @@ class ProfileReader {
     const auto value = yaml_.integer(entry.value, entry.place, "'" + entry.key + "'");
     if (value && *value >= least && *value <= most) return *value;
     if (value)
-      yaml_.fault(entry.place, "'" + entry.key + "' must be from " + std::to_string(least) + " to " +
-                                   std::to_string(most) + ", got " + std::to_string(*value));
+      yaml_.fault(entry.place, formatted("'{}' must be from {} to {}, got {}", entry.key, least, most, *value));
     return least;
   }
 

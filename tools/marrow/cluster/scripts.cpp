@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/text_file.hpp"
 #include "process.hpp"
 #include "report/report.hpp"
@@ -129,36 +130,17 @@ std::string emit_snakemake(const ClusterPlan& plan, const ClusterProfile& profil
   write_chunk_script(plan, profile);
   write_gather_script(plan);
   const std::string script = "plans/" + plan.id;
-  const std::string text =
-      "# Runs the chunks of a comparison by Snakemake, and makes the report. Cases are made first.\n" +
-      kStartOfSnakefile + "CASES = " + python_list(plan.cases) + "\nCHUNKS = " + python_list(plan.cells) +
-      "\n\n"
-      "localrules: gather\n\n"
-      "rule gather:\n"
-      "    input: [f\"rows/{chunk}.jsonl\" for chunk in CHUNKS]\n"
-      "    shell: \"" +
-      script +
-      "-gather.sh\"\n\n"
-      "rule chunk:\n"
-      "    input: lambda wildcards: [] if wildcards.chunk in CASES else [f\"rows/{one}.jsonl\" for one in CASES]\n"
-      "    output: \"rows/{chunk}.jsonl\"\n"
-      "    wildcard_constraints: chunk=\"" +
-      plan.id +
-      "-[a-z0-9-]+\"\n"
-      "    threads: " +
-      std::to_string(std::max<std::int64_t>(1, profile.processors)) +
-      "\n"
-      "    retries: " +
-      std::to_string(profile.tries - 1) +
-      "\n"
-      "    shell: \"" +
-      script +
-      "-chunk.sh {wildcards.chunk} --quiet --jobs {threads}\"\n\n"
-      "# If chunks failed, the rule gather does not run.\n"
-      "onerror:\n"
-      "    if not all(os.path.exists(f\"rows/{chunk}.jsonl\") for chunk in CHUNKS):\n"
-      "        shell(\"" +
-      script + "-gather.sh || true\")\n";
+  const std::string text = formatted(
+      "# Runs the chunks of a comparison by Snakemake, and makes the report. Cases are made first.\n{}CASES = "
+      "{}\nCHUNKS = {}\n\nlocalrules: gather\n\nrule gather:\n    input: [f\"rows/{{chunk}}.jsonl\" for chunk in "
+      "CHUNKS]\n    shell: \"{}-gather.sh\"\n\nrule chunk:\n    input: lambda wildcards: [] if wildcards.chunk in "
+      "CASES else [f\"rows/{{one}}.jsonl\" for one in CASES]\n    output: \"rows/{{chunk}}.jsonl\"\n    "
+      "wildcard_constraints: chunk=\"{}-[a-z0-9-]+\"\n    threads: {}\n    retries: {}\n    shell: \"{}-chunk.sh "
+      "{{wildcards.chunk}} --quiet --jobs {{threads}}\"\n\n# If chunks failed, the rule gather does not "
+      "run.\nonerror:\n    if not all(os.path.exists(f\"rows/{{chunk}}.jsonl\") for chunk in CHUNKS):\n        "
+      "shell(\"{}-gather.sh || true\")\n",
+      kStartOfSnakefile, python_list(plan.cases), python_list(plan.cells), script, plan.id,
+      std::max<std::int64_t>(1, profile.processors), profile.tries - 1, script, script);
   const fs::path file = beside(plan, "Snakefile");
   write_text_file(file, text);
   return "snakemake --snakefile " + shell_word(file.string()) + " --keep-going --cores all";

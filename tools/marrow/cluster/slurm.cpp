@@ -13,6 +13,7 @@
 #include "cluster/scripts.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/json_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
 #include "process.hpp"
@@ -35,7 +36,7 @@ std::string said_by(const std::vector<std::string>& command) {
   const ChildEnd end = run_child(
       command, [] { return false; }, Said::kept);
   if (end.code != 0)
-    throw Error(command[0] + " failed (exit code " + std::to_string(end.code) + "): " + without_end_of_line(end.said));
+    throw Error(formatted("{} failed (exit code {}): {}", command[0], end.code, without_end_of_line(end.said)));
   return end.said;
 }
 
@@ -84,9 +85,9 @@ std::vector<std::string> sbatch(const ClusterPlan& plan, const ClusterProfile& p
   };
   add("--partition", profile.partition);
   add("--account", profile.account);
-  add("--cpus-per-task", std::to_string(profile.processors));
-  add("--mem", std::to_string(profile.memory_mb));
-  add("--time", std::to_string(profile.minutes));
+  add("--cpus-per-task", formatted("{}", profile.processors));
+  add("--mem", formatted("{}", profile.memory_mb));
+  add("--time", formatted("{}", profile.minutes));
   add("--output", place_of_log(plan, is_array ? "%A_%a.txt" : "%j.txt"));
   command.insert(command.end(), profile.options.begin(), profile.options.end());
   return command;
@@ -118,12 +119,11 @@ class Submitter {
       const std::vector<Chunk> part(
           chunks.begin() + std::ptrdiff_t(begin),
           chunks.begin() + std::ptrdiff_t(std::min(chunks.size(), begin + std::size_t(profile_.most_tasks))));
-      const fs::path list =
-          plan_.folder / "plans" / (plan_.id + "-" + what + "-" + std::to_string(done_.arrays.size()) + ".txt");
+      const fs::path list = plan_.folder / "plans" / (formatted("{}-{}-{}.txt", plan_.id, what, done_.arrays.size()));
       write_list(list, part);
       std::vector<std::string> command = sbatch(plan_, profile_, true);
-      std::string range = "--array=0-" + std::to_string(part.size() - 1);
-      if (profile_.most_at_once) range += "%" + std::to_string(profile_.most_at_once);
+      std::string range = formatted("--array=0-{}", part.size() - 1);
+      if (profile_.most_at_once) range += formatted("%{}", profile_.most_at_once);
       command.push_back(range);
       add_dependency(command, after);
       command.insert(command.end(), {script_.string(), list.string()});
@@ -270,7 +270,7 @@ std::map<std::string, std::string> reasons_of(const ClusterPlan& plan, const Sub
   std::map<std::string, std::string> reasons;
   for (const Submission::Array& array : submission.arrays)
     for (std::size_t i = 0; i < array.chunks.size(); ++i) {
-      const std::string task = array.job + "_" + std::to_string(i), log = "log/" + task + ".txt";
+      const std::string task = formatted("{}_{}", array.job, i), log = "log/" + task + ".txt";
       const auto state = states.find(task);
       const std::string name = state == states.end() ? "UNKNOWN" : state->second;
       const std::string said =

@@ -36,8 +36,8 @@ std::string overview(const Experiment& experiment, const Answer& answer) {
   const NumberScale scale(seconds);
   for (std::size_t v = 0; v < answer.variants.size(); ++v) {
     const VariantSummary& summary = answer.variants[v];
-    table.add({experiment.variants[v].name + (v == experiment.baseline ? " *" : ""), std::to_string(summary.runs),
-               std::to_string(summary.failed), std::to_string(summary.incomplete),
+    table.add({experiment.variants[v].name + (v == experiment.baseline ? " *" : ""), formatted("{}", summary.runs),
+               formatted("{}", summary.failed), formatted("{}", summary.incomplete),
                summary.success ? success_text(*summary.success) : kNone,
                summary.seconds.count ? scale.text(summary.seconds.summary.median) : kNone,
                summary.evaluations.count ? formatted("{:.10g}", summary.evaluations.summary.median) : kNone});
@@ -74,9 +74,8 @@ std::string figure_table(const Experiment& experiment, const Answer& answer, std
     const VariantFigure& figure = answer.variants[v].figures[m];
     const auto text = [&](double value) { return figure.count ? scale.text(value) : kNone; };
     const compare::Summary& of = figure.summary;
-    table.add({experiment.variants[v].name, std::to_string(figure.count) + "/" + std::to_string(figure.of),
-               text(of.median), text(of.lower_quartile), text(of.upper_quartile), text(of.percentile_95),
-               text(of.worst),
+    table.add({experiment.variants[v].name, formatted("{}/{}", figure.count, figure.of), text(of.median),
+               text(of.lower_quartile), text(of.upper_quartile), text(of.percentile_95), text(of.worst),
                figure.median ? scale.text(figure.median->lower) + " to " + scale.text(figure.median->upper) : kNone});
   }
   const std::string title =
@@ -116,13 +115,11 @@ std::string capture_text(const Experiment& experiment, const Answer& answer) {
   });
   std::size_t unknown = 0;
   for (const VariantSummary& summary : answer.variants) unknown += summary.unknown_starts;
-  std::string text = "\nCapture range: success over " +
-                     printable(with_unit(experiment.initial_error, answer.initial_error_unit)) + ", in bins of " +
-                     formatted("{:g}", longest[0].to - longest[0].from) +
-                     (answer.initial_error_unit.empty() ? "" : " " + printable(answer.initial_error_unit)) +
-                     ", with 95 % intervals\n" + table.text();
-  if (unknown)
-    text += std::to_string(unknown) + " runs do not count here, because the error of their start is not known\n";
+  std::string text = formatted(
+      "\nCapture range: success over {}, in bins of {:g}{}, with 95 % intervals\n{}",
+      printable(with_unit(experiment.initial_error, answer.initial_error_unit)), longest[0].to - longest[0].from,
+      answer.initial_error_unit.empty() ? "" : " " + printable(answer.initial_error_unit), table.text());
+  if (unknown) text += formatted("{} runs do not count here, because the error of their start is not known\n", unknown);
   return text;
 }
 
@@ -133,7 +130,7 @@ std::string table_text(const Experiment& experiment, const Answer& answer) {
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) text += figure_table(experiment, answer, m);
   text += verdict_table(experiment, answer) + capture_text(experiment, answer) + "\n* the baseline";
   if (experiment.variants.size() > 1)
-    text += "; against it, with Holm's correction over all " + std::to_string(answer.findings.size()) + ":";
+    text += formatted("; against it, with Holm's correction over all {}:", answer.findings.size());
   text += "\n";
   for (const Finding& finding : answer.findings) text += "  " + printable(finding.sentence) + "\n";
   if (answer.look) {

@@ -26,10 +26,11 @@ PoolSettings pool_of(const CompareRequest& request, const fs::path& folder, int 
   };
   pool.command = {
       this_program().string(), "worker", fs::absolute(request.file).string(), "--out", folder.string(), "--threads",
-      std::to_string(threads)};
+      formatted("{}", threads)};
   if (request.no_cache) pool.command.push_back("--no-cache");
   if (!request.tuned.empty()) pool.command.insert(pool.command.end(), {"--tuned", request.tuned});
-  if (request.more_cases) pool.command.insert(pool.command.end(), {"--more-cases", std::to_string(request.more_cases)});
+  if (request.more_cases)
+    pool.command.insert(pool.command.end(), {"--more-cases", formatted("{}", request.more_cases)});
   for (const auto& [name, value] :
        {std::pair("--file-memory", request.file_limits.memory_mb), {"--file-seconds", request.file_limits.seconds}})
     if (value > 0) pool.command.insert(pool.command.end(), {name, exact_number(value)});

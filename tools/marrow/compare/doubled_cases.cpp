@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "compare/doubled_cases.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::cli {
 
@@ -19,10 +20,11 @@ std::string doubled_cases_text(const compare::Experiment& experiment, const comp
     if (!doubled++) example = "'" + known->second + "' and '" + experiment.cases[i].name + "'";
   }
   if (!doubled) return "";
-  return std::to_string(doubled) + (doubled > 1 ? " cases have" : " case has") +
-         " the same content as another one, such as " + example +
-         "; each counts as a case of its own, so intervals are too narrow and p too small: leave the copies out" +
-         (experiment.simulation.pipeline.empty() ? "" : ", or let the simulation take the seed (seed_input)");
+  return formatted(
+      "{}{} the same content as another one, such as {}; each counts as a case of its own, so intervals are too narrow "
+      "and p too small: leave the copies out{}",
+      doubled, doubled > 1 ? " cases have" : " case has", example,
+      experiment.simulation.pipeline.empty() ? "" : ", or let the simulation take the seed (seed_input)");
 }
 
 }  // namespace marrow::cli

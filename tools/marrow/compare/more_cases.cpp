@@ -4,6 +4,7 @@
 
 #include "compare/comparison.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 
 namespace marrow::cli {
@@ -18,8 +19,8 @@ std::vector<std::size_t> looks_within(const CompareRequest& request, const Exper
                 experiment.metrics[0].path + ", width: 0.05, most_cases: 300, look_every: 20}");
   const compare::StopRule& rule = *experiment.stop;
   if (request.more_cases < rule.look_every && rule.first_cases < rule.most_cases)
-    throw Error("--more-cases " + std::to_string(request.more_cases) + " is less than the " +
-                std::to_string(rule.look_every) + " cases from one look to the next; give at least as many");
+    throw Error(formatted("--more-cases {} is less than the {} cases from one look to the next; give at least as many",
+                          request.more_cases, rule.look_every));
   std::vector<std::size_t> looks = rule.looks();
   while (looks.back() > rule.first_cases + request.more_cases) looks.pop_back();
   return looks;
@@ -30,7 +31,7 @@ Experiment with_more(const Experiment& experiment, const Catalogue& catalogue, s
   Diagnostics diagnostics;
   Experiment larger = compare::read_experiment(experiment.file, catalogue, diagnostics, more);
   if (!diagnostics.empty())
-    throw Error("the experiment cannot have " + std::to_string(more) + " more cases:\n" + diagnostics.text());
+    throw Error(formatted("the experiment cannot have {} more cases:\n{}", more, diagnostics.text()));
   return larger;
 }
 

@@ -15,6 +15,7 @@
 #include "compare/times.hpp"
 #include "compare/unchanged.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/remove_tree.hpp"
 #include "process.hpp"
@@ -207,10 +208,10 @@ class Comparison {
     if (const std::string text = reasons_text(tried, &CellRow::absent); !text.empty())
       std::printf("\ncells in which a node failed that may fail\n%s", text.c_str());
     if (lost.empty()) return;
-    lost_text_ = std::to_string(lost.size()) + " of " + std::to_string(rows.size()) +
-                 " cells are lost: no task left a row of them, and they count as failed. The command that made the "
-                 "plan goes on with them.\n" +
-                 reasons_text(lost, &CellRow::failed);
+    lost_text_ = formatted(
+        "{} of {} cells are lost: no task left a row of them, and they count as failed. The command that made the plan "
+        "goes on with them.\n{}",
+        lost.size(), rows.size(), reasons_text(lost, &CellRow::failed));
   }
 
   /// The first of the rows that have a reason, one on each line.
@@ -220,7 +221,7 @@ class Comparison {
     for (const CellRow* row : rows)
       if (!(row->*reason).empty() && ++count <= kMostNamed)
         text += "  " + printable(row->id) + ": " + printable(row->*reason) + "\n";
-    if (count > kMostNamed) text += "  and " + std::to_string(count - kMostNamed) + " more, in cells.csv\n";
+    if (count > kMostNamed) text += formatted("  and {} more, in cells.csv\n", count - kMostNamed);
     return text;
   }
 

@@ -75,17 +75,16 @@ std::string csv(const Experiment& experiment, const std::vector<CellRow>& rows) 
   for (const compare::MetricChoice& metric : experiment.metrics) text += "," + field(metric.path);
   text += ",initial_error,seconds,evaluations,key\n";
   for (const CellRow& row : rows) {
-    text += field(row.id) + "," + field(row.variant) + "," + field(row.case_name) + "," + field(row.start) + "," +
-            (row.failed.empty() ? "done" : "failed") + "," + field(row.failed + row.absent) + "," +
-            (!experiment.defines_success() ? ""
-             : row.is_success(experiment)  ? "1"
-                                           : "0") +
-            "," + std::to_string(row.tries) + "," + (row.verdict ? name_of(*row.verdict) : "") + "," +
-            number_text(row.failure_probability);
+    text += formatted("{},{},{},{},{},{},{},{},{},{}", field(row.id), field(row.variant), field(row.case_name),
+                      field(row.start), row.failed.empty() ? "done" : "failed", field(row.failed + row.absent),
+                      !experiment.defines_success() ? ""
+                      : row.is_success(experiment)  ? "1"
+                                                    : "0",
+                      row.tries, row.verdict ? name_of(*row.verdict) : "", number_text(row.failure_probability));
     for (const std::string& value : values_of.at(row.variant)) text += "," + field(value);
     for (const auto& value : row.values) text += "," + number_text(value);
-    text += "," + number_text(row.initial_error) + "," + number_text(row.seconds) + "," +
-            std::to_string(row.evaluations) + "," + row.key + "\n";
+    text +=
+        formatted(",{},{},{},{}\n", number_text(row.initial_error), number_text(row.seconds), row.evaluations, row.key);
   }
   return text;
 }

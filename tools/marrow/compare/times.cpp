@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <thread>
 
+#include "marrow/base/number_text.hpp"
+
 namespace marrow::cli {
 namespace {
 
@@ -14,7 +16,7 @@ using CaseAndStart = std::pair<std::string, std::string>;
 bool is_done_without_a_failure(const CellRow& row) { return row.failed.empty() && row.absent.empty(); }
 
 std::string count_of_times(std::size_t count, const std::string& one, const std::string& more) {
-  return std::to_string(count) + " " + (count == 1 ? one : more);
+  return formatted("{} {}", count, count == 1 ? one : more);
 }
 
 }  // namespace

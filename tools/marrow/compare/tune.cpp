@@ -7,6 +7,7 @@
 #include "compare/figure_units.hpp"
 #include "compare/unchanged.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/domain/functions.hpp"
 #include "marrow/runtime/node/types.hpp"
@@ -116,9 +117,9 @@ class Tuner {
     }
     known_[values] = made_.points.size() - 1;
     const TuningPoint& point = made_.points.back();
-    say("point " + std::to_string(made_.points.size()) + " of at most " + std::to_string(rule_.points) + ", " +
-        values_text(rule_, values) + ": score " + score_text(made_, point) +
-        (made_.best ? "; best so far " + score_text(made_, made_.points[*made_.best]) : ""));
+    say(formatted("point {} of at most {}, {}: score {}{}", made_.points.size(), rule_.points,
+                  values_text(rule_, values), score_text(made_, point),
+                  made_.best ? "; best so far " + score_text(made_, made_.points[*made_.best]) : ""));
     return sign() * point.score;
   }
 

@@ -15,7 +15,6 @@ std::string text(double value) { return formatted("{:.4g}", value); }
 std::string text(const Tuning& tuning, double value) {
   return text(value) + (tuning.unit.empty() ? "" : " " + tuning.unit);
 }
-std::string text(std::size_t count) { return std::to_string(count); }
 
 json of(const TuningPoint& point) {
   json result{{"values", point.values}, {"score", point.score},   {"mean", point.mean ? json(*point.mean) : json()},
@@ -26,18 +25,18 @@ json of(const TuningPoint& point) {
 
 std::string runs_text(const Tuning& tuning, const TuningPoint& point) {
   if (!point.refused.empty()) return "refused by the pipeline";
-  if (!point.mean) return "no figure in any of " + text(point.runs) + " runs";
-  std::string result = "mean " + text(tuning, *point.mean) + " of " +
-                       (point.failed ? text(point.runs - point.failed) + " of " : "") + text(point.runs) + " runs";
-  if (point.failed) result += ", " + text(point.failed) + " failed or without the figure";
-  if (point.capped) result += ", " + text(point.capped) + " worse than " + text(tuning, tuning.rule.failed_as);
+  if (!point.mean) return formatted("no figure in any of {} runs", point.runs);
+  std::string result = formatted("mean {} of {}{} runs", text(tuning, *point.mean),
+                                 point.failed ? formatted("{} of ", point.runs - point.failed) : "", point.runs);
+  if (point.failed) result += formatted(", {} failed or without the figure", point.failed);
+  if (point.capped) result += formatted(", {} worse than {}", point.capped, text(tuning, tuning.rule.failed_as));
   return result;
 }
 
 std::string refused_text(const Tuning& tuning) {
   const auto refused = std::count_if(tuning.points.begin(), tuning.points.end(),
                                      [](const auto& point) { return !point.refused.empty(); });
-  return refused ? ", " + text(std::size_t(refused)) + " of them refused by the pipeline" : "";
+  return refused ? formatted(", {} of them refused by the pipeline", std::size_t(refused)) : "";
 }
 
 }  // namespace
@@ -72,12 +71,13 @@ bool Tuning::is_better() const { return best && is_better_score(points[*best].sc
 std::string values_text(const compare::TuneRule& rule, const std::vector<double>& values) {
   std::string result;
   for (std::size_t o = 0; o < values.size(); ++o)
-    result += (o ? ", " : "") + rule.options[o].key + " " + text(values[o]);
+    result += formatted("{}{} {:.4g}", o ? ", " : "", rule.options[o].key, values[o]);
   return result;
 }
 
 std::string score_rule(const Tuning& tuning) {
-  return "mean " + tuning.figure + " with failed and worse runs counted as " + text(tuning, tuning.rule.failed_as);
+  return formatted("mean {} with failed and worse runs counted as {}", tuning.figure,
+                   text(tuning, tuning.rule.failed_as));
 }
 
 std::string score_text(const Tuning& tuning, const TuningPoint& point) {
@@ -85,10 +85,10 @@ std::string score_text(const Tuning& tuning, const TuningPoint& point) {
 }
 
 std::string sentence(const Tuning& tuning) {
-  const std::string start = "tuned on " + text(tuning.rule.training_cases) + " cases by " + tuning.rule.optimizer +
-                            ", " + text(tuning.points.size()) + " points" + refused_text(tuning) +
-                            "; score: " + score_rule(tuning) + "; " + tuning.variant + ": " +
-                            score_text(tuning, tuning.untuned) + "; ";
+  const std::string start =
+      formatted("tuned on {} cases by {}, {} points{}; score: {}; {}: {}; ", tuning.rule.training_cases,
+                tuning.rule.optimizer, tuning.points.size(), refused_text(tuning), score_rule(tuning), tuning.variant,
+                score_text(tuning, tuning.untuned));
   if (!tuning.best)
     return start + "no point is better than failed runs, so none is compared on the cases that are held out";
   const TuningPoint& best = tuning.points[*tuning.best];

@@ -2,6 +2,7 @@
 #include "compare/unchanged.hpp"
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/text_file.hpp"
 
 namespace marrow::cli {
@@ -19,7 +20,7 @@ namespace fs = std::filesystem;
 std::map<std::string, std::string> cases_of(const compare::Experiment& experiment) {
   std::map<std::string, std::string> cases;
   for (const compare::ExperimentCase& one : experiment.cases)
-    cases[one.name] = one.folder.string() + " " + std::to_string(one.seed);
+    cases[one.name] = formatted("{} {}", one.folder.string(), one.seed);
   return cases;
 }
 

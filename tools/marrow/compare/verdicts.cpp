@@ -3,6 +3,7 @@
 #include "compare/comparison.hpp"
 #include "compare/figure_text.hpp"
 #include "compare/text_table.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace marrow::cli {
 
@@ -37,9 +38,9 @@ std::string verdict_table(const compare::Experiment& experiment, const Answer& a
   table.add({"", "cells", "silent failures", "caught", "false alarms"});
   for (std::size_t v = 0; v < answer.variants.size(); ++v) {
     const VerdictCounts& counts = answer.variants[v].verdicts;
-    table.add({experiment.variants[v].name, std::to_string(counts.cells),
+    table.add({experiment.variants[v].name, formatted("{}", counts.cells),
                rate_text(counts.silent, counts.misses, counts.silent_rate, 1),
-               experiment.defines_success() ? std::to_string(counts.caught()) : "-",
+               experiment.defines_success() ? formatted("{}", counts.caught()) : "-",
                rate_text(counts.false_alarms, counts.successes, counts.false_alarm_rate, 1)});
   }
   return "\nVerdicts: misses that are trusted, of all misses; successes that are not, of all successes\n" +

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // marrow conformance: runs the suite of a node's kind in a worker process. So if a node crashes or hangs, only this
 // check fails.
-#include <stdlib.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
@@ -14,8 +12,10 @@
 
 #include "command_options.hpp"
 #include "commands.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/reason_of_exception.hpp"
+#include "marrow/base/temporary_folder.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/process/worker.hpp"
 #include "process.hpp"
@@ -87,32 +87,10 @@ std::string measured(const Catalogue& catalogue, const NodeDefinition& node, con
   }
 }
 
-/// A folder for files that checks write. Its name is unpredictable, so nobody can have put files there before, and only
-/// this user can access it. It is removed here and not by a worker, because a worker may crash or be killed.
-class FilesFolder {
- public:
-  FilesFolder() : path_((std::filesystem::temp_directory_path() / "marrow-conformance-XXXXXX").string()) {
-    if (!mkdtemp(path_.data()))
-      throw Error("cannot make a folder for the files that checks need in " +
-                  std::filesystem::path(path_).parent_path().string() + ": " + std::strerror(errno) +
-                  "; name another one in TMPDIR");
-  }
-  ~FilesFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  FilesFolder(const FilesFolder&) = delete;
-  FilesFolder& operator=(const FilesFolder&) = delete;
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
-
 /// Runs the checks of one node, one after the other, in a worker.
 class Checks {
  public:
-  Checks(std::string node, json makers, const FilesFolder& files, const std::atomic<bool>& stopped)
+  Checks(std::string node, json makers, const TemporaryFolder& files, const std::atomic<bool>& stopped)
       : node_(std::move(node)), makers_(std::move(makers)), files_(files), stopped_(stopped) {}
 
   Outcome run(std::size_t number) {
@@ -120,7 +98,7 @@ class Checks {
     WorkerEnd end = ask(number);
     // An earlier check may have damaged the process. So this check is tried again in a new process.
     if (end.died && !end.is_late && !was_fresh) end = ask(number);
-    if (end.is_late) return {'-', "it took longer than " + std::to_string(time_limit_s()) + " s"};
+    if (end.is_late) return {'-', formatted("it took longer than {} s", time_limit_s())};
     if (end.signal == SIGKILL) return {'-', "its process " + end.failed};
     if (end.signal) return {'-', std::string("it crashed: ") + strsignal(end.signal)};
     if (!end.failed.empty()) return {'-', end.failed};
@@ -131,7 +109,8 @@ class Checks {
  private:
   WorkerEnd ask(std::size_t number) {
     if (!worker_)
-      worker_ = std::make_unique<Worker>(WorkerSettings{{this_program().string(), "check-worker", files_.path()}});
+      worker_ =
+          std::make_unique<Worker>(WorkerSettings{{this_program().string(), "check-worker", files_.path().string()}});
     worker_->ask({{"do", "check"}, {"node", node_}, {"in", makers_}, {"check", number}});
     const WorkerEnd end = worker_->wait({double(time_limit_s()), kMemory_mb}, &stopped_, nullptr);
     if (stopped_.load()) throw Cancelled();  // Ctrl-C in a terminal ends the worker too
@@ -141,7 +120,7 @@ class Checks {
 
   std::string node_;
   json makers_;  ///< for inputs that the kind does not have: names of nodes, by port
-  const FilesFolder& files_;
+  const TemporaryFolder& files_;
   const std::atomic<bool>& stopped_;
   std::unique_ptr<Worker> worker_;
 };
@@ -240,7 +219,7 @@ int run_conformance(const ConformanceRequest& request) try {
   for (const std::string& subject : subjects)
     for (const std::string& node : nodes_of(catalogue, subject)) nodes.push_back(node);
   expect_known(wanted, catalogue, nodes);
-  const FilesFolder files;
+  const TemporaryFolder files(new_temporary_folder("conformance"));
   std::map<char, int> count;
   for (const std::string& node : nodes) {
     if (const std::vector<CheckInfo> all = checks_for(node, catalogue); !all.empty()) {

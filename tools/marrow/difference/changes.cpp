@@ -2,10 +2,10 @@
 #include "difference/changes.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <set>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/runtime/run/keys.hpp"
 
 namespace marrow::cli {
@@ -24,11 +24,8 @@ std::string shortened(const std::string& text) {
     }
     return "[" + result + "]";
   }
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return text;
-  char shortest[32];
-  return std::string(shortest, std::to_chars(shortest, shortest + sizeof shortest, value).ptr);
+  const std::optional<double> value = parsed_number(text);
+  return value ? shortest_number(*value) : text;
 }
 
 std::string is_was(const std::string& what, const std::string* before, const std::string* now) {
@@ -256,7 +253,7 @@ class Comparer {
   }
 
   Change seed_change(const std::string& node, const std::string& text) const {
-    const std::string before = std::to_string(before_.seed), now = std::to_string(now_.seed);
+    const std::string before = formatted("{}", before_.seed), now = formatted("{}", now_.seed);
     return {"seed", node, "", before, now, text + now + ", was " + before};
   }
 
@@ -326,8 +323,7 @@ class Comparer {
     if (before_.cpu_level != now_.cpu_level)
       change.text += "; the processor is of another level (" + now_.cpu_level + ", was " + before_.cpu_level + ")";
     if (before_.threads != now_.threads)
-      change.text +=
-          "; it ran on " + std::to_string(now_.threads) + " threads, ran on " + std::to_string(before_.threads);
+      change.text += formatted("; it ran on {} threads, ran on {}", now_.threads, before_.threads);
     return change;
   }
 

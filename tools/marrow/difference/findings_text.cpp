@@ -5,6 +5,7 @@
 #include <set>
 
 #include "difference/findings.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 
 namespace marrow::cli {
@@ -168,7 +169,7 @@ bool has_unknown_amount(const std::vector<OutputDifference>& outputs) {
 
 void print(const Findings& findings) {
   const RunDifference& difference = findings.difference;
-  const std::string nodes = std::to_string(difference.same) + " node" + (difference.same == 1 ? "" : "s");
+  const std::string nodes = counted(difference.same, "node");
   std::printf("first run (was): %s\nsecond run (is): %s\n\n", printable(findings.before.folder.string()).c_str(),
               printable(findings.now.folder.string()).c_str());
   if (findings.identical()) {

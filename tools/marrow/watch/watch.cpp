@@ -10,6 +10,7 @@
 #include "commands.hpp"
 #include "given_path.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "process.hpp"
 #include "watch/child.hpp"
@@ -33,7 +34,7 @@ struct WatchRequest {
 
 /// What a program that failed printed, with what it was to do.
 std::string shown_fault(const std::string& what, const ChildEnd& end) {
-  return what + " (exit code " + std::to_string(end.code) + ")\n\n" + printable_lines(end.said);
+  return formatted("{} (exit code {})\n\n{}", what, end.code, printable_lines(end.said));
 }
 
 class Watch {
@@ -139,7 +140,7 @@ class Watch {
   void run_once() {
     if (restart_) return;
     note_files();
-    const fs::path run = folder_ / ("run-" + std::to_string(last_ + 1));
+    const fs::path run = folder_ / (formatted("run-{}", last_ + 1));
     tell("running " + printable(request_.pipeline.file.string()));
     std::vector<std::string> command{this_program().string(), "run", request_.pipeline.file.string()};
     command.insert(command.end(), request_.pipeline.inputs.begin(), request_.pipeline.inputs.end());
