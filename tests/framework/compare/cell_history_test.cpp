@@ -6,6 +6,7 @@
 #include <numbers>
 #include <set>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/compare/cell.hpp"
 #include "marrow/compare/draw.hpp"
 
@@ -156,7 +157,7 @@ TEST(Draw, InputsAreUniformInTheirRanges) {
   random.uniform();
   EXPECT_EQ(values[1].value, "5");
   EXPECT_NEAR(std::stod(values[2].value), 100 + random.uniform(), 1e-3);
-  EXPECT_EQ(short_number(0.1 + 0.2, 6), "0.3");
+  EXPECT_EQ(marrow::short_number(0.1 + 0.2, 6), "0.3");
 }
 
 }  // namespace cell_history_test

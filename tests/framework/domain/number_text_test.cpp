@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <limits>
 
@@ -37,7 +38,7 @@ TEST(NumberText, IsThatOfPrintf) {
     EXPECT_EQ(formatted("{:.17g}", value), printed("%.17g", value));
     EXPECT_EQ(formatted("{:f}", value), printed("%f", value));
     EXPECT_EQ(formatted("{:.3e}", value), printed("%.3e", value));
-    if (std::isfinite(value)) EXPECT_EQ(formatted("{:+09.2f}|", value), printed("%+09.2f|", value));
+    EXPECT_EQ(formatted("{:+09.2f}|", value), printed("%+09.2f|", value));
   }
   EXPECT_EQ(formatted("{}: {} of {}", "a", 3, std::size_t(4)), "a: 3 of 4");
   EXPECT_EQ(formatted("{}", std::string(5000, 'x').c_str()), std::string(5000, 'x'));

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Numbers become texts in one place, marrow/base/number_text.hpp, which is the same in every locale."""
+import pathlib
+import re
+import sys
+import unittest
+
+SOURCE = pathlib.Path(sys.argv[1])
+OWN_WAYS = re.compile(r"std::to_string\(|snprintf\(|\bostringstream\b|std::to_chars\(|std::setprecision\(")
+MAY = {
+    "framework/marrow/base/number_text.cpp": "the one place",
+    "plugins/toolbox/files/jpeg_baseline.cpp": "no text with a destructor may live between setjmp and longjmp",
+}
+
+
+class NumberTexts(unittest.TestCase):
+    def test_no_file_has_its_own_way(self):
+        found = set()
+        for room in ("framework", "plugins", "tools", "python"):
+            for path in (SOURCE / room).rglob("*.[ch]pp"):
+                if OWN_WAYS.search(path.read_text()):
+                    found.add(str(path.relative_to(SOURCE)))
+        self.assertEqual(found, set(MAY), "use formatted(), short_number() or exact_number() of number_text.hpp")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
