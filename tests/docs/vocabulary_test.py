@@ -9,11 +9,11 @@ import sys
 import tempfile
 import unittest
 
-SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
+from harness import BUILD, MARROW, SOURCE
+
 sys.path.insert(0, str(SOURCE / "tools" / "site"))
 import catalogue  # noqa: E402
 
-MARROW = BUILD / "bin" / "marrow"
 ONE = re.compile(r"`(\w+)` \(([^),]+)(?:, ([^)]+))?\)")  # a name with its type, and its unit if it has one
 
 
@@ -96,19 +96,17 @@ class Vocabulary(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         file = pathlib.Path(folder.name) / "old.yaml"
         for since, of, old, now in lines:
-            users = [
-                (name, part)
-                for name, node in self.nodes.items()
-                for part in ("options", "inputs", "outputs")
-                if (name + ".").startswith(of + ".") and has(node, part, now) and not has(node, part, old)
-            ]
-            self.assertTrue(users, (of, now))
-            name, part = users[0]
-            given = {"options": "with: {%s: 1}" % old, "inputs": "in: {%s: a}" % old, "outputs": ""}[part]
-            file.write_text("marrow: 1\nnodes:\n  a: {uses: %s, %s}\noutputs: {x: a.%s}\n" % (name, given, old))
-            said = subprocess.run([MARROW, "check", file], capture_output=True, text=True)
-            self.assertIn("'%s' is called '%s' since %s" % (old, now, since), said.stdout + said.stderr, (name, part))
+            said = ""
+            for name, node in self.nodes.items():
+                for part, given in (("options", "with: {%s: 1}"), ("inputs", "in: {%s: a}"), ("outputs", "")):
+                    if (name + ".").startswith(of + ".") and has(node, part, now) and not has(node, part, old):
+                        given = given and ", " + given % old
+                        file.write_text(
+                            "marrow: 1\nnodes:\n  a: {uses: %s%s}\noutputs: {x: a.%s}\n" % (name, given, old)
+                        )
+                        said += subprocess.run([MARROW, "check", file], capture_output=True, text=True).stderr
+            self.assertIn("'%s' is called '%s' since %s" % (old, now, since), said)
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])
+    unittest.main()

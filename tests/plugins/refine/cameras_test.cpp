@@ -205,7 +205,7 @@ TEST(RefineCameras, SaysWhatIsWrong) {
       "the cost of 'distal' cannot be split into views: it compares no views, or it holds more than them, such as "
       "a prior; give the cost of the images alone");
   EXPECT_EQ(shipped::refusal("refine.cameras", inputs({bone}), {{"reference_view", std::string("frontl")}}),
-            "reference: there is no view 'frontl'; did you mean 'frontal'?");
+            "reference_view: there is no view 'frontl'; did you mean 'frontal'?");
   Bone negative = bone;
   negative.pose.covariance = marrow::Matrix6d(-marrow::Matrix6d::Identity());
   EXPECT_EQ(shipped::refusal("refine.cameras", inputs({negative})),
