@@ -106,7 +106,7 @@ void doubt(const LockingOptions& options, int seen, LockingPlan::Drill& drill) {
   if (!(drill.most_mm <= options.max_offset_mm) && !std::isnan(drill.most_mm))
     drill.doubts.push_back(formatted("the place of the hole is known to {:.2f} mm only (95 %), and the limit is {:.2f}",
                                      drill.most_mm, options.max_offset_mm));
-  if (seen < 2) drill.doubts.push_back(seen == 0 ? "no view shows the hole" : "only one view shows the hole");
+  if (seen < 2) drill.doubts.push_back(formatted("{} shows the hole", seen == 0 ? "no view" : "only one view"));
 }
 
 /// The direction in the world from which the drill comes: from the outer side, a little from the front.

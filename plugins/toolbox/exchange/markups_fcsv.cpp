@@ -69,8 +69,7 @@ double coordinate(const std::string& text, const Line& line) {
 
 /// What the comments at the beginning say.
 struct Header {
-  bool has_version = false;
-  std::optional<bool> is_ras;
+  bool has_version = false, has_axes = false, is_ras = false;
   std::size_t x = 1, label = 11, columns = 14;
   std::vector<std::size_t> of_flags{8, 9, 10};          ///< vis, sel and lock, which are 0 or 1
   std::vector<std::size_t> of_orientation{4, 5, 6, 7};  ///< ow, ox, oy, oz: an angle and an axis, or a quaternion
@@ -84,6 +83,7 @@ struct Header {
       const std::string system = value->substr(0, value->find(','));  // tables fill lines up with commas
       if (system != "LPS" && system != "RAS" && system != "0" && system != "1")
         line.refuse("expected the coordinate system LPS or RAS (also 1 or 0), got " + in_quotes(*value));
+      has_axes = true;
       is_ras = system == "RAS" || system == "0";
     } else if (const auto names = said(text, "columns")) {
       const std::vector<std::string> cells = cells_of(*names, line);
@@ -161,7 +161,7 @@ std::optional<MarkedPoint> point_of(const std::string& text, const Header& heade
   if (status && *status != kPlaced) return std::nullopt;
   Eigen::Vector3d at_mm;
   for (int i = 0; i < 3; ++i) at_mm[i] = coordinate(cells[header.x + std::size_t(i)], line);
-  return MarkedPoint{cells[header.label], in_lps(at_mm, header.is_ras.value())};
+  return MarkedPoint{cells[header.label], in_lps(at_mm, header.is_ras)};
 }
 
 /// In small or capital letters.
@@ -196,7 +196,7 @@ std::vector<MarkedPoint> read_markups_fcsv(const std::filesystem::path& path) {
       continue;
     }
     if (!header.has_version) line.refuse("expected 3D Slicer's '# Markups fiducial file version = ' first");
-    if (!header.is_ras)
+    if (!header.has_axes)
       line.refuse("no line '# CoordinateSystem = ' came before; add it, with LPS or RAS after the sign");
     if (auto point = point_of(text, header, line)) points.push_back(std::move(*point));
   }
