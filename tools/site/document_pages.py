@@ -29,7 +29,7 @@ GROUPS = {
         "guidance",
     ],
     "Method": ["method", "results"],
-    "Development": ["plugins", "architecture", "testing", "site"],
+    "Development": ["plugins", "plugin-host", "architecture", "testing", "site"],
 }
 # A page of these is in the navigation if it has been written. python/index is for a reference of a Python module.
 REFERENCE = ["kinds/index", "commands/index", "keys/index", "pipelines/index", "cpp/index", "python/index"]

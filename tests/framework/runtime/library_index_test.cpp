@@ -3,6 +3,7 @@
 // longer.
 #include "marrow/runtime/plugins/library_index.hpp"
 
+#include <fcntl.h>
 #include <sys/stat.h>
 
 #include <chrono>
@@ -10,7 +11,7 @@
 #include <thread>
 
 #include "marrow/runtime/plugins/manifest.hpp"
-#include "runtime/library_fixture.hpp"
+#include "tests/framework/runtime/library_fixture.hpp"
 
 namespace library_index_test {
 
@@ -99,6 +100,7 @@ TEST_F(LibraryIndexTest, LinkedLibrariesAndSearchedFoldersCount) {
       fs::copy_file(linked / "libs1" / one, folder(name) / "libs" / one);
     fs::copy_file(linked / "linked.so", folder(name) / "linked.so");
     files.push_back(folder(name) / "linked.so");
+    marrow::write_manifest(marrow::describe_library(files.back()));
   }
   if (!are_kept(files)) GTEST_SKIP() << kNotKept;
   fs::copy_file(linked / "libs2" / "libtest_deep.so", folder("other") / "libs" / "libtest_deep.so",

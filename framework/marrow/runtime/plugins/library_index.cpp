@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <ctime>
 
 #include "marrow/base/file_state.hpp"
@@ -98,7 +99,8 @@ bool LibraryIndex::is_current(const IndexedLibrary& library) {
     if (is_new) known->second = is_still_trusted({{folder}, {}});
     if (!known->second) return false;
   }
-  return is_still_trusted({{}, {library.groups.begin(), library.groups.end()}}) &&
+  if (!is_still_trusted({{}, {library.groups.begin(), library.groups.end()}})) return false;
+  return !std::getenv("LD_LIBRARY_PATH") ||
          std::all_of(library.info.linked.begin(), library.info.linked.end(),
                      [](const LinkedLibrary& linked) { return found_before(linked).empty(); });
 }

@@ -163,7 +163,6 @@ std::string found_before(const LinkedLibrary& library) {
   static std::mutex mutex;
   static Found found;
   const std::string search_path = variable("LD_LIBRARY_PATH");
-  if (search_path.empty()) return "";
   const std::scoped_lock lock(mutex);
   if (found.search_path != search_path) {
     found = {search_path, {}};
