@@ -17,8 +17,7 @@ import sys
 import tempfile
 import time
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "tools" / "report"))
-import browser  # noqa: E402
+from harness import browser
 
 PIPELINE = """marrow: 1
 nodes:

@@ -6,7 +6,6 @@ import os
 import re
 import shlex
 import shutil
-import sys
 import unittest
 
 import yaml
@@ -242,4 +241,4 @@ def declaration_of(text):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1], verbosity=2)
+    unittest.main(verbosity=2)

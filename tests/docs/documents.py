@@ -9,16 +9,14 @@ import sys
 import tempfile
 import unittest
 
-SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
-sys.path[:0] = [str(SOURCE / "tools" / "site"), str(SOURCE / "tests")]
-import blocks  # noqa: E402
-import compiler_cache  # noqa: E402
-import document_pages  # noqa: E402
-from sample import ALL, sample  # noqa: E402, F401
+from harness import BUILD, MARROW, SOURCE
 
-MARROW = BUILD / "bin" / "marrow"
-compiler_cache.use(BUILD)
-IS_SANITIZED = any(name in MARROW.read_bytes() for name in (b"libasan.so", b"libtsan.so"))
+sys.path.insert(0, str(SOURCE / "tools" / "site"))
+import blocks  # noqa: E402
+import document_pages  # noqa: E402
+from harness.program import IS_SANITIZED  # noqa: F401
+from harness.sample import ALL, sample  # noqa: F401
+
 NOT_RUN = re.compile(r"<!-- not run: (.*) -->")
 
 

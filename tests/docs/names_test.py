@@ -7,7 +7,8 @@ import sys
 import tempfile
 import unittest
 
-SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
+from harness import BUILD, SOURCE
+
 sys.path.insert(0, str(SOURCE / "tools" / "site"))
 import catalogue  # noqa: E402
 import document_pages  # noqa: E402
@@ -70,4 +71,4 @@ class Names(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1], verbosity=2)
+    unittest.main(verbosity=2)

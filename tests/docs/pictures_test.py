@@ -9,12 +9,11 @@ import sys
 import tempfile
 import unittest
 
-SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
+from harness import MARROW, SOURCE
+
 sys.path.insert(0, str(SOURCE / "tools" / "site"))
 import catalogue  # noqa: E402
 import pictures  # noqa: E402
-
-MARROW = BUILD / "bin" / "marrow"
 
 
 class Pictures(unittest.TestCase):
@@ -59,4 +58,4 @@ class Pictures(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1], verbosity=2)
+    unittest.main(verbosity=2)

@@ -11,8 +11,8 @@ import tempfile
 import unittest
 import zlib
 
-SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
-MARROW = BUILD / "bin" / "marrow"
+from harness import BUILD, MARROW, SOURCE
+
 LINK = re.compile(r'<(?:a|img|link|script)\b[^>]*?\b(?:href|src)="([^"#]*)(?:#([^"]*))?"')
 ID = re.compile(r'\bid="([^"]+)"')
 MISSING_PACKAGES = 77
@@ -182,4 +182,4 @@ if __name__ == "__main__":
     if not has_packages():
         print("skipped: the site needs the packages python3-sphinx, python3-myst-parser and furo")
         sys.exit(MISSING_PACKAGES)
-    unittest.main(argv=sys.argv[:1], verbosity=2)
+    unittest.main(verbosity=2)

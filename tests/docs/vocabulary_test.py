@@ -9,7 +9,7 @@ import sys
 import tempfile
 import unittest
 
-from harness import BUILD, MARROW, SOURCE
+from harness import MARROW, SOURCE
 
 sys.path.insert(0, str(SOURCE / "tools" / "site"))
 import catalogue  # noqa: E402

@@ -13,9 +13,8 @@ import sys
 import time
 import unittest
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "tools" / "marrow"))
-from harness import SKIPPED, arguments_parser, program_of, sample
-from processes import has_processes
+from starting import SKIPPED, arguments_parser, program_of, sample
+from harness.processes import has_processes
 from subjects import Compare, Run, bytes_below
 
 USER = 50000 + 2 * (os.getpid() % 5000)  # of no account and no other process, nor of this program elsewhere

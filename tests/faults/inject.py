@@ -12,7 +12,7 @@ import struct
 import subprocess
 import sys
 
-from harness import ALL, arguments_parser, conclude, program_of
+from starting import ALL, arguments_parser, conclude, program_of
 from subjects import SENTENCE, Collect, Compare, Run
 
 CALLS = [

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 
-from harness import ALL, arguments_parser, conclude, program_of
+from starting import ALL, arguments_parser, conclude, program_of
 from subjects import SENTENCE, Collect, Compare, Run
 
 Pair = collections.namedtuple("Pair", "number kind gap_s")

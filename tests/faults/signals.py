@@ -16,7 +16,7 @@ import sys
 import time
 import uuid
 
-from harness import ALL, arguments_parser, conclude, program_of
+from starting import ALL, arguments_parser, conclude, program_of
 from subjects import SENTENCE, Compare, Run
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

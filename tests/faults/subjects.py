@@ -4,7 +4,6 @@ left."""
 import csv
 import json
 import os
-import pathlib
 import re
 import shutil
 import struct

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a call gave, as a text that changes with it. Functions are asked for values."""
 import numpy
-from package import marrow
+from harness.package import marrow
 
 _OFFSETS = ([0, 0, 0], [2, 0, 0], [0, 3, 0], [0, 0, 2], [1, -2, 4])
 

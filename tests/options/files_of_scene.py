@@ -2,7 +2,7 @@
 """Files for the nodes that read some, written by a pipeline."""
 import pathlib
 
-from package import SCRATCH, SOURCE, marrow
+from harness.package import SCRATCH, SOURCE, marrow
 
 PIPELINE = """marrow: 1
 nodes:

@@ -1,21 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each option of each node changes an output, or is refused, or is listed with the reason why it does neither."""
 import keyword
-import pathlib
-import sys
 import time
 import unittest
 
-TESTS = pathlib.Path(__file__).resolve().parent.parent
-sys.path += [str(TESTS), str(TESTS / "python")]
 import calls_of_bones  # noqa: E402
 import calls_of_files  # noqa: E402
 import calls_of_simulation  # noqa: E402
 from alternatives import alternatives  # noqa: E402
 from digests import digest_of  # noqa: E402
 from no_effect import NO_EFFECT  # noqa: E402
-from package import main, marrow  # noqa: E402
-from sample import sample  # noqa: E402
+from harness.package import main, marrow
+from harness.sample import sample
 from scene import Scene  # noqa: E402
 from tries import TRIES  # noqa: E402
 from untried import UNTRIED  # noqa: E402

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small inputs for every node, made by nodes. Each is made when it is first asked for."""
 import functools
-import pathlib
 
 import numpy
-from package import SCRATCH, SOURCE, marrow
+from harness.package import SCRATCH, SOURCE, marrow
 
 
 SHORT_SEARCH = {"candidates": 1, "scan_rotation_deg": 3, "scan_translation_mm": 3}

@@ -3,7 +3,7 @@
 import gc
 
 import numpy
-from package import FEMUR, Case, main, marrow, small_case
+from harness.package import FEMUR, Case, main, marrow, small_case
 
 
 def address(array):

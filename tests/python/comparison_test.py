@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tables of a comparison in Python have the numbers of comparison.json, and None for what is not known."""
-from package import main, marrow  # it finds the modules below
-from given_cases import GivenCase
+from harness.package import main, marrow  # it finds the modules below
+from harness.given_cases import GivenCase
 
 
 class Tables(GivenCase):

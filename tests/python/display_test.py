@@ -7,7 +7,7 @@ import struct
 import zlib
 
 import numpy
-from package import FEMUR, Case, main, marrow, small_case
+from harness.package import FEMUR, Case, main, marrow, small_case
 from marrow.display import MOST_TRIANGLES, coarser, grey, png
 
 

@@ -10,7 +10,7 @@ import re
 import shutil
 
 import numpy
-from package import BUILD, SOURCE, Case, main, marrow, small_case
+from harness.package import BUILD, SOURCE, Case, main, marrow, small_case
 
 # What makes the cases of the demonstration quick.
 COARSE = "    set: {ct.spacing_mm: [1.2, 1.2, 1.5], ct.range_mm: [0, 300]}\n"

@@ -4,7 +4,7 @@ import os
 import shutil
 
 import yaml
-from package import FEMUR, Case, main, marrow, small_case
+from harness.package import FEMUR, Case, main, marrow, small_case
 
 FAULTY = """marrow: 1
 nodes:

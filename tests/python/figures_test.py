@@ -2,7 +2,7 @@
 """The names of figures that a node declares, in C++ or in Python."""
 import json
 
-from package import main, marrow
+from harness.package import main, marrow
 from written_nodes import Written, view
 
 MEASURES = """

@@ -7,7 +7,7 @@ import re
 import typing
 
 import numpy
-from package import marrow
+from harness.package import marrow
 
 
 def module(name):

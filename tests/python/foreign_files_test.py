@@ -10,7 +10,7 @@ import foreign_found
 import foreign_vtk
 import foreign_written
 from foreign_files import row_of
-from package import Case, main
+from harness.package import Case, main
 
 SOURCES = (
     foreign_found.of_pydicom,

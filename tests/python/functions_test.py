@@ -7,7 +7,7 @@ import threading
 import time
 
 import numpy
-from package import main, marrow, small_case
+from harness.package import main, marrow, small_case
 from written_nodes import Written, view
 
 SLOW = """import time

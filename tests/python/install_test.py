@@ -5,7 +5,7 @@ import pathlib
 import subprocess
 import sys
 
-from package import BUILD, SOURCE, Case, main
+from harness.package import BUILD, SOURCE, Case, main
 
 CODE = """
 import marrow, numpy

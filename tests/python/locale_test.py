@@ -4,7 +4,7 @@ import locale
 import os
 import subprocess
 
-from package import Case, main, marrow
+from harness.package import Case, main, marrow
 
 QUARTER = "0,-1,0,1.5,1,0,0,-2.5,0,0,1,300.25,0,0,0,1\n"
 PIPELINE = """marrow: 1

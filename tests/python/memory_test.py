@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Memory stays level, however often nodes run: memory_test.py SOURCE BUILD [CALLS of a small node]."""
+"""Memory stays level, however often nodes run: memory_test.py [CALLS of a small node]."""
 import gc
 import sys
 
 import numpy
-from package import Case, main, marrow
+from harness.package import Case, main, marrow
 
-CALLS = int(sys.argv[3]) if len(sys.argv) > 3 else 1000
+CALLS = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
 RUNS = 200
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calls of nodes written in Python: what they get, what they may return, and that results repeat."""
 import numpy
-from package import main, marrow
+from harness.package import main, marrow
 from written_nodes import Written, processes, view
 
 FIRST_PIXELS = """

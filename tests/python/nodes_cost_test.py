@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Costs written in Python: poses come in batches, and an optimizer in C++ finds the least."""
 import numpy
-from package import main, marrow
+from harness.package import main, marrow
 from written_nodes import Written, view
 
 COST = """

@@ -7,7 +7,7 @@ import shutil
 import subprocess
 
 import numpy
-from package import BUILD, SOURCE, main, marrow, small_case
+from harness.package import BUILD, SOURCE, main, marrow, small_case
 from written_nodes import HEAD, Written, view
 
 EXAMPLE = SOURCE / "docs" / "example-plugin"

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import threading
 
-from package import BUILD, MARROW, main, marrow, wait_until
+from harness.package import BUILD, MARROW, main, marrow, wait_until
 from written_nodes import Written, processes, view
 
 CALLS = """

@@ -6,7 +6,7 @@ import subprocess
 import time
 
 import numpy
-from package import MARROW, main, marrow, wait_until
+from harness.package import MARROW, main, marrow, wait_until
 from written_nodes import Written, processes, view
 
 NODES = """

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import zipfile
 
-from package import main, marrow
+from harness.package import main, marrow
 from written_nodes import Written, view
 
 NODE = """

@@ -6,7 +6,7 @@ import threading
 import time
 
 import numpy
-from package import main, marrow
+from harness.package import main, marrow
 from written_nodes import Written, processes
 
 STEPS = """import time

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Projectors of radiographs written in Python: marrow asks for the pixels of a picture, and costs compare it."""
 import numpy
-from package import main, marrow
+from harness.package import main, marrow
 from written_nodes import Written
 
 BALL = """

@@ -5,7 +5,7 @@ import os
 import pathlib
 
 import numpy
-from package import main, marrow
+from harness.package import main, marrow
 from written_nodes import Written, processes, view
 
 PLACES = """

@@ -4,7 +4,7 @@ import json
 import os
 import py_compile
 
-from package import main, marrow
+from harness.package import main, marrow
 from written_nodes import Written, view
 
 NODE = """

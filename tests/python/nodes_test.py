@@ -3,7 +3,7 @@
 import inspect
 
 import numpy
-from package import FEMUR, Case, main, marrow, small_case
+from harness.package import FEMUR, Case, main, marrow, small_case
 
 
 class Nodes(Case):

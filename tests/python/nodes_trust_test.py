@@ -3,7 +3,7 @@
 import os
 import subprocess
 
-from package import MARROW, main, marrow
+from harness.package import MARROW, main, marrow
 from written_nodes import Written, view
 
 NODE = """

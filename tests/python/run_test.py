@@ -6,7 +6,7 @@ import os
 
 import numpy
 import yaml
-from package import FEMUR, Case, main, marrow, program, small_case
+from harness.package import FEMUR, Case, main, marrow, program, small_case
 
 
 class Run(Case):

@@ -8,7 +8,7 @@ import threading
 import time
 
 import numpy
-from package import FEMUR, Case, main, marrow, small_case
+from harness.package import FEMUR, Case, main, marrow, small_case
 
 LONG = """marrow: 1
 nodes:

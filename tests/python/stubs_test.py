@@ -7,7 +7,7 @@ import subprocess
 import sys
 import unittest
 
-from package import BUILD, TEST_PLUGINS, Case, main, marrow
+from harness.package import BUILD, TEST_PLUGINS, Case, main, marrow
 
 PACKAGE = BUILD / "python"
 USE = """import marrow

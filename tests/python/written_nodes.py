@@ -5,7 +5,7 @@ import pathlib
 import subprocess
 
 import numpy
-from package import MARROW, SCRATCH, TEST_PLUGINS, Case, marrow
+from harness.package import MARROW, SCRATCH, TEST_PLUGINS, Case, marrow
 
 HEAD = """from typing import Annotated, NamedTuple, Optional
 import marrow

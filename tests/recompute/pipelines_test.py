@@ -5,8 +5,8 @@ import shutil
 import tempfile
 
 from recomputing import counts, recompute_all, run  # it finds the modules below
-from cases import SMALL, simulate
-from marrow_cli import Case, main, marrow
+from harness.cases import SMALL, simulate
+from harness.program import Case, main, marrow
 
 NAIL = ["femur.resolution_mm=2", "implant.resolution_mm=1", "nail_searched.poses=2000"]
 LEG = ["femur.resolution_mm=2", "ct.spacing_mm=[1.2, 1.2, 1.5]"]

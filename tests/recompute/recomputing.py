@@ -5,17 +5,12 @@ import re
 import subprocess
 import sys
 
+from harness import MARROW, SOURCE, need_scipy
+from harness.program import marrow
+
 HERE = pathlib.Path(__file__).resolve().parent
 sys.dont_write_bytecode = True
-sys.path.insert(0, str(HERE.parent / "tools" / "marrow"))
-try:
-    import numpy  # noqa: F401
-    import scipy  # noqa: F401
-except ImportError as missing:
-    print("skipped: %s; install python3-scipy to recompute figures" % missing)
-    sys.exit(77)
-
-from marrow_cli import MARROW, SOURCE, marrow  # noqa: E402
+need_scipy()
 
 
 def run(folder, pipeline, *arguments):

@@ -5,7 +5,7 @@ import shutil
 import tempfile
 
 from recomputing import counts, different, recompute, recompute_all, run  # it finds the modules below
-from marrow_cli import Case, main
+from harness.program import Case, main
 
 
 def changed(path, before, after):

@@ -3,10 +3,11 @@
 import collections
 import time
 
-from recomputing import BUILD  # it finds the modules below
-from marrow_cli import Case, main, sample
-from sample import ALL
+from harness import BUILD, need_scipy
+from harness.program import Case, main
+from harness.sample import ALL, sample
 
+need_scipy()  # before the modules below
 import files
 import of_words
 import ranks

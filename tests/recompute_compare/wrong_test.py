@@ -7,9 +7,10 @@ import re
 import shutil
 import tempfile
 
-from recomputing import BUILD  # it finds the modules below
-from marrow_cli import Case, main
+from harness import BUILD, need_scipy
+from harness.program import Case, main
 
+need_scipy()  # before the modules below
 import files
 import recompute_compare
 from checks import Checks

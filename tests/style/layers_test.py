@@ -2,11 +2,10 @@
 """Who may include whom: docs/architecture.md names the layers, this holds them apart."""
 import pathlib
 import re
-import subprocess
-import sys
 import unittest
 
-SOURCE = pathlib.Path(sys.argv[1])
+from harness import SOURCE
+
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]', re.M)
 # What a layer may include besides itself. A plugin may also include its own folder, a topic those named in TOPICS.
 LAYERS = {
@@ -97,4 +96,4 @@ class Layers(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])
+    unittest.main()

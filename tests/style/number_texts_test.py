@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Numbers become texts in one place, marrow/base/number_text.hpp, which is the same in every locale."""
-import pathlib
 import re
-import sys
 import unittest
 
-SOURCE = pathlib.Path(sys.argv[1])
+from harness import SOURCE
+
 OWN_WAYS = re.compile(r"std::to_string\(|snprintf\(|\bostringstream\b|std::to_chars\(|std::setprecision\(")
 MAY = {
     "framework/marrow/base/number_text.cpp": "the one place",
@@ -24,4 +23,4 @@ class NumberTexts(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])
+    unittest.main()

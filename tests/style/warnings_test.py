@@ -6,14 +6,11 @@ import pathlib
 import re
 import shlex
 import subprocess
-import sys
 import tempfile
 import unittest
 
-SOURCE = pathlib.Path(sys.argv[1])
-BUILD = pathlib.Path(sys.argv[2])
-sys.path.insert(0, str(SOURCE / "tests"))
-from sample import sample  # noqa: E402
+from harness import BUILD
+from harness.sample import sample
 
 MUST_NOT_COMPILE = ("forgotten_field.cpp",)
 HAVE_WARNED = ("plugins/deviations/calibrated.cpp",)  # compiled each time
@@ -40,4 +37,4 @@ class Warnings(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1] + sys.argv[3:], verbosity=2)
+    unittest.main(verbosity=2)

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Does the interface that plugins are built with differ from the one that is kept for this minor version?
 
-    abi_test.py SOURCE BUILD            compare
-    abi_test.py SOURCE BUILD --store    keep today's: after the version's minor number was raised
+    abi_test.py            compare
+    abi_test.py --store    keep today's: after the version's minor number was raised
 
 Compared are the types (abidiff, by the debugging information of interface.cpp) and the functions that the library
 exports. Added functions are no difference. Skipped where abidiff (package abigail-tools) is missing.
@@ -18,13 +18,14 @@ import sys
 import tempfile
 import unittest
 
-SOURCE, BUILD = (pathlib.Path(argument).resolve() for argument in sys.argv[1:3])
+from harness import BUILD, SOURCE
+
 FOLDER = SOURCE / "tests" / "framework" / "abi"
 VERSION = re.search(r"project\(marrow VERSION (\d+\.\d+)", (SOURCE / "CMakeLists.txt").read_text()).group(1)
 TYPES, FUNCTIONS = FOLDER / ("types-%s.abi.xz" % VERSION), FOLDER / ("functions-%s.txt" % VERSION)
 CURE = (
     "plugins built before this change do not fit any more: raise the minor number of the version in CMakeLists.txt, "
-    "say so in CHANGELOG.md, and run tests/framework/abi/abi_test.py SOURCE BUILD --store"
+    "say so in CHANGELOG.md, and run PYTHONPATH=tests tests/framework/abi/abi_test.py --store"
 )
 
 
@@ -129,4 +130,4 @@ if __name__ == "__main__":
     if "--store" in sys.argv:
         store()
     else:
-        unittest.main(argv=sys.argv[:1], verbosity=2)
+        unittest.main(verbosity=2)

@@ -4,12 +4,11 @@ import subprocess
 import sys
 import warnings
 
-try:
-    import numpy
-    from scipy import stats
-except ImportError as missing:
-    print(f"skipped: {missing}; install python3-scipy to compare with it")
-    sys.exit(77)
+from harness import need_scipy
+
+need_scipy()
+import numpy  # noqa: E402
+from scipy import stats  # noqa: E402
 
 PROGRAM = sys.argv[1]
 warnings.simplefilter("ignore")  # scipy warns of small samples and ties, which are the point here

@@ -7,15 +7,13 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
-from sample import sample  # noqa: E402
+from harness.sample import sample
 
-BUILD = pathlib.Path(sys.argv[1])
-MARROW = BUILD / "bin" / "marrow"
+from harness import BUILD, MARROW
+
 WRONG = {  # node: checks of which at least one must fail
     "camera.silent": {"mirrored", "wrong_unit"},
     "camera.anxious": {"right_cameras"},
@@ -223,4 +221,4 @@ class Conformance(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1], verbosity=2)
+    unittest.main(verbosity=2)

@@ -1,18 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every node of a kind passes a sample of the kind's checks; all of them with MARROW_TEST_ALL=1.
 
-    kind_test.py BUILD KIND COUNT    COUNT: the number of checks of a sample
+    kind_test.py KIND COUNT    COUNT: the number of checks of a sample
 """
 import json
-import pathlib
 import subprocess
 import sys
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
-from sample import sample  # noqa: E402
+from harness import MARROW
+from harness.sample import sample
 
-MARROW = pathlib.Path(sys.argv[1]) / "bin" / "marrow"
-KIND, COUNT = sys.argv[2], int(sys.argv[3])
+KIND, COUNT = sys.argv[1], int(sys.argv[2])
 ALWAYS = "contract"
 
 

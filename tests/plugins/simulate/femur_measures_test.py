@@ -3,14 +3,14 @@
 """A simulated femur has the measures it is asked for, as a radiologist would measure them on its surface: numpy finds
 the head's sphere, the neck's axis through the middles of its sections, and the line that touches both condyles at the
 back. Nothing of the femur's shape functions is used."""
-import pathlib
 import sys
 import unittest
 
 import numpy as np
 
-BINARY = pathlib.Path(sys.argv.pop())
-sys.path.insert(0, str(BINARY / "python"))
+from harness import BUILD
+
+sys.path.insert(0, str(BUILD / "python"))
 import marrow  # noqa: E402  (the path to it is set above)
 
 

@@ -6,18 +6,22 @@ import sys
 import tempfile
 import unittest
 
-try:
-    import numpy as np
-    from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
-except ImportError as missing:
-    print(f"skipped: {missing}; install python3-scipy to compare with it")
-    sys.exit(77)
+from harness import BUILD, need_scipy
 
-sys.path.insert(0, str(pathlib.Path(sys.argv[2]) / "python"))
+need_scipy()
+import numpy as np  # noqa: E402
+from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov  # noqa: E402
+
+sys.path.insert(0, str(BUILD / "python"))
 import marrow  # noqa: E402  (the path to it is set above)
 
 ACCELERATION, NOISE, IMPULSE = 5000.0, 0.09, 0.1  # mm/s^2, mm, mm
-WEIGHED = {"first_scale": 1, "added_deviation_deg": 0, "added_deviation_mm": 0, "gate": 1e12}  # nothing but the Kalman filter is left
+WEIGHED = {
+    "first_scale": 1,
+    "added_deviation_deg": 0,
+    "added_deviation_mm": 0,
+    "gate": 1e12,
+}  # nothing but the Kalman filter is left
 
 
 def model(rate_hz):
@@ -110,4 +114,4 @@ class Kalman(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1], verbosity=2)
+    unittest.main(verbosity=2)

@@ -2,7 +2,6 @@
 """Chunks of a comparison, run by one process after the other, by GNU parallel and by Snakemake: the same figures as
 without chunks, also after tasks were killed and files damaged."""
 import json
-import pathlib
 import shutil
 import signal
 import subprocess

@@ -9,8 +9,8 @@ import subprocess
 import sys
 import tempfile
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "marrow"))
-from marrow_cli import MARROW, SOURCE, TEST_PLUGINS, Case, another_run_makes_all, main, wait_until  # noqa: E402, F401
+from harness import MARROW, SOURCE, TEST_PLUGINS  # noqa: F401
+from harness.program import Case, another_run_makes_all, main, wait_until  # noqa: F401
 
 IN_A_CLUSTER = "CLUSTER_FOLDER" in os.environ
 CAN_START_CLUSTER = os.geteuid() == 0 and shutil.which("sbatch") is not None
@@ -30,7 +30,9 @@ def run_in_cluster():
         os.environ["CLUSTER_MEMORY"] = "1"
     folder = tempfile.mkdtemp(prefix="marrow-cluster-")
     try:
-        return subprocess.run([SOURCE / "tools" / "cluster_test", folder, sys.executable, *sys.argv]).returncode
+        return subprocess.run(
+            [SOURCE / "tools" / "checks" / "cluster_test", folder, sys.executable, *sys.argv]
+        ).returncode
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

@@ -3,7 +3,7 @@
 """Three hosts share results in a folder that refuses locks, shows files late and fails now and then; their clocks
 differ, and some of their processes are killed.
 
-    hosts_test.py SOURCE BUILD
+    hosts_test.py
 
 A host is a namespace of processes, of names and, where that is possible, of times. Skipped where none can be made.
 """
@@ -21,8 +21,8 @@ import threading
 import time
 import unittest
 
-SOURCE, BUILD = (pathlib.Path(argument).resolve() for argument in sys.argv[1:3])
-MARROW = BUILD / "bin" / "marrow"
+from harness import BUILD, MARROW
+
 SHIM = BUILD / "tests" / "cluster" / "libshared_folder_shim.so"
 HOSTS = {"alpha": -30, "beta": 0, "gamma": 30}  # seconds by which their clocks are wrong
 CASES, VARIANTS = 6, 3
@@ -220,4 +220,4 @@ if __name__ == "__main__":
     if not namespaces():
         print("no host can be made: unshare is missing or not allowed")
         sys.exit(77)
-    unittest.main(argv=sys.argv[:1], verbosity=2)
+    unittest.main(verbosity=2)

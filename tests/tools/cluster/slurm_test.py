@@ -88,7 +88,7 @@ class OnSlurm(Cluster):
         subprocess.run([os.environ["CLUSTER_FOLDER"] + "/daemon", *words], check=True)
 
     def only_with_all(self):
-        if not ALL and len(sys.argv) < 4:
+        if not ALL and len(sys.argv) < 2:
             self.skipTest("takes a minute; MARROW_TEST_ALL=1, or its name, tries it")
 
     def test_same_figures(self):

@@ -9,8 +9,8 @@ import tempfile
 
 import yaml
 
-from cases import FEMUR, SMALL, contents, copy_case, dicom_slice, mha, png, replace, simulate, tiff
-from marrow_cli import Case, main, marrow
+from harness.cases import FEMUR, SMALL, contents, copy_case, dicom_slice, mha, png, replace, simulate, tiff
+from harness.program import Case, main, marrow
 
 READ_VOLUME = "marrow: 1\nnodes:\n  ct: {uses: read.volume, with: {path: %s}}\noutputs: {ct: ct}\n"
 SIZE = 512

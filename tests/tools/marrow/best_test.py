@@ -5,8 +5,9 @@ import pathlib
 import shutil
 import tempfile
 
-from cases import metrics, simulate
-from marrow_cli import SOURCE, Case, main, marrow
+from harness.cases import metrics, simulate
+from harness import SOURCE
+from harness.program import Case, main, marrow
 
 PIPELINES = SOURCE / "pipelines"
 SMALL = ["bone.resolution_mm=1.6", "cameras.width_px=256", "cameras.height_px=256", "cameras.pixel_mm=1.172"]

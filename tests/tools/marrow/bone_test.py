@@ -6,8 +6,9 @@ import tempfile
 
 import yaml
 
-from cases import copy_case, metrics, simulate
-from marrow_cli import SOURCE, Case, main, marrow
+from harness.cases import copy_case, metrics, simulate
+from harness import SOURCE
+from harness.program import Case, main, marrow
 
 PIPELINES = SOURCE / "pipelines"
 SMALL = ["bone.resolution_mm=1.6", "ct.spacing_mm=[1.2, 1.2, 1.2]", "cameras.width_px=256", "cameras.height_px=256"]

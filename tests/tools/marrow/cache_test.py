@@ -6,7 +6,8 @@ import stat
 import subprocess
 import time
 
-from marrow_cli import MARROW, TEST_PLUGINS, Case, another_run_makes_all, main, marrow, wait_until
+from harness import MARROW, TEST_PLUGINS
+from harness.program import Case, another_run_makes_all, main, marrow, wait_until
 
 NUMBER = "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: 3}}\noutputs: {number: c}\n"
 WRONG_NUMBERS = ("abc", "inf", "nan", "-5", "0,5", "1e12", "")

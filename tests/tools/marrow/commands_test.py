@@ -6,7 +6,8 @@ import signal
 import subprocess
 import time
 
-from marrow_cli import BUILD, MARROW, SOURCE, TEST_PLUGINS, Case, main, marrow, wait_until
+from harness import BUILD, MARROW, SOURCE, TEST_PLUGINS
+from harness.program import Case, main, marrow, wait_until
 
 WORK = """marrow: 1
 nodes:

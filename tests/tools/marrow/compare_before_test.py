@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What can be known before a comparison runs is said before any cell runs, or after the first ones."""
-from marrow_cli import TEST_PLUGINS, Case, main, marrow
+from harness import TEST_PLUGINS
+from harness.program import Case, main, marrow
 
 PIPELINE = """marrow: 1
 inputs: {case: {type: path}}

@@ -3,7 +3,8 @@
 import os
 import subprocess
 
-from marrow_cli import MARROW, TEST_PLUGINS, Case, marrow, wait_until
+from harness import MARROW, TEST_PLUGINS
+from harness.program import Case, marrow, wait_until
 
 PIPELINE = """marrow: 1
 inputs: {case: {type: path}}

@@ -5,7 +5,7 @@ import shutil
 import signal
 
 from compare_cases import DRAWN, PIPELINE, Comparison
-from marrow_cli import IS_SANITIZED, main
+from harness.program import IS_SANITIZED, main
 
 
 class Cells(Comparison):

@@ -7,7 +7,8 @@ import shutil
 import subprocess
 
 from compare_cases import DRAWN
-from marrow_cli import MARROW, TEST_PLUGINS, Case, another_run_makes_all, main, marrow, wait_until
+from harness import MARROW, TEST_PLUGINS
+from harness.program import Case, another_run_makes_all, main, marrow, wait_until
 
 PIPELINE = """marrow: 1
 inputs: {case: {type: path}}

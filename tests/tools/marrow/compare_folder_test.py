@@ -6,7 +6,8 @@ import shutil
 import subprocess
 
 from compare_cases import Comparison
-from marrow_cli import MARROW, TEST_PLUGINS, main, marrow
+from harness import MARROW, TEST_PLUGINS
+from harness.program import main, marrow
 
 
 class Folder(Comparison):

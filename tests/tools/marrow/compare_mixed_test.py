@@ -6,7 +6,7 @@ import json
 import shutil
 
 from compare_cases import HEAD, Comparison
-from marrow_cli import main
+from harness.program import main
 
 TWO_FIGURES = """marrow: 1
 inputs: {case: {type: path}}

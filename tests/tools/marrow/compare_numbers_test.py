@@ -3,8 +3,8 @@
 is not shown as a number. The values are of tables, so the right text follows from them by hand."""
 import csv
 
-from given_cases import PIPELINE, GivenCase
-from marrow_cli import main
+from harness.given_cases import PIPELINE, GivenCase
+from harness.program import main
 
 JUDGED = """  v: {uses: test.given_verdict, in: {start: s}, with: {table: $case, column: a}}
 outputs: {figures: n, verdict: v}

@@ -3,15 +3,13 @@
 import base64
 import csv
 import json
-import pathlib
 import random
 import re
-import sys
 
-from marrow_cli import TEST_PLUGINS, Case, main, marrow
+from harness import TEST_PLUGINS
+from harness.program import Case, main, marrow
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "report"))
-import shapes  # noqa: E402
+from harness import shapes
 
 PICTURES = """marrow: 1
 inputs: {case: {type: path}}

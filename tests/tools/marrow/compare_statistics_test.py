@@ -3,7 +3,8 @@
 import json
 import re
 
-from marrow_cli import TEST_PLUGINS, Case, main, marrow
+from harness import TEST_PLUGINS
+from harness.program import Case, main, marrow
 
 PIPELINE = """marrow: 1
 nodes:

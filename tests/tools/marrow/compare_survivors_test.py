@@ -6,8 +6,8 @@ import math
 import statistics
 from fractions import Fraction
 
-from given_cases import GivenCase
-from marrow_cli import main
+from harness.given_cases import GivenCase
+from harness.program import main
 
 # Ten easy cases, in which b is 0.2 mm better, and twenty hard ones, which b loses.
 EASY = [1 + 0.01 * i for i in range(10)]

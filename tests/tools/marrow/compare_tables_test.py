@@ -8,12 +8,11 @@ import resource
 import shlex
 import shutil
 import subprocess
-import sys
 
-from marrow_cli import IS_SANITIZED, SOURCE, TEST_PLUGINS, Case, main, marrow
+from harness import TEST_PLUGINS
+from harness.program import IS_SANITIZED, Case, main, marrow
 
-sys.path.insert(0, str(SOURCE / "tests" / "tools" / "report"))
-from modules import modules  # noqa: E402
+from harness.modules import modules
 
 PIPELINE = """marrow: 1
 inputs: {case: {type: path}}

@@ -9,7 +9,8 @@ import signal
 import subprocess
 import time
 
-from marrow_cli import IS_SANITIZED, MARROW, TEST_PLUGINS, Case, main, marrow
+from harness import MARROW, TEST_PLUGINS
+from harness.program import IS_SANITIZED, Case, main, marrow
 
 PIPELINE = """marrow: 1
 inputs: {case: {type: path}}

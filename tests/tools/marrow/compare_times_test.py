@@ -4,7 +4,8 @@ of its calls, so most tests do not depend on the clock: they compare lists of ca
 import json
 import os
 
-from marrow_cli import TEST_PLUGINS, Case, main, marrow
+from harness import TEST_PLUGINS
+from harness.program import Case, main, marrow
 
 PIPELINE = """marrow: 1
 inputs: {case: {type: path}}

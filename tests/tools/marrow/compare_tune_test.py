@@ -6,7 +6,8 @@ import signal
 import subprocess
 import time
 
-from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow
+from harness import MARROW, TEST_PLUGINS
+from harness.program import Case, main, marrow
 
 # number.value is x - 3 + a draw of the case's seed, and best is nearest to zero.
 PIPELINE = """marrow: 1

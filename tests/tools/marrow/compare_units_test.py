@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Numbers of a comparison have the units in which the cells gave them, everywhere, and numbers of different units are
 never put together."""
-from given_cases import PIPELINE, GivenCase
-from marrow_cli import main
+from harness.given_cases import PIPELINE, GivenCase
+from harness.program import main
 
 METRES = {"a": ["2 mm", "3 mm", "4 mm"], "b": ["2 mm", "0.003 m", "0.004 m"]}
 REFUSED = (

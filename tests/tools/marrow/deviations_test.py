@@ -4,17 +4,15 @@ import contextlib
 import importlib.machinery
 import importlib.util
 import io
-import pathlib
 import random
 import re
-import sys
 import unittest
 
-ROOT = pathlib.Path(sys.argv[1])
+from harness import SOURCE
 
 
 def tool():
-    loader = importlib.machinery.SourceFileLoader("deviations", str(ROOT / "tools/studies/deviations"))
+    loader = importlib.machinery.SourceFileLoader("deviations", str(SOURCE / "tools/studies/deviations"))
     module = importlib.util.module_from_spec(importlib.util.spec_from_loader("deviations", loader))
     loader.exec_module(module)
     return module
@@ -99,4 +97,4 @@ class Deviations(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])
+    unittest.main()

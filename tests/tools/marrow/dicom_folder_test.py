@@ -4,7 +4,7 @@ pydicom reads from the slices. What is not installed is skipped, and said so."""
 import copy
 import shutil
 
-from marrow_cli import main
+from harness.program import main
 from other_programs import DICOM, Reading, needs, numpy, pydicom
 
 NO_CT = (

@@ -2,9 +2,9 @@
 """By how much two runs differ, in the terms of the field."""
 import json
 
-from cases import FEMUR, SMALL, matrix_product, mha, png, rotation_vector_deg, simulate, transposed
+from harness.cases import FEMUR, SMALL, matrix_product, mha, png, rotation_vector_deg, simulate, transposed
 from diff_cases import Runs
-from marrow_cli import main
+from harness.program import main
 
 POSE = """marrow-pose: 1
 target: world

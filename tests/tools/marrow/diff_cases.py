@@ -2,7 +2,8 @@
 """What the tests of comparing and repeating runs share: pipelines, and runs of them into folders."""
 import json
 
-from marrow_cli import BUILD, TEST_PLUGINS, Case, marrow
+from harness import BUILD, TEST_PLUGINS
+from harness.program import Case, marrow
 
 VERSIONS = BUILD / "tests" / "plugin_versions"
 CHAIN = """marrow: 1

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Two runs that differ only in names, and nodes that one of the runs did not need."""
 from diff_cases import Runs
-from marrow_cli import main
+from harness.program import main
 
 READ = """marrow: 1
 inputs: {data: {type: path}}

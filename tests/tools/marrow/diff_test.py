@@ -4,7 +4,7 @@ import json
 import shutil
 
 from diff_cases import CHAIN, Runs
-from marrow_cli import main
+from harness.program import main
 
 FILES = """marrow: 1
 inputs: {data: {type: path}}

@@ -6,8 +6,9 @@ import resource
 import subprocess
 import unittest
 
-from marrow_cli import IS_SANITIZED, MARROW, Case, main, wait_until
-from processes import has_processes
+from harness import MARROW
+from harness.program import IS_SANITIZED, Case, main, wait_until
+from harness.processes import has_processes
 
 USER = 40000 + os.getpid() % 10000  # of no account and no other process, nor of this test elsewhere
 TETRAHEDRON = """ply

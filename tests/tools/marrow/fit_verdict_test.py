@@ -5,13 +5,12 @@ import math
 import pathlib
 import random
 import subprocess
-import sys
 import tempfile
 import unittest
 
 import yaml
 
-ROOT = pathlib.Path(sys.argv[1])
+from harness import SOURCE
 
 
 def row_of(cell, errors, figures):
@@ -60,7 +59,9 @@ class FitVerdict(unittest.TestCase):
         cls.temporary.cleanup()
 
     def run_tool(self, *arguments):
-        return subprocess.run([str(ROOT / "tools/studies/fit_verdict"), *map(str, arguments)], capture_output=True, text=True)
+        return subprocess.run(
+            [str(SOURCE / "tools/studies/fit_verdict"), *map(str, arguments)], capture_output=True, text=True
+        )
 
     def test_fits_what_the_poses_were_drawn_from(self):
         model_file = self.folder / "model.yaml"
@@ -218,4 +219,4 @@ class FitVerdict(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])
+    unittest.main()

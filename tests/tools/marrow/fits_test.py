@@ -5,7 +5,9 @@ import unittest
 
 import yaml
 
-from marrow_cli import SOURCE, Case, main, marrow, sample
+from harness import SOURCE
+from harness.program import Case, main, marrow
+from harness.sample import sample
 
 PIPELINES = sorted((SOURCE / "pipelines").glob("*.yaml"))
 INTENSITY = SOURCE / "pipelines" / "femur-intensity.yaml"

@@ -6,7 +6,8 @@ import shutil
 import subprocess
 import unittest
 
-from marrow_cli import SOURCE, Case, main, marrow
+from harness import SOURCE
+from harness.program import Case, main, marrow
 from other_programs import module, needs, numpy, read_mha, vtk
 
 h5py = module("h5py")

@@ -4,7 +4,8 @@ A node that ends the process is no program that has done its work."""
 import json
 
 from diff_cases import Runs
-from marrow_cli import BUILD, TEST_PLUGINS, main
+from harness import BUILD, TEST_PLUGINS
+from harness.program import main
 
 PYTHON = """
 import locale

@@ -3,7 +3,8 @@
 import os
 import subprocess
 
-from marrow_cli import BUILD, Case, main
+from harness import BUILD
+from harness.program import Case, main
 
 
 class Install(Case):

@@ -7,8 +7,9 @@ import subprocess
 import tempfile
 import unittest
 
-from cases import FEMUR, SMALL, simulate
-from marrow_cli import BUILD, IS_SANITIZED, SOURCE, Case, main, marrow
+from harness.cases import FEMUR, SMALL, simulate
+from harness import BUILD, SOURCE
+from harness.program import IS_SANITIZED, Case, main, marrow
 
 WRONG = """
 marrow::View unchanged(const marrow::View& view) { return view; }

@@ -7,8 +7,9 @@ import tempfile
 
 import yaml
 
-from cases import metrics
-from marrow_cli import SOURCE, Case, main, marrow
+from harness.cases import metrics
+from harness import SOURCE
+from harness.program import Case, main, marrow
 
 PIPELINES = SOURCE / "pipelines"
 

@@ -7,7 +7,8 @@ import re
 import subprocess
 import unittest
 
-from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow
+from harness import MARROW, TEST_PLUGINS
+from harness.program import Case, main, marrow
 
 PIPELINE = """marrow: 1
 nodes:

@@ -4,7 +4,7 @@ import csv
 import json
 
 from diff_cases import Runs
-from marrow_cli import main
+from harness.program import main
 
 PIPELINE = """marrow: 1
 nodes:

@@ -4,7 +4,8 @@ import json
 import re
 
 from compare_cases import Comparison
-from marrow_cli import SOURCE, main, marrow
+from harness import SOURCE
+from harness.program import main, marrow
 
 NUMBER = "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: 3}}\noutputs: {number: c}\n"
 

@@ -5,7 +5,9 @@ import json
 import random
 import shutil
 
-from marrow_cli import SOURCE, Case, main, marrow, sample
+from harness import SOURCE
+from harness.program import Case, main, marrow
+from harness.sample import sample
 
 
 def mutated(text, chance):

@@ -4,8 +4,9 @@ import json
 
 import yaml
 
-from cases import metrics
-from marrow_cli import SOURCE, Case, main, marrow
+from harness.cases import metrics
+from harness import SOURCE
+from harness.program import Case, main, marrow
 
 PIPELINE = SOURCE / "pipelines" / "nailing.yaml"
 

@@ -5,7 +5,8 @@ import os
 import shutil
 import subprocess
 
-from marrow_cli import MARROW, TEST_PLUGINS, main
+from harness import MARROW, TEST_PLUGINS
+from harness.program import main
 from number_cases import NUMBER, Commands
 
 SIDES = (

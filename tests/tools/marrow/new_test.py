@@ -6,7 +6,9 @@ import subprocess
 import unittest
 
 import yaml
-from marrow_cli import BUILD, MARROW, SOURCE, Case, main, marrow, sample
+from harness import BUILD, MARROW, SOURCE
+from harness.program import Case, main, marrow
+from harness.sample import sample
 
 KINDS = sorted(path.parent.parent.name for path in (SOURCE / "plugins").glob("*/template/template.yaml"))
 

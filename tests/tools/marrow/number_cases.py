@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small pipelines of numbers, and the program run on them in a folder of the test's own."""
-from marrow_cli import TEST_PLUGINS, Case, marrow
+from harness import TEST_PLUGINS
+from harness.program import Case, marrow
 
 NUMBER = "marrow: 1\n%snodes:\n  c: {uses: test.constant, with: {value: 3}}\noutputs: {number: c}\n"
 

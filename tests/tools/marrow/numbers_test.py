@@ -2,7 +2,8 @@
 """Options that take a number take no other text for one."""
 import json
 
-from marrow_cli import TEST_PLUGINS, Case, main, marrow
+from harness import TEST_PLUGINS
+from harness.program import Case, main, marrow
 
 PIPELINE = "marrow: 1\nnodes:\n  c: {uses: test.constant}\noutputs: {number: c}\n"
 LARGEST_SEED = 2**64 - 1

@@ -3,11 +3,11 @@
 """Outputs that no file can hold: what `check` and `run` say about them, and pipelines that only the program runs."""
 import pathlib
 import subprocess
-import sys
 import tempfile
 import unittest
 
-SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
+from harness import BUILD, SOURCE
+
 PIPELINE = """marrow: 1
 %snodes:
   optimizer: {uses: optimizer.nelder_mead}
@@ -90,4 +90,4 @@ class OnlyInsideTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1] + sys.argv[3:], verbosity=2)
+    unittest.main(verbosity=2)

@@ -3,7 +3,7 @@
 import json
 import re
 
-from marrow_cli import Case, main, marrow
+from harness.program import Case, main, marrow
 
 POSE = """marrow-pose: 1
 target: world

@@ -3,7 +3,8 @@
 import json
 import subprocess
 
-from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow
+from harness import MARROW, TEST_PLUGINS
+from harness.program import Case, main, marrow
 
 PIPELINE = """marrow: 1
 name: p

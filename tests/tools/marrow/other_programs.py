@@ -5,7 +5,7 @@ import shutil
 import unittest
 import zlib
 
-from marrow_cli import Case, marrow
+from harness.program import Case, marrow
 
 
 def module(name):

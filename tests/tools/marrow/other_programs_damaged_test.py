@@ -7,8 +7,9 @@ import resource
 import shutil
 import subprocess
 
-import marrow_cli
-from marrow_cli import main, sample
+from harness import MARROW, program
+from harness.program import main
+from harness.sample import sample
 from other_programs import DICOM, PIL, Reading, needs, nibabel, numpy, tifffile, vtk
 
 DAMAGED = 10  # copies of each kind of file; by default a sample of them, with each way to damage one
@@ -48,7 +49,7 @@ def run_limited(pipeline_text, folder, limit):
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
     # One thread: how many there are at the same moment, each with a stack, would be a matter of chance.
-    command = [str(marrow_cli.MARROW), "run", "p.yaml", "--out", "out", "--quiet", "--threads", "1"]
+    command = [str(MARROW), "run", "p.yaml", "--out", "out", "--quiet", "--threads", "1"]
     return subprocess.run(
         command,
         cwd=folder,
@@ -65,7 +66,7 @@ class Damaged(Reading):
     """Damaged copies of each kind of file, through the program as a person runs it."""
 
     def check(self, node, options, good):
-        if marrow_cli.IS_SANITIZED:
+        if program.IS_SANITIZED:
             self.skipTest("a sanitizer reserves all address space, so there is none to limit")
         text = "marrow: 1\nnodes:\n  it: {uses: %s, with: {path: '%s'%s}}\noutputs: {it: it}\n"
         limit = least_memory(text % (node, good, options), self.scratch) + MEMORY

@@ -4,7 +4,7 @@ programs read them. What is not installed is skipped, and said so."""
 import shutil
 import subprocess
 
-from marrow_cli import main
+from harness.program import main
 from other_programs import DICOM, PIL, Reading, needs, nibabel, numpy, pydicom, read_mha, tifffile, vtk
 
 

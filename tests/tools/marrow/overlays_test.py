@@ -3,7 +3,8 @@
 import unittest
 
 import yaml
-from marrow_cli import SOURCE, main
+from harness import SOURCE
+from harness.program import main
 
 # The inputs by which poses go from one node to the next.
 WAYS = ("initial", "pose", "poses", "stages", "start", "first", "second", "third", "fourth")

@@ -8,7 +8,8 @@ import socket
 import subprocess
 import unittest
 
-from marrow_cli import BUILD, IS_SANITIZED, MARROW, SOURCE, TEST_PLUGINS, Case, main, marrow
+from harness import BUILD, MARROW, SOURCE, TEST_PLUGINS
+from harness.program import IS_SANITIZED, Case, main, marrow
 
 BAD = BUILD / "tests" / "bad_plugins"
 

@@ -6,8 +6,9 @@ import os
 import shutil
 import subprocess
 
-from cases import png
-from marrow_cli import MARROW, main
+from harness.cases import png
+from harness import MARROW
+from harness.program import main
 from number_cases import NUMBER, Commands
 
 

@@ -7,7 +7,8 @@ import signal
 import subprocess
 
 from diff_cases import Runs
-from marrow_cli import MARROW, main
+from harness import MARROW
+from harness.program import main
 
 BODY = """marrow: 1
 nodes:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Options of a cost that the levels of a search replace are named where a pipeline gives them."""
 from compare_cases import Comparison
-from marrow_cli import main
+from harness.program import main
 
 PIPELINE = """marrow: 1
 inputs: {case: {type: path, default: case}}

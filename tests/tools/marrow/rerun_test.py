@@ -4,7 +4,8 @@ import json
 import struct
 
 from diff_cases import CHAIN, Runs
-from marrow_cli import CACHE, IS_SANITIZED, TEST_PLUGINS, main
+from harness import TEST_PLUGINS
+from harness.program import CACHE, IS_SANITIZED, main
 
 
 class Rerun(Runs):

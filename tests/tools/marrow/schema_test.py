@@ -6,7 +6,9 @@ import shutil
 import jsonschema
 import yaml
 
-from marrow_cli import SOURCE, Case, main, marrow, sample
+from harness import SOURCE
+from harness.program import Case, main, marrow
+from harness.sample import sample
 
 
 class SchemaCase(Case):

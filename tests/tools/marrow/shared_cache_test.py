@@ -4,7 +4,8 @@ when somebody asks for it."""
 import json
 import re
 
-from marrow_cli import TEST_PLUGINS, Case, main, marrow
+from harness import TEST_PLUGINS
+from harness.program import Case, main, marrow
 
 SLOW = """marrow: 1
 nodes:

@@ -7,7 +7,7 @@ import tempfile
 
 import yaml
 
-from cases import (
+from harness.cases import (
     FEMUR,
     SMALL,
     contents,
@@ -19,7 +19,8 @@ from cases import (
     times,
     transposed,
 )
-from marrow_cli import Case, main, marrow, sample
+from harness.program import Case, main, marrow
+from harness.sample import sample
 
 
 # Coarser images than usual, so that each run takes less time.

@@ -4,7 +4,8 @@ import os
 import subprocess
 import time
 
-from marrow_cli import MARROW, TEST_PLUGINS, main
+from harness import MARROW, TEST_PLUGINS
+from harness.program import main
 from number_cases import Commands
 
 

@@ -4,7 +4,8 @@ import json
 import os
 import subprocess
 
-from marrow_cli import MARROW, TEST_PLUGINS, main
+from harness import MARROW, TEST_PLUGINS
+from harness.program import main
 from number_cases import Commands
 
 ESCAPE = "\x1b[2J\x1b]0;owned\x07\nmarrow: forged"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a pipeline says and nothing uses is named; and whom a plan compares with."""
 from compare_cases import Comparison
-from marrow_cli import main
+from harness.program import main
 
 UNUSED = """marrow: 1
 inputs: {case: {type: path, default: p.yaml}}

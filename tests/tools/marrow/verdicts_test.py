@@ -8,7 +8,8 @@ import re
 import subprocess
 
 from diff_cases import Runs
-from marrow_cli import BUILD, MARROW, TEST_PLUGINS, main
+from harness import BUILD, MARROW, TEST_PLUGINS
+from harness.program import main
 
 PIPELINE = """marrow: 1
 nodes:

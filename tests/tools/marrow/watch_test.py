@@ -5,12 +5,11 @@ import os
 import pathlib
 import signal
 import subprocess
-import sys
 
-from marrow_cli import BUILD, MARROW, SOURCE, TEST_PLUGINS, Case, main, marrow, wait_until
+from harness import BUILD, MARROW, SOURCE, TEST_PLUGINS
+from harness.program import Case, main, marrow, wait_until
 
-sys.path.insert(0, str(SOURCE / "tests/tools/report"))
-import browser  # noqa: E402
+from harness import browser
 
 PIPELINE = "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: %s}}\noutputs: {c: c}\n"
 PLUGIN = """#include <marrow/plugin.hpp>

@@ -7,7 +7,8 @@ import signal
 import subprocess
 import time
 
-from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow, wait_until
+from harness import MARROW, TEST_PLUGINS
+from harness.program import Case, main, marrow, wait_until
 
 FORGED = json.dumps(
     {

@@ -8,8 +8,8 @@ readers reach all rows although few are drawn; and each cell has an address.
 import os
 import sys
 
-import synthetic
-from page import BrowserTest, run_tests
+from harness import synthetic
+from harness.page import BrowserTest, run_tests
 
 # Both times are for a machine that does the work below in this time. On one that is slower, or busy, they are longer.
 MOST_SECONDS, MOST_BYTES, MOST_TASK_MS = 3, 20e6, 100

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import unittest
 
-from modules import TOOLS
+from harness.modules import TOOLS
 
 ENTRIES = [TOOLS / "report" / "page" / "main.js", TOOLS / "workbench" / "page" / "main.js"]
 BROWSER = set(

@@ -8,8 +8,8 @@ for those who do not see them.
 import pathlib
 import sys
 
-import synthetic
-from page import PageTest, page_of, run_tests
+from harness import synthetic
+from harness.page import PageTest, page_of, run_tests
 
 HOSTILE = "</script><script>window.hurt = 1</script><img src=x onerror='window.hurt = 2'>\"&amp;${1}"
 

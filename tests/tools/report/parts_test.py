@@ -11,8 +11,8 @@ import shutil
 import sys
 import threading
 
-import synthetic
-from page import BrowserTest, page_of, run_tests
+from harness import synthetic
+from harness.page import BrowserTest, page_of, run_tests
 
 SOURCES = "return [...document.querySelectorAll('#cell .gallery img')].map((image) => image.naturalWidth)"
 

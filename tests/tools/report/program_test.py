@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pages that the program writes, in headless Chromium: of a run and of a comparison with a failed cell.
 
-    tests/tools/report/program_test.py SOURCE BUILD     exit code 77: skipped, with the reason
+    tests/tools/report/program_test.py     exit code 77: skipped, with the reason
 """
 import os
 import pathlib
@@ -12,11 +12,10 @@ import sys
 import tempfile
 import unittest
 
-HERE = pathlib.Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE))
-import browser  # noqa: E402
+from harness import browser
 
-SOURCE, BUILD = map(pathlib.Path, sys.argv[1:3])
+from harness import BUILD, SOURCE
+
 EXPERIMENT = """experiment: 1
 name: small
 pipeline: %(source)s/pipelines/femur.yaml
@@ -138,5 +137,4 @@ if __name__ == "__main__":
     if browser.missing():
         print("skipped: " + browser.missing())
         sys.exit(77)
-    sys.argv[1:3] = []
     unittest.main(verbosity=2)

@@ -11,11 +11,11 @@ import pathlib
 import sys
 import time
 
-import browser
-import synthetic
-import synthetic_verdicts
-from modules import modules
-from page import SECTIONS, PageTest, page_of, run_tests
+from harness import browser
+from harness import synthetic
+from harness import synthetic_verdicts
+from harness.modules import modules
+from harness.page import SECTIONS, PageTest, page_of, run_tests
 
 
 class ReportTest(PageTest):

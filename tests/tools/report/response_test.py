@@ -6,8 +6,8 @@
 """
 import sys
 
-import synthetic
-from page import PageTest, run_tests
+from harness import synthetic
+from harness.page import PageTest, run_tests
 
 
 def curve(variant, option, figure, scale="linear"):

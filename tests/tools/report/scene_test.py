@@ -6,8 +6,8 @@
 """
 import sys
 
-import shapes
-from page import PageTest, run_tests
+from harness import shapes
+from harness.page import PageTest, run_tests
 
 # The result's pixels of the drawn canvas: their bounds in pixels of the canvas, and how many they are.
 COVERED = """

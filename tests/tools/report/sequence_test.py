@@ -7,9 +7,9 @@
 import sys
 import time
 
-import shapes
-import synthetic
-from page import PageTest, run_tests
+from harness import shapes
+from harness import synthetic
+from harness.page import PageTest, run_tests
 
 
 def sequence(frames=6, lost=3):

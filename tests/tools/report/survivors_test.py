@@ -8,9 +8,9 @@ of how many runs each number is, in which unit, and no number for what is not kn
 import copy
 import sys
 
-import synthetic
-from modules import modules
-from page import PageTest, run_tests
+from harness import synthetic
+from harness.modules import modules
+from harness.page import PageTest, run_tests
 
 
 class SurvivorsTest(PageTest):

@@ -6,8 +6,8 @@
 """
 import sys
 
-import synthetic
-from page import PageTest, run_tests
+from harness import synthetic
+from harness.page import PageTest, run_tests
 
 SCORES = [0.5, 0.3, 0.4, 0.2, 0.25]
 

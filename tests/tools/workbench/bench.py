@@ -13,21 +13,19 @@ import sys
 import tempfile
 import unittest
 
-SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
-MARROW = BUILD / "bin" / "marrow"
+from harness import MARROW, SHARED_CACHE, SOURCE, skip
+from harness import browser as chromium
+from harness.sample import sample
+
 os.environ["MARROW_CACHE"] = tempfile.mkdtemp(prefix="marrow-cache-")  # not the store of who runs the tests
 atexit.register(shutil.rmtree, os.environ["MARROW_CACHE"], ignore_errors=True)
-sys.path.insert(0, str(SOURCE / "tests" / "tools" / "report"))
-sys.path.insert(0, str(SOURCE / "tests"))
-import browser as chromium  # noqa: E402
-from sample import sample  # noqa: E402
 
 SMALL = ["--set", "ct.spacing_mm=[1.2, 1.2, 1.5]", "--set", "ct.range_mm=[0, 300]"]  # 0.8 s instead of 5 s to make
 
 
 def simulate(folder, *arguments, pipeline=SOURCE / "pipelines" / "simulate.yaml"):
     """The folder of what a simulation makes. The same one is made once for all tests."""
-    environment = {**os.environ, "MARROW_CACHE": str(BUILD / "tests" / "store")}
+    environment = {**os.environ, "MARROW_CACHE": str(SHARED_CACHE)}
     command = [MARROW, "run", pipeline, "--out", folder, "--quiet", *arguments]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment)
     return folder / "outputs"
@@ -160,12 +158,11 @@ def named_tests(suite):
 
 
 def main(part=5):
-    """Runs the tests that the command line names; without names, one of `part` of them, another each day."""
+    """Runs the tests that the command line names; without names, one of `part` of them, the same in each run."""
     missing = chromium.missing()
     if missing:
-        print("skipped:", missing)
-        sys.exit(77)
-    names = sys.argv[3:]
+        skip(missing)
+    names = sys.argv[1:]
     if not names:
         every = list(named_tests(unittest.defaultTestLoader.loadTestsFromModule(sys.modules["__main__"])))
         names = sample(every, max(3, len(every) // part))

@@ -3,7 +3,7 @@
 """How long a CT of 512 x 512 x 400 voxels takes to open and to segment, and its slices to follow the wheel. It
 prints figures and tests nothing.
 
-    tests/tools/workbench/ct_benchmark.py SOURCE BUILD
+    tests/tools/workbench/ct_benchmark.py
 """
 import array
 import os

@@ -9,7 +9,7 @@ import unittest
 import numpy
 
 from bench import MARROW, SOURCE, PageTest, main
-from modules import modules
+from harness.modules import modules
 from xray_bench import write_png
 
 COUNT = 1000

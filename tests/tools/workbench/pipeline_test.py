@@ -8,7 +8,9 @@ import unittest
 import unittest.mock
 
 import bench
-from bench import BUILD, MARROW, BenchTest, PageTest
+from bench import MARROW, BenchTest, PageTest
+
+from harness import TEST_PLUGINS
 
 PIPELINE = """\
 marrow: 1
@@ -358,7 +360,7 @@ class PipelinePageTest(PageTest, PipelineBench):
     def test_a_run_can_be_stopped(self):
         # It would work for 1000 s.
         self.file.write_text("marrow: 1\nnodes:\n  w: {uses: test.work, with: {value: 1000}}\noutputs: {w: w}\n")
-        with unittest.mock.patch.dict(os.environ, MARROW_PLUGIN_PATH=str(BUILD / "tests" / "plugins")):
+        with unittest.mock.patch.dict(os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS)):
             self.show_pipeline()
         self.browser.wait("return !document.querySelector('[data-do=run]').disabled", 60)
         self.click("[data-do=run]")

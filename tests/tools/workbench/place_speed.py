@@ -4,7 +4,7 @@
 server's part of it; and the memory of server and page before and after 1,000 drags. Its figures are for people: no
 test depends on them.
 
-    tests/tools/workbench/place_speed.py SOURCE BUILD [WIDTH_PX ...]
+    tests/tools/workbench/place_speed.py [WIDTH_PX ...]
 """
 import os
 import pathlib
@@ -16,7 +16,7 @@ import tempfile
 import time
 
 import bench
-from modules import modules
+from harness.modules import modules
 
 POSES = 300
 DRAGS = 1000
@@ -162,7 +162,7 @@ def main():
     if missing:
         print("skipped:", missing)
         return
-    widths_px = [int(text) for text in sys.argv[3:]] or [512, 1024]
+    widths_px = [int(text) for text in sys.argv[1:]] or [512, 1024]
     scratch = pathlib.Path(tempfile.mkdtemp(prefix="marrow-place-"))
     browser = bench.chromium.Browser()
     try:

@@ -3,7 +3,7 @@
 """A real bone of the wrist, placed on the page "Place" by drags and keys as a person makes them, from a start that is
 20 degrees and 20 mm off, and registered from there. Prints how long it took and where it ended, and keeps pictures.
 
-    tests/tools/workbench/place_wrist.py SOURCE BUILD WRIST [PICTURES]      # WRIST: the folder with volumes, images, cameras
+    tests/tools/workbench/place_wrist.py WRIST [PICTURES]      # WRIST: the folder with volumes, images, cameras
 
 The script stands for a person who sees where the bone belongs. It aims with the pointer at whole steps of 4 pixels and
 2 degrees. Where the bone belongs is the placement that is shipped for pipelines/wrist-intensity.yaml, which was made
@@ -24,8 +24,8 @@ import bench
 import placing
 from placing import at, seen, times
 
-WRIST = pathlib.Path(sys.argv[3]) if len(sys.argv) > 3 else pathlib.Path("nowhere")
-PICTURES = pathlib.Path(sys.argv[4]) if len(sys.argv) > 4 else None
+WRIST = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else pathlib.Path("nowhere")
+PICTURES = pathlib.Path(sys.argv[2]) if len(sys.argv) > 2 else None
 STEM = "xr_rad_uln_cam0%d_UND.0002.tif"
 AIM_PX, AIM_DEG = 4, 2
 
@@ -176,5 +176,5 @@ class Wrist(placing.PageOfCase, bench.PageTest):
 
 
 if __name__ == "__main__":
-    del sys.argv[3:]
-    unittest.main(argv=sys.argv[:1], verbosity=2)
+    del sys.argv[1:]
+    unittest.main(verbosity=2)

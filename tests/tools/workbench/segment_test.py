@@ -153,4 +153,4 @@ class SegmentTest(BenchTest):
 if __name__ == "__main__":
     import sys
 
-    unittest.main(argv=sys.argv[:1] + sys.argv[3:], verbosity=2)
+    unittest.main(verbosity=2)

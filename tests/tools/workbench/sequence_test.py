@@ -12,7 +12,7 @@ import yaml
 import bench
 from accessible_test import LOW_CONTRAST, UNNAMED
 from bench import PageTest
-from modules import modules
+from harness.modules import modules
 from moving import NONE, VIEWS, Moving, line, shifted, truth
 from placing import PageOfCase, angle_deg, at
 from xray_bench import write_png

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What tools/checks/mutate takes for a place to change, and that what tests/mutants.txt explains still stands in the
 sources."""
-import pathlib
 import subprocess
 import sys
 import unittest
 
-SOURCE = pathlib.Path(sys.argv[1])
+from harness import SOURCE
+
 sys.dont_write_bytecode = True
-sys.path.insert(0, str(SOURCE / "tools" / "mutation"))
+sys.path.insert(0, str(SOURCE / "tools" / "checks" / "mutation"))
 from places import places_of  # noqa: E402
 
 
@@ -118,4 +118,4 @@ class Explained(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])
+    unittest.main()

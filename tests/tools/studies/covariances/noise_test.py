@@ -3,11 +3,11 @@
 """The predicted deviations of nodes that fit points are right over 60 draws of noise: the ratio of two root mean
 squares of 60 errors or more is known to a tenth, the shares within one and two deviations (68 and 95 %) to a few
 points. The study beside this test does the same for the costs."""
-import pathlib
 import sys
 import unittest
 
-SOURCE, BUILD = map(pathlib.Path, sys.argv[1:3])
+from harness import BUILD, SOURCE
+
 sys.path[:0] = [str(SOURCE / "tests/tools/studies/covariances/study"), str(BUILD / "python")]
 
 import figures
@@ -53,4 +53,4 @@ class Noise(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1] + sys.argv[3:])
+    unittest.main()

@@ -9,11 +9,10 @@ import tempfile
 import time
 import unittest
 
-HERE = pathlib.Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE.parents[2] / "tools" / "report" / "page")]
-import browser  # noqa: E402
+from harness import SOURCE, browser, skip, synthetic
+
+sys.path.insert(0, str(SOURCE / "tools" / "report" / "page"))
 import bundle  # noqa: E402
-import synthetic  # noqa: E402
 
 SECTIONS = [
     "summary",
@@ -122,10 +121,8 @@ class PageTest(BrowserTest):
 
 
 def run_tests(arguments=()):
-    """The exit code of this file's tests: 77 where they are skipped, with the reason."""
-    reason = browser.missing()
-    if reason:
-        print("skipped: " + reason)
-        return 77
+    """The exit code of this file's tests, which are skipped without a browser."""
+    if browser.missing():
+        skip(browser.missing())
     program = unittest.main(argv=sys.argv[:1] + list(arguments), exit=False, verbosity=2)
     return 0 if program.result.wasSuccessful() else 1

@@ -8,8 +8,8 @@ import subprocess
 import sys
 import tempfile
 
-sys.path.insert(0, str(pathlib.Path(sys.argv[1]) / "tests" / "tools" / "marrow"))
-from marrow_cli import BUILD, MARROW, SHARED_CACHE, SOURCE, TEST_PLUGINS, Case, main, wait_until  # noqa: E402, F401
+from harness import BUILD, MARROW, SHARED_CACHE, SOURCE, TEST_PLUGINS  # noqa: F401
+from harness.program import Case, main, wait_until  # noqa: F401
 
 FEMUR = SOURCE / "pipelines" / "femur.yaml"
 SCRATCH = pathlib.Path(tempfile.mkdtemp(prefix="marrow-python-"))

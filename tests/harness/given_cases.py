@@ -3,7 +3,8 @@
 import json
 import re
 
-from marrow_cli import BUILD, Case, marrow
+from harness import BUILD
+from harness.program import Case, marrow
 
 GIVEN_PLUGINS = BUILD / "tests" / "given_plugins"
 PIPELINE = """marrow: 1

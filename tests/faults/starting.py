@@ -12,24 +12,21 @@ import tempfile
 
 from subjects import Program
 
-SOURCE = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(SOURCE / "tests"))
-from sample import ALL, SEED, sample  # noqa: E402, F401
+from harness import BUILD
+from harness.sample import ALL, SEED, sample  # noqa: F401
 
 SKIPPED = 77  # ctest's SKIP_RETURN_CODE
 
 
 def arguments_parser(description):
     parser = argparse.ArgumentParser(description=description)
-    parser.add_argument(
-        "--build", type=pathlib.Path, default=SOURCE / "build", help="the build folder (default: build)"
-    )
+    parser.add_argument("--build", type=pathlib.Path, default=BUILD, help="the build folder")
     parser.add_argument("--all", action="store_true", help="the whole, not a sample")
     parser.add_argument(
         "--seed",
         type=int,
         default=random.Random(SEED).randrange(10**6),
-        help="of what is drawn by chance (default: another each day)",
+        help="of what is drawn by chance (default: the same in each run)",
     )
     parser.add_argument("--jobs", type=int, default=2, help="how many at once (default: 2)")
     return parser

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests of the command line share: where things are, and how to run the program."""
+"""How tests run the program, and a folder of its own for each of them."""
 import atexit
 import contextlib
 import fcntl
@@ -8,20 +8,12 @@ import pathlib
 import shutil
 import struct
 import subprocess
-import sys
 import tempfile
 import time
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
-import compiler_cache  # noqa: E402
-from sample import sample  # noqa: E402, F401
+from harness import BUILD, MARROW, compiler_cache
 
-SOURCE = pathlib.Path(sys.argv[1])
-BUILD = pathlib.Path(sys.argv[2])
-MARROW = BUILD / "bin" / "marrow"
-TEST_PLUGINS = BUILD / "tests" / "plugins"
-SHARED_CACHE = BUILD / "tests" / "store"  # of simulated cases, which are the same in many tests
 # A sanitizer makes everything several times slower and larger.
 IS_SANITIZED = any(name in MARROW.read_bytes() for name in (b"libasan.so", b"libtsan.so"))
 CACHE = pathlib.Path(tempfile.mkdtemp(prefix="marrow-cache-"))  # no test sees what another run left
@@ -75,4 +67,4 @@ class Case(unittest.TestCase):
 
 
 def main():
-    unittest.main(argv=sys.argv[:1] + sys.argv[3:], verbosity=2)
+    unittest.main(verbosity=2)

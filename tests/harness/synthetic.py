@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Made-up data of a report, the same at every call: for the report's tests and for looking at its design.
 
-    tests/tools/report/synthetic.py comparison data.json --cases 12 --starts 5
-    tests/tools/report/synthetic.py run data.json
+    tests/harness/synthetic.py comparison data.json --cases 12 --starts 5
+    tests/harness/synthetic.py run data.json
 """
 import argparse
 import hashlib
@@ -13,9 +13,8 @@ import pathlib
 import random
 import statistics
 
-import shapes
+from harness import SOURCE, shapes
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
 METRICS = [
     {"name": "mtre_mm", "label": "mTRE", "unit": "mm", "success_below": 2.0},
     {"name": "rotation_deg", "label": "rotation error", "unit": "deg", "success_below": None},
@@ -274,7 +273,7 @@ def add_material(data, chance, pairs):
 
 
 def experiment(kind):
-    pipeline = ROOT / "pipelines" / "femur.yaml"
+    pipeline = SOURCE / "pipelines" / "femur.yaml"
     return {
         "name": "edge detectors on the femur",
         "file": "experiments/edges.yaml",

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Modules of the pages for tests that call their functions, in a browser or in node."""
-import pathlib
 import subprocess
 
-TOOLS = pathlib.Path(__file__).resolve().parents[3] / "tools"
+from harness import SOURCE
+
+TOOLS = SOURCE / "tools"
 
 
 def modules(**paths):
