@@ -86,7 +86,7 @@ class Places(unittest.TestCase):
         def drawn(seed):
             return subprocess.run(
                 [
-                    str(SOURCE / "tools" / "mutate"),
+                    str(SOURCE / "tools" / "checks" / "mutate"),
                     "--list",
                     "--in",
                     "plugins/fracture",
