@@ -100,6 +100,10 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
 /// Throws Error if the pipeline reads a folder to which the run writes. An empty `folder` means a folder below runs/.
 void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& folder, const Store* store);
 
+/// Throws Error if no file can hold an output: a pipeline that only runs inside the program may have such outputs, but
+/// a run into a folder cannot write them.
+void expect_files_can_hold(const Pipeline& pipeline, const Catalogue& catalogue);
+
 /// Prints what is to be thought of each pose, with reasons and remedies; coloured on a terminal.
 void print_verdicts(const std::vector<NamedVerdict>& verdicts);
 

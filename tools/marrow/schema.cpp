@@ -13,9 +13,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+Json reference_to(const std::string& definition) { return {{"$ref", "#/definitions/" + definition}}; }
+
+std::string inputs_of(const std::string& kind) { return kind + ".inputs"; }
+
 Json scalar_schema(const OptionInfo& option) {
-  // For every type of option, the value may be the name of an input ("$case").
-  const Json name = {{"type", "string"}, {"pattern", "\\$"}};
   Json value;
   switch (option.type) {
     case OptionType::boolean:
@@ -35,7 +37,7 @@ Json scalar_schema(const OptionInfo& option) {
   if (option.minimum) value["minimum"] = *option.minimum;
   if (option.maximum) value["maximum"] = *option.maximum;
   if (!option.choices.empty()) value = {{"enum", option.choices}};
-  return {{"anyOf", {value, name}}};
+  return {{"anyOf", {value, reference_to("name_of_input")}}};
 }
 
 Json option_schema(const OptionInfo& option) {
@@ -44,71 +46,73 @@ Json option_schema(const OptionInfo& option) {
     schema = {{"type", "array"}, {"items", schema}};
     if (option.length) schema["minItems"] = schema["maxItems"] = option.length;
   }
-  schema["description"] = option.help + " (" + range_text(option) + ")";
   if (!option.required) std::visit([&](const auto& value) { schema["default"] = value; }, option.default_value);
+  schema["description"] = option.help + " (" + range_text(option) + ")";
   return schema;
 }
 
-Json node_schema(const NodeInfo& node, const Catalogue& catalogue) {
+Json inputs_schema(const std::vector<KindPort>& ports) {
+  Json properties = Json::object();
+  for (const KindPort& port : ports) {
+    properties[port.name] = reference_to("wire");
+    properties[port.name]["description"] = port_text(port) + (port.help.empty() ? "" : ": " + port.help);
+  }
+  return {{"type", "object"}, {"additionalProperties", false}, {"properties", properties}};
+}
+
+/// What holds for the node beside what holds for all: its options, and the inputs of its kind.
+Json node_schema(const NodeInfo& node) {
   Json with = {{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
-  Json required = Json::array();
+  Json in = {{"allOf", Json::array({reference_to(inputs_of(node.kind()))})}};
+  Json needs = Json::array();
   for (const OptionInfo& option : node.options) {
     with["properties"][option.name] = option_schema(option);
-    if (option.required) required.push_back(option.name);
+    if (option.required) with["required"].push_back(option.name);
   }
-  if (!required.empty()) with["required"] = required;
-  const Json reference = {{"type", "string"}};
-  Json in = {{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
-  for (const KindPort& port : catalogue.ports_of_kind(node.kind()))
-    in["properties"][port.name] = {{"description", port_text(port) + (port.help.empty() ? "" : ": " + port.help)},
-                                   {"anyOf", {reference, {{"type", "array"}, {"items", reference}}}}};
-  Json wired = Json::array();
   for (const PortInfo& port : node.inputs)
-    if (!port.optional) wired.push_back(port.name);
-  Json properties = {{"uses", {{"const", node.name}, {"description", node.summary}}}, {"with", with}, {"in", in}};
-  Json schema = {{"properties", properties}};
-  Json needs = Json::array();
-  if (!required.empty()) needs.push_back("with");
-  if (!wired.empty()) {
-    schema["properties"]["in"]["required"] = wired;
-    needs.push_back("in");
-  }
+    if (!port.optional) in["required"].push_back(port.name);
+  if (with.contains("required")) needs.push_back("with");
+  if (in.contains("required")) needs.push_back("in");
+  Json schema = {{"properties", {{"with", with}, {"in", in}}}};
   if (!needs.empty()) schema["required"] = needs;
   return {{"if", {{"required", {"uses"}}, {"properties", {{"uses", {{"const", node.name}}}}}}}, {"then", schema}};
 }
 
-Json pipeline_schema(const Catalogue& catalogue) {
+Json any_node_schema(const Catalogue& catalogue) {
   Json uses = Json::array(), conditions = Json::array();
   for (const std::string& name : catalogue.node_names()) {
     uses.push_back({{"const", name}, {"description", catalogue.find(name)->summary}});
-    conditions.push_back(node_schema(*catalogue.find(name), catalogue));
+    conditions.push_back(node_schema(*catalogue.find(name)));
   }
   const Json place = {{"type", "string"}};
-  const Json node = {
-      {"type", "object"},
-      {"anyOf", {{{"required", {"uses"}}}, {{"required", {"repeat"}}}}},
-      {"additionalProperties", false},
-      {"properties",
-       {{"uses", {{"description", "kind.name of the node"}, {"oneOf", uses}}},
-        {"with", {{"type", "object"}, {"description", "options"}}},
-        {"in", {{"type", "object"}, {"description", "port: node, node.output or node.output.item"}}},
-        {"may_fail",
-         {{"type", "boolean"},
-          {"default", false},
-          {"description", "whether the run goes on without the node's outputs if it fails"}}},
-        {"repeat",
-         {{"description", "the body that is run again and again: a pipeline file, or nodes and outputs"},
-          {"anyOf", {place, {{"$ref", "#/definitions/body"}}}}}},
-        {"over", {{"type", "string"}, {"description", "the axis of the items that passes are for"}}},
-        {"carry",
-         {{"type", "object"},
-          {"additionalProperties", place},
-          {"description", "node of the body: output of the body that takes its place in the next pass"}}},
-        {"at_most", {{"type", "integer"}, {"minimum", 1}, {"description", "number of passes"}}},
-        {"until", {{"type", "string"}, {"description", "output of the body, of type stop, that ends the passes"}}},
-        {"if_pass_fails",
-         {{"enum", {"end", "go_on"}}, {"default", "end"}, {"description", "what follows a failed pass"}}}}},
-      {"allOf", conditions}};
+  return {{"type", "object"},
+          {"anyOf", {{{"required", {"uses"}}}, {{"required", {"repeat"}}}}},
+          {"additionalProperties", false},
+          {"properties",
+           {{"uses", {{"description", "kind.name of the node"}, {"oneOf", uses}}},
+            {"with", {{"type", "object"}, {"description", "options"}}},
+            {"in", {{"type", "object"}, {"description", "port: node, node.output or node.output.item"}}},
+            {"may_fail",
+             {{"type", "boolean"},
+              {"default", false},
+              {"description", "whether the run goes on without the node's outputs if it fails"}}},
+            {"repeat",
+             {{"description", "the body that is run again and again: a pipeline file, or nodes and outputs"},
+              {"anyOf", {place, reference_to("body")}}}},
+            {"over", {{"type", "string"}, {"description", "the axis of the items that passes are for"}}},
+            {"carry",
+             {{"type", "object"},
+              {"additionalProperties", place},
+              {"description", "node of the body: output of the body that takes its place in the next pass"}}},
+            {"at_most", {{"type", "integer"}, {"minimum", 1}, {"description", "number of passes"}}},
+            {"until", {{"type", "string"}, {"description", "output of the body, of type stop, that ends the passes"}}},
+            {"if_pass_fails",
+             {{"enum", {"end", "go_on"}}, {"default", "end"}, {"description", "what follows a failed pass"}}}}},
+          {"allOf", conditions}};
+}
+
+/// The parts that a pipeline and the body of a repetition have in common.
+Json common_parts() {
   const Json input = {
       {"type", "object"},
       {"additionalProperties", false},
@@ -118,43 +122,91 @@ Json pipeline_schema(const Catalogue& catalogue) {
          {{"type", {"string", "number", "boolean"}},
           {"description", "its value if none is given; without it, one must be given"}}},
         {"help", {{"type", "string"}, {"description", "what it means, for those who give it"}}}}}};
-  const Json inputs = {{"type", "object"},
-                       {"description", "values that are given on the command line as name=value; $name stands for one"},
-                       {"additionalProperties", input}};
-  const Json nodes = {{"type", "object"},
-                      {"description", "the nodes by their names, in any order"},
-                      {"additionalProperties", {{"$ref", "#/definitions/node"}}}};
-  const Json outputs = {{"type", "object"},
-                        {"description", "what is computed and written: name of the output, and node or node.output"},
-                        {"additionalProperties", place}};
+  return {{"inputs",
+           {{"type", "object"},
+            {"description", "values that are given on the command line as name=value; $name stands for one"},
+            {"additionalProperties", input}}},
+          {"nodes",
+           {{"type", "object"},
+            {"description", "the nodes by their names, in any order"},
+            {"additionalProperties", reference_to("node")}}},
+          {"outputs",
+           {{"type", "object"},
+            {"description", "what is computed and written: name of the output, and node or node.output"},
+            {"additionalProperties", {{"type", "string"}}}}}};
+}
+
+Json definitions(const Catalogue& catalogue) {
+  const Json text = {{"type", "string"}};
+  Json all = {{"node", any_node_schema(catalogue)},
+              {"body",
+               {{"type", "object"},
+                {"required", {"nodes", "outputs"}},
+                {"additionalProperties", false},
+                {"properties", common_parts()}}},
+              // An option's value may be the name of an input of the pipeline, whatever the option's type.
+              {"name_of_input", {{"type", "string"}, {"pattern", "\\$"}}},
+              {"wire", {{"anyOf", {text, {{"type", "array"}, {"items", text}}}}}}};
+  for (const std::string& kind : catalogue.kind_names())
+    all[inputs_of(kind)] = inputs_schema(catalogue.ports_of_kind(kind));
+  return all;
+}
+
+Json pipeline_schema(const Catalogue& catalogue) {
+  Json properties = {
+      {"marrow", {{"const", 1}, {"description", "version of the format"}}},
+      {"name",
+       {{"type", "string"}, {"description", "of the folder that a run writes, runs/NAME (default: the file's name)"}}},
+      {"help", {{"type", "string"}, {"description", "what the pipeline does, and for which data"}}},
+      {"only_inside",
+       {{"type", "boolean"},
+        {"description", "no command runs it, but the program itself, so no file need hold its outputs"}}}};
+  properties.update(common_parts());
   return {{"$schema", "http://json-schema.org/draft-07/schema#"},
           {"title", "marrow pipeline"},
           {"type", "object"},
           {"required", {"marrow", "nodes", "outputs"}},
           {"additionalProperties", false},
-          {"definitions",
-           {{"node", node},
-            {"body",
-             {{"type", "object"},
-              {"required", {"nodes", "outputs"}},
-              {"additionalProperties", false},
-              {"properties", {{"inputs", inputs}, {"nodes", nodes}, {"outputs", outputs}}}}}}},
-          {"properties",
-           {{"marrow", {{"const", 1}, {"description", "version of the format"}}},
-            {"name",
-             {{"type", "string"},
-              {"description", "of the folder that a run writes, runs/NAME (default: the file's name)"}}},
-            {"help", {{"type", "string"}, {"description", "what the pipeline does, and for which data"}}},
-            {"only_inside",
-             {{"type", "boolean"},
-              {"description", "no command runs it, but the program itself, so no file need hold its outputs"}}},
-            {"inputs", inputs},
-            {"nodes", nodes},
-            {"outputs", outputs}}}};
+          {"properties", properties},
+          {"definitions", definitions(catalogue)}};
+}
+
+std::string on_one_line(const Json& value) {
+  if (!value.is_structured()) return value.dump();
+  std::string text;
+  for (const auto& [name, member] : value.items()) {
+    text += text.empty() ? "" : ", ";
+    text += (value.is_object() ? Json(name).dump() + ": " : "") + on_one_line(member);
+  }
+  return value.is_object() ? "{" + text + "}" : "[" + text + "]";
+}
+
+/// What fits into the line stands on it. Of what does not, each map and whatever no longer fits begins a line. A text
+/// is not broken, so a long description makes a long line.
+std::string laid_out(const Json& value, const std::string& margin, std::size_t column) {
+  constexpr std::size_t columns = 114;  // of 120: more brackets may close at the end
+  const std::string line = on_one_line(value);
+  if (!value.is_structured() || column + line.size() < columns) return line;
+  std::string text(1, line.front());
+  ++column;
+  const std::string inner = margin + " ";
+  for (const auto& [name, member] : value.items()) {
+    const std::string start = value.is_object() ? Json(name).dump() + ": " : "";
+    const bool goes_on = !member.is_object() && column + start.size() + on_one_line(member).size() < columns;
+    if (text.size() > 1) text += goes_on ? ", " : ",";
+    if (!goes_on) {
+      text += "\n" + inner;
+      column = inner.size();
+    }
+    const std::string told = laid_out(member, inner, column + start.size());
+    text += start + told;
+    column = told.find('\n') == std::string::npos ? column + start.size() + told.size() + 2 : columns;
+  }
+  return text + line.back();
 }
 
 int schema(const std::filesystem::path& file) {
-  const std::string text = pipeline_schema(Catalogue()).dump(1) + "\n";
+  const std::string text = laid_out(pipeline_schema(Catalogue()), "", 0) + "\n";
   if (file.empty()) {
     std::fputs(text.c_str(), stdout);
     return 0;

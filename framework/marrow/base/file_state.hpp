@@ -6,9 +6,10 @@
 #include <filesystem>
 #include <optional>
 
+#include "marrow/base/export.hpp"
 #include "marrow/base/hash.hpp"
 
-namespace marrow {
+namespace MARROW_EXPORT_TO_TESTS marrow {
 
 /// What distinguishes two states of a file. A write changes the time of the file's last change, which no program can
 /// set. If the file is mapped into memory, only the first write after write_back() changes it.

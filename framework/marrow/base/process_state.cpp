@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <fstream>
 #include <locale>
 #include <map>
@@ -22,12 +23,35 @@
 #include "marrow/base/descriptor.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/thread_state.hpp"
-#include "marrow/base/working_folder.hpp"
 
 namespace marrow {
 
 /// They have a name because ProcessState::Parts, which is known outside of this file, holds them.
 namespace process_parts {
+
+/// The folder at which all relative paths start. If a plugin's library changed it, inputs would be read and results
+/// written in the wrong place.
+class WorkingFolder {
+ public:
+  WorkingFolder() {
+    if (descriptor_.is_open() && fstat(descriptor_, &status_) != 0) descriptor_.close();
+  }
+  /// Returns the folder in which the process was; empty if it had not changed.
+  std::string go_back() const {
+    struct stat now {};
+    if (!descriptor_.is_open() ||
+        (stat(".", &now) == 0 && now.st_dev == status_.st_dev && now.st_ino == status_.st_ino))
+      return "";
+    std::error_code error;
+    const std::filesystem::path elsewhere = std::filesystem::current_path(error);
+    if (fchdir(descriptor_) != 0) return "";
+    return error ? "a folder that is gone" : elsewhere.string();
+  }
+
+ private:
+  Descriptor descriptor_{open(".", O_PATH | O_DIRECTORY | O_CLOEXEC)};
+  struct stat status_ {};
+};
 
 /// The locale of C and that of C++, which decide how numbers are written and read.
 class Locale {

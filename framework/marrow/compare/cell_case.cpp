@@ -3,6 +3,7 @@
 #include "cell_fault.hpp"
 #include "cell_key.hpp"
 #include "marrow/base/folder_use.hpp"
+#include "marrow/base/temporary_folder.hpp"
 #include "marrow/base/text_file.hpp"
 #include "marrow/compare/cell.hpp"
 #include "marrow/runtime/run/keys.hpp"
@@ -31,18 +32,6 @@ bool is_whole_case(const fs::path& folder, const fs::path& outputs) {
     return false;
   }
 }
-
-/// A temporary folder. It is removed at the end, unless it was renamed before.
-struct TemporaryFolder {
-  explicit TemporaryFolder(const fs::path& final) : path(new_folder_beside(final)) {}
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  fs::path path;
-};
 
 }  // namespace
 
@@ -73,9 +62,9 @@ void CellRunner::make_case(std::size_t index, const fs::path& folder) const {
   const auto key = digest_of_hex(folder.filename().string());
   if (!shared || !key || !store_->prepare().empty()) return simulate(index, folder);
   const auto take_shared = [&](SharedLook look) {
-    const TemporaryFolder temporary(folder);
-    const bool is_there = shared->fetch_case(*key, temporary.path, look);
-    if (is_there) put_case(index, temporary.path, folder);
+    const TemporaryFolder temporary(new_folder_beside(folder));
+    const bool is_there = shared->fetch_case(*key, temporary.path(), look);
+    if (is_there) put_case(index, temporary.path(), folder);
     return is_there;
   };
   if (take_shared(SharedLook::quick)) return;
@@ -102,14 +91,14 @@ void CellRunner::simulate(std::size_t index, const fs::path& folder) const {
   if (states_of_files(pipeline) != states || case_folder_of(place_of_simulated(index, Look::anew)) != folder)
     throw Error("case '" + one.name +
                 "' cannot be simulated: what it is made from was changed meanwhile; run it again");
-  const TemporaryFolder temporary(folder);
-  RunFolder written(temporary.path, pipeline);
+  const TemporaryFolder temporary(new_folder_beside(folder));
+  RunFolder written(temporary.path(), pipeline);
   for (const RunFolder::Written& output : written.write_outputs(pipeline, result, catalogue_))
     if (const std::string fault = output.fault + output.absent; !fault.empty())
       throw Error("case '" + one.name + "' cannot be written: " + fault);
   const fs::path outputs = fs::path("outputs") / experiment_.simulation.output;
-  write_text_file(temporary.path / "content.txt", content_of_case(temporary.path / outputs) + "\n");
-  put_case(index, temporary.path, folder);
+  write_text_file(temporary.path() / "content.txt", content_of_case(temporary.path() / outputs) + "\n");
+  put_case(index, temporary.path(), folder);
 }
 
 void CellRunner::put_case(std::size_t index, const fs::path& made, const fs::path& folder) const {
@@ -117,8 +106,8 @@ void CellRunner::put_case(std::size_t index, const fs::path& made, const fs::pat
   std::error_code error;
   fs::rename(made, folder, error);
   if (!error || is_whole_case(folder, outputs)) return;  // another process may have been quicker
-  const TemporaryFolder damaged(folder);
-  fs::rename(folder, damaged.path, error);
+  const TemporaryFolder damaged(new_folder_beside(folder));
+  fs::rename(folder, damaged.path(), error);
   fs::rename(made, folder, error);
   if (!is_whole_case(folder, outputs))
     throw Error("case '" + experiment_.cases[index].name + "' cannot be written to " + folder.string() + ": " +

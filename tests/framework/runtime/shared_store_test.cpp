@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The store that hosts share: what is kept there, who may read it, and what its faults do.
 #include "marrow/runtime/store/shared_store.hpp"
+#include "marrow/runtime/store/shared_claim.hpp"
+#include "marrow/runtime/store/shared_folder.hpp"
 
 #include <sys/stat.h>
 #include <sys/wait.h>

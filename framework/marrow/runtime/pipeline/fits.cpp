@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "marrow/base/printable.hpp"
-#include "marrow/runtime/pipeline/pipeline_trial.hpp"
 #include "marrow/runtime/plugins/contract.hpp"
 
 namespace marrow {

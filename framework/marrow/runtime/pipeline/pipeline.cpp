@@ -20,7 +20,6 @@
 #include "marrow/runtime/pipeline/pipeline_repetition.hpp"
 #include "marrow/runtime/pipeline/pipeline_replaced.hpp"
 #include "marrow/runtime/pipeline/pipeline_text.hpp"
-#include "marrow/runtime/pipeline/pipeline_trial.hpp"
 #include "marrow/runtime/pipeline/renamed.hpp"
 #include "marrow/runtime/plugins/contract.hpp"
 

@@ -118,6 +118,12 @@ struct PipelineArguments {
 Pipeline read_pipeline(const std::filesystem::path& file, const PipelineArguments& arguments,
                        const Catalogue& catalogue, Diagnostics& diagnostics, bool inputs_required = true);
 
+/// The same, for a caller that tries many changes of one file and wants to know what is wrong with each, but not what
+/// to do about it: no hint names nodes that would fit, because finding them means to check the pipeline with each other
+/// node. Inputs without a default may have no value.
+Pipeline try_pipeline(const std::filesystem::path& file, const PipelineArguments& arguments, const Catalogue& catalogue,
+                      Diagnostics& diagnostics);
+
 /// The pipeline as YAML, with the values of all options. Reading it gives the same pipeline.
 std::string resolved_yaml(const Pipeline& pipeline);
 

@@ -8,9 +8,10 @@
 #include <functional>
 #include <string>
 
+#include "marrow/base/export.hpp"
 #include "marrow/runtime/store/store_file.hpp"
 
-namespace marrow {
+namespace MARROW_EXPORT_TO_TESTS marrow {
 
 struct SharedFolderState {
   bool is_store = false;

@@ -12,9 +12,10 @@
 #include <vector>
 
 #include "marrow/base/descriptor.hpp"
+#include "marrow/base/export.hpp"
 #include "marrow/base/hash.hpp"
 
-namespace marrow {
+namespace MARROW_EXPORT_TO_TESTS marrow {
 
 /// What new files and folders of a store allow, with any umask. If a group is named, what is made allows it to no other
 /// group.
