@@ -1,5 +1,6 @@
-# Debian packages by CPack: marrow (program, plugins, pipelines), marrow-dev (headers, toolbox, CMake package),
-# marrow-cgal (the one node under the GPL), marrow-doc, python3-marrow. A package is a component of the installation.
+# Debian packages by CPack: marrow (program, plugins, pipelines), marrow-workbench (the program behind `marrow open`),
+# marrow-dev (headers, toolbox, CMake package), marrow-cgal (the one node under the GPL), marrow-doc, python3-marrow. A
+# package is a component of the installation.
 set(MARROW_MAINTAINER "$ENV{DEBFULLNAME} <$ENV{DEBEMAIL}>")
 if(NOT DEFINED ENV{DEBEMAIL})
   set(MARROW_MAINTAINER "The marrow developers <marrow@marrow.invalid>")
@@ -13,7 +14,7 @@ set(CPACK_STRIP_FILES ON)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE
   WORLD_READ WORLD_EXECUTE)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
-set(CPACK_COMPONENTS_ALL marrow marrow-dev marrow-cgal marrow-doc)
+set(CPACK_COMPONENTS_ALL marrow marrow-workbench marrow-dev marrow-cgal marrow-doc)
 if(MARROW_PYTHON)
   list(APPEND CPACK_COMPONENTS_ALL python3-marrow)
 endif()
@@ -64,6 +65,9 @@ marrow_debian_package(marrow science "finds the 3D pose of bones in X-ray images
 registration) for research in image-guided and robotic surgery. Every step
 is a plugin, and a YAML file wires the plugins. Variants are compared side by
 side.")
+marrow_debian_package(marrow-workbench science "workbench of marrow in the browser"
+"The program behind `marrow open`: cases are made, bones placed, pipelines
+edited and results looked at in the browser.")
 marrow_debian_package(marrow-dev libdevel "files to write plugins for marrow"
 "Headers, the toolbox of static libraries, and the CMake package by which a
 plugin of your own is built.")
@@ -106,7 +110,9 @@ file(WRITE ${PROJECT_BINARY_DIR}/debian/overrides/marrow
 install(FILES ${PROJECT_BINARY_DIR}/debian/overrides/marrow DESTINATION ${CMAKE_INSTALL_DATADIR}/lintian/overrides
   EXCLUDE_FROM_ALL)
 set(CPACK_DEBIAN_MARROW-CGAL_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_MARROW_PACKAGE_RECOMMENDS "libjs-three")
+set(CPACK_DEBIAN_MARROW_PACKAGE_RECOMMENDS "marrow-workbench, libjs-three")
+set(CPACK_DEBIAN_MARROW-WORKBENCH_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_MARROW-WORKBENCH_PACKAGE_DEPENDS "marrow (= ${PROJECT_VERSION})")
 set(CPACK_DEBIAN_MARROW-CGAL_PACKAGE_DEPENDS "marrow (= ${PROJECT_VERSION})")
 set(CPACK_DEBIAN_MARROW-DEV_PACKAGE_DEPENDS
   "marrow (= ${PROJECT_VERSION}), g++, cmake, libeigen3-dev, libfmt-dev, libopencv-dev, libtbb-dev")

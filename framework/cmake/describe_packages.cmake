@@ -4,7 +4,7 @@ set(packages ${CPACK_TEMPORARY_DIRECTORY})
 set(MARROW_ROOT ${packages}/marrow/usr)
 set(MARROW_LIBRARIES ${CPACK_MARROW_LIBRARIES})
 set(plugins ${MARROW_LIBRARIES}/marrow)
-file(GLOB programs ${MARROW_ROOT}/bin/marrow ${MARROW_ROOT}/${MARROW_LIBRARIES}/libmarrow*.so.*.*.*
+file(GLOB programs ${packages}/*/usr/bin/marrow* ${MARROW_ROOT}/${MARROW_LIBRARIES}/libmarrow*.so.*.*.*
   ${MARROW_ROOT}/${plugins}/marrow-worker ${packages}/*/usr/${plugins}/*.so
   ${packages}/*/usr/lib/python3/dist-packages/marrow/*.so)
 foreach(program IN LISTS programs)

@@ -217,12 +217,12 @@ class Cpp(Documents):
         self.assertIn("shipped::call", calls)
         file = self.folder / "pieces.cpp"
         file.write_text(AROUND % (calls, declarations))
-        digest = next(BUILD.rglob("marrow/runtime/headers_digest.hpp")).parent.parent.parent
+        digest = BUILD / "include"
         flags = [
             "-std=c++20",
             "-fsyntax-only",
             "-I",
-            SOURCE / "framework/include",
+            SOURCE / "framework",
             "-I",
             digest,
             "-I",

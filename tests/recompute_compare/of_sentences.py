@@ -154,16 +154,15 @@ def check_look(checks, text, look, label, unit, baseline, look_every, alpha):
     is_last = look["look"] == look["looks"]
     end = "the rule says stop" if look["is_met"] else "this was the last look" if is_last else "--more-cases goes on"
     checks.that(kind, "end", "; " + end in text, text)
-    meaning = r"(\S+) to (\S+)%s, which holds with %g %% confidence over all looks" % (
-        re.escape(with_unit),
-        100 * (1 - alpha),
-    )
-    found = re.search(meaning, text)
-    is_known = look["low"] is not None and look["high"] is not None
-    checks.same(kind, "has an interval", found is not None, is_known)
-    if found:
-        checks.shown(kind, "low", found[1], look["low"])
-        checks.shown(kind, "high", found[2], look["high"])
+    bound = r"(a failure|\S+?)(?:%s)?" % re.escape(with_unit)  # of a difference, one bound may be a failure
+    found = re.search(bound + " to " + bound + ", which holds with %g %% confidence over" % (100 * (1 - alpha)), text)
+    known = [look[name] is not None for name in ("low", "high")]
+    checks.same(kind, "has an interval", found is not None, any(known) if "p" in look else all(known))
+    for shown, name in zip(found.groups() if found else (), ("low", "high")):
+        if look[name] is None:
+            checks.same(kind, name, shown, "a failure")
+        else:
+            checks.shown(kind, name, shown, look[name])
     if "p" in look:
         verb = "differs from" if look["is_met"] else "is not shown to differ from"
         start = "%s %s %s in %s: p = " % (look["variant"], verb, baseline, label)
@@ -173,7 +172,7 @@ def check_look(checks, text, look, label, unit, baseline, look_every, alpha):
         checks.shown(kind, "p", said[1] if said else "", look["p"])
         return
     width = re.search(r"is (\S+)%s wide, (not more|more) than (\S+?)%s" % ((re.escape(with_unit),) * 2), text)
-    checks.same(kind, "has a width", width is not None, is_known)
+    checks.same(kind, "has a width", width is not None, all(known))
     if width:
         checks.shown(kind, "width", width[1], look["high"] - look["low"])
         checks.same(kind, "met", width[2] == "not more", look["is_met"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who may include whom: docs/architecture.md names the layers, this holds them apart."""
+"""Who may include whom: docs/architecture.md names the layers and the rooms, this holds them apart."""
 import pathlib
 import re
 import unittest
@@ -7,67 +7,112 @@ import unittest
 from harness import SOURCE
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]', re.M)
-# What a layer may include besides itself. A plugin may also include its own folder, a topic those named in TOPICS.
-LAYERS = {
-    "domain": {"domain"},
-    "runtime": {"domain", "runtime"},
-    "testing": {"domain", "runtime"},
-    "compare": {"domain", "runtime", "compare"},
-    "toolbox": {"domain", "runtime"},
-    "plugins": {"domain", "runtime", "toolbox"},
-    "tools": {"domain", "runtime", "compare", "toolbox", "tools"},
-    "python": {"domain", "runtime", "compare", "python"},
-}
+# The rooms of the framework. Each stands only on those before it.
+ROOMS = """
+    base domain runtime/node runtime/process runtime/plugins runtime/pipeline runtime/store runtime/run compare
+""".split()
+# The topics of the toolbox on which a topic stands.
 TOPICS = {
-    "analytic": {"image"},
     "calibration": {"files"},
     "draw": {"image"},
     "exchange": {"files"},
     "match": {"image"},
     "phantom": {"calibration", "files"},
-    "shaft": {"image"},
     "track": {"files"},
+}
+# A part of tools may include those named here, besides itself.
+TOOLS = {"marrow": {"report"}, "report": {"marrow"}, "workbench": {"marrow", "report"}}
+HEAVY = re.compile(r"^(yaml-cpp|spdlog|pcl|CGAL|vtk|itk|nlopt)")
+# Public headers that need such a library, because their reader gives its values.
+NEED_IT = {
+    "framework/marrow/base/strict_yaml.hpp",
+    "framework/marrow/base/yaml.hpp",
+    "plugins/optimizer/library/nlopt_run.hpp",
+    "plugins/toolbox/files/yaml_text.hpp",
+    "plugins/toolbox/vtk/poly_data.hpp",
 }
 
 
-def folder_of(path):
-    """(layer, topic or kind) of a file, given by its path from the source folder."""
+def listed(text, pattern):
+    """Groups of a CMake call that name headers: (what stands before them, the headers)."""
+    for before, names in re.findall(pattern, text):
+        yield before, re.findall(r"[a-z_0-9]+\.hpp", names)
+
+
+def public_headers():
+    """The paths of all headers that CMake's FILE_SETs list."""
+    found = set()
+    for file in ("framework/CMakeLists.txt", "framework/marrow/compare/CMakeLists.txt"):
+        text = (SOURCE / file).read_text()
+        for room, names in listed(text, r"marrow_public_headers\(marrow\w* (\S+) ([^)]*)\)"):
+            found |= {pathlib.Path("framework/marrow", room, name) for name in names}
+    for file in SOURCE.glob("plugins/*/CMakeLists.txt"):
+        text = file.read_text()
+        for folder, names in listed(text, r"marrow_add_library\(\w+ FOLDER (\S+)[^)]*?HEADERS ([^)]*)\)"):
+            below = folder if folder.startswith("toolbox/") else folder + "/library"
+            found |= {pathlib.Path("plugins", below, name) for name in names}
+    return found
+
+
+PUBLIC = public_headers()
+
+
+def home_of(path):
+    """(layer, part): a room of the framework, a topic, a kind or a part of tools. None for what belongs to none."""
     parts = path.parts
-    if {"template", "templates"} & set(parts):  # what a new node or kind begins with
-        return ("tests", "")
-    if parts[:3] == ("framework", "include", "marrow"):
-        parts = ("framework",) + (parts[3:] if len(parts) > 4 else ("runtime",))
+    if {"template", "templates"} & set(parts) or path.parts[0] not in ("framework", "plugins", "tools", "python"):
+        return None  # what a new node or kind begins with
     if parts[0] == "framework":
-        return (parts[1], parts[2] if parts[1] == "toolbox" else "")
-    return ("plugins", parts[1]) if parts[0] == "plugins" else (parts[0], "")
+        inside = "/".join(parts[2:-1])
+        return ("framework", inside) if inside in ROOMS else None  # the others collect headers for plugins and tests
+    if parts[:2] == ("plugins", "toolbox"):
+        return ("toolbox", parts[2])
+    return (parts[0], parts[1])
 
 
 def included(path, name):
     """The file of this project that an include names, or None."""
-    for base in (path.parent, pathlib.Path("framework/include"), pathlib.Path("."), pathlib.Path("framework")):
-        candidate = pathlib.Path(base, name)
-        if (SOURCE / candidate).is_file():
-            return pathlib.Path((SOURCE / candidate).resolve()).relative_to(SOURCE.resolve())
+    places = [path.parent / name, "framework/" + name, name, "tools/" + name, "tools/marrow/" + name]
+    if match := re.fullmatch(r"marrow/(toolbox/.+)", name):
+        places.append("plugins/" + match[1])
+    if match := re.fullmatch(r"marrow/(\w+)/(\w+\.hpp)", name):
+        places.append("plugins/%s/library/%s" % match.groups())
+    for place in places:
+        if (SOURCE / place).is_file():
+            return (SOURCE / place).resolve().relative_to(SOURCE.resolve())
     return None
 
 
 def fault(path, other):
     """Why the first may not include the second, or None."""
-    (layer, part), (other_layer, other_part) = folder_of(path), folder_of(other)
-    if layer not in LAYERS or (layer, part) == (other_layer, other_part):
+    here, there = home_of(path), home_of(other)
+    if here is None or there is None or here == there:
         return None
-    if layer == other_layer == "toolbox":
-        return None if other_part in TOPICS.get(part, ()) else "topic %s does not build on %s" % (part, other_part)
-    if layer == other_layer == "plugins":
-        return "a node of the kind %s may not use files of the kind %s: share them in the toolbox" % (part, other_part)
-    return None if other_layer in LAYERS[layer] else "%s may not include %s" % (layer, other_layer)
+    if here[0] == there[0] == "framework":
+        return "%s may not include %s, which stands on it" % (here[1], there[1]) if above(here, there) else None
+    if here[0] == there[0] == "toolbox":
+        return None if there[1] in TOPICS.get(here[1], ()) else "topic %s does not build on %s" % (here[1], there[1])
+    if here[0] == there[0] == "plugins":
+        return "a node of the kind %s may not use files of the kind %s: share them in the toolbox" % (here[1], there[1])
+    if here[0] == there[0] == "tools":
+        return None if there[1] in TOOLS.get(here[1], ()) else "%s may not include %s" % (here[1], there[1])
+    may = {"framework": (), "toolbox": ("framework",), "python": ("framework",)}
+    if there[0] not in may.get(here[0], ("framework", "toolbox")):
+        return "%s may not include %s" % (here[0], there[0])
+    if there[1] == "compare" and here[0] in ("toolbox", "plugins"):
+        return "%s may not include compare" % here[0]
+    return None if other in PUBLIC else "%s is private" % other
+
+
+def above(here, there):
+    return ROOMS.index(there[1]) > ROOMS.index(here[1])
 
 
 class Layers(unittest.TestCase):
     def test_each_layer_includes_only_what_lies_below(self):
         faults, seen = [], 0
-        for pattern in ("framework", "plugins", "tools", "python"):
-            for file in sorted((SOURCE / pattern).rglob("*.?pp")):
+        for layer in ("framework", "plugins", "tools", "python"):
+            for file in sorted((SOURCE / layer).rglob("*.?pp")):
                 path = file.relative_to(SOURCE)
                 for name in INCLUDE.findall(file.read_text()):
                     other = included(path, name)
@@ -75,24 +120,41 @@ class Layers(unittest.TestCase):
                     why = other and fault(path, other)
                     if why:
                         faults.append("%s includes %s: %s" % (path, other, why))
-        self.assertGreater(seen, 1000)
+        self.assertGreater(seen, 3000)
+        self.assertEqual(faults, [])
+
+    def test_a_public_header_needs_public_headers_only(self):
+        self.assertGreater(len(PUBLIC), 200)
+        faults = []
+        for path in sorted(PUBLIC):
+            for name in INCLUDE.findall((SOURCE / path).read_text()):
+                other = included(path, name)
+                if other and other not in PUBLIC:
+                    faults.append("%s includes %s, which is private" % (path, other))
+                if HEAVY.match(name) and str(path) not in NEED_IT:
+                    faults.append("%s includes <%s>: only sources may" % (path, name))
         self.assertEqual(faults, [])
 
     def test_what_is_wrong_is_found(self):
         path = pathlib.Path
-        self.assertIn("share them", fault(path("plugins/camera/a.cpp"), path("plugins/read/b.hpp")))
-        self.assertIn("may not include compare", fault(path("plugins/camera/a.cpp"), path("framework/compare/b.hpp")))
-        self.assertIn("may not include runtime", fault(path("framework/domain/a.cpp"), path("framework/runtime/b.hpp")))
+
+        def between(one, other):
+            return fault(path(one), path(other))
+
+        self.assertIn("share them", between("plugins/camera/a.cpp", "plugins/read/library/b.hpp"))
+        self.assertIn("stands on it", between("framework/marrow/domain/a.cpp", "framework/marrow/runtime/node/b.hpp"))
         self.assertIn(
-            "does not build on",
-            fault(path("framework/toolbox/files/a.cpp"), path("framework/include/marrow/toolbox/image/b.hpp")),
+            "stands on it", between("framework/marrow/runtime/plugins/a.cpp", "framework/marrow/runtime/run/b.hpp")
         )
-        self.assertIn(
-            "may not include toolbox",
-            fault(path("python/bindings/a.cpp"), path("framework/include/marrow/toolbox/image/b.hpp")),
-        )
-        self.assertIsNone(fault(path("framework/toolbox/files/a.cpp"), path("framework/toolbox/files/b.hpp")))
-        self.assertIsNone(fault(path("plugins/camera/a.cpp"), path("framework/marrow/plugin.hpp")))
+        self.assertIn("may not include compare", between("plugins/camera/a.cpp", "framework/marrow/compare/cell.hpp"))
+        self.assertIn("does not build on", between("plugins/toolbox/files/a.cpp", "plugins/toolbox/image/b.hpp"))
+        self.assertIn("may not include plugins", between("plugins/toolbox/files/a.cpp", "plugins/read/b.hpp"))
+        self.assertIn("may not include toolbox", between("python/bindings/a.cpp", "plugins/toolbox/image/b.hpp"))
+        self.assertIn("is private", between("tools/marrow/a.cpp", "framework/marrow/runtime/store/store_file.hpp"))
+        self.assertIn("may not include workbench", between("tools/marrow/a.cpp", "tools/workbench/open.hpp"))
+        self.assertIsNone(between("plugins/toolbox/files/a.cpp", "plugins/toolbox/files/b.hpp"))
+        self.assertIsNone(between("plugins/camera/a.cpp", "framework/marrow/plugin.hpp"))
+        self.assertIsNone(between("framework/marrow/runtime/run/a.cpp", "framework/marrow/runtime/store/store.hpp"))
 
 
 if __name__ == "__main__":

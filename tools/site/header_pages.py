@@ -4,6 +4,7 @@
 A comment that stands by itself, and what follows it up to the next such comment, make an entry. Comments at the end of
 a line, and those inside a type, stay where they are in the code.
 """
+import pathlib
 import re
 
 from markdown import ORPHAN, block, plain, sections, table
@@ -82,9 +83,19 @@ def header_page(path, text):
 
 
 def headers(root):
-    """{path from include/marrow: text} of all public headers."""
-    base = root / "framework" / "include" / "marrow"
-    return {path.relative_to(base): path.read_text() for path in sorted(base.rglob("*.hpp"))}
+    """{path as it is included, without marrow/: text} of all headers that CMake's lists call public."""
+    found = {}
+    for file in sorted([root / "framework/CMakeLists.txt", root / "framework/marrow/compare/CMakeLists.txt"]):
+        for room, names in re.findall(r"marrow_public_headers\(marrow\w* (\S+) ([^)]*)\)", file.read_text()):
+            for name in names.split():
+                found[pathlib.Path(room, name)] = root / "framework/marrow" / room / name
+    for file in sorted(root.glob("plugins/*/CMakeLists.txt")):
+        pattern = r"marrow_add_library\(\w+ FOLDER (\S+)[^)]*?HEADERS ([^)]*)\)"
+        for folder, names in re.findall(pattern, file.read_text()):
+            below = folder if folder.startswith("toolbox/") else folder + "/library"
+            for name in re.findall(r"[a-z_0-9]+\.hpp", names):
+                found[pathlib.Path(folder, name)] = root / "plugins" / below / name
+    return {path: found[path].read_text() for path in sorted(found)}
 
 
 def page_of(path):

@@ -56,7 +56,7 @@ class Names:
             for path in self.root.glob(pattern):
                 if path.is_file() and path.suffix in (".hpp", ".cpp", ".cmake", "", ".js"):
                     self.words |= set(declared_in(path))
-        for path in [*self.root.glob("framework/runtime/*.*"), *self.root.glob("framework/cmake/*")]:
+        for path in [*self.root.glob("framework/marrow/runtime/**/*.*"), *self.root.glob("framework/cmake/*")]:
             self.words |= set(re.findall(r"\w+", path.read_text()))  # it knows no node, so no option either
         for part in ("docs", "framework", "pipelines", "plugins", "schemas", "tests", "tools"):
             for path in (self.root / part).rglob("*"):

@@ -16,7 +16,8 @@ from graph import Graph
 
 # For each folder, the tests near it, by the beginnings of their names. A GoogleTest suite is named program.suite.
 NEAR = {
-    "framework/domain": [
+    "framework/marrow/base": ["domain.", "runtime", "cli_bad", "cli_ca", "cli_na", "faults_"],
+    "framework/marrow/domain": [
         "domain.",
         "fracture.",
         "evaluate.",
@@ -27,7 +28,7 @@ NEAR = {
         "initial.",
         "runtime",
     ],
-    "framework/runtime": [
+    "framework/marrow/runtime": [
         "runtime",
         "domain.",
         "compare.",
@@ -45,7 +46,7 @@ NEAR = {
         "cli_w",
         "conformance_optimizer",
     ],
-    "framework/compare": ["compare.", "compare_", "cli_compare", "cli_commands"],
+    "framework/marrow/compare": ["compare.", "compare_", "cli_compare", "cli_commands"],
     "plugins/camera": ["camera.", "conformance_camera", "cli_schema"],
     "plugins/evaluate": ["evaluate.", "cli_schema"],
     "plugins/fracture": ["fracture.", "evaluate.", "cli_schema"],

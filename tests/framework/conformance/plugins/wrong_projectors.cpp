@@ -150,7 +150,7 @@ MARROW_PLUGIN(plugin) {
   const auto add_outline = [&](const char* name, auto* function) {
     plugin.node(name, function)
         .summary("For a test of the suite")
-        .in("mesh", "surface")
+        .in("model", "surface")
         .out("projector", "draws the outline");
   };
   add_outline("project.plain_outline", outline<Fault::none>);
