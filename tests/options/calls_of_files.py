@@ -10,7 +10,7 @@ def calls(s):
     def at(name):
         return str(written() / name)
 
-    size = dict(size_px=[96, 96])
+    size = dict(image_size_px=[96, 96])
     return {
         "read.camera": lambda: ({}, {"path": at("matrix.txt"), **size}),
         "read.cameras": lambda: (

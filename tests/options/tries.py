@@ -138,7 +138,7 @@ for _node in (
 ):
     TRIES[_node + ".moved"] = one(reference="distal", to="proximal")
     TRIES[_node + ".reference"] = one(to="nobody")
-for _node in ("simulate.hexapod", "simulate.photograph", "robot.hexapod"):
+for _node in ("simulate.hexapod", "simulate.photograph"):
     TRIES[_node + ".fragment"] = one(to="proximal")
 TRIES["robot.hexapod.moved"] = one(reference="distal", to="proximal")
 TRIES["robot.hexapod.reference"] = one(to="nobody")
