@@ -21,7 +21,7 @@ const Chain& chain() {
   static const Chain made = [] {
     Chain result;
     result.phantom = simulated::fracture(simulated::femur({{"resolution_mm", 2.0}}, 11),
-                                         {{"level", 0.3}, {"rotation_deg", std::vector<double>{0, 0, 8}}});
+                                         {{"height_fraction", 0.3}, {"rotation_deg", std::vector<double>{0, 0, 8}}});
     result.ct = simulated::ct(
         result.phantom, {{"spacing_mm", std::vector<double>{1.2, 1.2, 1.5}}, {"range_mm", std::vector<double>{0, 250}}},
         11);

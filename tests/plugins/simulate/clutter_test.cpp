@@ -362,8 +362,8 @@ TEST(SimulateClutter, APlateWithoutRoomIsLeftOutWithAWarning) {
   std::vector<std::string> warnings;
   Context::Hooks hooks;
   hooks.log = [&](std::string_view line, LogLevel) { warnings.emplace_back(line); };
-  const Phantom low =
-      simulated::fracture(simulated::femur({{"resolution_mm", 2.0}}), {{"level", 0.12}, {"obliquity_deg", 0.0}});
+  const Phantom low = simulated::fracture(simulated::femur({{"resolution_mm", 2.0}}),
+                                          {{"height_fraction", 0.12}, {"obliquity_deg", 0.0}});
   const auto phantom = shipped::call("simulate.clutter", {{"phantom", shipped::item(low)}},
                                      {{"plate", std::string("bad")}}, Context(hooks))
                            .at("phantom")

@@ -122,7 +122,7 @@ TEST(SimulateExport, BadInputIsExplained) {
         lag);
   };
   EXPECT_EQ(refusal(even(100, 64, "lateral")),
-            "simulate.export: there is no earlier image of view 'frontal'; give 'earlier' the same views");
+            "simulate.export: there is no earlier image of view 'frontal'; give 'earlier_views' the same views");
   EXPECT_EQ(refusal(even(100, 32)), "simulate.export: the earlier image of view 'frontal' has another size");
 }
 

@@ -137,7 +137,7 @@ TEST(SimulateFracture, BadInputIsExplained) {
   EXPECT_EQ(marrow::test::message_of([] {
               simulated::fracture(shaft(), {{"height_fraction", 1.2}});
             }),
-            "simulate.fracture: the level 1.200000 must lie in 0.1 to 0.9 of the bone's length");
+            "simulate.fracture: the height_fraction 1.200000 must lie in 0.1 to 0.9 of the bone's length");
 }
 
 }  // namespace fracture_test

@@ -10,7 +10,7 @@ using namespace marrow;
 using phantom::Phantom;
 
 const Phantom& broken() {
-  static const Phantom made = simulated::fracture(simulated::femur({}), {{"level", 0.4}});
+  static const Phantom made = simulated::fracture(simulated::femur({}), {{"height_fraction", 0.4}});
   return made;
 }
 

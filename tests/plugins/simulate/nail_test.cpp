@@ -56,8 +56,9 @@ const std::vector<double> kNone{0, 0, 0};
 
 const ClutteredPhantom& femur() {
   static const ClutteredPhantom phantom{
-      simulated::fracture(simulated::femur({{"resolution_mm", 2.0}}),
-                          {{"level", 0.4}, {"rotation_deg", kNone}, {"translation_mm", kNone}, {"ct_gap_mm", kNone}}),
+      simulated::fracture(
+          simulated::femur({{"resolution_mm", 2.0}}),
+          {{"height_fraction", 0.4}, {"rotation_deg", kNone}, {"translation_mm", kNone}, {"ct_gap_mm", kNone}}),
       {},
       {}};
   return phantom;

@@ -116,7 +116,7 @@ TEST(Photograph, ABodyBehindTheCameraIsRefused) {
 }
 
 TEST(SimulatePhotograph, ShowsBoneClampAndPlatform) {
-  const auto broken = simulated::fracture(simulated::femur({}), {{"level", 0.4}});
+  const auto broken = simulated::fracture(simulated::femur({}), {{"height_fraction", 0.4}});
   const auto camera =
       shipped::call("simulate.camera_arm", {},
                     {{"width_px", std::int64_t(320)}, {"height_px", std::int64_t(240)}, {"focal_px", 400.0}});

@@ -5,8 +5,8 @@
 #include <cstring>
 #include <sstream>
 
-#include "tests/plugins/toolbox/exchange/values.hpp"
 #include "marrow/toolbox/exchange/written_files.hpp"
+#include "tests/plugins/toolbox/exchange/values.hpp"
 
 namespace plastimatch_test {
 
@@ -15,8 +15,8 @@ using marrow::exchange::PlastimatchFile;
 
 const std::filesystem::path kData = std::filesystem::path(MARROW_SOURCE_DIR) / "tests/plugins/toolbox/exchange/data";
 
-marrow::Camera read(const std::filesystem::path& path, std::vector<double> size_px = {120, 160}) {
-  return read_by<marrow::Camera>("read.camera", path, {{"image_size_px", std::move(size_px)}});
+marrow::Camera read(const std::filesystem::path& path, std::vector<double> image_size_px = {120, 160}) {
+  return read_by<marrow::Camera>("read.camera", path, {{"image_size_px", std::move(image_size_px)}});
 }
 
 // Written by: plastimatch drr --nrm "1 0 0" --vup "0 0 1" --sad 1000 --sid 1500 -r "120 160" -z "120 240" -c "50 70"
@@ -150,11 +150,12 @@ TEST(Plastimatch, DiagnosesFaults) {
       "c.txt: row 2 of its matrix is not that of Intrinsic times Extrinsic; one of them was changed: write it again");
   put(folder / "c.txt", good);
   EXPECT_REFUSED(read(folder / "c.txt", {}), "c.txt",
-                 "does not say how many pixels the image has; wire the image, or give size_px: [width, height]");
-  EXPECT_REFUSED(read(folder / "c.txt", {120}), "c.txt", "size_px: expected [width, height], got 1 numbers");
-  EXPECT_REFUSED(read(folder / "c.txt", {0, 160}), "c.txt", "size_px: expected 1 to 65536 pixels each way, got 0");
+                 "does not say how many pixels the image has; wire the image, or give image_size_px: [width, height]");
+  EXPECT_REFUSED(read(folder / "c.txt", {120}), "c.txt", "image_size_px: expected [width, height], got 1 numbers");
+  EXPECT_REFUSED(read(folder / "c.txt", {0, 160}), "c.txt",
+                 "image_size_px: expected 1 to 65536 pixels each way, got 0");
   EXPECT_REFUSED(read(folder / "c.txt", {120, 1e9}), "c.txt",
-                 "size_px: expected 1 to 65536 pixels each way, got 1000000");
+                 "image_size_px: expected 1 to 65536 pixels each way, got 1000000");
   const auto refusal = [&](const shipped::Options& options) {
     shipped::Options all = options;
     all["path"] = (folder / "c.txt").string();
@@ -188,8 +189,8 @@ TEST(Plastimatch, DiagnosesOptionsThatAFormatDoesNotNeed) {
     EXPECT_EQ(shipped::refusal("read.camera", {}, options),
               (folder / name).string() + ": " + said + " is not for this format of cameras; leave it out");
   };
-  expect("c.yaml", {"image_size_px", std::vector<double>{3, 4}}, "size_px");
-  expect("c.h5", {"image_size_px", std::vector<double>{3, 4}}, "size_px");
+  expect("c.yaml", {"image_size_px", std::vector<double>{3, 4}}, "image_size_px");
+  expect("c.h5", {"image_size_px", std::vector<double>{3, 4}}, "image_size_px");
   expect("c.h5", {"pixel_mm", std::vector<double>{1}}, "pixel_mm");
   expect("c.h5", {"corner_mm", std::vector<double>{0, 0}}, "corner_mm");
   expect("c.yaml", {"mirror", "upside_down"}, "mirror");

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "tests/plugins/toolbox/exchange/values.hpp"
 #include "marrow/toolbox/exchange/written_files.hpp"
 #include "marrow/toolbox/exchange/xreg_file.hpp"
+#include "tests/plugins/toolbox/exchange/values.hpp"
 
 namespace xreg_test {
 
@@ -67,9 +67,9 @@ TEST(Xreg, SeveralProjectionsAtOnce) {
   EXPECT_NE(refusal("projections", std::vector<double>{2, 0.5})
                 .find("projections: expected whole numbers from 0, got 0.500000"),
             std::string::npos);
-  EXPECT_NE(
-      refusal("size_px", std::vector<double>{2, 3}).find("says itself how large its images are; leave out size_px"),
-      std::string::npos);
+  EXPECT_NE(refusal("image_size_px", std::vector<double>{2, 3})
+                .find("says itself how large its images are; leave out image_size_px"),
+            std::string::npos);
   EXPECT_NE(shipped::refusal("read.cameras", {}, {{"path", "a.txt"}, {"names", std::vector<std::string>{"a"}}})
                 .find("a.txt: expected RTK's geometry (.xml) or xReg's projection data (.h5)"),
             std::string::npos);
