@@ -10,6 +10,7 @@ foreach(head ${heads})
   # Skipped is a suite of which no case passed and none failed: the list of failed ones would come last.
   string(APPEND text "add_test([==[${suite}]==] [==[${PROGRAM}]==] [==[--gtest_filter=${suite}.*]==])\n"
     "set_tests_properties([==[${suite}]==] PROPERTIES TIMEOUT 1200 LABELS ${LABEL}\n"
-    "  WORKING_DIRECTORY [==[${HERE}]==] SKIP_REGULAR_EXPRESSION [==[PASSED  . 0 tests.\n(.  SKIPPED [^\n]*\n)+\n*$]==])\n")
+    "  WORKING_DIRECTORY [==[${HERE}]==]
+  SKIP_REGULAR_EXPRESSION [==[PASSED  . 0 tests.\n(.  SKIPPED [^\n]*\n)+\n*$]==])\n")
 endforeach()
 file(WRITE ${FILE} "${text}")

@@ -1,5 +1,5 @@
-# marrow_add_library(NAME FOLDER folder SOURCES file.cpp ... HEADERS file.hpp ... [LINK library that its headers need ...]
-#   [NEEDS other library ...] [OBJECTS object library ...] [APART])
+# marrow_add_library(NAME FOLDER folder SOURCES file.cpp ... HEADERS file.hpp ... [LINK library that its headers need
+# ...] [NEEDS other library ...] [OBJECTS object library ...] [APART])
 #
 # A static library for nodes, installed as marrow::NAME: a topic of the toolbox, or what only one kind needs. HEADERS
 # are the public ones; FOLDER says how they are included: marrow/FOLDER/file.hpp. Without sources it is a library of

@@ -218,16 +218,7 @@ class Cpp(Documents):
         file = self.folder / "pieces.cpp"
         file.write_text(AROUND % (calls, declarations))
         digest = BUILD / "include"
-        flags = [
-            "-std=c++20",
-            "-fsyntax-only",
-            "-I",
-            SOURCE / "framework",
-            "-I",
-            digest,
-            "-I",
-            SOURCE / "tests",
-        ]
+        flags = ["-std=c++20", "-fsyntax-only", "-I", SOURCE / "framework", "-I", digest, "-I", SOURCE / "tests"]
         flags += ["-isystem", "/usr/include/eigen3", "-isystem", "/usr/include/opencv4"]
         result = self.run_here("c++", *flags, file)
         self.assertEqual(result.returncode, 0, result.stderr)

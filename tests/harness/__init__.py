@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What all tests in Python share: where things are. The modules beside it run the program, draw samples and show pages.
 
-A test is started with the folder tests/ in PYTHONPATH, as ctest does. MARROW_BUILD is the build folder (default: build).
+A test is started with the folder tests/ in PYTHONPATH, as ctest does. MARROW_BUILD is the build folder (default:
+build).
 """
 import importlib.util
 import os

@@ -78,7 +78,10 @@ def calls(s):
         "simulate.cluttered_ct": lambda: ({"phantom": s.plated}, {"spacing_mm": [3, 3, 4], "range_mm": [60, 260]}),
         "simulate.cluttered_fluoroscopy": lambda: ({"phantom": s.plated, "cameras": s.cameras}, {}),
         "simulate.ct": lambda: ({"phantom": s.phantom}, {"spacing_mm": [3, 3, 4], "range_mm": [0, 200]}),
-        "simulate.export": lambda: ({"views": s.views, "earlier_views": s.earlier}, {"collimator": "mild", "lag": "mild"}),
+        "simulate.export": lambda: (
+            {"views": s.views, "earlier_views": s.earlier},
+            {"collimator": "mild", "lag": "mild"},
+        ),
         "simulate.femur": lambda: ({}, {"resolution_mm": 3, "variation": 0.5}),
         "simulate.fluoroscopy": lambda: ({"phantom": s.phantom, "cameras": s.cameras}, {}),
         "simulate.fracture": lambda: ({"bone": s.bone}, {}),

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "tests/properties/moved_world_values.hpp"
 #include "shipped.hpp"
+#include "tests/properties/moved_world_values.hpp"
 
 namespace moved_world {
 

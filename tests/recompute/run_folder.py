@@ -89,8 +89,8 @@ class Run:
         return dataclasses.replace(node, wires=wires), inner_port
 
     def wire(self, node, port):
-        """The reference that an input takes; None if it is not wired. `projector.model` is the model of the node that is
-        wired to the projector, and `@model` stands for the reference itself."""
+        """The reference that an input takes; None if it is not wired. `projector.model` is the model of the node that
+        is wired to the projector, and `@model` stands for the reference itself."""
         if port[0] == "@":
             return port[1:]
         first, _, then = port.partition(".")

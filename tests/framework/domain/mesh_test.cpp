@@ -5,8 +5,8 @@
 #include <marrow/domain/manifold.hpp>
 #include <marrow/domain/mesh.hpp>
 
-#include "tests/harness/message_of.hpp"
 #include "tests/framework/domain/shapes.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace mesh_test {
 

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/harness/message_of.hpp"
 #include "shapes.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace same_place_test {
 

@@ -6,10 +6,10 @@
 #include <map>
 #include <opencv2/imgproc.hpp>
 
-#include "tests/plugins/camera/boards.hpp"
 #include "marrow/read/calibration_file.hpp"
-#include "tests/plugins/read/files.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/camera/boards.hpp"
+#include "tests/plugins/read/files.hpp"
 #include "tests/plugins/write/writing.hpp"
 
 namespace bead_board_test {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "tests/plugins/camera/boards.hpp"
 #include "marrow/toolbox/calibration/calibrate.hpp"
+#include "tests/plugins/camera/boards.hpp"
 #include "tests/plugins/read/files.hpp"
 
 namespace calibrate_test {

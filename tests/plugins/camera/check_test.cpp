@@ -12,8 +12,8 @@
 #include "marrow/domain/c_arm.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
-#include "tests/plugins/read/files.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/read/files.hpp"
 
 namespace check_test {
 

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "marrow/domain/c_arm.hpp"
+#include "shipped.hpp"
 #include "tests/plugins/read/dicom_text.hpp"
 #include "tests/plugins/read/files.hpp"
-#include "shipped.hpp"
 
 namespace dicom_test {
 

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
-#include "tests/plugins/camera/boards.hpp"
 #include "marrow/toolbox/calibration/correspondence.hpp"
+#include "tests/plugins/camera/boards.hpp"
 #include "tests/plugins/read/files.hpp"
 
 namespace match_board_test {

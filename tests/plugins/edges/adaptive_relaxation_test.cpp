@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/plugins/edges/drawn.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/edges/drawn.hpp"
 
 namespace {
 

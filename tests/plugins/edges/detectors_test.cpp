@@ -14,9 +14,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
+#include "shipped.hpp"
 #include "tests/harness/message_of.hpp"
 #include "tests/plugins/edges/drawn.hpp"
-#include "shipped.hpp"
 
 namespace detectors_test {
 

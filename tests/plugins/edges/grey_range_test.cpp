@@ -6,10 +6,10 @@
 #include <cmath>
 #include <limits>
 
-#include "tests/plugins/edges/drawn.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/edges/drawn.hpp"
 
 namespace grey_range_test {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "tests/plugins/project/shapes.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/project/shapes.hpp"
 
 namespace landscape_test {
 

@@ -6,8 +6,8 @@
 #include <map>
 #include <random>
 
-#include "tests/plugins/evaluate/listener.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/evaluate/listener.hpp"
 
 namespace outline_distance_test {
 

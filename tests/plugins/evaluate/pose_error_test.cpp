@@ -4,8 +4,8 @@
 #include <cmath>
 #include <map>
 
-#include "tests/framework/domain/shapes.hpp"
 #include "shipped.hpp"
+#include "tests/framework/domain/shapes.hpp"
 
 namespace pose_error_test {
 

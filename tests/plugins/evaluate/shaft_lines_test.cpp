@@ -3,10 +3,10 @@
 
 #include <cmath>
 
+#include "shipped.hpp"
 #include "tests/plugins/edges/radiograph.hpp"
 #include "tests/plugins/evaluate/listener.hpp"
 #include "tests/plugins/initial/tube.hpp"
-#include "shipped.hpp"
 
 namespace shaft_lines_test {
 

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <random>
 
+#include "shipped.hpp"
 #include "tests/plugins/edges/radiograph.hpp"
 #include "tests/plugins/evaluate/cone.hpp"
 #include "tests/plugins/evaluate/listener.hpp"
 #include "tests/plugins/initial/tube.hpp"
-#include "shipped.hpp"
 
 namespace shaft_width_test {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "tests/framework/domain/shapes.hpp"
 #include "shipped.hpp"
+#include "tests/framework/domain/shapes.hpp"
 
 namespace surface_distance_test {
 

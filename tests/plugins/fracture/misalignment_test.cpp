@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "tests/plugins/fracture/fragments.hpp"
 #include "marrow/fracture/fracture_site.hpp"
+#include "tests/plugins/fracture/fragments.hpp"
 
 namespace misalignment_test {
 

@@ -2,9 +2,9 @@
 // Costs are the mean square of the six numbers (degrees and mm) that a pose is away from the bottom of a bowl.
 #include <gtest/gtest.h>
 
+#include "shipped.hpp"
 #include "tests/plugins/project/shapes.hpp"
 #include "tests/plugins/register/bowl.hpp"
-#include "shipped.hpp"
 
 namespace best_of_test {
 

@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
 
+#include "shipped.hpp"
 #include "tests/plugins/project/shapes.hpp"
 #include "tests/plugins/register/well.hpp"
-#include "shipped.hpp"
 
 namespace global_search_test {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Landmarks of a model at a known pose, and views that see them.
-#include "tests/framework/domain/shapes.hpp"
 #include "shipped.hpp"
+#include "tests/framework/domain/shapes.hpp"
 
 namespace scene {
 

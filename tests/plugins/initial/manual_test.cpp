@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include "shipped.hpp"
 #include "tests/plugins/evaluate/listener.hpp"
 #include "tests/plugins/initial/tube.hpp"
-#include "shipped.hpp"
 
 namespace manual_test {
 

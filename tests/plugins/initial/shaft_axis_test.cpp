@@ -3,10 +3,10 @@
 
 #include <chrono>
 
-#include "tests/plugins/edges/radiograph.hpp"
-#include "tests/plugins/initial/tube.hpp"
 #include "marrow/initial/model_borders.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/edges/radiograph.hpp"
+#include "tests/plugins/initial/tube.hpp"
 
 namespace shaft_axis_test {
 

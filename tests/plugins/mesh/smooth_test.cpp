@@ -4,9 +4,9 @@
 #include <cmath>
 #include <random>
 
+#include "shipped.hpp"
 #include "tests/framework/domain/shapes.hpp"
 #include "tests/plugins/project/shapes.hpp"
-#include "shipped.hpp"
 
 namespace smooth_test {
 

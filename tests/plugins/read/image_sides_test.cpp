@@ -5,9 +5,9 @@
 #include <gtest/gtest.h>
 
 #include "marrow/domain/c_arm.hpp"
+#include "shipped.hpp"
 #include "tests/plugins/read/dicom_text.hpp"
 #include "tests/plugins/read/files.hpp"
-#include "shipped.hpp"
 
 namespace image_sides_test {
 

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/plugins/read/files.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/read/files.hpp"
 
 namespace implant_test {
 

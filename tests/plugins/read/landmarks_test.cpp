@@ -3,8 +3,8 @@
 
 #include <ctime>
 
-#include "tests/plugins/read/files.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/read/files.hpp"
 
 namespace landmarks_test {
 

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "marrow/toolbox/files/volume_file.hpp"
-#include "tests/plugins/read/files.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/read/files.hpp"
 
 namespace seeds_test {
 

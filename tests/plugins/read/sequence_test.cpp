@@ -5,10 +5,10 @@
 #include <opencv2/videoio.hpp>
 
 #include "marrow/toolbox/track/sequence.hpp"
+#include "shipped.hpp"
 #include "tests/plugins/read/dicom_text.hpp"
 #include "tests/plugins/read/files.hpp"
 #include "tests/plugins/read/itk_files.hpp"
-#include "shipped.hpp"
 
 namespace sequence_test {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "tests/harness/comma_locale.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
-#include "tests/plugins/read/files.hpp"
 #include "shipped.hpp"
+#include "tests/harness/comma_locale.hpp"
+#include "tests/plugins/read/files.hpp"
 
 namespace tra_test {
 

@@ -4,10 +4,10 @@
 #include <opencv2/core.hpp>
 
 #include "marrow/toolbox/track/sequence.hpp"
+#include "shipped.hpp"
 #include "tests/plugins/read/avi.hpp"
 #include "tests/plugins/read/files.hpp"
 #include "tests/plugins/read/itk_files.hpp"
-#include "shipped.hpp"
 
 extern "C" {
 #include <libavcodec/avcodec.h>

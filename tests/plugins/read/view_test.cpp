@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include "shipped.hpp"
 #include "tests/plugins/read/dicom_text.hpp"
 #include "tests/plugins/read/files.hpp"
 #include "tests/plugins/read/itk_files.hpp"
 #include "tests/plugins/read/reading.hpp"
-#include "shipped.hpp"
 
 namespace view_test {
 

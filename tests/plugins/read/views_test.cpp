@@ -4,9 +4,9 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "shipped.hpp"
 #include "tests/plugins/read/files.hpp"
 #include "tests/plugins/read/itk_files.hpp"
-#include "shipped.hpp"
 
 namespace views_test {
 

@@ -5,8 +5,8 @@
 #include <marrow/domain/functions.hpp>
 
 #include "marrow/toolbox/match/views_cost.hpp"
-#include "tests/plugins/register/well.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/register/well.hpp"
 
 namespace refine_cameras_test {
 

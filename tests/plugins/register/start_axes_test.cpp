@@ -7,9 +7,9 @@
 #include <cmath>
 
 #include "bowl.hpp"
+#include "shipped.hpp"
 #include "tests/plugins/evaluate/listener.hpp"
 #include "tests/plugins/project/shapes.hpp"
-#include "shipped.hpp"
 
 namespace start_axes_test {
 

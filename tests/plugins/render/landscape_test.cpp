@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "marrow/render/plot.hpp"
-#include "tests/plugins/render/pictures.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/render/pictures.hpp"
 
 namespace landscape_test {
 

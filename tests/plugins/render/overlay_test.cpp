@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "marrow/toolbox/draw/canvas.hpp"
-#include "tests/plugins/render/pictures.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/render/pictures.hpp"
 
 namespace overlay_test {
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "tests/harness/message_of.hpp"
-#include "tests/framework/domain/shapes.hpp"
 #include "shipped.hpp"
+#include "tests/framework/domain/shapes.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace scene_test {
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "tests/harness/message_of.hpp"
 #include "marrow/toolbox/robotics/hexapod.hpp"
+#include "tests/harness/message_of.hpp"
 #include "tests/plugins/simulate/nodes.hpp"
 
 namespace condition_test {

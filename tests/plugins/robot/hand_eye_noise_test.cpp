@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "tests/harness/message_of.hpp"
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/robotics/hand_eye.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace hand_eye_noise_test {
 

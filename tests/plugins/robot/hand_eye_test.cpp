@@ -2,10 +2,10 @@
 // Hand-eye calibration against motions that are made with a known transform.
 #include <gtest/gtest.h>
 
-#include "tests/harness/message_of.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/guide/servo.hpp"
 #include "marrow/toolbox/robotics/hand_eye.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace hand_eye_test {
 

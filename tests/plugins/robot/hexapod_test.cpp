@@ -2,9 +2,9 @@
 // The kinematics of a hexapod against lengths computed by hand, and against each other.
 #include <gtest/gtest.h>
 
-#include "tests/harness/message_of.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/robotics/hexapod.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace hexapod_test {
 

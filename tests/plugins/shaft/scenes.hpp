@@ -7,8 +7,8 @@
 #include <marrow/domain/features.hpp>
 #include <string>
 
-#include "tests/plugins/edges/radiograph.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/edges/radiograph.hpp"
 
 namespace scenes {
 

@@ -9,8 +9,8 @@
 #include "marrow/domain/case.hpp"
 #include "marrow/domain/features.hpp"
 #include "marrow/domain/functions.hpp"
-#include "tests/plugins/project/shapes.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/project/shapes.hpp"
 
 namespace contour_derivatives_test {
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "marrow/toolbox/match/nearest_outline.hpp"
-#include "tests/plugins/project/shapes.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/project/shapes.hpp"
 
 namespace contour_distance_test {
 

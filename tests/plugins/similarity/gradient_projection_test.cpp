@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "other_fragment.hpp"
-#include "tests/plugins/project/shapes.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/project/shapes.hpp"
 
 namespace gradient_projection_test {
 

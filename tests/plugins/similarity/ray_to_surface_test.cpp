@@ -6,8 +6,8 @@
 #include <marrow/domain/features.hpp>
 
 #include "other_fragment.hpp"
-#include "tests/plugins/project/shapes.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/project/shapes.hpp"
 
 namespace ray_to_surface_test {
 

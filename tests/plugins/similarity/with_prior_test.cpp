@@ -3,8 +3,8 @@
 
 #include <marrow/domain/decompositions.hpp>
 
-#include "tests/plugins/register/bowl.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/register/bowl.hpp"
 
 namespace with_prior_test {
 

@@ -3,9 +3,9 @@
 // Bodies whose path lengths and volumes are known.
 #include <cmath>
 
-#include "tests/harness/message_of.hpp"
 #include "marrow/simulate/polygonise.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace marrow::phantom::test {
 

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "marrow/toolbox/track/sequence.hpp"
-#include "tests/plugins/read/files.hpp"
 #include "sequences.hpp"
+#include "tests/plugins/read/files.hpp"
 
 namespace keyframes_test {
 

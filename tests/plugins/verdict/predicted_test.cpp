@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "tests/plugins/evaluate/listener.hpp"
 #include "shipped.hpp"
+#include "tests/plugins/evaluate/listener.hpp"
 
 namespace predicted_test {
 

@@ -3,8 +3,8 @@
 // A box, a cost with wells at given poses, and a pose to judge by them.
 #include <cmath>
 
-#include "tests/framework/domain/shapes.hpp"
 #include "shipped.hpp"
+#include "tests/framework/domain/shapes.hpp"
 
 namespace wells {
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A comparison on a Slurm cluster of one host, which tools/checks/cluster_test starts: the same figures as on one machine,
-also after tasks and the controller were killed."""
+"""A comparison on a Slurm cluster of one host, which tools/checks/cluster_test starts: the same figures as on one
+machine, also after tasks and the controller were killed."""
 import os
 import pathlib
 import shutil

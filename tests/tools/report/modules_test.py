@@ -14,11 +14,13 @@ ENTRIES = [TOOLS / "report" / "page" / "main.js", TOOLS / "workbench" / "page" /
 BROWSER = set(
     """
     AbortController Array Blob Boolean CSS Error Event EventTarget Float32Array Float64Array Image ImageData Infinity
-    Int16Array Int32Array IntersectionObserver Intl JSON Map Math NaN Number Object Promise ResizeObserver Set String URL
+    Int16Array Int32Array IntersectionObserver Intl JSON Map Math NaN Number Object Promise ResizeObserver Set String
+    URL
     URLSearchParams Uint16Array Uint32Array Uint8Array WeakMap addEventListener atob cancelAnimationFrame clearInterval
     clearTimeout console decodeURIComponent devicePixelRatio document encodeURIComponent fetch getComputedStyle
     getSelection globalThis history innerHeight innerWidth localStorage location matchMedia navigator parent parseFloat
-    parseInt performance removeEventListener requestAnimationFrame setInterval setTimeout structuredClone undefined window
+    parseInt performance removeEventListener requestAnimationFrame setInterval setTimeout structuredClone undefined
+    window
     """.split()
 )
 KEYWORDS = set(

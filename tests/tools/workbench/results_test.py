@@ -182,7 +182,8 @@ class ResultsPageTest(PageTest, ResultsBench):
             "They begin to differ at the node edges (edges.canny).",
         )
         cells = self.js(
-            "return [...document.querySelectorAll('[data-change=\"edges.noise_high\"] > *')].map((one) => one.textContent)"
+            "const found = document.querySelectorAll('[data-change=\"edges.noise_high\"] > *');"
+            "return [...found].map((one) => one.textContent)"
         )
         self.assertEqual(cells, ["edges", "option noise_high", "5", "9", "the first difference"])
         self.browser.wait(

@@ -3,8 +3,8 @@
 // the unit: 10 times that of the file for cm.
 #include <gtest/gtest.h>
 
-#include "tests/plugins/toolbox/exchange/values.hpp"
 #include "marrow/toolbox/files/samples_out.hpp"
+#include "tests/plugins/toolbox/exchange/values.hpp"
 
 namespace camera_scale_test {
 

@@ -3,12 +3,12 @@
 // The value must be that of the same text in plain UTF-8 with line feeds, which the other tests of each reader check.
 #include <gtest/gtest.h>
 
-#include "tests/harness/comma_locale.hpp"
-#include "tests/plugins/toolbox/exchange/values.hpp"
 #include "marrow/base/hash.hpp"
 #include "marrow/toolbox/exchange/written_files.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
+#include "tests/harness/comma_locale.hpp"
+#include "tests/plugins/toolbox/exchange/values.hpp"
 
 namespace foreign_text_test {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "tests/plugins/toolbox/exchange/values.hpp"
 #include "marrow/toolbox/exchange/written_files.hpp"
+#include "tests/plugins/toolbox/exchange/values.hpp"
 
 namespace markups_test {
 

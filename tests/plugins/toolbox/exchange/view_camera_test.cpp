@@ -2,8 +2,8 @@
 // Views whose cameras are in files of other programs: as read.view, read.views and read.case take them.
 #include <gtest/gtest.h>
 
-#include "tests/plugins/toolbox/exchange/values.hpp"
 #include "marrow/toolbox/files/samples_out.hpp"
+#include "tests/plugins/toolbox/exchange/values.hpp"
 
 namespace view_camera_test {
 

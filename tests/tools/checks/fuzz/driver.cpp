@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs a fuzz target without libFuzzer, so that the ordinary tests need no clang: the seeds, then what a seeded mutator
 // makes of them, until the time is over: 2 s, or 10 s if MARROW_TEST_ALL is 1. The mutator makes the same in each run,
-// unless MARROW_TEST_SEED or --seed gives another seed. This driver sees crashes, foreign exceptions, too much memory and
-// too much time; leaks and errors of memory that do no harm at once need the sanitizers of tools/checks/fuzz.
+// unless MARROW_TEST_SEED or --seed gives another seed. This driver sees crashes, foreign exceptions, too much memory
+// and too much time; leaks and errors of memory that do no harm at once need the sanitizers of tools/checks/fuzz.
 //   fuzz_NAME --seeds FOLDER --dictionary FILE [--seconds 10] [--seed 1]        fuzz_NAME FILE...
 #include <fcntl.h>
 #include <sys/time.h>

@@ -7,9 +7,9 @@
 #include <memory>
 #include <string>
 
+#include "shipped.hpp"
 #include "tests/framework/domain/shapes.hpp"
 #include "tests/plugins/register/well.hpp"
-#include "shipped.hpp"
 
 namespace covariances_test {
 

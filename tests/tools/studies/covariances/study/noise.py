@@ -6,7 +6,7 @@ with any number of jobs.
 
     PYTHONPATH=build/python tests/tools/studies/covariances/study/noise.py                    # 20 draws each
     PYTHONPATH=build/python tests/tools/studies/covariances/study/noise.py --draws 200 --jobs 8
-    PYTHONPATH=build/python tests/tools/studies/covariances/study/noise.py contour --draws 50 # what has this in its name
+    PYTHONPATH=build/python tests/tools/studies/covariances/study/noise.py contour --draws 50 # with this name
 
 Right are: ratios of 1 (predicted over real, both as root mean squares), 68 and 95 % of the errors within one and two
 deviations, and a squared Mahalanobis distance of 1 for each degree of freedom. A ratio of n draws of one axis is known
