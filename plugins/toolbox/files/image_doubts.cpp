@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/read/image_doubts.hpp"
+#include "marrow/toolbox/files/image_doubts.hpp"
 
 #include <algorithm>
 
