@@ -17,8 +17,8 @@ class Install(Case):
         self.root = self.scratch / "moved"
 
     def marrow(self, *arguments):
-        # Without a home folder nothing that was found out before is used.
-        environment = {key: value for key, value in os.environ.items() if key not in ("HOME", "XDG_CACHE_HOME")}
+        # With a cache of its own, nothing that was found out before is used.
+        environment = {**os.environ, "XDG_CACHE_HOME": str(self.scratch / "cache")}
         result = subprocess.run(
             [self.root / "bin" / "marrow", *arguments],
             env=environment,
