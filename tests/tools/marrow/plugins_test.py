@@ -50,7 +50,7 @@ class Plugins(Case):
         (folder / "CMakeLists.txt").write_text(
             "cmake_minimum_required(VERSION 3.25)\nproject(mine CXX C)\n"
             "find_package(marrow REQUIRED COMPONENTS toolbox)\n"
-            "marrow_add_plugin(edges_mine mine.cpp LINK marrow::image)\n"
+            "marrow_add_plugin(edges_mine mine.cpp LINK marrow::edges)\n"
         )
         configure = ["cmake", "-S", folder, "-B", folder / "build", "-G", "Ninja", "-Dmarrow_DIR=%s" % BUILD]
         subprocess.run(configure, check=True, capture_output=True)
