@@ -4,8 +4,8 @@
 
 #include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/read/view_file.hpp"
+#include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/sequence_files.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/track/sequence.hpp"

@@ -56,7 +56,9 @@ class Nodes(Case):
             "    sigma_px (number in px, at least 0.7, at most 10, default 1.5): standard deviation", canny.__doc__
         )
         signature = inspect.signature(canny)
-        self.assertEqual(list(signature.parameters), ["view", "sigma_px", "logarithm", "window_px", "noise_low", "noise_high"])
+        self.assertEqual(
+            list(signature.parameters), ["view", "sigma_px", "logarithm", "window_px", "noise_low", "noise_high"]
+        )
         self.assertEqual(signature.parameters["noise_high"].default, 5)
         self.assertEqual(signature.parameters["noise_high"].kind, inspect.Parameter.KEYWORD_ONLY)
         self.assertIn("canny", dir(marrow.edges))

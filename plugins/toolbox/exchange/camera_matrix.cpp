@@ -34,12 +34,12 @@ Eigen::Vector2d mirrored(const Eigen::Vector2d& pixel, Mirror mirror, int width_
 Eigen::Vector2i size_px(const ImageSize& size, const std::string& what) {
   if (size.size_px.empty())
     throw Error(what +
-                ": does not say how many pixels the image has; wire the image, or give size_px: [width, height]");
+                ": does not say how many pixels the image has; wire the image, or give image_size_px: [width, height]");
   if (size.size_px.size() != 2)
-    throw Error(formatted("{}: size_px: expected [width, height], got {} numbers", what, size.size_px.size()));
+    throw Error(formatted("{}: image_size_px: expected [width, height], got {} numbers", what, size.size_px.size()));
   for (const double side : size.size_px)
     if (!(side >= 1 && side <= kLargestSide_px) || side != std::floor(side))
-      throw Error(formatted("{}: size_px: expected 1 to 65536 pixels each way, got {:f}", what, side));
+      throw Error(formatted("{}: image_size_px: expected 1 to 65536 pixels each way, got {:f}", what, side));
   return {int(size.size_px[0]), int(size.size_px[1])};
 }
 

@@ -15,6 +15,7 @@ import yaml
 import bench
 import ct_cases
 from bench import BenchTest, PageTest
+from harness.modules import modules
 
 SIZE = (40, 36, 32)
 
@@ -220,7 +221,8 @@ class CtPageTest(PageTest):
             }
             cases.append([grid, index, view, chance.choice(("axial", "coronal", "sagittal"))])
         answers = self.browser.js(
-            """return arguments[0].map(([ct, index, view, name]) => {
+            modules(SliceGeometry="workbench/page/slice_geometry.js")
+            + """return arguments[0].map(([ct, index, view, name]) => {
               const G = SliceGeometry, plane = G.planes(ct)[name], place = G.place(ct, plane, view, index);
               const back = G.indexAt(ct, plane, view, place, index[plane.across]);
               const numbers = G.pictureTransform(ct, plane, view);

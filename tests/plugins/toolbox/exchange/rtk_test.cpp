@@ -168,7 +168,7 @@ TEST(Rtk, DiagnosesWhatTheImageLacks) {
       "g.xml: projection 0: its images are seen from the detector, or have their rows from below; turn them over "
       "by mirror: left_right or upside_down when they are read, and give the same mirror here");
   EXPECT_SAYS(read(folder / "g.xml", {{"image_size_px", std::vector<double>{}}}),
-              "g.xml: projection 0: does not say how many pixels the image has; wire the image, or give size_px");
+              "g.xml: projection 0: does not say how many pixels the image has; wire the image, or give image_size_px");
   EXPECT_SAYS(read(folder / "g.xml", {{"pixel_mm", std::vector<double>{}}}),
               "g.xml: projection 0: needs the size of a pixel on the detector; give pixel_mm: [width, height]");
   EXPECT_SAYS(read(folder / "g.xml", {{"corner_mm", std::vector<double>{1}}}),
