@@ -48,7 +48,7 @@ def check_success_rule(checks, sentence, experiment, units):
 
 def check_score(checks, text, point, unit, bad):
     """ "0.41 mm (mean 0.5 mm of 18 of 20 runs, 2 failed or without the figure, 1 worse than 8 mm)"."""
-    kind, number = "words: tuning", r"(\S+)" + (" " + re.escape(unit) if unit else "")
+    kind, number = "words: tuning", r"([^\s),]+)" + (" " + re.escape(unit) if unit else "")
     score = re.match(number + r" \(", text)
     checks.shown(kind, "score", score[1] if score else "", point["score"])
     if point["mean"] is None:

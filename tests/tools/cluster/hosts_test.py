@@ -186,7 +186,11 @@ class HostsTest(unittest.TestCase):
         )
         print("files of %d cells: %s" % (len(names), dict(kinds)))
         self.assertEqual(kinds["result"], 2 * CASES, "the work and the case")
-        self.assertEqual(kinds["claims"], 0, "each was given back, or taken over")
+        # A process that is killed between its result and the end of its claim leaves a claim that nobody waits for.
+        results = {path.name for path in files if path.parent.name != "claims"}
+        waiting = [path.name for path in files if path.parent.name == "claims" and path.name not in results]
+        self.assertEqual(waiting, [], "each claim without a result was taken over")
+        self.assertLessEqual(kinds["claims"], killed)
         self.assertLessEqual(kinds["temporary"], killed)
         for path in files:
             if ".tmp-" in path.name:
