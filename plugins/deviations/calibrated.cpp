@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Predicted deviations that were compared with real errors. The residuals that a covariance is predicted from do not
-// show every error, such as that of the segmentation, and they count some twice. So the deviations about and along each
-// axis are multiplied by a factor, which was fitted to bones whose true pose is known (tools/studies/deviations --fit).
+// Corrects predicted deviations. A covariance is predicted from residuals, which miss some errors, such as that of the
+// segmentation, and count others twice. So the deviation about and along each axis is multiplied by a factor that was
+// fitted to bones whose true pose is known (tools/studies/deviations --fit).
 #include <array>
 #include <marrow/plugin.hpp>
 
@@ -51,7 +51,8 @@ Result calibrated(const marrow::List<marrow::Pose>& stages, const marrow::Mesh& 
 MARROW_PLUGIN(plugin) {
   plugin.node("deviations.calibrated", calibrated)
       .summary("Multiplies the predicted deviations of poses by factors that were fitted to known errors")
-      .in("stages", "poses of a search; 'first' is that by its first cost (register.sequence), if it is not the last",
+      .in("stages",
+          "poses of a search; 'first' is the result of the first cost (register.sequence), unless it is the last pose",
           marrow::over("stage"))
       .in("model", "surface of the bone; it gives the axes")
       .out("pose", &Result::pose, "the last pose; a covariance that is absent or not finite stays as it is")

@@ -19,8 +19,8 @@ marrow::Metrics calibration_error(const Calibration& found, const Calibration& t
     return 100 * std::abs(found.intrinsics(i, i) - truth.intrinsics(i, i)) / truth.intrinsics(i, i);
   };
   const auto principal_error = [&](int i) { return std::abs(found.intrinsics(i, 2) - truth.intrinsics(i, 2)); };
-  // What counts for a measurement is where both calibrations see the same ray. A shift of the principal point is nearly
-  // a rotation of the whole device, and the poses of the views compensate for it. So the mean shift over the image is
+  // A measurement depends on where both calibrations see the same ray. A shift of the principal point is nearly a
+  // rotation of the whole device, which the poses of the views compensate. So the mean shift over the image is
   // subtracted.
   std::vector<Eigen::Vector2d> shifts;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();

@@ -62,7 +62,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.frames", frames)
       .summary("Figures of merit of a sequence: median, 95th percentile, worst and root mean square over its frames")
       .in("metrics", "figures of each frame", over("frame"))
-      .in("states", "what is known after each frame: then only frames in which the bone was found count", over("frame"))
+      .in("states", "state after each frame; if given, only frames in which the bone was found count", over("frame"))
       .out("metrics",
            "number of frames and of lost ones; of the absolute values of each figure: median_NAME, p95_NAME, "
            "worst_NAME, rms_NAME")

@@ -24,7 +24,7 @@ struct Result {
   Metrics metrics;
 };
 
-/// Angle between two lines, which have no sense.
+/// Angle between two lines, whatever their senses.
 double angle_deg(const Vector3d& a, const Vector3d& b) {
   return degrees(std::atan2(a.cross(b).norm(), std::abs(a.dot(b))));
 }
@@ -80,12 +80,13 @@ MARROW_PLUGIN(plugin) {
       .in("truth", "exact pose of the nail")
       .out("holes", &Result::holes,
            "angle between planned and true axis; distance between the axes at the hole's centre; angle between the ray "
-           "of the planned view through the true hole and its axis; the predicted deviations; 1 if the plan doubts it",
+           "of the planned view through the true hole and its axis; the predicted deviations; 1 if the plan doubts the "
+           "hole",
            over("hole"))
       .figures({"angle_deg", "offset_mm", "view_deg", "predicted_angle_deg", "predicted_offset_mm", "flagged"})
       .out("metrics", &Result::metrics,
-           "the worst of the holes; 1 or 0: whether the plan doubts a hole (flagged), whether one is off by more than "
-           "max_angle_deg or max_offset_mm (off), and whether one is off that the plan does not doubt (silent)")
+           "largest figures of all holes; 1 if the plan doubts a hole (flagged), if a hole is off by more than "
+           "max_angle_deg or max_offset_mm (off), and if such a hole is not doubted by the plan (silent), else 0")
       .figures({"angle_deg", "offset_mm", "view_deg", "flagged", "off", "silent"})
       .option("max_angle_deg", &Options::max_angle_deg, "a hole is off if its axis is turned by more than this",
               at_least(0))

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares the borders of the shaft found in a view with those of the true outline. The true outline is that of the
-// model at its true pose, along the same part of the shaft in the same view.
+// Compares the borders of the shaft found in a view with the true outline: that of the model at its true pose, along
+// the same part of the shaft in the same view.
 #include <algorithm>
 #include <cmath>
 #include <marrow/plugin.hpp>
@@ -118,10 +118,10 @@ MARROW_PLUGIN(plugin) {
       .in("truths", "exact pose of each fragment", marrow::over("fragment"))
       .out("metrics",
            "all lengths in mm at the depth of the true outline; of the two borders, the larger angle to the true "
-           "border and the "
-           "larger distance from it in the middle; the largest distance at an end (more than a few mm means a wrong "
-           "pair); angle and distance of the axis, the line midway between the borders; found width minus true width "
-           "(negative if the edges lie inside the outline); true width; length; log-likelihood from the shaft node")
+           "border and the larger distance from it in the middle; the largest distance at an end (more than a few mm "
+           "means a wrong pair); angle and distance of the axis, the line midway between the borders; found width "
+           "minus true width (negative if the edges lie inside the outline); true width; length; log-likelihood from "
+           "the shaft node")
       .figures({"border_angle_deg", "border_offset_mm", "worst_mm", "axis_angle_deg", "axis_offset_mm",
                 "width_error_mm", "true_width_mm", "length_mm", "log_likelihood"})
       .option("tolerance_mm", &Options::tolerance_mm,

@@ -19,8 +19,8 @@ struct Options {
   int points = 20000;
 };
 
-/// The sign of the distance that VTK gives outside of a surface: it goes by the triangles' normals, which face outwards
-/// if the surface encloses a positive volume. Seen from its middle, this also holds where it is not quite closed.
+/// The sign of VTK's distance outside a surface. It follows the triangles' normals, which face outwards if the enclosed
+/// volume is positive. The volume is taken about the surface's middle, so small holes do not change its sign.
 double sign_outside(Mesh reference, const Context& context) {
   if (!is_closed(reference))
     context.warn("the reference is no closed surface; the sign of bias_mm then is that of the nearest triangle's side");
@@ -32,8 +32,8 @@ double sign_outside(Mesh reference, const Context& context) {
 }
 
 /// Signed distances (negative inside) from points spread over one surface to another surface. The vertices count only
-/// for the largest distance, which is usually at a vertex. For the mean they would be unfair: a finer mesh has more of
-/// them.
+/// for the largest distance, which is usually at a vertex. They would distort the mean, because a finer mesh has more
+/// of them.
 struct Distances {
   std::vector<double> of_points_mm;
   double largest_mm = 0;

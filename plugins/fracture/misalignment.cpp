@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a broken bone is out of place, in the words of surgeons. All figures are of the distal fragment relative to the
+// The misalignment of a broken bone in the terms of surgeons. All figures are of the distal fragment relative to the
 // proximal one, compared with the CT, which shows both in place.
 #include <Eigen/Geometry>
 #include <cmath>
@@ -47,8 +47,8 @@ Eigen::Matrix3d directions(const Eigen::Vector3d& shaft, const Options& options)
   return axes;
 }
 
-/// The distal fragment's long axis in the CT. A fragment that is shorter than it is wide has none along the bone: then
-/// the two fragments' axes differ, and the one that is nearer to `up` is the bone's.
+/// The distal fragment's long axis in the CT. The long axis of a fragment that is shorter than wide does not run along
+/// the bone. Then the axes of the two fragments differ, and the one nearer to `up` is taken.
 Eigen::Vector3d shaft_of(const FragmentFrame& distal, const FragmentFrame& proximal, const Options& options,
                          const Context& context) {
   constexpr double kMostApart_deg = 30;
@@ -57,8 +57,8 @@ Eigen::Vector3d shaft_of(const FragmentFrame& distal, const FragmentFrame& proxi
   if (apart_deg <= kMostApart_deg) return one;
   const bool takes_distal = std::abs(one.dot(options.up)) > std::abs(other.dot(options.up));
   context.warn(
-      formatted("the long axes of the two fragments differ by {:.0f} degrees in the CT, so one is too short to "
-                "show the bone's; that of the {} fragment is taken, which is nearer to 'up'",
+      formatted("the long axes of the two fragments differ by {:.0f} degrees in the CT, so one is too short to show "
+                "the bone's; that of the {} fragment is taken, which is nearer to 'up'",
                 apart_deg, takes_distal ? "distal" : "proximal"));
   return takes_distal ? one : other;
 }
@@ -79,8 +79,8 @@ Eigen::Vector3d fracture_in_ct_mm(const List<Mesh>* models, const Options& optio
   return geometry::middle_of_fracture_mm(*moved, options.moved, *reference, options.reference);
 }
 
-/// `motion`: of the distal fragment, in the CT, from its place beside the proximal one. It is taken apart into a swing,
-/// which leads the long axis to where it is now, after a twist about the long axis.
+/// `motion`: of the distal fragment, in the CT, from its place beside the proximal one. It is split into a twist about
+/// the long axis and a swing, which then turns this axis to its present direction.
 std::vector<Figure> figures_of(const RigidTransform& motion, const Eigen::Matrix3d& axes,
                                const Eigen::Vector3d& fracture_mm, const std::string& side) {
   const Eigen::Matrix3d turn = axes.transpose() * motion.rotation * axes;
@@ -142,18 +142,17 @@ MARROW_PLUGIN(plugin) {
           "compared with the CT, where both are in place")
       .in("poses", "poses of both fragments", over("fragment"))
       .in("models", "surfaces of both fragments in the CT: they show where the fracture is", over("fragment"))
-      .out(
-          "metrics",
-          "angle between the long axes, and its parts in the frontal plane (positive: varus) and in the sagittal plane "
-          "(positive: procurvatum, apex to the front); internal torsion, about the long axis; shift of the fracture's "
-          "faces across it, its medial and anterior parts; shortening. If the side is not known, varus, internal and "
-          "medial are replaced by the patient's left: apex_left_deg, torsion_left_deg, left_shift_mm")
+      .out("metrics",
+           "angle between the long axes, and its parts in the frontal plane (positive: varus) and in the sagittal "
+           "plane (positive: procurvatum, apex to the front); internal torsion, about the long axis; shift of the "
+           "fracture's faces across it, its medial and anterior parts; shortening. If the side is not known, varus, "
+           "internal and medial are replaced by the patient's left: apex_left_deg, torsion_left_deg, left_shift_mm")
       .figures({"angulation_deg", "shift_mm", "varus_deg", "apex_left_deg", "procurvatum_deg", "internal_torsion_deg",
                 "torsion_left_deg", "medial_shift_mm", "left_shift_mm", "anterior_shift_mm", "shortening_mm"})
       .option("moved", &Options::moved, "one fragment; the one that is lower in the CT is the distal one")
       .option("reference", &Options::reference, "the other fragment")
       .option("side", &Options::side,
-              "side of the limb; it says what is medial: varus or valgus, internal or external torsion",
+              "side of the limb; it tells medial from lateral, varus from valgus, internal from external torsion",
               one_of({"unknown", "left", "right"}))
       .option("front", &Options::front, "direction to the front of the limb in the CT", unit(""))
       .option("up", &Options::up, "direction in the CT from the limb's end to the trunk", unit(""))

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Position-based visual servoing: the distal fragment is brought to its place beside the proximal one, which is found
-// in the same images. Where the robot stands need not be known: its own moves tell.
+// Position-based visual servoing: brings the distal fragment to its place beside the proximal one. Both are found in
+// the same images. Where the robot stands need not be known, because its moves show it.
 #include <algorithm>
 #include <cmath>
 #include <marrow/plugin.hpp>
@@ -68,9 +68,10 @@ std::string why_not_trusted(const Pose& pose, const std::string& name, const Lis
   return "";
 }
 
-/// Whether the last two pairs brought nothing: near the end, the way has not become shorter beyond its deviation; far
-/// from it, where bones are held apart while they are rotated and aligned, it has become longer. The first moves may
-/// lead astray, as long as nothing is known of the robot's place.
+/// Whether the last two pairs of images brought no progress. Near the end, this means that the way has not become
+/// shorter by more than its deviation. Far from the end, where bones are held apart while they are rotated and aligned,
+/// it means that the way has become longer. The first moves do not count: they may lead astray, because the robot's
+/// place is not known yet.
 bool brings_nothing(const std::vector<double>& errors, double deviation) {
   constexpr std::size_t kFirst = 5;
   constexpr double kNear = 4;  // tolerances
@@ -109,7 +110,7 @@ Stop stop_of(const GuideState& state, const Remaining& remaining, const std::str
   return {false, remaining.in_words()};
 }
 
-/// What the last move teaches.
+/// Learns from the last move.
 void learn(GuideState& state, const RigidTransform& seen, const Eigen::Vector3d& centre_mm, const RobotReport& report) {
   const bool is_move = !report.done.rotation.isIdentity(1e-9) || !report.done.translation_mm.isZero(1e-6);
   if (state.seen && is_move) {
@@ -123,7 +124,8 @@ void learn(GuideState& state, const RigidTransform& seen, const Eigen::Vector3d&
   state.seen = seen;
 }
 
-/// The poses of the next pair: as wide as the motion and what is known of the robot's place say.
+/// The poses expected in the next pair of images. Their deviations grow with the motion and with the uncertainty of the
+/// robot's place.
 List<Pose> predicted(const List<Pose>& poses, const List<Mesh>& models, const RigidTransform& motion,
                      const Vector6d& step, const Matrix6d& hand_eye, const Options& options) {
   constexpr double kLeast_deg = 0.5, kLeast_mm = 1;
@@ -150,15 +152,15 @@ List<Pose> predicted(const List<Pose>& poses, const List<Mesh>& models, const Ri
   return result;
 }
 
-/// The motion that is told, and what is expected to be seen of it.
+/// The motion that the robot is told, and the motion that the images should show.
 struct Command {
   Vector6d step = Vector6d::Zero();
   RigidTransform told{"robot", "robot"}, expected{"reference", "reference"};
   Matrix6d hand_eye = Matrix6d::Zero();  ///< covariance of the robot's place
 };
 
-/// A step is shortened so that what is not known of the robot's place leads the fracture no farther astray than the
-/// bones are apart, or than `astray_mm`.
+/// Shortens a step: the uncertainty of the robot's place must not lead the fracture farther astray than the bones are
+/// apart, or than `astray_mm` if this is more.
 Vector6d careful(const Vector6d& step, const Matrix6d& hand_eye, double distance_mm, double astray_mm) {
   constexpr double kArm_mm = 150;  // from the fragment's middle to the fracture
   const double turn = step.head<3>().norm(), unknown_rad = std::min(1.5, robot::rotation_deviation_rad(hand_eye)),
@@ -186,7 +188,7 @@ Command command_for(const GuideState& state, const RobotReport& report, const Le
   constexpr double kUnknown_deg = 45;  // of the robot's direction: a step may lead anywhere
   const bool is_lost = degrees(robot::rotation_deviation_rad(hand_eye.covariance)) > kUnknown_deg;
   if (options.hand_eye == "estimated" && is_lost && report.is_pressed) {
-    // What presses on the way to somewhere lets go on the way back.
+    // Going back releases bones that were pressed together on the way here.
     command.told = inverse(state.told);
     command.expected = inverse(hand_eye.robot_from_reference) * command.told * hand_eye.robot_from_reference;
     command.step = robot::step_of(command.expected, middle_mm);
@@ -218,7 +220,7 @@ Result closed_loop(const List<Pose>& poses, const GuideState& before, const Robo
   }
   learn(state, seen, centre_mm, report);
   const Remaining remaining(relative, centre_mm);
-  // The sum: while the fragment is rotated it is held apart, and its shift becomes no smaller.
+  // The sum, because the shift does not become smaller while the fragment is held apart and rotated.
   state.errors.push_back(remaining.rotation_deg / options.reduced_deg + remaining.shift_mm / options.reduced_mm);
   std::string not_trusted = why_not_trusted(moved, options.moved, verdicts);
   if (not_trusted.empty()) not_trusted = why_not_trusted(reference, options.reference, verdicts);
@@ -258,7 +260,7 @@ MARROW_PLUGIN(plugin) {
           "Brings a fragment to its place step by step: each pair of images gives the next motion of a robot whose "
           "place is not known")
       .in("poses", "poses of both fragments in the newest images, with their covariances", over("fragment"))
-      .in("state", "what is known from the pairs before")
+      .in("state", "what is known from the earlier pairs")
       .in("report", "what the robot says of its last motion")
       .in("fields", "both fragments in the CT, to keep them apart", over("fragment"))
       .in("models", "surfaces of both fragments; they give the axes of poses that have none", over("fragment"))
@@ -282,28 +284,26 @@ MARROW_PLUGIN(plugin) {
       .option("max_rotation_deg", &Options::max_rotation_deg, "largest rotation of a step", at_least(0.01))
       .option("max_shift_mm", &Options::max_shift_mm, "largest shift of a step", at_least(0.01))
       .option("astray_mm", &Options::astray_mm,
-              "with 'estimated': a step is so short that what is not known of the robot's place leads it at most this "
-              "far astray, or as far as the bones are apart",
+              "with 'estimated': steps are shortened until the uncertainty of the robot's place leads them at most "
+              "this far astray, or as far as the bones are apart",
               at_least(0.1))
       .option("clearance_mm", &Options::clearance_mm, "the bones are kept this far apart on the way")
       .option("max_distraction_mm", &Options::max_distraction_mm, "how far they may be pulled apart for this",
               at_least(0))
-      .option("rotated_deg", &Options::rotated_deg, "a smaller rotation is no stage of its own", at_least(0))
-      .option("aligned_mm", &Options::aligned_mm, "the same of a shift across the shaft", at_least(0))
+      .option("rotated_deg", &Options::rotated_deg, "a smaller rotation does not count as a stage", at_least(0))
+      .option("aligned_mm", &Options::aligned_mm, "the same for a shift across the shaft", at_least(0))
       .option("motion_deviation_deg", &Options::motion_deviation_deg, "deviation of a seen motion's rotation",
               at_least(1e-6))
       .option("motion_deviation_mm", &Options::motion_deviation_mm, "deviation of its shift", at_least(1e-6))
       .option("motion_deviation_fraction", &Options::motion_deviation_fraction,
-              "deviation that is added, as a part of the motion", at_least(0), unit(""))
-      .option("guess_deg", &Options::guess_deg, "deviation of the robot's direction as planned", at_least(1e-3))
-      .option("guess_mm", &Options::guess_mm, "deviation of its place as planned", at_least(1e-3))
+              "deviation that is added, as a fraction of the motion", at_least(0), unit(""))
+      .option("guess_deg", &Options::guess_deg, "deviation of the robot's planned direction", at_least(1e-3))
+      .option("guess_mm", &Options::guess_mm, "deviation of its planned place", at_least(1e-3))
       .option("reduced_deg", &Options::reduced_deg,
-              "the fracture is reduced if the rotation and two deviations are "
-              "below this",
-              at_least(1e-3))
-      .option("reduced_mm", &Options::reduced_mm, "and the shift and two deviations below this", at_least(1e-3))
+              "the fracture is reduced if the rotation plus two deviations is below this", at_least(1e-3))
+      .option("reduced_mm", &Options::reduced_mm, "and the shift plus two deviations below this", at_least(1e-3))
       .option("max_deviation_deg", &Options::max_deviation_deg, "poses with a larger deviation are not trusted",
               at_least(0))
-      .option("max_deviation_mm", &Options::max_deviation_mm, "the same of the shift", at_least(0))
+      .option("max_deviation_mm", &Options::max_deviation_mm, "the same for the shift", at_least(0))
       .option("max_pairs", &Options::max_pairs, "largest number of pairs of images", at_least(1));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One move that reduces the fracture. The robot's place in the images is calibrated before, with a target on its hand.
+// One move that reduces the fracture. Before it, the robot's place is calibrated with a target on its hand.
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/number_text.hpp"
@@ -58,8 +58,8 @@ Place place_of(const std::vector<robot::Station>& stations, const std::string& m
                        stations[j].world_from_target * inverse(stations[i].world_from_target),
                        Eigen::Vector3d::Zero()});
   const robot::HandEye found = robot::solve_ax_xb(moves);
-  // The motions between n stations share the noise of these. For n (n - 1) / 2 motions with noise of their own the
-  // covariance would be 2 / (n + 1) times that of n stations.
+  // The n (n - 1) / 2 motions between n stations share the noise of the stations. With independent noise, their
+  // covariance would be 2 / (n + 1) times that of the stations.
   return {found.robot_from_reference, 0.5 * double(stations.size() + 1) * found.covariance};
 }
 
@@ -67,10 +67,10 @@ Place place_of(const std::vector<robot::Station>& stations, const std::string& m
 void check_left(double left_deg, double left_mm, const Options& options) {
   if (left_deg <= options.max_deviation_deg && left_mm <= options.max_deviation_mm) return;
   throw Error(
-      formatted("the stations do not tell well enough where the robot is: this move would leave the fragment "
-                "{:.2f} degrees and {:.2f} mm from its place (one standard deviation), at most {:g} degrees and {:g} "
-                "mm are allowed; turn the robot further between stations, about axes that are at least 30 "
-                "degrees apart, or raise max_deviation_deg and max_deviation_mm",
+      formatted("the stations do not tell well enough where the robot is: this move would leave the fragment {:.2f} "
+                "degrees and {:.2f} mm from its place (one standard deviation), at most {:g} degrees and {:g} mm are "
+                "allowed; turn the robot further between stations, about axes that are at least 30 degrees apart, or "
+                "raise max_deviation_deg and max_deviation_mm",
                 left_deg, left_mm, options.max_deviation_deg, options.max_deviation_mm));
 }
 
@@ -112,8 +112,8 @@ MARROW_PLUGIN(plugin) {
       .in("models", "surfaces of both fragments; they give the centroid if a pose does not", over("fragment"))
       .out("motion", &Result::motion, "motion in the axes of the robot's base")
       .out("metrics", &Result::metrics,
-           "size of the motion, how far from its place it leaves the fragment because the robot's place is not known "
-           "better (standard deviations in the worst direction), and the number of images")
+           "size of the motion; how far the uncertainty of the robot's place leaves the fragment from its place "
+           "(standard deviations in the worst direction); number of images")
       .figures({"step_deg", "step_mm", "left_deg", "left_mm", "stations", "images"})
       .option("moved", &Options::moved, "fragment that the robot holds")
       .option("reference", &Options::reference, "fragment that stays")

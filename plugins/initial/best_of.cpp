@@ -89,11 +89,11 @@ Pose best_of(const Pose* first, const Pose* second, const Pose* third, const Pos
 
 MARROW_PLUGIN(plugin) {
   plugin.node("initial.best_of", best_of)
-      .summary("The best of several starts: each is refined for a moment, and the one of least cost is taken")
+      .summary("The best of several starts: each is refined briefly, and the one with the least cost is taken")
       .in("first", "a start")
       .in("second", "another start")
       .in("third", "another start")
-      .in("fourth", "another start; starts that are not there are left out, but one must be there")
+      .in("fourth", "another start; missing starts are left out, but at least one must be given")
       .in("model", "surface of the fragment: it gives the axes of a start that has none")
       .in("cost", "cost of a pose")
       .in("optimizer", "minimiser that refines each start")

@@ -91,7 +91,8 @@ MARROW_PLUGIN(plugin) {
       .option("translation_axial_mm", &Options::translation_axial_mm,
               "range of the shift along the long axis, to either side", marrow::at_least(0))
       .option("poses", &Options::poses,
-              "number of poses to try, spread evenly over these ranges; 0: it fails, where a pipeline has other ways",
+              "number of poses to try, spread evenly over these ranges; 0: the node fails, for pipelines with other "
+              "ways to a start",
               marrow::at_least(0))
       .option("candidates", &Options::candidates, "number of best poses to refine; no two of them are neighbours",
               marrow::at_least(1))
@@ -111,6 +112,5 @@ MARROW_PLUGIN(plugin) {
       .relation(marrow::as_many_or_none("pixel_step", "contour_spacing_px"))
       .option("max_evaluations", &Options::max_evaluations,
               "largest number of evaluations of the cost for each search of a level", marrow::at_least(1))
-      .option("needs_start", &Options::needs_start,
-              "fail if there is no start, where a pipeline has other ways to one");
+      .option("needs_start", &Options::needs_start, "fail if there is no start, for pipelines with other ways to one");
 }

@@ -44,8 +44,7 @@ marrow::Pose manual(const marrow::Mesh& model, const marrow::Pose* start, const 
   marrow::check_mesh(model, "model");
   if (!start && options.needs_start)
     throw marrow::Error(
-        "there is no start; give the approximate placement of the fragment, in case.yaml under 'start' "
-        "(docs/case.md)");
+        "there is no start; give the approximate placement of the fragment, in case.yaml under 'start' (docs/case.md)");
   marrow::Pose pose;
   if (start) {
     pose.world_from_model = start->world_from_model;
@@ -79,6 +78,5 @@ MARROW_PLUGIN(plugin) {
       .option("translation_mm", &Options::translation_mm, "shift along the frontal, lateral and long axis")
       .option("distance_mm", &Options::distance_mm,
               "if above 0, both are scaled until the mean distance moved by the surface is this", marrow::at_least(0))
-      .option("needs_start", &Options::needs_start,
-              "fail if there is no start, where a pipeline has other ways to one");
+      .option("needs_start", &Options::needs_start, "fail if there is no start, for pipelines with other ways to one");
 }

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The chapter's first stage (3.4): finds the bone's axis from the shaft lines of the views, and moves the model so that
 // its axis coincides. The chapter back-projects at right angles to the image. Here the planes go through the X-ray
-// source, which avoids an error of up to 20 mm (docs/method.md). The model's axis is measured anew in each round, from
+// source, which avoids an error of up to 20 mm (docs/method.md). The model's axis is measured again in each round, from
 // the silhouette of the model along the same parts of the same views. So a bow, a taper or a ridge shifts both axes by
-// the same amount.
-// An image may show the shafts of two fragments. Each fragment takes the best pair of lines at its own position. This
-// may be a pair that the shaft node rejected in favour of a better one.
+// the same amount. An image may show the shafts of two fragments. Each fragment takes the best pair of lines at its own
+// position. This may be a pair that the shaft node rejected in favour of a better one.
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
@@ -123,8 +122,8 @@ std::vector<ModelBorders> borders_of(const Mesh& model, const Pose& pose, const 
   for (std::size_t i = 0; i < sights.size(); ++i) {
     if (!found[i])
       throw marrow::Error("view '" + sights[i].name +
-                          "': where the image shows the shaft, the model at its start does not appear; "
-                          "give a start nearer to the bone");
+                          "': where the image shows the shaft, the model at its start does not appear; give a start "
+                          "nearer to the bone");
     borders.push_back(std::move(*found[i]));
   }
   return borders;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A pose from markers on the skin that a tracking system measures in the world. Two errors are known apart: that of
-// each marker by itself, and a motion of all markers together, as the skin slides about and along the bone. Weighted
-// least squares with the covariance of both; begun at the unweighted fit (Arun, Huang and Blostein, IEEE PAMI 9, 1987;
-// Umeyama, IEEE PAMI 13, 1991).
+// A pose from markers on the skin that a tracking system measures in the world. There are two kinds of error: that of
+// each single marker, and a common motion of all markers, because the skin slides about and along the bone. The pose is
+// fitted by weighted least squares with the covariance of both, from the unweighted fit (Arun, Huang and Blostein, IEEE
+// PAMI 9, 1987; Umeyama, IEEE PAMI 13, 1991).
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
@@ -102,10 +102,9 @@ Matrix6d fit_weighted(RigidTransform& pose, const FragmentFrame& frame, const Ma
   }
 }
 
-/// Residuals in units of the markers' own noise, against what is expected of them: they have 3 N - 6 degrees of
-/// freedom.
+/// Compares the residuals, in units of the markers' own noise, with their expectation for 3 N - 6 degrees of freedom.
 void warn_of_residuals(Pose& pose, const Markers& markers, Context& context) {
-  constexpr double kMost = 2.5;  // three right markers exceed it once in 3000 times, more markers less often
+  constexpr double kMost = 2.5;  // three correct markers exceed it once in 3000 cases, more markers less often
   double squares = 0, largest = 0;
   std::string farthest;
   for (std::size_t i = 0; i < markers.names.size(); ++i) {
@@ -149,16 +148,15 @@ Pose skin_markers(const Mesh& model, const Landmarks& landmarks, const Options& 
 MARROW_PLUGIN(plugin) {
   plugin.node("initial.skin_markers", skin_markers)
       .summary(
-          "Pose from tracked markers on the skin, by weighted least squares; its covariance has the error of each "
-          "marker "
-          "and the rotation of all of them about the bone")
+          "Pose from tracked markers on the skin, by weighted least squares; its covariance includes the error of each "
+          "marker and their common motion about the bone")
       .in("model", "surface of the fragment; it gives the axes")
       .in("landmarks", "markers in the CT and their tracked positions")
-      .out("pose", "fitted pose with its covariance; its cost is the root mean square of the distances left, in mm")
-      .option(
-          "noise_mm", &Options::noise_mm,
-          "standard deviation of each tracked coordinate of a marker by itself: one for all, or one for each in the "
-          "order of tracking")
+      .out("pose",
+           "fitted pose with its covariance; its cost is the root mean square of the remaining distances, in mm")
+      .option("noise_mm", &Options::noise_mm,
+              "standard deviation of each tracked coordinate of a single marker: one for all, or one for each in the "
+              "order of tracking")
       .option("common_rotation_deg", &Options::common_rotation_deg,
               "standard deviation of the rotation of all markers together about the long axis", at_least(0),
               at_most(90))

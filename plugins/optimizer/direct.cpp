@@ -33,7 +33,7 @@ class Direct : public marrow::Optimizer {
     const Eigen::VectorXd high = problem.start + reach_ * problem.initial_step;
     bounded.lower = problem.lower.size() ? problem.lower.array().isFinite().select(problem.lower, low).eval() : low;
     bounded.upper = problem.upper.size() ? problem.upper.array().isFinite().select(problem.upper, high).eval() : high;
-    // NLopt's other version, GN_DIRECT_L, ends at its budget only.
+    // NLopt's other version, GN_DIRECT_L, stops only at its budget.
     marrow::search::NloptRun search(nlopt::GN_ORIG_DIRECT_L, bounded);
     search.end_at_part_of_range(least_side(bounded));
     return search.run();

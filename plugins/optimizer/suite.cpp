@@ -157,7 +157,7 @@ double differing_results(const Subject& subject) {
   return double(std::count_if(found.begin(), found.end(), [&](const Eigen::VectorXd& one) { return one != expected; }));
 }
 
-/// How many problems without sense the optimizer takes.
+/// How many senseless problems the optimizer accepts.
 double nonsense_taken(const Subject& subject) {
   const Made optimizer = made(subject);
   std::vector<MinimisationProblem> problems;
@@ -245,7 +245,7 @@ Suite optimizer_suite() {
       differing_results);
   add("tolerance", "a bowl of six variables, a step tolerance of 0.1: evaluations in percent of a budget of 20000", 50,
       "%", evaluations_to_tolerance);
-  add("nonsense", "problems without coordinates, with a start or a step tolerance that is no number that are taken", 0,
+  add("nonsense", "accepted problems that have no coordinates, or a start or step tolerance that is not a number", 0,
       "problems", nonsense_taken);
   add("nothing_finite", "results for a function that is NaN everywhere; an error is right", 0, "results",
       best_of_nothing);

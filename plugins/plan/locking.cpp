@@ -65,7 +65,7 @@ void predict(const Pose& pose, const Hole& hole, LockingPlan::Drill& drill) {
 
 /// The C-arm turned so that the ray through the hole's centre runs along its axis. With the viewing direction w, the
 /// source lies at isocentre - distance * w. The ray runs along the axis if centre - source = s * axis, so |w| = 1 gives
-/// s. Of the two sides that the source may be on, the one that needs less turning.
+/// s. The source may be on either side; the side that needs less turning is taken.
 void aim(const LockingOptions& options, LockingPlan::Drill& drill) {
   const double distance = options.source_to_isocentre_mm;
   const Vector3d off = drill.centre_mm - options.isocentre_mm, &axis = drill.direction;

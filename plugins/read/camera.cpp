@@ -16,7 +16,7 @@ struct Options {
   double scale = 1;
 };
 
-/// Where the file says how large its images are, a wired one must be so; a size in numbers is refused there.
+/// If the file gives the size of its images, a wired image must have this size, and image_size_px is refused.
 Camera camera(const Image* image, const Options& options, Context& context) {
   const exchange::CameraFormat format = exchange::camera_format(options.path);
   const bool is_alone = format == exchange::CameraFormat::own || format == exchange::CameraFormat::xmalab,
@@ -56,13 +56,12 @@ MARROW_PLUGIN(plugin) {
               "plastimatch and RTK: width and height of the image; or wire the image")
       .option("pixel_mm", &Options::pixel_mm,
               "RTK: width and height of a pixel on the detector; one number for square pixels")
-      .option(
-          "corner_mm", &Options::corner_mm,
-          "RTK: the origin of its images, which is the place (u, v) of the first pixel's centre on the detector; if "
-          "empty, the image is centred")
+      .option("corner_mm", &Options::corner_mm,
+              "RTK: the origin of its images: the place (u, v) of the first pixel's centre on the detector; empty: the "
+              "image is centred")
       .option("mirror", &Options::mirror,
-              "RTK and xReg: how their images, which are seen from the detector or have rows from below, are turned "
-              "over before use, as by the same option of read.view or read.image",
+              "RTK and xReg: how their images are turned over before use, as by the same option of read.view or "
+              "read.image; they are seen from the detector, or have their rows from below",
               one_of({"none", "left_right", "upside_down"}))
       .option(
           "scale", &Options::scale,

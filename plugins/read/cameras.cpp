@@ -34,8 +34,8 @@ List<Camera> cameras(const Options& options, Context& context) {
   if (exchange::projections_in(options.path) == exchange::Projections::xreg &&
       !(options.image_size_px.empty() && options.pixel_mm.empty() && options.corner_mm.empty()))
     throw Error(options.path.string() +
-                ": says itself how large its images are; leave out image_size_px, pixel_mm and "
-                "corner_mm, which are for RTK's geometry");
+                ": says itself how large its images are; leave out image_size_px, pixel_mm and corner_mm, which are "
+                "for RTK's geometry");
   const std::vector<Camera> read = exchange::read_projections(
       options.path, numbers_of(options), {options.image_size_px, options.pixel_mm, options.corner_mm},
       exchange::mirror_of(options.mirror), options.scale);
@@ -65,13 +65,12 @@ MARROW_PLUGIN(plugin) {
       .option("image_size_px", &Options::image_size_px, "RTK: width and height of the images")
       .option("pixel_mm", &Options::pixel_mm,
               "RTK: width and height of a pixel on the detector; one number for square pixels")
-      .option(
-          "corner_mm", &Options::corner_mm,
-          "RTK: the origin of its images, which is the place (u, v) of the first pixel's centre on the detector; if "
-          "empty, the images are centred")
+      .option("corner_mm", &Options::corner_mm,
+              "RTK: the origin of its images: the place (u, v) of the first pixel's centre on the detector; empty: the "
+              "images are centred")
       .option("mirror", &Options::mirror,
-              "how the program's images, which are seen from the detector or have rows from below, are turned over "
-              "before use, as by the same option of read.views",
+              "how the program's images are turned over before use, as by the same option of read.views; they are seen "
+              "from the detector, or have their rows from below",
               one_of({"none", "left_right", "upside_down"}))
       .option("scale", &Options::scale,
               "factor that converts the unit of the camera file to mm: 10 for cm, 1000 for metres", at_least(1e-6));

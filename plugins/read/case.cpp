@@ -89,7 +89,7 @@ void read_ct(const fs::path& folder, const YamlMap& map, marrow::Case& result, m
     result.ct = std::move(*volume);
 }
 
-/// What a map says about a camera file of another program.
+/// What a map says about the camera file of another program.
 marrow::exchange::CameraReading camera_reading(const YamlMap& map) {
   marrow::exchange::CameraReading reading;
   if (map.has("projection")) {
@@ -110,7 +110,7 @@ marrow::exchange::CameraReading camera_reading(const YamlMap& map) {
   return reading;
 }
 
-/// The camera of a view whose image is this one.
+/// The camera of the view with this image.
 std::optional<marrow::DistortedCamera> read_camera(const fs::path& folder, const YamlMap& map,
                                                    const std::optional<marrow::Image>& image,
                                                    marrow::Context& context) {
@@ -154,9 +154,9 @@ std::optional<cv::Mat> read_mask(const fs::path& folder, const YamlMap& map, boo
   if (mask->pixels.type() != CV_8U)
     map.fault("mask", "mask: expected an image of 8 bits, zero where the view may not be used");
   if (marrow::files::is_lossy_image(file_in(folder, map, "mask").value()))
-    map.fault("mask",
-              "mask: was compressed with loss (JPEG or the like), so what was zero may be so no more; save the "
-              "mask as PNG");
+    map.fault(
+        "mask",
+        "mask: was compressed with loss (JPEG or the like), so what was zero may be so no more; save the mask as PNG");
   const auto is_mirrored = [&](const std::string& key) {
     return marrow::files::is_mirrored_as_read(file_in(folder, map, key).value());
   };
@@ -166,7 +166,8 @@ std::optional<cv::Mat> read_mask(const fs::path& folder, const YamlMap& map, boo
   return mirrored;
 }
 
-/// Says what the image's file lets one doubt. A camera of angles shares the patient's axes with that header.
+/// Warns of what is doubtful about the image's file. A camera given by angles uses the patient's axes, as the header of
+/// the image does.
 void warn_of_image(const fs::path& folder, const YamlMap& map, const marrow::Camera& camera, marrow::Context& context) {
   const fs::path image = file_in(folder, map, "image").value();
   const YAML::Node written = map.node("camera");

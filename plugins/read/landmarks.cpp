@@ -21,7 +21,7 @@ struct Options {
   std::string mirror = "none";
 };
 
-/// Notes a fault if the points in the CT have none with the name of a seen or tracked point.
+/// Notes a fault if no point in the CT has the name of a seen or tracked point.
 void check_known(const YamlMap& places, const YamlMap& map, const std::string& name) {
   if (places.has(name)) return;
   const std::string near = map.file().is_full() ? "" : nearest_name(name, places.keys());
@@ -128,7 +128,7 @@ MARROW_PLUGIN(plugin) {
       .option(
           "seen", &Options::seen,
           "only for 3D Slicer's files: projection data of xReg (.h5), which say where its images show the landmarks")
-      .option("names", &Options::names, "names of the views that xReg's projections are, in their order")
+      .option("names", &Options::names, "names of the views, in the order of xReg's projections")
       .option("mirror", &Options::mirror, "how xReg's images are turned over before use, as for read.camera",
               one_of({"none", "left_right", "upside_down"}));
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A pose maps the CT to the world. ITK's transform files map points of the fixed image (here the world) to the moving
-// one (the CT), and 3D Slicer saves transforms so: when the model was moved by hand to its place in the world, the file
-// holds the inverse of that motion.
+// one (the CT). 3D Slicer saves transforms in the same way: for a model that was moved by hand to its place in the
+// world, the file holds the inverse of this motion.
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/exchange/itk_transform.hpp"
@@ -15,13 +15,13 @@ struct Options {
   std::string maps = "world_to_ct";
 };
 
-/// `frame`: that of what is placed, which a transform file does not name.
+/// `frame`: the model's frame, which a transform file does not name.
 marrow::Pose pose_in(const Options& options, const std::string& frame) {
   if (!marrow::exchange::is_itk_transform_file(options.path)) {
     if (options.maps != "world_to_ct")
-      throw marrow::Error(options.path.string() +
-                          ": says itself what it maps; maps is only for transforms of ITK (.tfm "
-                          "or .txt), so leave it out");
+      throw marrow::Error(
+          options.path.string() +
+          ": says itself what it maps; maps is only for transforms of ITK (.tfm or .txt), so leave it out");
     return marrow::files::read_pose_file(options.path);
   }
   marrow::Pose pose;
@@ -44,8 +44,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("read.pose", pose)
       .summary(
           "Reads a pose from marrow's YAML or from a transform of ITK and 3D Slicer, for example a start that was "
-          "found "
-          "by hand, or the result of another run")
+          "found by hand, or the result of another run")
       .in("model", "surface of the fragment: it gives the pose its axes, which a transform file does not have")
       .out("pose", "pose of the model in the world")
       .option("path", &Options::path,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sequence of X-ray images: of each view a folder of images, a file with several frames, or a video.
+// A sequence of X-ray images: for each view a folder of images, a file with several frames, or a video.
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/names.hpp"
@@ -97,18 +97,15 @@ MARROW_PLUGIN(plugin) {
       .option("names", &Options::names, "one name per view", required())
       .relation(at_least_one({"names"}))
       .relation(distinct("names"))
-      .option(
-          "images", &Options::images,
-          "per view: a folder of images (PNG, TIFF, DICOM, ...) whose names differ in a number only, a file with "
-          "several "
-          "pages or frames (TIFF, DICOM), or a video (AVI, MP4, MOV, MKV, WebM, WMV, MPEG) of up to 16 bits; colours "
-          "of a video become grey",
-          required())
+      .option("images", &Options::images,
+              "per view: a folder of images (PNG, TIFF, DICOM, ...) whose names differ only in a number, a file with "
+              "several pages or frames (TIFF, DICOM), or a video (AVI, MP4, MOV, MKV, WebM, WMV, MPEG) of up to 16 "
+              "bits; colours of a video become grey",
+              required())
       .relation(same_length({"names", "images"}))
-      .option(
-          "patterns", &Options::patterns,
-          "per view: which files of its folder belong to it, as 'frontal_*.png' or '*/frontal.png'; * stands for any "
-          "characters, ? for one. Empty: all images of the folder")
+      .option("patterns", &Options::patterns,
+              "per view: which files of its folder belong to it, as 'frontal_*.png' or '*/frontal.png'; * stands for "
+              "any characters, ? for one. Empty: all images of the folder")
       .relation(as_many_or_none("patterns", "names"))
       .option("cameras", &Options::cameras,
               "one camera file (marrow's YAML, or a file of XMALab, plastimatch or xReg) per view")

@@ -39,5 +39,5 @@ MARROW_PLUGIN(plugin) {
       .out("track", &Tra::track, "the poses of all frames")
       .out("poses", &Tra::poses, "poses of the frames in which the bone was tracked, named by their number",
            over("frame"))
-      .option("path", &Options::path, "the file, one line a frame", required());
+      .option("path", &Options::path, "the file, one line per frame", required());
 }

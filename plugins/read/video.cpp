@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Videos by FFmpeg's libraries. OpenCV, which uses them too, cuts every frame to 8 bits, and opens whatever other file
-// a video names.
+// Videos by FFmpeg's libraries. OpenCV, which uses them too, cuts every frame to 8 bits, and opens every other file
+// that a video names.
 #include "video.hpp"
 
 #include <algorithm>
@@ -89,7 +89,7 @@ class Video {
 
   std::string what() const { return file_.path().string(); }
 
-  /// Number of frames that the header tells of; 0 if it does not.
+  /// Number of frames by the header; 0 if it does not give one.
   long frames_told() const {
     if (stream_->nb_frames > 0) return long(stream_->nb_frames);
     const AVRational rate = av_guess_frame_rate(container_.get(), stream_, nullptr);
@@ -108,7 +108,7 @@ class Video {
     return nullptr;
   }
 
-  /// Whether the frame after the last that next() returned is there but cannot be decoded.
+  /// Whether there is a next frame that cannot be decoded.
   bool is_damaged() const { return is_damaged_; }
 
  private:
@@ -196,7 +196,7 @@ std::vector<Image> read_video(const fs::path& path, const char* container, const
   if (video.is_damaged())
     throw Error(formatted("{}: frame {} is cut off or damaged; to read those before it, set last to {}", path.string(),
                           count + 1, count));
-  files::frames_of(range, count, path.string());  // are there the first and the last?
+  files::frames_of(range, count, path.string());  // throws if the first or the last frame is missing
   return images;
 }
 

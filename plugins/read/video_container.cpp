@@ -34,7 +34,7 @@ bool is_transport_stream(std::string_view head) {
 }
 
 bool is_mov(std::string_view head) {
-  // Still pictures (HEIC, AVIF) begin so too.
+  // Still pictures (HEIC, AVIF) begin in the same way.
   for (const std::string_view picture : {"heic", "heix", "mif1", "avif"})
     if (has_at(head, 4, "ftyp") && has_at(head, 8, picture)) return false;
   if (has_at(head, 4, "mdat")) return true;
@@ -53,7 +53,7 @@ const char* container_of(std::string_view head) {
   return is_transport_stream(head) ? "mpegts" : nullptr;
 }
 
-/// What kind of list of other files it is; empty if it is none.
+/// The kind of a list of other files; empty if it is not a list.
 std::string name_of_list(std::string_view head) {
   struct Known {
     std::string_view mark;
@@ -129,10 +129,9 @@ const char* video_container(const fs::path& path) {
   const InputFile file(path);
   const std::string head = file.text(0, std::size_t(std::min<std::uint64_t>(file.size(), kHeadBytes)));
   if (const std::string list = name_of_list(head); !list.empty())
-    throw Error(
-        path.string() + ": is " + list +
-        ", not a video: the frames are in other files, whose changes would go unnoticed; name the video itself, "
-        "or a folder of images");
+    throw Error(path.string() + ": is " + list +
+                ", not a video: the frames are in other files, whose changes would go unnoticed; name the video "
+                "itself, or a folder of images");
   const char* const container = container_of(head);
   if (!container && is_named_like_a_video(path))
     throw Error(path.string() +

@@ -47,16 +47,15 @@ MARROW_PLUGIN(plugin) {
               "image")
       .option("frame", &Options::frame, "frame of a multi-frame file, counted from 1; 0: the file has only one frame",
               marrow::at_least(0))
+      .option("mirror", &Options::mirror,
+              "turns the image over, if it is seen from the detector or has its rows from below, and with it the "
+              "camera in a file of RTK or xReg; any other camera must already be that of the turned image, as "
+              "read.camera gives it with the same option",
+              marrow::one_of({"none", "left_right", "upside_down"}))
       .option(
-          "mirror", &Options::mirror,
-          "turns the image over, if it is seen from the detector or has its rows from below, and with it the camera "
-          "in a file of RTK or xReg; any other camera must be that of the image that was turned over, as "
-          "read.camera gives it with the same option",
-          marrow::one_of({"none", "left_right", "upside_down"}))
-      .option("projection", &Options::projection,
-              "RTK and xReg: number of the view's projection in the camera file, counted from 0; -1: the file has "
-              "only one",
-              marrow::at_least(-1))
+          "projection", &Options::projection,
+          "RTK and xReg: number of the view's projection in the camera file, counted from 0; -1: the file has only one",
+          marrow::at_least(-1))
       .option("pixel_mm", &Options::pixel_mm,
               "RTK: width and height of a pixel on the detector; one number for square pixels")
       .option("corner_mm", &Options::corner_mm,

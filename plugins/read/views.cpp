@@ -65,12 +65,11 @@ MARROW_PLUGIN(plugin) {
               "and its distortion is removed from the images")
       .option("frame", &Options::frame, "frame of a multi-frame file, counted from 1; 0: the file has only one frame",
               marrow::at_least(0))
-      .option(
-          "mirror", &Options::mirror,
-          "turns all images over, if they are seen from the detector or have their rows from below, and with them the "
-          "cameras in files of RTK or xReg; any others must be those of the images that were turned over, as "
-          "read.cameras gives them with the same option",
-          marrow::one_of({"none", "left_right", "upside_down"}))
+      .option("mirror", &Options::mirror,
+              "turns all images over, if they are seen from the detector or have their rows from below, and with them "
+              "the cameras in files of RTK or xReg; any other cameras must already be those of the turned images, as "
+              "read.cameras gives them with the same option",
+              marrow::one_of({"none", "left_right", "upside_down"}))
       .option("projections", &Options::projections,
               "RTK and xReg: number of each view's projection in its camera file, counted from 0; if empty, each file "
               "must have only one")

@@ -40,8 +40,8 @@ class BoneInView {
 
   double value(const RigidTransform& pose) const { return cost_.value_in_view(view_, pose); }
 
-  /// By central differences; the scatter only if asked for. A step is so long that the cost rises by about
-  /// `wanted_rise`; 0: by the deviation of the cost's value, from block to block.
+  /// By central differences; the scatter only if asked for. Steps are chosen so long that the cost rises by about
+  /// `wanted_rise`; 0: by the deviation of the cost's value from block to block.
   Model model_at(const RigidTransform& pose, double wanted_rise, bool with_scatter) {
     Model model;
     const Sample here = sample(pose, !(wanted_rise > 0));
@@ -71,8 +71,8 @@ class BoneInView {
     return model;
   }
 
-  /// Moves a model to another pose, whose value it has: its gradient is made anew, by the steps of the last model, and
-  /// its curvature and scatter stay. This takes a quarter of the time.
+  /// Moves a model, which already holds the value of the new pose: computes its gradient again by the steps of the last
+  /// model, and keeps its curvature and scatter. This takes a quarter of the time.
   void move(Model& model, const RigidTransform& pose) const {
     tbb::parallel_for(0, 6, [&](int axis) {
       model.gradient[axis] =
@@ -100,15 +100,15 @@ class BoneInView {
     const SymmetricEigen<6> eigen = eigen_of_symmetric(h);
     return eigen.vectors * eigen.values.cwiseMax(0).asDiagonal() * eigen.vectors.transpose();
   }
-  /// The cost in this view, and without each block of its image. To the latter the same number may be added: the cost
-  /// in the other views.
+  /// The cost in this view, and without each block of its image. The latter values may include a constant: the cost in
+  /// the other views.
   struct Sample {
     double value = 0;
     Eigen::VectorXd without;
   };
   Sample sample(const RigidTransform& pose, bool with_blocks) const {
     if (!with_blocks) return {value(pose), {}};
-    // A cost that is a mean over views tells both at once. Others compare all views a second time.
+    // A cost that is a mean over views gives both at once. Others compare all views a second time.
     if (const auto* views = dynamic_cast<const match::ViewsCost*>(&cost_)) {
       const match::ViewsCost::Split split = views->split(view_, pose);
       check_count(split.without_block.size(), blocks_);
@@ -124,7 +124,8 @@ class BoneInView {
           "the cost gives no values without each block of the images; use a cost that predicts deviations, such as "
           "that of the contour");
   }
-  /// Of the slopes about their mean, which is that of the whole cost in this view, and what the other views add.
+  /// The scatter of the slopes about their mean. The mean is the slope of the whole cost in this view, plus what the
+  /// other views add.
   Matrix6d scatter(const std::array<Sample, 12>& ends) const {
     Eigen::MatrixXd gradients(6, Eigen::Index(blocks_));
     for (std::size_t axis = 0; axis < 6; ++axis) {

@@ -11,7 +11,7 @@ namespace marrow::refine {
 
 /// What is expected of the cameras' motions: a Gaussian density. A motion that all cameras share changes no image,
 /// because the bones can follow it. So the images cannot tell how large it is, and it always counts as expected. The
-/// scale, which the images tell, is that of the rest: of how far the cameras are off against each other.
+/// images only tell the scale of the rest: how far the cameras are off relative to each other.
 class CameraPrior {
  public:
   explicit CameraPrior(const std::vector<Sight>& sights) {
@@ -33,7 +33,7 @@ class CameraPrior {
     rest_ = rest.transpose() * weight.asDiagonal() * rest;
   }
 
-  /// The inverse covariance of all motions, if the cameras are off against each other by `scale` times what is
+  /// The inverse covariance of all motions, if the cameras are off relative to each other by `scale` times what is
   /// expected.
   Eigen::MatrixXd inverse_covariance(double scale) const { return shared_ + rest_ / (scale * scale); }
   /// The logarithm of the density's factor that depends on the scale.
@@ -44,8 +44,8 @@ class CameraPrior {
 };
 
 /// A matrix F with F F^T = a^-1, for a symmetric and positive definite matrix. J F F^T J^T is then the covariance of J
-/// x for any J, and never indefinite, however much cancels. The numbers may be of very different size, so they are
-/// scaled first.
+/// x for any J, and never indefinite, however much cancels. The numbers may differ much in size, so they are scaled
+/// first.
 inline Eigen::MatrixXd root_of_inverse(Eigen::MatrixXd a) {
   a.diagonal().array() += 1e-9;  // for a direction that nothing determines
   const Eigen::VectorXd scale = a.diagonal().cwiseSqrt().cwiseInverse();

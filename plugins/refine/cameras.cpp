@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Corrects cameras that are a little off, together with the poses of the bones that they show; how, says
-// refinement.hpp.
+// Corrects cameras that are a little off, together with the poses of the bones that they show. refinement.hpp says how.
 #include <array>
 #include <cstdio>
 #include <marrow/base/names.hpp>
@@ -66,7 +65,7 @@ void warn_of_large(const std::string& view, const Vector6d& in_deviations, Conte
                " times what the options expect; is it the camera of this image, and are the poses right?");
 }
 
-/// Throws Error if the images say nothing about one of the bones: its pose and the cameras would be whatever was given.
+/// Throws Error if the images say nothing about one of the bones: its pose and the cameras would stay as given.
 void check_compared(const Refinement& refinement, const List<Pose>& poses) {
   for (std::size_t f = 0; f < poses.size(); ++f) {
     const std::string why = search::nothing_compared(refinement.level(f), refinement.state().poses[f], poses[f].frame);
@@ -125,13 +124,12 @@ MARROW_PLUGIN(plugin) {
       .in("poses", "pose of each bone, from a registration", over("fragment"))
       .out("views", &Result::views, "the same images with corrected cameras", over("view"))
       .out("poses", &Result::poses,
-           "poses that go with these cameras; their covariance includes what is not known about the cameras",
+           "poses that go with these cameras; their covariance includes the uncertainty of the cameras",
            over("fragment"))
-      .out(
-          "relative", &Result::relative,
-          "the same poses with their covariances relative to the first bone, whose own is zero: what all bones are off "
-          "by in common does not count",
-          over("fragment"))
+      .out("relative", &Result::relative,
+           "the same poses with their covariances relative to the first bone, whose own is zero: errors that all bones "
+           "share do not count",
+           over("fragment"))
       .out("motions", &Result::motions,
            "motion of each camera, about and along the axes of its image (u, v, depth), and its predicted deviations",
            over("view"))
@@ -140,11 +138,10 @@ MARROW_PLUGIN(plugin) {
                 "predicted_shift_u_mm", "predicted_shift_v_mm", "predicted_shift_depth_mm"})
       .option("turn_deg", &Options::turn_deg, "root mean square of the cameras' rotations", at_least(1e-6))
       .option("shift_mm", &Options::shift_mm, "root mean square of the cameras' shifts", at_least(1e-6))
-      .option(
-          "focal_percent", &Options::focal_percent,
-          "root mean square error of the focal lengths; it is corrected by a shift along the depth, which shows the "
-          "bone in the same size",
-          at_least(0))
+      .option("focal_percent", &Options::focal_percent,
+              "root mean square error of the focal lengths; it is corrected by a shift along the depth, which shows "
+              "the bone in the same size",
+              at_least(0))
       .option("centre_px", &Options::centre_px,
               "root mean square error of the principal points; it is corrected by a shift across the depth",
               at_least(0))
@@ -159,8 +156,7 @@ MARROW_PLUGIN(plugin) {
               "the cameras are off, and the last one decides the poses",
               at_least(1), replaces({"pixel_step"}))
       .option("max_iterations", &Options::max_iterations, "largest number of iterations", at_least(1))
-      .option(
-          "reference_view", &Options::reference_view,
-          "view whose camera is right and stays, such as the one that was calibrated with the robot; empty: none is "
-          "known to be");
+      .option("reference_view", &Options::reference_view,
+              "view whose camera is right and stays, such as the one that was calibrated with the robot; empty: no "
+              "camera is known to be right");
 }

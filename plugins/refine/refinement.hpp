@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Cameras by the bones that their images show. A view whose camera is off by a motion sees each bone in a pose that is
-// off by the same motion, for all bones. So no image is projected anew: a cost that can be split into views tells which
-// pose each view alone would like. Sought are the poses of the bones and one motion for each view. They minimise the
-// sum of the costs, in units of their noise, and of the squares of the motions, in units of the deviations expected of
-// a calibration (a Gaussian prior, camera_prior.hpp). The minimum is found by Levenberg and Marquardt's steps. The
+// off by the same motion, for all bones. So no image has to be projected again: a cost that can be split into views
+// tells which pose each view alone prefers. The unknowns are the poses of the bones and one motion for each view. They
+// minimise the sum of the costs, in units of their noise, and of the squares of the motions, in units of the deviations
+// expected of a calibration (a Gaussian prior, camera_prior.hpp). Levenberg-Marquardt steps find the minimum. The
 // curvature there gives the covariance of all poses and motions together (Laplace's approximation).
 #include <tbb/parallel_for.h>
 
@@ -36,7 +36,7 @@ struct Options : ExpectedErrors {
   std::string reference_view;
 };
 
-/// What is sought: a pose for each bone, and a motion in degrees and mm for each view.
+/// The unknowns: a pose for each bone, and a motion in degrees and mm for each view.
 struct State {
   std::vector<RigidTransform> poses;
   std::vector<Vector6d> motions;
@@ -73,10 +73,10 @@ class Refinement {
   }
 
   bool converged() const { return converged_; }
-  /// How far the cameras are off against each other, in units of what the options expect.
+  /// How far the cameras are off relative to each other, in units of what the options expect.
   double scale() const { return scale_; }
   const State& state() const { return state_; }
-  /// What a bone is compared by: its cost at the level of the last pixel step; before run(), of the first.
+  /// The cost of a bone at the level of the last pixel step; before run(), of the first one.
   const Cost& level(std::size_t bone) const { return *levels_[bone]; }
   const Sight& sight(std::size_t view) const { return sights_[view]; }
   /// The cost of a bone, as the mean over the views with their cameras corrected.
@@ -89,7 +89,7 @@ class Refinement {
     const Eigen::MatrixXd root = root_.middleRows<6>(at_pose(bone));
     return root * root.transpose();
   }
-  /// Of the bone's small motion relative to the first bone: what both are off by in common does not count.
+  /// Of the bone's small motion relative to the first bone: errors that both share do not count.
   Matrix6d covariance_beside_first(std::size_t bone) const {
     if (bone == 0) return Matrix6d::Zero();
     const auto frame_of = [&](std::size_t f) -> FragmentFrame {
@@ -103,7 +103,8 @@ class Refinement {
   Vector6d deviation_of_motion(std::size_t view) const { return root_.middleRows<6>(at_motion(view)).rowwise().norm(); }
 
  private:
-  static constexpr double kOfReference = 1e-3;  ///< how far the reference may move, of what is expected of the others
+  static constexpr double kOfReference =
+      1e-3;  ///< how far the reference may move, as a fraction of what is expected of the others
 
   /// The most probable state for a scale.
   struct Found {
@@ -127,10 +128,10 @@ class Refinement {
     models_.assign(in_views_.size(), Model());
   }
 
-  /// Finds the most probable state if the cameras are off against each other as expected, a tenth and a hundredth of
-  /// it, and keeps the one with the largest marginal likelihood. So cameras that are right stay as they are. The others
-  /// count in the covariance by their likelihood: where the images hardly tell how far the cameras are off, all of them
-  /// may be right.
+  /// Finds the most probable state if the cameras are off relative to each other as expected, by a tenth and by a
+  /// hundredth of it, and keeps the state with the largest marginal likelihood. So cameras that are right stay as they
+  /// are. The other states count in the covariance by their likelihood, because the images may hardly tell how far the
+  /// cameras are off.
   void choose_scale(Context& context) {
     const State given = state_;
     std::vector<Found> all;
@@ -196,7 +197,7 @@ class Refinement {
     for (std::size_t i = 0; i < costs.size(); ++i) sum += costs[i] / noise_[i / views_.size()];
     return sum;
   }
-  /// Of the state, whose costs the models have.
+  /// Of the present state, whose costs the models hold.
   double energy() const {
     std::vector<double> costs;
     for (const Model& model : models_) costs.push_back(model.value);
@@ -210,16 +211,16 @@ class Refinement {
     return costs;
   }
 
-  /// Moves the models, which have the state's costs, to the state. Their curvatures stay.
+  /// Moves the models, which already hold the state's costs, to the state. Their curvatures stay.
   void move_models() {
     for (std::size_t i = 0; i < models_.size(); ++i)
       in_views_[i].move(models_[i], seen(state_, i / views_.size(), i % views_.size()));
   }
 
-  /// Makes the models anew, and if wanted the noises. The noise of a cost is by how much it rises, in the mean over six
-  /// directions, where the pose moves by what the scatter of its blocks predicts (as for the predicted covariance of a
-  /// registration), times 2; and twice this, because blocks do not see an error that is common to several of them
-  /// (docs/results.md).
+  /// Computes the models again and, if wanted, the noise of each cost. The noise is twice the rise of the cost,
+  /// averaged over six directions, when the pose moves as far as the scatter of the cost's blocks predicts (as for the
+  /// predicted covariance of a registration). It is doubled again, because blocks do not see an error that several of
+  /// them share (docs/results.md).
   void expand(bool with_noise) {
     constexpr double kWantedRise = 2.5, kUnseen = 2;  // the rise in units of the noise
     for (std::size_t f = 0; f < poses_.size(); ++f) {
@@ -263,8 +264,8 @@ class Refinement {
   }
 
   /// Goes on until a step makes the state hardly more probable. The noise is measured in the first two rounds, if
-  /// wanted. Later rounds keep the curvatures. The first models are kept in `first`; if it holds some, these are those
-  /// of the state already.
+  /// wanted. Later rounds keep the curvatures. `first` receives the first models; if it already holds some, they are
+  /// those of the state.
   bool descend(bool with_noise, Context& context, std::vector<Model>& first) {
     for (int round = 0; round < options_.max_iterations; ++round) {
       context.check_cancelled();
@@ -328,7 +329,7 @@ class Refinement {
   std::vector<Model> models_;
   std::vector<double> noise_;  ///< of each bone's cost in one view
   State state_;
-  double scale_ = 1;   ///< of the deviations that the options expect of the cameras against each other
+  double scale_ = 1;   ///< of the deviations that the options expect of the cameras relative to each other
   double weight_ = 1;  ///< the probability of this scale
   Eigen::MatrixXd root_of_other_scales_;
   bool converged_ = false;

@@ -8,7 +8,7 @@
 
 namespace marrow::refine {
 
-/// Root mean squares of what is expected of a calibration.
+/// Root mean square errors that are expected of a calibration.
 struct ExpectedErrors {
   double turn_deg = 0.5;
   double shift_mm = 1;

@@ -40,7 +40,7 @@ class Bowl : public Cost {
   std::shared_ptr<const Cost> at_level(const CostLevel&) const override { return std::make_shared<Bowl>(*this); }
 };
 
-/// A bowl of which one view, or all of them, say that they show nothing.
+/// A bowl with one view, or with all views, saying that they show nothing.
 class Silent : public Bowl {
  public:
   explicit Silent(bool all) : all_(all) {}
@@ -65,7 +65,7 @@ class Constant : public Cost {
   double value_;
 };
 
-/// Goes along one coordinate after the other; where none leads down, with half the steps.
+/// Goes along one coordinate after the other, and halves its steps when no coordinate leads down.
 class Compass : public Optimizer {
  public:
   MinimisationResult minimise(const MinimisationProblem& problem) const override {

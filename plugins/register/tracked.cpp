@@ -63,7 +63,7 @@ search::SearchOptions search_options(const Options& options, const Pose& predict
   return result;
 }
 
-/// Of a start that does not say how exact it is: as far as the wider search goes.
+/// For a start of unknown accuracy: as far as the wider search goes.
 Matrix6d unknown_covariance(const Options& options) {
   Vector6d deviation;
   deviation << Eigen::Vector3d::Constant(radians(options.max_wide_deg) / kDeviations),
@@ -141,7 +141,7 @@ class Frame {
   const Optimizer& optimizer_;
   const Optimizer& finer_optimizer_;
   const Pose& predicted_;
-  const std::optional<Matrix6d> covariance_;  ///< of the frames before, if it is taken for this one, too
+  const std::optional<Matrix6d> covariance_;  ///< of an earlier frame, if it is reused for this one
   const Options& options_;
   search::SearchOptions search_options_;
   Context& context_;
@@ -149,7 +149,8 @@ class Frame {
   std::string why_nothing_;
 };
 
-/// After some frames without the bone the prediction is so wide that a wrong pose agrees with it, too. Its cost tells.
+/// After some frames without the bone the prediction is so wide that a wrong pose agrees with it, too. Its cost reveals
+/// it.
 bool is_unusual(const Pose& found, const track::TrackState& state) {
   constexpr double kMostRatio = 1.5;
   return found.cost > kMostRatio * state.usual_cost;  // not if there is no usual cost yet: it is not a number
@@ -198,9 +199,9 @@ MARROW_PLUGIN(plugin) {
       .in("optimizer", "minimiser")
       .in("finer_optimizer", "minimiser of finer_cost; none: the same as for cost")
       .in("start",
-          "predicted pose with its covariance, and the fragment's axes; without a covariance, "
-          "or with one that says nothing, it counts as hardly known")
-      .in("state", "what is known before the frame; then most frames take over the covariance of a frame before")
+          "predicted pose with its covariance, and the fragment's axes; without a covariance, or with one that says "
+          "nothing, it counts as hardly known")
+      .in("state", "state before the frame; if given, most frames reuse the covariance of an earlier frame")
       .in("model", "surface of the fragment: it gives the axes of a start that has none")
       .out("pose", &Result::pose, "pose of least cost, with its predicted covariance")
       .out("stages", &Result::stages, "poses of the search: predicted, near (if it was found but not enough), final",
@@ -225,7 +226,7 @@ MARROW_PLUGIN(plugin) {
               "right poses are nearer)",
               at_least(0), unit(""))
       .option("covariance_every", &Options::covariance_every,
-              "with 'state': the covariance is computed anew for every n-th frame", at_least(1))
+              "with 'state': the covariance is computed again for every n-th frame", at_least(1))
       .option("wide_poses", &Options::wide_poses, "number of poses that the wider search tries", at_least(1))
       .option("max_wide_deg", &Options::max_wide_deg, "largest range of the wider search about each axis", at_least(0),
               at_most(180))

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A hexapod is fixed beside the patient and grips the distal fragment. Where it stands is known roughly only.
+// A hexapod is fixed beside the patient and grips the distal fragment. Its place is known only roughly.
 #include <marrow/plugin.hpp>
 
 #include "held.hpp"
@@ -81,7 +81,7 @@ Result hexapod(const phantom::Phantom& phantom, const Options& options, Context&
 
 MARROW_PLUGIN(plugin) {
   plugin.node("robot.hexapod", hexapod)
-      .summary("A hexapod grips the distal fragment; where it stands, its joints and the soft tissue are not known")
+      .summary("A hexapod grips the distal fragment; its place, its joints and the soft tissue are not known exactly")
       .in("phantom", "fractured bone")
       .out("state", &Result::state, "the robot, with what only the simulation knows")
       .out("report", &Result::report, "what the robot says: its place as planned, and the load")

@@ -30,5 +30,5 @@ MARROW_PLUGIN(plugin) {
       .in("states", "what is known after each frame", over("frame"))
       .out("track", "poses of the frames in which the bone was found");
   plugin.writer<AutoscoperTrack>(".tra", write_tra,
-                                 "Autoscoper's format: a line a frame, a 4x4 matrix in mm, row by row");
+                                 "Autoscoper's format: one line per frame, with a 4x4 matrix in mm, row by row");
 }

@@ -45,17 +45,16 @@ MARROW_PLUGIN(plugin) {
       .in("start", "approximate pose in the first frame, with the fragment's axes")
       .in("model", "surface of the fragment: it gives the axes of a start that has none")
       .out("state", "the bone at rest, with the deviations that the options give")
-      .option("frame_rate_hz", &Options::frame_rate_hz, "frames a second", at_least(1e-6), unit("Hz"))
+      .option("frame_rate_hz", &Options::frame_rate_hz, "frames per second", at_least(1e-6), unit("Hz"))
       .option("start_deg", &Options::start_deg, "standard deviation of the start's rotations", at_least(1e-6))
       .option("start_mm", &Options::start_mm, "standard deviation of the start's translations", at_least(1e-6))
       .option("speed_deg_s", &Options::speed_deg_s, "standard deviation of the first angular velocity", at_least(0),
               unit("deg/s"))
       .option("speed_mm_s", &Options::speed_mm_s, "standard deviation of the first velocity", at_least(0), unit("mm/s"))
-      .option(
-          "acceleration_deg_s2", &Options::acceleration_deg_s2,
-          "standard deviation of a frame's mean angular acceleration about each axis: the larger, the wider a frame "
-          "is searched",
-          at_least(1e-6), unit("deg/s^2"))
+      .option("acceleration_deg_s2", &Options::acceleration_deg_s2,
+              "standard deviation of a frame's mean angular acceleration about each axis: the larger, the wider a "
+              "frame is searched",
+              at_least(1e-6), unit("deg/s^2"))
       .option("acceleration_mm_s2", &Options::acceleration_mm_s2,
               "standard deviation of a frame's mean acceleration along each axis", at_least(1e-6), unit("mm/s^2"));
 }

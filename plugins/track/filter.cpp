@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Takes a frame's registered pose into the state, or finds the bone lost in this frame.
+// Updates the state by a frame's registered pose, or finds that the bone is lost in this frame.
 #include <cmath>
 #include <marrow/plugin.hpp>
 
@@ -25,8 +25,8 @@ struct Frame {
   Pose pose;
 };
 
-/// Of a pose in the state's frame of axes. Its deviations are at least those of the options: a covariance that is too
-/// small would shut out all later frames.
+/// The measurement of a pose in the state's axes. Its deviations are at least those of the options, because a
+/// covariance that is too small would shut out all later frames.
 Measurement measured_by(const Pose& pose, double scale, const Options& options) {
   Measurement measured{pose.world_from_model, scale * *pose.covariance};
   for (int i = 0; i < 6; ++i) {
@@ -71,7 +71,7 @@ Frame filter(const TrackState& predicted, const Pose* pose, const Verdict* verdi
     state.usual_covariance = usual;
     constexpr double kShare = 0.1, kShareOfCost = 0.3;  // of the newest frame in the scale and in the usual cost
     constexpr double kExpected = 6;
-    // If the poses scatter more than their covariances say, the surprises are too large on average.
+    // If the poses scatter more than their covariances predict, the surprises are too large on average.
     state.noise_scale = std::max(1.0, scale * (1 - kShare + kShare * surprise / kExpected));
     state.usual_cost =
         std::isnan(state.usual_cost) ? pose->cost : (1 - kShareOfCost) * state.usual_cost + kShareOfCost * pose->cost;
@@ -100,11 +100,11 @@ MARROW_PLUGIN(plugin) {
       .option(
           "gate", &Options::gate,
           "largest squared Mahalanobis distance between the registered and the predicted pose (38.26: one right pose "
-          "in "
-          "a million is farther off); it is larger than that of register.tracked, beyond which the search is widened",
+          "in a million is farther off); it is larger than the gate of register.tracked, which widens the search",
           at_least(0), unit(""))
       .option("max_cost_ratio", &Options::max_cost_ratio,
-              "largest cost of a pose that is taken, as a multiple of that of the frames so far", at_least(0), unit(""))
+              "a pose with a larger cost is not taken; as a multiple of the usual cost of the frames so far",
+              at_least(0), unit(""))
       .option("first_scale", &Options::first_scale,
               "factor on the covariances of the first registered poses; later it follows from how far they scatter",
               at_least(1), unit(""))

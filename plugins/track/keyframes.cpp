@@ -70,6 +70,6 @@ MARROW_PLUGIN(plugin) {
       .in("frames", "the sequence, to see whether the files have a line for each frame", over("frame"))
       .out("keyframes", "the keyframes of each bone; none for a bone without a file", over("fragment"))
       .option("path", &Options::path,
-              "folder with a file BONE.tra for each bone that has keyframes: a line a frame, NaN where there is none; "
-              "empty: there are no keyframes");
+              "folder with a file BONE.tra for each bone that has keyframes: one line per frame, NaN if it has no "
+              "keyframe; empty: there are no keyframes");
 }

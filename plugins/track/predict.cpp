@@ -34,8 +34,8 @@ const RigidTransform* keyframe_of(const AutoscoperTrack* keyframes, int frame) {
   return keyframes->world_from_bone[at] ? &*keyframes->world_from_bone[at] : nullptr;
 }
 
-/// The bone is where a person says. The usual cost, covariance and noise of poses are found anew, because the frames
-/// before may have followed something else. Their velocity is kept only if it led to the keyframe.
+/// Puts the bone where a person placed it. The usual cost, covariance and noise of poses are estimated again, because
+/// the earlier frames may have followed something else. Their velocity is kept only if it led to the keyframe.
 void begin_again_at(const RigidTransform& keyframe, TrackState& state, const Options& options) {
   check_rigid(keyframe, "the keyframe");
   constexpr double kMostSurprise = 22.46;  // 0.1 % of right poses are farther off: chi-squared, 6 degrees of freedom
@@ -68,7 +68,7 @@ MARROW_PLUGIN(plugin) {
       .summary("Where the bone is in the next frame, if it keeps its velocity, or where a keyframe says")
       .in("state", "what is known after the frame before")
       .in("keyframes", "poses that a person placed in some frames; they take the place of the prediction there")
-      .out("state", &Prediction::state, "what is known before the frame is looked at")
+      .out("state", &Prediction::state, "what is known before the frame is registered")
       .out("pose", &Prediction::pose, "predicted pose with its covariance, to start the frame's registration from")
       .option("keyframe_deg", &Options::keyframe_deg, "standard deviation of a keyframe's rotations", at_least(1e-6))
       .option("keyframe_mm", &Options::keyframe_mm, "standard deviation of a keyframe's translations", at_least(1e-6))

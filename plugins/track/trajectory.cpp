@@ -87,6 +87,5 @@ MARROW_PLUGIN(plugin) {
   plugin.writer<TrackState>(".csv", write_state, "one frame: time, 3x4 matrix world_from_model, motion, deviations");
   plugin.writer<Trajectory>(
       ".csv", write_csv,
-      "a line a frame: time, 3x4 matrix world_from_model, motion from the first frame, deviations, "
-      "verdict");
+      "one line per frame: time, 3x4 matrix world_from_model, motion from the first frame, deviations, verdict");
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Judges a pose by evidence of many kinds: its cost against that of other poses, other minima, what each view alone
-// would have, where the outline lies on the images' edges, whether contour and grey values agree, and the predicted
+// prefers, where the outline lies on the images' edges, whether contour and grey values agree, and the predicted
 // deviations. The failure model, which tools/studies/fit_verdict fits to poses whose errors are known, turns these
 // figures into the probability that the pose is off.
 #include <tbb/parallel_invoke.h>
@@ -27,7 +27,7 @@ struct Options {
   double max_intersection_mm = 2;
 };
 
-/// What a figure means, in words for a reason, and what would settle it. The text has one place for the value.
+/// The reason that a figure gives, with one place for its value, and what would settle the doubt.
 struct Words {
   const char* figure;
   const char* reason;
@@ -84,14 +84,14 @@ void add_predicted(const Pose& pose, const Mesh& mesh, Evidence& evidence) {
   evidence.push_back({"predicted_axial_deg", std::min(spread.axial_deg, kUnknown_deg), "deg"});
 }
 
-/// The share of the errors that the pose's own covariance stands for, and that are off.
+/// The share of failures among the errors that the pose's own covariance predicts.
 double predicted_failure(const Pose& pose, const verdicts::Spread& spread) {
   if (!pose.covariance) return 0;
   if (!verdicts::is_determined(pose)) return 1;
   return double(spread.off) / verdicts::Spread::kDraws;
 }
 
-/// What the pose's own covariance leaves open. After refine.cameras it counts with the cameras, too.
+/// Explains what the pose's own covariance leaves open. After refine.cameras it includes the cameras.
 void explain_predicted(const verdicts::Spread& spread, double predicted, bool is_refined, Verdict& verdict) {
   if (is_refined) {
     verdict.reasons.push_back("with what is not known about the cameras, the bone's surface is known to " +
@@ -167,7 +167,7 @@ const Words* words_of(const std::string& figure) {
   return found == std::end(kWords) ? nullptr : &*found;
 }
 
-/// A pose from which a cost leads away as far as a failure is doubtful, however likely the model finds it.
+/// A pose is doubtful if a cost leads away from it as far as a failure, whatever the model says.
 void doubt_what_a_cost_denies(const Evidence& figures, Verdict& verdict) {
   for (const char* by : {"", "contour_"})
     for (const Metric& figure : figures) {
@@ -180,7 +180,7 @@ void doubt_what_a_cost_denies(const Evidence& figures, Verdict& verdict) {
     }
 }
 
-/// The figures that speak most against the pose, each with what would settle it.
+/// Adds the figures that speak most against the pose, each with what would settle it.
 void explain(std::vector<FailureModel::Contribution> contributions, Verdict& verdict) {
   constexpr std::size_t kMostReasons = 3;
   std::stable_sort(contributions.begin(), contributions.end(),
@@ -288,7 +288,7 @@ MARROW_PLUGIN(plugin) {
       .option("failure_model", &Options::failure_model,
               "file of tools/studies/fit_verdict; none: the figures alone, to fit one, and the pose is doubtful")
       .option("pixel_step", &Options::pixel_step,
-              "for costs of grey values: only every n-th pixel is compared, and half as many far from the pose",
+              "for costs of grey values: only every n-th pixel is compared, and half as many pixels far from the pose",
               at_least(1), at_most(32), replaces({"cost.pixel_step"}))
       .option("max_intersection_mm", &Options::max_intersection_mm,
               "a pose is doubtful if the bone reaches deeper into one of the others", at_least(0));

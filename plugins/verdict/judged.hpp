@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A pose that is judged, and what the evidence for or against it has in common.
+// A pose that is judged, and what all evidence for or against it needs.
 #include <marrow/plugin.hpp>
 #include <memory>
 #include <vector>
@@ -54,7 +54,7 @@ using Evidence = std::vector<Metric>;
 Evidence landscape(const Judged& judged, const Cost& cost, const std::string& prefix);
 /// Other minima: searches from elsewhere that end in a cost about as low.
 Evidence other_minima(const Judged& judged, const Cost& coarse, const Cost& cost);
-/// What each view alone would have: a motion in its image, and a rotation about the long axis.
+/// Where each view alone would move the bone: in its image, and about the long axis.
 Evidence views_alone(const Judged& judged, const Cost& cost, const List<View>& views, const std::string& prefix);
 /// How the outline lies on the images' edges.
 Evidence outline_on_edges(const Judged& judged, const OutlineProjector& projector, const List<View>& views,

@@ -51,7 +51,7 @@ Evidence other_minima(const Judged& judged, const Cost& coarse, const Cost& cost
     found[i].value = coarse_scale.closeness(found[i].value);
     const bool is_near = i < near_count || i + 1 == starts.size();
     if (!is_near && found[i].value < kWorthRefining) return;
-    // Those from near go on to the end: where they are given up half-way would depend on the last digits of the pose.
+    // Those from near go on to the end, because the place of an early stop would depend on the last digits of the pose.
     if (is_near)
       found[i] = minimum_near(judged, cost, found[i].pose, {0.5, 1, 0.5, 0.01}, 150);
     else

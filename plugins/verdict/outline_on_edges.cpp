@@ -18,7 +18,7 @@ constexpr double kMostAlong_px = 3;                 ///< an edge further along b
 constexpr int kParts = 4;                           ///< along the bone, on each side
 constexpr std::size_t kLeastPoints = 12;            ///< of a part
 
-/// Of a view, and then of the worst of all views.
+/// The fit in one view; at the end, the worst of all views.
 struct Fit {
   double unexplained = 0;  ///< share of the outline without an edge
   double part_mm = 0;      ///< the largest median distance of a part from the whole view's

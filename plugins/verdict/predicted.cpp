@@ -22,7 +22,7 @@ struct Options {
   double contradicts_above = 1.8;
 };
 
-/// What makes the pose uncertain, the weightier first, each with what would settle it.
+/// Adds the reasons why the pose is uncertain, the more important first, each with what would settle it.
 void explain(const Spread& spread, Verdict& verdict) {
   const bool is_axial_first = spread.off_axial >= spread.off_mm;
   for (const bool is_axial : {is_axial_first, !is_axial_first}) {
@@ -53,9 +53,9 @@ void judge_by_deviations(const marrow::Pose& pose, const marrow::Mesh& mesh, con
     verdict.failure_probability = 1;
     verdict.reasons.emplace_back(is_finite ? "the predicted deviations are 0, so the registration compared nothing"
                                            : "the images do not determine the pose in every direction");
-    verdict.remedies.emplace_back(is_finite ? "a start nearer to the bone, and a look at the masks and edges of each "
-                                              "view"
-                                            : "another view, or a landmark");
+    verdict.remedies.emplace_back(is_finite
+                                      ? "a start nearer to the bone, and a look at the masks and edges of each view"
+                                      : "another view, or a landmark");
     return;
   }
   const Spread spread = marrow::verdicts::spread_of(pose, mesh);
@@ -80,10 +80,10 @@ void judge_by_warnings(const marrow::Pose& pose, Verdict& verdict) {
   verdict.remedies.emplace_back("a look at the overlay of each view");
 }
 
-/// A rotation about the long axis between the prior and the pose that images and prior have led to, in standard
-/// deviations. The pose lies between the two, so its difference from the prior has the variance of the prior minus that
-/// of the pose; this is the same as comparing prior and images with the sum of their variances. Nothing if the images
-/// say hardly more than the prior. Both covariances are about the bone's axes.
+/// The rotation about the long axis between the prior and the pose found from images and prior, in standard deviations.
+/// The pose lies between the two, so its difference from the prior has the variance of the prior minus that of the
+/// pose; this is the same as comparing prior and images with the sum of their variances. Nothing if the images say
+/// hardly more than the prior. Both covariances are about the bone's axes.
 std::optional<double> deviations_of(double apart_rad, const marrow::Pose& pose, const marrow::Pose& prior) {
   constexpr double kLeastNews = 0.01;  // of the prior's variance
   const double of_prior = (*prior.covariance)(2, 2), news = of_prior - (*pose.covariance)(2, 2);
@@ -144,9 +144,8 @@ MARROW_PLUGIN(plugin) {
       .option("wrong_above", &Options::wrong_above, "a pose is wrong above this probability", marrow::at_least(0),
               marrow::at_most(1))
       .relation(marrow::below("doubtful_above", "wrong_above"))
-      .option(
-          "contradicts_above", &Options::contradicts_above,
-          "a prior whose rotation about the long axis is farther off than this many standard deviations contradicts "
-          "the images: the pose is doubtful at best",
-          marrow::at_least(0));
+      .option("contradicts_above", &Options::contradicts_above,
+              "a prior whose rotation about the long axis is farther off than this many standard deviations "
+              "contradicts the images: the pose is doubtful at best",
+              marrow::at_least(0));
 }

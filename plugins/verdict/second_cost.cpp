@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a second cost leads from a pose. The way begins at the pose that is judged, not where its own search began: so
-// the same pose is judged alike, whatever led to it.
+// Where a second cost leads from a pose. The way begins at the judged pose, not where its own search began. So the same
+// pose always gets the same judgement.
 #include <Eigen/QR>
 #include <algorithm>
 

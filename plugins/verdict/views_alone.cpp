@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What each view alone would have. At the right pose every view agrees with it; the views of a wrong pose, of a wrong
-// camera or of another bone each pull in another direction.
+// Where each view alone would move the bone. Every view agrees with the right pose; the views of a wrong pose, of a
+// wrong camera or of another bone each pull in another direction.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>

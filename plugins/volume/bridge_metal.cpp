@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Metal makes streaks in the slices of a CT that show it. They are worst where a long piece lies within a slice, such
-// as a screw across a bone: what is left of the bone's border there leads every segmentation astray. A screw is seen in
-// few slices, and a bone hardly changes from one of its sides to the other. So these slices are replaced by what lies
-// between their neighbours. Slices that only a plate crosses are kept.
+// as a screw across a bone. The rest of the bone's border there misleads every segmentation. A screw is seen in few
+// slices, over which a bone hardly changes. So these slices are interpolated from their neighbours. Slices that only a
+// plate crosses are kept.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -45,8 +45,8 @@ Metal metal_of(const Volume& ct, int z, double metal_hu) {
   return metal;
 }
 
-/// In a few slices in a row there is no plate, only screws: there long metal counts by its length. In more, slices with
-/// more metal than usual for them show a screw besides the plate.
+/// Metal in only a few consecutive slices is that of screws, so its length counts. Metal in more slices is that of a
+/// plate; slices with more metal than usual among them also show a screw.
 std::vector<bool> slices_of_long_metal(const Volume& ct, const Options& options) {
   constexpr double kLong_mm = 10;
   const std::size_t slices = std::size_t(ct.grid.size[2]);
@@ -124,17 +124,16 @@ Volume bridge_metal(const Volume& volume, const Options& options, Context& conte
 
 MARROW_PLUGIN(plugin) {
   plugin.node("volume.bridge_metal", bridge_metal)
-      .summary(
-          "Replaces slices of a CT in which long metal lies, such as screws, by what lies between their neighbours")
+      .summary("Interpolates slices of a CT that show long metal, such as screws, from their neighbours")
       .in("volume", "CT in Hounsfield units; its slices lie across the third axis of its grid")
       .out("volume", "the CT with these slices interpolated; without metal, the same CT")
       .option("metal_hu", &Options::metal_hu, "metal is above this value", marrow::unit("HU"))
-      .option(
-          "times_median", &Options::times_median,
-          "where metal goes on over more than longest_mm, as a plate does: a slice is replaced if it shows this many "
-          "times more metal than the median of these slices. Elsewhere it is if its metal is longer than 10 mm",
-          marrow::at_least(1))
-      .option("margin_mm", &Options::margin_mm, "slices nearer than this to one of them are replaced too",
+      .option("times_median", &Options::times_median,
+              "where metal extends over more than longest_mm, as a plate does: a slice is replaced if it shows this "
+              "many times more metal than the median of these slices. Any other slice is replaced if its metal is "
+              "longer than 10 mm",
+              marrow::at_least(1))
+      .option("margin_mm", &Options::margin_mm, "slices nearer than this to such a slice are replaced, too",
               marrow::at_least(0))
       .option("longest_mm", &Options::longest_mm, "longer gaps stay as they are, with a warning", marrow::at_least(0));
 }

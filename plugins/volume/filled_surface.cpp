@@ -49,7 +49,7 @@ Grid grid_around(const marrow::Mesh& mesh, double spacing) {
   return grid;
 }
 
-/// A voxel that the surface cuts holds the part of the metal that lies in it, taken from the distance of its middle.
+/// A voxel that the surface cuts gets the part of it that is metal, estimated from the distance of its centre.
 Volume filled_surface(const marrow::Mesh& mesh, const Options& options) {
   marrow::check_mesh(mesh, "volume.filled_surface");
   if (!marrow::is_closed(mesh))

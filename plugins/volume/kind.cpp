@@ -3,7 +3,7 @@
 
 MARROW_PLUGIN(plugin) {
   plugin.kind("volume")
-      .summary("a volume for what follows: a CT made better, or an implant's surface filled with metal")
+      .summary("a volume for later nodes: an improved CT, or an implant's surface filled with metal")
       .in<marrow::Volume>("volume", "CT in Hounsfield units")
       .in<marrow::Mesh>("mesh", "closed surface")
       .out<marrow::Volume>("volume", "the changed CT, on the same grid, or the surface as a volume");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras, and landmarks as views show them, as xReg's projection data in HDF5. The camera frame is the one whose
-// images are not turned over. The images themselves are left out.
+// Cameras, and landmarks seen in views, as xReg's projection data in HDF5. The camera frame is the one whose images are
+// not turned over. The images themselves are left out.
 #include <algorithm>
 #include <marrow/domain/landmarks.hpp>
 #include <marrow/plugin.hpp>
@@ -45,7 +45,7 @@ XregFile xreg(const List<Camera>* cameras, const List<View>* views, const Landma
 
 MARROW_PLUGIN(plugin) {
   plugin.node("write.xreg", xreg)
-      .summary("Gives cameras, and landmarks as views show them, as projection data of xReg (.h5)")
+      .summary("Gives cameras, and landmarks seen in views, as projection data of xReg (.h5)")
       .in("cameras", "the cameras", over("view"))
       .in("views", "the views whose cameras they are", over("view"))
       .in("landmarks", "landmarks of one fragment; only those seen in the views are written")

@@ -18,17 +18,17 @@ struct Prepared {
   bool logarithm = false;
   bool whole_numbers = false;  ///< grey values are integers, so there is at least rounding noise
   float range = 0;             ///< largest minus smallest grey value
-  float brightest = 0;         ///< largest grey value, above that where no light falls
+  float brightest = 0;         ///< largest grey value, counted from where no light falls
 
   /// By how much `value` changes for one grey value.
   float slope(float value) const { return logarithm ? std::exp(-value) / brightest : 1.0f; }
 };
 
-/// Checks the view and prepares its image. Not usable are pixels that View::mask excludes, pixels outside a round
-/// collimator's field, black areas that reach three corners, and the image's border; around all of them also a margin
-/// of 3 sigma. Warns as warn_of_greys() does. Throws Error if check_view() refuses the view, or for an image that is
-/// not CV_8UC1, CV_16UC1 or CV_32FC1, is constant, holds NaN or infinity, has no usable pixel, or has no positive value
-/// for the logarithm.
+/// Checks the view and prepares its image. The usable pixels keep a distance of 3 sigma from pixels that View::mask
+/// excludes, from the outside of a round collimator's field, from black areas that reach three corners, and from the
+/// image's border. Warns as warn_of_greys() does. Throws Error if check_view() refuses the view, or for an image that
+/// is not CV_8UC1, CV_16UC1 or CV_32FC1, is constant, holds NaN or infinity, has no usable pixel, or has no positive
+/// value for the logarithm.
 Prepared prepare(const View& view, double sigma_px, bool logarithm, const Context& context);
 
 /// A separable filter for a derivative: `derive` along its axis, `smooth` along the other. Both have the same number of

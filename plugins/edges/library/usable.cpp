@@ -17,8 +17,8 @@ constexpr int kRays = 720, kStepsPerRay = 6, kTrials = 400, kHarmonics = 9;
 constexpr double kDarkCorner = 0.25;  // part of the brightest pixel; not 0, because scatter reaches behind a collimator
 constexpr double kSupported =
     0.5;  // least part of the rays crossing the outline within the image that have a step there
-// A rim inside the outline is left out because of its blur, and because a collimator's iris may cut a crescent off the
-// intensifier's field. Its width is the larger of the two; the second is a part of the radius.
+// A rim inside the outline is left out, because it is blurred and because a collimator's iris may cut a crescent off
+// the intensifier's field. Its width is the larger of kRim_px and kRim times the radius.
 constexpr double kRim_px = 3, kRim = 0.02;
 constexpr double kTolerance_px = 2.5;
 
@@ -74,7 +74,7 @@ Circle through(const cv::Point2d& a, const cv::Point2d& b, const cv::Point2d& c)
   return {{centre.x(), centre.y()}, std::hypot(a.x - centre.x(), a.y - centre.y())};
 }
 
-/// RANSAC over circles through the steepest steps of three random rays: the circle that most rays have a step near.
+/// RANSAC: of circles through the steepest steps of three random rays, the one near which most rays have a step.
 Circle best_circle(const Steps& steps, double tolerance_px, double largest_radius) {
   std::vector<std::size_t> rays;
   for (std::size_t i = 0; i < steps.size(); ++i)

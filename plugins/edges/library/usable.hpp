@@ -17,13 +17,13 @@ struct Field {
   double radius(double angle) const;
 };
 
-/// The field of a round collimator, of which the image shows at least an arc. Its outline is a circle with at least
-/// three corners of the image outside. In most directions in which it lies within the image, the image is darker
-/// outside than inside. std::nullopt if there is none. `grey`: CV_32F; `largest`: its largest value.
+/// The field of a round collimator. The image shows at least an arc of its outline, a circle that leaves at least three
+/// corners of the image outside. In most directions in which the outline lies within the image, the image is darker
+/// outside than inside. std::nullopt if there is no such circle. `grey`: CV_32F; `largest`: its largest value.
 std::optional<Field> collimator_field(const cv::Mat& grey, double largest);
 
-/// CV_8U, non-zero at the pixels that may be used. Not usable are, each with a margin: pixels that View::mask excludes,
-/// pixels outside a round collimator's field, black areas that reach three corners, and the image's border.
+/// CV_8U, non-zero at the usable pixels. A margin is left around pixels that View::mask excludes, pixels outside a
+/// round collimator's field, black areas that reach three corners, and the image's border.
 cv::Mat usable_pixels(const View& view, const cv::Mat& grey, double smallest, double largest, int margin_px);
 
 }  // namespace marrow::image

@@ -63,7 +63,7 @@ class Approach {
   }
 
  private:
-  /// How far the bones are kept apart at a place: the less, the nearer it is to that in the restored bone.
+  /// How far apart the bones are kept at a place: less near the place in the restored bone.
   double least_at(const RigidTransform& at) const {
     constexpr double kPart = 0.3, kArm_mm = 100;
     const double way =
@@ -142,7 +142,7 @@ Leg next_leg(const Gap& gap, const RigidTransform& now, const FragmentFrame& fra
     leg.stage = next == "release" ? "align" : next;
     return leg;
   }
-  // First away from where it is, as far as needed to get on from there.
+  // First pull the fragment away from where it is, until a way is free from there.
   const double room_mm =
       options.max_distraction_mm - apart.dot(Eigen::Vector3d(now * frame.origin_mm - frame.origin_mm));
   for (double away = kStep_mm; away <= room_mm; away += kStep_mm) {

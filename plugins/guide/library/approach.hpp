@@ -29,24 +29,24 @@ class Gap {
 
 /// The next part of the way.
 struct Leg {
-  Vector6d error;     ///< from the place to go to now, to where the fragment is (servo.hpp)
+  Vector6d error;     ///< from the next place to where the fragment is (servo.hpp)
   std::string stage;  ///< distract, rotate, align or release
 };
 
 struct ApproachOptions {
   double clearance_mm = 1;         ///< bones are kept this far apart, but less near their place in the restored bone
-  double max_distraction_mm = 14;  ///< from its place
+  double max_distraction_mm = 14;  ///< from the fragment's final place
   double rotated_deg = 2;          ///< smaller rotations do not count as a stage of their own
-  double aligned_mm = 2;           ///< the same of shifts across the shaft
+  double aligned_mm = 2;           ///< the same for shifts across the shaft
 };
 
 /// Straight away from the other fragment, along its shaft.
 Leg leg_apart(const FragmentFrame& frame, const FragmentFrame& reference, double by_mm);
 
-/// If the straight way is free, it is taken. Otherwise the fragment goes by a place that is pulled away from its own
-/// along the shaft, as little as possible; and if the way to this place is not free, it is first pulled away from where
-/// it is. If no way is free, it is turned where it is pulled away as far as allowed. `frame`: of the fragment; its long
-/// axis leads away from or to the other one.
+/// Takes the straight way if it is free. Otherwise the fragment first goes to a place that is pulled away along the
+/// shaft, as little as possible. If the way to this place is not free, the fragment is first pulled away from where it
+/// is. If no way is free, it is turned where it is pulled away as far as allowed. `frame`: of the fragment; its long
+/// axis points to the other fragment or away from it.
 Leg next_leg(const Gap& gap, const RigidTransform& reference_from_fragment, const FragmentFrame& frame,
              const FragmentFrame& reference, const ApproachOptions& options);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// One fragment's pose relative to another's, both found in the same images. What both are off by in common cancels.
+// One fragment's pose relative to another's, both found in the same images. Errors that both share cancel.
 #include "marrow/domain/pose.hpp"
 
 namespace marrow::robot {
@@ -8,7 +8,7 @@ namespace marrow::robot {
 struct RelativePose {
   RigidTransform reference_from_fragment{"reference", "fragment"};  ///< the identity: both lie as in the CT
   /// Of a small motion (r [rad], t [mm]) about the fragment's middle along the axes of "reference". The errors of both
-  /// poses are taken as independent. Not finite if a pose has no covariance.
+  /// poses count as independent. Not finite if a pose has no covariance.
   Matrix6d covariance;
 };
 

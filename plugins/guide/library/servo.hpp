@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Laws of a closed loop that brings a fragment to its place by images (position-based visual servoing). Errors and
-// motions are small motions (r [rad], t [mm]) about the fragment's middle, along the axes of the frame "reference",
+// Control laws of a closed loop that brings a fragment to its place by images (position-based visual servoing). Errors
+// and motions are small motions (r [rad], t [mm]) about the fragment's middle, along the axes of the frame "reference",
 // which is that of the other fragment. The error is the motion from the fragment's place to where it is now.
 #include <string>
 
@@ -31,8 +31,8 @@ Vector6d in_mm(const Vector6d& motion);
 Vector6d from_mm(const Vector6d& motion_mm);
 
 /// Broyden's rank-one update of a Jacobian (Jagersand, Fuentes and Nelson, ICRA 1997, Eq 7): J += (dy - J dq) dq^T /
-/// dq^T dq. `asked` and `seen` are small motions in mm; J takes motions that were asked for to those that were seen. It
-/// stays the same if hardly anything was asked for.
+/// dq^T dq. `asked` and `seen` are small motions in mm; J maps the motions that were asked for to those that were seen.
+/// It stays the same if hardly any motion was asked for.
 Matrix6d broyden(const Matrix6d& jacobian, const Vector6d& asked_mm, const Vector6d& seen_mm);
 
 /// What must be asked for so that `wanted` happens: the least |J q - w|^2 + mu^2 |q|^2. mu keeps a Jacobian that is

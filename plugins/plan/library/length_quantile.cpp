@@ -10,8 +10,8 @@
 namespace marrow::geometry {
 namespace {
 
-/// The probability that a vector with these variances along two axes is longer. In the units of its deviations, its
-/// direction is even and its length Rayleigh's, so the probability is the mean over the directions of exp(-length^2 /
+/// The probability that a vector with these variances along two axes is longer. Scaled by its deviations, the vector
+/// has a uniform direction and a Rayleigh length. So the probability is the mean over the directions of exp(-length^2 /
 /// (2 variance along the direction)). The function is smooth and periodic, so few points give all digits.
 double longer_than(double length, double large, double small) {
   constexpr int kDirections = 128;  // of a quarter turn; the others are alike

@@ -25,12 +25,12 @@ struct CameraReading {
 };
 
 /// The camera in a file of any format. Only marrow's own YAML holds a distortion. `size.size_px` may be given for any
-/// format; all else is refused for a format that does not need it. Throws Error so, if it is of images of another size
-/// than `size_px`, if the file holds several projections and none is named, and as the format's reader does.
+/// format. Throws Error for any other value that the format does not need, if the camera's images have another size
+/// than `size_px`, if the file holds several projections and none is chosen, and as the format's reader does.
 DistortedCamera read_camera(const std::filesystem::path& path, const CameraReading& reading);
 
 /// files::doubt_about_distance() of a camera from this file, with the file's name; empty for marrow's own format, which
-/// says that it is in mm.
+/// is always in mm.
 std::string doubt_about_unit(const std::filesystem::path& path, const Camera& camera, double scale);
 
 }  // namespace marrow::exchange

@@ -11,7 +11,7 @@
 namespace marrow::exchange {
 namespace {
 
-/// The cameras of those of `all` that are named. `camera(one, what)` makes one.
+/// The cameras of the projections with these numbers, or of all. `camera(one, what)` makes one.
 template <class Projection, class MakeCamera>
 std::vector<Camera> cameras_of(const std::vector<Projection>& all, std::vector<int> numbers, const std::string& what,
                                MakeCamera camera) {

@@ -13,7 +13,8 @@ namespace marrow::exchange {
 enum class Projections { none, rtk, xreg };
 Projections projections_in(const std::filesystem::path& path);
 
-/// A projection's number from an option's. Throws Error, with `what` in front, unless it is a whole number from 0.
+/// Converts the number in an option to that of a projection. Throws Error, with `what` in front, unless it is a whole
+/// number from 0.
 int projection_number(double number, const std::string& what);
 
 /// How many projections such a file holds. Throws Error as the readers of the two formats do.

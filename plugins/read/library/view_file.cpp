@@ -10,7 +10,7 @@
 namespace marrow::exchange {
 namespace {
 
-/// The image's own size is that of the camera, whose format may not say it.
+/// Some formats do not give the size of the images: then it is taken from the image.
 DistortedCamera camera_in_file(const ViewSource& source, const Image& image, const Context& context) {
   CameraReading reading{source.projection, {{}, source.pixel_mm, source.corner_mm}, Mirror::none, source.scale};
   const CameraFormat format = camera_format(source.camera_file);

@@ -26,7 +26,7 @@ struct ViewSource {
   double scale = 1;  ///< as CameraReading has it
 };
 
-/// The camera of this name. Throws Error, with the names that there are, if there is none.
+/// The camera of this name. Throws Error with the known names if there is none.
 const Camera& camera_of_view(const std::string& view, const List<Camera>& cameras);
 
 /// How the images of a view were taken.

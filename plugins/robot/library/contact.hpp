@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Whether the two fragments of a simulated bone stick in each other. Bone cannot go through bone.
+// Whether the two fragments of a simulated bone overlap. Bone cannot go through bone.
 #include <vector>
 
 #include "marrow/toolbox/phantom/phantom.hpp"
@@ -13,7 +13,7 @@ class Contact {
   /// Throws Error, naming `what`, unless the phantom has a fracture.
   Contact(const Phantom& phantom, const std::string& what);
 
-  /// How deep the distal fragment sticks in the proximal one; 0 if they are apart. `bone_from_distal`: the distal
+  /// How deep the distal fragment reaches into the proximal one; 0 if they are apart. `bone_from_distal`: the distal
   /// fragment's place in the frame "bone" of the proximal one; the identity is the whole bone. Accurate to about 1 mm.
   double overlap_mm(const RigidTransform& bone_from_distal) const;
 

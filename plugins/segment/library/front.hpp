@@ -20,7 +20,7 @@ struct Force {
   double advection = 1;       ///< F0; a positive value expands the surface
   double curvature_mm = 0.1;  ///< epsilon
   double edge_hu = 150;       ///< K in g = 1 / (1 + (drop / K)^2)
-  double floor_hu = 150;      ///< against leaks: the advection changes its sign where the CT is below this
+  double floor_hu = 150;      ///< the advection changes its sign where the CT is below this, which prevents leaks
 };
 
 class Front {
