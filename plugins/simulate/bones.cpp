@@ -4,6 +4,7 @@
 #include <marrow/plugin.hpp>
 #include <sstream>
 
+#include "marrow/base/names.hpp"
 #include "marrow/simulate/posture.hpp"
 
 namespace {
@@ -50,12 +51,12 @@ std::vector<std::string> parts_of(const std::string& together) {
 }
 
 const Body& body_named(const ClutteredPhantom& phantom, const std::string& name) {
-  std::string known;
+  std::vector<std::string> known;
   for (const Body& body : phantom.bodies) {
     if (body.name == name) return body;
-    known += (known.empty() ? "'" : ", '") + body.name + "'";
+    known.push_back(body.name);
   }
-  throw Error("simulate.bones: the phantom has no body '" + name + "'; there are " + known);
+  throw Error("simulate.bones: the phantom has no body '" + name + "'; " + suggestion(name, known));
 }
 
 Bones bones(const ClutteredPhantom& given, const phantom::Posture* posture, const Volume* ct, const Options& options) {

@@ -8,7 +8,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/names.hpp"
-#include "marrow/domain/random.hpp"
+#include "marrow/simulate/vectors.hpp"
 
 namespace {
 
@@ -31,11 +31,6 @@ double factor_of(const std::string& level) {
 /// A length that is uniform in 0 to sqrt(3), so that the mean of its square is 1.
 double length(marrow::Random& random) { return std::sqrt(3.0) * random.uniform(); }
 
-Eigen::Vector3d direction(marrow::Random& random) {
-  const double x = random.normal(), y = random.normal(), z = random.normal();
-  return Eigen::Vector3d(x, y, z).normalized();
-}
-
 List<View> camera_faults(const List<View>& views, const Options& options) {
   for (const std::string& name : options.only)
     if (!views.find(name)) throw Error("only: there is no view '" + name + "'; " + suggestion(name, views.names()));
@@ -49,9 +44,9 @@ List<View> camera_faults(const List<View>& views, const Options& options) {
       marrow::Random random(std::uint64_t(options.camera_seed), i);
       RigidTransform off{"world", "world"};
       const double angle = radians(factor * options.turn_deg) * length(random);
-      off.rotation = rotation_from_vector(angle * direction(random));
+      off.rotation = rotation_from_vector(angle * phantom::random_direction(random));
       const double shift = factor * options.shift_mm * length(random);
-      off.translation_mm = shift * direction(random);
+      off.translation_mm = shift * phantom::random_direction(random);
       camera.camera_from_world = camera.camera_from_world * off;
       const double longer =
           1 + factor * options.focal_percent / 100 * (random.uniform() < 0.5 ? -1 : 1) * length(random);

@@ -22,16 +22,8 @@ Case assemble(const Volume& ct, const List<View>& views, const Phantom& phantom,
   Case result;
   result.ct = ct;
   result.views = views;
-  for (const std::string& name : options.wanted) {
-    std::string known;
-    bool found = false;
-    for (const Fragment& fragment : phantom.fragments) {
-      found = found || fragment.name == name;
-      known += (known.empty() ? "" : ", ") + fragment.name;
-    }
-    if (!found)
-      throw Error("simulate.case: the option 'register' names the fragment '" + name + "', but there are: " + known);
-  }
+  for (const std::string& name : options.wanted)
+    phantom::fragment_named(phantom, name, "simulate.case: the option 'register'");
   for (const Fragment& fragment : phantom.fragments) {
     Seeds seeds{fragment.name, phantom::points_within(ct.grid, fragment.seeds_mm),
                 std::find(options.wanted.begin(), options.wanted.end(), fragment.name) != options.wanted.end()};

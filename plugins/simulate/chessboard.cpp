@@ -64,8 +64,8 @@ Result chessboard(const phantom::CameraArm& arm, const Options& options, Context
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.node("simulate.chessboard", chessboard)
-      .summary("Photographs of a chessboard: held in several ways, and at a known place from each stop of the arm")
+  auto node = plugin.node("simulate.chessboard", chessboard);
+  node.summary("Photographs of a chessboard: held in several ways, and at a known place from each stop of the arm")
       .random()
       .in("arm", "the camera and where its arm stops")
       .out("boards", &Result::boards, "the board held before the camera, 8 bit colour", over("photograph"))
@@ -81,9 +81,6 @@ MARROW_PLUGIN(plugin) {
               at_most(100))
       .option("distance_mm", &Options::distance_mm, "mean distance of the held board from the camera", at_least(50))
       .option("tilt_deg", &Options::tilt_deg, "largest tilt of the held board", at_least(0), at_most(60))
-      .option("shift_mm", &Options::shift_mm, "largest shift of the held board across the view", at_least(0))
-      .option("blur_px", &Options::blur_px, "standard deviation of the lens's blur", at_least(0), at_most(10))
-      .option("gamma", &Options::gamma, "grey value = 255 light^(1 / gamma)", at_least(0.1), at_most(10), unit("1"))
-      .option("noise_levels", &Options::noise_levels, "standard deviation of the noise, of 255 levels, in each colour",
-              at_least(0), at_most(100), unit(""));
+      .option("shift_mm", &Options::shift_mm, "largest shift of the held board across the view", at_least(0));
+  phantom::declare_sensor<Options>(node);
 }

@@ -8,6 +8,7 @@
 #include "marrow/simulate/knee.hpp"
 #include "marrow/simulate/surgery.hpp"
 #include "marrow/simulate/thigh.hpp"
+#include "marrow/simulate/vectors.hpp"
 
 namespace {
 
@@ -57,8 +58,7 @@ void add(std::vector<Body>& bodies, const std::vector<Body>& more) {
 double whole_below(const Phantom& phantom) {
   constexpr double kFromFractureMm = 8;
   const Eigen::Vector2d axis = phantom::distal_end(phantom.bone.outer).middle_mm;
-  double height = phantom.bone.outer.vertices_mm.front().z();
-  for (const auto& vertex : phantom.bone.outer.vertices_mm) height = std::max(height, vertex.z());
+  double height = phantom::bounds_of(phantom.bone.outer.vertices_mm).max().z();
   // The block below the fracture is wider than the bone. Only what lies above the shaft counts, so its floor does not.
   for (const auto& t : phantom.fracture.triangles) {
     const Eigen::Vector3d &a = phantom.fracture.vertices_mm[t[0]], &b = phantom.fracture.vertices_mm[t[1]],
@@ -124,11 +124,10 @@ struct Cluttered {
 /// The phantom of an earlier frame: the fragment at the knee, and what is fixed to it, lie elsewhere.
 ClutteredPhantom moved_back(const ClutteredPhantom& now, double distance_mm, std::uint64_t seed) {
   marrow::Random random(seed, 10);
-  const double x = random.normal(), y = random.normal(), z = random.normal();
   ClutteredPhantom earlier = now;
   const std::string name = phantom::distal_fragment(now.phantom).name;
   RigidTransform shift{"world", "world"};
-  shift.translation_mm = distance_mm * Eigen::Vector3d(x, y, z).normalized();
+  shift.translation_mm = distance_mm * phantom::random_direction(random);
   for (Fragment& fragment : earlier.phantom.fragments)
     if (fragment.name == name) fragment.world_from_ct = shift * fragment.world_from_ct;
   for (Body& body : earlier.bodies)

@@ -3,11 +3,13 @@
 // noise.
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "ct_raster.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/simulate/solid.hpp"
@@ -20,6 +22,8 @@ using namespace marrow;
 using phantom::ClutteredPhantom;
 using phantom::Interval;
 using phantom::Phantom;
+using phantom::Raster;
+using phantom::Rectangle;
 
 struct CtOptions {
   std::array<double, 3> spacing_mm{0.8, 0.8, 1.0};
@@ -36,30 +40,13 @@ struct CtOptions {
 };
 
 constexpr double kAirHu = -1000;
-constexpr double kFinestMm = 0.3;
 constexpr int kSlabSlices = 16;
 
-/// The fine raster of a grid. Along y and z it consists of rays, along x of bins that take exact lengths.
-struct Raster {
-  std::array<int, 3> steps;  // fine samples per voxel
-  std::array<int, 3> halo;   // fine samples beyond the grid on each side, for the blur
-  Eigen::Vector3d spacing_mm, origin_mm;
-  std::array<int, 3> size;
-};
-
-/// All x, y with x0 <= x < x1 and y0 <= y < y1. Empty if x0 >= x1.
-struct Rectangle {
-  int x0, x1, y0, y1;
-};
-
 Grid grid_around(const Phantom& phantom, const CtOptions& options) {
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(1e300), high = -low;
+  Eigen::AlignedBox3d box;
   for (const auto& fragment : phantom.fragments)
-    for (const auto& vertex : phantom.bone.outer.vertices_mm) {
-      const Eigen::Vector3d point = fragment.ct_from_bone * vertex;
-      low = low.cwiseMin(point);
-      high = high.cwiseMax(point);
-    }
+    for (const auto& vertex : phantom.bone.outer.vertices_mm) box.extend(fragment.ct_from_bone * vertex);
+  Eigen::Vector3d low = box.min(), high = box.max();
   const double distal_end = low.z();
   low.array() -= options.margin_mm;
   high.array() += options.margin_mm;
@@ -79,36 +66,6 @@ Grid grid_around(const Phantom& phantom, const CtOptions& options) {
   return grid;
 }
 
-Raster raster_under(const Grid& grid, const CtOptions& options) {
-  Raster raster;
-  for (int k = 0; k < 3; ++k) {
-    const std::size_t i = std::size_t(k);
-    raster.steps[i] = std::max(1, int(std::ceil(grid.spacing_mm[k] / kFinestMm)));
-    raster.spacing_mm[k] = grid.spacing_mm[k] / raster.steps[i];
-    const double reach = 4 * options.blur_mm + (k == 2 ? 0.5 * options.slice_thickness_mm : 0);
-    raster.halo[i] = int(std::ceil(reach / raster.spacing_mm[k]));
-    raster.size[i] = (grid.size[i] - 1) * raster.steps[i] + 1 + 2 * raster.halo[i];
-    raster.origin_mm[k] = grid.origin_mm[k] - raster.halo[i] * raster.spacing_mm[k];
-  }
-  return raster;
-}
-
-/// Weights of a sampled Gaussian over the halo, or of a box of this thickness that is blurred by it. Their sum is 1.
-std::vector<double> point_spread(double blur_mm, double thickness_mm, double spacing_mm, int halo) {
-  std::vector<double> weights;
-  double sum = 0;
-  for (int i = -halo; i <= halo; ++i) {
-    const double at = i * spacing_mm, t = blur_mm > 0 ? at / blur_mm : 0, half = 0.5 * thickness_mm;
-    const auto below = [&](double x) {  // share of the Gaussian below x; without blur a step
-      return blur_mm > 0 ? 0.5 * std::erfc(-x / (blur_mm * std::sqrt(2.0))) : x > 1e-9 ? 1.0 : x < -1e-9 ? 0.0 : 0.5;
-    };
-    weights.push_back(thickness_mm > 0 ? below(at + half) - below(at - half) : std::exp(-0.5 * t * t));
-    sum += weights.back();
-  }
-  for (double& weight : weights) weight /= sum;
-  return weights;
-}
-
 std::vector<const phantom::Body*> bodies_in_ct(const std::vector<phantom::Body>& bodies) {
   std::vector<const phantom::Body*> those;
   for (const phantom::Body& body : bodies)
@@ -123,7 +80,7 @@ class Scanner {
         phantom_(cluttered.phantom),
         grid_(grid),
         options_(options),
-        raster_(raster_under(grid, options)),
+        raster_(grid, options.blur_mm, options.slice_thickness_mm),
         fill_(phantom_.bone),
         rays_(phantom_, raster_.size[1], raster_.size[2],
               [this](const phantom::Fragment& fragment) {
@@ -143,9 +100,6 @@ class Scanner {
           return to_rays(body.ct_from_world, raster_.spacing_mm.x(), raster_.spacing_mm.y(), raster_.spacing_mm.z(),
                          raster_.origin_mm.z());
         }) {
-    for (int k = 0; k < 3; ++k)
-      spread_[std::size_t(k)] = point_spread(options.blur_mm, k == 2 ? options.slice_thickness_mm : 0,
-                                             raster_.spacing_mm[k], raster_.halo[std::size_t(k)]);
     for (const phantom::Body* body : bodies_in_ct(cluttered.tissues)) tissue_hu_.push_back(hu_of(*body));
     for (const phantom::Body* body : bodies_in_ct(cluttered.bodies)) body_hu_.push_back(hu_of(*body));
     if (cluttered.tissues.empty()) even_background_ = background();
@@ -160,8 +114,8 @@ class Scanner {
     std::vector<double> sums, blurred(slice, 0.0);
     for (int z = first; z < last; ++z) {
       if (z == first || backgrounds.size() > 1)
-        blur(backgrounds[backgrounds.size() > 1 ? std::size_t(z - first) : 0], {0, raster_.size[0], 0, raster_.size[1]},
-             blurred);
+        raster_.blur(backgrounds[backgrounds.size() > 1 ? std::size_t(z - first) : 0],
+                     {0, raster_.size[0], 0, raster_.size[1]}, blurred);
       sums.insert(sums.end(), blurred.begin(), blurred.end());
     }
     const auto crossings = rays_.bundle().crossings(fine_first, fine_last);
@@ -175,11 +129,11 @@ class Scanner {
           std::clamp((row - raster_.halo[2] + raster_.steps[2] / 2) / raster_.steps[2], first, last - 1);
       const std::vector<double>& empty = backgrounds[backgrounds.size() > 1 ? std::size_t(nearest - first) : 0];
       const Rectangle bone = draw(met, met_others, row, empty, plane);
-      const Rectangle seen = blur(plane, bone, blurred);
+      const Rectangle seen = raster_.blur(plane, bone, blurred);
       for (int z = first; z < last; ++z) {
         const int tap = row - z * raster_.steps[2];
         if (tap < 0 || tap > 2 * raster_.halo[2]) continue;
-        const double weight = spread_[2][std::size_t(tap)];
+        const double weight = raster_.spread[2][std::size_t(tap)];
         for (int y = seen.y0; y < seen.y1; ++y) {
           const std::size_t line = std::size_t(y) * std::size_t(grid_.size[0]);
           double* sum = sums.data() + slice * std::size_t(z - first) + line;
@@ -321,45 +275,14 @@ class Scanner {
     return fraction * options_.cortical_hu + (1 - fraction) * options_.marrow_hu;
   }
 
-  /// Blurs a fine plane in x and y and samples it at the grid's positions. The plane must be zero outside `bone`.
-  /// Returns the part of `blurred` that is set.
-  Rectangle blur(const std::vector<double>& plane, const Rectangle& bone, std::vector<double>& blurred) const {
-    const int nx = grid_.size[0], ny = grid_.size[1], sx = raster_.steps[0], sy = raster_.steps[1];
-    const int hx = raster_.halo[0], hy = raster_.halo[1];
-    // Position i uses the fine samples i * step to i * step + 2 * halo.
-    const auto first = [](int fine, int halo, int step) { return std::max(0, (fine - 2 * halo + step - 1) / step); };
-    const Rectangle seen{first(bone.x0, hx, sx), std::min(nx, (bone.x1 - 1) / sx + 1), first(bone.y0, hy, sy),
-                         std::min(ny, (bone.y1 - 1) / sy + 1)};
-    const int width = std::max(0, seen.x1 - seen.x0);
-    std::vector<double> rows(std::size_t(width) * std::size_t(std::max(0, bone.y1 - bone.y0)));
-    for (int y = bone.y0; y < bone.y1; ++y)
-      for (int x = seen.x0; x < seen.x1; ++x) {
-        const double* from = plane.data() + std::size_t(y) * std::size_t(raster_.size[0]) + std::size_t(x * sx);
-        double sum = 0;
-        for (double weight : spread_[0]) sum += weight * *from++;
-        rows[std::size_t(y - bone.y0) * std::size_t(width) + std::size_t(x - seen.x0)] = sum;
-      }
-    for (int y = seen.y0; y < seen.y1; ++y) {
-      double* to = blurred.data() + std::size_t(y) * std::size_t(nx) + std::size_t(seen.x0);
-      std::fill(to, to + width, 0.0);
-      for (int fine = std::max(bone.y0, y * sy); fine < std::min(bone.y1, y * sy + 2 * hy + 1); ++fine) {
-        const double weight = spread_[1][std::size_t(fine - y * sy)];
-        const double* from = rows.data() + std::size_t(fine - bone.y0) * std::size_t(width);
-        for (int x = 0; x < width; ++x) to[x] += weight * from[x];
-      }
-    }
-    return seen;
-  }
-
   const ClutteredPhantom& cluttered_;
   const Phantom& phantom_;
   const Grid& grid_;
   const CtOptions& options_;
-  Raster raster_;
+  const Raster raster_;
   phantom::Fill fill_;
   phantom::SolidRays rays_;
   phantom::BodyRays tissue_rays_, body_rays_;
-  std::array<std::vector<double>, 3> spread_;
   std::vector<double> tissue_hu_, body_hu_;
   std::vector<double> even_background_;  ///< a slice without bone, where all are the same
 };

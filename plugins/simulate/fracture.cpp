@@ -8,6 +8,7 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/simulate/solid.hpp"
+#include "marrow/simulate/vectors.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
@@ -31,18 +32,6 @@ struct FractureOptions {
 };
 
 constexpr double kRasterMm = 0.8;
-
-struct Box {
-  Eigen::Vector3d low, high;
-};
-Box bounds(const Mesh& mesh) {
-  Box box{mesh.vertices_mm.front(), mesh.vertices_mm.front()};
-  for (const auto& vertex : mesh.vertices_mm) {
-    box.low = box.low.cwiseMin(vertex);
-    box.high = box.high.cwiseMax(vertex);
-  }
-  return box;
-}
 
 /// Centre of the bone's outline at a height: the mean of the outline's segments, weighted by their lengths.
 Eigen::Vector2d centre_at(const Mesh& mesh, double z) {
@@ -101,14 +90,14 @@ class Relief {
 };
 
 /// A closed block below the relief. It contains the distal side of the bone.
-Mesh block_below(const Relief& relief, const Box& box) {
+Mesh block_below(const Relief& relief, const Eigen::AlignedBox3d& box) {
   constexpr double kMarginMm = 5;
-  const Eigen::Vector2d low = box.low.head<2>().array() - kMarginMm,
-                        extent = (box.high - box.low).head<2>().array() + 2 * kMarginMm;
+  const Eigen::Vector2d low = box.min().head<2>().array() - kMarginMm,
+                        extent = box.sizes().head<2>().array() + 2 * kMarginMm;
   const std::uint32_t nx = std::uint32_t(extent.x() / kRasterMm) + 2, ny = std::uint32_t(extent.y() / kRasterMm) + 2;
   Mesh mesh;
   mesh.frame = "bone";
-  double lowest = box.low.z();
+  double lowest = box.min().z();
   for (std::uint32_t y = 0; y < ny; ++y)
     for (std::uint32_t x = 0; x < nx; ++x) {
       const Eigen::Vector2d at = low + kRasterMm * Eigen::Vector2d(x, y);
@@ -164,10 +153,9 @@ void add_seeds(const Phantom& phantom, const Fragment& fragment, int along, std:
   constexpr int kHeights = 14;
   constexpr double kThickMm = 3, kDense = 0.12;
   const int across = 1 - along;
-  const Box box = bounds(phantom.bone.outer);
-  const double low = box.low[across], step = (box.high.z() - box.low.z()) / kHeights,
-               first_z = box.low.z() + 0.5 * step;
-  const int lines = int(box.high[across] - low) + 1;  // 1 mm apart
+  const Eigen::AlignedBox3d box = phantom::bounds_of(phantom.bone.outer.vertices_mm);
+  const double low = box.min()[across], step = box.sizes().z() / kHeights, first_z = box.min().z() + 0.5 * step;
+  const int lines = int(box.max()[across] - low) + 1;  // 1 mm apart
   // (y, z, x) and (z, x, y) are right-handed.
   const phantom::SolidRays rays(
       {phantom.bone, phantom.fracture, {fragment}}, along == 0 ? lines : kHeights, along == 0 ? kHeights : lines,
@@ -212,8 +200,8 @@ Phantom fracture(const Bone& bone, const FractureOptions& options) {
   if (!(options.height_fraction >= 0.1 && options.height_fraction <= 0.9))
     throw Error(formatted("simulate.fracture: the height_fraction {:f} must lie in 0.1 to 0.9 of the bone's length",
                           options.height_fraction));
-  const Box box = bounds(bone.outer);
-  const double z = box.low.z() + options.height_fraction * (box.high.z() - box.low.z());
+  const Eigen::AlignedBox3d box = phantom::bounds_of(bone.outer.vertices_mm);
+  const double z = box.min().z() + options.height_fraction * box.sizes().z();
   const Eigen::Vector2d at = centre_at(bone.outer, z);
   const Relief relief(options, {at.x(), at.y(), z});
   Phantom phantom;

@@ -6,6 +6,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/simulate/knee.hpp"
+#include "marrow/simulate/photograph.hpp"
 #include "marrow/simulate/posture.hpp"
 #include "marrow/toolbox/track/sequence.hpp"
 
@@ -45,16 +46,11 @@ constexpr const char* kShutter = "shutter";
 /// A closed shutter: steel that fills the field of view.
 Body shutter() {
   constexpr double kHalf_mm = 170;
-  Body body;
-  body.name = kShutter;
-  body.material = "steel";
-  body.surface.frame = "world";
-  for (int i = 0; i < 8; ++i)
-    body.surface.vertices_mm.emplace_back(i & 1 ? kHalf_mm : -kHalf_mm, i & 2 ? kHalf_mm : -kHalf_mm,
-                                          i & 4 ? kHalf_mm : -kHalf_mm);
-  body.surface.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                            {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  return body;
+  const Eigen::Vector3d corner_mm = Eigen::Vector3d::Constant(kHalf_mm);
+  return {.name = kShutter,
+          .material = "steel",
+          .surface = phantom::box(RigidTransform{"world", "world"}, -corner_mm, corner_mm),
+          .moves_with = {}};
 }
 
 struct Motion {

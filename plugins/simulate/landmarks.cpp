@@ -5,7 +5,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/number_text.hpp"
-#include "marrow/domain/random.hpp"
+#include "marrow/simulate/vectors.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
@@ -71,8 +71,7 @@ List<Landmarks> landmarks(const phantom::Phantom& phantom, const List<Camera>* c
     marrow::Random random(context.seed(), f);
     Landmarks found;
     for (const Eigen::Vector3d& point : points) {
-      std::string name = "p";
-      name += formatted("{}", found.points.size() + 1);
+      const std::string name = formatted("p{}", found.points.size() + 1);
       const Eigen::Vector3d world = fragment.world_from_ct * point;
       const auto off = [&](double deviation) { return deviation * random.normal(); };
       found.points.push_back({name, point});
@@ -81,8 +80,7 @@ List<Landmarks> landmarks(const phantom::Phantom& phantom, const List<Camera>* c
         const double right = off(options.noise_px), down = off(options.noise_px);
         found.seen.push_back({name, views.name(v), pixel + Eigen::Vector2d(right, down)});
       }
-      const double x = off(options.noise_mm), y = off(options.noise_mm), z = off(options.noise_mm);
-      found.tracked.push_back({name, world + Eigen::Vector3d(x, y, z)});
+      found.tracked.push_back({name, world + options.noise_mm * phantom::normal_vector(random)});
     }
     all.add(fragment.name, std::move(found));
   }

@@ -7,7 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "marrow/base/number_text.hpp"
-#include "marrow/domain/random.hpp"
+#include "marrow/simulate/vectors.hpp"
 
 namespace {
 
@@ -86,13 +86,9 @@ void swap_images(List<View>& views) {
 /// The last view with the camera of another pose of the C-arm.
 void move_camera(List<View>& views, const Options& options) {
   Random random{std::uint64_t(options.mistake_seed)};
-  const auto direction = [&] {
-    const double x = random.normal(), y = random.normal(), z = random.normal();
-    return Eigen::Vector3d(x, y, z).normalized();
-  };
   RigidTransform off{"world", "world"};
-  off.rotation = rotation_from_vector(radians(options.camera_deg) * direction());
-  off.translation_mm = options.camera_mm * direction();
+  off.rotation = rotation_from_vector(radians(options.camera_deg) * phantom::random_direction(random));
+  off.translation_mm = options.camera_mm * phantom::random_direction(random);
   List<View> moved;
   for (std::size_t i = 0; i < views.size(); ++i) {
     View view = views[i];

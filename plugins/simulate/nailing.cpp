@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "marrow/base/number_text.hpp"
-#include "marrow/domain/random.hpp"
+#include "marrow/simulate/vectors.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
 #include "marrow/toolbox/phantom/loft.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
@@ -48,11 +48,8 @@ struct MiddleLine {
 
 MiddleLine middle_line(const Mesh& surface) {
   constexpr double kNearMm = 1.5;
-  double low = std::numeric_limits<double>::max(), high = -low;
-  for (const Vector3d& vertex : surface.vertices_mm) {
-    low = std::min(low, vertex.z());
-    high = std::max(high, vertex.z());
-  }
+  const Eigen::AlignedBox3d whole = phantom::bounds_of(surface.vertices_mm);
+  const double low = whole.min().z(), high = whole.max().z();
   MiddleLine line;
   std::vector<double> radii;
   for (double z = low + kNearMm; z <= high - kNearMm; z += kStepMm) {
@@ -159,11 +156,9 @@ RigidTransform in_canal(const MiddleLine& line, const BoneAt& bone, double turn_
   return pose;
 }
 
-std::string shown(double value) { return formatted("{:.1f}", value); }
-
 void check_fit(const MiddleLine& line, const RigidTransform& pose, const BoneAt& bone, const NailingOptions& options) {
   const double wide = line.radius_mm + 0.5 * options.reaming_mm, lowest = bone.lowest_z();
-  const auto height = [&](const Vector3d& at) { return shown(at.z() - lowest) + " mm above the distal end"; };
+  const auto height = [&](const Vector3d& at) { return formatted("{:.1f} mm above the distal end", at.z() - lowest); };
   for (const Vector3d& point : line.points_mm)
     if (const Vector3d at = pose * point; !bone.canal(at.z()))
       throw Error("simulate.nailing: the nail reaches out of the bone, to " + height(at) +
@@ -188,12 +183,8 @@ void check_fit(const MiddleLine& line, const RigidTransform& pose, const BoneAt&
 }
 
 Body body_of(const std::string& name, const std::string& material, Mesh surface) {
-  Body body;
-  body.name = name;
-  body.material = material;
-  body.surface = std::move(surface);
-  body.surface.frame = "world";
-  return body;
+  surface.frame = "world";
+  return {.name = name, .material = material, .surface = std::move(surface), .moves_with = {}};
 }
 
 Nailed nailing(const ClutteredPhantom& given, const geometry::Implant& implant, const NailingOptions& options) {

@@ -84,8 +84,8 @@ List<Picture> photograph(const phantom::CameraArm& arm, const phantom::Phantom& 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.node("simulate.photograph", photograph)
-      .summary(
+  auto node = plugin.node("simulate.photograph", photograph);
+  node.summary(
           "Colour photographs of a plastic bone in a clamp on a platform: light and shadow, highlights, distortion, "
           "blur, gamma and noise")
       .random()
@@ -102,9 +102,6 @@ MARROW_PLUGIN(plugin) {
               at_least(0), at_most(1), unit(""))
       .option("lamps", &Options::lamps, "strength of the lamps: 1 for 0.4 from the left and 0.2 from the right",
               at_least(0), at_most(2), unit(""))
-      .option("backdrop", &Options::backdrop, "light from the backdrop", at_least(0), at_most(1), unit(""))
-      .option("blur_px", &Options::blur_px, "standard deviation of the lens's blur", at_least(0), at_most(10))
-      .option("gamma", &Options::gamma, "grey value = 255 light^(1 / gamma)", at_least(0.1), at_most(10), unit("1"))
-      .option("noise_levels", &Options::noise_levels, "standard deviation of the noise, of 255 levels, in each colour",
-              at_least(0), at_most(100), unit(""));
+      .option("backdrop", &Options::backdrop, "light from the backdrop", at_least(0), at_most(1), unit(""));
+  phantom::declare_sensor<Options>(node);
 }

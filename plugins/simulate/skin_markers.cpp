@@ -7,7 +7,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/number_text.hpp"
-#include "marrow/domain/random.hpp"
+#include "marrow/simulate/vectors.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
@@ -54,10 +54,8 @@ Landmarks markers_of(const Fragment& fragment, const Options& options, Random& r
   const RigidTransform world_from_skin = moved(fragment.world_from_ct, fragment.frame, slide);
   Landmarks markers;
   for (std::size_t i = 0; i < places.size(); ++i) {
-    std::string name = "m";
-    name += formatted("{}", i + 1);
-    Eigen::Vector3d off_mm;
-    for (double& one : off_mm) one = options.noise_mm * random.normal();
+    const std::string name = formatted("m{}", i + 1);
+    const Eigen::Vector3d off_mm = options.noise_mm * phantom::normal_vector(random);
     markers.points.push_back({name, places[i]});
     markers.tracked.push_back({name, world_from_skin * places[i] + off_mm});
   }

@@ -8,6 +8,7 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/simulate/polygonise.hpp"
 #include "marrow/simulate/shape_functions.hpp"
+#include "marrow/simulate/vectors.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/field/mesh_field.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
@@ -69,12 +70,8 @@ Bone surface(const SurfaceOptions& options, Context& context) {
   Bone bone;
   bone.outer = placed(options.outer, options, context);
   if (!options.inner.empty()) bone.inner = placed(options.inner, options, context);
-  Eigen::Vector3d low = bone.outer.vertices_mm.front(), high = low;
-  for (const auto& vertex : bone.outer.vertices_mm) {
-    low = low.cwiseMin(vertex);
-    high = high.cwiseMax(vertex);
-  }
-  const Eigen::Vector3d extent = high - low;
+  const Eigen::AlignedBox3d box = phantom::bounds_of(bone.outer.vertices_mm);
+  const Eigen::Vector3d low = box.min(), extent = box.sizes();
   if (options.long_bone && extent.z() < std::max(extent.x(), extent.y()))
     throw Error(
         formatted("simulate.surface: the bone's long axis must lie along z with the distal end low, but it extends "
@@ -87,7 +84,7 @@ Bone surface(const SurfaceOptions& options, Context& context) {
     std::vector<phantom::Node> cortex_mm;
     for (std::size_t i = 0; i < options.cortex_mm.size(); ++i)
       cortex_mm.emplace_back(low.z() + options.fill_at[i] * extent.z(), options.cortex_mm[i]);
-    bone.inner = endosteum(bone.outer, low, high, cortex_mm);
+    bone.inner = endosteum(bone.outer, low, box.max(), cortex_mm);
   }
   bone.fill_z_mm.clear();
   for (double at : options.fill_at) bone.fill_z_mm.push_back(low.z() + at * extent.z());

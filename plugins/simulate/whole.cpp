@@ -5,6 +5,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/simulate/solid.hpp"
+#include "marrow/simulate/vectors.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
@@ -24,13 +25,10 @@ struct WholeOptions {
 /// wall.
 std::vector<Eigen::Vector3d> seeds_of(const Bone& bone, const Fragment& fragment) {
   constexpr int kHeights = 14;
-  Eigen::Vector3d low = bone.outer.vertices_mm.front(), high = low;
-  for (const auto& vertex : bone.outer.vertices_mm) {
-    low = low.cwiseMin(vertex);
-    high = high.cwiseMax(vertex);
-  }
-  const double step = (high.z() - low.z()) / kHeights, first_z = low.z() + 0.5 * step;
-  const int lines = int(high.y() - low.y()) + 1;  // 1 mm apart
+  const Eigen::AlignedBox3d box = phantom::bounds_of(bone.outer.vertices_mm);
+  const Eigen::Vector3d low = box.min();
+  const double step = box.sizes().z() / kHeights, first_z = low.z() + 0.5 * step;
+  const int lines = int(box.sizes().y()) + 1;  // 1 mm apart
   const phantom::SolidRays rays({bone, {}, {fragment}}, lines, kHeights, [&](const Fragment&) {
     return [=](const Eigen::Vector3d& p) {
       return phantom::RayVertex{p.y() - low.y(), (p.z() - first_z) / step, p.x()};

@@ -3,9 +3,6 @@
 
 #include <cmath>
 
-#include "marrow/domain/random.hpp"
-#include "marrow/simulate/shape_functions.hpp"
-
 namespace marrow::phantom {
 namespace {
 
@@ -60,7 +57,9 @@ constexpr double kCondylesApartMm = 49.5, kCondylesRiseMm = 4;
 }  // namespace
 
 FemurField::FemurField(const FemurShape& shape)
-    : shape_(shape), scale_(0.5 * shape.bicondylar_width_mm / kHalfWidthMm) {
+    : shape_(shape),
+      scale_(0.5 * shape.bicondylar_width_mm / kHalfWidthMm),
+      ripple_(shape.ripple_mm, 35, 65, Random(shape.seed, 7)) {
   const double head_radius = 0.5 * shape.head_diameter_mm;
   const double out = shape.neck_length_mm * std::sin(shape.neck_shaft_rad),
                up = -shape.neck_length_mm * std::cos(shape.neck_shaft_rad);
@@ -70,12 +69,6 @@ FemurField::FemurField(const FemurShape& shape)
   head_ = neck_base_ + Vector3d(out * std::cos(forward_rad), -out * std::sin(forward_rad), up);
   // Parts swell where they are joined, and where the shaft joins them, so the width is not that of the parts.
   for (int round = 0; round < 5; ++round) scale_ *= shape.bicondylar_width_mm / distal_width_mm();
-  Random random(shape.seed, 7);
-  for (Wave& wave : waves_) {
-    const Vector3d direction(random.normal(), random.normal(), random.normal());
-    wave = {direction.normalized() * 2 * 3.14159265358979323846 / (35 + 65 * random.uniform_above_0()),
-            2 * 3.14159265358979323846 * random.uniform_above_0()};
-  }
 }
 
 double FemurField::distal_width_mm() const {
@@ -167,13 +160,7 @@ double FemurField::outer_at(const Vector3d& p) const {
 
 double FemurField::outer(const Vector3d& point) const {
   const Vector3d p = anatomical(point);
-  double field = outer_at(p);
-  if (shape_.ripple_mm > 0 && std::abs(field) < 20) {
-    double ripple = 0;
-    for (const Wave& wave : waves_) ripple += std::sin(wave.number.dot(p) + wave.phase);
-    field += shape_.ripple_mm * ripple / std::sqrt(0.5 * double(waves_.size()));
-  }
-  return field;
+  return ripple_.added_to(outer_at(p), p);
 }
 
 double FemurField::inner(const Vector3d& point) const {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <Eigen/Core>
-#include <array>
 #include <cstdint>
+
+#include "marrow/simulate/shape_functions.hpp"
 
 namespace marrow::phantom {
 
@@ -41,10 +41,6 @@ class FemurField {
   Eigen::Vector3d high_mm() const;
 
  private:
-  struct Wave {
-    Eigen::Vector3d number;
-    double phase;
-  };
   Eigen::Vector3d anatomical(const Eigen::Vector3d& point) const;  ///< (medial, back, up)
   double outer_at(const Eigen::Vector3d& p) const;
   double shaft(const Eigen::Vector3d& p) const;
@@ -56,7 +52,7 @@ class FemurField {
   FemurShape shape_;
   double scale_;  ///< of the distal end, for the bicondylar width that is asked for
   Eigen::Vector3d head_, neck_base_;
-  std::array<Wave, 12> waves_;
+  Ripple ripple_;
 };
 
 }  // namespace marrow::phantom

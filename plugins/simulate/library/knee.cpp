@@ -2,10 +2,10 @@
 #include "marrow/simulate/knee.hpp"
 
 #include <Eigen/Geometry>
-#include <limits>
 
 #include "marrow/simulate/polygonise.hpp"
 #include "marrow/simulate/shape_functions.hpp"
+#include "marrow/simulate/vectors.hpp"
 
 namespace marrow::phantom {
 namespace {
@@ -80,26 +80,20 @@ RigidTransform bent(const Vector3d& axis_at, double angle) {
 DistalEnd distal_end(const Mesh& outer) {
   constexpr double kEndMm = 60;
   constexpr double kHeadShare = 0.12;
-  constexpr double kFar = std::numeric_limits<double>::max();
-  Vector3d low = Vector3d::Constant(kFar), high = -low;
-  for (const auto& vertex : outer.vertices_mm) {
-    low = low.cwiseMin(vertex);
-    high = high.cwiseMax(vertex);
-  }
-  Eigen::Vector2d least = Eigen::Vector2d::Constant(kFar), most = -least;
+  const Eigen::AlignedBox3d whole = bounds_of(outer.vertices_mm);
+  const double lowest_z = whole.min().z(), highest_z = whole.max().z();
+  Eigen::AlignedBox2d end;
   double head_x = 0, heads = 0;
   for (const auto& vertex : outer.vertices_mm) {
-    if (vertex.z() < low.z() + kEndMm) {
-      least = least.cwiseMin(vertex.head<2>());
-      most = most.cwiseMax(vertex.head<2>());
-    }
-    if (vertex.z() > high.z() - kHeadShare * (high.z() - low.z())) {
+    if (vertex.z() < lowest_z + kEndMm) end.extend(vertex.head<2>());
+    if (vertex.z() > highest_z - kHeadShare * (highest_z - lowest_z)) {
       head_x += vertex.x();
       ++heads;
     }
   }
-  const Eigen::Vector2d middle = 0.5 * (least + most);
-  return {low.z(), 0.5 * (most.x() - least.x()), least.y(), most.y(), middle, head_x / heads > middle.x() ? -1.0 : 1.0};
+  const Eigen::Vector2d least = end.min(), most = end.max(), middle = 0.5 * (least + most);
+  return {
+      lowest_z, 0.5 * (most.x() - least.x()), least.y(), most.y(), middle, head_x / heads > middle.x() ? -1.0 : 1.0};
 }
 
 Vector3d knee_axis_at(const Mesh& femur_outer) {
@@ -109,14 +103,12 @@ Vector3d knee_axis_at(const Mesh& femur_outer) {
 }
 
 Body fixed_to(const Fragment& fragment, const std::string& name, const std::string& material, Mesh surface) {
-  Body body;
-  body.name = name;
-  body.material = material;
-  body.surface = turned(std::move(surface), fragment.world_from_bone());
-  body.in_ct = true;
-  body.ct_from_world = inverse(fragment.world_from_ct);
-  body.moves_with = fragment.name;
-  return body;
+  return {.name = name,
+          .material = material,
+          .surface = turned(std::move(surface), fragment.world_from_bone()),
+          .in_ct = true,
+          .ct_from_world = inverse(fragment.world_from_ct),
+          .moves_with = fragment.name};
 }
 
 std::vector<Body> make_knee(const Mesh& femur_outer, const Fragment& fragment, const KneeShape& shape) {

@@ -7,7 +7,7 @@
 
 #include "marrow/domain/calibration.hpp"
 #include "marrow/domain/mesh.hpp"
-#include "marrow/runtime/node/value.hpp"
+#include "marrow/plugin.hpp"
 
 namespace marrow::phantom {
 
@@ -38,6 +38,14 @@ struct Sensor {
   double gamma = 2.2;         ///< grey value = 255 light^(1 / gamma)
   double noise_levels = 2.5;  ///< standard deviation of the noise in grey values, in each colour
 };
+/// Declares the sensor's options at a node whose options are also those of a sensor.
+template <class Options>
+void declare_sensor(auto& node) {
+  node.option("blur_px", &Options::blur_px, "standard deviation of the lens's blur", at_least(0), at_most(10))
+      .option("gamma", &Options::gamma, "grey value = 255 light^(1 / gamma)", at_least(0.1), at_most(10), unit("1"))
+      .option("noise_levels", &Options::noise_levels, "standard deviation of the noise, of 255 levels, in each colour",
+              at_least(0), at_most(100), unit(""));
+}
 
 /// A camera on a rotary arm that stops at some angles, as it really is. The arm turns about the world's z axis; at 0
 /// degrees the camera looks along +y, at 90 degrees along -x. It looks at the world's origin, with z upwards.

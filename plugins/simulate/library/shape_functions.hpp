@@ -3,9 +3,12 @@
 // Continuous shapes as functions that are negative inside and about the distance in mm near the surface.
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 #include <utility>
+
+#include "marrow/domain/random.hpp"
 
 namespace marrow::phantom {
 
@@ -54,5 +57,33 @@ inline double capsule(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const 
   const double t = std::clamp((p - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
   return (p - a - t * (b - a)).norm() - (radius_a + t * (radius_b - radius_a));
 }
+
+/// Smooth irregularities of a surface: a sum of waves in random directions. Its root mean square is about `amplitude`.
+class Ripple {
+ public:
+  /// The waves are from `shortest` to `shortest` + `range` mm long.
+  Ripple(double amplitude, double shortest, double range, Random random) : amplitude_(amplitude) {
+    for (Wave& wave : waves_) {
+      const Eigen::Vector3d direction(random.normal(), random.normal(), random.normal());
+      wave = {direction.normalized() * 2 * 3.14159265358979323846 / (shortest + range * random.uniform_above_0()),
+              2 * 3.14159265358979323846 * random.uniform_above_0()};
+    }
+  }
+  /// The field of a shape with the irregularities, if `field` is that without them at the point.
+  double added_to(double field, const Eigen::Vector3d& point) const {
+    if (!(amplitude_ > 0) || !(std::abs(field) < 20)) return field;
+    double sum = 0;
+    for (const Wave& wave : waves_) sum += std::sin(wave.number.dot(point) + wave.phase);
+    return field + amplitude_ * sum / std::sqrt(0.5 * double(waves_.size()));
+  }
+
+ private:
+  struct Wave {
+    Eigen::Vector3d number;
+    double phase;
+  };
+  double amplitude_;
+  std::array<Wave, 12> waves_;
+};
 
 }  // namespace marrow::phantom

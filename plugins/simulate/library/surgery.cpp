@@ -18,11 +18,7 @@ using Eigen::Vector3d;
 constexpr double kReachMm = 220;  // half the length of what is longer than the images show
 
 Body outside(const std::string& name, const std::string& material, Mesh surface) {
-  Body body;
-  body.name = name;
-  body.material = material;
-  body.surface = std::move(surface);
-  return body;
+  return {.name = name, .material = material, .surface = std::move(surface), .moves_with = {}};
 }
 
 double between(Random& random, double low, double high) { return low + (high - low) * random.uniform(); }

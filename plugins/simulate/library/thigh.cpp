@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "marrow/simulate/knee.hpp"
+#include "marrow/simulate/vectors.hpp"
 #include "marrow/toolbox/phantom/loft.hpp"
 
 namespace marrow::phantom {
@@ -17,11 +18,7 @@ constexpr int kSides = 240;
 constexpr double kLowestMm = -300, kAboveMm = 60, kSeenMm = 130;
 constexpr double kFineMm = 1, kCoarseMm = 8;  // between rings, where folds are and elsewhere
 
-double top_of(const Bone& bone) {
-  double top = bone.outer.vertices_mm.front().z();
-  for (const auto& vertex : bone.outer.vertices_mm) top = std::max(top, vertex.z());
-  return top + kAboveMm;
-}
+double top_of(const Bone& bone) { return bounds_of(bone.outer.vertices_mm).max().z() + kAboveMm; }
 
 /// A surface around the axis of the thigh, from its radius at an angle and a height.
 Mesh around(const Bone& bone, const std::function<double(double, double)>& radius_at) {
@@ -39,12 +36,7 @@ Mesh around(const Bone& bone, const std::function<double(double, double)>& radiu
 }
 
 Body still(const std::string& name, const std::string& material, Mesh surface) {
-  Body body;
-  body.name = name;
-  body.material = material;
-  body.surface = std::move(surface);
-  body.in_ct = true;
-  return body;
+  return {.name = name, .material = material, .surface = std::move(surface), .in_ct = true, .moves_with = {}};
 }
 
 /// A bulge with a crease beside it, over a part of the circumference.

@@ -3,9 +3,6 @@
 
 #include <cmath>
 
-#include "marrow/domain/random.hpp"
-#include "marrow/simulate/shape_functions.hpp"
-
 namespace marrow::phantom {
 namespace {
 
@@ -25,14 +22,8 @@ double tall_capsule(const Vector3d& p, const Vector3d& a, const Vector3d& b, dou
 
 }  // namespace
 
-VertebraField::VertebraField(const VertebraShape& shape) : shape_(shape), scale_(shape.body_width_mm / 45) {
-  Random random(shape.seed, 8);
-  for (Wave& wave : waves_) {
-    const Vector3d direction(random.normal(), random.normal(), random.normal());
-    wave = {direction.normalized() * 2 * 3.14159265358979323846 / (15 + 30 * random.uniform_above_0()),
-            2 * 3.14159265358979323846 * random.uniform_above_0()};
-  }
-}
+VertebraField::VertebraField(const VertebraShape& shape)
+    : shape_(shape), scale_(shape.body_width_mm / 45), ripple_(shape.ripple_mm, 15, 30, Random(shape.seed, 8)) {}
 
 double VertebraField::body(const Vector3d& p) const {
   const double at = 2 * p.z() / shape_.body_height_mm;  // -1 at the lower end plate, 1 at the upper one
@@ -72,13 +63,7 @@ double VertebraField::arch(const Vector3d& point) const {
 }
 
 double VertebraField::outer(const Vector3d& p) const {
-  double field = cut(join(body(p), arch(p), 3), -canal(p), 1);
-  if (shape_.ripple_mm > 0 && std::abs(field) < 20) {
-    double ripple = 0;
-    for (const Wave& wave : waves_) ripple += std::sin(wave.number.dot(p) + wave.phase);
-    field += shape_.ripple_mm * ripple / std::sqrt(0.5 * double(waves_.size()));
-  }
-  return field;
+  return ripple_.added_to(cut(join(body(p), arch(p), 3), -canal(p), 1), p);
 }
 
 Vector3d VertebraField::low_mm() const {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <Eigen/Core>
-#include <array>
 #include <cstdint>
+
+#include "marrow/simulate/shape_functions.hpp"
 
 namespace marrow::phantom {
 
@@ -38,17 +38,13 @@ class VertebraField {
   Eigen::Vector3d high_mm() const;
 
  private:
-  struct Wave {
-    Eigen::Vector3d number;
-    double phase;
-  };
   double body(const Eigen::Vector3d& p) const;
   double arch(const Eigen::Vector3d& p) const;
   double canal(const Eigen::Vector3d& p) const;
 
   VertebraShape shape_;
   double scale_;  ///< of the parts without a measure of their own, from the body's width
-  std::array<Wave, 12> waves_;
+  Ripple ripple_;
 };
 
 }  // namespace marrow::phantom

@@ -112,7 +112,7 @@ TEST(SimulateCase, WrongFragmentsAndUncoveredOnesAreExplained) {
   EXPECT_EQ(marrow::test::message_of([] {
               assemble({{"register", std::vector<std::string>{"middle"}}});
             }),
-            "simulate.case: the option 'register' names the fragment 'middle', but there are: proximal, distal");
+            "simulate.case: the option 'register': the phantom has no fragment 'middle', only proximal, distal");
   const Volume ct = simulated::ct(
       chain().phantom, {{"spacing_mm", std::vector<double>{2, 2, 2}}, {"range_mm", std::vector<double>{200, 300}}});
   EXPECT_EQ(marrow::test::message_of([&] { assemble_with(ct); }),
