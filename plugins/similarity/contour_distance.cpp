@@ -2,54 +2,20 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <marrow/base/number_text.hpp>
 #include <marrow/plugin.hpp>
 
+#include "contour_matches.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/similarity/block_expansions.hpp"
 #include "marrow/similarity/blur.hpp"
 #include "marrow/similarity/edge_loss.hpp"
-#include "marrow/toolbox/match/nearest_edges.hpp"
-#include "marrow/toolbox/match/nearest_outline.hpp"
 #include "marrow/toolbox/match/views_cost.hpp"
 
 namespace {
 
-struct Options {
-  double contour_spacing_px = 2;
-  double reach_px = 6;
-  double scale_px = 1;
-  double direction_tolerance_deg = 40;
-  std::string polarity = "brighter_outside";
-  double edge_offset_px = 0;
-  bool estimate_offset = true;
-  bool x_ray = true;
-  bool symmetric = false;
-  double others_reach_px = marrow::match::kOthersReach_px;
-  std::vector<double> weights;
-};
-
 using marrow::match::in_view, marrow::match::weight_of;
-
-/// The offset between outline and edges is estimated within this distance of the given one.
-constexpr double kMostOffset_px = 3;
-
-/// A point of the outline and its nearest edge.
-struct Residual {
-  float along_normal;  ///< signed distance along the normal, positive if the edge lies outside the outline
-  float beyond;  ///< distance along the outline from the point to the end of the edge pixel; 0 on an edge without gaps
-  float u, v;
-  float normal_u, normal_v;
-  Eigen::Vector3f model_mm;
-};
-
-struct Matches {
-  std::vector<Residual> residuals;
-  std::vector<Eigen::Vector2f> unmatched_px;  ///< points compared that have no edge
-  std::size_t points() const { return residuals.size() + unmatched_px.size(); }
-  std::vector<Residual> of_edges;  ///< from the edges near the outline to the outline; only if the cost is symmetric
-  bool is_drawn = false;           ///< some of the outline lies in the image, maybe outside the mask
-};
+using marrow::match::kMostOffset_px, marrow::match::Matches, marrow::match::Residual;
+using Options = marrow::match::ContourOptions;
 
 /// Data that does not depend on the level. It is made once and shared by all levels.
 struct Scene {
@@ -273,67 +239,10 @@ class ContourDistance : public marrow::match::ViewsCost {
   }
 
   Matches match(std::size_t index, const marrow::RigidTransform& world_from_model) const {
-    constexpr float kMargin_px = 3;  // edge detectors find nothing next to the border of an image
     const marrow::View& view = scene_->views[index];
-    const float right = float(view.camera.width_px - 1) - kMargin_px,
-                bottom = float(view.camera.height_px - 1) - kMargin_px;
-    Matches matches;
-    const auto outline = scene_->projector->outline(view.camera, world_from_model, level_.contour_spacing_px);
-    matches.residuals.reserve(outline.size());
-    std::vector<marrow::OutlinePoint> compared;
-    for (const marrow::OutlinePoint& p : outline) {
-      const bool is_inside = p.u_px >= kMargin_px && p.v_px >= kMargin_px && p.u_px <= right && p.v_px <= bottom;
-      if (!is_inside) continue;  // nor is a point that is not a number
-      matches.is_drawn = true;
-      if (!view.mask.empty() && !view.mask.at<std::uint8_t>(int(p.v_px + 0.5f), int(p.u_px + 0.5f))) continue;
-      if (scene_->options.symmetric) compared.push_back(p);
-      if (const marrow::EdgePixel* edge = nearest_edge(index, p))
-        matches.residuals.push_back(residual(p, *edge));
-      else
-        matches.unmatched_px.emplace_back(p.u_px, p.v_px);
-    }
-    if (scene_->options.symmetric) matches.of_edges = match_edges(index, compared);
-    return matches;
-  }
-
-  bool either_polarity() const { return scene_->options.polarity == "either"; }
-
-  /// With either polarity, the nearer one of two edges: that which is brighter outside, and that which is darker there.
-  const marrow::EdgePixel* nearest_edge(std::size_t index, const marrow::OutlinePoint& p) const {
-    const marrow::EdgePixel* edge = scene_->edges[index].find(p.u_px, p.v_px, p.normal_u, p.normal_v);
-    if (!either_polarity()) return edge;
-    const marrow::EdgePixel* other = scene_->edges[index].find(p.u_px, p.v_px, -p.normal_u, -p.normal_v);
-    if (!edge || !other) return edge ? edge : other;
-    const auto distance2 = [&](const marrow::EdgePixel& e) {
-      return (e.u_px - p.u_px) * (e.u_px - p.u_px) + (e.v_px - p.v_px) * (e.v_px - p.v_px);
-    };
-    return distance2(*other) < distance2(*edge) ? other : edge;
-  }
-
-  std::vector<Residual> match_edges(std::size_t index, const std::vector<marrow::OutlinePoint>& outline) const {
-    const double reach_px =
-        level_.reach_px + (scene_->options.estimate_offset ? kMostOffset_px : std::abs(scene_->options.edge_offset_px));
-    const float least_cosine = float(std::cos(marrow::radians(scene_->options.direction_tolerance_deg)));
-    const marrow::match::NearestOutline nearest(outline, scene_->views[index].camera.width_px,
-                                                scene_->views[index].camera.height_px, reach_px);
-    std::vector<Residual> residuals;
-    for (const marrow::EdgePixel& edge : scene_->edges[index].all())
-      if (const int point = nearest.find(edge, reach_px, least_cosine, either_polarity()); point >= 0)
-        residuals.push_back(residual(outline[std::size_t(point)], edge));
-    return residuals;
-  }
-
-  static Residual residual(const marrow::OutlinePoint& p, const marrow::EdgePixel& edge) {
-    constexpr float kOwnLength_px = 1.5f;  // an edge pixel represents this length of the edge on each side
-    const float du = edge.u_px - p.u_px, dv = edge.v_px - p.v_px;
-    const float along = std::abs(dv * p.normal_u - du * p.normal_v);
-    return {du * p.normal_u + dv * p.normal_v,
-            std::max(0.0f, along - kOwnLength_px),
-            p.u_px,
-            p.v_px,
-            p.normal_u,
-            p.normal_v,
-            p.model_mm};
+    return matches_of(view, scene_->edges[index],
+                      scene_->projector->outline(view.camera, world_from_model, level_.contour_spacing_px),
+                      level_.reach_px, scene_->options);
   }
 
   /// Distance of the images' edges outside the model's outline, the same in all views. It is needed because X-ray edges

@@ -124,7 +124,6 @@ class DrrEdges : public marrow::match::ViewsCost {
 
   /// The loss of each edge of the radiograph.
   marrow::match::BlockSums sums(std::size_t index, const marrow::RigidTransform& world_from_model) const {
-    constexpr float kMargin_px = 3;  // edge detectors find nothing next to the border of an image
     const marrow::View& view = scene_->views[index];
     const marrow::Camera& camera = view.camera;
     const marrow::PixelGrid region = scene_->projector->region(camera, world_from_model);
@@ -141,11 +140,8 @@ class DrrEdges : public marrow::match::ViewsCost {
     if (const double blur = std::sqrt(std::max(blur2, 0.0)) / step_; blur > 0.2)
       cv::GaussianBlur(radiograph, radiograph, {}, blur);
     for (const DrawnEdge& edge : edges_of(radiograph, grid, scene_->options.threshold_percent)) {
-      const bool is_inside = edge.u >= kMargin_px && edge.v >= kMargin_px &&
-                             edge.u <= float(camera.width_px - 1) - kMargin_px &&
-                             edge.v <= float(camera.height_px - 1) - kMargin_px;
-      if (!is_inside) continue;  // nor is an edge whose place is not a number
-      if (!view.mask.empty() && !view.mask.at<std::uint8_t>(int(edge.v + 0.5f), int(edge.u + 0.5f))) continue;
+      if (!marrow::match::is_away_from_border(camera, edge.u, edge.v)) continue;
+      if (marrow::match::is_masked(view, edge.u, edge.v)) continue;
       found.add(edge.u, edge.v, double(edge.weight) * loss_(distance2(index, edge)), double(edge.weight));
     }
     return found;
@@ -154,13 +150,10 @@ class DrrEdges : public marrow::match::ViewsCost {
   /// Squared distance to the nearest edge of similar direction. The distance along the edge counts only beyond the
   /// length that an edge pixel represents.
   double distance2(std::size_t view, const DrawnEdge& edge) const {
-    constexpr float kOwnLength_px = 1.5f;
     const marrow::EdgePixel* nearest = scene_->edges[view].find(edge.u, edge.v, edge.direction_u, edge.direction_v);
     if (!nearest) return 1e30;
-    const float du = nearest->u_px - edge.u, dv = nearest->v_px - edge.v;
-    const float across = du * edge.direction_u + dv * edge.direction_v,
-                along = std::abs(dv * edge.direction_u - du * edge.direction_v);
-    const float beyond = std::max(0.0f, along - kOwnLength_px);
+    const auto [across, beyond] =
+        marrow::match::way_to_edge(nearest->u_px - edge.u, nearest->v_px - edge.v, edge.direction_u, edge.direction_v);
     return double(across * across + beyond * beyond);
   }
 

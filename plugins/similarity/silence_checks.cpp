@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "silence_checks.hpp"
-
 #include <algorithm>
 
 #include "marrow/similarity/invisible.hpp"
 #include "marrow/toolbox/search/compared.hpp"
 #include "scene.hpp"
+#include "suite.hpp"
 
 namespace marrow::conformance {
 namespace {

@@ -14,7 +14,6 @@
 
 #include "marrow/base/number_text.hpp"
 #include "scene.hpp"
-#include "silence_checks.hpp"
 
 namespace marrow::conformance {
 namespace {
