@@ -99,8 +99,8 @@ struct Spread {
 };
 
 // 8 views, at most 60 beads, 7 % pincushion, 0.2 px of noise on each coordinate. The limits hold for the mean (focal
-// length 0.15 %, principal point 0.5 px, residual within 5 % of the noise); what a single run can reach is bounded by
-// the noise itself, so the worst run is held against what that predicts.
+// length 0.15 %, principal point 0.5 px, residual within 5 % of the noise). Noise bounds what a single run can reach,
+// so the worst run is compared with the error that this noise predicts.
 TEST(Calibrate, ErrorsUnderNoiseAreWhatTheNoisePredicts) {
   const calibration::Board board = calibration::read_board_file(test::kBoardFile);
   ASSERT_LE(board.beads.size(), 60u);

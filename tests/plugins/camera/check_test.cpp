@@ -247,7 +247,7 @@ TEST(CheckNode, RightCamerasNeedNoWarning) {
   }
 }
 
-// A camera whose pixels are twice as high as wide, moved by 3 mm along its x or y axis, has missed each point by 3 mm.
+// Pixels are twice as high as wide. A camera that is moved by 3 mm along its x or y axis misses each point by 3 mm.
 TEST(CheckNode, MillimetresAtTheObjectHoldForPixelsOfAnyShape) {
   const TemporaryFolder folder;
   for (const int axis : {0, 1}) {
@@ -361,7 +361,7 @@ TEST(PointsFile, Faults) {
               "point 'A' is seen in 'one', but there is no view of that name; there are 'two'");
 }
 
-// Twelve metal beads in two frames of a real biplane system, their places triangulated from the same pixels.
+// Twelve metal beads in two frames of a real biplane system. Their places are triangulated from the same pixels.
 TEST(CheckNode, RealWristCameras) {
   MARROW_NEED_DATA(data, "wrist");
   const TemporaryFolder folder;
@@ -396,7 +396,7 @@ TEST(CheckNode, RealWristCameras) {
                   ran.value(name + std::string(".worst")), ran.value(name + std::string(".mean_at_object")));
     EXPECT_TRUE(ran.warnings.empty()) << ran.warnings[0];
     EXPECT_LT(ran.value("error"), 0.4);
-    // As if the images were mirrored, the same cameras are found out.
+    // With mirrored pixels, both cameras get a warning.
     std::string mirrored;
     for (const auto& point : files::read_points_file(folder / "beads.yaml")) {
       const auto list = [](const auto& values) {

@@ -136,8 +136,8 @@ TEST(DicomCamera, NamesAllThatIsMissing) {
   EXPECT_NEAR((camera.camera_from_world * Vector3d::Zero()).z(), 700, 1e-9);
 }
 
-// What PatientOrientation says is what the image shows to its right and downwards. Whatever it is, the patient's left
-// must come out where the image as read shows it.
+// PatientOrientation says which side of the patient the image shows to the right and downwards. In every case the
+// camera must project the patient's left to where the image, as it is read, shows it.
 TEST(DicomCamera, OrientationOfTheStoredImage) {
   const Vector3d left(20, 0, 0), head(0, 0, 20), back(0, 20, 0);
   const auto moved = [](const marrow::Camera& camera, const Vector3d& to) {
@@ -147,12 +147,12 @@ TEST(DicomCamera, OrientationOfTheStoredImage) {
   marrow::Camera camera = read(fluoroscopy()).camera;
   EXPECT_LT(moved(camera, left).x(), 0);
   EXPECT_LT(moved(camera, head).y(), 0);
-  // As one facing the patient sees it: stored mirrored, and mirrored back when it is read, so the camera stays.
+  // As a person who faces the patient sees it. It is stored mirrored and mirrored back when read, so the camera stays.
   camera = read(with(fluoroscopy(), kOrientation, "CS:L\\F")).camera;
   EXPECT_LT(moved(camera, left).x(), 0);
   EXPECT_LT(moved(camera, head).y(), 0);
   EXPECT_TRUE(read(with(fluoroscopy(), kOrientation, "CS:L\\F")).warnings.empty());
-  // Turned by a half and by quarters.
+  // Turned by 180 and by 90 degrees.
   camera = read(with(fluoroscopy(), kOrientation, "CS:L\\H")).camera;
   EXPECT_GT(moved(camera, left).x(), 0);
   EXPECT_GT(moved(camera, head).y(), 0);
@@ -276,7 +276,7 @@ Elements frames_at(const std::vector<std::string>& angles) {
   return header;
 }
 
-// The image may be of any of them: read.views takes the frame that it is told.
+// The image may show any of them: read.views reads the frame that its option names.
 TEST(DicomCamera, FramesWithAGeometryEachMustBeNamed) {
   const Elements turning = frames_at({"0", "30", "60"});
   EXPECT_SAYS(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is a bead and what is not, at each limit; and where beads are found beside others, on slopes and at borders.
+// What counts as a bead, at each limit. Where beads are found: beside others, on slopes and at borders.
 #include "marrow/toolbox/calibration/beads.hpp"
 
 #include <gtest/gtest.h>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which disc is which bead, from lists of discs: with beads missing, with discs that are none, and without enough of
-// them.
+// Which disc is which bead: with beads missing, with discs that are not beads, and with too few beads.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,8 +22,8 @@ const calibration::Board& board() {
   return board;
 }
 
-/// The discs of a view, the landmarks first, without so many of the other beads of each side, and with discs that are
-/// no beads.
+/// The discs of a view, landmarks first. Some of the other beads of each side are missing, and `others` discs are not
+/// beads.
 Seen see(std::uint64_t seed, std::size_t without_lower, std::size_t without_upper, int others,
          double pincushion_percent, double noise_px = 0.1) {
   phantom::DeviceOptions options;

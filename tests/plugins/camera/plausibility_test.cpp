@@ -30,8 +30,7 @@ std::vector<Vector3d> object_seen_by(const Camera& camera) {
           source + 610 * ray_direction(camera, middle + Vector2d(20, 20))};
 }
 
-/// Whether a sentence with these words is said, and no other. Without an object of its own: of one that the camera
-/// sees.
+/// Whether one sentence with these words is found, and no other. If `object` is empty, the camera sees an object.
 bool says(const std::string& words, const Camera& camera, const Device& device = {},
           std::vector<Vector3d> object = {}) {
   if (object.empty()) object = object_seen_by(camera);
@@ -54,7 +53,7 @@ Camera with_principal(double u, double v) {
   return camera;
 }
 
-/// So far from the source, in the middle of the image, and of that extent.
+/// An object in the middle of the image, at this distance from the source and of this extent.
 std::vector<Vector3d> object_at(double distance_mm, double extent_mm) {
   const Camera camera = right_camera();
   const Vector3d axis = camera.camera_from_world.rotation.row(2).transpose();
@@ -76,7 +75,7 @@ SeenPoints points_of(const Camera& camera, int count = 20) {
   return points;
 }
 
-/// Of one view by itself.
+/// The explanation for one view alone.
 std::optional<std::string> explanation(const Camera& camera, const SeenPoints& points) {
   return calibration::explanations({camera}, {points}).at(0);
 }
@@ -190,7 +189,7 @@ TEST(Plausibility, ObjectsBehindTheSourceOrBesideTheImage) {
                 10 * Vector3d(right_camera().camera_from_world.rotation.row(2).transpose()));
   EXPECT_TRUE(says("1 of 3 points of the object lie behind the X-ray source", right_camera(), {}, one));
   EXPECT_TRUE(says("2 of 2 points of the object lie behind the X-ray source", right_camera(), {}, behind));
-  // Beside the image: where a pixel more would be in it.
+  // Just beside the image: one pixel further in would be inside.
   const Camera camera = right_camera();
   const auto at = [&](double u, double v) {
     return Vector3d(source_position_mm(camera) + 600 * ray_direction(camera, {u, v}));
@@ -242,11 +241,11 @@ TEST(Explanation, OfEveryUnit) {
                       "and then subtract 0.25 from the principal point"));
 }
 
-/// The error that a sentence says is left.
+/// The remaining error that a sentence states.
 double left_px(const std::string& sentence) { return std::stod(sentence.substr(sentence.find("only ") + 5)); }
 
-// Two pixels of the larger image, with the middles 2 u and 2 u + 1, are pixel u of the smaller one: so place u there is
-// place 2 u + 0.5 here, and place v here is place (v - 0.5) / 2 there.
+// Pixel u of the smaller image covers two pixels of the larger one, with the middles 2 u and 2 u + 1. So place u in the
+// smaller image is place 2 u + 0.5 in the larger one, and place v in the larger one is (v - 0.5) / 2 in the smaller.
 TEST(Explanation, SizesOfImagesAreSaidToTheHalfPixel) {
   const Camera right = right_camera();
   Camera half = right, twice = right;
@@ -311,7 +310,7 @@ TEST(Explanation, ReversedPointsAreNotMirroredImages) {
 
 TEST(Explanation, OnlyOfWhatIsFarOffAndThenMuchBetter) {
   const Camera right = right_camera();
-  // Mirrored, and on top of that off by so many pixels each: 6.4 px are a hundredth of the image, 12.8 px two.
+  // Mirrored, and each point is off by `noise_px` in addition. 6.4 px are 1 % of the image width, 12.8 px are 2 %.
   const auto mirrored = [&](double noise_px, int count = 20) {
     SeenPoints points = points_of(right, count);
     for (std::size_t i = 0; i < points.pixels.size(); ++i)
@@ -323,7 +322,7 @@ TEST(Explanation, OnlyOfWhatIsFarOffAndThenMuchBetter) {
   EXPECT_FALSE(explanation(right, mirrored(13.1)));
   EXPECT_TRUE(explanation(right, mirrored(0, 4)));
   EXPECT_FALSE(explanation(right, mirrored(0, 3)));
-  // Points near the line about which they are mirrored move little: by d px, and stay off by a part of that.
+  // Points near the mirror line move little, by off_px. A part of this, rest_px, remains after mirroring them back.
   const auto near_line = [&](double off_px, double rest_px) {
     SeenPoints points = points_of(right);
     for (std::size_t i = 0; i < points.pixels.size(); ++i) {

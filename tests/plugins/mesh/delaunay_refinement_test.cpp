@@ -15,7 +15,8 @@ namespace delaunay_refinement_test {
 
 using Eigen::Vector3d;
 
-/// A field as a level set about its middle, with spacing 1 mm: trilinear, and outside beyond a layer about its grid.
+/// A field as a level set around its middle, with a spacing of 1 mm. It is trilinear; beyond one layer around the grid
+/// all is outside.
 marrow::delaunay::LevelSet level_set_of(const marrow::SignedField& field, const Vector3d& middle) {
   marrow::delaunay::LevelSet level_set;
   const marrow::surface::Padded padded(field);

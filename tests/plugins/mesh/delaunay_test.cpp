@@ -81,7 +81,7 @@ TEST(Delaunay, FindsPartsMuchSmallerThanItsTriangles) {
   }
 }
 
-/// CGAL's own order of cells is that of their addresses; several at once lie in memory otherwise than one alone.
+/// CGAL orders cells by their addresses. Several meshers at once place them differently in memory than one alone.
 TEST(Delaunay, SameBytesWhereverItsMemoryLies) {
   const auto field = mesh_shapes::field_of(mesh_shapes::turned_grid({40, 40, 32}),
                                            [](const Vector3d& p) { return mesh_shapes::torus(p, 9, 4); });

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Analytic fields and counts on meshes that the tests of this kind share.
+// Analytic fields, and counts on meshes, that the tests of this kind share.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -44,8 +44,8 @@ inline marrow::SignedField field_of(const marrow::Grid& grid, const Distance& di
   return field;
 }
 
-/// A field without any structure: all 256 patterns of a cell, with every kind of neighbour. `inside_part`: how much is
-/// inside.
+/// A field of noise: all 256 patterns of a cell occur, with every kind of neighbour. `inside_part`: the share of
+/// samples inside.
 inline marrow::SignedField noise_field(std::array<int, 3> size, unsigned seed, double inside_part = 0.5) {
   marrow::SignedField field;
   field.grid.size = size;
@@ -55,7 +55,7 @@ inline marrow::SignedField noise_field(std::array<int, 3> size, unsigned seed, d
   return field;
 }
 
-/// A cell with the pattern's signs (bit c: corner c is inside) in a field whose other samples are on one side.
+/// A cell with the pattern's signs (bit c: corner c is inside). All other samples of the field are on one side.
 inline marrow::SignedField pattern_field(unsigned pattern, bool inside_around) {
   marrow::SignedField field;
   field.grid.size = {4, 4, 4};
@@ -73,7 +73,7 @@ inline double two_slabs(const Eigen::Vector3d& p, double gap_mm) {
   return std::min(box(p - Eigen::Vector3d(0, 0, shift_mm)), box(p + Eigen::Vector3d(0, 0, shift_mm)));
 }
 
-/// What a node makes of a field.
+/// The mesh that a node makes from a field.
 inline marrow::Mesh meshed(const std::string& node, const marrow::SignedField& field,
                            const shipped::Options& options = {}) {
   return shipped::call(node, {{"field", shipped::item(field)}}, options).at("mesh").as<marrow::Mesh>();
@@ -83,7 +83,7 @@ inline std::string refusal(const std::string& node, const marrow::SignedField& f
   return shipped::refusal(node, {{"field", shipped::item(field)}});
 }
 
-/// Every mesher says the same of a field that is no good.
+/// Every mesher refuses a bad field with the same message.
 inline void expect_texts_for_bad_fields(const std::string& node) {
   EXPECT_EQ(refusal(node, {}),
             "field: 0 values do not fill a grid of 0 x 0 x 0 voxels; wire the output of a segment node");
@@ -114,7 +114,7 @@ inline double largest_error_mm(const marrow::Mesh& mesh, const Distance& distanc
   return largest;
 }
 
-/// True when the normal of every triangle with an area points up the distance.
+/// Whether the normal of every triangle with an area points to larger distances.
 inline bool normals_point_outward(const marrow::Mesh& mesh, const Distance& distance_mm) {
   for (const auto& t : mesh.triangles) {
     const Eigen::Vector3d a = mesh.vertices_mm[t[0]], b = mesh.vertices_mm[t[1]], c = mesh.vertices_mm[t[2]];

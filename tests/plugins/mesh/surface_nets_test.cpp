@@ -38,8 +38,8 @@ TEST(SurfaceNets, NoiseIsAClosedManifold) {
   }
 }
 
-/// Two samples that touch along the diagonal of a face, in an inside elsewhere: both cells about the face have one
-/// loop, which crosses it twice.
+/// Two samples are outside, on the diagonal of a face; all others are inside. Both cells at the face have one loop,
+/// which crosses the face twice.
 TEST(SurfaceNets, AFaceThatIsCrossedTwiceByTheSameTwoLoopsIsSplit) {
   SignedField field;
   field.grid.size = {5, 5, 5};

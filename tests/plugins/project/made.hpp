@@ -12,7 +12,7 @@
 
 namespace made {
 
-/// The projector keeps what it was made from.
+/// The projector, which keeps the inputs that it was made from.
 template <class Projector>
 std::shared_ptr<const Projector> projector(const std::string& node, const shipped::Inputs& in,
                                            const shipped::Options& options = {}) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What every outline must be, as functions that the test of each projector calls with its own tolerance in pixels.
+// What every outline must satisfy. The test of each projector calls these functions with its own tolerance in pixels.
 #include <gtest/gtest.h>
 
 #include <functional>

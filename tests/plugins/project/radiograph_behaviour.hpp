@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What every projector of radiographs must do, against integrals that are known exactly.
+// What every projector of radiographs must do, compared with integrals that are known exactly.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -20,7 +20,7 @@ using marrow::RigidTransform;
 using marrow::Volume;
 using Make = std::function<std::shared_ptr<const RadiographProjector>(const Volume&, const marrow::SignedField*)>;
 
-/// A volume of HU by position, around the frame's origin, its axes turned by `turn`.
+/// A volume in HU, as a function of the position, around the origin of the frame. `turn` rotates its axes.
 inline Volume volume_of(const std::array<int, 3>& size, const Eigen::Vector3d& spacing_mm, const Eigen::Matrix3d& turn,
                         const std::function<double(const Eigen::Vector3d&)>& hu) {
   Volume volume;
@@ -85,7 +85,7 @@ inline void integrals_of_a_cloud(const Make& make, double mean_limit_mm, double 
     }
 }
 
-/// A Gaussian cloud smoothed by a Gaussian is a wider and thinner one.
+/// A Gaussian cloud smoothed by a Gaussian is a wider and thinner cloud.
 inline void smoothed_cloud(const Make& make, double limit_mm) {
   constexpr double kSigma_mm = 3;
   const double width_mm = std::hypot(kWidth_mm, kSigma_mm);
@@ -139,7 +139,7 @@ inline void region_holds_all(const Make& make) {
   EXPECT_EQ(projector->region(view, shapes::centred_at({300, 0, 0})).count(), 0u) << "out of view";
 }
 
-/// Between an image of every step-th pixel and the same pixels one by one.
+/// Difference between an image of every step-th pixel and the same pixels one by one.
 inline double largest_difference_mm(const RadiographProjector& projector, double angle_deg, int step) {
   const RigidTransform pose = shapes::centred_at({1, 2, 3});
   const PixelGrid region = projector.region(camera(angle_deg), pose);
@@ -214,7 +214,7 @@ inline void refuses_nonsense(const Make& make) {
   EXPECT_TRUE(make(cloud(), nullptr)->radiograph(camera(0), shapes::centred_at({0, 0, 0}), PixelGrid{}).empty());
 }
 
-/// From within the volume, and with the volume around and behind the source.
+/// Rays that start within the volume, so that a part of it lies behind the source.
 inline void source_within(const Make& make) {
   const Volume block =
       volume_of({100, 100, 100}, {2, 2, 2}, Eigen::Matrix3d::Identity(), [](const Eigen::Vector3d&) { return 0; });

@@ -22,7 +22,7 @@ cv::Mat drawn(const List<Metrics>& metrics, const shipped::Options& options = {}
       .pixels;
 }
 
-/// The mean height of the blue curve in the left or right third of the first plot, from the top.
+/// The mean row of the blue curve in the left or right third of the first plot.
 double height(const cv::Mat& picture, bool right) {
   double sum = 0, count = 0;
   for (int v = 40; v < 220; ++v)

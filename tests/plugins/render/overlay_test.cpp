@@ -75,7 +75,7 @@ bool contains(const cv::Mat& picture, int height, const cv::Scalar& colour) {
   return false;
 }
 
-// OpenCV's fonts have ASCII only. The names that stand for the others are written by hand.
+// OpenCV's fonts have only ASCII. The expected replacements of other characters are written by hand.
 TEST(Overlay, WritesNamesWithoutTheirMarks) {
   const auto titled = [](const std::string& name) {
     marrow::View named = view();
@@ -137,7 +137,7 @@ TEST(Overlay, ZoomShowsTheOutlinesAndAMargin) {
   shipped::Options options = kTripled;
   options["zoom"] = true;
   const cv::Mat picture = overlay(pose_at(10), {}, options);
-  // Pixels of many values tell in the margin, where nothing is drawn, which part of the image it is.
+  // All pixels differ, so the margin, where nothing is drawn, tells which part of the image is shown.
   marrow::View varied = view();
   for (int v = 0; v < 100; ++v)
     for (int u = 0; u < 200; ++u) varied.image.pixels.at<std::uint16_t>(v, u) = (7919 * u + 1733 * v) % 4001 + 1000;

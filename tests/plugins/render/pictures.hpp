@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a picture shows: colours of pixels, and texts, which are compared with the same text drawn on purpose.
+// What a picture shows: colours of pixels, and texts. A text is compared with the same text drawn by the test.
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <vector>
@@ -20,7 +20,7 @@ inline bool same(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && a.type() == b.type() && cv::norm(a, b, cv::NORM_INF) == 0;
 }
 
-/// Whether below its first `height` rows the picture has this legend and nothing else.
+/// Whether the picture has this legend, and nothing else, below its first `height` rows.
 inline bool has_legend(const cv::Mat& picture, int height, const std::vector<marrow::draw::LegendItem>& items) {
   const cv::Mat expected = marrow::draw::with_legend(cv::Mat(height, picture.cols, CV_8UC3, cv::Scalar()), items);
   return same(expected.rowRange(height, expected.rows), picture.rowRange(height, picture.rows));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The derivatives and the blocks of the contour's cost, against differences, numbers worked out by hand, and noise
-// itself.
+// The derivatives and the blocks of the contour's cost, compared with finite differences, with numbers worked out by
+// hand, and with the effect of noise.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -23,8 +23,9 @@ using marrow::Vector6d;
 
 constexpr double kDepth_mm = 600, kFocal_px = 1000 / 0.586, kMiddle_px = 255.5;
 
-/// Three sides of a rectangle, each in a plane through the source, so that it stays a straight line of the image at any
-/// depth: left and right at -+40 mm, and the upper one at 50 mm. Of the view from the side another one.
+/// Three sides of a rectangle: left and right at -40 and 40 mm, and the upper one at 50 mm. Each lies in a plane
+/// through the source, so it is a straight line in the image at any depth. The view from the side shows another
+/// rectangle.
 class Sides : public marrow::OutlineProjector {
  public:
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const RigidTransform& pose,
@@ -47,7 +48,7 @@ class Sides : public marrow::OutlineProjector {
   }
 };
 
-/// Edges so far outside of the sides.
+/// Edges at this distance outside the sides.
 marrow::EdgeMap edges_outside(double offset_px, bool frontal) {
   marrow::EdgeMap map{512, 512, {}};
   const auto px = [](double mm) { return kFocal_px * mm / kDepth_mm; };
@@ -77,7 +78,7 @@ struct Held {
   marrow::Value made;
 };
 
-/// With a mask of the frontal view, if there is one.
+/// `mask`: of the frontal view; may be empty.
 Held cost_of(double offset_px, const shipped::Options& options, const cv::Mat& mask = {}) {
   List<marrow::View> views;
   List<marrow::EdgeMap> edges;
@@ -93,7 +94,7 @@ Held cost_of(double offset_px, const shipped::Options& options, const cv::Mat& m
 
 FragmentFrame frame() { return {Eigen::Vector3d(10, -5, 20), marrow::rotation_from_vector({0.2, -0.3, 0.4})}; }
 
-/// Away from the bottom by about a pixel or two in all six.
+/// Away from the minimum by about one or two pixels along all six axes.
 RigidTransform away() {
   Vector6d motion;
   motion << 0.012, -0.015, 0.01, 0.7, -0.5, 0.6;
@@ -126,7 +127,7 @@ Matrix6d curvature_by_differences(const Cost& cost, const RigidTransform& pose) 
   return curvature;
 }
 
-/// Lengths of both in like units: a step of each axis.
+/// A slope per step of each axis, so that all six numbers have the same unit.
 Vector6d in_steps(Vector6d slope) {
   for (int axis = 0; axis < 6; ++axis) slope[axis] *= step(axis);
   return slope;
@@ -167,7 +168,7 @@ TEST(ContourDerivatives, TheCurvatureIsThatOfTheValueAtTheBottom) {
   expect_curvature_at_the_bottom(*cost_of(1.5, {}));
 }
 
-/// Leaves out one square of 102 px, a fifth of the image, of the frontal view: by a mask, and as a block.
+/// Leaves out one square of the frontal view, by a mask and as a block. Its side of 102 px is a fifth of the image.
 void expect_same_without_a_block(double offset_px, const shipped::Options& options, const RigidTransform& pose,
                                  double tolerance) {
   constexpr int kSide_px = 102, kColumns = 6;
@@ -182,7 +183,7 @@ void expect_same_without_a_block(double offset_px, const shipped::Options& optio
     const Vector6d difference = in_steps(found.gradient - expected->gradient);
     const double change = in_steps(expected->gradient - whole->expansion(pose, frame())->gradient).norm();
     EXPECT_LE(difference.norm(), tolerance * change + 1e-9) << column << ", " << row;
-    if (pose.translation_mm.norm() > 0) continue;  // away from the bottom, the curvatures differ
+    if (pose.translation_mm.norm() > 0) continue;  // away from the minimum, the curvatures differ
     for (int i = 0; i < 6; ++i)
       for (int j = 0; j < 6; ++j) {
         const double scale = std::sqrt(expected->curvature(i, i) * expected->curvature(j, j));
@@ -199,7 +200,8 @@ TEST(ContourDerivatives, WithoutABlockAreThoseWithAMask) {
   }
 }
 
-/// An upright line at u = 100 + the pose's x in mm, facing left, for v from 50 to 50 less than the image has.
+/// An upright line at u = 100 + the pose's x in mm that faces left, from 50 px below the top of the image to 50 px
+/// above its bottom.
 class Line : public marrow::OutlineProjector {
  public:
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const RigidTransform& pose,
@@ -223,7 +225,7 @@ RigidTransform shifted(double x_mm) {
   return pose;
 }
 
-/// Views of the same line.
+/// The cost of views that all show the same line.
 Held cost_of_line(const std::vector<marrow::EdgeMap>& maps, shipped::Options options) {
   List<marrow::View> views;
   List<marrow::EdgeMap> edges;
@@ -239,7 +241,7 @@ Held cost_of_line(const std::vector<marrow::EdgeMap>& maps, shipped::Options opt
 }
 
 TEST(ContourBlocks, TheCurvatureWithoutThemIsThatOfTheLoss) {
-  // Of sqrt(s^2 + x^2) with a scale s of 2 px: s^2 / (s^2 + x^2)^1.5, at x = 1.5 px and at 0.
+  // The second derivative of sqrt(s^2 + x^2) with a scale s of 2 px is s^2 / (s^2 + x^2)^1.5, here at 1.5 px and at 0.
   const auto curvature = [](double edge_u_px) {
     const auto cost = cost_of_line({line_at(edge_u_px)}, {{"scale_px", 2.0}});
     const auto without = cost->expansion_without_each_block(shifted(0), {});
@@ -255,7 +257,7 @@ TEST(ContourBlocks, PredictTheScatterThatNoiseMakes) {
   constexpr int kRuns = 120;
   double squares = 0, predicted = 0;
   for (int run = 0; run < kRuns; ++run) {
-    // Of each edge and of what its block has in common.
+    // Noise of each edge, and noise that all edges of a block have in common.
     marrow::EdgeMap map = line_at(100, 1850);  // 20 blocks
     double common = 0;
     for (std::size_t v = 0; v < map.pixels.size(); ++v) {

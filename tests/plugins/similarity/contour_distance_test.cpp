@@ -15,7 +15,7 @@
 
 namespace contour_distance_test {
 
-/// An outline that is a straight upright line at u = 100 + the pose's x in mm, for v from 50 to 149, facing left.
+/// An outline that is a straight upright line at u = 100 + the pose's x in mm, for v from 50 to 149. It faces left.
 class LineProjector : public marrow::OutlineProjector {
  public:
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform& pose,
@@ -28,7 +28,7 @@ class LineProjector : public marrow::OutlineProjector {
   }
 };
 
-/// The same line, of which every second point faces right.
+/// The same line, but every second point faces right.
 class TwoSidedProjector : public LineProjector {
  public:
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const marrow::RigidTransform& pose,
@@ -70,7 +70,7 @@ shipped::Options fixed_offset(double offset_px = 0) {
 
 const auto kLine = std::make_shared<const LineProjector>();
 
-/// Of one fragment alone.
+/// The inputs for one fragment alone.
 shipped::Inputs inputs(const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges) {
   return {{"projector", marrow::Value::of<marrow::OutlineProjector>(kLine)},
           {"views", shipped::list(views, "view")},
@@ -119,7 +119,7 @@ TEST(ContourDistance, OfEitherPolarityTheNearerEdgeCounts) {
 }
 
 TEST(ContourDistance, InAPhotographBlurMovesEdgesToNoSide) {
-  // A step under a blur of 2 px. As an X-ray image, its edge is taken to lie 1.5 px inside of the outline.
+  // A step blurred by 2 px. In an X-ray image, such an edge is expected 1.5 px inside the outline.
   cv::Mat1f blurred(200, 200);
   for (int v = 0; v < 200; ++v)
     for (int u = 0; u < 200; ++u) blurred(v, u) = float(70 + 30 * std::erf((99.5 - u) / (2 * std::sqrt(2.0))));
@@ -151,14 +151,14 @@ TEST(ContourDistance, PointsOfADirectionThatNoEdgeHasPayTheMost) {
 }
 
 TEST(ContourDistance, OffsetIsGivenOrFound) {
-  // The edges lie 2 px to the right of u = 100, which for an outline facing left is 2 px inside.
+  // The edges lie 2 px to the right of u = 100. The outline faces left, so this is 2 px inside.
   const auto edges = edge_maps(line_at(102, -1));
   EXPECT_NEAR(contour_distance(one_view(), edges, fixed_offset(-2))->value(shifted(0)), 0, 1e-5);
   EXPECT_NEAR(contour_distance(one_view(), edges, fixed_offset(2))->value(shifted(0)), std::sqrt(17.0) - 1, 1e-5);
   shipped::Options found = fixed_offset();
   found["estimate_offset"] = true;
   EXPECT_NEAR(contour_distance(one_view(), edges, found)->value(shifted(0)), 0, 1e-5);
-  // No more than 3 px are put down to the offset.
+  // The offset explains at most 3 px.
   EXPECT_NEAR(contour_distance(one_view(), edges, found)->value(shifted(-3)), std::sqrt(5.0) - 1, 1e-5);
 }
 
@@ -184,8 +184,8 @@ TEST(ContourDistance, LevelsHaveTheirOwnReach) {
 }
 
 TEST(ContourDistance, WithoutEachBlockIsTheMeanOverTheOthers) {
-  // The 100 points lie in the fifth column of blocks of 25 px, 25 in each of four rows. Those of the first two of these
-  // rows are 2 px away from the edges, the others 1 px.
+  // The 100 points lie in the fifth column of blocks of 25 px, 25 in each of four rows. In the first two rows they are
+  // 2 px away from the edges, in the others 1 px.
   marrow::EdgeMap map = line_at(101, -1);
   for (auto& edge : map.pixels)
     if (edge.v_px < 100) edge.u_px = 102;

@@ -14,7 +14,7 @@ using pixelwise_projector::PixelwiseProjector;
 
 constexpr double kWidth_px = 2.5;
 
-/// An upright wall at u = 100 + x that the ray crosses to the right of it, blurred by an error function.
+/// An upright wall: rays to the right of u = 100 + x cross it. Its border is blurred by an error function.
 class WallProjector : public PixelwiseProjector {
  public:
   marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform& pose) const override {
@@ -42,7 +42,7 @@ class ObliqueWallProjector : public PixelwiseProjector {
   }
 };
 
-/// A square whose region ends with it, or further out.
+/// A square. The region ends at the square or `around_px` further out.
 class SquareProjector : public PixelwiseProjector {
  public:
   explicit SquareProjector(int around_px) : around_px_(around_px) {}
@@ -59,7 +59,7 @@ class SquareProjector : public PixelwiseProjector {
   const int around_px_;
 };
 
-/// Edges at u, facing left as the wall's do: left of it the image is brighter.
+/// Edges at u that face left, as the wall's edges do: the image is brighter on the left.
 shipped::Inputs inputs(double u, float direction = -1) {
   marrow::EdgeMap map{200, 170, {}};
   for (int v = 0; v < 170; ++v) map.pixels.push_back({float(u), float(v), direction, 0, 1});
@@ -99,7 +99,8 @@ TEST(DrrEdges, DistancesAreAcrossAnObliqueEdge) {
 }
 
 TEST(DrrEdges, DistancesAlongAnEdgeBeginBeyondAPixel) {
-  // One edge pixel alone, at (101, 80): the wall's rows from 15 to 155 lie 1 px across and up to 75 px along from it.
+  // A single edge pixel at (101, 80). The wall's points in rows 15 to 155 lie 1 px away across the edge, and up to 75
+  // px along it.
   marrow::EdgeMap map{200, 170, {{101, 80, -1, 0, 1}}};
   marrow::List<marrow::EdgeMap> edges;
   edges.add("frontal", map);
@@ -129,7 +130,7 @@ TEST(DrrEdges, BlurReachesBeyondTheRegion) {
 }
 
 TEST(DrrEdges, AnotherFragmentsEdgesDoNotCount) {
-  // Edges of the square's left border alone, which the wall meets as well.
+  // Only the edges of the square's left border, which the wall meets too.
   marrow::EdgeMap map{200, 170, {}};
   for (int v = 60; v < 90; ++v) map.pixels.push_back({101, float(v), -1, 0, 1});
   marrow::List<marrow::EdgeMap> edges;

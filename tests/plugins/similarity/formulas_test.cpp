@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The measures against their formulas as the papers print them (Penney et al., IEEE Trans Med Imaging 1998), summed
-// pixel by pixel over all of the image.
+// The measures compared with the formulas that the papers print (Penney et al., IEEE Trans Med Imaging 1998), summed
+// pixel by pixel over the whole image.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,7 +12,7 @@
 
 namespace formulas_test {
 
-constexpr int kWidth = 200, kHeight = 170, kMargin_px = 400;  // so wide that all of the image is compared
+constexpr int kWidth = 200, kHeight = 170, kMargin_px = 400;  // so wide that the whole image is compared
 
 /// Grey values of the image as line integrals, and the radiograph's, at every pixel.
 struct Images {
@@ -46,7 +46,7 @@ double covariance(const std::vector<double>& x, const std::vector<double>& y) {
 double correlation(const std::vector<double>& x, const std::vector<double>& y) {
   return covariance(x, y) / std::sqrt(covariance(x, x) * covariance(y, y));
 }
-/// Sobel's, over eight, where all nine pixels are in the image.
+/// Sobel's gradient divided by 8, where all nine pixels are in the image.
 std::array<std::vector<double>, 2> gradients(const std::vector<double>& image) {
   std::array<std::vector<double>, 2> g;
   const auto at = [&](int u, int v) { return image[std::size_t(v * kWidth + u)]; };
@@ -62,7 +62,7 @@ std::array<std::vector<double>, 2> gradients(const std::vector<double>& image) {
   return g;
 }
 
-/// seen - s * rendered, with s by least squares of the gradients; without the model: the image itself.
+/// seen - s * rendered, where least squares of the gradients give s. Without the model it is the image itself.
 std::vector<double> difference(const Images& images, bool with_model = true) {
   const auto seen = gradients(images.seen), rendered = gradients(images.rendered);
   double products = 0, squares = 0;
@@ -85,7 +85,7 @@ std::pair<double, double> range(const std::vector<double>& x) {
   return {*low, *high};
 }
 
-/// The projector's region is only part of the image: here all of it.
+/// The projector's region is the whole image.
 class Everywhere : public intensity_behaviour::BlobProjector {
  public:
   marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override {

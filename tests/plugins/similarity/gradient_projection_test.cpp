@@ -94,7 +94,8 @@ TEST(GradientProjection, WhatLiesBehindTheSourceIsNotSeen) {
   views.add("frontal", view);
   in["views"] = shipped::list(views, "view");
   const marrow::Value made = shipped::call("similarity.gradient_projection", in).at("cost");
-  // Through the source the ball would be seen where it is now, upside down, with gradients that then fit a bright ball.
+  // Mirrored through the source, the ball would be projected to the same place, upside down. Its gradients would then
+  // fit a bright ball.
   const Eigen::Vector3d behind_mm = 2 * marrow::source_position_mm(views[0].camera);
   for (const double off_mm : {-3.0, 0.0, 4.0})
     EXPECT_EQ(made.as<marrow::Cost>().value(shifted(behind_mm.x() + off_mm, behind_mm.y(), behind_mm.z() - off_mm)), 1)
@@ -116,7 +117,7 @@ TEST(GradientProjection, DirectionsCount) {
 }
 
 TEST(GradientProjection, ABrightSpotCountsTwiceAtMost) {
-  // Beside the ball a small one that the images do not show; so it only adds to what the points could reach.
+  // Beside the ball lies a small one that the images do not show. It only adds to the sum that the points could reach.
   const Eigen::Vector3d spot_mm = kMiddle_mm + Eigen::Vector3d(20, 20, 20);
   constexpr double kSpot_mm = 6;
   marrow::Mesh mesh = shapes::sphere(kRadius_mm), spot = shapes::sphere(kSpot_mm);

@@ -5,8 +5,8 @@
 
 namespace inputs_test {
 
-/// Two opposite sides of a rectangle, both of which belong to it: it is open where the CT ends. It may reach beyond the
-/// image, against the contract.
+/// The outline of a rectangle. Two opposite sides belong to it. It may be open above, where the CT ends. It may reach
+/// beyond the image, which the contract forbids.
 class RectangleOutline : public marrow::OutlineProjector {
  public:
   RectangleOutline(int left, int right, int top, int bottom, bool is_open_above)
@@ -36,7 +36,7 @@ TEST(WithoutShadows, FillsAnOutlineInsideTheImageAlone) {
   view.image.pixels = cv::Mat(kRows, kColumns, CV_8U, cv::Scalar(100));
   marrow::List<marrow::View> views;
   views.add("ap", view);
-  // Inside, over one border, over the other, and over both.
+  // Inside the image, beyond one border, beyond the other, and beyond both.
   for (const auto& [first, last] : std::vector<std::pair<int, int>>{{3, 7}, {-5, 4}, {9, 25}, {-5, 25}})
     for (const bool is_open_above : {true, false}) {
       const int left = is_open_above ? first : 4, right = is_open_above ? last : 8, top = is_open_above ? 4 : first,

@@ -27,7 +27,7 @@ using marrow::RadiographProjector;
 using marrow::RigidTransform;
 using marrow::View;
 
-/// Line integrals of two blobs, which move by a pixel a millimetre.
+/// Line integrals of two blobs, which move by one pixel per millimetre.
 inline double blobs(double u, double v) {
   const auto blob = [&](double u0, double v0, double width) {
     return std::exp(-0.5 * ((u - u0) * (u - u0) + (v - v0) * (v - v0)) / (width * width));
@@ -91,8 +91,8 @@ inline std::shared_ptr<const Cost> make(const std::string& node, const std::shar
   return std::static_pointer_cast<const Cost>(shipped::call(node, inputs).at("cost").data);
 }
 
-/// Best where the model is, and the worse the further it is off; some costs are best there, but have no slope to it
-/// from afar.
+/// The cost is least at the true pose and rises with the distance from it. Some costs are least there but do not fall
+/// towards it from far away (`has_slope` is false).
 inline void is_best_at_the_truth(const std::string& node, bool has_slope = true) {
   const auto projector = std::make_shared<const BlobProjector>();
   const auto cost = make(node, projector, views_of(view_of()));
@@ -114,7 +114,7 @@ inline void is_unmoved_by_brightness(const std::string& node) {
   EXPECT_NEAR(one->value(at(3, 2)), darker->value(at(3, 2)), 0.01);
 }
 
-/// Nothing to compare is the worst, and never NaN.
+/// If there is nothing to compare, the cost is the worst, and never NaN.
 inline void nothing_is_the_worst(const std::string& node, double worst) {
   const auto projector = std::make_shared<const BlobProjector>();
   View view = view_of();
@@ -158,7 +158,7 @@ inline void refuses_nonsense(const std::string& node) {
   EXPECT_THROW(make(node, projector, {}), marrow::Error);
 }
 
-/// A cost whose blocks say nothing about its error gives none, so no deviations are predicted from it.
+/// A cost gives no blocks if they say nothing about its error. So no deviations are predicted from it.
 inline void has_no_blocks(const std::string& node) {
   const auto projector = std::make_shared<const BlobProjector>();
   const auto cost = make(node, projector, views_of(view_of()));
@@ -166,7 +166,7 @@ inline void has_no_blocks(const std::string& node) {
   EXPECT_EQ(cost->at_level({4, 8, 1})->without_each_block(at(1, 0.5)), std::vector<double>());
 }
 
-/// Without a block the cost is what it is with a mask that leaves the block out.
+/// The cost without a block equals the cost with a mask that excludes the block.
 inline void blocks_are_masks(const std::string& node) {
   const auto projector = std::make_shared<const BlobProjector>();
   const View whole = view_of();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of which the measures are made, on patches of a few pixels, against values computed by hand.
+// The building blocks of the measures, on patches of a few pixels, compared with values computed by hand.
 #include "marrow/similarity/intensity.hpp"
 
 #include <gtest/gtest.h>
@@ -73,7 +73,7 @@ TEST(Gradients, ScaleLeavesOutWhatDoesNotCount) {
 }
 
 TEST(Moments, OfTheValuesThatCount) {
-  // 0 to 15, and a last one that does not count.
+  // 0 to 15, and a last pixel that does not count.
   std::vector<float> a, b, odd;
   for (int i = 0; i < 17; ++i) a.push_back(float(i)), b.push_back(float(100 - 3 * i)), odd.push_back(float(i % 2));
   std::vector<char> counts(17, 1);
@@ -92,8 +92,7 @@ TEST(Moments, OfTheValuesThatCount) {
 }
 
 TEST(Patches, WeighEachSquareByItsVariance) {
-  // Two squares of 4 x 4 without overlap of their values: the radiograph agrees with the image in the left one, and is
-  // opposite in the right.
+  // Two squares of 4 x 4. In the left one the radiograph agrees with the image, in the right one it is opposite.
   Patch patch{8, 4, 0, 0, {}, {}, std::vector<char>(32, 1)};
   std::vector<float> a, b;
   for (int row = 0; row < 4; ++row)
@@ -112,7 +111,8 @@ TEST(Patches, WeighEachSquareByItsVariance) {
 }
 
 TEST(Patches, LieWhereTheyLieInTheImage) {
-  // Of 6 columns that begin at the image's column 3, the square of 4 x 4 at the image's column 4 alone is whole.
+  // The 6 columns begin at column 3 of the image. They contain only one whole square of 4 x 4, at column 4 of the
+  // image.
   Patch patch{6, 4, 3, 0, {}, {}, std::vector<char>(24, 1)};
   std::vector<float> a(24), b(24);
   for (int i = 0; i < 24; ++i)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The nearest edge of each pixel and direction, against a search of all edges.
+// The nearest edge of each pixel and direction, compared with a search through all edges.
 #include "marrow/toolbox/match/nearest_edges.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ marrow::EdgeMap random_edges(int width, int height, int count, std::mt19937& ran
   const float middle = 6.2831853f * part(random);
   for (int i = 0; i < count; ++i) {
     const float angle =
-        i % 2 ? 6.2831853f * part(random) : middle + part(random);  // half of them alike, so that smoothing moves them
+        i % 2 ? 6.2831853f * part(random) : middle + part(random);  // half of them are alike, so smoothing moves them
     marrow::EdgePixel edge;
     edge.u_px = -0.49f + (float(width) - 0.02f) * part(random);
     edge.v_px = -0.49f + (float(height) - 0.02f) * part(random);
@@ -30,7 +30,7 @@ marrow::EdgeMap random_edges(int width, int height, int count, std::mt19937& ran
   return edges;
 }
 
-/// The middle of the sixteenth of the diamond |u| + |v| = 1 in which a direction lies.
+/// The diamond |u| + |v| = 1 is divided into 16 sectors. Returns the middle of the sector of a direction.
 Eigen::Vector2d middle_of_sector(const Eigen::Vector2d& direction) {
   const Eigen::Vector2d corners[5] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}, {1, 0}};
   const int quadrant = direction.y() >= 0 ? (direction.x() > 0 ? 0 : 1) : (direction.x() < 0 ? 2 : 3);
@@ -39,7 +39,7 @@ Eigen::Vector2d middle_of_sector(const Eigen::Vector2d& direction) {
   return (from + (std::floor(4 * part) + 0.5) / 4 * (to - from)).normalized();
 }
 
-/// Of 2 x 2 pixels; what smoothing moved out of the image counts at its border.
+/// The cell of 2 x 2 pixels. Edges that smoothing moved out of the image count at its border.
 Eigen::Vector2i cell_of(float u, float v, int width, int height) {
   return {std::min(int(u + 0.5f) / 2, (width - 1) / 2), std::min(int(v + 0.5f) / 2, (height - 1) / 2)};
 }
@@ -97,14 +97,14 @@ TEST(NearestEdges, LieInsideTheMaskAndTheImage) {
 }
 
 TEST(NearestEdges, AreSmoothedAlongTheirBorder) {
-  // A vertical border at u = 10 whose pixels are 0.3 px too far to either side in turn.
+  // A vertical border at u = 10. Its pixels are off by 0.3 px to the left and to the right in turn.
   marrow::EdgeMap edges;
   edges.width_px = 20, edges.height_px = 21;
   for (int v = 0; v < 21; ++v) edges.pixels.push_back({v % 2 ? 10.3f : 9.7f, float(v), 1, 0, 1});
   edges.pixels.push_back({12.5f, 10, 1, 0, 1});   // too far away
   edges.pixels.push_back({10.6f, 10, -1, 0, 1});  // another border
   const marrow::match::NearestEdges nearest(edges, {}, kTolerance_rad);
-  // Of seven pixels in the middle, three or four lie on either side.
+  // Seven pixels are averaged; three or four of them lie on each side.
   for (int v = 3; v < 18; ++v)
     EXPECT_NEAR(nearest.all()[std::size_t(v)].u_px, v % 2 ? 10 - 0.3 / 7 : 10 + 0.3 / 7, 1e-5) << v;
   EXPECT_EQ(nearest.all()[21].u_px, 12.5f);

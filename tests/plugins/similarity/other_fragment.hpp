@@ -15,7 +15,7 @@ namespace other_fragment {
 using marrow::List;
 using marrow::Pose;
 
-/// Lists of fragments: the one in question, and another at a place of its own.
+/// Lists of two fragments: the own one, and another at a different place.
 template <class Projector>
 struct Fragments {
   std::shared_ptr<const Projector> own, other;
@@ -24,7 +24,7 @@ struct Fragments {
     List<Pose> poses;
     projectors.add_shared("own", own);
     projectors.add_shared("other", other);
-    poses.add("other", Pose());  // of its own pose there is none yet
+    poses.add("other", Pose());  // the own pose is not known yet
     inputs["projector"] = marrow::Value::of<Projector>(own);
     inputs["other_projectors"] = shipped::list(projectors, "fragment");
     inputs["others"] = shipped::list(poses, "fragment");
@@ -32,7 +32,7 @@ struct Fragments {
   }
 };
 
-/// Another fragment, at a place of its own, that is known as a surface only.
+/// Another fragment at a different place, known only as a surface.
 inline shipped::Inputs with_outline(shipped::Inputs inputs, std::shared_ptr<const marrow::OutlineProjector> other) {
   List<marrow::OutlineProjector> outlines;
   List<Pose> poses;
@@ -56,7 +56,7 @@ class SquareProjector : public pixelwise_projector::PixelwiseProjector {
   }
 };
 
-/// The same square as an outline, open below, which moves by a pixel a millimetre.
+/// The same square as an outline that is open below. It moves by one pixel per millimetre.
 class SquareOutline : public marrow::OutlineProjector {
  public:
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform& pose,

@@ -19,7 +19,7 @@ using other_fragment::SquareOutline;
 using other_fragment::SquareProjector;
 using other_fragment::with_outline;
 
-/// An upright line at u = 60 + x, facing left.
+/// An upright line at u = 60 + x that faces left.
 class LineProjector : public OutlineProjector {
  public:
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform& pose,
@@ -31,7 +31,7 @@ class LineProjector : public OutlineProjector {
   }
 };
 
-/// The image with the square in other grey values, as another fragment makes them.
+/// The image with another grey value in the square, as if another fragment were there.
 marrow::View view_with(double grey) {
   marrow::View view = intensity_behaviour::view_of(50000, 0.02, 0);
   view.image.pixels = view.image.pixels.clone();
@@ -134,8 +134,8 @@ TEST(Others, TheirEdgesDoNotCount) {
 }
 
 TEST(Others, BothWaysAndWeights) {
-  // Half of the edges lie 3 px off: seen from the outline every point has an edge at 0, seen from the edges half are
-  // off.
+  // Half of the edges lie 3 px off. Every point of the outline has an edge at 0 px, but half of the edges have the
+  // outline 3 px away.
   marrow::EdgeMap map{200, 170, {}};
   for (int v = 20; v < 140; ++v) {
     if (v % 2) map.pixels.push_back({64, float(v), -1, 0, 1});
@@ -155,7 +155,7 @@ TEST(Others, BothWaysAndWeights) {
       << "there is only half of the edges that the outline would make";
   EXPECT_NEAR(value(node, inputs, at(500, 0), options), worst, 1e-6);
 
-  // A second view without the line: weighted away.
+  // A second view does not show the line. Its weight is 0.
   marrow::EdgeMap none = map;
   for (auto& edge : none.pixels) edge.u_px = 150;
   List<marrow::View> views = intensity_behaviour::views_of(intensity_behaviour::view_of());

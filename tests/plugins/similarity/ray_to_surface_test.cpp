@@ -16,7 +16,8 @@ using marrow::RigidTransform;
 
 constexpr double kRadius_mm = 15;
 
-/// Signed distance to a ball and a smaller one, through which rays run that touch the larger; clamped as segmenters do.
+/// Signed distance to a ball and to a smaller one. Rays that touch the larger ball run through the smaller one.
+/// Clamped, as segmentations do it.
 double distance_mm(const Eigen::Vector3d& p) {
   return std::clamp(std::min(p.norm() - kRadius_mm, (p - Eigen::Vector3d(8, 18, 20)).norm() - 8), -6.0, 6.0);
 }
@@ -33,7 +34,7 @@ marrow::SignedField field(const Eigen::Vector3d& spacing_mm = {1, 1, 1}) {
   return field;
 }
 
-/// Pixels whose rays touch the larger ball at its place; the directions are the outline's normals.
+/// Pixels whose rays touch the larger ball. Their directions are the normals of its outline.
 marrow::EdgeMap edges_of_ball(const marrow::Camera& camera) {
   const Eigen::Vector3d source = marrow::source_position_mm(camera), n = source.normalized(), a = n.unitOrthogonal(),
                         b = n.cross(a);
@@ -84,8 +85,8 @@ double tukey(double d, double reach) {
 TEST(RayToSurface, IsTheDistanceThatOneComputesByHand) {
   const Made cost(inputs(), {{"ray_step", std::int64_t(1)}, {"reach_mm", 5.0}});
   EXPECT_NEAR((*cost).value(shifted(0, 0, 0)), 0, 2e-3) << "touches all rays, up to the voxels";
-  // Along the frontal view's own axis a shift changes that view little; the other sees it from the side: a ray at angle
-  // a to the shift s passes at s cos a.
+  // A shift s along the axis of the frontal view hardly changes this view. The lateral view sees it from the side: a
+  // ray at an angle a to the shift passes the surface at a distance of s cos a.
   const double s = 1.5;
   double lateral = 0, frontal = 0;
   for (int i = 0; i < 360; ++i) {
@@ -119,7 +120,7 @@ shipped::Inputs ends_in_the_ball(float first_column_mm) {
 }
 
 TEST(RayToSurface, NothingIsReadBeyondTheField) {
-  // Voxels lie row after row: what follows the last one of a row is the first one of the next.
+  // Voxels are stored row after row: the first voxel of a row follows the last one of the row before.
   EXPECT_NEAR((*Made(ends_in_the_ball(5.9f))).value(shifted(0, 0, 0)),
               (*Made(ends_in_the_ball(4.1f))).value(shifted(0, 0, 0)), 1e-6);
 }

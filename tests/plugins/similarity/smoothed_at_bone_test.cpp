@@ -12,7 +12,7 @@ using marrow::Camera, marrow::PixelGrid, marrow::RigidTransform;
 
 const Eigen::Vector3d kMiddle_mm(120, -80, 300), kHalf_mm(20, 30, 60);
 
-/// A model in a box, whose radiograph is everywhere the variance in mm^2 by which it was smoothed.
+/// A model in a box. Every value of its radiograph is the variance in mm^2 by which it was smoothed.
 class Box : public marrow::RadiographProjector {
  public:
   explicit Box(double sigma_mm = 0) : variance_mm2_(sigma_mm * sigma_mm) {}

@@ -29,7 +29,7 @@ TEST(Blocks, CoverTheImage) {
   EXPECT_EQ(Blocks::of(camera, 5).side_px, 200);
 }
 
-// The same picture of twice as many pixels has the same blocks, so the same deviations follow from it.
+// An image of twice as many pixels has the same blocks, so it gives the same deviations.
 TEST(Blocks, AreTheSamePartsOfAnImageOfAnySize) {
   for (const int along : {5, 8, 10})
     for (const int width_px : {50, 200, 253, 383, 500, 512}) {
@@ -43,7 +43,7 @@ TEST(Blocks, AreTheSamePartsOfAnImageOfAnySize) {
         larger.height_px *= times;
         const Blocks same = Blocks::of(larger, along);
         EXPECT_NEAR(same.side_px, times * blocks.side_px, 0.01 * same.side_px) << width_px << " x " << times;
-        if (width_px * times >= 768) continue;  // sides of whole pixels, which the smaller image has no halves of
+        if (width_px * times >= 768) continue;  // sides are whole pixels; the smaller image has no half pixels
         EXPECT_EQ(same.side_px, times * blocks.side_px) << width_px << " x " << times;
         EXPECT_EQ(same.columns, blocks.columns);
         EXPECT_EQ(same.rows, blocks.rows);
@@ -91,7 +91,7 @@ TEST(BlockExpansions, WithoutEachBlock) {
   EXPECT_DOUBLE_EQ(bound[1].curvature(3, 3), 3 / 4.0);
 }
 
-/// A cost whose views are 1 and 5 at the origin, and grow with x in the second. Without its single block a view is 0.
+/// A cost that is 1 in the first view and 5 + x in the second. Without its single block, a view is 0.
 class Two : public marrow::match::ViewsCost {
  public:
   explicit Two(const std::vector<double>& weights) : ViewsCost(2, weights) {}
@@ -116,7 +116,7 @@ TEST(ViewsCost, IsTheWeightedMean) {
   EXPECT_EQ(Two({3, 1}).without_each_block(pose), (std::vector<double>{1.75, 0.75}));
 }
 
-/// Of its three views, those named here say nothing.
+/// Three views. A view whose text is not empty is silent for this reason.
 class Silent : public marrow::match::ViewsCost {
  public:
   Silent(const std::vector<double>& weights, std::vector<std::string> silences)
@@ -137,7 +137,7 @@ TEST(ViewsCost, SaysNothingWhereNoneOfItsViewsDoes) {
   EXPECT_EQ(some.silent_views(pose), (Texts{"a is empty", "c is empty"}));
   EXPECT_EQ(some.nothing_compared(pose), "");
   EXPECT_EQ(all.nothing_compared(pose), "a is empty; b is empty; c is empty");
-  // A view that does not count is not named, and what it shows does not help.
+  // A view with weight 0 is not named, and the cost stays silent although this view shows something.
   const Silent without_second({1, 0, 1}, {"a is empty", "", "c is empty"});
   EXPECT_EQ(without_second.nothing_compared(pose), "a is empty; c is empty");
   EXPECT_EQ(Silent({1, 0, 1}, {"", "b is empty", ""}).silent_views(pose), Texts{});

@@ -11,7 +11,7 @@ namespace with_prior_test {
 using marrow::Cost, marrow::Matrix6d, marrow::Pose, marrow::Vector6d;
 using well::pose_at;
 
-/// A bowl with derivatives, made by central differences, and with two blocks. Both are exact for small motions.
+/// A bowl with two blocks and with derivatives, computed by central differences. Both are exact for small motions.
 class Differentiable : public well::Bowl {
  public:
   using Bowl::Bowl;
@@ -23,7 +23,7 @@ class Differentiable : public well::Bowl {
                                                       const marrow::FragmentFrame& frame) const override {
     return {of(*this, pose, frame), of(*this, pose, frame)};
   }
-  /// Of any cost, by differences of its values.
+  /// The expansion of any cost, by differences of its values.
   static Expansion of(const Cost& cost, const marrow::RigidTransform& pose, const marrow::FragmentFrame& frame) {
     constexpr double kStep = 1e-4;
     const auto at = [&](const Vector6d& motion) { return cost.value(marrow::moved(pose, frame, motion)); };
@@ -66,8 +66,8 @@ Vector6d six(double rotations_deg, double axial_deg, double shifts_mm) {
 
 constexpr double kInformation = 1e4;
 
-/// A bowl of curvature 1 in each degree and mm, known to 0.01 of each: the noise of its value is 1e-4, and a unit of
-/// the prior counts twice this.
+/// A bowl whose curvature is 1 per square degree and mm. Its minimum is known to 0.01 degrees and mm. So the noise of
+/// its value is 1e-4, and a unit of the prior counts twice this.
 struct Trial {
   explicit Trial(const Pose& prior) {
     const Pose at = truth();
@@ -155,7 +155,7 @@ TEST(WithPrior, ItsSixResidualsStandForItsCovariance) {
     sum += (without[i].gradient - whole) * (without[i].gradient - whole).transpose();
   const Matrix6d expected = kUnit * kUnit * prior.covariance->inverse();
   EXPECT_LT((sum - expected).norm(), 1e-6 * expected.norm());
-  // The same by values: a motion of one deviation about the long axis.
+  // The same by values, for a motion of one deviation about the long axis.
   const auto turned = pose_at(truth(), 0, 0, 5, 0, 0, 0).world_from_model;
   const std::vector<double> values = cost->without_each_block(turned);
   ASSERT_EQ(values.size(), 12u + 6);
@@ -164,7 +164,7 @@ TEST(WithPrior, ItsSixResidualsStandForItsCovariance) {
   EXPECT_NEAR(squares / (kUnit * kUnit), 10.0 / 11, 1e-6) << "q = 1, and the weight of Student's t is 10 / 11";
 }
 
-/// Without each of two blocks it is tilted to another side.
+/// Without one of its two blocks it is tilted to one side, without the other to the other side.
 class Tilted : public Differentiable {
  public:
   using Differentiable::Differentiable;
@@ -177,7 +177,7 @@ class Tilted : public Differentiable {
   }
 };
 
-// Of noise that is four times that of the blocks, each block shows half the deviation.
+// If the noise is four times as large as the blocks show, each block shows half the deviation.
 TEST(WithPrior, WhatABlockChangesGrowsWithTheNoise) {
   Trial trial(with_deviations(truth(), six(2, 5, 3)));
   trial.images = std::make_shared<Tilted>(truth().world_from_model, truth().frame, Matrix6d::Identity(), kInformation);
@@ -203,7 +203,7 @@ TEST(WithPrior, WhatABlockChangesGrowsWithTheNoise) {
   }
 }
 
-/// Tells its derivatives, but not those without each block.
+/// Gives its derivatives, but not those without each block.
 class Whole : public Differentiable {
  public:
   using Differentiable::Differentiable;
@@ -249,7 +249,7 @@ TEST(WithPrior, SaysWhatIsWrong) {
             "of the same model");
 }
 
-/// A bowl of which the images say nothing.
+/// A bowl whose images show nothing.
 class Mute : public Differentiable {
  public:
   using Differentiable::Differentiable;
