@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Edges of the rendered radiograph (DRR) against edges of the image. Both are gradient maxima of a blurred image, so
-// blur moves both inside the bone's outline by about the same distance. This is not so for the outline of a surface
+// blur moves both inside the bone's outline by about the same distance. Blur does not move the outline of a surface
 // (docs/method.md, Stage 2). Gottesfeld Brown and Boult (MICCAI workshop 1996) and Penney et al. (IEEE Trans Med
 // Imaging 1998) compare the gradients of radiograph and image. Here the truncated distance of the contour cost is used.
 #include <algorithm>

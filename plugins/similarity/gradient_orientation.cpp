@@ -10,7 +10,7 @@ namespace {
 
 using marrow::match::Patch;
 
-/// Which pixels are compared changes with the pose, and each block by itself would choose others.
+/// No blocks: the pixels compared change with the pose, and each block alone would choose others.
 struct Options : marrow::match::IntensityOptions {
   Options() { has_blocks = false; }
 };

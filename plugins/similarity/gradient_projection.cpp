@@ -121,7 +121,7 @@ class GradientProjection : public marrow::match::ViewsCost {
   }
 
  private:
-  /// Of the points inside image and mask, and the weight of all points.
+  /// Sums over the points inside image and mask, and the weight of all points.
   struct Sums {
     marrow::match::BlockSums::Sums inside;
     double all = 0;
@@ -142,8 +142,8 @@ class GradientProjection : public marrow::match::ViewsCost {
     return {};
   }
 
-  /// No blocks: which points rays touch changes with the pose, so each block asks for another pose, and only all of
-  /// them together for the right one.
+  /// No blocks: the points that rays touch change with the pose. So each block alone has its minimum at another pose;
+  /// only all of them together have it at the right one.
   Split split(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
     return {value_in_view(view, world_from_model), {}};
   }

@@ -92,10 +92,10 @@ class RayToSurface : public marrow::match::ViewsCost {
     return about;
   }
 
-  /// With a distance that all edges have in common as one more unknown. Blur moves all edges inwards: this pulls
-  /// opposite borders to opposite sides, so it hardly moves the pose, but each block by itself shows it. Five blocks
-  /// along an image, as for the contour. One view alone gives none: its least cost lies centimetres away from
-  /// the bone along the rays.
+  /// A distance that all edges have in common is one more unknown. Blur moves all edges inwards. This pulls opposite
+  /// borders to opposite sides, so it hardly moves the pose, but each block alone shows it. Five blocks along an image,
+  /// as for the contour. A single view gives no blocks: its least cost lies centimetres away from the bone along the
+  /// rays.
   std::vector<Expansion> expansion_without_each_block(const marrow::RigidTransform& world_from_model,
                                                       const marrow::FragmentFrame& frame) const override {
     constexpr int kBlocksAlong = 5;
@@ -122,9 +122,9 @@ class RayToSurface : public marrow::match::ViewsCost {
       }
     }
     std::vector<Expansion> without = marrow::match::BlockExpansions::without_each(of_views, weights, 1, true);
-    // The pose is that of least cost without this unknown, so what all blocks have in common is the cost's own slope.
-    // Where noise hides some edges, the pull of the others is left, which a common distance hides: kMore covers it, as
-    // measured (docs/results.md, Deviations and noise).
+    // The pose has the least cost without this unknown, so what all blocks have in common is the cost's own slope.
+    // Where noise hides some edges, a pull of the others remains, which the common distance hides. kMore covers this
+    // pull, as measured (docs/results.md, Deviations and noise).
     constexpr double kMore = 1.3;
     const marrow::Vector6d whole = expansion(world_from_model, frame)->gradient;
     marrow::Vector6d mean = marrow::Vector6d::Zero();
@@ -134,8 +134,7 @@ class RayToSurface : public marrow::match::ViewsCost {
   }
 
   /// Uses every n-th edge pixel, with n from the contour spacing. The reach is converted to mm where the views meet. If
-  /// they do not tell how far away the bone is, reach_mm is taken as that of a usual level, and the others in
-  /// proportion.
+  /// they do not meet, reach_mm is the reach of a usual level, and other levels have theirs in proportion.
   std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
     const std::optional<Eigen::Vector3d> bone_mm = marrow::meeting_point_mm(scene_->views);
     const double reach_mm = bone_mm ? level.reach_px * pixel_size_at_mm(scene_->views[0].camera, *bone_mm)
@@ -189,7 +188,7 @@ class RayToSurface : public marrow::match::ViewsCost {
     return loss_.worst() + (sums.weights > 0 ? sums.values / sums.weights : 0);
   }
 
-  /// No deviations follow from values: what all edges have in common must be taken away first.
+  /// No deviations are predicted from values: the distance that all edges have in common must be removed first.
   std::vector<double> without_each_block(const marrow::RigidTransform&) const override { return {}; }
 
   Split split(std::size_t view, const marrow::RigidTransform& world_from_model) const override {

@@ -17,7 +17,7 @@ Inputs inputs_of_nothing_drawn() {
   return inputs;
 }
 
-/// Whether the node needs this input: it is there and not optional.
+/// Whether the node has this input and requires it.
 bool needs(const Subject& subject, const std::string& port) {
   return std::any_of(subject.info().inputs.begin(), subject.info().inputs.end(),
                      [&](const PortInfo& one) { return one.name == port && !one.optional; });
@@ -27,7 +27,7 @@ bool compares_edges(const Subject& subject) { return needs(subject, "edges"); }
 bool compares_grey_values(const Subject& subject) { return compares_images(subject) && !compares_edges(subject); }
 bool draws(const Subject& subject) { return needs(subject, "projector"); }
 
-/// A way in which there is nothing to compare, for some nodes.
+/// A situation in which some nodes have nothing to compare.
 struct Nothing {
   std::string name;
   bool (*is_for)(const Subject&);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A cost of the images together with what is known about the pose from elsewhere, such as markers on the skin. The
-// prior is Student's t: near its middle it counts like a normal distribution with the prior's covariance, and a pose
-// that the images want clearly is hardly held back from far away.
+// prior is Student's t. Near its middle it counts like a normal distribution with the prior's covariance. If the images
+// clearly show a pose far away, it hardly holds the pose back.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -54,7 +54,7 @@ class Prior {
   /// curvature in the middle is Lambda.
   double energy(const RigidTransform& pose) const { return 0.5 * weight_ * std::log1p(square(motion(pose)) / weight_); }
 
-  /// What the motion's weight in the energy is, against that of a normal distribution: 1 in the middle, less outside.
+  /// The weight of a motion, relative to its weight in a normal distribution: 1 in the middle, less outside.
   double weight(const Vector6d& motion) const { return weight_ / (weight_ + square(motion)); }
 
   /// How motion() changes with a small motion of the pose in `frame`.
@@ -80,8 +80,8 @@ class Prior {
   Matrix6d information_, root_;
 };
 
-/// By how much a cost rises where the pose moves by a standard deviation, times 2: what one unit of minus the logarithm
-/// of the likelihood is worth. The median over six directions.
+/// The value in a cost of one unit of the negative log-likelihood: twice the rise of the cost if the pose moves by one
+/// standard deviation. The median over six directions.
 double noise_of(const Cost& cost, const Pose& found) {
   constexpr double kDeviations = 2, kMostStep = 4;  // a step in degrees or mm
   Vector6d unit = Vector6d::Ones();
@@ -107,11 +107,11 @@ double noise_of(const Cost& cost, const Pose& found) {
   return std::max(1e-12, quantile_in_place(noise, 0.5));
 }
 
-/// The prior counts the same at each level of the cost: a coarse level is too rough for a noise of its own.
+/// The prior counts the same at each level of the cost. A coarse level is too rough to estimate its own noise.
 class WithPrior : public Cost {
  public:
-  /// `noise`: what a unit of the prior counts. `noise_times`: how much of it the images' blocks do not show.
-  /// `images` is kept by `owner`, or by the runtime.
+  /// `noise`: the weight of a unit of the prior. `noise_times`: how many times larger the images' noise is than their
+  /// blocks show. `owner`, or the runtime, keeps `images`.
   WithPrior(std::shared_ptr<const Prior> prior, double noise, double noise_times, const Cost& images,
             std::shared_ptr<const Cost> owner)
       : prior_(std::move(prior)), noise_(noise), noise_times_(noise_times), images_(images), owner_(std::move(owner)) {}
@@ -137,15 +137,15 @@ class WithPrior : public Cost {
     return about;
   }
 
-  /// Of the images alone: the prior says something about every pose.
+  /// What the images alone say: the prior says something about every pose.
   std::string nothing_compared(const RigidTransform& pose) const override { return images_.nothing_compared(pose); }
   std::vector<std::string> silent_views(const RigidTransform& pose) const override {
     return images_.silent_views(pose);
   }
 
-  /// The blocks of the images, and six residuals of the prior, each with its expected size. So a deviation that is
-  /// predicted from them is that of images and prior together. What a block changes is told larger than it is, as the
-  /// noise of the images is.
+  /// The blocks of the images, and six residuals of the prior, each with its expected size. So the deviation that is
+  /// predicted from them is that of images and prior together. The change by each block is enlarged, because the noise
+  /// of the images is larger than the blocks show.
   std::vector<double> without_each_block(const RigidTransform& pose) const override {
     std::vector<double> without = images_.without_each_block(pose);
     if (without.empty()) return without;

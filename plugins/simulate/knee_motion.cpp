@@ -58,7 +58,7 @@ struct Motion {
   List<Posture> postures;
 };
 
-/// The other leg's shin, in the place of this leg's. Only the images show it.
+/// The lower leg of the other side, at the place of this one. Only the images show it.
 std::vector<Body> other_leg(const ClutteredPhantom& phantom) {
   std::vector<Body> bodies;
   for (Body body : phantom.bodies) {
@@ -109,7 +109,7 @@ class Knee {
   }
 
  private:
-  /// A rotation vector of this leg. It is given for a left one, and of a right one it is the mirror image.
+  /// A rotation vector for this leg, from that of a left leg. A right leg moves as the mirror image.
   Eigen::Vector3d turn(const Eigen::Vector3d& of_left) const {
     return {of_left.x(), lateral_x_ * of_left.y(), lateral_x_ * of_left.z()};
   }
@@ -118,7 +118,7 @@ class Knee {
     return options_.blank.size() == 2 && frame + 1 >= options_.blank[0] && frame + 1 <= options_.blank[1];
   }
 
-  /// The other leg swings through behind the knee.
+  /// Where the other leg is while it swings past behind the knee.
   RigidTransform crossing(int frame) const {
     constexpr double kBehind_mm = 110, kWay_mm = 240;
     RigidTransform shift{"world", "world"};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A mistake as people make it with the data of a registration. It gives registrations that end in a wrong pose, to see
-// whether a verdict notices.
+// A mistake that people make with the data of a registration. The registration then ends in a wrong pose, and a study
+// shows whether a verdict notices it.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <marrow/plugin.hpp>
@@ -20,7 +20,7 @@ struct Options {
   int mistake_seed = 1;
 };
 
-/// What a registration is given.
+/// The data of a registration.
 struct Given {
   Volume volume;
   List<Seeds> seeds;
@@ -39,7 +39,7 @@ void set_far(List<Truth>& truth) {
   truth = far;
 }
 
-/// The CT with its first axis reversed, and the seeds with it.
+/// Reverses the first axis of the CT, and moves the seeds accordingly.
 void mirror_ct(Given& made) {
   const Grid& grid = made.volume.grid;
   for (int z = 0; z < grid.size[2]; ++z)
@@ -71,7 +71,7 @@ void mirror_images(List<View>& views) {
   views = mirrored;
 }
 
-/// The images of the first two views, each with the other's camera.
+/// Exchanges the cameras of the first two views.
 void swap_images(List<View>& views) {
   if (views.size() < 2) throw Error(formatted("swapped_views needs two views, got {}", views.size()));
   List<View> swapped;
@@ -83,7 +83,7 @@ void swap_images(List<View>& views) {
   views = swapped;
 }
 
-/// The last view with the camera of another pose of the C-arm.
+/// Gives the last view the camera of another pose of the C-arm.
 void move_camera(List<View>& views, const Options& options) {
   Random random{std::uint64_t(options.mistake_seed)};
   RigidTransform off{"world", "world"};

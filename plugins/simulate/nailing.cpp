@@ -40,7 +40,7 @@ struct Nailed {
 
 constexpr double kStepMm = 10;  // between the heights at which nail and bone are compared
 
-/// The nail's middle line and its radius, from the nail's own surface.
+/// The nail's middle line and radius, measured on its surface.
 struct MiddleLine {
   std::vector<Vector3d> points_mm;
   double radius_mm = 0;
@@ -65,7 +65,7 @@ MiddleLine middle_line(const Mesh& surface) {
   return line;
 }
 
-/// The bone around a height of the world: the middle of its canal, and how far its borders are from a point.
+/// The bone at a height of the world: the middle of its canal, and the distances of its borders from a point.
 class BoneAt {
  public:
   explicit BoneAt(const phantom::Phantom& phantom) {
@@ -94,7 +94,7 @@ class BoneAt {
     return low;
   }
 
-  /// The middle of the canal at a height, the mean over the fragments that have one there. Nothing above the bone.
+  /// The middle of the canal at a height: the mean over the fragments that have a canal there. Nothing above the bone.
   std::optional<Vector2d> canal(double z) const {
     Vector2d sum(0, 0);
     int count = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a robot is told in a study of accuracy: turns about one axis after the other.
+// The commands to a robot in a study of accuracy: turns about one axis after another.
 #include <cmath>
 #include <marrow/plugin.hpp>
 
@@ -16,7 +16,7 @@ struct Options {
   Eigen::Vector3d pivot_mm{0, 0, 90};
 };
 
-/// As many digits after the point as tell each step, two at least.
+/// The number of digits after the point that tells the steps apart; at least two.
 int digits_of(double step_deg) {
   constexpr int kLeast = 2, kMost = 6;
   for (int digits = kLeast; digits < kMost; ++digits) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A bone that is not broken: one fragment, moved by a known rigid transform between CT and images.
+// An unbroken bone: one fragment, moved by a known rigid transform between CT and images.
 #include <algorithm>
 #include <cstdlib>
 #include <marrow/plugin.hpp>

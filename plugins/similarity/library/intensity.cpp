@@ -14,8 +14,8 @@
 namespace marrow::match {
 namespace {
 
-/// The projector of the radiographs that are compared with images smoothed by `sigma_px`. Where the views meet tells
-/// how far away the bone is; without such a point each pose tells it. Null if the projector cannot be smoothed.
+/// A projector whose radiographs are as smooth as images smoothed by `sigma_px`. The point where the views meet tells
+/// how far away the bone is; if they do not meet, each pose tells it. Null if the projector cannot be smoothed.
 std::shared_ptr<const RadiographProjector> as_smooth_as_images(const RadiographProjector& projector,
                                                                const List<View>& views, double sigma_px) {
   if (!(sigma_px > 0)) return nullptr;

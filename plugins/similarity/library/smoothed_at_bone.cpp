@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// To smooth a model for each pose would take too long. So it is smoothed by some standard deviations, whose variances
-// double from one to the next. A radiograph is mixed from those of the two next to the variance wanted, in such
-// proportion that the mixture has this variance. The mixture changes continuously with the pose, so a cost does not
-// jump.
+// Smoothing a model for each pose would take too long. So it is smoothed by a few variances, each twice the one before.
+// A radiograph is a mixture of the radiographs for the two variances next to the wanted one, in such a proportion that
+// it has the wanted variance. The mixture changes continuously with the pose, so a cost does not jump.
 #include "smoothed_at_bone.hpp"
 
 #include <tbb/task_arena.h>
@@ -18,7 +17,7 @@ namespace {
 
 constexpr double kLeast = 1e-3, kMost = 0.125;  // limits of the standard deviation, in half sizes of the model
 
-/// The box outside of which nothing of a model is seen, in the model's frame.
+/// A box that contains all of a model that is seen, in the model's frame.
 struct Box {
   Eigen::Vector3d middle_mm = Eigen::Vector3d::Zero(), half_mm = Eigen::Vector3d::Zero();
 };
@@ -88,7 +87,7 @@ class SmoothedAtBone : public RadiographProjector {
   const RadiographProjector& at(int level) const {
     const std::lock_guard lock(mutex_);
     auto& one = levels_[level];
-    // Isolated: a thread that waits for parts of this work must not begin another radiograph, which needs the lock.
+    // Isolated: a thread that waits for parts of this work must not start another radiograph, which needs the lock.
     if (!one) tbb::this_task_arena::isolate([&] { one = projector_.smoothed(std::exp2(0.5 * level)); });
     return *one;
   }

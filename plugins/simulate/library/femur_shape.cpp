@@ -8,8 +8,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Width and depth relative to the mid-shaft value, over the fraction of the length from the distal end (24 measured
-// femora, FACTS).
+// Width and depth relative to the mid-shaft value, over the fraction of the length from the distal end (measured on 24
+// femora).
 constexpr std::array<Node, 13> kWidth{{{0.05, 2.2},
                                        {0.09, 2.05},
                                        {0.13, 1.68},
@@ -48,10 +48,10 @@ constexpr std::array<Node, 9> kCanal{{{0.06, 12.0},
                                       {0.83, 2.6},
                                       {0.90, 12.0}}};
 
-// Half the width that the parts of the distal end are placed by, before they are scaled.
+// Half the width of the distal end before it is scaled. Its parts are placed for this width.
 constexpr double kHalfWidthMm = 41;
-// Of the points of the medial condyle that lie farthest back, from those of the lateral one: to the medial side, and to
-// the back. The line through them is the one from which anteversion is measured.
+// How far the rearmost point of the medial condyle lies from that of the lateral one: to the medial side, and to the
+// back. Anteversion is measured from the line through these points.
 constexpr double kCondylesApartMm = 49.5, kCondylesRiseMm = 4;
 
 }  // namespace
@@ -67,7 +67,7 @@ FemurField::FemurField(const FemurShape& shape)
   neck_base_ = {0, bow(z - up), z - up};
   const double forward_rad = shape.anteversion_rad - std::atan2(kCondylesRiseMm, kCondylesApartMm);
   head_ = neck_base_ + Vector3d(out * std::cos(forward_rad), -out * std::sin(forward_rad), up);
-  // Parts swell where they are joined, and where the shaft joins them, so the width is not that of the parts.
+  // Parts swell where they are joined to each other and to the shaft. So the whole is wider than the parts.
   for (int round = 0; round < 5; ++round) scale_ *= shape.bicondylar_width_mm / distal_width_mm();
 }
 

@@ -44,7 +44,7 @@ double fibula(const Vector3d& p) {
   return join(head, shaft, 8);
 }
 
-/// Wide and flat, with a point below and a ridge behind. Its frame has the origin in its own middle.
+/// Wide and flat, with a point below and a ridge behind. The origin of its frame is its middle.
 double patella(const Vector3d& p) {
   const double body = ellipsoid(p, Vector3d(22, 10, 21));
   const double apex = capsule(p, Vector3d(0, -1, -10), Vector3d(0, 1, -22), 8, 3);
@@ -126,7 +126,7 @@ std::vector<Body> make_knee(const Mesh& femur_outer, const Fragment& fragment, c
       {{"patella", patella, one_mm, {-28, -16, -32}, {28, 18, 28}}, kneecap}};
   std::vector<Body> bodies;
   for (const auto& [part, at] : parts) {
-    // Flexed, the patella follows the tibia on a shorter way.
+    // During flexion, the patella follows the tibia but turns less.
     const double share = part.name == "patella" ? 0.7 : 1;
     const RigidTransform in_images = bent(axis, share * shape.flexion_rad),
                          in_ct = bent(axis, share * shape.ct_flexion_rad);

@@ -106,7 +106,7 @@ class Shadow {
              })).depth;
   }
 
-  /// The share of the lamp's light that reaches a point: of 3 x 3 rays around it.
+  /// The share of the lamp's light that reaches a point, from 3 x 3 rays around it.
   double lit(const Eigen::Vector3d& p) const {
     const Eigen::Vector3d seen = at(p);
     const int u = int(std::lround(seen.x())), v = int(std::lround(seen.y()));
@@ -199,7 +199,7 @@ class Photographer {
   }
 
  private:
-  /// By how much more than a pinhole a barrel shows at the corners.
+  /// How far a lens with barrel distortion sees beyond the corners of a pinhole's image.
   double margin_px() const {
     double most = 1;
     for (const double u : {0.0, camera_.width_px - 1.0})
@@ -256,7 +256,7 @@ class Photographer {
     return {light[0], light[1], light[2]};
   }
 
-  /// Between the normals of the corners, by the areas opposite to them.
+  /// The mean of the corners' normals, weighted by the areas opposite to them.
   static Eigen::Vector3d normal_at(const Facet& facet, const Eigen::Vector3d& p) {
     const auto& [a, b, c] = facet.corners;
     const Eigen::Vector3d whole = (b.at_mm - a.at_mm).cross(c.at_mm - a.at_mm);

@@ -32,7 +32,7 @@ struct Studio {
   Eigen::Vector3d backdrop{0.04, 0.045, 0.05};
 };
 
-/// How a sensor makes numbers of light.
+/// How a sensor turns light into numbers.
 struct Sensor {
   double blur_px = 0.8;       ///< standard deviation of the lens's blur
   double gamma = 2.2;         ///< grey value = 255 light^(1 / gamma)
@@ -54,25 +54,25 @@ struct CameraArm {
   double distance_mm = 600;  ///< from the camera to the arm's axis
   std::vector<std::string> names;
   std::vector<double> angles_deg;  ///< of each stop
-  double repeat_sd_deg = 0;        ///< standard deviation of the angle each time that the arm stops there
+  double repeat_sd_deg = 0;        ///< standard deviation of the angle, each time that the arm stops
 
   using fields = Fields<&CameraArm::device, &CameraArm::distance_mm, &CameraArm::names, &CameraArm::angles_deg,
                         &CameraArm::repeat_sd_deg>;
 };
 /// The camera while the arm is at an angle.
 Camera camera_at(const CameraArm& arm, double angle_deg);
-/// The camera at one of the stops, in one of the times that the arm goes there.
+/// The camera at a stop. `seed` draws by how much the arm misses the stop this time.
 Camera camera_at_stop(const CameraArm& arm, std::size_t stop, std::uint64_t seed);
 
-/// The photograph: light is ambient + sum over the lamps that are not hidden of strength max(0, n . l), times the
-/// albedo, and a highlight (Blinn 1977). CV_8UC3 in RGB order. The lens distorts as `distortion` says. Noise depends
-/// only on the seed. Throws Error if a body reaches behind the camera.
+/// The photograph, CV_8UC3 in RGB order. The light from a point is its albedo times (ambient + the sum of strength
+/// max(0, n . l) over the lamps that it sees), and a highlight (Blinn 1977). The lens distorts as `distortion` says.
+/// Noise depends only on the seed. Throws Error if a body reaches behind the camera.
 Picture photograph(const std::vector<Painted>& bodies, const Camera& camera, const RadialDistortion& distortion,
                    const Studio& studio, const Sensor& sensor, std::uint64_t seed);
 
-/// A box with edges along the axes of a frame that is at `world_from_box`, and an upright round body around its z axis
-/// from z = 0 to z = height.
+/// A box with edges along the axes of its frame.
 Mesh box(const RigidTransform& world_from_box, const Eigen::Vector3d& low_mm, const Eigen::Vector3d& high_mm);
+/// A cylinder around the z axis of its frame, from `low_mm` to `high_mm`.
 Mesh drum(const RigidTransform& world_from_drum, double radius_mm, double low_mm, double high_mm);
 
 /// A chessboard: its black and its white parts, with a white margin as wide as a square. Inner corners are at x =

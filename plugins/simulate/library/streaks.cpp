@@ -27,7 +27,7 @@ double mean_of(const Spectrum& per_mm) {
   return sum;
 }
 
-/// A line integral through metal and tissue, as many energies make it.
+/// The line integral through metal and tissue that a beam of several energies measures.
 double measured(const Spectrum& metal, double tissue_mm) {
   double sum = 0;
   for (std::size_t e = 0; e < metal.size(); ++e)
@@ -35,7 +35,7 @@ double measured(const Spectrum& metal, double tissue_mm) {
   return -std::log(sum);
 }
 
-/// The line integrals of the metal in one slice, for each energy: a row an angle, a column a position across.
+/// The line integrals of the metal in one slice, for each energy. A row is an angle, a column a position across.
 struct Sinogram {
   int columns;
   std::vector<Spectrum> values;
@@ -60,7 +60,7 @@ class Slice {
     }
   }
 
-  /// Where a voxel is projected to, in columns.
+  /// The column to which a voxel is projected.
   double column_of(int angle, int x, int y) const {
     const double right = (x - 0.5 * (nx_ - 1)) * spacing_.x(), down = (y - 0.5 * (ny_ - 1)) * spacing_.y();
     return (right * cosine_[std::size_t(angle)] + down * sine_[std::size_t(angle)]) / step_mm_ + 0.5 * (columns_ - 1);

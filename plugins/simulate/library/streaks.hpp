@@ -17,7 +17,7 @@ struct StreakOptions {
   double tissue_radius_mm = 80;
 };
 
-/// Adds what metal does to a CT, in the manner of De Man et al. (IEEE TNS 1999). Each slice is projected along parallel
+/// Adds the artefacts of metal to a CT, after De Man et al. (IEEE TNS 1999). Each slice is projected along parallel
 /// rays. Beam hardening and the few photons behind metal make each line integral wrong; the filtered back-projection of
 /// these errors are the streaks. Values are then cut to -1024 to 3071 HU. Without metal in `bodies` nothing changes.
 void add_metal_streaks(Volume& volume, const std::vector<const Body*>& bodies, const StreakOptions& options,

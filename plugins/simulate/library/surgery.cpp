@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kReachMm = 220;  // half the length of what is longer than the images show
+constexpr double kReachMm = 220;  // half the length of bodies that reach beyond the images
 
 Body outside(const std::string& name, const std::string& material, Mesh surface) {
   return {.name = name, .material = material, .surface = std::move(surface), .moves_with = {}};

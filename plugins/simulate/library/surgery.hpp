@@ -18,8 +18,8 @@ struct PlateShape {
   double screw_distance_mm = 18;
   std::string material = "steel";
 };
-/// An old plate on the lateral side of the femur's distal end, with screws through the bone, also in the CT. It ends at
-/// `highest_z` of frame "bone" at the latest. Empty if there is no room for 40 mm of it.
+/// An old plate on the lateral side of the femur's distal end, with screws through the bone. The CT shows it too. It
+/// does not reach above `highest_z` of frame "bone". Empty if there is no room for 40 mm of it.
 std::vector<Body> make_plate(const Mesh& femur_outer, const Fragment& fragment, const PlateShape& shape,
                              double highest_z, Random& random);
 
