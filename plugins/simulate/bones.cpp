@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exact poses and seeds of the bones in a phantom with bodies: its fragments, and those bodies that are bones, too.
+// Exact poses and seeds of the bones in a phantom: its fragments, and the bodies that are bones.
 #include <algorithm>
 #include <marrow/plugin.hpp>
 #include <sstream>
@@ -24,7 +24,7 @@ struct Bones {
   List<Pose> starts;
 };
 
-/// Points just below the surface, all along the body. `ct_from_world` is that of the body.
+/// Points just below the surface, spread over the body, in its CT coordinates.
 std::vector<Eigen::Vector3d> seeds_of(const Body& body) {
   constexpr std::size_t kSeeds = 40;
   constexpr double kDepth_mm = 1;
@@ -42,7 +42,7 @@ std::vector<Eigen::Vector3d> seeds_of(const Body& body) {
   return seeds;
 }
 
-/// 'tibia+fibula' is tibia and fibula.
+/// The names in 'tibia+fibula': tibia and fibula.
 std::vector<std::string> parts_of(const std::string& together) {
   std::vector<std::string> parts;
   std::stringstream stream(together);
@@ -95,8 +95,8 @@ MARROW_PLUGIN(plugin) {
   plugin.node("simulate.bones", bones)
       .summary("Gives exact poses and seeds of the fragments of a phantom, and of further bones among its bodies")
       .in("phantom", "phantom with tissues and bodies")
-      .in("posture", "where it is; none: as the phantom says")
-      .in("volume", "CT of the phantom: then only seeds in it are given")
+      .in("posture", "posture of the phantom; if not given, its own")
+      .in("volume", "CT of the phantom; if given, seeds outside it are left out")
       .out("truths", &Bones::truths, "exact pose of each bone", over("fragment"))
       .out("seeds", &Bones::seeds, "points inside each bone, in the CT", over("fragment"))
       .out("starts", &Bones::starts, "the same poses, as starts for experiments that displace them", over("fragment"))

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Combines a simulated CT and images with the seeds and the exact truth to a case.
+// Combines a simulated CT and images with the seeds and the exact truth into a case.
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
@@ -43,7 +43,7 @@ Case assemble(const Volume& ct, const List<View>& views, const Phantom& phantom,
   return result;
 }
 
-/// For a pipeline that goes on from a simulated case as it would from one that read.case has read.
+/// Lets a pipeline use a simulated case in the same way as one that read.case has read.
 Case parts_of(const Case& whole) { return whole; }
 
 }  // namespace
@@ -61,7 +61,7 @@ MARROW_PLUGIN(plugin) {
               "none: the case has no start; exact: the start is the true pose, for experiments that displace it",
               one_of({"none", "exact"}));
   plugin.node("simulate.case_parts", parts_of)
-      .summary("Gives the parts of a simulated case, with the names that read.case has for them")
+      .summary("Gives the parts of a simulated case, under the names that read.case uses")
       .in("case", "case of simulate.case")
       .out("ct", &Case::ct, "CT in Hounsfield units")
       .out("seeds", &Case::seeds, "points inside each fragment", over("fragment"))

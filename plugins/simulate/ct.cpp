@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A CT of the phantom. The continuous shape is cut by rays that are at most 0.3 mm apart, blurred, sampled, and gets
-// noise.
+// A CT of the phantom. Rays at most 0.3 mm apart cut the continuous shape. The result is blurred and sampled, and noise
+// is added.
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
@@ -179,7 +179,7 @@ class Scanner {
     return those;
   }
 
-  /// Adds a part of a ray to its bins, as the difference to what is there without bone and bodies.
+  /// Adds a part of a ray to its bins, as the difference from what `empty` holds there.
   void add(double from, double to, double hu, const double* empty, double* bins, int& x0, int& x1) const {
     const int first = std::max(0, int(std::floor(from + 0.5)));
     const int last = std::min(raster_.size[0] - 1, int(std::floor(to + 0.5)));
@@ -190,7 +190,7 @@ class Scanner {
     }
   }
 
-  /// The slices first to last - 1 without bone and bodies, on the fine raster; one for all where all are the same.
+  /// The slices first to last - 1 without bone and bodies, on the fine raster. Only one if all are the same.
   std::vector<std::vector<double>> backgrounds_of(int first, int last) const {
     if (cluttered_.tissues.empty()) return {even_background_};
     const std::size_t width = std::size_t(raster_.size[0]);
@@ -227,7 +227,7 @@ class Scanner {
     return plane;
   }
 
-  /// Adds the bone in one fine row of rays to the plane, as the difference to the background. Each bin counts by the
+  /// Adds the bone in one fine row of rays to the plane, as the difference from the background. Each bin counts by the
   /// length of bone in it. Returns the changed part of the plane.
   Rectangle draw(std::span<const phantom::Crossing> crossings, std::span<const phantom::Crossing> others, int row,
                  const std::vector<double>& background, std::vector<double>& plane) const {
@@ -284,7 +284,7 @@ class Scanner {
   phantom::SolidRays rays_;
   phantom::BodyRays tissue_rays_, body_rays_;
   std::vector<double> tissue_hu_, body_hu_;
-  std::vector<double> even_background_;  ///< a slice without bone, where all are the same
+  std::vector<double> even_background_;  ///< a slice without bone, if all slices are the same without it
 };
 
 Volume cluttered_scan(const ClutteredPhantom& phantom, const CtOptions& options, Context& context) {
@@ -321,16 +321,15 @@ Volume scan(const Phantom& phantom, const CtOptions& options, Context& context) 
   return cluttered_scan({phantom, {}, {}}, options, context);
 }
 
-/// What both nodes have.
+/// Declares what both nodes have in common.
 void declare(auto&& node) {
   node.random()
       .out("volume", "CT in Hounsfield units, rounded to whole numbers")
       .option("spacing_mm", &CtOptions::spacing_mm, "voxel size along x, y, z")
       .option("margin_mm", &CtOptions::margin_mm, "space around the bone", at_least(0))
       .option("range_mm", &CtOptions::range_mm,
-              "scans only between these two heights above the bone's distal end, such as [-100, 200] for a knee; [0, "
-              "0]: the "
-              "whole bone")
+              "scans only between these two heights above the bone's distal end, such as [-100, 200] for a knee; "
+              "[0, 0]: the whole bone")
       .option("blur_mm", &CtOptions::blur_mm, "standard deviation of the Gaussian point-spread function", at_least(0),
               at_most(3))
       .option("noise_hu", &CtOptions::noise_hu, "standard deviation of the noise", at_least(0), unit("HU"))

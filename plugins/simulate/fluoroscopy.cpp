@@ -39,7 +39,7 @@ constexpr double kNearestMm = 10;
 /// The share of each energy in the detected signal, for a 70 kV beam behind 3.5 mm of aluminium with a mean of 49 keV.
 constexpr phantom::Spectrum kShare{0.40, 0.33, 0.20, 0.07};
 
-/// Lengths in tissue, and the attenuation by everything else, as its exponent.
+/// Lengths in tissue, and the exponent of the attenuation by everything else.
 struct Lengths {
   double bone = 0, marrow = 0, muscle = 0, fat = 0;
   phantom::Spectrum others{};
@@ -106,7 +106,7 @@ class XRay {
     lengths.muscle = std::max(0.0, lengths.muscle - lengths.bone - lengths.marrow);
   }
 
-  /// What a ray meets that also crosses bodies or soft tissue of its own shape.
+  /// The lengths along a ray that also crosses bodies, or soft tissue that is not a cylinder.
   Lengths among_others(const Ray& ray, const std::vector<Interval>& bone,
                        const std::vector<phantom::BodyInterval>& others) const {
     constexpr int kBoneRank = 1000;
@@ -172,7 +172,7 @@ class XRay {
     return others;
   }
 
-  /// The crossings of one ray, from `next` on, which is moved behind them.
+  /// The crossings of one ray, from `next` on. Moves `next` behind them.
   static std::span<const phantom::Crossing> of_ray(const std::vector<phantom::Crossing>& crossings, int column, int row,
                                                    std::size_t& next) {
     const std::size_t begin = next;
@@ -197,7 +197,7 @@ class XRay {
                "the fragment's translation");
   }
 
-  /// From a body's frame to rays. `name` and `place` are for a message.
+  /// The map from a body's frame to ray coordinates. `name` and `place` are for a message.
   phantom::SolidRays::Map map(const RigidTransform& camera_from_body, const std::string& name,
                               const std::string& place) const {
     return [this, camera_from_body, name, place](const Eigen::Vector3d& point) {
@@ -234,7 +234,7 @@ cv::Mat1d primary_image(const XRay& xray, const Camera& camera, Context& context
   return primary;
 }
 
-/// Scatter as a blurred image of its source. The source is T ln(1 / T) for a transmission T: 0 in air, little behind
+/// Scatter as the blurred image of its source. The source is T ln(1 / T) for a transmission T: 0 in air, little behind
 /// thick tissue (Ohnesorge, Flohr, Klingenbeck-Regn, Eur. Radiol. 1999). It is scaled so that the ratio of scattered to
 /// primary radiation is the wanted one behind wide soft tissue.
 cv::Mat1d scatter_image(const cv::Mat1d& primary, const FluoroscopyOptions& options, double behind_tissue) {
@@ -306,11 +306,11 @@ List<View> fluoroscopy(const Phantom& phantom, const List<Camera>& cameras, cons
   return cluttered_fluoroscopy({phantom, {}, {}}, cameras, posture, options, context);
 }
 
-/// What both nodes have.
+/// Declares what both nodes have in common.
 void declare(auto&& node) {
   node.random()
       .in("cameras", "camera of each view", over("view"))
-      .in("posture", "where the phantom's parts are; none: as the phantom says")
+      .in("posture", "posture of the phantom; if not given, its own")
       .out("views", "16-bit images, bright = air", over("view"))
       .option("photons", &FluoroscopyOptions::photons, "photons per pixel behind soft tissue alone; 0: no noise",
               at_least(0), unit("1/px"))

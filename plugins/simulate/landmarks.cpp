@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Landmarks of a phantom's fragments as a person or a tracking system would find them. They have noise, so that a
-// method never sees the truth.
+// Landmarks of a phantom's fragments as a person or a tracking system would find them. They have noise, so no method
+// sees the truth.
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
@@ -64,7 +64,7 @@ List<Landmarks> landmarks(const phantom::Phantom& phantom, const List<Camera>* c
     const std::vector<Eigen::Vector3d> points = spread_points(fragment, views, options.count);
     if (points.empty()) {
       context.warn(
-          formatted("of fragment '{}' the views show too little for {} landmarks in all of them; it is left out",
+          formatted("fragment '{}' is left out: the views show too little of it for {} landmarks in all of them",
                     fragment.name, options.count));
       continue;
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Markers on the skin around a limb, as a tracking system measures them. Skin slides over the bone: each marker by
-// itself, and all of them together. The common part does not average out.
+// Markers on the skin around a limb, as a tracking system measures them. Skin slides over the bone: each marker moves
+// alone, and all of them move together. The common part does not average out.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -25,8 +25,8 @@ struct Options {
   double false_rotation_deg = 0;
 };
 
-/// Markers around the fragment's long axis, in CT coordinates: turned by the same angle from one to the next, at even
-/// heights in a shuffled order, so that they do not lie in one plane across the axis. Each is a little off.
+/// Markers around the fragment's long axis, in CT coordinates. Angles and heights are evenly spaced. The order of the
+/// heights is shuffled, so the markers do not lie in one plane. Each place is a little off.
 std::vector<Eigen::Vector3d> marker_places(const FragmentFrame& frame, const Options& options, Random& random) {
   constexpr double kUneven = 0.1;  // of the step from one marker to the next, and of the radius
   const auto uneven = [&] { return kUneven * (2 * random.uniform_above_0() - 1); };
@@ -97,5 +97,5 @@ MARROW_PLUGIN(plugin) {
       .option("common_shift_mm", &Options::common_shift_mm,
               "standard deviation of the shift of all markers together, along each axis of the fragment", at_least(0))
       .option("false_rotation_deg", &Options::false_rotation_deg,
-              "a further such rotation, always the same: for tests of a method that must notice it");
+              "another such rotation that is always the same; for tests of methods that must notice it");
 }

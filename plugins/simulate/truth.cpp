@@ -40,7 +40,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("simulate.truth", truth)
       .summary("Gives the exact surface and pose of each fragment of a phantom")
       .in("phantom", "fragments with their surfaces and exact poses")
-      .in("posture", "where they are; none: as the phantom says")
+      .in("posture", "posture of the phantom; if not given, its own")
       .in("volume", "CT of the phantom, for the seeds")
       .out("models", &Known::models, "outer surface in CT coordinates, open at the fracture", over("fragment"))
       .out("truths", &Known::truths, "exact pose in the images", over("fragment"))
