@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Calibration of an X-ray device from images of a board with beads on both sides (Tsai 1987, as the chapter uses it).
+// Calibration of an X-ray device from images of a board with beads on both sides (Tsai 1987).
 #include <algorithm>
 #include <cmath>
 #include <marrow/plugin.hpp>

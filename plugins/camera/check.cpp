@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks whether the cameras are right. A known object is drawn into the images. The positions where its points are
-// seen are compared with their projections.
+// Checks whether the cameras are right. It draws a known object into the images, and compares the places where its
+// points are seen with their projections.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>

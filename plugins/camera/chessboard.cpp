@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Calibration of a camera for visible light from photographs of a chessboard (Zhang 2000, as OpenCV does it), and where
-// the camera is while it sees the board at a known place.
+// Calibration of a camera for visible light from photographs of a chessboard (Zhang 2000, by OpenCV), and the place of
+// the camera when it sees the board at a known place.
 #include <algorithm>
 #include <cmath>
 #include <marrow/plugin.hpp>
@@ -58,7 +58,7 @@ Fit fitted(const std::vector<Seen>& seen, const cv::Size& size, const Options& o
       cv::calibrateCamera(std::vector<std::vector<cv::Point3f>>(seen.size(), board), pixels, size, fit.matrix,
                           fit.distortion, fit.rotations, fit.translations, cv::noArray(), cv::noArray(), fit.residuals,
                           flags, {cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 100, 1e-12});
-  fit.residual_px = root_mean_square / std::sqrt(2.0);  // OpenCV's is the length, this is that of a coordinate
+  fit.residual_px = root_mean_square / std::sqrt(2.0);  // OpenCV gives that of the length; this is that of a coordinate
   return fit;
 }
 
@@ -67,8 +67,8 @@ RigidTransform camera_from_board(const Fit& fit, std::size_t i) {
   return {"camera", "board", rotation_from_vector({turn(0), turn(1), turn(2)}), {shift(0), shift(1), shift(2)}};
 }
 
-/// OpenCV's own deviations leave out what it takes for singular: of boards that were never tilted it gave a focal
-/// length 3 times too long, known to half a pixel.
+/// OpenCV's own deviations leave out directions that it takes for singular. For boards that were never tilted, it gave
+/// a focal length that was 3 times too long, with a deviation of half a pixel.
 void add_deviations(const std::vector<Seen>& seen, const Fit& fit, const Options& options, Calibration& device) {
   std::vector<calibration::ViewPoints> views;
   calibration::CalibrationResult result{device, {}};

@@ -16,8 +16,8 @@ struct Options {
 
 constexpr double kBrightest = 65535;
 
-/// Light is taken as what an X-ray image shows as a line integral: bright things become dark, and the logarithm that
-/// nodes take of X-ray images gives the light back. So blur is symmetric about each border.
+/// Light takes the place of the line integrals of an X-ray image. So bright things become dark, and the logarithm that
+/// nodes take of X-ray images gives the light again. Blur is then symmetric about each border.
 cv::Mat as_x_ray(const cv::Mat& photograph, const Options& options) {
   std::array<std::array<double, 256>, 3> light;
   double sum = 0;

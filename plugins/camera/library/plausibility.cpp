@@ -118,7 +118,7 @@ void check_object(const Camera& camera, const std::vector<Eigen::Vector3d>& obje
 struct Mistake {
   std::string sentence;
   std::function<void(Camera&, SeenPoints&)> undo;
-  bool is_of_points = false;  ///< of their places in the world, which are the same in all views
+  bool is_of_points = false;  ///< a mistake of the points' places in the world, which all views share
   bool is_of_unit = false;
 };
 
@@ -201,8 +201,8 @@ std::vector<Mistake> all_mistakes() {
   return mistakes;
 }
 
-/// The error before a mistake is undone, and the largest that may remain. Three points can be explained by chance, and
-/// an error below 1 % of the image is not due to a mistake of these kinds.
+/// The error before a mistake is undone, and the largest that may remain. Chance can explain three points, and an error
+/// below 1 % of the image is not due to a mistake of these kinds.
 struct Trouble {
   bool exists = false;
   double error_px = 0, most_left_px = 0;
@@ -224,7 +224,8 @@ bool is_distance_plausible(const Camera& camera, const SeenPoints& points) {
   return distance_mm >= kNearest_mm && distance_mm <= kFarthest_mm;
 }
 
-/// Points in metres and a translation in micrometres are seen at the same places, so of units the distance decides.
+/// Points in metres, and a translation in micrometres, project to the same pixels. So the distance decides which unit
+/// is wrong.
 double error_without(const Mistake& mistake, Camera camera, SeenPoints points) {
   mistake.undo(camera, points);
   if (mistake.is_of_unit && !is_distance_plausible(camera, points)) return std::numeric_limits<double>::infinity();
@@ -257,7 +258,7 @@ class Explanations {
   }
 
  private:
-  /// Of the mistakes that may count, the one with the least error. Of those that are nearly alike, the first.
+  /// The mistake with the least error among those that may count; the first one of those with nearly the same error.
   std::optional<std::size_t> best(const std::function<bool(std::size_t)>& counts,
                                   const std::function<double(std::size_t)>& error_px) const {
     constexpr double kAlike = 0.9, kRounding_px = 1e-6;
@@ -269,7 +270,7 @@ class Explanations {
   bool explains(std::size_t view, std::size_t mistake) const {
     return troubles_[view].exists && left_px_[view][mistake] < troubles_[view].most_left_px;
   }
-  /// Whether undoing it would be right in all views with an error. Points may also not become wrong in another view.
+  /// Whether undoing the mistake is right in all views with an error, and makes the points wrong in no other view.
   bool explains_all(std::size_t mistake) const {
     for (std::size_t v = 0; v < troubles_.size(); ++v) {
       if (troubles_[v].exists && !explains(v, mistake)) return false;

@@ -34,8 +34,8 @@ double reprojection_error_px(const Camera& camera, const SeenPoints& points);
 /// explains its points best. Undoing it must reduce the error to a fifth and to less than 2 % of the image's width.
 /// std::nullopt if there is no such mistake, the error is below 1 % of the width, or there are fewer than four points.
 /// One view alone may not tell whether its image is mirrored or an axis of the points reversed. So a mistake that
-/// explains all views counts first. One of the points, which all views share, counts otherwise only where no other
-/// does.
+/// explains all views counts first. Otherwise a mistake of the points, which all views share, counts only if no other
+/// mistake explains the view.
 std::vector<std::optional<std::string>> explanations(const std::vector<Camera>& cameras,
                                                      const std::vector<SeenPoints>& points);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// AVI files of compressed frames, put together by hand.
+// AVI files of compressed frames, written by hand.
 #include <string>
 #include <vector>
 
@@ -10,7 +10,7 @@ struct AviFrames {
   std::string codec;  ///< its four letters
   int width = 0, height = 0;
   std::vector<std::string> frames{};
-  std::string extra{};  ///< what the codec needs to know beforehand
+  std::string extra{};  ///< what the codec must know before the first frame
 };
 
 inline std::string little_endian(std::size_t number, int bytes) {

@@ -37,7 +37,7 @@ TEST(ReadCamera, XmalabText) {
   }
 }
 
-// Metal beads whose positions in both images and in space are known; their own reprojection error is 0.02-0.36 px.
+// Metal beads whose positions in both images and in space are known. Their reprojection error is 0.02 to 0.36 px.
 TEST(ReadCamera, RealBeadsReprojectWithinTheirMeasuredError) {
   MARROW_NEED_DATA(folder, "wrist");
   const marrow::Camera cameras[] = {read(folder / "cameras/xr_calib_wrist_cam01.txt"),

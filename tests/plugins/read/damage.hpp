@@ -31,8 +31,8 @@ inline std::size_t address_space_bytes() {
   return pages * std::size_t(::sysconf(_SC_PAGESIZE));
 }
 
-/// What reading comes to in a process that may reserve only `limit` bytes more than it has, and gets 60 seconds.
-/// `said`: the error.
+/// The outcome of reading in a process of its own. It may reserve only `limit` more bytes than it has, and has 60
+/// seconds. `said` becomes the text of the error.
 inline Outcome outcome_of(const std::function<void()>& read, const std::string& file_name, std::size_t limit,
                           std::string& said) {
   int channel[2];
@@ -73,7 +73,8 @@ inline Outcome outcome_of(const std::function<void()>& read, const std::string& 
                                                                           : Outcome::crashed;
 }
 
-/// A good file (its bytes), where its header ends, and what in it can lie: text or bytes to be replaced.
+/// A good file: its bytes, where its header ends, and the lies that it can tell (text or bytes, and what replaces
+/// them).
 struct Sample {
   std::string name;  ///< of the file to be damaged, inside the folder
   std::string bytes;

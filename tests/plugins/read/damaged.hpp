@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the tests of damaged files share. Files of every kind that is read are cut off at random places, have bytes of
-// the header flipped, or sizes that lie: of each kind a hundred copies are refused with an error that names them, or
-// read, within 64 MB. Files made to harm are in hostile_*_test.cpp.
+// The common part of the tests of damaged files. Files of each format are cut off at random places, bytes of their
+// headers are flipped, or their sizes lie. A hundred copies of each format must be read, or refused with an error that
+// names the file, within 64 MB. Files that are made to harm are in hostile_*_test.cpp.
 #include <gtest/gtest.h>
 
 #include <cstdio>

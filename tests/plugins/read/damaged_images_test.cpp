@@ -24,7 +24,7 @@ TEST(Damaged, Tiff) {
   const TemporaryFolder folder;
   for (const bool compressed : {false, true}) {
     Sample sample = written(folder, compressed ? "packed.tif" : "a.tif", picture(), compressed, 0);
-    // ITK writes the directory behind the pixels: the flips go there, by turning the file's last bytes into the header.
+    // ITK writes the directory behind the pixels, so the whole file counts as the header whose bytes are flipped.
     sample.header_bytes = sample.bytes.size();
     const std::string width = std::string("\0\1\3\0\1\0\0\0\x3C\0", 10);  // ImageWidth, SHORT, 1, 60
     if (sample.bytes.find(width) != std::string::npos)
@@ -57,7 +57,7 @@ TEST(Damaged, DicomImage) {
       {rows, dicom_element(0x00280010, "US", little_bytes(0, 2))},
       {"CS" + little_bytes(2, 2) + "XA", "CS" + little_bytes(0xFFFE, 2) + "XA"}};
   expect_handled(folder, sample, image_at);
-  // The camera needs the header alone, so a file whose pixels are damaged in themselves may pass.
+  // The camera needs only the header, so a file with damaged pixels may be accepted.
   expect_handled(folder, sample, [](const Path& path) { marrow::files::read_xray_geometry(path, 1, {}); });
 }
 

@@ -57,7 +57,7 @@ class DicomFolder : public testing::Test {
     hooks.log = [&](std::string_view text, marrow::LogLevel) { lines.emplace_back(text); };
     return read_by<marrow::Volume>("read.volume", folder.path(), {{"series_uid", series_uid}}, marrow::Context(hooks));
   }
-  /// The volume is that of the three slices alone, and one line of the log says what was passed over.
+  /// The volume consists of the three slices alone, and one line of the log says what was left out.
   void expect_passed_over(const std::string& said, const std::string& series_uid = "") {
     marrow::Volume volume;
     ASSERT_EQ(message_of([&] { volume = read(series_uid); }), "") << said;
@@ -80,7 +80,7 @@ TEST_F(DicomFolder, MoreReportsThanSlicesInTheSameSeries) {
   EXPECT_EQ(read("1.2.9").grid.size[2], 3);
 }
 
-// A media for patients comes with the program that shows it.
+// A disc for patients contains the program that shows the images.
 TEST_F(DicomFolder, ProgramsAndArchivesArePassedOver) {
   put_file("VIEWER", "MZ\x90" + std::string(200, '\1'));
   put_file("viewer.bin", "\x7f" + ("ELF" + std::string(200, '\1')));
@@ -145,7 +145,7 @@ TEST_F(DicomFolder, AFileWhoseSeriesCannotBeToldIsRefused) {
   for (const char* series : {"", "1.2.9"}) EXPECT_SAYS(read(series), "s3: is cut off or damaged:");
 }
 
-// A byte of a slice's class or modality may be damaged.
+// A byte of the class or modality of a slice may be damaged.
 TEST_F(DicomFolder, ASliceIsNotPassedOverForOneWrongElement) {
   const Elements classed{{0x00080016, std::string("UI:") + kCtClass}};
   for (int z = 0; z < 3; ++z) put_file("s" + std::to_string(z), dicom_file(changed(ct_slice(z), classed)));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images in which higher values mean less radiation. Each is inverted within the range of its stored bits, so the right
-// value of a pixel p of 12 bits is 4095 - p by hand, whatever else the frame holds.
+// Images in which higher values mean less radiation. Each is inverted within the range of its stored bits. So the right
+// value of a pixel p of 12 bits is 4095 - p, whatever the other pixels of the frame are.
 #include <gtest/gtest.h>
 
 #include "marrow/toolbox/files/sequence_files.hpp"
@@ -32,7 +32,7 @@ Elements two_frames(int bits_stored, std::uint32_t last, std::uint32_t last_of_s
 
 class DicomPolarity : public testing::Test {
  protected:
-  /// The pixel (column 1, row 0), stored as 100, of both frames.
+  /// The pixel (column 1, row 0) of both frames, which is stored as 100.
   std::array<double, 2> second_pixels(const Elements& elements) {
     put(folder / "x.dcm", dicom_file(elements));
     std::array<double, 2> values{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the slices of a series lie: within 0.1 mm of an even, straight grid, and none is missing.
+// The slices of a series lie within 0.1 mm of an even, straight grid, and none is missing.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,7 +21,7 @@ std::string rounded(double value, int decimals) {
 
 class DicomSlices : public testing::Test {
  protected:
-  /// Slices at these texts of z, each with its number as its values.
+  /// Slices at these z, which are written as given. All values of a slice are its number.
   marrow::Volume series(const std::vector<std::string>& z_mm) {
     std::filesystem::remove_all(folder / "ct");
     for (std::size_t i = 0; i < z_mm.size(); ++i) {
@@ -36,7 +36,7 @@ class DicomSlices : public testing::Test {
   TemporaryFolder folder;
 };
 
-// The spacing is that of the first and last position, as written: for 0.625 mm with two decimals 11.88 mm / 19.
+// The spacing follows from the first and the last position as written: for 0.625 mm with two decimals 11.88 mm / 19.
 TEST_F(DicomSlices, WithRoundedPositionsAreRead) {
   for (const double gap_mm : {0.3, 0.4, 0.625, 0.75, 0.8, 1.25, 2.5})
     for (const int decimals : {1, 2, 3}) {

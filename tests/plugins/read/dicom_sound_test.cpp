@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sound DICOM files that are unusual, or not for this program. None of them is called damaged.
+// Sound DICOM files that are unusual, or that this program does not read. No message calls them damaged.
 #include <gtest/gtest.h>
 
 #include "marrow/toolbox/files/sequence_files.hpp"
@@ -60,7 +60,7 @@ TEST_F(DicomSound, CompressedIconsAreSteppedOver) {
   }
 }
 
-// A pixel of 8 bits stands for a colour, so there are 24 bytes for 24 pixels.
+// A pixel of 8 bits is the number of a colour, so 24 pixels take 24 bytes.
 TEST_F(DicomSound, ColoursFromATableAreOnlyCalledColours) {
   const Elements palette{{0x00280004, "CS:PALETTE COLOR"},
                          {0x00280100, "US:8"},
@@ -70,7 +70,7 @@ TEST_F(DicomSound, ColoursFromATableAreOnlyCalledColours) {
   expect_refused(dicom_file(but(fluoroscopy(), palette)), "x.dcm: has 3 channels; an X-ray image has one");
 }
 
-// Four pixels share their colour: 1.5 values a pixel.
+// Four pixels share a colour, so there are 1.5 values per pixel.
 TEST_F(DicomSound, ColoursWithFewerBytesAreOnlyCalledColours) {
   const Elements colours{{0x00280002, "US:3"}, {0x00280004, "CS:YBR_PARTIAL_420"},
                          {0x00280100, "US:8"}, {0x00280101, "US:8"},
@@ -92,7 +92,7 @@ TEST_F(DicomSound, BitsInAnotherPlaceAreOnlyCalledNotRead) {
                  "x.dcm: its pixels have 1 of 1 bits");
 }
 
-// Some programs write elements with a kind where the transfer syntax says without, or the reverse.
+// Some programs write the kind of an element although the transfer syntax excludes it, or leave it out.
 TEST_F(DicomSound, ElementsAreReadAsTheFirstOneIsWritten) {
   const std::string implicit = "1.2.840.10008.1.2", with_kinds = "1.2.840.10008.1.2.1";
   EXPECT_EQ(image(dicom_start(with_kinds) + implicit_elements(fluoroscopy())).pixels.at<std::uint16_t>(3, 1), 301);

@@ -24,7 +24,7 @@ DicomSlice slice_at(double z, int base) {
   return slice;
 }
 
-/// Four slices at z = 10, 12, 14, 16 whose file names run against their order.
+/// Four slices at z = 10, 12, 14, 16. Their file names are in the reverse order.
 void write_series(const TemporaryFolder& folder, const std::string& series = "1.2.3.4",
                   const std::string& prefix = "") {
   for (int k = 0; k < 4; ++k) {
@@ -71,7 +71,7 @@ TEST(ReadDicom, TwoSeriesAreListedAndOneCanBeNamed) {
   EXPECT_SAYS(read(folder.path(), "9.9"), "holds no series 9.9; it holds:\n    1.2.3.4");
 }
 
-// What is left of the last slice would not be missed by a gap, whatever it is called.
+// If the last slice were left out, no gap would show it. So it is refused, whatever its name is.
 TEST(ReadDicom, FilesThatAreNoWholeSliceAreRefused) {
   const TemporaryFolder elsewhere;
   write_dicom(elsewhere / "slice.dcm", slice_at(18, 0));
@@ -100,7 +100,7 @@ TEST(ReadDicom, FilesThatAreNoSliceByNameArePassedOver) {
   EXPECT_EQ(read(folder.path()).grid.size[2], 4);
 }
 
-// Labels beside the CT would be handed on in its place.
+// Otherwise labels beside the CT would be used in its place.
 TEST(ReadDicom, AVolumeOfAnotherKindBesideTheSlicesIsRefused) {
   for (const char* name : {"labels.mhd", "labels.nhdr"}) {
     const marrow::test::TemporaryFolder folder;
@@ -151,7 +151,7 @@ TEST(ReadDicom, PixelsThatTheHeaderDoesNotTellOfAreRefused) {
   put_slices(folder, filled);
   EXPECT_SAYS(read(folder.path()), "its header tells of 9 bytes of pixels, but there are 12");
   filled[0x7FE00010] =
-      "OW:" + std::string(9, '\5') + std::string(129, '\0');  // to the end of a block, as some write it
+      "OW:" + std::string(9, '\5') + std::string(129, '\0');  // to the end of a block, as some programs write it
   put_slices(folder, filled);
   EXPECT_EQ(read(folder.path()).at(2, 2, 2), 5 - 1024);
 }
@@ -180,7 +180,7 @@ TEST(ReadDicom, ValuesThatAreNoHounsfieldUnitsAreRefused) {
               "s0.dcm: its values are no Hounsfield units: RescaleType (0028,1054) is 'Z_EFF', expected HU");
 }
 
-// Each step is within what rounding makes of even ones.
+// Each step agrees with even steps up to rounding.
 TEST(ReadDicom, SmallStepsThatAddUpAreRefused) {
   const auto series = [](int count, auto place) {
     const TemporaryFolder folder;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// X-ray files as a C-arm writes them, made element by element, so that each may be left out or wrong.
+// X-ray files as a C-arm writes them, built element by element, so that each element may be missing or wrong.
 #include <bit>
 #include <cstdint>
 #include <map>

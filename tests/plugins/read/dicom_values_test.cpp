@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the header of a DICOM file says of its values: where it stands, and where it is missing.
+// What the header of a DICOM file says about its values: in different places, and missing.
 #include <gtest/gtest.h>
 
 #include "marrow/toolbox/files/volume_file.hpp"
@@ -36,7 +36,7 @@ class DicomValues : public testing::Test {
   TemporaryFolder folder;
 };
 
-/// Three frames whose values are to be multiplied by 1, 5 and 7: the sequence of what is said of each frame.
+/// The sequence that describes each frame, for three frames whose values are to be multiplied by 1, 5 and 7.
 std::string slopes(std::string (*write)(const Elements&), std::size_t count = 3) {
   std::vector<std::string> frames;
   for (const char* slope : {"DS:1", "DS:5", "DS:7"})
@@ -72,7 +72,7 @@ TEST_F(DicomValues, OfAFrameComeBeforeThoseOfTheFile) {
   EXPECT_EQ(image(dicom_file(both), 3).pixels.at<float>(3, 1), 7 * 301 + 2);
 }
 
-// With a value that is only likely in its place, bone is read as air, or a negative value as a high one.
+// A guess in its place could turn bone into air, or a negative value into a high one.
 TEST_F(DicomValues, WithoutWhatThePixelsAreAreRefused) {
   for (const auto& [tag, name] : {std::pair{0x00280002u, "SamplesPerPixel (0028,0002)"},
                                   {0x00280100u, "BitsAllocated (0028,0100)"},
@@ -98,7 +98,7 @@ TEST_F(DicomValues, OfSlicesWithOtherPixelsAreRefused) {
               "s1: its pixels have 12 bits without a sign, those of");
 }
 
-// By their SeriesInstanceUID and positions they would go together.
+// Their SeriesInstanceUID and positions would fit together.
 TEST_F(DicomValues, OfTwoPatientsOrPlacesAreNotJoined) {
   const Elements all{{0x00100020, "LO:x"}, {0x0020000D, "UI:1.2.1"}, {0x00200052, "UI:1.2.2"}};
   EXPECT_EQ(series(with(ct_slice(1), all), all).grid.size[2], 3);
@@ -121,7 +121,7 @@ TEST_F(DicomValues, OfACtThatDoesNotScaleThemAreRefused) {
   EXPECT_EQ(image(dicom_file(fluoroscopy())).pixels.at<std::uint16_t>(3, 1), 301) << "an X-ray image needs no scale";
 }
 
-// Outside of what a scanner sees it writes a value of its choice, here one above that of any bone.
+// Outside the scanned region, a scanner writes any value; here it is above that of any bone.
 TEST_F(DicomValues, OfPaddingAreAir) {
   const auto with_pixel = [](Elements slice, std::uint32_t value) {
     slice[0x7FE00010].replace(3, 2, little(value, 2));
@@ -137,7 +137,7 @@ TEST_F(DicomValues, OfPaddingAreAir) {
   EXPECT_EQ(volume.at(0, 0, 1), 63537 - 1024) << "only the padding itself";
   volume = series(with(ct_slice(1), {{0x00280120, "US:3"}}));
   EXPECT_EQ(volume.at(3, 0, 1), 3 - 1024) << "below air already";
-  // Of pixels with a sign it has one too, and may be written as if it had none.
+  // If pixels have a sign, the padding value has one too, but it may be written without.
   const Elements with_sign{{0x00280103, "US:1"}, {0x00281052, "DS:0"}, {0x00281053, "DS:-1"}};
   for (const char* value : {"SS:-2000", "US:63536"}) {
     volume = series(with_pixel(with(with(ct_slice(1), with_sign), {{0x00280120, value}}), 63536), with_sign);

@@ -63,7 +63,7 @@ inline std::string with(std::string text, const std::string& from, const std::st
         << "it said: " << (marrow_message.empty() ? "(nothing thrown)" : marrow_message); \
   } while (false)
 
-/// Real data beside the source tree; empty when it is not there.
+/// Real data beside the source tree; empty if it is missing.
 inline std::filesystem::path real_data(const std::string& name) {
   const std::filesystem::path path = std::filesystem::path(MARROW_SOURCE_DIR) / "../shared/data" / name;
   return std::filesystem::exists(path) ? path : std::filesystem::path();

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the tests of hostile files share: the limits that a small file must stay within.
+// The common part of the tests of hostile files: the limits within which a small file must be refused.
 #include <chrono>
 
 #include "tests/plugins/read/damage.hpp"
 
 namespace marrow::test {
 
-/// Reads in a process of its own that may take 256 MB; what it says. Fails the test unless it is refused by name within
-/// 2 seconds (60, at most, on a machine that does much else).
+/// Reads in a process of its own that may take 256 MB, and returns its error. Fails the test unless the error names the
+/// file and comes within 60 seconds, also on a busy machine.
 inline std::string refusal_within_limits(const std::function<void()>& read, const std::string& file_name) {
   std::string said;
   const auto begin = std::chrono::steady_clock::now();

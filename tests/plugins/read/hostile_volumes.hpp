@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the tests of hostile volumes share: a small stack, and that a file made of it is refused.
+// The common part of the tests of hostile volumes: a small stack, and the expectation that a file is refused.
 #include <gtest/gtest.h>
 
 #include "marrow/toolbox/files/volume_file.hpp"
@@ -33,7 +33,7 @@ inline std::string replaced(std::string bytes, std::size_t at, const std::string
   return bytes.replace(at, by.size(), by);
 }
 
-/// Bytes of good files, and of others that are refused for the reason given.
+/// Gives the bytes of good files, and expects that other files are refused for a given reason.
 class Hostile : public testing::Test {
  protected:
   std::string good(const std::string& name) {

@@ -110,7 +110,7 @@ TEST(SimulateClutter, ALaterBodyReplacesWhatItOverlaps) {
                         });
   EXPECT_EQ(parts,
             (std::vector<std::array<double, 3>>{{0, 2, 1}, {2, 4, 3}, {4, 5, 3}, {5, 7, 2}, {7, 10, 1}, {12, 14, 1}}));
-  // A hollow of plastic in steel in bone in muscle: each takes its own length of the others.
+  // A hollow of plastic in steel in bone in muscle: each replaces a length of what surrounds it.
   Phantom inside = test::whole(test::box({-30, -20, -30}, {30, 20, 30}));
   inside.bone.thigh_radius_mm = 80;
   inside.bone.fat_mm = 10;
@@ -149,7 +149,7 @@ TEST(SimulateClutter, UnevenFatIsMovedNotAdded) {
   EXPECT_LT(least, 7);
   EXPECT_GT(most, 17);
   EXPECT_LT(most, 12 * 1.8 + 0.8);  // 9.6^2 / (2 x 68) more, because areas are kept
-  // With nothing uneven the surfaces are the cylinders that the bone has by itself, to the corners of 240 sides.
+  // Without unevenness the surfaces are the cylinders of the bone, up to the corners of their 240 sides.
   const View round = exposed({broken(), {}, {}}), sides = exposed({broken(), even, {}});
   EXPECT_NEAR(grey(sides, 64, 5) / double(grey(round, 64, 5)), 1, 2e-3);
 }
@@ -233,7 +233,7 @@ TEST(SimulateClutter, PlacesDependOnTheSeedAlone) {
   const auto one = made(3, 1);
   EXPECT_EQ(one, made(3, 2));
   EXPECT_NE(one, made(4, 2));
-  // One level does not move what another adds.
+  // A level does not move what another one adds.
   const auto plate = [&](const shipped::Options& options) {
     for (const Body& one : cluttered(broken(), options).bodies)
       if (one.name == "plate") return one.surface.vertices_mm;
@@ -286,7 +286,7 @@ TEST(SimulateClutter, TheCtShowsWhatIsInThePatient) {
   const Volume volume = scanned({bone, {tissue, muscle}, {marker, outside}}, {{"noise_hu", 0.0}, {"margin_mm", 16.0}});
   EXPECT_NEAR(at(volume, {4, 4, 34}), 120, 2);  // where it lies in the CT, not in the images
   EXPECT_NEAR(at(volume, {4, 4, 4}), 1450, 1);
-  EXPECT_NEAR(at(volume, {-6, -6, 14}), 1450, 1);  // what is not in the patient is not in the CT
+  EXPECT_NEAR(at(volume, {-6, -6, 14}), 1450, 1);  // the CT does not show what is not in the patient
   EXPECT_NEAR(at(volume, {17.5, 0, 30}), 50, 2);
   EXPECT_NEAR(at(volume, {25, 0, 30}), -100, 2);
   EXPECT_NEAR(at(volume, {27, 27, 30}), -1000, 2);

@@ -16,7 +16,7 @@ struct Extent {
   Eigen::Vector3d low = Eigen::Vector3d::Constant(1e9), high = Eigen::Vector3d::Constant(-1e9);
   Eigen::Vector3d size() const { return high - low; }
 };
-/// Of the vertices between two fractions of the length from the distal end.
+/// The extent of the vertices between two fractions of the length from the distal end.
 Extent extent(const Mesh& mesh, double from, double to) {
   Extent all, part;
   for (const auto& p : mesh.vertices_mm) all.low = all.low.cwiseMin(p), all.high = all.high.cwiseMax(p);

@@ -22,7 +22,7 @@ Bone shaft() {
   return bone;
 }
 
-/// Points of the surface along which a bone breaks, in a raster over it. The block below has its floor 5 mm deeper.
+/// Points of the surface along which a bone breaks, on a raster. The floor of the block below lies 5 mm deeper.
 std::vector<Eigen::Vector3d> relief(const Bone& bone, const shipped::Options& options) {
   std::vector<Eigen::Vector3d> points = simulated::fracture(bone, options).fracture.vertices_mm;
   double floor = 1e9;
@@ -36,7 +36,7 @@ TEST(SimulateFracture, CentreOfAnOutlineIsExact) {
   const Bone bone = shaft();
   double low = 1e9, high = -1e9;
   for (const auto& vertex : bone.outer.vertices_mm) low = std::min(low, vertex.z()), high = std::max(high, vertex.z());
-  // A smooth fracture contains the centre of the outline at its level, and rises here by 1 mm in 1 mm.
+  // A smooth fracture contains the centre of the outline at its height. Here it rises by 1 mm per mm.
   shipped::Options options{
       {"height_fraction", (12.34 - low) / (high - low)}, {"obliquity_deg", 45.0}, {"roughness_mm", 0.0}};
   options["direction_deg"] = 0.0;
@@ -60,7 +60,7 @@ TEST(SimulateFracture, CutsAtItsLevelWithItsObliquity) {
 }
 
 TEST(SimulateFracture, RoughnessIsItsRootMeanSquareAndItsSeedChangesIt) {
-  Bone block;  // wide against the longest waves of the relief, 40 mm
+  Bone block;  // much wider than the longest waves of the relief, 40 mm
   block.outer = test::box({-60, -60, -100}, {60, 60, 100});
   shipped::Options options{{"obliquity_deg", 0.0}, {"roughness_mm", 1.5}, {"height_fraction", 0.5}};
   const auto surface = [&](int seed) {

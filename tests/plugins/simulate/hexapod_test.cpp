@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A fragment on a hexapod: what it is told, where it is, and by how much its errors move it.
+// A fragment on a hexapod: the commands, its true pose, and how far the errors move it.
 #include <gtest/gtest.h>
 
 #include "nodes.hpp"
@@ -83,7 +83,7 @@ TEST(SimulateHexapod, WithoutErrorsItDoesWhatItIsTold) {
   }
   EXPECT_LT((made.at("start").as<Pose>().world_from_model.rotation - fragment[0].world_from_model.rotation).norm(),
             1e-9);
-  // The fragment stands on its fracture, its middle at the place that is asked for.
+  // The fragment stands on its fracture, with its middle at the given place.
   const phantom::Fragment* distal = nullptr;
   for (const auto& one : broken().fragments)
     if (one.name == "distal") distal = &one;

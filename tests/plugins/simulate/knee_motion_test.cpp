@@ -64,7 +64,7 @@ TEST(KneeMotion, BendsByTheFlexionAskedFor) {
   EXPECT_LT((truth(5, "tibia") * in_ct - axis_mm).norm(), 1e-6) << "about the axis of the knee";
 }
 
-/// The front of a leg that turns inwards goes to the other leg: to the patient's right on the left side.
+/// If a leg turns inwards, its front moves towards the other leg: for a left leg, to the patient's right.
 TEST(KneeMotion, TheLowerLegTurnsInwardsOnBothSides) {
   const auto front_goes_to_left_mm = [](const std::string& side) {
     const auto femur = simulated::femur({{"side", side}, {"resolution_mm", 2.0}});

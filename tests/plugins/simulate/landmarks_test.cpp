@@ -5,7 +5,7 @@
 
 namespace landmarks_test {
 
-/// A broken femur, the truth of its fragments, and two cameras that show 180 mm of its distal end.
+/// A broken femur, the true poses of its fragments, and two cameras that show its distal 180 mm.
 struct Broken {
   Broken() {
     const auto bone =

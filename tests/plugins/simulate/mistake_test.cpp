@@ -9,7 +9,7 @@ namespace mistake_test {
 
 using namespace marrow;
 
-/// A CT of 4 x 3 x 2 voxels whose values are their places, one seed, and two views.
+/// A CT of 4 x 3 x 2 voxels whose values are their indices, one seed, and two views.
 Case right() {
   Case made;
   made.ct.grid.size = {4, 3, 2};

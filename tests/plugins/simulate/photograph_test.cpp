@@ -24,12 +24,12 @@ CameraArm arm(double k1 = 0) {
   return made;
 }
 
-/// Light itself as grey values, without blur and noise.
+/// A sensor whose grey values are the light, without blur and noise.
 const Sensor kLinear{0, 1, 0};
 
 const RigidTransform kWorld{"world", "body"};
 
-/// Only even light: a body has its albedo.
+/// Only even light, so the light from a body is its albedo.
 Studio even() { return {{}, 1, {0, 0, 0}}; }
 
 Painted block(const Eigen::Vector3d& low, const Eigen::Vector3d& high, const Eigen::Vector3d& albedo) {

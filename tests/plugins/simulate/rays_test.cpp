@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rays through closed surfaces against chords known in closed form, and the polygoniser that makes the surfaces.
+// Rays through closed surfaces compared with chords that are known exactly, and the polygoniser that makes the
+// surfaces.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -39,7 +40,7 @@ std::vector<std::array<double, 2>> lengths(const Phantom& phantom, const Camera&
   return result;
 }
 
-/// Chord of a ray through a turned box, by slabs: another way than triangles.
+/// Chord of a ray through a turned box, computed from its slabs and not from triangles.
 double box_chord(const Eigen::Vector3d& source, const Eigen::Vector3d& direction, const Eigen::Vector3d& low,
                  const Eigen::Vector3d& high) {
   double from = -1e300, to = 1e300;

@@ -44,7 +44,7 @@ inline Mesh sphere(const Eigen::Vector3d& centre, double radius, double spacing)
                     centre + reach, spacing, 1);
 }
 
-/// One whole, still fragment.
+/// A phantom of one whole fragment that does not move.
 inline Phantom whole(Mesh outer, Mesh inner = {}) {
   Phantom phantom;
   phantom.bone.outer = std::move(outer);

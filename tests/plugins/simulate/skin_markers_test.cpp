@@ -11,7 +11,7 @@ namespace skin_markers_test {
 
 using marrow::Landmarks;
 
-/// A broken femur; made once. It is coarse, because each call checks its surface.
+/// A broken femur, made only once. It is coarse, because each call checks its surface.
 const marrow::Value& phantom() {
   static const marrow::Value phantom = [] {
     const auto bone = shipped::call("simulate.femur", {}, {{"resolution_mm", 6.0}}).at("bone");
@@ -36,7 +36,7 @@ Landmarks markers(shipped::Options options, std::uint64_t seed = 1) {
               .find("distal");
 }
 
-/// A marker's place in the distal fragment's axes.
+/// The place of a marker, along the axes of the distal fragment.
 Eigen::Vector3d in_axes(const Eigen::Vector3d& model_mm) {
   return distal().frame.axes.transpose() * (model_mm - distal().frame.origin_mm);
 }

@@ -38,14 +38,14 @@ TEST(SimulateVertebra, HasTheMeasuresItIsMadeFrom) {
   const Extent front = extent(bone.outer, [](const auto& p) { return p.y() < 3; });  // of the body alone
   EXPECT_NEAR(front.size().x(), 45, 1);
   EXPECT_NEAR(front.size().z(), 27, 1);
-  // The end plates are dished and the wall has a waist.
+  // The end plates are hollow, and the wall is narrower in the middle.
   const auto near_axis = [](const auto& p) { return std::hypot(p.x(), p.y()) < 2; };
   EXPECT_NEAR(extent(bone.outer, near_axis).size().z(), 27 - 2 * 1.5, 0.7);
   const Extent waist = extent(bone.outer, [](const auto& p) { return p.y() < 3 && std::abs(p.z()) < 1; });
   EXPECT_NEAR(waist.size().x(), 45 - 2 * 2.5, 1);
 }
 
-/// Where straight lines leave the canal.
+/// The places where straight lines leave the canal.
 TEST(SimulateVertebra, TheCanalIsOpenAndAsWideAsStated) {
   const Bone bone = vertebra();
   double left = 1e9, right = -1e9, front = -1e9, back = 1e9;
