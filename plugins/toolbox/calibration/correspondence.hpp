@@ -8,9 +8,9 @@
 namespace marrow::calibration {
 
 /// The beads of the board that are found among the discs of an image (the largest first, from find_beads()). Each side
-/// is found by itself. Four of the larger discs taken as four landmarks give a projective map; all choices are tried.
+/// is found separately. Four of the larger discs taken as four landmarks give a projective map; all choices are tried.
 /// The map under which most other beads fall on discs is right. Both sides must then fit one camera, which finds the
-/// remaining beads. Throws Error that says what is missing.
+/// remaining beads. Throws Error, whose text says what is missing.
 ViewPoints match_board(const Board& board, const std::vector<BeadImage>& discs, int width_px, int height_px,
                        const std::string& view);
 

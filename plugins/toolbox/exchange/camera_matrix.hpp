@@ -17,22 +17,22 @@ Mirror mirror_of(const std::string& text);
 /// Where a pixel of a program's image is in the image that was turned over.
 Eigen::Vector2d mirrored(const Eigen::Vector2d& pixel, Mirror mirror, int width_px, int height_px);
 
-/// The width and height of an image, and of a pixel, as far as the user gave them.
+/// What the user gave of the size of an image and of its pixels.
 struct ImageSize {
   std::vector<double> size_px;
   std::vector<double> pixel_mm;   ///< one number: the pixels are square
   std::vector<double> corner_mm;  ///< the centre of the first pixel on the detector; empty: the image is centred
 };
-/// Width and height in pixels; those of a pixel in mm; the place of the first pixel. Throw Error if they are missing or
-/// not positive. `what` names the file that needs them.
+/// The image's width and height in pixels, a pixel's width and height in mm, and the place of the first pixel. Throw
+/// Error if they are missing or not positive. `what` names the file that needs them.
 Eigen::Vector2i size_px(const ImageSize& size, const std::string& what);
 Eigen::Vector2d pixel_mm(const std::vector<double>& numbers, const std::string& what);
 Eigen::Vector2d corner_mm(const ImageSize& size, const std::string& what);
 
 /// The camera with pixel ~ P (x, 1), for images that are turned over as `mirror` says. P counts pixels from the centre
 /// of the first one, and its third coordinate must be positive in front of the source. Throws Error if P is singular,
-/// or if `mirror` is missing or too much: exactly one way of turning gives a camera that looks from the source. `what`
-/// names the file.
+/// or if `mirror` is wrong: exactly one way of turning gives a camera that looks from the source. `what` names the
+/// file.
 Camera camera_of(const Eigen::Matrix<double, 3, 4>& pixel_from_world, const Eigen::Vector2i& size_px, Mirror mirror,
                  const std::string& what);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Files of HDF5: numbers, texts and groups by their keys. Only small values are read, so neither images in the file nor
-// a damaged file take much memory. What is written is made in memory.
+// HDF5 files: numbers, texts and groups by their keys. Only small values are read, so neither images nor damage in a
+// file cost much memory. Files to be written are made in memory.
 #include <hdf5.h>
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 
 namespace marrow::exchange {
 
-/// Something of HDF5 that must be closed.
+/// An open HDF5 object, which is closed at the end.
 class Hdf5Id {
  public:
   Hdf5Id(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
@@ -29,15 +29,15 @@ class Hdf5Id {
 
 class Hdf5Reader {
  public:
-  /// Throws Error if the file cannot be read, or is no HDF5.
+  /// Throws Error if the file cannot be read, or is not HDF5.
   explicit Hdf5Reader(const std::filesystem::path& path);
 
-  /// Throws Error if a part of the key is a link, which could lead to a file that nobody named.
+  /// Throws Error if a part of the key is a link, because it could lead to a file that nobody named.
   bool has(const std::string& key) const;
   /// The names in a group, in their order; empty if there is no such group.
   std::vector<std::string> names_in(const std::string& key) const;
-  /// The numbers of a dataset, and its shape. Throw Error if there is none, if it holds no numbers, or has another
-  /// number of them than `count`.
+  /// The values of a dataset. Throw Error if there is no such dataset, or if it does not hold `count` finite numbers or
+  /// one text.
   std::vector<double> numbers(const std::string& key, std::size_t count) const;
   double number(const std::string& key) const { return numbers(key, 1)[0]; }
   std::string text(const std::string& key) const;

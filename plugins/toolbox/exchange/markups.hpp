@@ -14,11 +14,11 @@ struct MarkedPoint {
   Eigen::Vector3d at_mm = Eigen::Vector3d::Zero();
 };
 
-/// Whether the name ends as those of 3D Slicer's points do: .mrk.json or .fcsv, in small or capital letters.
+/// Whether the extension is that of 3D Slicer's points: .mrk.json or .fcsv, in small or capital letters.
 bool is_markups_file(const std::filesystem::path& path);
 
 /// The points of a file of 3D Slicer, in the file's order. The file says whether its coordinates are LPS or RAS; the
-/// result is always LPS. Of a .mrk.json all lists are read; points that were declared but not placed yet are left out.
+/// result is always LPS. All lists of a .mrk.json are read. Points that are declared but not placed yet are left out.
 /// Throws Error if the file is damaged, of another version or unit, or holds no point.
 std::vector<MarkedPoint> read_markups(const std::filesystem::path& path);
 

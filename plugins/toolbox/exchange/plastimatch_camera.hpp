@@ -8,13 +8,13 @@
 
 namespace marrow::exchange {
 
-/// Whether the file begins as plastimatch's projection matrices do: with two numbers, which no camera of XMALab does.
-/// False if there is no such file.
+/// Whether the file begins with two numbers. plastimatch's projection matrices do, XMALab's cameras do not. False if
+/// there is no such file.
 bool is_plastimatch_camera(const std::filesystem::path& path);
 
 /// The camera that plastimatch (drr, fdk) wrote beside an image: two numbers, the pixel that the central ray meets
 /// (column, row); a 3x4 matrix from the world, in mm, to pixels counted from there; the distances of the isocentre and
-/// the detector from the source; the direction of the central ray; then, after a title each, the matrix's factors
+/// the detector from the source; the direction of the central ray; the matrix's factors, each below its title,
 /// Extrinsic (4x4) and Intrinsic (3x4). The file does not hold the image's size. Throws Error with the line for a
 /// damaged file, or one whose factors do not give its matrix.
 Camera read_plastimatch_camera(const std::filesystem::path& path, const ImageSize& size);

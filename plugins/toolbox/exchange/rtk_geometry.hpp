@@ -22,17 +22,17 @@ struct RtkProjection {
 Eigen::Matrix<double, 3, 4> rtk_matrix(const RtkProjection& projection);
 
 /// The projections of a file, in its order. Throws Error with the line for a damaged file, another version, parallel
-/// rays, a curved detector, or a matrix that is not that of the angles and distances.
+/// rays, a curved detector, or a matrix that contradicts the angles and distances.
 std::vector<RtkProjection> read_rtk(const std::filesystem::path& path);
 
-/// The camera of a projection. Needs the image's size, and that of its pixels. RTK's images have their rows from below,
-/// so `mirror` must say how they are turned over. `what` names the projection. Throws Error as camera_of() for a matrix
-/// does, or if a size is missing.
+/// The camera of a projection. Needs the size of the image and of its pixels. RTK counts rows from below, so `mirror`
+/// must say how they are turned over. `what` names the projection. Throws Error as camera_of() for a matrix does, or if
+/// a size is missing.
 Camera camera_of(const RtkProjection& projection, const ImageSize& size, Mirror mirror, const std::string& what);
 
-/// A whole file with these cameras, for images that are turned upside down and centred on the detector, as
-/// camera_of() takes them with Mirror::upside_down and no `corner_mm`. Throws Error if a camera's pixels are not
-/// those of `pixel_mm`, or are askew.
+/// A whole file with these cameras, for images that are turned upside down and centred on the detector, as camera_of()
+/// takes them with Mirror::upside_down and no `corner_mm`. Throws Error if a camera's pixels have another size than
+/// `pixel_mm`, or are skewed.
 std::string rtk_geometry(const std::vector<Camera>& cameras, const Eigen::Vector2d& pixel_mm);
 
 }  // namespace marrow::exchange

@@ -9,12 +9,12 @@
 
 namespace marrow::exchange {
 
-/// Reads a triangle surface by the end of the file's name: .stl, .ply (files::read_marked_mesh()), .obj or .vtp. Points
-/// with equal coordinates are merged; faces of more corners are cut into triangles. Where the file says that its
-/// coordinates are RAS, as 3D Slicer marks them, they become LPS; all others are kept as they are. Coordinates are
-/// multiplied by `scale`, which must make them mm. A closed surface whose triangles face inwards is turned. Warns of
-/// that, and of a surface that is open, crosses itself, faces different sides, has a size that no bone or implant has,
-/// or whose file names two frames. Throws Error for another end, a damaged file, or a mesh that check_mesh() refuses.
+/// Reads a triangle surface from .stl, .ply (files::read_marked_mesh()), .obj or .vtp. Points with equal coordinates
+/// are merged; faces with more corners are cut into triangles. If the file says that its coordinates are RAS, as 3D
+/// Slicer marks them, they become LPS; all others are kept. Coordinates are multiplied by `scale`, which must make them
+/// mm. A closed surface whose triangles face inwards is turned. Warns of that, and of a surface that is open, crosses
+/// itself, faces different sides, has a size that no bone or implant has, or whose file names two frames. Throws Error
+/// for another extension, a damaged file, or a mesh that check_mesh() refuses.
 Mesh read_surface_file(const std::filesystem::path& path, double scale, const Context& context);
 
 /// A whole Wavefront OBJ file, and a whole .vtp file of VTK. Both say that the coordinates are LPS. Reading gives

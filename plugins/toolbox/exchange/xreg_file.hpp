@@ -29,7 +29,7 @@ struct XregProjection {
 };
 
 /// All projections of the file, without the images; or the one camera of a file that holds only that. Throws Error with
-/// the key of what is missing, has another shape or type, or is no number that a camera may have.
+/// the key of a value that is missing, has another shape or type, or cannot be that of a camera.
 std::vector<XregProjection> read_xreg(const std::filesystem::path& path);
 
 /// The camera, and the landmarks, of a projection whose image is turned over as `mirror` says. `what` names the

@@ -31,8 +31,8 @@ const DicomElement* find_element(const std::filesystem::path& path, const DicomE
 
 class DicomFile {
  public:
-  /// `header`: only the elements before the pixels, to tell what the file is. They are also read of transfer syntaxes
-  /// that are not supported. Where they are damaged they end, and fault() says why.
+  /// `header`: only the elements before the pixels, to tell what the file is, even if its transfer syntax is not
+  /// supported. Reading ends where they are damaged, and fault() says why.
   enum class Part { all, header };
 
   /// Throws Error if the file is not DICOM, has a transfer syntax that is not supported, or has an element that claims
@@ -42,7 +42,7 @@ class DicomFile {
   const InputFile& file() const { return file_; }
   const std::filesystem::path& path() const { return file_.path(); }
   const std::string& transfer_syntax() const { return transfer_syntax_; }
-  /// MediaStorageSOPClassUID: what kind of object the file is. It is legible even if the elements are damaged.
+  /// MediaStorageSOPClassUID: what kind of object the file is. It can be read even if the elements are damaged.
   const std::string& media_class() const { return media_class_; }
   /// Why not all of the header could be read; empty if it could.
   const std::string& fault() const { return fault_; }

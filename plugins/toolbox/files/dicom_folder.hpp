@@ -13,8 +13,9 @@ struct SeriesFiles {
 };
 
 /// Finds the slices of the series in a folder. Without a `series_uid` the folder must hold only one series that may be
-/// a CT. What is surely no slice of it is passed over. Throws Error if the choice is open, and if files may be slices
-/// that are damaged or lie in a folder below: otherwise a first or last slice could be missed, which leaves no gap.
+/// a CT. Files that are certainly not slices are skipped. Throws Error if the choice of the series is not clear, or if
+/// a file may be a slice but is damaged or in a subfolder. Otherwise the first or last slice could be missed, which
+/// leaves no gap.
 SeriesFiles files_of_series(const std::filesystem::path& folder, const std::string& series_uid);
 
 }  // namespace marrow::files

@@ -8,11 +8,11 @@ namespace marrow::files {
 
 enum class FileFormat { unknown, png, tiff, jpeg, bmp, dicom, meta_image, nrrd, nifti };
 
-/// The format by the file's first bytes. If they are those of no known format, as in a damaged file, by the end of its
-/// name. Throws Error as InputFile does; the file may be empty.
+/// The format by the file's first bytes or, if they belong to no known format, as in a damaged file, by its extension.
+/// Throws Error as InputFile does; the file may be empty.
 FileFormat file_format(const std::filesystem::path& path);
 
-/// "a GIF picture": the format of a file that file_format() does not know, if its first bytes tell; else empty.
+/// "a GIF picture": the name of a format that is not read, if the file's first bytes tell it; else empty.
 std::string name_of_other_format(const std::filesystem::path& path);
 
 }  // namespace marrow::files

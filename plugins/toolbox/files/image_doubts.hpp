@@ -6,7 +6,7 @@
 
 namespace marrow::files {
 
-/// Whether an image was compressed with loss: a JPEG, or a DICOM file that is or was one.
+/// Whether an image was compressed with loss: it is a JPEG, or a DICOM file whose pixels are or were one.
 bool is_lossy_image(const std::filesystem::path& image);
 
 /// Warns where the file's format gives a reason to doubt the pixels that read_image_file() returns: they were

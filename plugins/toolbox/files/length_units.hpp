@@ -12,8 +12,8 @@ namespace marrow::files {
 /// empty if there is none.
 std::string likely_unit(double length_mm, double least_mm, double most_mm, double scale);
 
-/// A sentence if the camera's source is closer to the world's origin, or farther from it, than any X-ray source from
-/// its patient, and it is not the origin itself. Empty if all is well. `scale` is that with which the camera was read.
+/// A sentence if no X-ray device has the distance between this camera's source and the world's origin. Empty if the
+/// distance is possible, or 0. `scale`: the one with which the camera was read.
 std::string doubt_about_distance(const Camera& camera, double scale);
 
 }  // namespace marrow::files

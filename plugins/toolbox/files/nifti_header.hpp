@@ -30,7 +30,7 @@ struct NiftiHeader {
   double unit_mm() const { return unit == 1 ? 1e3 : unit == 3 ? 1e-3 : 1; }
 };
 
-/// Throws Error if the file is none of NIfTI with its samples in it. Does not judge the values of the fields.
+/// Throws Error unless the file is NIfTI and holds its samples itself. Does not judge the values of the fields.
 NiftiHeader read_nifti_header(const InputFile& file);
 
 }  // namespace marrow::files

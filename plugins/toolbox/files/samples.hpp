@@ -43,7 +43,8 @@ struct VolumeSamples {
 
 VolumeSamples read_meta_image(const std::filesystem::path& path, bool folder_is_named);
 VolumeSamples read_nrrd(const std::filesystem::path& path, bool folder_is_named);
-/// `is_placed`: the header must say where the volume lies. Else it may be one image, and the grid is not read.
+/// `is_placed`: the header must say where the volume lies. If false, the file may hold one image, and the grid is not
+/// read.
 VolumeSamples read_nifti(const std::filesystem::path& path, bool is_placed = true);
 /// A CT series in HU: all slices of one series in a folder, sorted by position and checked for gaps. `series_uid`
 /// selects the series; empty: the folder must hold only one CT. Other files of the folder are passed over. Throws Error

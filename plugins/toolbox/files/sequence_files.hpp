@@ -19,10 +19,10 @@ struct FrameRange {
 /// `first` or `last`, or if `last` lies before `first`.
 std::vector<int> frames_of(const FrameRange& range, int count, const std::string& what);
 
-/// The images of a folder, one a frame, in the order of their numbers. An empty pattern stands for all files of the
-/// folder that are images by their content: PNG, TIFF and DICOM, or, if there are none, JPEG and BMP, or files for
-/// volumes. Else their paths from the folder fit the pattern: * stands for any characters but /, ? for one. The names
-/// may differ only in a number, and no number may be missing. Throws Error otherwise.
+/// The images of a folder, one a frame, in the order of their numbers. The pattern selects them by their paths from the
+/// folder: * stands for any characters but /, ? for one. An empty pattern selects by content all PNG, TIFF and DICOM
+/// files; if there are none, JPEG and BMP; else files for volumes. The names may differ only in a number, and no number
+/// may be missing. Throws Error otherwise.
 std::vector<std::filesystem::path> frame_files(const std::filesystem::path& folder, const std::string& pattern);
 
 /// Frames of one file, each as read_image_file() returns it: pages of a TIFF, frames of a DICOM file, slices of a file

@@ -20,7 +20,7 @@ struct LockingPlan {
     /// Predicted root mean squares: the angle between planned and true axis, and the distance between the two at the
     /// hole's centre. NaN if the pose has no covariance.
     double deviation_deg = 0, deviation_mm = 0;
-    /// What 95 % of these angles and distances do not exceed.
+    /// The 95th percentiles of these angles and distances.
     double most_deg = 0, most_mm = 0;
     /// The C-arm's angles at which the ray through the hole's centre runs along its axis. So it is seen as a circle.
     double alpha_deg = 0, beta_deg = 0;

@@ -70,8 +70,8 @@ class ViewsCost : public Cost {
   std::vector<std::string> silent_views(const RigidTransform& world_from_model) const override;
 
   /// The cost in a view, and the same without each block of the view in turn. For costs that are sums over pixels or
-  /// points it takes about as long as value_in_view(). A cost gives no blocks in any view if those of a right pose do
-  /// not all ask for this pose: then how the minimum moves without one of them says nothing about its error.
+  /// points it takes about as long as value_in_view(). A cost gives no blocks in any view if, at the right pose, single
+  /// blocks may prefer another pose. Then the motion of the minimum without a block says nothing about its error.
   struct Split {
     double value = 0;
     std::vector<double> without_block;

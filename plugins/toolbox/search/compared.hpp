@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Whether a cost has compared anything at a pose. A cost that has not is the same everywhere around, so any pose there
-// would be its minimum, known to a deviation of 0.
+// Whether a cost has compared anything at a pose. A cost that has compared nothing is the same at all poses around. Any
+// of them would pass for its minimum, with a deviation of 0.
 #include <string>
 
 #include "marrow/plugin.hpp"
@@ -17,7 +17,8 @@ void check_compared(const Cost& cost, const RigidTransform& pose, const Fragment
 [[noreturn]] void refuse_pose(const std::string& why_nothing_is_compared,
                               const std::string& which = "the pose that was found");
 
-/// Adds a warning for each view that says nothing about the pose, to the pose and to the log, unless the pose has it.
+/// Adds a warning for each view that says nothing about the pose, to the pose and to the log, unless the pose already
+/// has it.
 void warn_of_silent_views(const Cost& cost, Pose& pose, const Context& context);
 
 }  // namespace marrow::search

@@ -13,7 +13,7 @@ constexpr int kAxialRotation = 2, kAxialTranslation = 5;
 /// Motions of the start that are tried first, in degrees and mm, and the reach within which two of them are neighbours.
 struct Scan {
   std::vector<Vector6d> motions;
-  Vector6d reach;  ///< for a grid half the sides of a box, else half axes of an ellipsoid
+  Vector6d reach;  ///< half the sides of a box for a grid, else the half-axes of an ellipsoid
   bool grid = true;
 
   bool near(int a, int b) const {

@@ -13,7 +13,7 @@ namespace marrow::search {
 
 constexpr std::size_t kFewBlocks = 2;
 
-/// The blocks without which the cost is another.
+/// The blocks that change the cost when they are left out.
 inline std::set<Eigen::Index> blocks_that_speak(const Eigen::VectorXd& without_block, double whole) {
   constexpr double kRounding = 1e-9;  // relative, of sums from which those of a block are taken away
   std::set<Eigen::Index> speak;
@@ -23,7 +23,7 @@ inline std::set<Eigen::Index> blocks_that_speak(const Eigen::VectorXd& without_b
   return speak;
 }
 
-/// The same by derivatives: those that say nothing all leave the same.
+/// Their number, by derivatives: without any of the other blocks the expansion is the same.
 inline std::size_t count_of_blocks_that_speak(const std::vector<Cost::Expansion>& without_block) {
   std::map<double, int> alike;
   for (const Cost::Expansion& one : without_block) ++alike[one.curvature.sum() + one.gradient.sum()];
