@@ -204,11 +204,23 @@ Ran run(const List<View>& views, const std::filesystem::path& points, const Mesh
   return ran;
 }
 
-View view_of(const std::string& name, const Camera& camera) {
-  View view{name, {}, camera, {}};
-  view.image.pixels = cv::Mat1b(camera.height_px, camera.width_px, std::uint8_t(90));
-  view.image.pixels.row(3) = 200;
-  return view;
+/// Grey views of these cameras, named 'one' and 'two'.
+List<View> views_of(const std::vector<Camera>& cameras) {
+  List<View> views;
+  for (const Camera& camera : cameras) {
+    View view{views.empty() ? "one" : "two", {}, camera, {}};
+    view.image.pixels = cv::Mat1b(camera.height_px, camera.width_px, std::uint8_t(90));
+    view.image.pixels.row(3) = 200;
+    views.add(view.name, view);
+  }
+  return views;
+}
+
+/// Numbers as a list in YAML.
+std::string list_of(const auto& values) {
+  std::string all = "[";
+  for (const double value : values) all += (all.size() > 1 ? ", " : "") + std::to_string(value);
+  return all + "]";
 }
 
 std::string points_text(const List<View>& views, int count, bool with_places) {
@@ -216,16 +228,9 @@ std::string points_text(const List<View>& views, int count, bool with_places) {
   std::string text = "marrow-points: 1\npoints:\n";
   for (int i = 0; i < count; ++i) {
     const Vector3d& p = points.world_mm[std::size_t(i)];
-    const auto list = [](std::initializer_list<double> values) {
-      std::string all = "[";
-      for (double v : values) all += (all.size() > 1 ? ", " : "") + std::to_string(v);
-      return all + "]";
-    };
-    text += "  - {" + (with_places ? "at_mm: " + list({p.x(), p.y(), p.z()}) + ", " : std::string()) + "seen_px: {";
-    for (const View& view : views) {
-      const Vector2d at = project(view.camera, p);
-      text += (&view == &views[0] ? "" : ", ") + view.name + ": " + list({at.x(), at.y()});
-    }
+    text += "  - {" + (with_places ? "at_mm: " + list_of(p) + ", " : std::string()) + "seen_px: {";
+    for (const View& view : views)
+      text += (&view == &views[0] ? "" : ", ") + view.name + ": " + list_of(project(view.camera, p));
     text += "}}\n";
   }
   return text;
@@ -233,9 +238,7 @@ std::string points_text(const List<View>& views, int count, bool with_places) {
 
 TEST(CheckNode, RightCamerasNeedNoWarning) {
   const TemporaryFolder folder;
-  List<View> views;
-  views.add("one", view_of("one", camera_at(5, 0)));
-  views.add("two", view_of("two", camera_at(0, 80)));
+  const List<View> views = views_of({camera_at(5, 0), camera_at(0, 80)});
   for (const bool with_places : {true, false}) {
     put(folder / "points.yaml", points_text(views, 12, with_places));
     const Ran ran = run(views, folder / "points.yaml");
@@ -253,29 +256,20 @@ TEST(CheckNode, MillimetresAtTheObjectHoldForPixelsOfAnyShape) {
   for (const int axis : {0, 1}) {
     Camera right = camera_at(5, 0);
     right.intrinsics.row(1) *= 0.5;
-    List<View> views;
-    views.add("one", view_of("one", right));
-    put(folder / "points.yaml", points_text(views, 12, true));
+    put(folder / "points.yaml", points_text(views_of({right}), 12, true));
     Camera moved = right;
     moved.camera_from_world.translation_mm[axis] += 3;
-    views = {};
-    views.add("one", view_of("one", moved));
-    EXPECT_NEAR(run(views, folder / "points.yaml").value("one.mean_at_object"), 3, 0.1) << axis;
+    EXPECT_NEAR(run(views_of({moved}), folder / "points.yaml").value("one.mean_at_object"), 3, 0.1) << axis;
   }
 }
 
 TEST(CheckNode, WarnsInWords) {
   const TemporaryFolder folder;
-  List<View> right;
-  right.add("one", view_of("one", camera_at(5, 0)));
-  right.add("two", view_of("two", camera_at(0, 80)));
-  put(folder / "points.yaml", points_text(right, 12, true));
-  List<View> views;
-  views.add("one", right[0]);
-  Camera moved = right[1].camera;
+  const Camera first = camera_at(5, 0), second = camera_at(0, 80);
+  put(folder / "points.yaml", points_text(views_of({first, second}), 12, true));
+  Camera moved = second;
   moved.camera_from_world.translation_mm.x() += 5;
-  views.add("two", view_of("two", moved));
-  Ran ran = run(views, folder / "points.yaml");
+  Ran ran = run(views_of({first, moved}), folder / "points.yaml");
   ASSERT_EQ(ran.warnings.size(), 1u);
   char said[64];
   std::snprintf(said, sizeof said, "view 'two': the points are %.3g px off, but only ", ran.value("two.error"));
@@ -285,20 +279,15 @@ TEST(CheckNode, WarnsInWords) {
       << ran.warnings[0];
   EXPECT_NEAR(ran.value("two.mean_at_object"), 5, 0.4);
   EXPECT_LT(ran.value("two.error_with_free_pose"), 1e-3);
-  Camera longer = right[1].camera;
+  Camera longer = second;
   longer.intrinsics(0, 0) *= 1.05;  // not the other: no pose makes up for it
-  List<View> stretched;
-  stretched.add("one", right[0]);
-  stretched.add("two", view_of("two", longer));
-  ran = run(stretched, folder / "points.yaml");
+  ran = run(views_of({first, longer}), folder / "points.yaml");
   ASSERT_EQ(ran.warnings.size(), 1u);
   EXPECT_NE(ran.warnings[0].find(
                 "with the best pose: focal length, principal point, distortion or the points themselves are wrong"),
             std::string::npos)
       << ran.warnings[0];
-  List<View> twice;
-  twice.add("one", right[0]);
-  twice.add("two", view_of("two", right[0].camera));
+  const List<View> twice = views_of({first, first});
   put(folder / "points.yaml", points_text(twice, 12, true));
   ran = run(twice, folder / "points.yaml");
   ASSERT_EQ(ran.warnings.size(), 1u);
@@ -306,8 +295,7 @@ TEST(CheckNode, WarnsInWords) {
 }
 
 TEST(CheckNode, DrawsTheOutlineOfAMesh) {
-  List<View> views;
-  views.add("one", view_of("one", camera_at(0, 0)));
+  const List<View> views = views_of({camera_at(0, 0)});
   Mesh cube;
   cube.frame = "world";
   for (int i = 0; i < 8; ++i) cube.vertices_mm.emplace_back(i & 1 ? 30 : -30, i & 2 ? 30 : -30, i & 4 ? 30 : -30);
@@ -354,11 +342,9 @@ TEST(PointsFile, Faults) {
   EXPECT_SAYS(read(with(good, "[4, 5]", "[4]")), "point 1: seen_px: one: expected 2 numbers, got a list of 1");
   EXPECT_SAYS(read(with(good, "{one: [4, 5]}", "[4, 5]")), "expected the point's place per view");
   EXPECT_SAYS(read("marrow-points: 1\npoints: []\n"), "expected a list of points");
-  List<View> views;
-  views.add("two", view_of("two", camera_at(0, 0)));
-  put(folder / "p.yaml", good);
-  EXPECT_SAYS(run(views, folder / "p.yaml"),
-              "point 'A' is seen in 'one', but there is no view of that name; there are 'two'");
+  put(folder / "p.yaml", with(good, "one:", "two:"));
+  EXPECT_SAYS(run(views_of({camera_at(0, 0)}), folder / "p.yaml"),
+              "point 'A' is seen in 'two', but there is no view of that name; there are 'one'");
 }
 
 // Twelve metal beads in two frames of a real biplane system. Their places are triangulated from the same pixels.
@@ -380,13 +366,9 @@ TEST(CheckNode, RealWristCameras) {
     for (const auto& cluster : YAML::LoadFile(data / "beads.json")["beads"][frame])
       for (const auto& bead : cluster.second) {
         if (!bead.IsMap() || !bead["xyz_mm"].IsSequence()) continue;
-        const auto list = [](const YAML::Node& node) {
-          YAML::Emitter out;
-          out << YAML::Flow << node;
-          return std::string(out.c_str());
-        };
-        text += "  - {at_mm: " + list(bead["xyz_mm"]) + ", seen_px: {cam01: " + list(bead["uv_cam01"]) +
-                ", cam02: " + list(bead["uv_cam02"]) + "}}\n";
+        const auto list = [&](const char* key) { return YAML::Dump(bead[key]); };
+        text += "  - {at_mm: " + list("xyz_mm") + ", seen_px: {cam01: " + list("uv_cam01") +
+                ", cam02: " + list("uv_cam02") + "}}\n";
       }
     put(folder / "beads.yaml", text);
     const Ran ran = run(views, folder / "beads.yaml");
@@ -399,14 +381,9 @@ TEST(CheckNode, RealWristCameras) {
     // With mirrored pixels, both cameras get a warning.
     std::string mirrored;
     for (const auto& point : files::read_points_file(folder / "beads.yaml")) {
-      const auto list = [](const auto& values) {
-        std::string all = "[";
-        for (double v : values) all += (all.size() > 1 ? ", " : "") + std::to_string(v);
-        return all + "]";
-      };
-      mirrored += "  - {at_mm: " + list(*point.world_mm) + ", seen_px: {";
+      mirrored += "  - {at_mm: " + list_of(*point.world_mm) + ", seen_px: {";
       for (const auto& [name, at] : point.seen_px)
-        mirrored += (name == "cam01" ? "" : ", ") + name + ": " + list(Vector2d(1759 - at.x(), at.y()));
+        mirrored += (name == "cam01" ? "" : ", ") + name + ": " + list_of(Vector2d(1759 - at.x(), at.y()));
       mirrored += "}}\n";
     }
     put(folder / "beads.yaml", "marrow-points: 1\npoints:\n" + mirrored);
