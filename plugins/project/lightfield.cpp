@@ -175,7 +175,7 @@ std::shared_ptr<const marrow::RadiographProjector> lightfield(const marrow::Volu
                                                               const marrow::List<marrow::View>& views,
                                                               marrow::Context& context, const Options& options) {
   if (views.size() == 0)
-    throw marrow::Error("there is no view, so it is not known about which directions to integrate; wire 'views'");
+    throw marrow::Error("there is no view, so the directions to integrate along are not known; wire 'views'");
   for (const marrow::View& view : views) check_camera(view.camera, "view '" + view.name + "'");
   Attenuation attenuation = attenuation_of(volume, field, options);
   std::vector<Field> fields;

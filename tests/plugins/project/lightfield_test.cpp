@@ -86,7 +86,7 @@ TEST(LightField, SaysWhatIsWrong) {
       << text;
   in["views"] = {};
   EXPECT_EQ(shipped::refusal("project.lightfield", in),
-            "there is no view, so it is not known about which directions to integrate; wire 'views'");
+            "there is no view, so the directions to integrate along are not known; wire 'views'");
 }
 
 }  // namespace lightfield_test
