@@ -124,7 +124,7 @@ class RayToSurface : public marrow::match::ViewsCost {
     std::vector<Expansion> without = marrow::match::BlockExpansions::without_each(of_views, weights, 1, true);
     // The pose has the least cost without this unknown, so what all blocks have in common is the cost's own slope.
     // Where noise hides some edges, a pull of the others remains, which the common distance hides. kMore covers this
-    // pull, as measured (docs/results.md, Deviations and noise).
+    // pull, as measured (docs/results-trust.md, Deviations and noise).
     constexpr double kMore = 1.3;
     const marrow::Vector6d whole = expansion(world_from_model, frame)->gradient;
     marrow::Vector6d mean = marrow::Vector6d::Zero();

@@ -28,7 +28,7 @@ GROUPS = {
         "nailing",
         "guidance",
     ],
-    "Method": ["method", "results"],
+    "Method": ["method", "results", "results-trust", "results-parts"],
     "Development": ["plugins", "plugin-host", "architecture", "testing", "site"],
 }
 # A page of these is in the navigation if it has been written. python/index is for a reference of a Python module.
