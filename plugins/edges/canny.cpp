@@ -14,7 +14,7 @@
 
 namespace {
 
-using namespace marrow::image;
+using namespace marrow::edges;
 
 struct Options {
   double sigma_px = 1.5;

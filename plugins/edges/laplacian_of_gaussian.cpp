@@ -10,7 +10,7 @@
 
 namespace {
 
-using namespace marrow::image;
+using namespace marrow::edges;
 
 // Radius of the kernels in sigma. Shorter kernels give false zero crossings beside a steep edge.
 constexpr double kReach = 5;
@@ -62,11 +62,9 @@ marrow::EdgeMap laplacian_of_gaussian(const marrow::View& view, const ThresholdO
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  declare_threshold_options(
+  declare_thresholds(
       plugin.node("edges.laplacian_of_gaussian", laplacian_of_gaussian)
           .summary("Zero crossings of the Laplacian of a Gaussian (Marr and Hildreth 1980) with a significant gradient")
-          .in("view", "X-ray view")
-          .out("edges", "edge pixels at sub-pixel positions")
           .option("sigma_px", &ThresholdOptions::sigma_px, "standard deviation of the Gaussian", marrow::at_least(1),
                   marrow::at_most(10)));
 }

@@ -5,7 +5,7 @@
 
 namespace {
 
-using namespace marrow::image;
+using namespace marrow::edges;
 
 marrow::EdgeMap sobel(const marrow::View& view, const ThresholdOptions& options, marrow::Context& context) {
   static const Kernel kMask{{0.25f, 0.5f, 0.25f}, {-0.5f, 0, 0.5f}};
@@ -15,13 +15,7 @@ marrow::EdgeMap sobel(const marrow::View& view, const ThresholdOptions& options,
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  declare_threshold_options(
-      plugin.node("edges.sobel", sobel)
-          .summary(
-              "Sobel's mask of 3 x 3 pixels (1968) with thinning and one threshold, in multiples of the image's noise")
-          .in("view", "X-ray view")
-          .out("edges", "edge pixels at sub-pixel positions")
-          .option("sigma_px", &ThresholdOptions::sigma_px,
-                  "standard deviation of the Gaussian that smooths the image first; 0: no smoothing",
-                  marrow::at_least(0), marrow::at_most(10)));
+  declare_mask(plugin.node("edges.sobel", sobel)
+                   .summary("Sobel's mask of 3 x 3 pixels (1968) with thinning and one threshold, in multiples of the "
+                            "image's noise"));
 }

@@ -45,7 +45,7 @@ Distances distances_of(const View& view, const RigidTransform& pose, const Rigid
       throw Error("view '" + view.name + "': a target does not lie in front of the X-ray source" +
                   (project(view.camera, truth * target).allFinite()
                        ? " at the pose found"
-                       : " at the true pose; is the truth of another world frame?"));
+                       : " at the true pose; is the truth in another world frame?"));
     distances.px.push_back(apart.norm());
     const double mm = offset_at_mm(view.camera, truth * target, apart).norm();
     distances.mm.push_back(mm);

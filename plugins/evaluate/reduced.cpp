@@ -8,20 +8,14 @@ namespace {
 
 using namespace marrow;
 
-const RigidTransform& place_of(const List<Truth>& truths, const std::string& name) {
-  if (const Truth* truth = truths.find(name)) return truth->world_from_model;
-  std::string known;
-  for (const std::string& other : truths.names()) known += (known.empty() ? "" : ", ") + other;
-  throw Error("there is no exact pose of a fragment '" + name + "', only of " + known +
-              "; name both fragments with moved and reference");
-}
-
 Metrics reduced(const List<Truth>& truths, const List<Mesh>& models, const geometry::FragmentPair& options) {
-  const RigidTransform &moved = place_of(truths, options.moved), &reference = place_of(truths, options.reference);
+  const auto place_of = [&](const std::string& fragment) -> const RigidTransform& {
+    return geometry::of_fragment(truths, fragment, "exact pose").world_from_model;
+  };
+  const RigidTransform &moved = place_of(options.moved), &reference = place_of(options.reference);
   geometry::check_poses(moved, reference, "pose of '" + options.reference + "'");
-  const Mesh* model = models.find(options.moved);
-  if (!model) throw Error("there is no surface of the fragment '" + options.moved + "'");
-  const Vector6d motion = motion_between(reference, moved, fragment_frame(*model));
+  const Mesh& model = geometry::of_fragment(models, options.moved, "surface");
+  const Vector6d motion = motion_between(reference, moved, fragment_frame(model));
   return {{{"rotation_deg", degrees(geodesic_angle_rad(moved.rotation, reference.rotation)), "deg"},
            {"axial_deg", degrees(motion[2]), "deg"},
            {"translation_mm", motion.tail<3>().norm(), "mm"},

@@ -7,19 +7,11 @@
 
 namespace {
 
+using marrow::geometry::of_fragment;
+
 struct Options : marrow::geometry::FragmentPair {
   double border_mm = 3;
 };
-
-/// The item of that name. If there is none, throws an Error that lists the existing names.
-template <class T>
-const T& named(const marrow::List<T>& items, const std::string& name, const std::string& what) {
-  if (const T* item = items.find(name)) return *item;
-  std::string known;
-  for (const std::string& other : items.names()) known += (known.empty() ? "" : ", ") + other;
-  throw marrow::Error(what + ": there is none of a fragment '" + name + "', only of " + known +
-                      "; name both fragments with moved and reference");
-}
 
 /// Points on the fracture: points of the moved fragment's surface that lie within `border_mm` of the other fragment in
 /// the CT.
@@ -39,21 +31,22 @@ std::vector<Eigen::Vector3d> fracture_points(const marrow::Mesh& moved, const ma
 /// Computes the reduction from the found poses and applies it to the fragment at its true pose.
 marrow::Metrics reduction_gap(const marrow::List<marrow::Pose>& poses, const marrow::List<marrow::Truth>& truths,
                               const marrow::List<marrow::Mesh>& models, const Options& options) {
-  const marrow::Pose &moved = named(poses, options.moved, "poses"),
-                     &reference = named(poses, options.reference, "poses");
-  const marrow::RigidTransform &true_moved = named(truths, options.moved, "truths").world_from_model,
-                               &true_reference = named(truths, options.reference, "truths").world_from_model;
+  const marrow::Pose &moved = of_fragment(poses, options.moved, "pose"),
+                     &reference = of_fragment(poses, options.reference, "pose");
+  const marrow::RigidTransform &true_moved = of_fragment(truths, options.moved, "exact pose").world_from_model,
+                               &true_reference = of_fragment(truths, options.reference, "exact pose").world_from_model;
   marrow::geometry::check_poses(moved.world_from_model, true_moved);
   marrow::geometry::check_poses(reference.world_from_model, true_reference);
   const marrow::RigidTransform reduction = reference.world_from_model * marrow::inverse(moved.world_from_model);
   const marrow::RigidTransform reduced = reduction * true_moved;
-  const std::vector<Eigen::Vector3d> points_mm = fracture_points(
-      named(models, options.moved, "models"), named(models, options.reference, "models"), options.border_mm);
+  const marrow::Mesh& model = of_fragment(models, options.moved, "surface");
+  const std::vector<Eigen::Vector3d> points_mm =
+      fracture_points(model, of_fragment(models, options.reference, "surface"), options.border_mm);
   if (points_mm.empty())
     throw marrow::Error(
         "the surfaces of '" + options.moved + "' and '" + options.reference +
-        "' are nowhere within border_mm of each other; they are no two sides of a fracture, or raise border_mm");
-  const Eigen::Vector3d centre_mm = marrow::fragment_frame(named(models, options.moved, "models")).origin_mm;
+        "' are nowhere within border_mm of each other; are they the two sides of one fracture? If so, raise border_mm");
+  const Eigen::Vector3d centre_mm = marrow::fragment_frame(model).origin_mm;
   const std::vector<double> before = marrow::geometry::target_errors_mm(true_moved, true_reference, points_mm),
                             after = marrow::geometry::target_errors_mm(reduced, true_reference, points_mm);
   return {

@@ -83,7 +83,7 @@ void check_sides(const std::vector<Sight>& sights) {
   if (widest_deg < 10)
     throw marrow::Error(
         marrow::formatted("the {} views see the shaft from nearly the same side: the planes of its axis meet at {} "
-                          "degrees, where 10 are needed; use views farther apart",
+                          "degrees, but 10 are needed; use views farther apart",
                           sights.size(), angle));
 }
 
@@ -134,8 +134,8 @@ std::optional<marrow::Metrics> shaft_width(const List<ShaftLines>& lines, const 
   }
   if (sights.size() < 2) {
     context.warn(
-        "there are shaft lines of one view alone: where the bone lies between source and detector, and so its "
-        "diameter, is not known");
+        "only one view has shaft lines, so the distance of the bone from the source, and with it its diameter, is not "
+        "known");
     return std::nullopt;
   }
   const Taper bone = touching_all(sights);
@@ -145,8 +145,8 @@ std::optional<marrow::Metrics> shaft_width(const List<ShaftLines>& lines, const 
     const auto holds = [&](const Possible& one) { return width_mm >= one.least_mm && width_mm <= one.most_mm; };
     if (std::none_of(possible.begin(), possible.end(), holds))
       context.warn(
-          marrow::formatted("view '{}': the borders are {} mm apart at the depth where the views have the axis, which "
-                            "is no shaft's width ({}); one view's pair is another thing than the other's",
+          marrow::formatted("view '{}': the borders are {} mm apart at the depth of the axis, but shafts are {} wide; "
+                            "the views' pairs show different things",
                             lines.name(i), int(std::lround(width_mm)), range(possible)));
     metrics.items.push_back({lines.name(i) + "_width_mm", width_mm, "mm"});
     metrics.items.push_back({lines.name(i) + "_magnification", lines[i].width_mm / width_mm, ""});
@@ -164,8 +164,8 @@ MARROW_PLUGIN(plugin) {
       .in("lines", "borders of the shaft in each view", marrow::over("view"))
       .in("views", "X-ray views; only their cameras are used", marrow::over("view"))
       .out("metrics",
-           "for each view, the diameter in the middle of its borders, and the magnification there relative to "
-           "the depth at which the borders' own width was taken; gives a warning if no shaft has this diameter")
+           "for each view, the diameter in the middle of its borders, and the magnification there relative to the "
+           "depth at which the borders' own width was taken; gives a warning if no shaft has this diameter")
       .figures({"*_width_mm", "*_magnification"})
       .option("width_mm", &Options::width_mm,
               "mean outer diameters of the shaft, one for each direction from which the bone may be seen; empty: those "

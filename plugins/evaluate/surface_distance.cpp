@@ -23,7 +23,7 @@ struct Options {
 /// volume is positive. The volume is taken about the surface's middle, so small holes do not change its sign.
 double sign_outside(Mesh reference, const Context& context) {
   if (!is_closed(reference))
-    context.warn("the reference is no closed surface; the sign of bias_mm then is that of the nearest triangle's side");
+    context.warn("the reference is not closed, so the sign of bias_mm follows the side of the nearest triangle");
   const Eigen::Vector3d middle_mm = fragment_frame(reference).origin_mm;
   for (Eigen::Vector3d& vertex : reference.vertices_mm) vertex -= middle_mm;
   if (enclosed_volume_mm3(reference) >= 0) return 1;

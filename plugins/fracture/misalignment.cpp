@@ -41,7 +41,7 @@ Eigen::Matrix3d directions(const Eigen::Vector3d& shaft, const Options& options)
   if (!(across.norm() > kLeastSine))
     throw Error(
         "the bone's long axis runs from the patient's left to the right in the CT, so its frontal plane is not known; "
-        "give 'front' and 'up' as they are for this limb in the CT");
+        "give the 'front' and 'up' of this limb in the CT");
   axes.col(0) = across.normalized();
   axes.col(1) = axes.col(2).cross(axes.col(0));
   return axes;
@@ -57,8 +57,8 @@ Eigen::Vector3d shaft_of(const FragmentFrame& distal, const FragmentFrame& proxi
   if (apart_deg <= kMostApart_deg) return one;
   const bool takes_distal = std::abs(one.dot(options.up)) > std::abs(other.dot(options.up));
   context.warn(
-      formatted("the long axes of the two fragments differ by {:.0f} degrees in the CT, so one is too short to show "
-                "the bone's; that of the {} fragment is taken, which is nearer to 'up'",
+      formatted("the long axes of the two fragments differ by {:.0f} degrees in the CT, so one fragment is too short "
+                "to show the bone's axis; the {} one is taken, whose axis is nearer to 'up'",
                 apart_deg, takes_distal ? "distal" : "proximal"));
   return takes_distal ? one : other;
 }
@@ -76,7 +76,7 @@ Eigen::Vector3d fracture_in_ct_mm(const List<Mesh>* models, const Options& optio
     throw Error(
         "where the fracture is in the CT is not known, so there is no shift and no shortening; wire the surfaces of "
         "both fragments to 'models', or give the fracture's middle as 'fracture_mm'");
-  return geometry::middle_of_fracture_mm(*moved, options.moved, *reference, options.reference);
+  return fracture::middle_of_fracture_mm(*moved, options.moved, *reference, options.reference);
 }
 
 /// `motion`: of the distal fragment, in the CT, from its place beside the proximal one. It is split into a twist about

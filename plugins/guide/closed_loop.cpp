@@ -16,12 +16,12 @@
 namespace {
 
 using namespace marrow;
+using guide::Leg;
+using guide::RelativePose;
 using robot::GuideState;
-using robot::Leg;
-using robot::RelativePose;
 using robot::RobotReport;
 
-struct Options : geometry::FragmentPair, robot::StepLimits, robot::ApproachOptions, robot::HandEyeNoise {
+struct Options : geometry::FragmentPair, guide::StepLimits, guide::ApproachOptions, robot::HandEyeNoise {
   std::string hand_eye = "estimated";
   double astray_mm = 12;
   double reduced_deg = 0.5;
@@ -49,8 +49,8 @@ struct Remaining {
   Remaining(const RelativePose& pose, const Eigen::Vector3d& centre_mm)
       : rotation_deg(degrees(vector_from_rotation(pose.reference_from_fragment.rotation).norm())),
         shift_mm((pose.reference_from_fragment * centre_mm - centre_mm).norm()),
-        deviation_deg(degrees(robot::rotation_deviation_rad(pose.covariance))),
-        deviation_mm(robot::shift_deviation_mm(pose.covariance)) {}
+        deviation_deg(degrees(guide::rotation_deviation_rad(pose.covariance))),
+        deviation_mm(guide::shift_deviation_mm(pose.covariance)) {}
 
   std::string in_words() const {
     return shown(rotation_deg, "degrees") + " and " + shown(shift_mm, "mm") + " remain, known to " +
@@ -117,8 +117,8 @@ void learn(GuideState& state, const RigidTransform& seen, const Eigen::Vector3d&
     const robot::Move move{report.done, seen * inverse(*state.seen), *state.seen * centre_mm};
     state.moves.push_back(move);
     const RigidTransform asked = inverse(state.guess) * move.told * state.guess;
-    state.jacobian = robot::broyden(state.jacobian, robot::in_mm(robot::step_of(asked, move.centre_mm)),
-                                    robot::in_mm(robot::step_of(move.seen, move.centre_mm)));
+    state.jacobian = guide::broyden(state.jacobian, guide::in_mm(guide::step_of(asked, move.centre_mm)),
+                                    guide::in_mm(guide::step_of(move.seen, move.centre_mm)));
   }
   state.stops = report.stopped.empty() ? 0 : state.stops + 1;
   state.seen = seen;
@@ -139,9 +139,9 @@ List<Pose> predicted(const List<Pose>& poses, const List<Mesh>& models, const Ri
       in_ct.target = in_ct.source = reference.world_from_model.source;
       pose.world_from_model =
           reference.world_from_model * in_ct * inverse(reference.world_from_model) * pose.world_from_model;
-      const double unknown_rad = std::min(1.5, robot::rotation_deviation_rad(hand_eye));
+      const double unknown_rad = std::min(1.5, guide::rotation_deviation_rad(hand_eye));
       turn += step.head<3>().norm() * unknown_rad;
-      shift += step.tail<3>().norm() * unknown_rad + step.head<3>().norm() * robot::shift_deviation_mm(hand_eye);
+      shift += step.tail<3>().norm() * unknown_rad + step.head<3>().norm() * guide::shift_deviation_mm(hand_eye);
     }
     pose.covariance = (Vector6d() << Eigen::Vector3d::Constant(turn * turn), Eigen::Vector3d::Constant(shift * shift))
                           .finished()
@@ -163,8 +163,8 @@ struct Command {
 /// apart, or than `astray_mm` if this is more.
 Vector6d careful(const Vector6d& step, const Matrix6d& hand_eye, double distance_mm, double astray_mm) {
   constexpr double kArm_mm = 150;  // from the fragment's middle to the fracture
-  const double turn = step.head<3>().norm(), unknown_rad = std::min(1.5, robot::rotation_deviation_rad(hand_eye)),
-               unknown_mm = std::min(60.0, robot::shift_deviation_mm(hand_eye)),
+  const double turn = step.head<3>().norm(), unknown_rad = std::min(1.5, guide::rotation_deviation_rad(hand_eye)),
+               unknown_mm = std::min(60.0, guide::shift_deviation_mm(hand_eye)),
                astray = unknown_rad * (step.tail<3>().norm() + kArm_mm * turn) + unknown_mm * turn;
   return step * std::min(1.0, std::max(distance_mm, astray_mm) / std::max(astray, 1e-9));
 }
@@ -175,23 +175,23 @@ Command command_for(const GuideState& state, const RobotReport& report, const Le
   const robot::HandEye hand_eye = robot::estimate_hand_eye(
       options.hand_eye == "estimated" ? state.moves : std::vector<robot::Move>(), state.guess, options);
   command.hand_eye = hand_eye.covariance;
-  command.step = robot::limited_step(leg.error, options);
+  command.step = guide::limited_step(leg.error, options);
   if (options.hand_eye == "estimated")
     command.step = careful(command.step, hand_eye.covariance, distance_mm, options.astray_mm);
-  command.expected = robot::motion_of(command.step, middle_mm);
+  command.expected = guide::motion_of(command.step, middle_mm);
   Vector6d ask = command.step;
   if (options.hand_eye == "broyden") {
-    ask = robot::from_mm(robot::ask_for(state.jacobian, robot::in_mm(command.step)));
-    ask = robot::limited_step(-ask, {1, options.max_rotation_deg, options.max_shift_mm});
+    ask = guide::from_mm(guide::ask_for(state.jacobian, guide::in_mm(command.step)));
+    ask = guide::limited_step(-ask, {1, options.max_rotation_deg, options.max_shift_mm});
   }
-  command.told = robot::told_for(robot::motion_of(ask, middle_mm), hand_eye.robot_from_reference);
+  command.told = guide::told_for(guide::motion_of(ask, middle_mm), hand_eye.robot_from_reference);
   constexpr double kUnknown_deg = 45;  // of the robot's direction: a step may lead anywhere
-  const bool is_lost = degrees(robot::rotation_deviation_rad(hand_eye.covariance)) > kUnknown_deg;
+  const bool is_lost = degrees(guide::rotation_deviation_rad(hand_eye.covariance)) > kUnknown_deg;
   if (options.hand_eye == "estimated" && is_lost && report.is_pressed) {
     // Going back releases bones that were pressed together on the way here.
     command.told = inverse(state.told);
     command.expected = inverse(hand_eye.robot_from_reference) * command.told * hand_eye.robot_from_reference;
-    command.step = robot::step_of(command.expected, middle_mm);
+    command.step = guide::step_of(command.expected, middle_mm);
   }
   return command;
 }
@@ -200,13 +200,11 @@ Result closed_loop(const List<Pose>& poses, const GuideState& before, const Robo
                    const List<SignedField>& fields, const List<Mesh>& models, const List<Verdict>* verdicts,
                    const List<View>* views, const Options& options, Context& context) {
   const auto [moved, reference] = geometry::poses_of_pair(poses, options, &models);
-  const auto part_of = [](const auto& list, const std::string& name, const std::string& what) -> const auto& {
-    if (const auto* item = list.find(name)) return *item;
-    throw Error("there is no " + what + " of the fragment '" + name + "'; give those of both fragments");
+  const auto bone = [&](const std::string& fragment) -> guide::Gap::Bone {
+    return {geometry::of_fragment(models, fragment, "surface"), geometry::of_fragment(fields, fragment, "field")};
   };
-  const robot::Gap gap(part_of(models, options.moved, "surface"), part_of(fields, options.moved, "field"),
-                       part_of(models, options.reference, "surface"), part_of(fields, options.reference, "field"));
-  const RelativePose relative = robot::relative_pose(moved, reference);
+  const guide::Gap gap(bone(options.moved), bone(options.reference));
+  const RelativePose relative = guide::relative_pose(moved, reference);
   const RigidTransform& seen = relative.reference_from_fragment;
   const Eigen::Vector3d centre_mm = moved.frame.origin_mm, middle_mm = seen * centre_mm;
   Result result;
@@ -228,8 +226,8 @@ Result closed_loop(const List<Pose>& poses, const GuideState& before, const Robo
   Command command;
   if (!result.stop.stops) {
     constexpr double kBack_mm = 4;  // after bones have touched
-    const Leg leg = report.is_pressed ? robot::leg_apart(moved.frame, reference.frame, kBack_mm)
-                                      : robot::next_leg(gap, seen, moved.frame, reference.frame, options);
+    const Leg leg = report.is_pressed ? guide::leg_apart(moved.frame, reference.frame, kBack_mm)
+                                      : guide::next_leg(gap, seen, moved.frame, reference.frame, options);
     command = command_for(state, report, leg, middle_mm, gap.distance_mm(seen), options);
     state.told = command.told;
     result.stop.reason = leg.stage + ": " + result.stop.reason;
@@ -247,7 +245,7 @@ Result closed_loop(const List<Pose>& poses, const GuideState& before, const Robo
       {"distance_mm", gap.distance_mm(seen), "mm"},
       {"step_deg", degrees(command.step.head<3>().norm()), "deg"},
       {"step_mm", command.step.tail<3>().norm(), "mm"},
-      {"robot_known_to_deg", degrees(robot::rotation_deviation_rad(command.hand_eye)), "deg"},
+      {"robot_known_to_deg", degrees(guide::rotation_deviation_rad(command.hand_eye)), "deg"},
       {"reduced", double(result.stop.stops && result.stop.reason.starts_with("the fracture is reduced")), ""}};
   return result;
 }

@@ -86,7 +86,7 @@ Result open_loop(const List<Pose>& poses, const List<Pose>& hands, const List<Po
   const Eigen::Vector3d middle = moved.world_from_model * moved.frame.origin_mm;
   const double turn = degrees(vector_from_rotation(wanted.rotation).norm()), shift = (wanted * middle - middle).norm();
   const Matrix6d left = robot::left_by(wanted, place.covariance, wanted * middle);
-  const double left_deg = degrees(robot::rotation_deviation_rad(left)), left_mm = robot::shift_deviation_mm(left);
+  const double left_deg = degrees(guide::rotation_deviation_rad(left)), left_mm = guide::shift_deviation_mm(left);
   check_left(left_deg, left_mm, options);
   result.metrics.items = {{"step_deg", turn, "deg"},
                           {"step_mm", shift, "mm"},

@@ -15,7 +15,7 @@
 namespace {
 
 using namespace marrow;
-using geometry::Sight;
+using initial::Sight;
 
 struct Options {
   double noise_px = 1;
@@ -53,7 +53,7 @@ void check_enough(const std::vector<Sight>& sights) {
   }
   const std::size_t least = views.size() > 1 ? 3 : 4;
   if (names.size() < least)
-    throw Error(formatted("{} landmarks are seen in {}; a pose takes three that are seen in two views, or four in one",
+    throw Error(formatted("{} landmarks are seen in {}; a pose needs three that are seen in two views, or four in one",
                           names.size(), counted(views.size(), "view")));
   geometry::check_spread(points, "the landmarks that are seen");
 }
@@ -121,7 +121,7 @@ struct Candidate {
 /// The minima found from the starts, the lowest first.
 std::vector<Candidate> minima(const std::vector<Sight>& sights, const FragmentFrame& frame) {
   std::vector<Candidate> found;
-  for (const RigidTransform& start : geometry::pose_starts(sights)) {
+  for (const RigidTransform& start : initial::pose_starts(sights)) {
     const RigidTransform pose = refined(sights, start, frame);
     if (const double squares = squares_px(sights, pose); std::isfinite(squares)) found.push_back({pose, squares});
   }
@@ -156,7 +156,7 @@ std::string residual_warning(const std::vector<Sight>& sights, const Pose& pose,
     largest = off;
   }
   return formatted(
-      "the landmarks are seen {:.3g} px from where this pose has them, '{}' in view '{}' {:.3g} px, where {:.3g} px "
+      "the landmarks are {:.3g} px away from where this pose shows them ('{}' in view '{}' {:.3g} px), but {:.3g} px "
       "were expected; are two names exchanged, or is a camera wrong?",
       pose.cost, worst->name, worst->view, largest, noise_px);
 }

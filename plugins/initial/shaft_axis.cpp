@@ -18,7 +18,7 @@
 
 namespace {
 
-using namespace marrow::shaft;
+using namespace marrow::initial;
 using marrow::Camera, marrow::List, marrow::Mesh, marrow::Plane, marrow::Pose, marrow::RigidTransform,
     marrow::ShaftLines, marrow::View;
 
@@ -88,8 +88,8 @@ ShaftLines lines_of_model(const Mesh& model, const Pose& start, const Camera& ca
     if (std::abs(width - borders->width_px) < kWidthTolerance * borders->width_px) return lines;
   }
   throw marrow::Error("view '" + view +
-                      "': where the image shows the shaft, the model at its start does not appear, nor does another "
-                      "pair of lines fit it; give a start nearer to the bone");
+                      "': the model at its start is not where the image shows the shaft, and no other pair of lines "
+                      "fits it; give a start nearer to the bone");
 }
 
 std::vector<Sight> sights_of(const Mesh& model, const Pose& start, const List<ShaftLines>& lines,
@@ -121,9 +121,9 @@ std::vector<ModelBorders> borders_of(const Mesh& model, const Pose& pose, const 
   std::vector<ModelBorders> borders;
   for (std::size_t i = 0; i < sights.size(); ++i) {
     if (!found[i])
-      throw marrow::Error("view '" + sights[i].name +
-                          "': where the image shows the shaft, the model at its start does not appear; give a start "
-                          "nearer to the bone");
+      throw marrow::Error(
+          "view '" + sights[i].name +
+          "': the model at its start is not where the image shows the shaft; give a start nearer to the bone");
     borders.push_back(std::move(*found[i]));
   }
   return borders;

@@ -122,8 +122,8 @@ void warn_of_residuals(Pose& pose, const Markers& markers, Context& context) {
       pose.cost, ratio, degrees(std::sqrt((*pose.covariance)(2, 2)))));
   if (ratio <= kMost) return;
   pose.warnings.push_back(
-      formatted("the markers do not keep their places to each other: they are off by {:.3g} times what noise_mm says, "
-                "'{}' by {:.3g} mm; are two names exchanged, or did a marker move?",
+      formatted("the markers have moved relative to each other: they are off by {:.3g} times what noise_mm says, '{}' "
+                "by {:.3g} mm; are two names exchanged, or did a marker move?",
                 ratio, farthest, largest));
   context.warn(pose.warnings.back());
 }

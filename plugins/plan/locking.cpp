@@ -59,8 +59,8 @@ void predict(const Pose& pose, const Hole& hole, LockingPlan::Drill& drill) {
                  of_shift = shift * *pose.covariance * shift.transpose();
   drill.deviation_deg = degrees(std::sqrt(std::max(0.0, of_turn.trace())));
   drill.deviation_mm = std::sqrt(std::max(0.0, of_shift.trace()));
-  drill.most_deg = degrees(geometry::length_quantile(of_turn, kMost));
-  drill.most_mm = geometry::length_quantile(of_shift, kMost);
+  drill.most_deg = degrees(plan::length_quantile(of_turn, kMost));
+  drill.most_mm = plan::length_quantile(of_shift, kMost);
 }
 
 /// The C-arm turned so that the ray through the hole's centre runs along its axis. With the viewing direction w, the

@@ -87,7 +87,7 @@ Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose
     context.warn(
         formatted("the cameras still moved after {} iterations; raise max_iterations", options.max_iterations));
   const std::string text = formatted(
-      "the cameras are off against each other by about {:.3g} times what the options expect", refinement.scale());
+      "the cameras are off relative to each other by about {:.3g} times what the options expect", refinement.scale());
   context.info(text);
   Result result;
   for (std::size_t v = 0; v < views.size(); ++v) {

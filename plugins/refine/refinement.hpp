@@ -143,7 +143,7 @@ class Refinement {
       expand(scale == 1);
       all.push_back({scale, converged, evidence(), state_, models_, root_of_inverse(equations().first)});
       const std::string text =
-          formatted("cameras off against each other by {:g} times what is expected: log evidence {:.4g}", scale,
+          formatted("cameras off relative to each other by {:g} times what is expected: log evidence {:.4g}", scale,
                     all.back().evidence);
       context.debug(text);
     }

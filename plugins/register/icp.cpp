@@ -31,7 +31,7 @@ void check_frames(const Pose& initial, const Mesh& model, const Mesh& target) {
   check_mesh(target, "target");
   if (model.frame != initial.world_from_model.source)
     throw Error("the model is in the frame '" + model.frame + "', but the pose to start from takes points in '" +
-                initial.world_from_model.source + "'; give the model that the start is of");
+                initial.world_from_model.source + "'; give the model of this start");
   if (target.frame != initial.world_from_model.target)
     throw Error("the target is in the frame '" + target.frame + "', but the pose to start from leads to '" +
                 initial.world_from_model.target + "'; the target is a surface in the world");
@@ -41,7 +41,8 @@ std::string percent(std::size_t part, std::size_t whole) {
   return formatted("{:.0f} %", 100 * double(part) / double(whole));
 }
 
-void add_warnings(const marrow::match::Result& found, const Options& options, Pose& pose, const Context& context) {
+void add_warnings(const marrow::closest_points::Result& found, const Options& options, Pose& pose,
+                  const Context& context) {
   if (!found.converged)
     pose.warnings.push_back(formatted("the pairs of points still changed after {} iterations; raise max_iterations",
                                       options.max_iterations));
@@ -62,7 +63,8 @@ Result icp(const Pose& initial, const Mesh& model, const Mesh& target, const Opt
   for (Eigen::Vector3d& point : points) point = initial.world_from_model * point - middle;
   for (Eigen::Vector3d& point : goal) point -= middle;
   context.check_cancelled();
-  const marrow::match::Result found = marrow::match::align(points, goal, {options.max_iterations, options.reach_mm});
+  const marrow::closest_points::Result found =
+      marrow::closest_points::align(points, goal, {options.max_iterations, options.reach_mm});
   if (found.paired < 3)
     throw Error(
         formatted("{} of {} points of the model have one of the target within {} mm, but three at least are needed; "

@@ -29,7 +29,7 @@ class Held {
   }
 
  private:
-  phantom::Contact contact_;
+  robot::Contact contact_;
   SoftTissue tissue_;
   const phantom::Fragment& moved_;
   const phantom::Fragment& reference_;

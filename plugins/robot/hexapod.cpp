@@ -5,6 +5,7 @@
 #include "held.hpp"
 
 #include "marrow/base/number_text.hpp"
+#include "marrow/toolbox/robotics/hexapod_options.hpp"
 
 namespace {
 
@@ -80,23 +81,14 @@ Result hexapod(const phantom::Phantom& phantom, const Options& options, Context&
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.node("robot.hexapod", hexapod)
-      .summary("A hexapod grips the distal fragment; its place, its joints and the soft tissue are not known exactly")
+  auto node = plugin.node("robot.hexapod", hexapod);
+  node.summary("A hexapod grips the distal fragment; its place, its joints and the soft tissue are not known exactly")
       .in("phantom", "fractured bone")
       .out("state", &Result::state, "the robot, with what only the simulation knows")
       .out("report", &Result::report, "what the robot says: its place as planned, and the load")
       .option("moved", &Options::moved, "name of the fragment that it holds: the distal one")
-      .option("reference", &Options::reference, "name of the fragment that stays: the proximal one")
-      .option("base_radius_mm", &Options::base_radius_mm, "radius of the circle of the base's joints", at_least(1))
-      .option("platform_radius_mm", &Options::platform_radius_mm, "the same of the platform", at_least(1))
-      .option("base_gap_deg", &Options::base_gap_deg, "angle between the two joints of a pair of the base", at_least(0),
-              at_most(119))
-      .option("platform_gap_deg", &Options::platform_gap_deg, "the same of the platform", at_least(0), at_most(119))
-      .option("height_mm", &Options::height_mm, "height of the platform's joints above the base's at home", at_least(1))
-      .option("stroke_mm", &Options::stroke_mm, "how far a leg's length may differ from that at home, to either side",
-              at_least(0))
-      .option("joint_deg", &Options::joint_deg, "how far a leg may turn in its joints from its direction at home",
-              at_least(0), at_most(90))
+      .option("reference", &Options::reference, "name of the fragment that stays: the proximal one");
+  robot::declare_hexapod<Options>(node)
       .option("held_at_mm", &Options::held_at_mm, "distance from the platform's middle to the fragment's", at_least(0))
       .option("stand_off_deg", &Options::stand_off_deg,
               "how far the robot is turned from where it is planned to stand, about the fragment's middle")

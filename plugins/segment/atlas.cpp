@@ -18,14 +18,9 @@
 
 namespace {
 
+using namespace marrow;
+
 using Eigen::Vector3d;
-using marrow::Context;
-using marrow::Grid;
-using marrow::List;
-using marrow::Mesh;
-using marrow::Seeds;
-using marrow::SignedField;
-using marrow::Volume;
 using Map = Eigen::Affine3d;
 
 struct Options {
@@ -43,11 +38,11 @@ constexpr double kReach_mm = 40;  // largest distance to the bone for which clos
 class Target {
  public:
   Target(const Volume& volume, const std::vector<std::vector<Vector3d>>& seeds, double floor_hu) : volume_(volume) {
-    auto owner = marrow::field::race(volume, seeds, {.floor_hu = floor_hu});
+    auto owner = segment::race(volume, seeds, {.floor_hu = floor_hu});
     for (auto& one : owner)
-      if (one != marrow::field::kNobody) one = 0;
-    const marrow::field::Mask mask = marrow::field::solid(volume.grid, owner, 0, 4);
-    field_.grid = marrow::field::grid_of(volume.grid, mask);
+      if (one != segment::kNobody) one = 0;
+    const segment::Mask mask = segment::solid(volume.grid, owner, 0, 4);
+    field_.grid = segment::grid_of(volume.grid, mask);
     const float half_voxel_mm = float(volume.grid.spacing_mm.minCoeff() / 2);
     for (const std::uint8_t inside : mask.is_inside)
       field_.values_mm.push_back(inside ? -half_voxel_mm : half_voxel_mm);
@@ -56,7 +51,7 @@ class Target {
         for (int x = 0; x < mask.size[0]; ++x)
           if (mask.is_inside[field_.grid.offset(x, y, z)])
             points_mm_.push_back(field_.grid.point_from_index(Vector3d(x, y, z)));
-    marrow::field::march_distances(field_.grid, field_.values_mm, kReach_mm);
+    field::march_distances(field_.grid, field_.values_mm, kReach_mm);
   }
   /// The closest point of the bone's surface, within kReach_mm. `at_edge`: the point is moved to the steepest descent
   /// of the CT, because the fronts end a little outside the bone.
@@ -66,11 +61,11 @@ class Target {
     for (int k = 0; k < 3; ++k) index[k] = std::clamp(index[k], 0.0, double(grid.size[k] - 1));
     for (int k = 0; k < 3; ++k) {
       const Vector3d step = Vector3d::Unit(k);
-      slope[k] = (marrow::sample_trilinear(grid, field_.values_mm, index + step) -
-                  marrow::sample_trilinear(grid, field_.values_mm, index - step)) /
+      slope[k] = (sample_trilinear(grid, field_.values_mm, index + step) -
+                  sample_trilinear(grid, field_.values_mm, index - step)) /
                  (2 * grid.spacing_mm[k]);
     }
-    const double distance = marrow::sample_trilinear(grid, field_.values_mm, index);
+    const double distance = sample_trilinear(grid, field_.values_mm, index);
     const Vector3d outward = grid.direction * slope.normalized(),
                    closest = grid.point_from_index(index) - distance * outward;
     return at_edge ? steepest(closest, outward) : closest;
@@ -83,7 +78,7 @@ class Target {
     const auto hu = [&](int step) {
       Vector3d index = volume_.grid.index_from_point(point + step * kStep_mm * outward);
       for (int k = 0; k < 3; ++k) index[k] = std::clamp(index[k], 0.0, double(volume_.grid.size[k] - 1));
-      return marrow::sample_trilinear(volume_.grid, volume_.values, index);
+      return sample_trilinear(volume_.grid, volume_.values, index);
     };
     double most = 0;
     int where = 0;
@@ -109,7 +104,7 @@ Moments moments_of(double volume, const Vector3d& first, const Eigen::Matrix3d& 
   Moments moments;
   moments.centre = first / volume;
   const Eigen::Matrix3d spread = second / volume - moments.centre * moments.centre.transpose();
-  const marrow::SymmetricEigen<3> eigen = marrow::eigen_of_symmetric(spread);
+  const SymmetricEigen<3> eigen = eigen_of_symmetric(spread);
   moments.axes = eigen.vectors;
   if (moments.axes.determinant() < 0) moments.axes.col(0) *= -1;
   moments.size = std::sqrt(spread.trace());
@@ -228,13 +223,12 @@ SignedField part_of(const SignedField& whole, const List<Seeds>& seeds, std::siz
 
 List<SignedField> atlas(const Volume& volume, const List<Seeds>& seeds, const Mesh& whole, const Options& options,
                         Context& context) {
-  marrow::check_volume(volume, "volume");
-  marrow::check_mesh(whole, "template");
-  if (!marrow::is_closed(whole))
-    throw marrow::Error("template: a closed surface expected, got one with holes; its inside is not defined");
-  if (std::abs(marrow::enclosed_volume_mm3(whole)) < 1)
-    throw marrow::Error("template: it encloses less than 1 mm^3; is it in mm?");
-  const Target target(volume, marrow::field::seed_indices(volume, seeds, options.floor_hu), options.floor_hu);
+  check_volume(volume, "volume");
+  check_mesh(whole, "template");
+  if (!is_closed(whole))
+    throw Error("template: a closed surface expected, got one with holes; its inside is not defined");
+  if (std::abs(enclosed_volume_mm3(whole)) < 1) throw Error("template: it encloses less than 1 mm^3; is it in mm?");
+  const Target target(volume, segment::seed_indices(volume, seeds, options.floor_hu), options.floor_hu);
   std::vector<Vector3d> vertices;
   const std::size_t step = std::max<std::size_t>(1, whole.vertices_mm.size() / 4000);
   for (std::size_t i = 0; i < whole.vertices_mm.size(); i += step) vertices.push_back(whole.vertices_mm[i]);
@@ -246,12 +240,12 @@ List<SignedField> atlas(const Volume& volume, const List<Seeds>& seeds, const Me
     if (distance_mm < least_mm) least_mm = distance_mm, best = map;
   }
   least_mm = fit(target, vertices, options.keep_fraction, true, options.affine, options.iterations, best);
-  const std::string line = marrow::formatted("the template lies {:.2f} mm from the bone on average, scaled by {:.3f}",
-                                             least_mm, std::cbrt(best.linear().determinant()));
+  const std::string line = formatted("the template lies {:.2f} mm from the bone on average, scaled by {:.3f}", least_mm,
+                                     std::cbrt(best.linear().determinant()));
   context.debug(line);
   Mesh moved = whole;
   for (Vector3d& vertex : moved.vertices_mm) vertex = best * vertex;
-  const SignedField field = marrow::field::field_of_mesh(volume.grid, moved, options.band_mm);
+  const SignedField field = field::field_of_mesh(volume.grid, moved, options.band_mm);
   std::vector<SignedField> fields;
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     if (!seeds[f].wanted) continue;
@@ -260,10 +254,10 @@ List<SignedField> atlas(const Volume& volume, const List<Seeds>& seeds, const Me
       value = std::clamp(value, -float(options.band_mm), float(options.band_mm));
     if (std::none_of(fields.back().values_mm.begin(), fields.back().values_mm.end(),
                      [](float value) { return value < 0; }))
-      throw marrow::Error("fragment '" + seeds.name(f) +
-                          "': the template does not reach it; give a template of this bone, or place it closer");
+      throw Error("fragment '" + seeds.name(f) +
+                  "': the template does not reach it; give a template of this bone, or place it closer");
   }
-  return marrow::field::list_of(seeds, std::move(fields));
+  return segment::list_of(seeds, std::move(fields));
 }
 
 }  // namespace
@@ -272,19 +266,16 @@ MARROW_PLUGIN(plugin) {
   plugin.node("segment.atlas", atlas)
       .summary("Fits the surface of a whole bone to the bone in the CT; it cannot represent a fracture")
       .in("volume", "CT in Hounsfield units")
-      .in("seeds", "points inside each fragment", marrow::over("fragment"))
+      .in("seeds", "points inside each fragment", over("fragment"))
       .in("template", "closed surface of a whole bone of this kind, in mm; it may lie anywhere")
-      .out("field", "signed distance to the moved template, cut halfway between the fragments' seeds",
-           marrow::over("fragment"))
+      .out("field", "signed distance to the moved template, cut halfway between the fragments' seeds", over("fragment"))
       .option("floor_hu", &Options::floor_hu,
               "voxels below this value are not bone; the mean of the voxels around a seed must not be below it",
-              marrow::unit("HU"))
+              unit("HU"))
       .option("affine", &Options::affine, "end with an affine map instead of a similarity")
       .option("iterations", &Options::iterations, "iterations of closest points from each of the five starts",
-              marrow::at_least(1))
+              at_least(1))
       .option("keep_fraction", &Options::keep_fraction,
-              "fraction of the template's points to use, those with the smallest distances", marrow::at_least(0.3),
-              marrow::at_most(1))
-      .option("band_mm", &Options::band_mm, "larger distances are clamped to this", marrow::at_least(1),
-              marrow::at_most(50));
+              "fraction of the template's points to use, those with the smallest distances", at_least(0.3), at_most(1))
+      .option("band_mm", &Options::band_mm, "larger distances are clamped to this", at_least(1), at_most(50));
 }

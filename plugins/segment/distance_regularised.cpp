@@ -18,12 +18,7 @@
 
 namespace {
 
-using marrow::Context;
-using marrow::Grid;
-using marrow::List;
-using marrow::Seeds;
-using marrow::SignedField;
-using marrow::Volume;
+using namespace marrow;
 
 struct Options {
   double floor_hu = 150;
@@ -53,7 +48,7 @@ float dirac(float value) {
 /// phi of one fragment in a box around it, in units of the finest voxel spacing.
 class Evolution {
  public:
-  Evolution(const Volume& volume, const marrow::field::Mask& mask, const std::vector<std::uint8_t>& owner,
+  Evolution(const Volume& volume, const segment::Mask& mask, const std::vector<std::uint8_t>& owner,
             std::uint8_t fragment, const Options& options)
       : options_(options), size_(mask.size), phi_(mask.is_inside.size()), is_foreign_(mask.is_inside.size()) {
     const Grid& grid = volume.grid;
@@ -66,9 +61,9 @@ class Evolution {
           const std::size_t at = std::size_t(z) * steps_[2] + std::size_t(y) * steps_[1] + std::size_t(x);
           const std::uint8_t here = owner[grid.offset(mask.first[0] + x, mask.first[1] + y, mask.first[2] + z)];
           phi_[at] = mask.is_inside[at] ? -kStart : kStart;
-          is_foreign_[at] = here != fragment && here != marrow::field::kNobody;
+          is_foreign_[at] = here != fragment && here != segment::kNobody;
         }
-    make_indicator(marrow::field::cut_out(volume, mask), grid.spacing_mm);
+    make_indicator(segment::cut_out(volume, mask), grid.spacing_mm);
   }
 
   void run(Context& context) {
@@ -193,29 +188,25 @@ class Evolution {
 
 List<SignedField> distance_regularised(const Volume& volume, const List<Seeds>& seeds, const Options& options,
                                        Context& context) {
-  marrow::check_volume(volume, "volume");
-  const auto owner = marrow::field::race(volume, marrow::field::seed_indices(volume, seeds, options.floor_hu),
-                                         {.floor_hu = options.floor_hu});
+  check_volume(volume, "volume");
+  const auto owner =
+      segment::race(volume, segment::seed_indices(volume, seeds, options.floor_hu), {.floor_hu = options.floor_hu});
   std::vector<SignedField> fields;
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     context.progress(double(f) / double(seeds.size()), seeds.name(f));
-    const marrow::field::Mask mask = marrow::field::solid(volume.grid, owner, std::uint8_t(f),
-                                                          marrow::field::margin(volume.grid, options.band_mm) + kReach);
-    if (mask.empty())
-      throw marrow::Error("seeds of fragment '" + seeds.name(f) +
-                          "': all of them lie where another fragment's seeds are; move them into this fragment's bone");
+    const segment::Mask mask =
+        segment::solid_of(volume.grid, owner, seeds, f, segment::margin(volume.grid, options.band_mm) + kReach);
     if (!seeds[f].wanted) continue;
     Evolution evolution(volume, mask, owner, std::uint8_t(f), options);
     evolution.run(context);
     std::vector<float> values = evolution.phi();
     for (float& value : values) value *= float(volume.grid.spacing_mm.minCoeff());
     if (std::none_of(values.begin(), values.end(), [](float value) { return value < 0; }))
-      throw marrow::Error("fragment '" + seeds.name(f) +
-                          "': its level set vanished; take fewer steps, or a lower area weight");
-    marrow::field::march_distances(marrow::field::grid_of(volume.grid, mask), values, options.band_mm);
-    fields.push_back(marrow::field::paste(volume.grid, mask, values, float(options.band_mm)));
+      throw Error("fragment '" + seeds.name(f) + "': its level set vanished; take fewer steps, or a lower area weight");
+    field::march_distances(segment::grid_of(volume.grid, mask), values, options.band_mm);
+    fields.push_back(segment::paste(volume.grid, mask, values, float(options.band_mm)));
   }
-  return marrow::field::list_of(seeds, std::move(fields));
+  return segment::list_of(seeds, std::move(fields));
 }
 
 }  // namespace
@@ -224,25 +215,24 @@ MARROW_PLUGIN(plugin) {
   plugin.node("segment.distance_regularised", distance_regularised)
       .summary("Level set with distance regularisation (DRLSE: Li et al. 2010), without re-initialisation")
       .in("volume", "CT in Hounsfield units")
-      .in("seeds", "points inside each fragment", marrow::over("fragment"))
-      .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
+      .in("seeds", "points inside each fragment", over("fragment"))
+      .out("field", "signed distance to the outer surface of each wanted fragment", over("fragment"))
       .option("floor_hu", &Options::floor_hu,
               "the front from the seeds does not enter voxels below this value; the mean of the voxels around a seed "
               "must not be below it",
-              marrow::unit("HU"))
+              unit("HU"))
       .option("sigma_mm", &Options::sigma_mm,
-              "standard deviation of the Gaussian that smooths the CT before its gradient is taken",
-              marrow::at_least(0.1), marrow::at_most(5))
-      .option("edge_hu_per_mm", &Options::edge_hu_per_mm, "K: at this gradient of the CT, g is 1/2",
-              marrow::at_least(1), marrow::unit("HU/mm"))
-      .option("regularity", &Options::regularity, "mu: weight of the distance regularisation", marrow::at_least(0.01),
-              marrow::at_most(0.16))
+              "standard deviation of the Gaussian that smooths the CT before its gradient is taken", at_least(0.1),
+              at_most(5))
+      .option("edge_hu_per_mm", &Options::edge_hu_per_mm, "K: at this gradient of the CT, g is 1/2", at_least(1),
+              unit("HU/mm"))
+      .option("regularity", &Options::regularity, "mu: weight of the distance regularisation", at_least(0.01),
+              at_most(0.16))
       .option("length", &Options::length,
-              "lambda: weight of the length term, which smooths the surface and draws it to edges", marrow::at_least(0),
-              marrow::at_most(5))
+              "lambda: weight of the length term, which smooths the surface and draws it to edges", at_least(0),
+              at_most(5))
       .option("area", &Options::area, "alpha: weight of the area term; positive shrinks the body, negative expands it",
-              marrow::at_least(-2), marrow::at_most(2))
-      .option("iterations", &Options::iterations, "number of time steps", marrow::at_least(0))
-      .option("band_mm", &Options::band_mm, "larger distances are clamped to this", marrow::at_least(1),
-              marrow::at_most(50));
+              at_least(-2), at_most(2))
+      .option("iterations", &Options::iterations, "number of time steps", at_least(0))
+      .option("band_mm", &Options::band_mm, "larger distances are clamped to this", at_least(1), at_most(50));
 }

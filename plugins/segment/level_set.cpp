@@ -12,15 +12,10 @@
 
 namespace {
 
-using marrow::Context;
-using marrow::formatted;
-using marrow::List;
-using marrow::Seeds;
-using marrow::SignedField;
-using marrow::Volume;
-using marrow::field::EdgeProfile;
-using marrow::field::Force;
-using marrow::field::Front;
+using namespace marrow;
+using segment::EdgeProfile;
+using segment::Force;
+using segment::Front;
 
 struct Options {
   double band_voxels = 5;
@@ -48,18 +43,15 @@ void keep_all_apart(std::vector<Front>& fronts) {
 }
 
 std::vector<Front> begin(const Volume& volume, const List<Seeds>& seeds, const Options& options, Context& context) {
-  const auto indices = marrow::field::seed_indices(volume, seeds, options.floor_hu);
+  const auto indices = segment::seed_indices(volume, seeds, options.floor_hu);
   context.progress(0, "racing");
-  const auto owner = marrow::field::race(
-      volume, indices, {options.sigma_mm, options.cleft_mm, options.cleft_fraction, options.floor_hu});
+  const auto owner =
+      segment::race(volume, indices, {options.sigma_mm, options.cleft_mm, options.cleft_fraction, options.floor_hu});
   std::vector<Front> fronts;
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     context.check_cancelled();
     context.progress(0.3 + 0.2 * double(f) / double(seeds.size()), "filling");
-    const marrow::field::Mask mask = marrow::field::solid(volume.grid, owner, std::uint8_t(f));
-    if (mask.empty())
-      throw marrow::Error("seeds of fragment '" + seeds.name(f) +
-                          "': all of them lie where another fragment's seeds are; move them into this fragment's bone");
+    const segment::Mask mask = segment::solid_of(volume.grid, owner, seeds, f);
     fronts.emplace_back(volume.grid, options.band_voxels * volume.grid.spacing_mm[0], mask);
   }
   return fronts;
@@ -114,11 +106,11 @@ void move(const Volume& volume, const List<Seeds>& seeds, const Options& options
 }
 
 void check(const Volume& volume) {
-  marrow::check_volume(volume, "volume");
+  check_volume(volume, "volume");
   for (int size : volume.grid.size)
     if (size < 4)
-      throw marrow::Error(formatted("volume: at least 4 voxels along each axis expected, got {} x {} x {}",
-                                    volume.grid.size[0], volume.grid.size[1], volume.grid.size[2]));
+      throw Error(formatted("volume: at least 4 voxels along each axis expected, got {} x {} x {}", volume.grid.size[0],
+                            volume.grid.size[1], volume.grid.size[2]));
 }
 
 List<SignedField> level_set_fields(const Volume& volume, const List<Seeds>& seeds, const Options& options,
@@ -130,14 +122,14 @@ List<SignedField> level_set_fields(const Volume& volume, const List<Seeds>& seed
   List<SignedField> fields;
   for (std::size_t f = 0; f < fronts.size(); ++f) {
     if (fronts[f].has_vanished())
-      throw marrow::Error("fragment '" + seeds.name(f) +
-                          "': the front vanished, as its seeds lie too close to the edge of "
-                          "the bone; move them towards the middle of the cortical or spongy bone");
+      throw Error("fragment '" + seeds.name(f) +
+                  "': the front vanished, as its seeds lie too close to the edge of "
+                  "the bone; move them towards the middle of the cortical or spongy bone");
     if (!seeds[f].wanted) continue;
     fronts[f].finish();
     fields.add(seeds.name(f), SignedField{volume.grid, fronts[f].values_mm()});
   }
-  if (fields.empty()) throw marrow::Error("seeds: no fragment is wanted; set wanted: true for at least one");
+  if (fields.empty()) throw Error("seeds: no fragment is wanted; set wanted: true for at least one");
   return fields;
 }
 
@@ -147,38 +139,35 @@ MARROW_PLUGIN(plugin) {
   plugin.node("segment.level_set", level_set_fields)
       .summary("3D narrow-band level set whose fronts are drawn to the CT's edges along their normals")
       .in("volume", "CT in Hounsfield units")
-      .in("seeds", "points inside each fragment", marrow::over("fragment"))
-      .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
+      .in("seeds", "points inside each fragment", over("fragment"))
+      .out("field", "signed distance to the outer surface of each wanted fragment", over("fragment"))
       .option("band_voxels", &Options::band_voxels, "half the width of the narrow band, in in-plane voxels",
-              marrow::at_least(3), marrow::at_most(20), marrow::unit("voxels"))
+              at_least(3), at_most(20), unit("voxels"))
       .option("sigma_mm", &Options::sigma_mm,
               "standard deviation of the Gaussian that smooths the CT for the first expansion from the seeds",
-              marrow::at_least(0.1), marrow::at_most(5))
-      .option("cleft_mm", &Options::cleft_mm, "widest dark cleft that slows the first expansion", marrow::at_least(0.5),
-              marrow::at_most(10))
+              at_least(0.1), at_most(5))
+      .option("cleft_mm", &Options::cleft_mm, "widest dark cleft that slows the first expansion", at_least(0.5),
+              at_most(10))
       .option("cleft_fraction", &Options::cleft_fraction,
               "a cleft that is darker than its walls by this fraction of their value slows the first expansion e times",
-              marrow::at_least(0.02), marrow::at_most(1))
+              at_least(0.02), at_most(1))
       .option(
           "floor_hu", &Options::floor_hu,
           "no front advances into voxels below this value; the mean of the voxels around a seed must not be below it",
-          marrow::unit("HU"))
+          unit("HU"))
       .option("propagation", &Options::propagation, "F0: speed at which a front expands if no edge stops it",
-              marrow::at_least(0), marrow::at_most(1))
-      .option("edge_hu", &Options::edge_hu, "K: drop of the CT's value at an edge that halves the speed",
-              marrow::at_least(1), marrow::unit("HU"))
+              at_least(0), at_most(1))
+      .option("edge_hu", &Options::edge_hu, "K: drop of the CT's value at an edge that halves the speed", at_least(1),
+              unit("HU"))
       .option("edge_sigma_mm", &Options::edge_sigma_mm,
-              "standard deviation of the Gaussian derivative along the normal", marrow::at_least(0.1),
-              marrow::at_most(5))
-      .option("blur_mm", &Options::blur_mm, "standard deviation of the CT's own blur", marrow::at_least(0),
-              marrow::at_most(5))
+              "standard deviation of the Gaussian derivative along the normal", at_least(0.1), at_most(5))
+      .option("blur_mm", &Options::blur_mm, "standard deviation of the CT's own blur", at_least(0), at_most(5))
       .option("cortex_hu", &Options::cortex_hu,
               "CT value of dense cortical bone, used to correct the position of a thin cortex's edge; 0: no correction",
-              marrow::at_least(0), marrow::unit("HU"))
-      .option("curvature_mm", &Options::curvature_mm, "epsilon: weight of the curvature", marrow::at_least(0),
-              marrow::at_most(0.5))
+              at_least(0), unit("HU"))
+      .option("curvature_mm", &Options::curvature_mm, "epsilon: weight of the curvature", at_least(0), at_most(0.5))
       .option("stop_speed", &Options::stop_speed,
-              "a part of a front that is slower than this comes to rest; in units in which F0 is 1",
-              marrow::at_least(0.001), marrow::at_most(0.5))
-      .option("max_iterations", &Options::max_iterations, "largest number of time steps", marrow::at_least(0));
+              "a part of a front that is slower than this comes to rest; in units in which F0 is 1", at_least(0.001),
+              at_most(0.5))
+      .option("max_iterations", &Options::max_iterations, "largest number of time steps", at_least(0));
 }

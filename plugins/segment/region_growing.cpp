@@ -12,11 +12,7 @@
 
 namespace {
 
-using marrow::Context;
-using marrow::List;
-using marrow::Seeds;
-using marrow::SignedField;
-using marrow::Volume;
+using namespace marrow;
 
 struct Options {
   double threshold_hu = 250;
@@ -31,23 +27,17 @@ class Growth {
   Growth(const Volume& volume, std::size_t fragments, double threshold_hu)
       : volume_(volume),
         threshold_hu_(threshold_hu),
-        owner_(volume.values.size(), marrow::field::kNobody),
+        owner_(volume.values.size(), segment::kNobody),
         sums_hu_(fragments, 0),
         counts_(fragments, 0),
         waiting_(kSteps) {}
 
   void claim(std::size_t at, std::uint8_t fragment) {
-    if (owner_[at] != marrow::field::kNobody || volume_.values[at] < threshold_hu_) return;
+    if (owner_[at] != segment::kNobody || volume_.values[at] < threshold_hu_) return;
     owner_[at] = fragment;
     sums_hu_[fragment] += volume_.values[at];
     ++counts_[fragment];
-    const std::size_t row = std::size_t(volume_.grid.size[0]), slice = row * volume_.grid.size[1];
-    if (at % row > 0) wait(at - 1, fragment);
-    if (at % row + 1 < row) wait(at + 1, fragment);
-    if (at % slice >= row) wait(at - row, fragment);
-    if (at % slice + row < slice) wait(at + row, fragment);
-    if (at >= slice) wait(at - slice, fragment);
-    if (at + slice < owner_.size()) wait(at + slice, fragment);
+    segment::for_neighbours(volume_.grid, at, [&](std::size_t next) { wait(next, fragment); });
   }
 
   void run(Context& context) {
@@ -75,7 +65,7 @@ class Growth {
   };
 
   void wait(std::size_t at, std::uint8_t fragment) {
-    if (owner_[at] != marrow::field::kNobody || volume_.values[at] < threshold_hu_) return;
+    if (owner_[at] != segment::kNobody || volume_.values[at] < threshold_hu_) return;
     const double unlikeness = std::abs(volume_.values[at] - sums_hu_[fragment] / double(counts_[fragment]));
     const std::size_t step = std::min(std::size_t(unlikeness), kSteps - 1);
     waiting_[step].push_back({at, fragment});
@@ -93,9 +83,9 @@ class Growth {
 
 List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds, const Options& options,
                                  Context& context) {
-  marrow::check_volume(volume, "volume");
+  check_volume(volume, "volume");
   // Sparse spongy bone may be darker than the bone's surface. Seeds in it are allowed, although they claim no voxel.
-  const auto indices = marrow::field::seed_indices(volume, seeds, std::min(options.floor_hu, options.threshold_hu));
+  const auto indices = segment::seed_indices(volume, seeds, std::min(options.floor_hu, options.threshold_hu));
   Growth growth(volume, seeds.size(), options.threshold_hu);
   for (std::size_t f = 0; f < indices.size(); ++f)
     for (const Eigen::Vector3d& index : indices[f]) {
@@ -112,16 +102,16 @@ List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds,
     context.check_cancelled();
     context.progress(0.4 + 0.6 * double(f) / double(seeds.size()), seeds.name(f));
     if (!growth.has_any(f))
-      throw marrow::Error(
-          marrow::formatted("seeds of fragment '{}': at none of them the CT reaches {} HU, or it belongs to another "
-                            "fragment; add a point in brighter bone, or lower threshold_hu",
-                            seeds.name(f), int(options.threshold_hu)));
+      throw Error(
+          formatted("seeds of fragment '{}': none of them lies in bone of {} HU or more that no other "
+                    "fragment has taken; add a point in brighter bone, or lower threshold_hu",
+                    seeds.name(f), int(options.threshold_hu)));
     if (!seeds[f].wanted) continue;
-    const marrow::field::Mask mask = marrow::field::solid(volume.grid, growth.owner(), std::uint8_t(f),
-                                                          marrow::field::margin(volume.grid, options.band_mm));
-    fields.push_back(marrow::field::field_at_threshold(volume, mask, options.threshold_hu, options.band_mm));
+    const segment::Mask mask =
+        segment::solid(volume.grid, growth.owner(), std::uint8_t(f), segment::margin(volume.grid, options.band_mm));
+    fields.push_back(segment::field_at_threshold(volume, mask, options.threshold_hu, options.band_mm));
   }
-  return marrow::field::list_of(seeds, std::move(fields));
+  return segment::list_of(seeds, std::move(fields));
 }
 
 }  // namespace
@@ -130,13 +120,11 @@ MARROW_PLUGIN(plugin) {
   plugin.node("segment.region_growing", region_growing)
       .summary("Regions grow from the seeds of all fragments at once; the most similar voxel joins first")
       .in("volume", "CT in Hounsfield units")
-      .in("seeds", "points inside each fragment", marrow::over("fragment"))
-      .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
+      .in("seeds", "points inside each fragment", over("fragment"))
+      .out("field", "signed distance to the outer surface of each wanted fragment", over("fragment"))
       .option("threshold_hu", &Options::threshold_hu,
-              "darker voxels are not bone; the surface is where the CT crosses this value", marrow::unit("HU"))
+              "darker voxels are not bone; the surface is where the CT crosses this value", unit("HU"))
       .option("floor_hu", &Options::floor_hu,
-              "least allowed mean of the voxels around a seed; threshold_hu is used instead if it is lower",
-              marrow::unit("HU"))
-      .option("band_mm", &Options::band_mm, "larger distances are clamped to this", marrow::at_least(1),
-              marrow::at_most(50));
+              "least allowed mean of the voxels around a seed; threshold_hu is used instead if it is lower", unit("HU"))
+      .option("band_mm", &Options::band_mm, "larger distances are clamped to this", at_least(1), at_most(50));
 }

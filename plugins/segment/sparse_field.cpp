@@ -14,13 +14,7 @@
 
 namespace {
 
-using marrow::Context;
-using marrow::formatted;
-using marrow::Grid;
-using marrow::List;
-using marrow::Seeds;
-using marrow::SignedField;
-using marrow::Volume;
+using namespace marrow;
 
 struct Options {
   double floor_hu = 150;
@@ -34,55 +28,51 @@ struct Options {
   double band_mm = 4;
 };
 
-SignedField field_of(const Volume& volume, const marrow::field::Mask& mask, const std::vector<std::uint8_t>& owner,
+SignedField field_of(const Volume& volume, const segment::Mask& mask, const std::vector<std::uint8_t>& owner,
                      std::uint8_t fragment, const std::string& name, const Options& options, Context& context) {
-  const Grid box = marrow::field::grid_of(volume.grid, mask);
+  const Grid box = segment::grid_of(volume.grid, mask);
   const float half_voxel_mm = float(box.spacing_mm.minCoeff() / 2);
   std::vector<float> start(mask.is_inside.size());
   for (std::size_t at = 0; at < start.size(); ++at) start[at] = mask.is_inside[at] ? -half_voxel_mm : half_voxel_mm;
-  marrow::field::march_distances(box, start, options.band_mm);
+  field::march_distances(box, start, options.band_mm);
   const auto& s = box.spacing_mm;
-  const marrow::field::Settings settings{options.sigma_mm,  options.edge_hu_per_mm, options.propagation,
-                                         options.curvature, options.advection,      options.max_iterations,
-                                         options.min_rms};
-  marrow::field::Contour contour = marrow::field::geodesic(marrow::field::cut_out(volume, mask), std::move(start),
-                                                           box.size, {s.x(), s.y(), s.z()}, settings);
+  const segment::Settings settings{options.sigma_mm,  options.edge_hu_per_mm, options.propagation, options.curvature,
+                                   options.advection, options.max_iterations, options.min_rms};
+  segment::Contour contour =
+      segment::geodesic(segment::cut_out(volume, mask), std::move(start), box.size, {s.x(), s.y(), s.z()}, settings);
   const std::string line = formatted("{}: {} iterations, last change {:.4f}", name, contour.iterations, contour.rms);
   context.debug(line);
   for (int z = 0; z < box.size[2]; ++z)
     for (int y = 0; y < box.size[1]; ++y)
       for (int x = 0; x < box.size[0]; ++x) {
         const std::uint8_t here = owner[volume.grid.offset(mask.first[0] + x, mask.first[1] + y, mask.first[2] + z)];
-        if (here == fragment || here == marrow::field::kNobody) continue;
+        if (here == fragment || here == segment::kNobody) continue;
         float& value = contour.values[box.offset(x, y, z)];
         value = std::max(value, 0.1f * half_voxel_mm);
       }
   if (std::none_of(contour.values.begin(), contour.values.end(), [](float value) { return value < 0; }))
-    throw marrow::Error("fragment '" + name + "': its contour vanished; take fewer iterations, or less curvature");
-  marrow::field::march_distances(box, contour.values, options.band_mm);
-  return marrow::field::paste(volume.grid, mask, contour.values, float(options.band_mm));
+    throw Error("fragment '" + name + "': its contour vanished; take fewer iterations, or less curvature");
+  field::march_distances(box, contour.values, options.band_mm);
+  return segment::paste(volume.grid, mask, contour.values, float(options.band_mm));
 }
 
 List<SignedField> sparse_field(const Volume& volume, const List<Seeds>& seeds, const Options& options,
                                Context& context) {
-  marrow::check_volume(volume, "volume");
+  check_volume(volume, "volume");
   for (int size : volume.grid.size)
-    if (size < 4) throw marrow::Error(formatted("volume: at least 4 voxels along each axis expected, got {}", size));
-  const auto owner = marrow::field::race(volume, marrow::field::seed_indices(volume, seeds, options.floor_hu),
-                                         {.floor_hu = options.floor_hu});
+    if (size < 4) throw Error(formatted("volume: at least 4 voxels along each axis expected, got {}", size));
+  const auto owner =
+      segment::race(volume, segment::seed_indices(volume, seeds, options.floor_hu), {.floor_hu = options.floor_hu});
   std::vector<SignedField> fields;
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     context.check_cancelled();
     context.progress(double(f) / double(seeds.size()), seeds.name(f));
-    const marrow::field::Mask mask =
-        marrow::field::solid(volume.grid, owner, std::uint8_t(f), marrow::field::margin(volume.grid, options.band_mm));
-    if (mask.empty())
-      throw marrow::Error("seeds of fragment '" + seeds.name(f) +
-                          "': all of them lie where another fragment's seeds are; move them into this fragment's bone");
+    const segment::Mask mask =
+        segment::solid_of(volume.grid, owner, seeds, f, segment::margin(volume.grid, options.band_mm));
     if (seeds[f].wanted)
       fields.push_back(field_of(volume, mask, owner, std::uint8_t(f), seeds.name(f), options, context));
   }
-  return marrow::field::list_of(seeds, std::move(fields));
+  return segment::list_of(seeds, std::move(fields));
 }
 
 }  // namespace
@@ -91,24 +81,22 @@ MARROW_PLUGIN(plugin) {
   plugin.node("segment.sparse_field", sparse_field)
       .summary("Geodesic active contour on a sparse-field level set (ITK)")
       .in("volume", "CT in Hounsfield units")
-      .in("seeds", "points inside each fragment", marrow::over("fragment"))
-      .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
+      .in("seeds", "points inside each fragment", over("fragment"))
+      .out("field", "signed distance to the outer surface of each wanted fragment", over("fragment"))
       .option("floor_hu", &Options::floor_hu,
               "the front from the seeds does not enter voxels below this value; the mean of the voxels around a seed "
               "must not be below it",
-              marrow::unit("HU"))
+              unit("HU"))
       .option("sigma_mm", &Options::sigma_mm,
-              "standard deviation of the Gaussian that smooths the CT before its gradient is taken",
-              marrow::at_least(0.1), marrow::at_most(5))
-      .option("edge_hu_per_mm", &Options::edge_hu_per_mm, "the speed is halved at this gradient of the CT",
-              marrow::at_least(1), marrow::unit("HU/mm"))
-      .option("propagation", &Options::propagation, "weight of the expansion", marrow::at_least(-5), marrow::at_most(5))
-      .option("curvature", &Options::curvature, "weight of the curvature", marrow::at_least(0), marrow::at_most(5))
-      .option("advection", &Options::advection, "weight of the force towards edges", marrow::at_least(0),
-              marrow::at_most(10))
-      .option("max_iterations", &Options::max_iterations, "largest number of iterations", marrow::at_least(1))
+              "standard deviation of the Gaussian that smooths the CT before its gradient is taken", at_least(0.1),
+              at_most(5))
+      .option("edge_hu_per_mm", &Options::edge_hu_per_mm, "the speed is halved at this gradient of the CT", at_least(1),
+              unit("HU/mm"))
+      .option("propagation", &Options::propagation, "weight of the expansion", at_least(-5), at_most(5))
+      .option("curvature", &Options::curvature, "weight of the curvature", at_least(0), at_most(5))
+      .option("advection", &Options::advection, "weight of the force towards edges", at_least(0), at_most(10))
+      .option("max_iterations", &Options::max_iterations, "largest number of iterations", at_least(1))
       .option("min_rms", &Options::min_rms, "stops if the root mean square change of an iteration is below this",
-              marrow::at_least(0.0001), marrow::at_most(1))
-      .option("band_mm", &Options::band_mm, "larger distances are clamped to this", marrow::at_least(1),
-              marrow::at_most(50));
+              at_least(0.0001), at_most(1))
+      .option("band_mm", &Options::band_mm, "larger distances are clamped to this", at_least(1), at_most(50));
 }

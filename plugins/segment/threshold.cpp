@@ -8,13 +8,7 @@
 
 namespace {
 
-using marrow::Context;
-using marrow::formatted;
-using marrow::Grid;
-using marrow::List;
-using marrow::Seeds;
-using marrow::SignedField;
-using marrow::Volume;
+using namespace marrow;
 
 struct Options {
   double threshold_hu = 250;
@@ -22,20 +16,9 @@ struct Options {
   double band_mm = 4;
 };
 
-using marrow::field::kNobody;
+using segment::for_neighbours;
+using segment::kNobody;
 constexpr std::uint8_t kUnclaimed = 254;
-
-template <class Visit>
-void for_neighbours(const Grid& grid, std::size_t at, const Visit& visit) {
-  const std::size_t row = std::size_t(grid.size[0]), slice = row * grid.size[1];
-  const int x = int(at % row), y = int(at % slice / row), z = int(at / slice);
-  if (x > 0) visit(at - 1);
-  if (x + 1 < grid.size[0]) visit(at + 1);
-  if (y > 0) visit(at - row);
-  if (y + 1 < grid.size[1]) visit(at + row);
-  if (z > 0) visit(at - slice);
-  if (z + 1 < grid.size[2]) visit(at + slice);
-}
 
 /// Gives each bright voxel to the fragment whose seed reaches it in the fewest steps through bright voxels.
 void claim_from_seeds(const Grid& grid, const std::vector<std::vector<Eigen::Vector3d>>& seeds,
@@ -74,10 +57,10 @@ void check_claims(const List<Seeds>& seeds, const Options& options, const std::v
   for (std::uint8_t fragment : owner) has_bone[fragment] = true;
   for (std::size_t f = 0; f < seeds.size(); ++f)
     if (!has_bone[f])
-      throw marrow::Error(
-          formatted("seeds of fragment '{}': at none of them the CT reaches the threshold of {} HU, or it belongs to "
-                    "another fragment; add a point in cortical bone, or lower threshold_hu",
-                    seeds.name(f), int(options.threshold_hu)));
+      throw Error(formatted(
+          "seeds of fragment '{}': none of them lies in bone of {} HU or more that no other fragment has taken; "
+          "add a point in cortical bone, or lower threshold_hu",
+          seeds.name(f), int(options.threshold_hu)));
 }
 
 /// Gives the largest connected component of bright voxels to fragment 0.
@@ -100,19 +83,19 @@ void claim_largest(const Grid& grid, std::vector<std::uint8_t>& owner) {
 
 SignedField field_of(const Volume& volume, const Options& options, const std::vector<std::uint8_t>& owner,
                      std::uint8_t fragment) {
-  const marrow::field::Mask mask =
-      marrow::field::solid(volume.grid, owner, fragment, marrow::field::margin(volume.grid, options.band_mm));
-  return marrow::field::field_at_threshold(volume, mask, options.threshold_hu, options.band_mm);
+  const segment::Mask mask =
+      segment::solid(volume.grid, owner, fragment, segment::margin(volume.grid, options.band_mm));
+  return segment::field_at_threshold(volume, mask, options.threshold_hu, options.band_mm);
 }
 
 List<SignedField> threshold(const Volume& volume, const List<Seeds>* seeds, const Options& options, Context& context) {
-  marrow::check_volume(volume, "volume");
+  check_volume(volume, "volume");
   std::vector<std::uint8_t> owner(volume.values.size(), kNobody);
   bool any = false;
   for (std::size_t at = 0; at < owner.size(); ++at)
     if (volume.values[at] >= options.threshold_hu) owner[at] = kUnclaimed, any = true;
   if (!any)
-    throw marrow::Error(
+    throw Error(
         formatted("volume: no voxel reaches the threshold of {} HU, so there is no bone; lower threshold_hu, and check "
                   "that the CT is in Hounsfield units",
                   int(options.threshold_hu)));
@@ -125,14 +108,14 @@ List<SignedField> threshold(const Volume& volume, const List<Seeds>* seeds, cons
   std::vector<SignedField> fields;
   // Sparse spongy bone may be darker than the bone's surface. Seeds in it are allowed, although they claim no voxel.
   const double least_hu = std::min(options.floor_hu, options.threshold_hu);
-  claim_from_seeds(volume.grid, marrow::field::seed_indices(volume, *seeds, least_hu), owner);
+  claim_from_seeds(volume.grid, segment::seed_indices(volume, *seeds, least_hu), owner);
   check_claims(*seeds, options, owner);
   for (std::size_t f = 0; f < seeds->size(); ++f) {
     context.check_cancelled();
     context.progress(double(f) / double(seeds->size()), seeds->name(f));
     if ((*seeds)[f].wanted) fields.push_back(field_of(volume, options, owner, std::uint8_t(f)));
   }
-  return marrow::field::list_of(*seeds, std::move(fields));
+  return segment::list_of(*seeds, std::move(fields));
 }
 
 }  // namespace
@@ -141,12 +124,10 @@ MARROW_PLUGIN(plugin) {
   plugin.node("segment.threshold", threshold)
       .summary("Bone is brighter than a threshold; it is divided between the fragments by the nearest seed")
       .in("volume", "CT in Hounsfield units")
-      .in("seeds", "points inside each fragment; none: the largest connected bone", marrow::over("fragment"))
-      .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
-      .option("threshold_hu", &Options::threshold_hu, "CT value at the bone's surface", marrow::unit("HU"))
+      .in("seeds", "points inside each fragment; none: the largest connected bone", over("fragment"))
+      .out("field", "signed distance to the outer surface of each wanted fragment", over("fragment"))
+      .option("threshold_hu", &Options::threshold_hu, "CT value at the bone's surface", unit("HU"))
       .option("floor_hu", &Options::floor_hu,
-              "least allowed mean of the voxels around a seed; threshold_hu is used instead if it is lower",
-              marrow::unit("HU"))
-      .option("band_mm", &Options::band_mm, "larger distances are clamped to this", marrow::at_least(1),
-              marrow::at_most(50));
+              "least allowed mean of the voxels around a seed; threshold_hu is used instead if it is lower", unit("HU"))
+      .option("band_mm", &Options::band_mm, "larger distances are clamped to this", at_least(1), at_most(50));
 }

@@ -86,8 +86,5 @@ marrow::ShaftLines hough_pairs(const EdgeMap& edges, const marrow::View& view, c
 MARROW_PLUGIN(plugin) {
   declare_line_options(plugin.node("shaft.hough_pairs", hough_pairs)
                            .summary("Borders of the shaft: lines from a Hough transform, paired by the likelihood of "
-                                    "the outer diameter (section 3.2 of the chapter)")
-                           .in("edges", "edge pixels of the view")
-                           .in("view", "X-ray view; its camera and its grey values are used")
-                           .out("lines", "the two outer borders of the shaft, and the rejected pairs"));
+                                    "the outer diameter (section 3.2 of the chapter)"));
 }

@@ -107,9 +107,6 @@ MARROW_PLUGIN(plugin) {
       plugin.node("shaft.line_segments", line_segments)
           .summary("Borders of the shaft: line segments in the image (LSD, by OpenCV), paired by the likelihood of the "
                    "outer diameter")
-          .in("edges", "edge pixels of the view")
-          .in("view", "X-ray view; its camera and its grey values are used")
-          .out("lines", "the two outer borders of the shaft, and the rejected pairs")
           .option("resolution_mm", &Options::resolution_mm,
                   "size of a pixel, in mm at the shaft, to which the image is reduced to find segments",
                   marrow::at_least(0.05), marrow::at_most(10)));

@@ -127,9 +127,6 @@ MARROW_PLUGIN(plugin) {
                            .summary("Borders of the shaft: lines by random sample consensus (RANSAC), paired by the "
                                     "likelihood of the outer diameter")
                            .random()
-                           .in("edges", "edge pixels of the view")
-                           .in("view", "X-ray view; its camera and its grey values are used")
-                           .out("lines", "the two outer borders of the shaft, and the rejected pairs")
                            .option("samples", &Options::samples, "number of candidates for each line",
                                    marrow::at_least(1), marrow::at_most(100000)));
 }

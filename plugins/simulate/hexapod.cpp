@@ -7,7 +7,7 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
-#include "marrow/toolbox/robotics/hexapod.hpp"
+#include "marrow/toolbox/robotics/hexapod_options.hpp"
 
 namespace {
 
@@ -121,8 +121,8 @@ Result hexapod(const phantom::Phantom& phantom, const List<Pose>& commands, cons
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.node("simulate.hexapod", hexapod)
-      .summary("A bone fragment on a hexapod that is told to move, with errors of its legs, joints and mounting")
+  auto node = plugin.node("simulate.hexapod", hexapod);
+  node.summary("A bone fragment on a hexapod that is told to move, with errors of its legs, joints and mounting")
       .random()
       .in("phantom", "the fragment; it stands on the platform with its fracture downwards")
       .in("commands", "motions of the platform from home, in the axes of the platform at home, z upwards",
@@ -136,17 +136,8 @@ MARROW_PLUGIN(plugin) {
            "them moves the platform in the worst direction as in the best one",
            over("position"))
       .figures({"leg1", "leg2", "leg3", "leg4", "leg5", "leg6", "condition"})
-      .option("fragment", &Options::fragment, "name of the fragment on the platform")
-      .option("base_radius_mm", &Options::base_radius_mm, "radius of the circle of the base's joints", at_least(1))
-      .option("platform_radius_mm", &Options::platform_radius_mm, "the same of the platform", at_least(1))
-      .option("base_gap_deg", &Options::base_gap_deg, "angle between the two joints of a pair of the base", at_least(0),
-              at_most(119))
-      .option("platform_gap_deg", &Options::platform_gap_deg, "the same of the platform", at_least(0), at_most(119))
-      .option("height_mm", &Options::height_mm, "height of the platform's joints above the base's at home", at_least(1))
-      .option("stroke_mm", &Options::stroke_mm, "how far a leg's length may differ from that at home, to either side",
-              at_least(0))
-      .option("joint_deg", &Options::joint_deg, "how far a leg may turn in its joints from its direction at home",
-              at_least(0), at_most(90))
+      .option("fragment", &Options::fragment, "name of the fragment on the platform");
+  robot::declare_hexapod<Options>(node)
       .option("grip_mm", &Options::grip_mm, "height of the fragment's end above the platform's joints", at_least(0))
       .option("fragment_at_mm", &Options::fragment_at_mm,
               "where the fragment's middle lies in the world while the platform is at home, if nothing is off")
@@ -158,7 +149,7 @@ MARROW_PLUGIN(plugin) {
       .option("mount_sd_deg", &Options::mount_sd_deg,
               "standard deviation of the fragment's turn on the platform about each axis, drawn once in a run",
               at_least(0))
-      .option("mount_sd_mm", &Options::mount_sd_mm, "the same of its shift along each axis", at_least(0))
+      .option("mount_sd_mm", &Options::mount_sd_mm, "the same for its shift along each axis", at_least(0))
       .option("platform_seed", &Options::platform_seed, "seed of the joints' errors: one hexapod for each seed",
               at_least(0));
 }

@@ -19,7 +19,7 @@
 namespace {
 
 using namespace marrow;
-using verdicts::Evidence, verdicts::FailureModel, verdicts::Judged;
+using verdict::Evidence, verdict::FailureModel, verdict::Judged;
 
 struct Options {
   std::filesystem::path failure_model;
@@ -77,22 +77,22 @@ void add(Evidence& all, const Evidence& more) { all.insert(all.end(), more.begin
 void add_predicted(const Pose& pose, const Mesh& mesh, Evidence& evidence) {
   constexpr double kUnknown_mm = 50, kUnknown_deg = 90;
   if (!pose.covariance) return;
-  verdicts::Spread spread;
+  verdict::Spread spread;
   spread.mtre_mm = kUnknown_mm, spread.axial_deg = kUnknown_deg;
-  if (verdicts::is_determined(pose)) spread = verdicts::spread_of(pose, mesh);
+  if (verdict::is_determined(pose)) spread = verdict::spread_of(pose, mesh);
   evidence.push_back({"predicted_mtre_mm", std::min(spread.mtre_mm, kUnknown_mm), "mm"});
   evidence.push_back({"predicted_axial_deg", std::min(spread.axial_deg, kUnknown_deg), "deg"});
 }
 
 /// The share of failures among the errors that the pose's own covariance predicts.
-double predicted_failure(const Pose& pose, const verdicts::Spread& spread) {
+double predicted_failure(const Pose& pose, const verdict::Spread& spread) {
   if (!pose.covariance) return 0;
-  if (!verdicts::is_determined(pose)) return 1;
-  return double(spread.off) / verdicts::Spread::kDraws;
+  if (!verdict::is_determined(pose)) return 1;
+  return double(spread.off) / verdict::Spread::kDraws;
 }
 
 /// Explains what the pose's own covariance leaves open. After refine.cameras it includes the cameras.
-void explain_predicted(const verdicts::Spread& spread, double predicted, bool is_refined, Verdict& verdict) {
+void explain_predicted(const verdict::Spread& spread, double predicted, bool is_refined, Verdict& verdict) {
   if (is_refined) {
     verdict.reasons.push_back("with what is not known about the cameras, the bone's surface is known to " +
                               filled("{:.1f} mm, and the rotation about the long axis to ", spread.mtre_mm) +
@@ -128,28 +128,28 @@ Evidence gather(const Judged& judged, const Pose* contour_pose, const Pose& sear
   const auto fine = compared(cost, options);
   const auto coarse = cost.at_level({2 * kSpacing_px, 2 * kReach_px, 2 * options.pixel_step});
   Evidence evidence, of_views, of_contour, of_outline;
-  std::optional<verdicts::Apart> apart;
+  std::optional<verdict::Apart> apart;
   if (contour_pose)
     apart = {judged.off_mm(contour_pose->world_from_model), judged.axial_deg(contour_pose->world_from_model)};
   tbb::parallel_invoke(
       [&] {
         context.progress(0, "the cost of other poses");
-        evidence = verdicts::landscape(judged, *fine, "");
+        evidence = verdict::landscape(judged, *fine, "");
         context.progress(0.3, "other minima");
-        add(evidence, verdicts::other_minima(judged, *coarse, *fine));
+        add(evidence, verdict::other_minima(judged, *coarse, *fine));
       },
-      [&] { of_views = verdicts::views_alone(judged, *fine, views, ""); },
+      [&] { of_views = verdict::views_alone(judged, *fine, views, ""); },
       [&] {
         if (!contour_cost) return;
         const auto contour = contour_cost->at_level({kSpacing_px, kReach_px, 0});
-        of_contour = verdicts::landscape(judged, *contour, "contour_");
-        add(of_contour, verdicts::views_alone(judged, *contour, views, "contour_"));
+        of_contour = verdict::landscape(judged, *contour, "contour_");
+        add(of_contour, verdict::views_alone(judged, *contour, views, "contour_"));
       },
       [&] {
-        if (contour_cost) apart = verdicts::second_cost(judged, *contour_cost);
+        if (contour_cost) apart = verdict::second_cost(judged, *contour_cost);
       },
       [&] {
-        if (projector && edges) of_outline = verdicts::outline_on_edges(judged, *projector, views, *edges);
+        if (projector && edges) of_outline = verdict::outline_on_edges(judged, *projector, views, *edges);
       });
   for (const Evidence* more : {&of_views, &of_contour, &of_outline}) add(evidence, *more);
   if (apart) {
@@ -220,7 +220,7 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
   if (!others != !other_bones) throw Error("others and other_bones belong together; wire both or none");
   FailureModel model;
   if (!options.failure_model.empty()) {
-    model = verdicts::read_failure_model(options.failure_model);
+    model = verdict::read_failure_model(options.failure_model);
     check_figures(model, options.failure_model);
   }
   Judged judged{pose, fragment_frame(mesh), geometry::targets_mm(pose.world_from_model, &mesh, nullptr, kTargets),
@@ -235,7 +235,7 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
   if (!why_nothing.empty()) return of_nothing(why_nothing);
   verdict.figures = gather(judged, other_pose(contour_pose, stages), searched, cost, contour_cost, views, edges,
                            projector, mesh, options, context);
-  const double inside_mm = others ? verdicts::intersection_mm(judged, mesh, *others, *other_bones) : 0;
+  const double inside_mm = others ? verdict::intersection_mm(judged, mesh, *others, *other_bones) : 0;
   if (others) verdict.figures.push_back({"intersection_mm", inside_mm, "mm"});
   if (model.terms.empty()) {
     verdict.reasons.emplace_back("there is no failure model, so the figures are not judged");
@@ -243,8 +243,8 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
     return verdict;
   }
   const auto contributions = model.contributions(verdict.figures);
-  const bool is_determined = verdicts::is_determined(pose);
-  const verdicts::Spread spread = is_determined ? verdicts::spread_of(pose, mesh) : verdicts::Spread();
+  const bool is_determined = verdict::is_determined(pose);
+  const verdict::Spread spread = is_determined ? verdict::spread_of(pose, mesh) : verdict::Spread();
   const double predicted = predicted_failure(pose, spread);
   verdict.failure_probability = 1 - (1 - model.probability(contributions)) * (1 - predicted);
   verdict.judgement = verdict.failure_probability > model.wrong_above      ? Judgement::wrong

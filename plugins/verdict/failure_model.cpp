@@ -7,7 +7,7 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 
-namespace marrow::verdicts {
+namespace marrow::verdict {
 namespace {
 
 using files::YamlFile, files::YamlMap;
@@ -75,4 +75,4 @@ FailureModel read_failure_model(const std::filesystem::path& path) {
   return model;
 }
 
-}  // namespace marrow::verdicts
+}  // namespace marrow::verdict

@@ -7,7 +7,7 @@
 
 #include "judged.hpp"
 
-namespace marrow::verdicts {
+namespace marrow::verdict {
 
 /// A logistic regression on the figures' logarithms: log odds = bias + sum of weight * log(1 + figure / scale). No
 /// weight is negative, so a larger figure never makes a pose more likely to be right.
@@ -33,4 +33,4 @@ struct FailureModel {
 /// Reads a file of tools/studies/fit_verdict. Throws Error with all of its faults.
 FailureModel read_failure_model(const std::filesystem::path& path);
 
-}  // namespace marrow::verdicts
+}  // namespace marrow::verdict

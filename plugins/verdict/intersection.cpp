@@ -4,7 +4,7 @@
 
 #include "judged.hpp"
 
-namespace marrow::verdicts {
+namespace marrow::verdict {
 
 double intersection_mm(const Judged& judged, const Mesh& mesh, const List<Pose>& others,
                        const List<SignedField>& other_bones) {
@@ -32,4 +32,4 @@ double intersection_mm(const Judged& judged, const Mesh& mesh, const List<Pose>&
   return deepest_mm;
 }
 
-}  // namespace marrow::verdicts
+}  // namespace marrow::verdict

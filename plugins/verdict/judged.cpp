@@ -5,7 +5,7 @@
 
 #include "marrow/toolbox/geometry/targets.hpp"
 
-namespace marrow::verdicts {
+namespace marrow::verdict {
 
 double Judged::off_mm(const RigidTransform& other) const {
   return geometry::mean(geometry::target_errors_mm(other, pose.world_from_model, targets_mm));
@@ -44,4 +44,4 @@ Minimum minimum_near(const Judged& judged, const Cost& cost, const RigidTransfor
   return {at(result.x), result.value};
 }
 
-}  // namespace marrow::verdicts
+}  // namespace marrow::verdict

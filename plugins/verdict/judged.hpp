@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-namespace marrow::verdicts {
+namespace marrow::verdict {
 
 /// A pose with the points of the bone that say how far another pose is from it. Refers to the context.
 struct Judged {
@@ -66,4 +66,4 @@ Evidence outline_on_edges(const Judged& judged, const OutlineProjector& projecto
 double intersection_mm(const Judged& judged, const Mesh& mesh, const List<Pose>& others,
                        const List<SignedField>& other_bones);
 
-}  // namespace marrow::verdicts
+}  // namespace marrow::verdict

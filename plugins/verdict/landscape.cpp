@@ -8,7 +8,7 @@
 #include "marrow/domain/quantile.hpp"
 #include "marrow/domain/random.hpp"
 
-namespace marrow::verdicts {
+namespace marrow::verdict {
 namespace {
 
 constexpr double kTurnStep_deg = 10;
@@ -65,4 +65,4 @@ Evidence landscape(const Judged& judged, const Cost& cost, const std::string& pr
       {prefix + "best_turned", closeness(least(of_turn), own, median), ""}};
 }
 
-}  // namespace marrow::verdicts
+}  // namespace marrow::verdict

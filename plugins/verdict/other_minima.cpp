@@ -8,7 +8,7 @@
 #include "judged.hpp"
 #include "marrow/domain/quantile.hpp"
 
-namespace marrow::verdicts {
+namespace marrow::verdict {
 namespace {
 
 constexpr double kSame_mm = 1.5, kSame_deg = 4;  ///< a minimum within both is that of the pose
@@ -74,4 +74,4 @@ Evidence other_minima(const Judged& judged, const Cost& coarse, const Cost& cost
           {"restarts_deg", *std::max_element(near_deg.begin(), near_deg.end()), "deg"}};
 }
 
-}  // namespace marrow::verdicts
+}  // namespace marrow::verdict

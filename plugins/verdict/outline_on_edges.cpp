@@ -9,7 +9,7 @@
 #include "marrow/domain/quantile.hpp"
 #include "marrow/toolbox/match/nearest_edges.hpp"
 
-namespace marrow::verdicts {
+namespace marrow::verdict {
 namespace {
 
 constexpr double kSpacing_px = 2, kTolerance_deg = 40;
@@ -103,4 +103,4 @@ Evidence outline_on_edges(const Judged& judged, const OutlineProjector& projecto
           {"outline_spread_mm", worst.spread_mm, "mm"}};
 }
 
-}  // namespace marrow::verdicts
+}  // namespace marrow::verdict

@@ -14,7 +14,7 @@ namespace {
 using marrow::formatted;
 using marrow::Judgement;
 using marrow::Verdict;
-using marrow::verdicts::Spread, marrow::verdicts::about_the_bones_axes;
+using marrow::verdict::Spread, marrow::verdict::about_the_bones_axes;
 
 struct Options {
   double doubtful_above = 0.05;
@@ -47,7 +47,7 @@ void judge_by_deviations(const marrow::Pose& pose, const marrow::Mesh& mesh, con
     verdict.remedies.emplace_back("a registration that predicts its deviations");
     return;
   }
-  if (!marrow::verdicts::is_determined(pose)) {
+  if (!marrow::verdict::is_determined(pose)) {
     const bool is_finite = pose.covariance->allFinite();
     verdict.judgement = Judgement::wrong;
     verdict.failure_probability = 1;
@@ -58,7 +58,7 @@ void judge_by_deviations(const marrow::Pose& pose, const marrow::Mesh& mesh, con
                                       : "another view, or a landmark");
     return;
   }
-  const Spread spread = marrow::verdicts::spread_of(pose, mesh);
+  const Spread spread = marrow::verdict::spread_of(pose, mesh);
   verdict.failure_probability = double(spread.off) / Spread::kDraws;
   verdict.judgement = verdict.failure_probability > options.wrong_above      ? Judgement::wrong
                       : verdict.failure_probability > options.doubtful_above ? Judgement::doubtful

@@ -8,7 +8,7 @@
 #include "judged.hpp"
 #include "marrow/domain/random.hpp"
 
-namespace marrow::verdicts {
+namespace marrow::verdict {
 namespace {
 
 constexpr int kPoses = 112, kTerms = 28;  ///< a quadratic function of six numbers has 1 + 6 + 21 terms
@@ -69,4 +69,4 @@ Apart second_cost(const Judged& judged, const Cost& cost) {
   return {judged.off_mm(there), judged.axial_deg(there)};
 }
 
-}  // namespace marrow::verdicts
+}  // namespace marrow::verdict

@@ -7,7 +7,7 @@
 
 #include "marrow/toolbox/geometry/targets.hpp"
 
-namespace marrow::verdicts {
+namespace marrow::verdict {
 namespace {
 
 /// A matrix whose product with six standard normal numbers has this covariance. check_pose() has refused one with a
@@ -55,4 +55,4 @@ Spread spread_of(const Pose& as_found, const Mesh& mesh) {
   return spread;
 }
 
-}  // namespace marrow::verdicts
+}  // namespace marrow::verdict

@@ -2,7 +2,7 @@
 #pragma once
 #include <marrow/plugin.hpp>
 
-namespace marrow::verdicts {
+namespace marrow::verdict {
 
 /// The errors that a pose's predicted covariance stands for: 10000 draws of the normal distribution, always the same.
 struct Spread {
@@ -18,4 +18,4 @@ Pose about_the_bones_axes(const Pose& pose, const Mesh& mesh);
 /// `pose` has a finite covariance. The targets are 200 points of the mesh, which also gives the long axis.
 Spread spread_of(const Pose& pose, const Mesh& mesh);
 
-}  // namespace marrow::verdicts
+}  // namespace marrow::verdict

@@ -8,7 +8,7 @@
 
 #include "judged.hpp"
 
-namespace marrow::verdicts {
+namespace marrow::verdict {
 namespace {
 
 /// The pose after a motion in the plane of a view's image: a turn about the line of sight through the bone, and shifts
@@ -72,4 +72,4 @@ Evidence views_alone(const Judged& judged, const Cost& cost, const List<View>& v
   return {{prefix + "view_pull_mm", most(pulls_mm), "mm"}, {prefix + "view_pull_deg", most(pulls_deg), "deg"}};
 }
 
-}  // namespace marrow::verdicts
+}  // namespace marrow::verdict

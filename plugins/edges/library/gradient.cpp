@@ -15,7 +15,7 @@
 #include "marrow/toolbox/image/line_integrals.hpp"
 #include "usable.hpp"
 
-namespace marrow::image {
+namespace marrow::edges {
 namespace {
 
 constexpr int kBandRows = 64;  // fixed, so that the result does not depend on the number of threads
@@ -48,13 +48,13 @@ Prepared prepare(const View& view, double sigma_px, bool logarithm, const Contex
   view.image.pixels.convertTo(grey, CV_32F);
   if (type == CV_32FC1 && !cv::checkRange(grey))
     throw Error(what + ": the image holds pixels that are not finite (NaN or infinity)");
-  const GreyRange range = grey_range(grey);
+  const image::GreyRange range = image::grey_range(grey);
   if (range.least == range.greatest)
     throw Error(formatted("{}: all pixels have the same value {:g}, so there is no edge; check the image file", what,
                           range.least));
   if (logarithm && range.greatest <= 0)
     throw Error(what + ": the image has no positive grey value, so its logarithm cannot be taken");
-  warn_of_greys(view, context);
+  image::warn_of_greys(view, context);
   if (range.beyond > 0) grey = cv::min(cv::max(grey, range.least), range.greatest);
   const double dark = range.dark(), smallest = range.least - dark, largest = range.greatest - dark;
   if (dark < 0) grey -= dark;
@@ -68,7 +68,7 @@ Prepared prepare(const View& view, double sigma_px, bool logarithm, const Contex
   prepared.range = float(largest - smallest);
   prepared.logarithm = logarithm;
   prepared.brightest = float(largest);
-  prepared.values = logarithm ? cv::Mat(-line_integrals(grey)) : grey;
+  prepared.values = logarithm ? cv::Mat(-image::line_integrals(grey)) : grey;
   return prepared;
 }
 
@@ -175,4 +175,4 @@ float NoiseLevel::at(float value) const {
   return below->second + part * (above->second - below->second);
 }
 
-}  // namespace marrow::image
+}  // namespace marrow::edges

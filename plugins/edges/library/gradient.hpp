@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace marrow::image {
+namespace marrow::edges {
 
 /// The values whose edges are sought: grey values or, with `logarithm`, line integrals times -1 (line_integrals.hpp).
 /// Edges are then steps of attenuation, equally high in bright and dark parts of the image.
@@ -63,4 +63,4 @@ class NoiseLevel {
   std::vector<std::pair<float, float>> noise_of_value_;  ///< ascending values
 };
 
-}  // namespace marrow::image
+}  // namespace marrow::edges

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace marrow::image {
+namespace marrow::edges {
 namespace {
 
 struct Found {
@@ -97,4 +97,4 @@ EdgeMap refined(const Prepared& image, const Gradient& gradient, const cv::Mat& 
   return edges;
 }
 
-}  // namespace marrow::image
+}  // namespace marrow::edges

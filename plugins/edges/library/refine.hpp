@@ -8,7 +8,7 @@
 
 #include "marrow/edges/gradient.hpp"
 
-namespace marrow::image {
+namespace marrow::edges {
 
 /// Distance along the gradient, in pixels, from the centre of a pixel to the ridge of the gradient's magnitude.
 /// std::nullopt if the magnitude has no maximum across the edge. The pixel must not lie on the image's border. A
@@ -32,4 +32,4 @@ float bilinear(const cv::Mat& values, float u, float v);
 /// it is empty, way_to_ridge() does. An edge without a way stays at its pixel's centre.
 EdgeMap refined(const Prepared& image, const Gradient& gradient, const cv::Mat& marked, const WayToEdge& way = {});
 
-}  // namespace marrow::image
+}  // namespace marrow::edges

@@ -7,7 +7,7 @@
 
 #include "marrow/edges/window.hpp"
 
-namespace marrow::image {
+namespace marrow::edges {
 
 EdgeMap edges_above_noise(const Prepared& image, const Gradient& gradient, const ThresholdOptions& options,
                           const WayToEdge& way) {
@@ -32,4 +32,4 @@ EdgeMap mask_edges(const View& view, const ThresholdOptions& options, const Kern
   return edges_above_noise(image, gradient, options, [&](int u, int v) { return way_to_ridge(gradient, u, v); });
 }
 
-}  // namespace marrow::image
+}  // namespace marrow::edges

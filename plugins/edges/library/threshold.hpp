@@ -8,9 +8,9 @@
 #include "marrow/edges/gradient.hpp"
 #include "marrow/edges/refine.hpp"
 
-namespace marrow::image {
+namespace marrow::edges {
 
-/// See the help texts in declare_threshold_options(). `sigma_px`: standard deviation of the smoothing Gaussian.
+/// See the help texts in declare_mask(). `sigma_px`: standard deviation of the smoothing Gaussian.
 struct ThresholdOptions {
   double sigma_px = 1.5;
   bool logarithm = true;
@@ -27,10 +27,11 @@ EdgeMap edges_above_noise(const Prepared& image, const Gradient& gradient, const
 /// Throws Error as prepare() does.
 EdgeMap mask_edges(const View& view, const ThresholdOptions& options, const Kernel& mask, const Context& context);
 
-/// Declares all options except sigma_px.
+/// Declares the ports and all options except sigma_px.
 template <class Builder>
-auto& declare_threshold_options(Builder& node) {
-  return node
+auto& declare_thresholds(Builder& node) {
+  return node.in("view", "X-ray view")
+      .out("edges", "edge pixels at sub-pixel positions")
       .option("logarithm", &ThresholdOptions::logarithm, "find edges of the attenuation (logarithm of the grey value)")
       .option("window_px", &ThresholdOptions::window_px,
               "side of the window of the median, reduced to an odd multiple of 16", at_least(16))
@@ -38,4 +39,12 @@ auto& declare_threshold_options(Builder& node) {
               "least magnitude above the window's median, in standard deviations of the noise", at_least(0));
 }
 
-}  // namespace marrow::image
+/// Declares the ports and options of a node that calls mask_edges().
+template <class Builder>
+auto& declare_mask(Builder& node) {
+  return declare_thresholds(node.option(
+      "sigma_px", &ThresholdOptions::sigma_px,
+      "standard deviation of the Gaussian that smooths the image first; 0: no smoothing", at_least(0), at_most(10)));
+}
+
+}  // namespace marrow::edges

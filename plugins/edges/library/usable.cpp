@@ -10,7 +10,7 @@
 #include <random>
 #include "marrow/domain/decompositions.hpp"
 
-namespace marrow::image {
+namespace marrow::edges {
 namespace {
 
 constexpr int kRays = 720, kStepsPerRay = 6, kTrials = 400, kHarmonics = 9;
@@ -234,4 +234,4 @@ cv::Mat usable_pixels(const View& view, const cv::Mat& grey, double smallest, do
   return usable;
 }
 
-}  // namespace marrow::image
+}  // namespace marrow::edges

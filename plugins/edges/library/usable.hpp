@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-namespace marrow::image {
+namespace marrow::edges {
 
 /// The outline of a round collimator's field: its radius as a function of the direction from its centre. Removing an
 /// image's distortion turns a circle into a smooth oval, so the radius has a few harmonics.
@@ -26,4 +26,4 @@ std::optional<Field> collimator_field(const cv::Mat& grey, double largest);
 /// round collimator's field, black areas that reach three corners, and the image's border.
 cv::Mat usable_pixels(const View& view, const cv::Mat& grey, double smallest, double largest, int margin_px);
 
-}  // namespace marrow::image
+}  // namespace marrow::edges

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <numeric>
 
-namespace marrow::image {
+namespace marrow::edges {
 namespace {
 
 constexpr int kWindowBlock = 16;
@@ -135,4 +135,4 @@ void interpolate_row(const cv::Mat& blocks, int v, std::vector<float>& row) {
   }
 }
 
-}  // namespace marrow::image
+}  // namespace marrow::edges

@@ -6,7 +6,7 @@
 
 #include "marrow/edges/gradient.hpp"
 
-namespace marrow::image {
+namespace marrow::edges {
 
 /// Percentiles of the gradient's magnitude over the usable pixels of a window around each block. For each percentage a
 /// CV_32F matrix with one value per block of 16 x 16 pixels; 0 where the window has no usable pixel. The window's side
@@ -20,4 +20,4 @@ cv::Mat block_noise(const Prepared& image, const Gradient& gradient);
 /// Bilinear interpolation between the centres of blocks, along row `v` of the image. row.size() is the image's width.
 void interpolate_row(const cv::Mat& blocks, int v, std::vector<float>& row);
 
-}  // namespace marrow::image
+}  // namespace marrow::edges

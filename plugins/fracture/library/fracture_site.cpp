@@ -8,7 +8,7 @@
 
 #include "marrow/base/error.hpp"
 
-namespace marrow::geometry {
+namespace marrow::fracture {
 namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
@@ -76,4 +76,4 @@ Eigen::Vector3d middle_of_fracture_mm(const Mesh& moved, const std::string& move
   return 0.5 * (centre_of_face(on_moved, on_reference) + centre_of_face(on_reference, on_moved));
 }
 
-}  // namespace marrow::geometry
+}  // namespace marrow::fracture

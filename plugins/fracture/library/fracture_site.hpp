@@ -7,7 +7,7 @@
 
 #include "marrow/domain/mesh.hpp"
 
-namespace marrow::geometry {
+namespace marrow::fracture {
 
 /// For each point the squared distance from the nearest of `others`, which must not be empty.
 std::vector<double> nearest_squared_mm2(const std::vector<Eigen::Vector3d>& points_mm,
@@ -20,4 +20,4 @@ std::vector<double> nearest_squared_mm2(const std::vector<Eigen::Vector3d>& poin
 Eigen::Vector3d middle_of_fracture_mm(const Mesh& moved, const std::string& moved_name, const Mesh& reference,
                                       const std::string& reference_name);
 
-}  // namespace marrow::geometry
+}  // namespace marrow::fracture

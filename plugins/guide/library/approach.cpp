@@ -8,7 +8,7 @@
 #include "marrow/base/error.hpp"
 #include "marrow/domain/same_place.hpp"
 
-namespace marrow::robot {
+namespace marrow::guide {
 namespace {
 
 double field_at(const SignedField& field, const Eigen::Vector3d& point_mm) {
@@ -90,13 +90,13 @@ Eigen::Vector3d away_from(const FragmentFrame& reference, const FragmentFrame& f
 
 }  // namespace
 
-Gap::Gap(const Mesh& moved, const SignedField& of_moved, const Mesh& reference, const SignedField& of_reference)
-    : of_moved_(of_moved),
-      of_reference_(of_reference),
-      on_moved_(points_of(moved, of_reference)),
-      on_reference_(points_of(reference, of_moved)) {
-  check_lies_in(moved, of_moved.grid, "the moved fragment's surface", "its field");
-  check_lies_in(reference, of_reference.grid, "the reference's surface", "its field");
+Gap::Gap(const Bone& moved, const Bone& reference)
+    : of_moved_(moved.field),
+      of_reference_(reference.field),
+      on_moved_(points_of(moved.surface, reference.field)),
+      on_reference_(points_of(reference.surface, moved.field)) {
+  check_lies_in(moved.surface, moved.field.grid, "the moved fragment's surface", "its field");
+  check_lies_in(reference.surface, reference.field.grid, "the reference's surface", "its field");
   if (on_moved_.empty() || on_reference_.empty())
     throw Error("the two fragments are nowhere within 3 mm of each other in the CT; are they sides of one fracture?");
 }
@@ -158,4 +158,4 @@ Leg next_leg(const Gap& gap, const RigidTransform& now, const FragmentFrame& fra
   return leg;
 }
 
-}  // namespace marrow::robot
+}  // namespace marrow::guide

@@ -8,14 +8,18 @@
 #include "marrow/domain/volume.hpp"
 #include "marrow/guide/servo.hpp"
 
-namespace marrow::robot {
+namespace marrow::guide {
 
 /// How far two fragments of one CT are apart. Both are given in the coordinates of the CT, where they lie as in the
 /// restored bone.
 class Gap {
  public:
-  /// Throws Error, naming the fragments, if they are nowhere near each other in the CT.
-  Gap(const Mesh& moved, const SignedField& of_moved, const Mesh& reference, const SignedField& of_reference);
+  struct Bone {
+    const Mesh& surface;
+    const SignedField& field;
+  };
+  /// Refers to the fields. Throws Error, naming the fragments, if they are nowhere near each other in the CT.
+  Gap(const Bone& moved, const Bone& reference);
 
   /// The least distance between both surfaces near the fracture; negative where they overlap. Distances beyond the
   /// fields' bands count as the bands.
@@ -50,4 +54,4 @@ Leg leg_apart(const FragmentFrame& frame, const FragmentFrame& reference, double
 Leg next_leg(const Gap& gap, const RigidTransform& reference_from_fragment, const FragmentFrame& frame,
              const FragmentFrame& reference, const ApproachOptions& options);
 
-}  // namespace marrow::robot
+}  // namespace marrow::guide

@@ -7,7 +7,7 @@
 
 #include "marrow/domain/decompositions.hpp"
 
-namespace marrow::robot {
+namespace marrow::guide {
 namespace {
 
 double largest(const Eigen::Matrix3d& covariance) {
@@ -38,4 +38,4 @@ RelativePose relative_pose(const Pose& fragment, const Pose& reference) {
 double rotation_deviation_rad(const Matrix6d& covariance) { return largest(covariance.topLeftCorner<3, 3>()); }
 double shift_deviation_mm(const Matrix6d& covariance) { return largest(covariance.bottomRightCorner<3, 3>()); }
 
-}  // namespace marrow::robot
+}  // namespace marrow::guide

@@ -3,7 +3,7 @@
 // One fragment's pose relative to another's, both found in the same images. Errors that both share cancel.
 #include "marrow/domain/pose.hpp"
 
-namespace marrow::robot {
+namespace marrow::guide {
 
 struct RelativePose {
   RigidTransform reference_from_fragment{"reference", "fragment"};  ///< the identity: both lie as in the CT
@@ -18,4 +18,4 @@ RelativePose relative_pose(const Pose& fragment, const Pose& reference);
 double rotation_deviation_rad(const Matrix6d& covariance);
 double shift_deviation_mm(const Matrix6d& covariance);
 
-}  // namespace marrow::robot
+}  // namespace marrow::guide

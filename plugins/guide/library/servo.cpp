@@ -5,7 +5,7 @@
 
 #include "marrow/domain/decompositions.hpp"
 
-namespace marrow::robot {
+namespace marrow::guide {
 namespace {
 
 constexpr double kArm_mm = 100;
@@ -61,4 +61,4 @@ Vector6d ask_for(const Matrix6d& jacobian, const Vector6d& wanted_mm, double mu)
   return solve_symmetric<6>(squares, Vector6d(jacobian.transpose() * wanted_mm));
 }
 
-}  // namespace marrow::robot
+}  // namespace marrow::guide

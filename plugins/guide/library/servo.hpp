@@ -7,7 +7,7 @@
 
 #include "marrow/toolbox/robotics/hand_eye.hpp"
 
-namespace marrow::robot {
+namespace marrow::guide {
 
 /// How large a step may be.
 struct StepLimits {
@@ -39,4 +39,4 @@ Matrix6d broyden(const Matrix6d& jacobian, const Vector6d& asked_mm, const Vecto
 /// nearly singular from asking for huge motions.
 Vector6d ask_for(const Matrix6d& jacobian, const Vector6d& wanted_mm, double mu = 0.3);
 
-}  // namespace marrow::robot
+}  // namespace marrow::guide

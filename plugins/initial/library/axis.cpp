@@ -8,7 +8,7 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/domain/decompositions.hpp"
 
-namespace marrow::shaft {
+namespace marrow::initial {
 namespace {
 
 Eigen::Vector3d line_through(const LineSegment& segment) {
@@ -41,7 +41,7 @@ Axis axis_of_planes(const std::vector<Plane>& planes) {
     const std::string text = formatted("{:.1f}", angle_deg);
     throw Error(
         formatted("the {} views see the shaft from nearly the same side: the planes of its axis meet at {} degrees, "
-                  "where 10 are needed; use views farther apart, or a single one",
+                  "but 10 are needed; use views farther apart, or a single one",
                   planes.size(), text));
   }
   Axis axis;
@@ -70,4 +70,4 @@ RigidTransform world_from_world_move(const Axis& model, const Axis& target, cons
   return world_from_target_axis * inverse(world_from_model_axis);
 }
 
-}  // namespace marrow::shaft
+}  // namespace marrow::initial

@@ -7,7 +7,7 @@
 #include <marrow/domain/features.hpp>
 #include <vector>
 
-namespace marrow::shaft {
+namespace marrow::initial {
 
 /// A straight line: a point and a unit direction.
 struct Axis {
@@ -34,4 +34,4 @@ Axis axis_of_planes(const std::vector<Plane>& planes);
 /// first. The x axes are chosen so that the model does not rotate about its axis or slide along it.
 RigidTransform world_from_world_move(const Axis& model, const Axis& target, const Eigen::Vector3d& anchor);
 
-}  // namespace marrow::shaft
+}  // namespace marrow::initial

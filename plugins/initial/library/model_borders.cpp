@@ -9,7 +9,7 @@
 #include "marrow/base/dispatch.hpp"
 #include "marrow/domain/decompositions.hpp"
 
-namespace marrow::shaft {
+namespace marrow::initial {
 namespace {
 
 constexpr double kStep_px = 2;
@@ -161,4 +161,4 @@ std::optional<ModelBorders> model_borders(const Mesh& model, const RigidTransfor
   return borders;
 }
 
-}  // namespace marrow::shaft
+}  // namespace marrow::initial

@@ -9,7 +9,7 @@
 
 #include "marrow/initial/axis.hpp"
 
-namespace marrow::shaft {
+namespace marrow::initial {
 
 struct ModelBorders {
   LineSegment left, right;
@@ -25,4 +25,4 @@ struct ModelBorders {
 std::optional<ModelBorders> model_borders(const Mesh& model, const RigidTransform& world_from_model,
                                           const Camera& camera, const ShaftLines& lines, double tolerance_px);
 
-}  // namespace marrow::shaft
+}  // namespace marrow::initial

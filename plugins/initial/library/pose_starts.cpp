@@ -10,7 +10,7 @@
 
 #include "marrow/toolbox/geometry/rigid_fit.hpp"
 
-namespace marrow::geometry {
+namespace marrow::initial {
 namespace {
 
 std::vector<std::string> different(const std::vector<Sight>& sights, std::string Sight::*name) {
@@ -46,7 +46,7 @@ RigidTransform tilted_back(const RigidTransform& camera_from_model, const std::v
     points.push_back(sight.model_mm);
     centre += sight.model_mm / double(sights.size());
   }
-  const Eigen::Vector3d normal = camera_from_model.rotation * plane_normal(points);
+  const Eigen::Vector3d normal = camera_from_model.rotation * geometry::plane_normal(points);
   const Eigen::Vector3d there = camera_from_model * centre,
                         beam = normal.dot(there) < 0 ? Eigen::Vector3d(-there.normalized()) : there.normalized();
   const Eigen::Vector3d axis = normal.cross(beam);
@@ -102,8 +102,8 @@ std::vector<RigidTransform> pose_starts(const std::vector<Sight>& sights) {
           std::find_if(sights.begin(), sights.end(), [&](const Sight& sight) { return sight.name == name; })->model_mm);
       world_mm.push_back(*place);
     }
-  if (model_mm.size() >= 3 && !lie_on_a_line(model_mm) && !lie_on_a_line(world_mm))
-    starts.push_back(fit_rigid(model_mm, world_mm, "the landmarks that two views show"));
+  if (model_mm.size() >= 3 && !geometry::lie_on_a_line(model_mm) && !geometry::lie_on_a_line(world_mm))
+    starts.push_back(geometry::fit_rigid(model_mm, world_mm, "the landmarks that two views show"));
   for (const std::string& view : different(sights, &Sight::view)) {
     std::vector<Sight> in_view;
     for (const Sight& sight : sights)
@@ -114,4 +114,4 @@ std::vector<RigidTransform> pose_starts(const std::vector<Sight>& sights) {
   return starts;
 }
 
-}  // namespace marrow::geometry
+}  // namespace marrow::initial

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace marrow::geometry {
+namespace marrow::initial {
 
 /// A landmark seen in a view. The camera is that of the view and must not be null.
 struct Sight {
@@ -22,4 +22,4 @@ struct Sight {
 /// mirror image of those in the CT.
 std::vector<RigidTransform> pose_starts(const std::vector<Sight>& sights);
 
-}  // namespace marrow::geometry
+}  // namespace marrow::initial

@@ -7,7 +7,7 @@
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/transform.hpp"
 
-namespace marrow::geometry {
+namespace marrow::plan {
 namespace {
 
 /// The probability that a vector with these variances along two axes is longer. Scaled by its deviations, the vector
@@ -39,4 +39,4 @@ double length_quantile(const Eigen::Matrix3d& covariance, double probability) {
   return high;
 }
 
-}  // namespace marrow::geometry
+}  // namespace marrow::plan

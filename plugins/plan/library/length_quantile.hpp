@@ -3,7 +3,7 @@
 // How long a normally distributed vector may be.
 #include <Eigen/Core>
 
-namespace marrow::geometry {
+namespace marrow::plan {
 
 /// The length that a vector in a plane does not exceed with this probability (above 0, below 1), if it is normally
 /// distributed around zero. `covariance` is that of the plane's vectors in space, so its least eigenvalue is 0. The
@@ -11,4 +11,4 @@ namespace marrow::geometry {
 /// infinite if a variance is.
 double length_quantile(const Eigen::Matrix3d& covariance, double probability);
 
-}  // namespace marrow::geometry
+}  // namespace marrow::plan

@@ -8,7 +8,7 @@
 
 #include <cmath>
 
-namespace marrow::match {
+namespace marrow::closest_points {
 namespace {
 
 using Cloud = pcl::PointCloud<pcl::PointXYZ>;
@@ -54,4 +54,4 @@ Result align(const std::vector<Eigen::Vector3d>& points, const std::vector<Eigen
   return result;
 }
 
-}  // namespace marrow::match
+}  // namespace marrow::closest_points

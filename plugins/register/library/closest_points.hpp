@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-namespace marrow::match {
+namespace marrow::closest_points {
 
 struct Settings {
   int max_iterations = 100;
@@ -22,4 +22,4 @@ struct Result {
 Result align(const std::vector<Eigen::Vector3d>& points, const std::vector<Eigen::Vector3d>& target,
              const Settings& settings);
 
-}  // namespace marrow::match
+}  // namespace marrow::closest_points

@@ -7,7 +7,7 @@
 
 #include "marrow/base/error.hpp"
 
-namespace marrow::phantom {
+namespace marrow::robot {
 namespace {
 
 constexpr double kReach_mm = 70;     // of the model to either side of the fracture
@@ -23,7 +23,7 @@ std::size_t angle_of(const Eigen::Vector2d& from_middle) {
 
 }  // namespace
 
-Contact::Contact(const Phantom& phantom, const std::string& what) {
+Contact::Contact(const phantom::Phantom& phantom, const std::string& what) {
   if (phantom.fracture.vertices_mm.empty())
     throw Error(what + ": the phantom is of a whole bone; a broken one is needed");
   // The fracture as heights: the highest vertex in each cell of a raster. Its surface is closed far below.
@@ -113,4 +113,4 @@ double Contact::overlap_mm(const RigidTransform& bone_from_distal) const {
   return deepest;
 }
 
-}  // namespace marrow::phantom
+}  // namespace marrow::robot

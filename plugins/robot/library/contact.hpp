@@ -5,13 +5,13 @@
 
 #include "marrow/toolbox/phantom/phantom.hpp"
 
-namespace marrow::phantom {
+namespace marrow::robot {
 
 /// The bone near its fracture: the outer surface as radii around the shaft's middle, the fracture as heights.
 class Contact {
  public:
   /// Throws Error, naming `what`, unless the phantom has a fracture.
-  Contact(const Phantom& phantom, const std::string& what);
+  Contact(const phantom::Phantom& phantom, const std::string& what);
 
   /// How deep the distal fragment reaches into the proximal one; 0 if they are apart. `bone_from_distal`: the distal
   /// fragment's place in the frame "bone" of the proximal one; the identity is the whole bone. Accurate to about 1 mm.
@@ -31,4 +31,4 @@ class Contact {
   std::vector<Eigen::Vector3d> distal_, proximal_;  ///< points on both fragments' surfaces
 };
 
-}  // namespace marrow::phantom
+}  // namespace marrow::robot

@@ -8,7 +8,7 @@
 #include "marrow/domain/transform.hpp"
 #include "marrow/domain/volume.hpp"
 
-namespace marrow::field {
+namespace marrow::segment {
 
 /// Trilinear value at a fractional index, clamped to the border. The volume must have at least two voxels along each
 /// axis.
@@ -118,4 +118,4 @@ class EdgeProfile {
   std::array<std::array<double, 3>, 2 * kReach + 1> weights_{};
 };
 
-}  // namespace marrow::field
+}  // namespace marrow::segment

@@ -9,7 +9,7 @@
 
 #include "marrow/segment/fragments.hpp"
 
-namespace marrow::field {
+namespace marrow::segment {
 namespace {
 
 using marrow::Grid;
@@ -239,4 +239,4 @@ std::vector<std::uint8_t> race(const Volume& volume, const std::vector<std::vect
   return owner;
 }
 
-}  // namespace marrow::field
+}  // namespace marrow::segment

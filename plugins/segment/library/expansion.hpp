@@ -11,7 +11,7 @@
 
 #include "marrow/domain/volume.hpp"
 
-namespace marrow::field {
+namespace marrow::segment {
 
 struct Race {
   double sigma_mm = 0.7;        ///< standard deviation of the Gaussian that removes noise
@@ -25,4 +25,4 @@ struct Race {
 std::vector<std::uint8_t> race(const marrow::Volume& volume, const std::vector<std::vector<Eigen::Vector3d>>& seeds,
                                const Race& race);
 
-}  // namespace marrow::field
+}  // namespace marrow::segment

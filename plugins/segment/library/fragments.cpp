@@ -7,7 +7,7 @@
 #include "marrow/base/error.hpp"
 #include "marrow/toolbox/field/interior.hpp"
 
-namespace marrow::field {
+namespace marrow::segment {
 namespace {
 
 using marrow::Grid;
@@ -57,7 +57,16 @@ Mask solid(const Grid& grid, const std::vector<std::uint8_t>& owner, std::uint8_
       is_other[at + std::size_t(x)] = row[x] != fragment && row[x] != kNobody;
     }
   });
-  if (!mask.empty()) fill_interior(box, mask.is_inside, is_other);
+  if (!mask.empty()) field::fill_interior(box, mask.is_inside, is_other);
+  return mask;
+}
+
+Mask solid_of(const Grid& grid, const std::vector<std::uint8_t>& owner, const List<Seeds>& seeds, std::size_t fragment,
+              int margin) {
+  Mask mask = solid(grid, owner, std::uint8_t(fragment), margin);
+  if (mask.empty())
+    throw Error("seeds of fragment '" + seeds.name(fragment) +
+                "': all of them lie where another fragment's seeds are; move them into this fragment's bone");
   return mask;
 }
 
@@ -113,7 +122,7 @@ SignedField field_at_threshold(const Volume& volume, const Mask& mask, double su
       values[mask.offset(x, y, z)] = float(inside ? -distance : distance);
     }
   });
-  march_distances(grid_of(grid, mask), values, band_mm);
+  field::march_distances(grid_of(grid, mask), values, band_mm);
   return paste(grid, mask, values, float(band_mm));
 }
 
@@ -134,4 +143,4 @@ marrow::List<SignedField> list_of(const marrow::List<marrow::Seeds>& seeds, std:
   return list;
 }
 
-}  // namespace marrow::field
+}  // namespace marrow::segment

@@ -8,7 +8,7 @@
 #include "marrow/domain/list.hpp"
 #include "marrow/domain/volume.hpp"
 
-namespace marrow::field {
+namespace marrow::segment {
 
 constexpr std::uint8_t kNobody = 255;
 
@@ -32,8 +32,25 @@ struct Mask {
 /// each side, as far as the grid goes. The mask is empty if the fragment owns nothing.
 Mask solid(const marrow::Grid& grid, const std::vector<std::uint8_t>& owner, std::uint8_t fragment, int margin = 0);
 
+/// solid() of a fragment with seeds. Throws Error if it owns nothing.
+Mask solid_of(const marrow::Grid& grid, const std::vector<std::uint8_t>& owner,
+              const marrow::List<marrow::Seeds>& seeds, std::size_t fragment, int margin = 0);
+
 /// Margin in voxels that contains a band of `band_mm` in every direction.
 inline int margin(const marrow::Grid& grid, double band_mm) { return int(band_mm / grid.spacing_mm.minCoeff()) + 2; }
+
+/// Calls visit(place) for the six neighbours of a voxel that lie in the grid.
+template <class Visit>
+void for_neighbours(const marrow::Grid& grid, std::size_t at, const Visit& visit) {
+  const std::size_t row = std::size_t(grid.size[0]), slice = row * grid.size[1];
+  const int x = int(at % row), y = int(at % slice / row), z = int(at / slice);
+  if (x > 0) visit(at - 1);
+  if (x + 1 < grid.size[0]) visit(at + 1);
+  if (y > 0) visit(at - row);
+  if (y + 1 < grid.size[1]) visit(at + row);
+  if (z > 0) visit(at - slice);
+  if (z + 1 < grid.size[2]) visit(at + slice);
+}
 
 /// The grid of a mask's box.
 marrow::Grid grid_of(const marrow::Grid& grid, const Mask& mask);
@@ -56,4 +73,4 @@ marrow::SignedField field_at_threshold(const marrow::Volume& volume, const Mask&
 marrow::List<marrow::SignedField> list_of(const marrow::List<marrow::Seeds>& seeds,
                                           std::vector<marrow::SignedField> fields);
 
-}  // namespace marrow::field
+}  // namespace marrow::segment

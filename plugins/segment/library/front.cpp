@@ -9,7 +9,7 @@
 #include "halo.hpp"
 #include "marrow/base/dispatch.hpp"
 
-namespace marrow::field {
+namespace marrow::segment {
 namespace {
 
 /// The distances of a tile's voxels from their neighbours', in rows of eight. A voxel with no neighbour within
@@ -363,4 +363,4 @@ void Front::keep_apart(Front& a, Front& b) {
   });
 }
 
-}  // namespace marrow::field
+}  // namespace marrow::segment

@@ -11,7 +11,7 @@
 #include "marrow/segment/edge_profile.hpp"
 #include "marrow/segment/fragments.hpp"
 
-namespace marrow::field {
+namespace marrow::segment {
 
 /// Speed along the outward normal: F = advection g + edge (1 - g) - curvature kappa. This follows the chapter's Eq 6 as
 /// corrected in docs/method.md, with two changes. The curvature term is not multiplied by g. The term `edge` draws the
@@ -102,4 +102,4 @@ class Front {
   std::size_t band_voxels_ = 0;
 };
 
-}  // namespace marrow::field
+}  // namespace marrow::segment

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace marrow::field {
+namespace marrow::segment {
 
 inline constexpr int kX = 1, kY = 10, kZ = 100;  // steps to the neighbours within a halo
 
@@ -74,4 +74,4 @@ inline bool beside_surface(const float* v) {
   return differs;
 }
 
-}  // namespace marrow::field
+}  // namespace marrow::segment

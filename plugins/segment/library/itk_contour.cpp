@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-namespace marrow::field {
+namespace marrow::segment {
 namespace {
 
 using Image = itk::Image<float, 3>;
@@ -55,4 +55,4 @@ Contour geodesic(const std::vector<float>& hu, std::vector<float> start, const s
   return contour;
 }
 
-}  // namespace marrow::field
+}  // namespace marrow::segment

@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-namespace marrow::field {
+namespace marrow::segment {
 
 /// `sigma_mm`: of the Gaussian gradient of the CT. `edge_hu_per_mm`: K in speed = 1 / (1 + (gradient / K)^2).
 /// `propagation`, `curvature`, `advection`: scaling of ITK's three terms. It stops after `iterations`, or when the root
@@ -27,4 +27,4 @@ struct Contour {
 Contour geodesic(const std::vector<float>& hu, std::vector<float> start, const std::array<int, 3>& size,
                  const std::array<double, 3>& spacing_mm, const Settings& settings);
 
-}  // namespace marrow::field
+}  // namespace marrow::segment

@@ -8,7 +8,7 @@
 #include "marrow/domain/list.hpp"
 #include "marrow/domain/volume.hpp"
 
-namespace marrow::field {
+namespace marrow::segment {
 
 constexpr std::size_t kMostFragments = 253;  // one byte says who owns a voxel
 
@@ -58,4 +58,4 @@ inline std::vector<std::vector<Eigen::Vector3d>> seed_indices(const marrow::Volu
   return indices;
 }
 
-}  // namespace marrow::field
+}  // namespace marrow::segment

@@ -115,7 +115,8 @@ std::string reason_by_image(const Scene& scene, Pair& pair) {
   const double length_mm = length_of(pair, scene.scale);
   if (length_mm < scene.options.min_length_mm)
     return text(
-        "a border is too faint for bone but for {:.0f} mm, of {:.0f} mm wanted, as muscle's is ({:.1f} mm wide)",
+        "only {:.0f} mm of its borders are clear enough for bone, of {:.0f} mm wanted; muscle's are as faint ({:.1f} "
+        "mm wide)",
         length_mm, scene.options.min_length_mm, pair.width_mm);
   const Brightness mean = brightness_of(scene.image, pair.left, pair.right, pair.stretch, pixel_mm);
   if (mean.inside < std::min(mean.outside_left, mean.outside_right)) {

@@ -14,11 +14,14 @@ namespace marrow::shaft {
 ShaftLines best_pair(const EdgeMap& edges, const View& view, const std::vector<Border>& borders, const Scale& scale,
                      const LineOptions& options);
 
-/// The options of a node that calls best_pair().
+/// The ports and options of a node that calls best_pair().
 template <class Builder>
 void declare_line_options(Builder&& node) {
-  node.in("views", "all views of the bone: the shaft lies as deep as the point where their central rays meet",
+  node.in("edges", "edge pixels of the view")
+      .in("view", "X-ray view; its camera and its grey values are used")
+      .in("views", "all views of the bone: the shaft lies as deep as the point where their central rays meet",
           over("view"))
+      .out("lines", "the two outer borders of the shaft, and the rejected pairs")
       .option("source_to_shaft_mm", &LineOptions::source_to_shaft_mm,
               "distance of the shaft from the X-ray source along the central ray; 0: that of the point where the views "
               "meet. If they do not, or are not wired, 600 mm are assumed, with a warning",

@@ -16,6 +16,16 @@ struct FragmentPair {
   std::string reference = "proximal";
 };
 
+/// The item of this fragment. Throws Error, with the fragments that there are, if there is none. `what`: "surface".
+template <class T>
+const T& of_fragment(const List<T>& items, const std::string& fragment, const std::string& what) {
+  if (const T* item = items.find(fragment)) return *item;
+  std::string known;
+  for (const std::string& name : items.names()) known += (known.empty() ? "" : ", ") + name;
+  throw Error("there is no " + what + " of a fragment '" + fragment + "', only of " + known +
+              "; name both fragments with moved and reference");
+}
+
 /// The pose of this name. Throws Error if there is none, as check_pose() does for it and for those before it, and if
 /// one of these is between other frames than the first one.
 inline const Pose& pose_of(const List<Pose>& poses, const std::string& name) {

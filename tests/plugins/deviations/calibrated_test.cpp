@@ -5,19 +5,12 @@
 #include <limits>
 
 #include "shipped.hpp"
+#include "tests/framework/domain/shapes.hpp"
 
 namespace calibrated_test {
 
 /// A box of 20 x 30 x 100 mm about (1, 2, 3).
-marrow::Mesh box() {
-  marrow::Mesh mesh;
-  for (const double z : {-47, 53})
-    for (const double y : {-13, 17})
-      for (const double x : {-9, 11}) mesh.vertices_mm.emplace_back(x, y, z);
-  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  return mesh;
-}
+marrow::Mesh box() { return marrow::test::box({1, 2, 3}, {20, 30, 100}); }
 
 /// A pose whose own axes are not those of the box, with deviations of 1 about and along each axis of the box.
 marrow::Pose pose() {

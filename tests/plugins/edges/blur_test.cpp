@@ -11,7 +11,7 @@ namespace blur_test {
 
 constexpr int kSize_px = 240;
 
-/// exp(-line integral) in 16 bits, with noise of so many grey values.
+/// exp(-line integral) in 16 bits, with noise of this standard deviation in grey values.
 template <class LineIntegral>
 cv::Mat image_of(const LineIntegral& line_integral, double noise) {
   cv::Mat image(kSize_px, kSize_px, CV_16U);

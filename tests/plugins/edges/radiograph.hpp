@@ -27,7 +27,7 @@ inline marrow::Camera camera(double angle_deg, int size_px = 512) {
   return camera;
 }
 
-/// Attenuation is added to what surrounds the body: muscle 0.024, cortical bone 0.08, marrow 0.021 per mm.
+/// Attenuation relative to what surrounds the body: muscle 0.024, cortical bone 0.08, marrow 0.021 per mm.
 struct Cylinder {
   Eigen::Vector3d point, direction;
   double radius_mm, added_per_mm;
@@ -65,8 +65,8 @@ inline Scene shaft(const Eigen::Vector3d& point, const Eigen::Vector3d& directio
   return scene;
 }
 
-/// 16 bit image: `photons` per pixel where nothing is in the way (0: no noise), 60000 grey values there; each pixel is
-/// the mean over 3 x 3 rays.
+/// 16 bit image with 60000 grey values and `photons` per pixel (0: no noise) beside the body; each pixel is the mean
+/// over 3 x 3 rays.
 inline marrow::View image(const std::string& name, const marrow::Camera& camera, const Scene& scene, double photons,
                           unsigned seed) {
   marrow::View view;

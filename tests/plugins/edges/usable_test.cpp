@@ -11,7 +11,7 @@
 
 namespace usable_test {
 
-using namespace marrow::image;
+using namespace marrow::edges;
 
 /// A limb with a bone across a round field of the given radius; beyond the field is scatter, and the outline is
 /// blurred.

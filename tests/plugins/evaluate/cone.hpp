@@ -9,7 +9,7 @@ namespace cone {
 struct Cone {
   Eigen::Vector3d apex_mm, direction;
   double half_angle_rad;
-  /// Of the section across the axis that goes through a point.
+  /// Diameter of the section across the axis through a point.
   double radius_mm(const Eigen::Vector3d& point) const {
     return std::tan(half_angle_rad) * direction.dot(point - apex_mm);
   }

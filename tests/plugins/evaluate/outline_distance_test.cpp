@@ -101,8 +101,8 @@ TEST(OutlineDistance, EdgesOfAnotherDirectionDoNotCount) {
 }
 
 TEST(OutlineDistance, UnmatchedPointsCountWithTheReach) {
-  // Edges beside the upper 60 of 100 outline points only; the lower ones are more than the reach of 5 px away but for 4
-  // of them (v = 80 to 83 reach the last edge at v = 79, 3 px to the side).
+  // Only the upper 60 of 100 outline points have edges beside them. The lower ones are farther away than the reach of 5
+  // px, except 4 of them: v = 80 to 83 reach the last edge at v = 79, 3 px to the side.
   const shipped::Options options{{"reach_px", 5.0}};
   auto found = distances(one("frontal", view("frontal")), one("frontal", line_of_edges(103, 1, 0, 80)), options);
   EXPECT_NEAR(found["median_px"], 3, 1e-6);
@@ -178,8 +178,8 @@ TEST(OutlineDistance, TheNearestEdgeIsThatOfASearchThroughAll) {
 }
 
 TEST(OutlineDistance, SpreadAndPercentilesOfARoughLine) {
-  // Edges 1, 2, ... 10 px outside by turns: across the outline, each point's own edge is the nearest only where the
-  // next are as far.
+  // Edges lie 1, 2, ... 10 px outside in turn. So a point's own edge is the nearest only if its neighbours' edges are
+  // as far.
   marrow::EdgeMap edges{200, 150, {}};
   for (int v = 20; v < 120; ++v) edges.pixels.push_back({100 + 0.1f * float(v % 10), float(v), 1, 0, 1});
   auto found = distances(one("frontal", view("frontal")), one("frontal", edges));

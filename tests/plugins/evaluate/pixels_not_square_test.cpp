@@ -82,7 +82,7 @@ TEST(PixelsNotSquare, OutlineDistances) {
 }
 
 // A cylinder of 28 mm that is inclined in the image, so that width and angle depend on the shape of the pixels. Its
-// borders are those of the true one, turned by a degree in the patient.
+// borders are the true ones, turned by a degree in the patient.
 TEST(PixelsNotSquare, BordersOfAShaft) {
   constexpr double kRadius_mm = 14;
   const Eigen::Vector3d direction = marrow::rotation_from_vector({0, 0.5, 0}).col(2);

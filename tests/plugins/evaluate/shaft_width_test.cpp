@@ -129,10 +129,9 @@ TEST(ShaftWidth, WarnsWhereItIsNoShaft) {
   Listener listener;
   width(scene, listener);
   ASSERT_EQ(listener.warnings.size(), 2u);
-  EXPECT_EQ(
-      listener.warnings[0],
-      "view 'frontal': the borders are 80 mm apart at the depth where the views have the axis, which is no shaft's "
-      "width (15.0 to 55.0 mm); one view's pair is another thing than the other's");
+  EXPECT_EQ(listener.warnings[0],
+            "view 'frontal': the borders are 80 mm apart at the depth where the views have the axis, which is no "
+            "shaft's width (15.0 to 55.0 mm); one view's pair is another thing than the other's");
 }
 
 TEST(ShaftWidth, IsHeldAgainstOtherBonesWhereTheseAreGiven) {
@@ -158,7 +157,7 @@ std::string refusal(const Scene& scene, const std::vector<double>& width_mm, con
 
 TEST(ShaftWidth, IsRefusedFromViewsOfTheSameSideAndWidthsThatAreNone) {
   EXPECT_EQ(refusal(scene_of(14, {0, 4})),
-            "the 2 views see the shaft from nearly the same side: the planes of its axis meet at 3.7 degrees, where 10 "
+            "the 2 views see the shaft from nearly the same side: the planes of its axis meet at 3.7 degrees, but 10 "
             "are needed; use views farther apart");
   EXPECT_EQ(refusal(scene_of(14), {30, 0}, {3, 3}), "width_mm and width_deviation_mm must be positive");
   EXPECT_EQ(refusal(scene_of(14), {30, 30}, {3, -3}), "width_mm and width_deviation_mm must be positive");
@@ -169,10 +168,9 @@ TEST(ShaftWidth, SaysWhatItNeeds) {
   const Scene one = scene_of(14, {0});
   EXPECT_TRUE(width(one, listener).is_absent());
   ASSERT_EQ(listener.warnings.size(), 1u);
-  EXPECT_EQ(
-      listener.warnings[0],
-      "there are shaft lines of one view alone: where the bone lies between source and detector, and so its diameter, "
-      "is not known");
+  EXPECT_EQ(listener.warnings[0],
+            "only one view has shaft lines, so the distance of the bone from the source, and with it its diameter, is "
+            "not known");
   const Scene two = scene_of(14);
   EXPECT_EQ(refusal({two.lines, one.views}),
             "there are shaft lines of a view 'lateral', but no such view; wire the views that the lines were found in");

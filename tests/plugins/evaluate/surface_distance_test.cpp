@@ -70,10 +70,10 @@ TEST(SurfaceDistance, AnInsideOutReferenceHasTheSameBias) {
 }
 
 TEST(SurfaceDistance, OfBoxesOfWhichOneIsLonger) {
-  // 20 x 20 x 40 in 20 x 20 x 46. The longer one's ends (areas 400) lie 3 mm off the shorter one, and of its sides what
-  // sticks out (20 x 3, four times at each end) 0 to 3 mm: 2 * (400 * 3 + 240 * 1.5) over its area of 4480. The shorter
-  // one's ends lie 3 mm off, or m mm where a side is nearer: 14 * 14 * 3 + the integral of m * 4 (20 - 2 m) from 0 to
-  // 3, 288; squared 14 * 14 * 9 + 558.
+  // 20 x 20 x 40 in 20 x 20 x 46. The longer one's ends (areas 400) lie 3 mm off the shorter one, and the parts of its
+  // sides that stick out (20 x 3, four times at each end) lie 0 to 3 mm off it: 2 * (400 * 3 + 240 * 1.5) over its area
+  // of 4480. The shorter one's ends lie 3 mm off, or m mm where a side is nearer: 14 * 14 * 3 + the integral of m * 4
+  // (20 - 2 m) from 0 to 3, 288; squared 14 * 14 * 9 + 558.
   const auto metrics = distance(box({0, 0, 0}, {20, 20, 46}), box({0, 0, 0}, {20, 20, 40}));
   const double longer = 2 * (400 * 3 + 240 * 1.5) / 4480, shorter = 2 * (196 * 3 + 288) / 4000.0;
   EXPECT_NEAR(shipped::figure(metrics, "mean_mm"), 0.5 * (longer + shorter), 0.005);

@@ -40,8 +40,8 @@ TEST(PoseDifference, OfATurnAndAShift) {
   EXPECT_NEAR(figure(metrics, "translation_mm"), 5, 1e-9);
   EXPECT_GT(figure(metrics, "distance_mm"), 5);
   EXPECT_LT(figure(metrics, "distance_mm"), std::hypot(5.0, marrow::radians(10) * 15));
-  // At all points spread over the surface, as at one of it that is told by hand: how far it turns depends on its
-  // distance from the axis.
+  // What holds for one point by hand holds for all points of the surface: how far a point turns depends on its distance
+  // from the axis.
   double sum = 0;
   for (const Eigen::Vector3d& point : marrow::sample_surface(kLower, 500))
     sum += std::hypot(5.0, 2 * std::sin(marrow::radians(5)) * point.head<2>().norm()) / 500;
@@ -87,8 +87,8 @@ TEST(ReductionGap, AnErrorOfAPoseStaysOpen) {
   EXPECT_NEAR(figure(metrics, "translation_mm"), 0.5, 1e-9);
 }
 
-// Found turned by 2 degrees about x through the fracture: at the fracture's points, which lie up to 10 mm to the side
-// and, on the walls, up to border_mm below the cut, it stays open by that much of a turn.
+// Found turned by 2 degrees about x through the fracture. The gap that stays open is this turn of the fracture's
+// points, which lie up to 10 mm to the side and, on the walls, up to border_mm below the cut.
 TEST(ReductionGap, OfATurnIsWhatTheFractureShows) {
   const auto truth = placed({0, 0, 0}, {0, 0, 0}), found = placed({marrow::radians(2), 0, 0}, {0, 0, 0});
   for (const double border_mm : {3.0, 8.0}) {
@@ -124,13 +124,13 @@ TEST(ReductionGap, SaysWhatIsWrong) {
                              {"truths", both(marrow::Truth{here}, marrow::Truth{here})},
                              {"models", both(kLower, kUpper)}};
   EXPECT_EQ(shipped::refusal("evaluate.reduction_gap", good, {{"moved", std::string("middle")}}),
-            "poses: there is none of a fragment 'middle', only of distal, proximal; name both fragments with moved and "
+            "there is no pose of a fragment 'middle', only of distal, proximal; name both fragments with moved and "
             "reference");
   shipped::Inputs apart = good;
   apart["models"] = both(kLower, marrow::test::box({0, 0, 35}, {20, 20, 30}));
   EXPECT_EQ(shipped::refusal("evaluate.reduction_gap", apart),
-            "the surfaces of 'distal' and 'proximal' are nowhere within border_mm of each other; they are no two sides "
-            "of a fracture, or raise border_mm");
+            "the surfaces of 'distal' and 'proximal' are nowhere within border_mm of each other; are they the two "
+            "sides of one fracture? If so, raise border_mm");
   auto elsewhere = here;
   elsewhere.source = "atlas";
   for (const bool is_moved : {true, false}) {

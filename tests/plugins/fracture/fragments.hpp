@@ -54,7 +54,7 @@ inline marrow::List<marrow::Pose> poses(const marrow::RigidTransform& motion) {
   return both;
 }
 
-/// The same, as files give them that hold a matrix only.
+/// The same poses as from files that hold only a matrix.
 inline marrow::List<marrow::Pose> without_axes(const marrow::List<marrow::Pose>& given) {
   marrow::List<marrow::Pose> all;
   for (std::size_t i = 0; i < given.size(); ++i) {

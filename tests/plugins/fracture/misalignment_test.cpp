@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The right values are those that the motions are made of: a hinge, an angle in a plane, a turn about the shaft.
+// The motions are made from the right values: a hinge, an angle in a plane, a turn about the shaft.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -108,8 +108,9 @@ TEST(Misalignment, TheLimbMayLieOtherwiseInTheCt) {
   // An arm above the head: its end is up, and its front is still the patient's front.
   const RigidTransform moved = motion(turn(8, kBack));
   const auto found = misalignment(moved, {{"side", "left"}, {"up", std::vector<double>{0, 0, -1}}});
-  // What lies above is the distal fragment now. Relative to it the other one has turned by 8 degrees about the axis to
-  // the back, so itself by -8. Seen along the limb, left and right have changed with up and down.
+  // Now the upper fragment is the distal one. Relative to it the other fragment has turned by 8 degrees about the axis
+  // to the back, so it has turned by -8 degrees itself. Seen along the limb, left and right have changed with up and
+  // down.
   EXPECT_NEAR(figure(found, "varus_deg"), -8, 0.1);
   EXPECT_EQ(shipped::refusal("fracture.misalignment", inputs(poses(moved)), {{"up", std::vector<double>{0, 1, 0}}}),
             "'front' and 'up' must be two different directions of the CT, such as [0, -1, 0] and [0, 0, 1]");
@@ -121,7 +122,7 @@ TEST(Misalignment, TheLimbMayLieOtherwiseInTheCt) {
 
 /// Half of the tubes' facing ends is exactly the fracture's middle, by symmetry.
 TEST(Misalignment, TheFractureIsWhereTheSurfacesFaceEachOther) {
-  const Vector3d found = marrow::geometry::middle_of_fracture_mm(*models().find("distal"), "distal",
+  const Vector3d found = marrow::fracture::middle_of_fracture_mm(*models().find("distal"), "distal",
                                                                  *models().find("proximal"), "proximal");
   EXPECT_LT((found - kFracture_mm).norm(), kNear_mm) << found.transpose();
   marrow::Mesh far = *models().find("distal");
@@ -157,10 +158,10 @@ TEST(Misalignment, AxesOfPosesThatHaveNoneComeFromTheSurface) {
     EXPECT_EQ(metric.value, figure(found, metric.name)) << metric.name;
   shipped::Inputs without = inputs(without_axes(given));
   without.erase("models");
-  EXPECT_EQ(shipped::refusal("fracture.misalignment", without, {{"fracture_mm", std::vector<double>{0, 0, 0}}}),
-            "the pose of 'distal' does not say where the fragment's middle is and how its long axis runs, as a matrix "
-            "alone does not; wire the surfaces of both fragments to 'models', or give the node that reads the pose its "
-            "model");
+  EXPECT_EQ(
+      shipped::refusal("fracture.misalignment", without, {{"fracture_mm", std::vector<double>{0, 0, 0}}}),
+      "the pose of 'distal' does not say where the fragment's middle is and how its long axis runs, as a matrix alone "
+      "does not; wire the surfaces of both fragments to 'models', or give the node that reads the pose its model");
 }
 
 /// A distal fragment that is shorter than it is wide: the longest way through it is across the bone.
@@ -185,8 +186,8 @@ TEST(Misalignment, AShortFragmentDoesNotTellTheLongAxis) {
   EXPECT_NEAR(figure(found, "internal_torsion_deg"), -40, 0.2);
   EXPECT_TRUE(said.starts_with("the long axes of the two fragments differ by ")) << said;
   EXPECT_TRUE(
-      said.ends_with(" degrees in the CT, so one is too short to show the bone's; that of the proximal fragment "
-                     "is taken, which is nearer to 'up'"))
+      said.ends_with(" degrees in the CT, so one fragment is too short to show the bone's axis; the proximal one is "
+                     "taken, whose axis is nearer to 'up'"))
       << said;
 }
 

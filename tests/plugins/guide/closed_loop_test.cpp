@@ -161,8 +161,8 @@ TEST(ClosedLoop, NoStepIsLargerThanItsLimits) {
     }
 }
 
-/// How far a step leads the fracture astray at most, if nothing is known of the robot's place. Its direction counts as
-/// known to 1.5 rad then, its place to 60 mm, and the fracture lies 150 mm from the fragment's middle.
+/// How far a step leads the fracture astray at most, if nothing is known of the robot's place. Then its direction
+/// counts as known to 1.5 rad and its place to 60 mm; the fracture lies 150 mm from the fragment's middle.
 double astray_mm(const Value& figures) {
   const double turn = radians(shipped::figure(figures, "step_deg"));
   return 1.5 * (shipped::figure(figures, "step_mm") + 150 * turn) + 60 * turn;
@@ -201,7 +201,7 @@ TEST(ClosedLoop, AfterBonesHavePressedItGoesBack) {
   };
   const RigidTransform none = told(pressed) * state.told;
   EXPECT_TRUE(none.rotation.isIdentity(1e-9) && none.translation_mm.isZero(1e-9));
-  // It does not, if the robot could not reach farther.
+  // It does not, because the robot cannot reach farther.
   RobotReport beyond;
   beyond.stopped = "a leg is too long";
   EXPECT_FALSE((told(beyond) * state.told).translation_mm.isZero(0.1));
@@ -235,8 +235,8 @@ TEST(ClosedLoop, EndsWhereTheImagesShowNoMore) {
         .reason;
   };
   EXPECT_TRUE(
-      reason(0.4, 0.2).starts_with("the fragment is in its place as far as the images show: 0.40 degrees and "
-                                   "0.20 mm remain, known to 0.42 degrees and 0.43 mm"))
+      reason(0.4, 0.2).starts_with("the fragment is in its place as far as the images show: 0.40 degrees and 0.20 mm "
+                                   "remain, known to 0.42 degrees and 0.43 mm"))
       << reason(0.4, 0.2);
   EXPECT_TRUE(reason(0.5, 0.2).starts_with("release: ")) << reason(0.5, 0.2);
   EXPECT_TRUE(reason(0.4, 0.5).starts_with("release: ")) << reason(0.4, 0.5);
@@ -277,8 +277,9 @@ TEST(ClosedLoop, SaysWhatIsMissing) {
   List<Mesh> one;
   one.add("proximal", block(0, kLong_mm));
   lacking["models"] = shipped::list(one, "fragment");
-  EXPECT_EQ(shipped::refusal("guide.closed_loop", lacking),
-            "there is no surface of the fragment 'distal'; give those of both fragments");
+  EXPECT_EQ(
+      shipped::refusal("guide.closed_loop", lacking),
+      "there is no surface of a fragment 'distal', only of proximal; name both fragments with moved and reference");
   List<Mesh> apart = one;
   apart.add("distal", block(-80, -40));
   lacking["models"] = shipped::list(apart, "fragment");

@@ -12,7 +12,7 @@
 
 namespace axis_test {
 
-using namespace marrow::shaft;
+using namespace marrow::initial;
 
 struct Case {
   Eigen::Vector3d point, direction;
@@ -120,10 +120,9 @@ TEST(Axis, IsRefusedFromViewsOfTheSameSide) {
     axis_of_planes(planes);
     FAIL();
   } catch (const marrow::Error& error) {
-    EXPECT_STREQ(
-        error.what(),
-        "the 2 views see the shaft from nearly the same side: the planes of its axis meet at 4.0 degrees, where 10 are "
-        "needed; use views farther apart, or a single one");
+    EXPECT_STREQ(error.what(),
+                 "the 2 views see the shaft from nearly the same side: the planes of its axis meet at 4.0 degrees, but "
+                 "10 are needed; use views farther apart, or a single one");
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Costs are the mean square of the six numbers (degrees and mm) that a pose is away from the bottom of a bowl.
+// A cost is the mean square of six numbers: the distances (degrees and mm) of a pose from the bottom of a bowl.
 #include <gtest/gtest.h>
 
 #include "shipped.hpp"

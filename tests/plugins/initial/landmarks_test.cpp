@@ -90,11 +90,11 @@ TEST(Landmarks, ErrorsAreAsLargeAsPredicted) {
 TEST(Landmarks, RefusesWhatDoesNotDetermineAPose) {
   const auto points = scene::spread();
   EXPECT_EQ(refusal(seen_in({points.begin(), points.begin() + 3}, {"frontal"})),
-            "3 landmarks are seen in 1 view; a pose takes three that are seen in two views, or four in one");
+            "3 landmarks are seen in 1 view; a pose needs three that are seen in two views, or four in one");
   EXPECT_EQ(refusal(seen_in({points.begin(), points.begin() + 2}, {"frontal", "lateral"})),
-            "2 landmarks are seen in 2 views; a pose takes three that are seen in two views, or four in one");
+            "2 landmarks are seen in 2 views; a pose needs three that are seen in two views, or four in one");
   EXPECT_EQ(refusal({}),
-            "0 landmarks are seen in 0 views; a pose takes three that are seen in two views, or four in one");
+            "0 landmarks are seen in 0 views; a pose needs three that are seen in two views, or four in one");
   EXPECT_EQ(
       refusal(seen_in({{0, 0, 0}, {1, 2, 20}, {2, 4, 40}, {3, 6, 60}}, {"frontal", "lateral"})),
       "the landmarks that are seen lie on one line, so the rotation about it is not determined; add one aside of it");

@@ -47,7 +47,7 @@ struct TrueViews {
       ShaftLines window;
       window.left = {{300, 60}, {300, 350}};
       window.right = {{200, 60}, {200, 350}};
-      const auto borders = *marrow::shaft::model_borders(model, truth, view.camera, window, 3);
+      const auto borders = *marrow::initial::model_borders(model, truth, view.camera, window, 3);
       ShaftLines seen;
       seen.left = borders.left;
       seen.right = borders.right;
@@ -90,8 +90,8 @@ TEST(ShaftAxis, FindsTheAxisOfACylinderFromTwoAndThreeViews) {
   }
 }
 
-// A bow of 900 mm radius to the front, a taper of 2 degrees a side and a ridge of 4 mm at the back: none of them moves
-// the axis, because the model is measured as the image was.
+// A bow of 900 mm radius to the front, a taper of 2 degrees on each side and a ridge of 4 mm at the back: none of them
+// moves the axis, because the model is measured in the same way as the image.
 TEST(ShaftAxis, IsNotMisledByBowTaperAndRidge) {
   const Mesh model = tube::mesh(
       90,
@@ -163,14 +163,13 @@ TEST(ShaftAxis, WarnsOfBordersThatAreNotThoseOfTheModel) {
   setup.lines.add("lateral", tube::borders(side.camera, {0, 0, 0}, {0, 0, 1}, 19, 60, 350));
   const Pose pose = shaft_axis(model, setup.lines, setup.views, nullptr);
   ASSERT_EQ(pose.warnings.size(), 1u);
-  EXPECT_EQ(
-      pose.warnings[0],
-      "view 'lateral': the shaft's borders are 39.0 mm apart, where the model is 28.0 mm wide; they may belong to "
-      "something else");
+  EXPECT_EQ(pose.warnings[0],
+            "view 'lateral': the shaft's borders are 39.0 mm apart, where the model is 28.0 mm wide; they may belong "
+            "to something else");
 }
 
-// As in an image of a fracture: the shaft that was found is the other fragment's, below this one. Its own pair was
-// outdone by it, and stands behind a canal and a pair that is too short.
+// As in an image of a fracture: the shaft that was found belongs to the other fragment, below this one. This fragment's
+// own pair was rejected, and comes after a canal and a pair that is too short.
 TEST(ShaftAxis, TakesTheLinesWhereTheFragmentIs) {
   const Mesh model = tube::cylinder(14, 45);
   const RigidTransform truth = posed({4, -6, 0}, {8, -5, 50});
@@ -217,10 +216,9 @@ TEST(ShaftAxis, SaysWhatIsMissing) {
   EXPECT_EQ(refusal(model, {}, setup.views, nullptr), "there are no shaft lines; wire the lines of at least one view");
   Pose far;
   far.world_from_model.translation_mm = {0, 0, 400};
-  EXPECT_EQ(
-      refusal(model, setup.lines, setup.views, &far),
-      "view 'at 0': where the image shows the shaft, the model at its start does not appear, nor does another pair "
-      "of lines fit it; give a start nearer to the bone");
+  EXPECT_EQ(refusal(model, setup.lines, setup.views, &far),
+            "view 'at 0': the model at its start is not where the image shows the shaft, and no other pair of lines "
+            "fits it; give a start nearer to the bone");
   List<ShaftLines> empty_lines;
   empty_lines.add("at 0", ShaftLines{});
   EXPECT_EQ(refusal(model, empty_lines, setup.views, nullptr), "view 'at 0': a border of the shaft has no length");

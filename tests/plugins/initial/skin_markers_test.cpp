@@ -104,7 +104,7 @@ TEST(SkinMarkers, WarnsOfMarkersThatMovedAgainstEachOther) {
   const marrow::Pose pose = found(markers, errors({2}, 5, 0), listener.context);
   ASSERT_EQ(pose.warnings.size(), 1u);
   EXPECT_EQ(listener.warnings, pose.warnings);
-  EXPECT_EQ(pose.warnings[0].find("the markers do not keep their places to each other: they are off by "), 0u);
+  EXPECT_EQ(pose.warnings[0].find("the markers have moved relative to each other: they are off by "), 0u);
   EXPECT_NE(pose.warnings[0].find("times what noise_mm says"), std::string::npos) << pose.warnings[0];
   EXPECT_NE(pose.warnings[0].find("are two names exchanged, or did a marker move?"), std::string::npos);
 }
@@ -124,10 +124,9 @@ TEST(SkinMarkers, RefusesWhatGivesNoPose) {
   markers = seen_in(all, {});
   markers.tracked[3].name = markers.points[3].name = "unseen";
   markers.tracked[3].world_mm.y() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(
-      refusal(markers),
-      "the marker 'unseen' has a coordinate that is not a number; leave out a marker that the tracking system did "
-      "not see");
+  EXPECT_EQ(refusal(markers),
+            "the marker 'unseen' has a coordinate that is not a number; leave out a marker that the tracking system "
+            "did not see");
   EXPECT_EQ(refusal(seen_in(all, {}), {{"noise_mm", std::vector<double>{1, 2}}}),
             "noise_mm has 2 numbers for 4 tracked markers; give one for all, or one for each");
   EXPECT_EQ(refusal(seen_in(all, {}), {{"noise_mm", std::vector<double>{0}}}),

@@ -51,7 +51,7 @@ inline shipped::Inputs inputs(const marrow::geometry::Implant& implant, const ma
       {"implant", shipped::item(implant)}, {"pose", shipped::item(pose)}, {"views", shipped::list(views(), "view")}};
 }
 
-/// The options, of a left leg if they say nothing of where the drill comes from.
+/// The options; for a left leg, if they do not say where the drill comes from.
 inline shipped::Options of_left_leg(shipped::Options options) {
   if (!options.count("from") && !options.count("side")) options["side"] = std::string("left");
   return options;

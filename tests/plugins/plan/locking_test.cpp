@@ -124,8 +124,8 @@ TEST(PlanLocking, NinetyFivePerCentAreThatForAnyShapeOfTheCovariance) {
   }
 }
 
-/// 4000 draws of poses from a covariance whose largest part is a turn about the nail: 95 % of the holes' axes turn by
-/// no more than what is said. (Three deviations of the share are 1.0 %.)
+/// 4000 poses drawn from a covariance whose largest part is a turn about the nail: 95 % of the holes' axes turn by at
+/// most the stated angle. (Three deviations of the share are 1.0 %.)
 TEST(PlanLocking, NinetyFivePerCentOfDrawnPosesAreWithin) {
   marrow::Pose at = pose({0.1, 0.2, 0.3}, {0, 0, 50}, {0, 0, 0});
   marrow::Vector6d deviations;
@@ -209,13 +209,12 @@ TEST(PlanLocking, RefusesWhatCannotBePlanned) {
   Implant without = rod();
   without.holes.clear();
   EXPECT_EQ(refusal(without, at),
-            "plan.locking: the implant has no holes, so there is nothing to lock; give each "
-            "hole's centre and axis");
+            "plan.locking: the implant has no holes, so there is nothing to lock; give each hole's centre and axis");
   Implant flat = rod();
   flat.holes[0].axis.setZero();
   EXPECT_EQ(refusal(flat, at),
-            "plan.locking: the axis of hole 'distal' has the length 0.000000, so it has no "
-            "direction; give the direction of the hole, such as [1, 0, 0]");
+            "plan.locking: the axis of hole 'distal' has the length 0.000000, so it has no direction; give the "
+            "direction of the hole, such as [1, 0, 0]");
   flat.holes[0].axis = {0.5, 0, 0};
   EXPECT_EQ(refusal(flat, at), "plan.locking: the axis of hole 'distal' must have length 1, got 0.500000");
   Implant twice = rod();
@@ -230,8 +229,8 @@ TEST(PlanLocking, RefusesWhatCannotBePlanned) {
   Implant open = rod();
   open.surface.triangles.pop_back();
   EXPECT_EQ(refusal(open, at),
-            "plan.locking: the surface is open or not consistently oriented, so it has no inside; "
-            "close its holes (each edge must be shared by exactly two triangles)");
+            "plan.locking: the surface is open or not consistently oriented, so it has no inside; close its holes "
+            "(each edge must be shared by exactly two triangles)");
   Implant inward = rod();
   for (auto& triangle : inward.surface.triangles) std::swap(triangle[0], triangle[1]);
   EXPECT_NE(refusal(inward, at).find("plan.locking: the triangles face inward (enclosed volume -"), std::string::npos);

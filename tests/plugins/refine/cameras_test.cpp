@@ -33,7 +33,7 @@ TEST(RefineCameras, HalfOfAnErrorGoesToEachOfTwoViews) {
   EXPECT_NEAR(figure(motions(outputs, 0), "shift_u_mm"), 0, 0.02);
   const marrow::Pose pose = outputs.at("poses").as_list<marrow::Pose>()[0];
   EXPECT_NEAR(pose.world_from_model.translation_mm.y(), 41, 0.02);
-  // The deviation of what nothing tells: that of each camera, divided by the root of two.
+  // The deviation of what the images do not show: that of each camera, divided by the root of two.
   EXPECT_NEAR(figure(motions(outputs, 0), "predicted_rotation_u_deg"), 0.5 / std::sqrt(3) / std::sqrt(2), 0.005);
   EXPECT_GT((*pose.covariance)(3, 3), 0.01) << "the pose is not known better than the cameras";
 }
@@ -75,7 +75,7 @@ TEST(RefineCameras, CamerasThatAreRightStay) {
 TEST(RefineCameras, WhereImagesHardlyTellHowFarTheCamerasAreOffTheDeviationsSaySo) {
   const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
   const auto deviation_mm = [&](double information) {
-    // Against a camera that is right, so that nothing of what both share is left.
+    // Relative to a camera that is right, so that no shared error is left.
     const auto outputs = shipped::call("refine.cameras", inputs({Bone({none, none}, information)}),
                                        {{"reference_view", std::string("lateral")}});
     return figure(motions(outputs, 0), "predicted_shift_u_mm");
@@ -200,10 +200,9 @@ TEST(RefineCameras, SaysWhatIsWrong) {
                                                         return behind;
                                                       }())),
             "view 'frontal': the bones do not lie in front of its camera; look at the overlays first");
-  EXPECT_EQ(
-      shipped::refusal("refine.cameras", inputs({Bone({})})),
-      "the cost of 'distal' cannot be split into views: it compares no views, or it holds more than them, such as "
-      "a prior; give the cost of the images alone");
+  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({Bone({})})),
+            "the cost of 'distal' cannot be split into views: it compares no views, or it holds more than them, such "
+            "as a prior; give the cost of the images alone");
   EXPECT_EQ(shipped::refusal("refine.cameras", inputs({bone}), {{"reference_view", std::string("frontl")}}),
             "reference_view: there is no view 'frontl'; did you mean 'frontal'?");
   Bone negative = bone;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What all cameras are off by together: no image shows it, so the poses are as uncertain as the options say.
+// No image shows an error that all cameras share, so the poses are as uncertain as the options say.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -45,7 +45,8 @@ TEST(RefineCameras, AMotionThatBothCamerasShareIsAsLargeAsTheOptionsSay) {
 TEST(RefineCameras, WhatIsSharedGoesByTheReference) {
   const RigidTransform off = motion({0.2, 0.2, -0.2}, {1, 1, 1});
   const Outcome found = outcome(Bone({off, off}, 1e6), {{"reference_view", std::string("frontal")}});
-  // The reference is taken as right, so the bone follows it. That the other camera is off as much fits by no chance.
+  // The reference counts as right, so the bone follows it. It would be very unlikely that the other camera is off as
+  // much.
   EXPECT_LT(std::sqrt(found.covariance.diagonal().maxCoeff()), 0.05);
 }
 

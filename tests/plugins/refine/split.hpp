@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Cameras, bones and costs of which one can compute by hand what refine.cameras must find.
+// Cameras, bones and costs for which the right result of refine.cameras can be computed by hand.
 #include <marrow/domain/decompositions.hpp>
 #include <marrow/domain/functions.hpp>
 
@@ -29,8 +29,8 @@ inline marrow::List<marrow::View> views(int count = 2) {
   return views;
 }
 
-/// Each view likes one pose best. Its blocks say that the cost is known as well as `information` observations of noise
-/// 1 would make it: noise 1 / information.
+/// Each view likes one pose best. By its blocks the cost is known as well as from `information` observations of noise
+/// 1: its noise is 1 / information.
 class Split : public marrow::Cost {
  public:
   Split(std::vector<RigidTransform> best, marrow::FragmentFrame frame, double information, double stiffness = 1)
@@ -121,7 +121,7 @@ inline shipped::Inputs inputs(const std::vector<Bone>& bones, const marrow::List
           {"poses", shipped::list(poses, "fragment")}};
 }
 
-/// Which motion of the world the corrected camera of a view stands for.
+/// The motion of the world that the corrected camera of a view stands for.
 inline RigidTransform found(const shipped::Outputs& outputs, std::size_t view) {
   return inverse(views()[view].camera.camera_from_world) *
          outputs.at("views").as_list<marrow::View>()[view].camera.camera_from_world;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A cost whose Hessian, derivatives and noise are known exactly, and an optimizer that only notes what it is asked.
+// A cost with exactly known Hessian, derivatives and noise, and an optimizer that only records its problems.
 #include <marrow/domain/decompositions.hpp>
 #include <marrow/domain/functions.hpp>
 #include <vector>

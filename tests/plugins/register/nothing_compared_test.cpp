@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Images that say nothing about a pose: no search may end in a pose there. Every cost is tried in every way in which it
-// can have nothing to compare. That it has nothing is so by construction: the bone, the edges or the pixels are not
-// there.
+// can have nothing to compare: by construction, the bone, the edges or the pixels are missing.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -209,7 +208,7 @@ TEST(NothingCompared, ABoneOutOfViewIsNoPose) {
 }
 
 TEST(NothingCompared, ABoneBehindBothSourcesIsNoPose) {
-  // Each source is 600 mm from the origin; their sum lies 80 degrees between them, 1.17 times as far along either.
+  // Each source is 600 mm from the origin, 80 degrees from the other; their sum is 1.17 times as far away along either.
   Scene scene;
   scene.shift(1.5 * (source_position_mm(scene.views[0].camera) + source_position_mm(scene.views[1].camera)));
   expect_no_pose("behind the sources", scene, any);

@@ -23,7 +23,7 @@ marrow::RigidTransform bottom() {
   return {"world", "ct", marrow::rotation_from_vector({0.2, 0.1, -0.4}), Eigen::Vector3d(12, -7, 30)};
 }
 
-/// Axes that differ by much, and each tied to each other.
+/// Axes of very different curvature, each coupled to each other.
 Matrix6d hessian() {
   Matrix6d root = Matrix6d::Zero();
   root.diagonal() << 1, 0.5, 0.05, 2, 0.1, 0.7;
@@ -54,7 +54,7 @@ class Counted : public Bowl {
   mutable std::atomic<int> asked = 0;
 };
 
-/// All that it says lies in the first one or two of its blocks.
+/// All its information is in the first one or two of its blocks.
 class OfFewBlocks : public Bowl {
  public:
   OfFewBlocks(std::size_t few, const Bowl& bowl) : Bowl(bowl), few_(few) {}
@@ -68,7 +68,7 @@ class OfFewBlocks : public Bowl {
   std::size_t few_;
 };
 
-// With one block left out nothing is left, so no motion of the minimum tells how far the pose may be off.
+// Nothing is left without this one block, so no motion of the minimum shows how far the pose may be off.
 TEST(PredictedCovariance, OfOneOrTwoBlocksIsNotKnown) {
   for (const std::size_t few : {1u, 2u}) {
     const OfFewBlocks cost(few, Bowl(bottom(), frame(), hessian()));
@@ -324,7 +324,7 @@ TEST(PredictedCovariance, SaysWhichAxesTheImagesDoNotTell) {
 }
 
 TEST(PredictedCovariance, OfADirectionThatOnlyTwoAxesTogetherLeaveOpen) {
-  // Each axis alone is well determined, their sum against each other is not.
+  // Each axis alone is well determined, but not their combination.
   Matrix6d tied = Matrix6d::Identity();
   tied.topLeftCorner<2, 2>() << 1, 1, 1, 1;
   const marrow::RigidTransform pose = bottom();
@@ -368,8 +368,8 @@ TEST(PredictedCovariance, OfAPerfectFitIsTheLeastStep) {
 }
 
 TEST(PredictedCovariance, OneBlockThatAloneTellsAnAxisLeavesItOpen) {
-  // Of nine blocks, one alone holds the residuals along the last axis. Without it nothing tells that axis: no deviation
-  // follows from derivatives, and 0 would be wrong.
+  // Only one of nine blocks holds the residuals along the last axis. Without it nothing determines that axis: no
+  // deviation follows from derivatives, and 0 would be wrong.
   class Alone : public Squares {
    public:
     Alone() : Squares(0.05) {

@@ -51,7 +51,7 @@ TEST(Scan, OfTheAxisIsAGridWithinItsRanges) {
   options.scan_rotation_deg = 6;
   options.scan_rotation_step_deg = 2;
   options.scan_translation_mm = 0.3;
-  options.scan_translation_step_mm = 0.1;  // three steps, though 0.3 / 0.1 is a little less
+  options.scan_translation_step_mm = 0.1;  // three steps, although 0.3 / 0.1 is a little less than 3
   const Scan scan = marrow::search::axial_scan(options);
   ASSERT_EQ(scan.motions.size(), 7u * 7);
   EXPECT_TRUE(scan.motions.front().isApprox(motion(0, 0, -6, 0, 0, -0.3), 1e-12));
@@ -285,7 +285,7 @@ TEST(Derivatives, AreThoseOfTheCoordinates) {
   EXPECT_TRUE(std::isnan(marrow::search::in_coordinates(std::nullopt, motion(0, 0, 0, 0, 0, 0), kAllAxes).value));
 }
 
-/// Without a sentence: a constant, or not a number.
+/// A constant, or not a number, without a sentence that says so.
 class Blind : public marrow::Cost {
  public:
   explicit Blind(double value, std::string said = "") : value_(value), said_(std::move(said)) {}
@@ -317,10 +317,9 @@ std::string refused(const marrow::Cost& cost) {
 }
 
 TEST(Search, APoseAboutWhichTheImagesSayNothingIsNoResult) {
-  const std::string before = "the images say nothing about the pose that was found: ",
-                    remedy =
-                        "; give a start nearer to the bone, or see whether the masks, the edges and the model are "
-                        "right";
+  const std::string
+      before = "the images say nothing about the pose that was found: ",
+      remedy = "; give a start nearer to the bone, or see whether the masks, the edges and the model are right";
   EXPECT_EQ(refused(bowl()), "");
   EXPECT_EQ(refused(Blind(3)), before + "the cost is the same at all poses within 16 degrees and mm" + remedy);
   EXPECT_EQ(refused(Blind(0)), before + "the cost is the same at all poses within 16 degrees and mm" + remedy);

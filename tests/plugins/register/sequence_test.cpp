@@ -23,7 +23,7 @@ struct Trial {
   Trial(const Pose& first, const Pose& second) {
     inputs["cost"] = marrow::Value::of<Cost>(std::make_shared<const Well>(first.world_from_model, first.frame));
     finer = std::make_shared<const Well>(second.world_from_model, second.frame, 60,
-                                         6);  // of its waves the first cost is to lead out
+                                         6);  // the first cost must lead out of its waves
     inputs["finer_cost"] = marrow::Value::of<Cost>(finer);
     inputs["optimizer"] = shipped::call("optimizer.nelder_mead", {}).at("optimizer");
     inputs["start"] = shipped::item(pose_at(truth(), 2, -2, 8, 3, -3, 9));

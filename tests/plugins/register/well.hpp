@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Costs that one can compute by hand: a bowl about a pose, with waves or without.
+// Costs that can be computed by hand: a bowl about a pose, with or without waves.
 #include <cmath>
 #include <marrow/domain/case.hpp>
 #include <marrow/domain/functions.hpp>

@@ -44,8 +44,8 @@ TEST(HexapodCondition, PosesThatTheLegsDoNotHoldAreOutsideTheWorkspace) {
     });
   };
   EXPECT_EQ(refused(88), "");
-  // A turn by a quarter is singular for any hexapod of this kind (Fichter 1986). Behind it the legs hold the platform
-  // again, but it cannot come there.
+  // A turn by a quarter is singular for any hexapod of this kind (Fichter 1986). Beyond it the legs hold the platform
+  // again, but the platform cannot get there.
   EXPECT_TRUE(refused(90).starts_with("motion 'turn': the hexapod's legs do not hold the platform in this pose: "))
       << refused(90);
   EXPECT_TRUE(refused(90).ends_with(", at most 100 is allowed; give another motion, or another shape of the hexapod"))
@@ -63,7 +63,7 @@ TEST(HexapodCondition, NoPoseIsFoundWhereTheLegsDoNotHoldThePlatform) {
   EXPECT_EQ(message_of([&] { robot::pose_of_legs(free, lengths, free.base_from_home); }),
             "the hexapod's legs do not hold the platform in this pose: the pose is singular, at most 100 is allowed; "
             "give another motion, or another shape of the hexapod");
-  // The joints' errors make it regular, but no better.
+  // The joints' errors make it regular, but not better.
   EXPECT_TRUE(
       message_of([&] {
         robot::pose_of_legs(robot::as_built(free, 0.05, 1), lengths, free.base_from_home);
@@ -110,10 +110,9 @@ TEST(HexapodCondition, AHexapodNearASingularPoseIsWarnedOf) {
   const auto made = shipped::call(
       "simulate.hexapod", {{"phantom", shipped::item(broken())}, {"commands", shipped::list(commands, "position")}},
       shape(54), Context(hooks));
-  EXPECT_EQ(warnings,
-            std::vector<std::string>{"a motion comes near a singular pose of the hexapod: the condition of its legs is "
-                                     "41, and above 20 an error of a leg moves the platform several times as far as "
-                                     "usual"});
+  EXPECT_EQ(warnings, std::vector<std::string>{
+                          "a motion comes near a singular pose of the hexapod: the condition of its legs is 41, and "
+                          "above 20 an error of a leg moves the platform several times as far as usual"});
   EXPECT_NEAR(shipped::figure(shipped::item(made.at("legs").as_list<Metrics>()[0]), "condition"), 41.0714576825, 1e-6);
   warnings.clear();
   shipped::call("robot.hexapod", {{"phantom", shipped::item(broken())}},

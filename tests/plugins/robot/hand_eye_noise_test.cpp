@@ -59,7 +59,7 @@ std::vector<Move> moves_between(const std::vector<Station>& stations) {
 /// Errors of places found, against their predicted covariances.
 struct Errors {
   double distance2 = 0;  ///< mean squared Mahalanobis distance of the place
-  /// Of where the fragment is after a move told with this place: mean squares, and what was predicted of them.
+  /// Mean squared errors of the fragment after a move with this place, and their prediction.
   double turn2 = 0, shift2 = 0, predicted_turn2 = 0, predicted_shift2 = 0;
 
   void add(const RigidTransform& base_from_world, const Matrix6d& covariance, double weight) {
@@ -86,7 +86,7 @@ TEST(HandEyeNoise, ThePredictedDeviationsAreThoseOfDrawnStations) {
       stations.push_back(station(drawn(random, 8), drawn(random, 6), 0.1, 0.2, random));
     const robot::RobotWorld zb = robot::solve_ax_zb(stations);
     of_zb.add(zb.base_from_world, zb.covariance, 1.0 / kDraws);
-    // The motions between n stations share the noise of these, so their covariance counts (n + 1) / 2 times
+    // The motions between n stations share the noise of the stations, so their covariance counts (n + 1) / 2 times
     // (open_loop.cpp).
     const robot::HandEye xb = robot::solve_ax_xb(moves_between(stations));
     of_xb.add(xb.robot_from_reference, 0.5 * (kStations + 1) * xb.covariance, 1.0 / kDraws);
@@ -113,7 +113,7 @@ std::vector<Station> about_one_axis(double noise_deg, double noise_mm, std::uint
   return stations;
 }
 
-/// What a move would be left to, in mm; infinite where no place is found.
+/// The error that a move would leave, in mm; infinite if no place is found.
 double left_mm(const std::vector<Station>& stations, bool by_motions) {
   Matrix6d covariance;
   const std::string refused = message_of([&] {
@@ -136,11 +136,10 @@ TEST(HandEyeNoise, NoiseIsNoSecondAxis) {
       refused += std::isinf(left);
     }
   EXPECT_GE(refused, 90) << "of 100";
-  const std::string zb = message_of([] { robot::solve_ax_zb(about_one_axis(0.1, 0.1, 1)); }),
-                    xb = message_of([] { robot::solve_ax_xb(moves_between(about_one_axis(0.1, 0.1, 1))); }),
-                    remedy =
-                        " degrees only (one standard deviation); turn it further, about axes that are at least 30 "
-                        "degrees apart";
+  const std::string
+      zb = message_of([] { robot::solve_ax_zb(about_one_axis(0.1, 0.1, 1)); }),
+      xb = message_of([] { robot::solve_ax_xb(moves_between(about_one_axis(0.1, 0.1, 1))); }),
+      remedy = " degrees only (one standard deviation); turn it further, about axes that are at least 30 degrees apart";
   EXPECT_TRUE(zb.starts_with("the stations of the robot do not tell how the robot is turned: it is known to ")) << zb;
   EXPECT_TRUE(zb.ends_with(remedy)) << zb;
   EXPECT_TRUE(
@@ -166,7 +165,7 @@ TEST(HandEyeNoise, TurnsCountByTheirSize) {
 }
 
 TEST(HandEyeNoise, ManyMovesAboutOneAxisLeaveTheTurnAboutItToTheGuess) {
-  // By the loop's estimate, too: told motions are about x alone, and what is seen beside x is noise.
+  // The same for the loop's estimate: the told motions turn only about x, and what is seen about other axes is noise.
   const RigidTransform right{"robot", "reference", rotation_from_vector({1.1, -2, 0.7}), {120, -40, 300}};
   Random random(2);
   std::vector<Move> moves;

@@ -23,8 +23,8 @@ Vector6d motion(Eigen::Vector3d turn_deg, Eigen::Vector3d shift_mm) {
 }
 
 Move move(const Vector6d& step) {
-  const RigidTransform seen = robot::motion_of(step, kCentre);
-  return {robot::told_for(seen, kTrue), seen, kCentre};
+  const RigidTransform seen = guide::motion_of(step, kCentre);
+  return {guide::told_for(seen, kTrue), seen, kCentre};
 }
 
 const std::vector<Move> kMoves{move(motion({8, 0, 0}, {5, 2, 0})), move(motion({0, 7, 2}, {0, -4, 6})),

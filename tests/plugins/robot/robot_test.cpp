@@ -44,7 +44,7 @@ RigidTransform shift(double x, double y, double z) {
 }
 
 TEST(Contact, WholeBoneIsApartAndPressedBoneIsNot) {
-  const phantom::Contact contact(broken({0, 0, 0}, {0, 0, 0}), "test");
+  const robot::Contact contact(broken({0, 0, 0}, {0, 0, 0}), "test");
   RigidTransform place{"bone", "bone"};
   place.translation_mm.z() = -2;
   EXPECT_EQ(contact.overlap_mm(place), 0);
@@ -57,7 +57,7 @@ TEST(Contact, WholeBoneIsApartAndPressedBoneIsNot) {
 
 TEST(Contact, NeedsAFracture) {
   try {
-    phantom::Contact(Phantom{}, "test");
+    robot::Contact(Phantom{}, "test");
     FAIL();
   } catch (const Error& error) {
     EXPECT_STREQ(error.what(), "test: the phantom is of a whole bone; a broken one is needed");
@@ -170,11 +170,11 @@ TEST(RelativePose, ItsDeviationCountsBothPosesAndTheLever) {
   Matrix6d of_proximal = Matrix6d::Zero();
   of_proximal(0, 0) = 1e-6;  // 1 mrad about x, 200 mm away
   proximal.covariance = of_proximal;
-  const robot::RelativePose relative = robot::relative_pose(distal, proximal);
-  EXPECT_NEAR(robot::shift_deviation_mm(relative.covariance), 0.2, 1e-9);
-  EXPECT_NEAR(robot::rotation_deviation_rad(relative.covariance), 1e-3, 1e-12);
+  const guide::RelativePose relative = guide::relative_pose(distal, proximal);
+  EXPECT_NEAR(guide::shift_deviation_mm(relative.covariance), 0.2, 1e-9);
+  EXPECT_NEAR(guide::rotation_deviation_rad(relative.covariance), 1e-3, 1e-12);
   distal.covariance.reset();
-  EXPECT_TRUE(std::isinf(robot::shift_deviation_mm(robot::relative_pose(distal, proximal).covariance)));
+  EXPECT_TRUE(std::isinf(guide::shift_deviation_mm(guide::relative_pose(distal, proximal).covariance)));
 }
 
 }  // namespace robot_test

@@ -28,8 +28,8 @@ int pairs_of(Law law, double phi_deg, double damping, std::uint64_t seed) {
   RigidTransform pose{"reference", "fragment"};
   Vector6d start;
   start << radians(5 + 15 * random.uniform()) * direction(random), 17 * direction(random);
-  pose = robot::motion_of(start, centre) * pose;
-  const robot::StepLimits limits{damping, 8, 12};
+  pose = guide::motion_of(start, centre) * pose;
+  const guide::StepLimits limits{damping, 8, 12};
   RigidTransform x = guess;
   Matrix6d jacobian = Matrix6d::Identity();
   std::vector<Move> moves;
@@ -38,7 +38,7 @@ int pairs_of(Law law, double phi_deg, double damping, std::uint64_t seed) {
   for (int pair = 1; pair <= 40; ++pair) {
     Vector6d noise;
     for (int k = 0; k < 6; ++k) noise[k] = random.normal() * (k < 3 ? radians(0.1) : 0.06);
-    const RigidTransform seen = robot::motion_of(noise, pose * centre) * pose;
+    const RigidTransform seen = guide::motion_of(noise, pose * centre) * pose;
     const Eigen::Vector3d middle = seen * centre;
     Vector6d error;
     error << vector_from_rotation(seen.rotation), middle - centre;
@@ -48,16 +48,16 @@ int pairs_of(Law law, double phi_deg, double damping, std::uint64_t seed) {
       moves.push_back({told, happened, from});
       if (law == Law::estimated) x = robot::estimate_hand_eye(moves, guess, {}).robot_from_reference;
       if (law == Law::broyden)
-        jacobian = robot::broyden(jacobian, robot::in_mm(asked), robot::in_mm(robot::step_of(happened, from)));
+        jacobian = guide::broyden(jacobian, guide::in_mm(asked), guide::in_mm(guide::step_of(happened, from)));
     }
     // The true error: pairs count until it is small.
     if (degrees(vector_from_rotation(pose.rotation).norm()) < 1 && (pose * centre - centre).norm() < 1) return pair;
-    asked = robot::limited_step(error, limits);
+    asked = guide::limited_step(error, limits);
     if (law == Law::broyden) {
-      asked = -robot::from_mm(robot::ask_for(jacobian, -robot::in_mm(asked)));
-      asked = robot::limited_step(-asked, {1, 8, 12});
+      asked = -guide::from_mm(guide::ask_for(jacobian, -guide::in_mm(asked)));
+      asked = guide::limited_step(-asked, {1, 8, 12});
     }
-    told = robot::told_for(robot::motion_of(asked, middle), x);
+    told = guide::told_for(guide::motion_of(asked, middle), x);
     pose = (inverse(right) * told * right) * pose;
     seen_before = seen;
   }
@@ -109,21 +109,21 @@ TEST(Servo, AnEstimatedHandEyeTransformMayBeOffByAnyRotation) {
 TEST(Servo, AStepIsShortenedAsAWholeUntilItPassesNoLimit) {
   Vector6d error;
   error << 0, 0, radians(16), 6, 0, 0;
-  const Vector6d step = robot::limited_step(error, {1, 8, 12});
+  const Vector6d step = guide::limited_step(error, {1, 8, 12});
   EXPECT_NEAR(degrees(step[2]), -8, 1e-9);
   EXPECT_NEAR(step[3], -3, 1e-9);
   error << 0, 0, radians(2), 0, 24, 0;
-  EXPECT_NEAR(robot::limited_step(error, {1, 8, 12})[4], -12, 1e-9);
-  EXPECT_NEAR(degrees(robot::limited_step(error, {0.5, 8, 100})[2]), -1, 1e-9);
+  EXPECT_NEAR(guide::limited_step(error, {1, 8, 12})[4], -12, 1e-9);
+  EXPECT_NEAR(degrees(guide::limited_step(error, {0.5, 8, 100})[2]), -1, 1e-9);
 }
 
 TEST(Servo, AMotionAboutThePointAndBack) {
   Vector6d step;
   step << 0.1, -0.2, 0.3, 4, 5, 6;
   const Eigen::Vector3d centre(10, 20, 30);
-  const RigidTransform motion = robot::motion_of(step, centre);
+  const RigidTransform motion = guide::motion_of(step, centre);
   EXPECT_LT((motion * centre - centre - Eigen::Vector3d(4, 5, 6)).norm(), 1e-9);
-  EXPECT_LT((robot::step_of(motion, centre) - step).norm(), 1e-9);
+  EXPECT_LT((guide::step_of(motion, centre) - step).norm(), 1e-9);
 }
 
 // J dq is then what was seen, and other directions stay as they were.
@@ -132,12 +132,12 @@ TEST(Servo, BroydensJacobianExplainsTheLastMotion) {
   asked << 1, 2, 0, 0, 3, 0;
   seen << 0, 1, 1, 4, 0, 0;
   other << 0, 0, 1, 0, 0, 0;
-  const Matrix6d jacobian = robot::broyden(Matrix6d::Identity(), asked, seen);
+  const Matrix6d jacobian = guide::broyden(Matrix6d::Identity(), asked, seen);
   EXPECT_LT((jacobian * asked - seen).norm(), 1e-12);
   EXPECT_LT((jacobian * other - other).norm(), 1e-12);
-  EXPECT_EQ(robot::broyden(jacobian, 0.01 * asked, seen), jacobian);
-  EXPECT_LT((jacobian * robot::ask_for(jacobian, seen, 0) - seen).norm(), 1e-9);
-  EXPECT_LT(robot::ask_for(Matrix6d::Zero(), seen).norm(), 1e-12);
+  EXPECT_EQ(guide::broyden(jacobian, 0.01 * asked, seen), jacobian);
+  EXPECT_LT((jacobian * guide::ask_for(jacobian, seen, 0) - seen).norm(), 1e-9);
+  EXPECT_LT(guide::ask_for(Matrix6d::Zero(), seen).norm(), 1e-12);
 }
 
 }  // namespace servo_test

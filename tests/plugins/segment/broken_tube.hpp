@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A hollow bone in two fragments, cut obliquely, which may be displaced: what every segmenter of the kind is tried on.
+// A hollow bone in two fragments, cut obliquely and possibly displaced, for tests of every segmenter.
 #include <gtest/gtest.h>
 
 #include "marrow/domain/list.hpp"

@@ -17,12 +17,12 @@ TEST(DistanceRegularised, ItsOwnRegularityKeepsTheSlopeNearOne) {
   const phantom::BrokenTube tube;
   const Volume volume = tube.volume();
   const Options options;
-  const auto owner = marrow::field::race(volume, marrow::field::seed_indices(volume, tube.seeds(), 150), {});
-  const auto mask = marrow::field::solid(volume.grid, owner, 0, 10);
+  const auto owner = marrow::segment::race(volume, marrow::segment::seed_indices(volume, tube.seeds(), 150), {});
+  const auto mask = marrow::segment::solid(volume.grid, owner, 0, 10);
   Evolution evolution(volume, mask, owner, 0, options);
   Context context;
   evolution.run(context);
-  const Grid grid = marrow::field::grid_of(volume.grid, mask);
+  const Grid grid = marrow::segment::grid_of(volume.grid, mask);
   double sum = 0, count = 0;
   for (int z = 12; z < grid.size[2] - 12; ++z)
     for (int y = 4; y < grid.size[1] - 4; ++y)

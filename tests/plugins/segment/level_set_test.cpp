@@ -24,7 +24,7 @@ List<SignedField> level_set_fields(const Volume& volume, const List<Seeds>& seed
   return segmented::fields("segment.level_set", volume, seeds);
 }
 
-/// A long bone along z, slightly tilted, that leaves the volume at both ends, of a wall that gets thinner upwards.
+/// A long bone along z, slightly tilted, that leaves the volume at both ends; its wall gets thinner upwards.
 struct HollowBone {
   double inside_hu = -20, wall_low_mm = 7, wall_high_mm = 1.5, radius_low_mm = 13, radius_high_mm = 19;
   Vector3d low{-3, -2, -60}, high{3, 2, 60};
@@ -216,12 +216,10 @@ TEST(LevelSet, SaysWhatIsWrongWithSeeds) {
             "seeds: there are none; give at least one fragment with one point inside its bone (seeds in case.yaml)");
   EXPECT_EQ(message_of(volume, bone.seeds(bone.at(0, 0, 0))),
             "seeds of fragment 'distal': point 1 at (100.0, -50.0, 30.0) mm is not in bone: the CT shows 40 HU there, "
-            "at least "
-            "150 HU expected; move it into cortical or spongy bone");
+            "at least 150 HU expected; move it into cortical or spongy bone");
   EXPECT_EQ(message_of(volume, bone.seeds(Vector3d(900, 0, 0))),
             "seeds of fragment 'distal': point 1 at (900.0, 0.0, 0.0) mm lies outside the volume; seeds are points of "
-            "the CT's "
-            "frame 'ct' in mm");
+            "the CT's frame 'ct' in mm");
   volume.values[5] = std::nanf("");
   EXPECT_NE(message_of(volume, {}).find("is not a finite number"), std::string::npos);
 }

@@ -87,9 +87,10 @@ TEST(Threshold, ASeedInSparseSpongyBoneIsGoodBesideOneInCortex) {
   EXPECT_GT(marrow::sample_trilinear(volume.grid, fields[0].values_mm, volume.grid.index_from_point(at_height(4))), 0);
   List<Seeds> only_spongy;
   only_spongy.add("distal", Seeds{"distal", {at_height(4)}});
-  EXPECT_EQ(shipped::refusal(kNode, segmented::inputs(volume, only_spongy)),
-            "seeds of fragment 'distal': at none of them the CT reaches the threshold of 250 HU, or it belongs to "
-            "another fragment; add a point in cortical bone, or lower threshold_hu");
+  EXPECT_EQ(
+      shipped::refusal(kNode, segmented::inputs(volume, only_spongy)),
+      "seeds of fragment 'distal': none of them lies in bone of 250 HU or more that no other fragment has taken; add a "
+      "point in cortical bone, or lower threshold_hu");
 }
 
 // What the level set is for: level_set_test.cpp segments the same CT to 0.1 mm. (Higher thresholds find no spongy bone
@@ -117,8 +118,8 @@ TEST(Threshold, NoThresholdSegmentsADistalEnd) {
 TEST(Threshold, SaysWhenThereIsNoBone) {
   const Volume volume{phantom::ct_grid({8, 8, 8}), std::vector<float>(512, 30.f)};
   EXPECT_EQ(shipped::refusal(kNode, {{"volume", shipped::item(volume)}}),
-            "volume: no voxel reaches the threshold of 250 HU, so there is no bone; lower threshold_hu, and "
-            "check that the CT is in Hounsfield units");
+            "volume: no voxel reaches the threshold of 250 HU, so there is no bone; lower threshold_hu, and check that "
+            "the CT is in Hounsfield units");
 }
 
 }  // namespace threshold_test

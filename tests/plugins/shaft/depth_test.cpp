@@ -73,7 +73,7 @@ TEST_P(DeepShaft, OfASingleViewLiesAtAUsualDistanceWithAWarning) {
             "lengths in mm depend on this. Wire 'views' with two views or more, or set source_to_shaft_mm");
 }
 
-// Pixels twice as high as wide change the width of a shaft that is upright in the image by nothing.
+// Pixels twice as high as wide do not change the width of a shaft that is upright in the image.
 TEST_P(DeepShaft, IsAsWideWithPixelsThatAreNotSquare) {
   const listener::Listener listener;
   View view = meeting_at(600, {0, 0, 0})[0];

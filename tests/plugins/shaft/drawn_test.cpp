@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the nodes must do that find their lines in the edge map alone: exact lines, drawn.
+// Exact drawn lines, for the nodes that find their lines in the edge map alone.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -15,7 +15,7 @@ using marrow::test::message_of;
 
 class DrawnShaft : public Shaft {
  protected:
-  /// Lines that are drawn exactly are not those of a round bone.
+  /// Exactly drawn lines differ from those of a round bone.
   ShaftLines find_drawn(const marrow::EdgeMap& edges, const marrow::View& view) const {
     return find_shaft(edges, view, {{"outline", false}});
   }
@@ -104,8 +104,7 @@ TEST_P(DrawnShaft, SaysWhyThereIsNoPair) {
   draw(edges, {275, 20}, {275, 400}, kLeft);
   EXPECT_EQ(message_of([&] { find_shaft(edges, empty_view()); }),
             "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because it is darker outside than "
-            "inside, as a canal or "
-            "a gap between bones is (12.3 mm wide)" +
+            "inside, as a canal or a gap between bones is (12.3 mm wide)" +
                 advice);
   edges = no_edges();
   draw(edges, {40, 20}, {40, 400}, kLeft);  // the thigh's outline
@@ -117,11 +116,10 @@ TEST_P(DrawnShaft, SaysWhyThereIsNoPair) {
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);  // of a shaft's width, but the dark is elsewhere
   draw(edges, {285, 20}, {285, 400}, kRight);
-  EXPECT_EQ(
-      message_of([&] { find_shaft(edges, dark_between(270, 330)); }),
-      "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because a border is too faint for bone "
-      "but for 0 mm, of 25 mm wanted, as muscle's is (29.9 mm wide)" +
-          advice);
+  EXPECT_EQ(message_of([&] { find_shaft(edges, dark_between(270, 330)); }),
+            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because only 0 mm of its borders "
+            "are clear enough for bone, of 25 mm wanted; muscle's are as faint (29.9 mm wide)" +
+                advice);
   marrow::View rims = empty_view();  // two dark things with something bright between them
   rims.image.pixels.colRange(200, 212) = 800;
   rims.image.pixels.colRange(212, 273) = 1500;
@@ -133,18 +131,16 @@ TEST_P(DrawnShaft, SaysWhyThereIsNoPair) {
   edges = no_edges();  // short, and narrow for a femur
   draw(edges, {200, 20}, {200, 110}, kLeft);
   draw(edges, {262, 20}, {262, 110}, kRight);
-  EXPECT_EQ(
-      message_of([&] { find_shaft(edges, dark_between(200, 262)); }),
-      "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its log-likelihood of 1.7 is "
-      "below 2.0, the least that is taken (21.8 mm wide)" +
-          advice);
+  EXPECT_EQ(message_of([&] { find_shaft(edges, dark_between(200, 262)); }),
+            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its log-likelihood of 1.7 "
+            "is below 2.0, the least that is taken (21.8 mm wide)" +
+                advice);
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);
   draw(edges, {285, 380}, {285, 500}, kRight);
   EXPECT_EQ(message_of([&] { find_shaft(edges, empty_view()); }),
             "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its borders run side by "
-            "side for 7 mm only, of 25 mm "
-            "wanted" +
+            "side for 7 mm only, of 25 mm wanted" +
                 advice);
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);

@@ -88,7 +88,7 @@ TEST(TrackFilter, SaysWhyABoneIsLost) {
 }
 
 TEST(TrackFilter, TheUsualCostFollowsOneThatGrowsSlowly) {
-  // As where a joint bends and its bones come to overlap: four times as much after ten frames, but never a jump.
+  // As when a joint bends and its bones begin to overlap: four times as much after ten frames, but never a jump.
   TrackState state = sequences::begin();
   double cost = 0.02;
   for (int i = 0; i < 20; ++i, cost *= 1.15) {

@@ -63,7 +63,7 @@ TEST(Smooth, DoesNotRelyOnTheCovariancesOfTheRegistration) {
 }
 
 TEST(Smooth, IsTheLeastSquaresSolution) {
-  // Shifts along one axis: a linear problem, solved here at once with all positions and velocities as unknowns.
+  // Shifts along one axis are a linear problem. It is solved here with all positions and velocities as unknowns.
   constexpr int kFrames = 12;
   const double rate = 10, dt = 1 / rate, noise = 0.5;
   TrackState begin = sequences::begin({{"frame_rate_hz", rate}, {"acceleration_mm_s2", 40.0}});

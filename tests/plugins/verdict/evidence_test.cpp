@@ -101,7 +101,7 @@ TEST(VerdictEvidence, MeasuresTheOutlineAgainstTheEdges) {
   trial.inputs["edges"] = shipped::list(edges, "view");
   trial.inputs["projector"] = marrow::Value::of<marrow::OutlineProjector>(std::make_shared<const Borders>(borders));
   const Verdict verdict = trial.verdict();
-  // A pixel is 0.8 mm at 800 mm from the source, of which the bone is about 6 mm further away.
+  // A pixel is 0.8 mm at 800 mm from the source; the bone is about 6 mm farther away.
   EXPECT_NEAR(figure(verdict, "outline_part_mm"), 0.8, 0.05);
   EXPECT_LT(figure(verdict, "outline_spread_mm"), 0.05);
   EXPECT_NEAR(figure(verdict, "unexplained"), 0.05, 0.015);
@@ -183,7 +183,8 @@ TEST(VerdictEvidence, TheModelGivesTheProbability) {
   }
 }
 
-// 5 mm along each axis: most errors of such a pose are above 2 mm. Only the cameras leave it open, not the search.
+// 5 mm along each axis: most errors of such a pose are above 2 mm. The uncertainty comes from the cameras, not from the
+// search.
 TEST(VerdictEvidence, SaysWhatThePredictedDeviationsLeaveOpen) {
   const ModelFile model(model_of(-9, "  - {figure: warnings, scale: 1, weight: 1, absent: 0}\n"));
   Trial trial;
@@ -206,11 +207,12 @@ TEST(VerdictEvidence, SaysWhatThePredictedDeviationsLeaveOpen) {
   EXPECT_TRUE(
       refined.reasons.at(0).starts_with("with what is not known about the cameras, the bone's surface is known to "))
       << refined.reasons[0];
-  EXPECT_EQ(refined.remedies,
-            (std::vector<std::string>{"a check of what was given: the bone, the side, which image belongs to which "
-                                      "camera, the signs of its angles",
-                                      "cameras that are known better, by a calibration; then give refine.cameras "
-                                      "smaller rotation_deg, shift_mm, focal_percent and centre_px"}));
+  EXPECT_EQ(
+      refined.remedies,
+      (std::vector<std::string>{
+          "a check of what was given: the bone, the side, which image belongs to which camera, the signs of its angles",
+          "cameras that are known better, by a calibration; then give refine.cameras smaller rotation_deg, shift_mm, "
+          "focal_percent and centre_px"}));
   EXPECT_EQ(verdict_with(unknown, true).reasons.at(0),
             "the predicted deviations allow a failure with a probability of 1.00");
 }
@@ -269,7 +271,7 @@ TEST(VerdictEvidence, SaysWhatIsWrongWithAModel) {
             std::string::npos);
 }
 
-/// Of which the images say nothing, with or without a sentence.
+/// The images say nothing about it, with or without a sentence that says so.
 struct Blind : marrow::Cost {
   std::string said;
   explicit Blind(std::string text) : said(std::move(text)) {}
@@ -296,8 +298,8 @@ TEST(VerdictEvidence, APoseOfWhichTheImagesSayNothingIsWrong) {
                   "the images say nothing about this pose: view 'frontal': it shows nothing of the bone"});
   }
   EXPECT_EQ(verdict_on("", model.options()).reasons,
-            std::vector<std::string>{"the images say nothing about this pose: the cost is the same at all poses within "
-                                     "16 degrees and mm"});
+            std::vector<std::string>{
+                "the images say nothing about this pose: the cost is the same at all poses within 16 degrees and mm"});
 }
 
 TEST(VerdictEvidence, DeviationsOfZeroAreNoKnowledge) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "shipped.hpp"
+#include "tests/framework/domain/shapes.hpp"
 #include "tests/plugins/evaluate/listener.hpp"
 
 namespace predicted_test {
@@ -12,15 +13,7 @@ using marrow::Judgement, marrow::Verdict;
 using Texts = std::vector<std::string>;
 
 /// A box of 20 x 20 x 100 mm about the origin.
-marrow::Mesh box() {
-  marrow::Mesh mesh;
-  for (const double z : {-50, 50})
-    for (const double y : {-10, 10})
-      for (const double x : {-10, 10}) mesh.vertices_mm.emplace_back(x, y, z);
-  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  return mesh;
-}
+marrow::Mesh box() { return marrow::test::box({0, 0, 0}, {20, 20, 100}); }
 
 /// A pose with standard deviations about (degrees) and along (mm) the box's axes.
 marrow::Pose pose_with(const marrow::Vector6d& deviations) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The verdict is of the pose, not of the way to it. The costs are wells about given poses, so where a search ends is
-// known without a search.
+// The verdict depends on the pose, not on the way to it. The costs are wells about given poses, so the end of each
+// search is known.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -29,7 +29,7 @@ TEST(FilledSurface, HoldsTheVolumeOfTheSurface) {
 }
 
 #ifdef WITH_NAIL
-/// What a straight nail, whose bore and hole are known, takes from a ray across it.
+/// The attenuation of a ray across a straight nail with known bore and hole.
 TEST(FilledSurface, LineIntegralsThroughANailAreThoseByHand) {
   const auto nail = shipped::call("simulate.nail", {},
                                   {{"length_mm", 80.0},

@@ -65,11 +65,7 @@ marrow::ShaftLines shaft(const marrow::EdgeMap& edges, const marrow::View& view,
 
 MARROW_PLUGIN(plugin) {
   const auto add = [&](const char* name, auto* function) {
-    declare_line_options(plugin.node(name, function)
-                             .summary("For a test of the suite")
-                             .in("edges", "edge pixels")
-                             .in("view", "X-ray view")
-                             .out("lines", "borders"));
+    declare_line_options(plugin.node(name, function).summary("For a test of the suite"));
   };
   add("shaft.plain", shaft<Fault::none>);
   add("shaft.inner", shaft<Fault::inner>);
