@@ -19,19 +19,16 @@ void check_bounds(const marrow::MinimisationProblem& problem) {
   }
 }
 
-class Bobyqa : public marrow::Optimizer {
- public:
-  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    marrow::search::check_problem(problem);
-    if (problem.start.size() < 2)
-      throw marrow::Error(marrow::formatted(
-          "BOBYQA minimises functions of two or more numbers, got {}; use another optimizer", problem.start.size()));
-    check_bounds(problem);
-    return marrow::search::NloptRun(nlopt::LN_BOBYQA, problem).run();
-  }
-};
+marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) {
+  marrow::optimizer::check_problem(problem);
+  if (problem.start.size() < 2)
+    throw marrow::Error(marrow::formatted(
+        "BOBYQA minimises functions of two or more numbers, got {}; use another optimizer", problem.start.size()));
+  check_bounds(problem);
+  return marrow::optimizer::NloptRun(nlopt::LN_BOBYQA, problem).run();
+}
 
-std::shared_ptr<const marrow::Optimizer> bobyqa() { return std::make_shared<Bobyqa>(); }
+std::shared_ptr<const marrow::Optimizer> bobyqa() { return marrow::optimizer::optimizer_of(minimise); }
 
 }  // namespace
 

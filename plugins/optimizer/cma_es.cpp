@@ -57,7 +57,7 @@ class Strategy {
   }
 
   /// Computes one generation. True if its spread is below the tolerance.
-  bool step(marrow::search::Evaluations& evaluate) {
+  bool step(marrow::optimizer::Evaluations& evaluate) {
     std::vector<Eigen::VectorXd> points;
     std::vector<double> values;
     for (int i = 0; i < lambda_; ++i) {
@@ -110,28 +110,17 @@ class Strategy {
   Eigen::VectorXd lengths_;
 };
 
-class CmaEs : public marrow::Optimizer {
- public:
-  explicit CmaEs(const Options& options) : options_(options) {}
-  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    return marrow::search::Evaluations(problem).run([&](marrow::search::Evaluations& evaluate) -> std::string {
-      evaluate(Eigen::VectorXd::Zero(evaluate.size()));
-      Strategy strategy(evaluate.size(), options_);
-      while (!strategy.step(evaluate)) {
-      }
-      return "steps are below the tolerance";
-    });
-  }
-
- private:
-  const Options options_;
-};
-
 std::shared_ptr<const marrow::Optimizer> cma_es(const Options& options) {
   if (options.population != 0 && options.population < 4)
     throw marrow::Error(
         marrow::formatted("population: expected 4 or more, or 0 for the usual number, got {}", options.population));
-  return std::make_shared<CmaEs>(options);
+  return marrow::optimizer::optimizer_by([options](marrow::optimizer::Evaluations& evaluate) -> std::string {
+    evaluate(Eigen::VectorXd::Zero(evaluate.size()));
+    Strategy strategy(evaluate.size(), options);
+    while (!strategy.step(evaluate)) {
+    }
+    return "steps are below the tolerance";
+  });
 }
 
 }  // namespace

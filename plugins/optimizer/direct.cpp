@@ -23,28 +23,19 @@ double least_side(const marrow::MinimisationProblem& bounded) {
   return free > 0 ? std::clamp(std::exp(sum / free), 1e-15, 1.0) : 1.0;
 }
 
-class Direct : public marrow::Optimizer {
- public:
-  explicit Direct(double reach) : reach_(reach) {}
-  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    marrow::search::check_problem(problem);
+std::shared_ptr<const marrow::Optimizer> direct(const Options& options) {
+  return marrow::optimizer::optimizer_of([options](const marrow::MinimisationProblem& problem) {
+    marrow::optimizer::check_problem(problem);
     marrow::MinimisationProblem bounded = problem;
-    const Eigen::VectorXd low = problem.start - reach_ * problem.initial_step;
-    const Eigen::VectorXd high = problem.start + reach_ * problem.initial_step;
+    const Eigen::VectorXd low = problem.start - options.reach * problem.initial_step;
+    const Eigen::VectorXd high = problem.start + options.reach * problem.initial_step;
     bounded.lower = problem.lower.size() ? problem.lower.array().isFinite().select(problem.lower, low).eval() : low;
     bounded.upper = problem.upper.size() ? problem.upper.array().isFinite().select(problem.upper, high).eval() : high;
     // NLopt's other version, GN_DIRECT_L, stops only at its budget.
-    marrow::search::NloptRun search(nlopt::GN_ORIG_DIRECT_L, bounded);
+    marrow::optimizer::NloptRun search(nlopt::GN_ORIG_DIRECT_L, bounded);
     search.end_at_part_of_range(least_side(bounded));
     return search.run();
-  }
-
- private:
-  const double reach_;
-};
-
-std::shared_ptr<const marrow::Optimizer> direct(const Options& options) {
-  return std::make_shared<Direct>(options.reach);
+  });
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ struct Options {
 
 /// Evaluates all points of a grid around the best point so far, then of a finer grid around the best of these. The
 /// finer grid fills the space up to the neighbouring points of the last grid.
-std::string search(marrow::search::Evaluations& evaluate, int points) {
+std::string search(marrow::optimizer::Evaluations& evaluate, int points) {
   const Eigen::Index n = evaluate.size();
   Eigen::VectorXd centre = Eigen::VectorXd::Zero(n);
   double least = evaluate(centre);
@@ -34,23 +34,12 @@ std::string search(marrow::search::Evaluations& evaluate, int points) {
   return "steps are below the tolerance";
 }
 
-class GridSearch : public marrow::Optimizer {
- public:
-  explicit GridSearch(int points) : points_(points) {}
-  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    return marrow::search::Evaluations(problem).run(
-        [&](marrow::search::Evaluations& evaluate) { return search(evaluate, points_); });
-  }
-
- private:
-  const int points_;
-};
-
 std::shared_ptr<const marrow::Optimizer> grid(const Options& options) {
   if (options.grid_points % 2 == 0)
     throw marrow::Error(marrow::formatted(
         "grid_points: expected an odd number, so that the middle is one of them, got {}", options.grid_points));
-  return std::make_shared<GridSearch>(options.grid_points);
+  return marrow::optimizer::optimizer_by(
+      [points = options.grid_points](marrow::optimizer::Evaluations& evaluate) { return search(evaluate, points); });
 }
 
 }  // namespace

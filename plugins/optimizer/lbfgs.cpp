@@ -11,7 +11,7 @@ constexpr std::size_t kMemory = 8;
 
 /// The gradient: from the function itself if it has derivatives, else by central differences with step h, cut at the
 /// bounds (2 n evaluations). 0 along a variable whose bounds are equal.
-Eigen::VectorXd gradient_at(marrow::search::Evaluations& evaluate, const Eigen::VectorXd& y, double h) {
+Eigen::VectorXd gradient_at(marrow::optimizer::Evaluations& evaluate, const Eigen::VectorXd& y, double h) {
   if (evaluate.has_derivatives())
     if (const auto about = evaluate.expansion(y)) return about->gradient;
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(y.size());
@@ -63,7 +63,7 @@ class Memory {
 
 /// Goes along the direction until the value is low enough (Armijo's condition). Step lengths come from parabolas. False
 /// if no such point is found.
-bool step_along(marrow::search::Evaluations& evaluate, const Eigen::VectorXd& direction, double slope,
+bool step_along(marrow::optimizer::Evaluations& evaluate, const Eigen::VectorXd& direction, double slope,
                 Eigen::VectorXd& here, double& value) {
   double t = 1;
   for (int i = 0; i < 8; ++i) {
@@ -81,13 +81,13 @@ bool step_along(marrow::search::Evaluations& evaluate, const Eigen::VectorXd& di
 }
 
 /// 1 for variables that can move along -gradient, 0 for variables that a bound stops.
-Eigen::VectorXd free_coordinates(const marrow::search::Evaluations& evaluate, const Eigen::VectorXd& here,
+Eigen::VectorXd free_coordinates(const marrow::optimizer::Evaluations& evaluate, const Eigen::VectorXd& here,
                                  const Eigen::VectorXd& gradient, double h) {
   const Eigen::VectorXd down = here - h * gradient / std::max(gradient.norm(), 1e-300);
   return (evaluate.within(down) - down).unaryExpr([](double cut) { return std::abs(cut) > 1e-12 ? 0.0 : 1.0; });
 }
 
-std::string search(marrow::search::Evaluations& evaluate) {
+std::string search(marrow::optimizer::Evaluations& evaluate) {
   constexpr double kLongest = 4;
   Eigen::VectorXd here = Eigen::VectorXd::Zero(evaluate.size());
   double value = evaluate(here), h = 0.1;
@@ -113,14 +113,7 @@ std::string search(marrow::search::Evaluations& evaluate) {
   }
 }
 
-class Lbfgs : public marrow::Optimizer {
- public:
-  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    return marrow::search::Evaluations(problem).run(search);
-  }
-};
-
-std::shared_ptr<const marrow::Optimizer> lbfgs() { return std::make_shared<Lbfgs>(); }
+std::shared_ptr<const marrow::Optimizer> lbfgs() { return marrow::optimizer::optimizer_by(search); }
 
 }  // namespace
 

@@ -11,7 +11,8 @@ using Expansion = marrow::MinimisationProblem::Expansion;
 
 /// The expansion of a function without derivatives, by finite differences. Negative eigenvalues of the Hessian are made
 /// positive.
-Expansion by_differences(marrow::search::Evaluations& evaluate, const Eigen::VectorXd& here, double value, double h) {
+Expansion by_differences(marrow::optimizer::Evaluations& evaluate, const Eigen::VectorXd& here, double value,
+                         double h) {
   const Eigen::Index n = here.size();
   Expansion about{value, Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n)};
   Eigen::VectorXd above(n);
@@ -39,7 +40,7 @@ Expansion by_differences(marrow::search::Evaluations& evaluate, const Eigen::Vec
 /// Damped steps (Marquardt, SIAM J Appl Math 1963). The damping keeps steps short while the expansion is not reliable.
 class Search {
  public:
-  explicit Search(marrow::search::Evaluations& evaluate)
+  explicit Search(marrow::optimizer::Evaluations& evaluate)
       : evaluate_(evaluate), here_(Eigen::VectorXd::Zero(evaluate.size())), derivatives_(evaluate.has_derivatives()) {
     value_ = look(here_);
     about_ = seen_;
@@ -99,22 +100,17 @@ class Search {
     return 0;
   }
 
-  marrow::search::Evaluations& evaluate_;
+  marrow::optimizer::Evaluations& evaluate_;
   Eigen::VectorXd here_;
   double value_ = 0, damping_ = 1e-2;
   bool derivatives_;
   std::optional<Expansion> about_, seen_;  ///< at here_, and at the point evaluated last
 };
 
-class LevenbergMarquardt : public marrow::Optimizer {
- public:
-  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    return marrow::search::Evaluations(problem).run(
-        [](marrow::search::Evaluations& evaluate) { return Search(evaluate).run(); });
-  }
-};
-
-std::shared_ptr<const marrow::Optimizer> levenberg_marquardt() { return std::make_shared<LevenbergMarquardt>(); }
+std::shared_ptr<const marrow::Optimizer> levenberg_marquardt() {
+  return marrow::optimizer::optimizer_by(
+      [](marrow::optimizer::Evaluations& evaluate) { return Search(evaluate).run(); });
+}
 
 }  // namespace
 

@@ -5,14 +5,11 @@
 
 namespace {
 
-class NelderMead : public marrow::Optimizer {
- public:
-  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    return marrow::search::NloptRun(nlopt::LN_NELDERMEAD, problem).run();
-  }
-};
+marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) {
+  return marrow::optimizer::NloptRun(nlopt::LN_NELDERMEAD, problem).run();
+}
 
-std::shared_ptr<const marrow::Optimizer> nelder_mead() { return std::make_shared<NelderMead>(); }
+std::shared_ptr<const marrow::Optimizer> nelder_mead() { return marrow::optimizer::optimizer_of(minimise); }
 
 }  // namespace
 

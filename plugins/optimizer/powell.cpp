@@ -10,7 +10,7 @@ namespace {
 /// three points is refined by parabolas.
 class Line {
  public:
-  Line(marrow::search::Evaluations& evaluate, const Eigen::VectorXd& from, double value,
+  Line(marrow::optimizer::Evaluations& evaluate, const Eigen::VectorXd& from, double value,
        const Eigen::VectorXd& direction)
       : evaluate_(evaluate), from_(from), direction_(direction), value_(value) {}
 
@@ -46,14 +46,14 @@ class Line {
  private:
   double at(double t) { return evaluate_(from_ + t * direction_); }
 
-  marrow::search::Evaluations& evaluate_;
+  marrow::optimizer::Evaluations& evaluate_;
   const Eigen::VectorXd from_, direction_;
   double value_;
 };
 
 /// Powell's method with the rule of section 3 of his paper: the direction of the greatest decrease is replaced by the
 /// direction of the whole round, unless the directions would become linearly dependent.
-std::string search(marrow::search::Evaluations& evaluate) {
+std::string search(marrow::optimizer::Evaluations& evaluate) {
   const Eigen::Index n = evaluate.size();
   Eigen::MatrixXd directions = Eigen::MatrixXd::Identity(n, n);
   Eigen::VectorXd here = Eigen::VectorXd::Zero(n);
@@ -88,14 +88,7 @@ std::string search(marrow::search::Evaluations& evaluate) {
   }
 }
 
-class Powell : public marrow::Optimizer {
- public:
-  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    return marrow::search::Evaluations(problem).run(search);
-  }
-};
-
-std::shared_ptr<const marrow::Optimizer> powell() { return std::make_shared<Powell>(); }
+std::shared_ptr<const marrow::Optimizer> powell() { return marrow::optimizer::optimizer_by(search); }
 
 }  // namespace
 

@@ -5,14 +5,11 @@
 
 namespace {
 
-class Sbplx : public marrow::Optimizer {
- public:
-  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    return marrow::search::NloptRun(nlopt::LN_SBPLX, problem).run();
-  }
-};
+marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) {
+  return marrow::optimizer::NloptRun(nlopt::LN_SBPLX, problem).run();
+}
 
-std::shared_ptr<const marrow::Optimizer> sbplx() { return std::make_shared<Sbplx>(); }
+std::shared_ptr<const marrow::Optimizer> sbplx() { return marrow::optimizer::optimizer_of(minimise); }
 
 }  // namespace
 

@@ -6,14 +6,15 @@
 #include <cmath>
 #include <limits>
 #include <marrow/base/error.hpp>
-#include <marrow/base/number_text.hpp>
 #include <marrow/domain/functions.hpp>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "marrow/base/number_text.hpp"
 
-namespace marrow::search {
+namespace marrow::optimizer {
 
 /// Throws Error unless there are coordinates, start and steps are finite, steps are positive and as many as
 /// coordinates, bounds are empty or complete, the start lies within them, step_tolerance is positive and finite, and
@@ -129,4 +130,24 @@ class Evaluations {
   double worst_ = 0;
 };
 
-}  // namespace marrow::search
+/// An optimizer that calls minimise(problem), which may run in several threads at once.
+template <class Minimise>
+std::shared_ptr<const Optimizer> optimizer_of(Minimise minimise) {
+  class Made : public Optimizer {
+   public:
+    explicit Made(Minimise minimise) : minimise_(std::move(minimise)) {}
+    MinimisationResult minimise(const MinimisationProblem& problem) const override { return minimise_(problem); }
+
+   private:
+    const Minimise minimise_;
+  };
+  return std::make_shared<Made>(std::move(minimise));
+}
+
+/// An optimizer that calls algorithm(evaluations), as Evaluations::run() takes it.
+template <class Algorithm>
+std::shared_ptr<const Optimizer> optimizer_by(Algorithm algorithm) {
+  return optimizer_of([algorithm](const MinimisationProblem& problem) { return Evaluations(problem).run(algorithm); });
+}
+
+}  // namespace marrow::optimizer

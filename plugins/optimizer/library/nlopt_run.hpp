@@ -8,7 +8,7 @@
 
 #include "marrow/optimizer/evaluations.hpp"
 
-namespace marrow::search {
+namespace marrow::optimizer {
 
 /// Runs one of NLopt's derivative-free algorithms on a problem. The algorithm works in units of the initial step, so
 /// that all coordinates have the same scale. Throws Error as check_problem() does, and if NLopt refuses the problem.
@@ -83,4 +83,4 @@ class NloptRun {
   std::exception_ptr thrown_;
 };
 
-}  // namespace marrow::search
+}  // namespace marrow::optimizer

@@ -7,13 +7,6 @@ namespace bobyqa_test {
 
 std::shared_ptr<const marrow::Optimizer> bobyqa() { return optimizer_behaviour::made_by("optimizer.bobyqa"); }
 
-TEST(Bobyqa, FindsTheMinimum) { optimizer_behaviour::finds_the_minimum(*bobyqa()); }
-TEST(Bobyqa, KeepsToBoundsAndBudget) { optimizer_behaviour::keeps_to_bounds_and_budget(*bobyqa()); }
-TEST(Bobyqa, TakesNanForTheWorst) { optimizer_behaviour::takes_nan_for_the_worst(*bobyqa()); }
-TEST(Bobyqa, LetsExceptionsPass) { optimizer_behaviour::lets_exceptions_pass(*bobyqa()); }
-TEST(Bobyqa, RefusesWhatIsNowhereFinite) { optimizer_behaviour::refuses_what_is_nowhere_finite(*bobyqa()); }
-TEST(Bobyqa, RefusesNonsense) { optimizer_behaviour::refuses_nonsense(*bobyqa()); }
-
 TEST(Bobyqa, RefusesOneDimension) {
   marrow::MinimisationProblem problem;
   problem.function = [](const Eigen::VectorXd& x) { return x.squaredNorm(); };

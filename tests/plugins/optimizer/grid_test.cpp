@@ -14,11 +14,8 @@ TEST(Grid, FollowsTheBestAndBecomesFiner) {
   EXPECT_NEAR(result.x[1], -0.4, 1e-3);
   EXPECT_EQ(result.stopped_because, "steps are below the tolerance");
 }
-TEST(Grid, TakesNanForTheWorst) { optimizer_behaviour::takes_nan_for_the_worst(*grid()); }
-TEST(Grid, LetsExceptionsPass) { optimizer_behaviour::lets_exceptions_pass(*grid()); }
-TEST(Grid, RefusesWhatIsNowhereFinite) { optimizer_behaviour::refuses_what_is_nowhere_finite(*grid()); }
-TEST(Grid, RefusesNonsense) {
-  optimizer_behaviour::refuses_nonsense(*grid());
+
+TEST(Grid, RefusesAnEvenNumberOfPoints) {
   EXPECT_EQ(shipped::refusal("optimizer.grid", {}, {{"grid_points", std::int64_t{4}}}),
             "grid_points: expected an odd number, so that the middle is one of them, got 4");
 }

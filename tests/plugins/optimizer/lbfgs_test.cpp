@@ -5,13 +5,6 @@ namespace lbfgs_test {
 
 std::shared_ptr<const marrow::Optimizer> lbfgs() { return optimizer_behaviour::made_by("optimizer.lbfgs"); }
 
-TEST(Lbfgs, FindsTheMinimum) { optimizer_behaviour::finds_the_minimum(*lbfgs()); }
-TEST(Lbfgs, KeepsToBoundsAndBudget) { optimizer_behaviour::keeps_to_bounds_and_budget(*lbfgs()); }
-TEST(Lbfgs, TakesNanForTheWorst) { optimizer_behaviour::takes_nan_for_the_worst(*lbfgs()); }
-TEST(Lbfgs, LetsExceptionsPass) { optimizer_behaviour::lets_exceptions_pass(*lbfgs()); }
-TEST(Lbfgs, RefusesWhatIsNowhereFinite) { optimizer_behaviour::refuses_what_is_nowhere_finite(*lbfgs()); }
-TEST(Lbfgs, RefusesNonsense) { optimizer_behaviour::refuses_nonsense(*lbfgs()); }
-
 TEST(Lbfgs, UsesDerivatives) {
   auto problem = optimizer_behaviour::valley();
   problem.expansion = [&](const Eigen::VectorXd& x) {

@@ -9,17 +9,6 @@ std::shared_ptr<const marrow::Optimizer> levenberg_marquardt() {
   return optimizer_behaviour::made_by("optimizer.levenberg_marquardt");
 }
 
-TEST(LevenbergMarquardt, FindsTheMinimum) { optimizer_behaviour::finds_the_minimum(*levenberg_marquardt()); }
-TEST(LevenbergMarquardt, KeepsToBoundsAndBudget) {
-  optimizer_behaviour::keeps_to_bounds_and_budget(*levenberg_marquardt());
-}
-TEST(LevenbergMarquardt, TakesNanForTheWorst) { optimizer_behaviour::takes_nan_for_the_worst(*levenberg_marquardt()); }
-TEST(LevenbergMarquardt, LetsExceptionsPass) { optimizer_behaviour::lets_exceptions_pass(*levenberg_marquardt()); }
-TEST(LevenbergMarquardt, RefusesWhatIsNowhereFinite) {
-  optimizer_behaviour::refuses_what_is_nowhere_finite(*levenberg_marquardt());
-}
-TEST(LevenbergMarquardt, RefusesNonsense) { optimizer_behaviour::refuses_nonsense(*levenberg_marquardt()); }
-
 // The valley is the sum of the squares of r = (10 (y - x^2), 1 - x).
 marrow::MinimisationProblem valley_of_squares() {
   auto problem = optimizer_behaviour::valley();
