@@ -18,24 +18,25 @@ struct Options {
 
 /// If the file gives the size of its images, a wired image must have this size, and image_size_px is refused.
 Camera camera(const Image* image, const Options& options, Context& context) {
-  const exchange::CameraFormat format = exchange::camera_format(options.path);
-  const bool is_alone = format == exchange::CameraFormat::own || format == exchange::CameraFormat::xmalab,
-             has_size = is_alone || format == exchange::CameraFormat::xreg;
+  const read::CameraFormat format = read::camera_format(options.path);
+  const bool is_alone = format == read::CameraFormat::own || format == read::CameraFormat::xmalab,
+             has_size = is_alone || format == read::CameraFormat::xreg;
   if (has_size && !options.image_size_px.empty())
     throw Error(options.path.string() + ": image_size_px is not for this format of cameras; leave it out");
-  exchange::CameraReading reading{options.projection,
-                                  {options.image_size_px, options.pixel_mm, options.corner_mm},
-                                  exchange::mirror_of(options.mirror),
-                                  options.scale};
-  if (reading.projection == 0 && (is_alone || format == exchange::CameraFormat::plastimatch))
+  read::CameraReading reading{options.projection,
+                              {options.image_size_px, options.pixel_mm, options.corner_mm},
+                              exchange::mirror_of(options.mirror),
+                              options.scale};
+  if (reading.projection == 0 && (is_alone || format == read::CameraFormat::plastimatch))
     reading.projection = -1;  // the default
   if (image) reading.size.size_px = {double(image->width()), double(image->height())};
-  const DistortedCamera read = exchange::read_camera(options.path, reading);
+  const DistortedCamera read = read::read_camera(options.path, reading);
   if (!read.distortion.is_none())
-    context.warn(options.path.string() +
-                 ": the images of this camera are distorted, which only read.view, read.views and read.case remove, "
-                 "with the camera file as their option; the camera is that of the image without distortion");
-  if (const std::string doubt = exchange::doubt_about_unit(options.path, read.camera, options.scale); !doubt.empty())
+    context.warn(
+        options.path.string() +
+        ": the images of this camera are distorted; only read.view, read.views and read.case remove the distortion, if "
+        "they read the camera file themselves. This camera is that of the image without distortion");
+  if (const std::string doubt = read::doubt_about_unit(options.path, read.camera, options.scale); !doubt.empty())
     context.warn(doubt);
   return read.camera;
 }

@@ -25,24 +25,24 @@ std::vector<int> numbers_of(const Options& options) {
   std::vector<int> numbers(options.names.size());
   std::iota(numbers.begin(), numbers.end(), 0);
   for (std::size_t i = 0; i < options.projections.size(); ++i) {
-    numbers.at(i) = exchange::projection_number(options.projections[i], options.path.string());
+    numbers.at(i) = read::projection_number(options.projections[i], options.path.string());
   }
   return numbers;
 }
 
 List<Camera> cameras(const Options& options, Context& context) {
-  if (exchange::projections_in(options.path) == exchange::Projections::xreg &&
+  if (read::projections_in(options.path) == read::Projections::xreg &&
       !(options.image_size_px.empty() && options.pixel_mm.empty() && options.corner_mm.empty()))
     throw Error(options.path.string() +
                 ": says itself how large its images are; leave out image_size_px, pixel_mm and corner_mm, which are "
                 "for RTK's geometry");
-  const std::vector<Camera> read = exchange::read_projections(
-      options.path, numbers_of(options), {options.image_size_px, options.pixel_mm, options.corner_mm},
-      exchange::mirror_of(options.mirror), options.scale);
+  const std::vector<Camera> read = read::read_projections(options.path, numbers_of(options),
+                                                          {options.image_size_px, options.pixel_mm, options.corner_mm},
+                                                          exchange::mirror_of(options.mirror), options.scale);
   List<Camera> cameras;
   for (std::size_t i = 0; i < read.size(); ++i) {
     check_item_name("view", options.names.at(i));
-    if (const std::string doubt = exchange::doubt_about_unit(options.path, read[i], options.scale); !doubt.empty())
+    if (const std::string doubt = read::doubt_about_unit(options.path, read[i], options.scale); !doubt.empty())
       context.warn("view '" + options.names[i] + "': " + doubt);
     cameras.add(options.names[i], read[i]);
   }

@@ -90,8 +90,8 @@ void read_ct(const fs::path& folder, const YamlMap& map, marrow::Case& result, m
 }
 
 /// What a map says about the camera file of another program.
-marrow::exchange::CameraReading camera_reading(const YamlMap& map) {
-  marrow::exchange::CameraReading reading;
+marrow::read::CameraReading camera_reading(const YamlMap& map) {
+  marrow::read::CameraReading reading;
   if (map.has("projection")) {
     reading.projection = map.integer("projection").value_or(0);
     if (reading.projection < 0) map.fault("projection", "projection: expected a whole number from 0");
@@ -118,7 +118,7 @@ std::optional<marrow::DistortedCamera> read_camera(const fs::path& folder, const
   if (!node) return std::nullopt;
   const bool is_map = node->IsMap(), names_file = is_map && (*node)["file"];
   if (is_map && !names_file) return marrow::files::camera_from(*node, map.file());
-  marrow::exchange::CameraReading reading;
+  marrow::read::CameraReading reading;
   std::optional<fs::path> file;
   if (names_file) {
     const YamlMap camera(map.file(), *node, "camera",
@@ -129,14 +129,14 @@ std::optional<marrow::DistortedCamera> read_camera(const fs::path& folder, const
     file = file_in(folder, map, "camera");
   }
   if (!file) return std::nullopt;
-  const auto format = marrow::exchange::camera_format(*file);
-  if (format == marrow::exchange::CameraFormat::rtk || format == marrow::exchange::CameraFormat::plastimatch) {
+  const auto format = marrow::read::camera_format(*file);
+  if (format == marrow::read::CameraFormat::rtk || format == marrow::read::CameraFormat::plastimatch) {
     if (!image) return std::nullopt;  // the file does not say how large it is
     reading.size.size_px = {double(image->width()), double(image->height())};
   }
-  const auto read = read_or_fault(map, "camera", [&] { return marrow::exchange::read_camera(*file, reading); });
+  const auto read = read_or_fault(map, "camera", [&] { return marrow::read::read_camera(*file, reading); });
   if (!read) return std::nullopt;
-  if (const auto doubt = marrow::exchange::doubt_about_unit(*file, read->camera, reading.scale); !doubt.empty())
+  if (const auto doubt = marrow::read::doubt_about_unit(*file, read->camera, reading.scale); !doubt.empty())
     context.warn(doubt);
   return read;
 }
@@ -154,9 +154,8 @@ std::optional<cv::Mat> read_mask(const fs::path& folder, const YamlMap& map, boo
   if (mask->pixels.type() != CV_8U)
     map.fault("mask", "mask: expected an image of 8 bits, zero where the view may not be used");
   if (marrow::files::is_lossy_image(file_in(folder, map, "mask").value()))
-    map.fault(
-        "mask",
-        "mask: was compressed with loss (JPEG or the like), so what was zero may be so no more; save the mask as PNG");
+    map.fault("mask",
+              "mask: was compressed with loss (JPEG or the like), so its zeros may have changed; save the mask as PNG");
   const auto is_mirrored = [&](const std::string& key) {
     return marrow::files::is_mirrored_as_read(file_in(folder, map, key).value());
   };

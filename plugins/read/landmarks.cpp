@@ -66,15 +66,15 @@ void add_seen(Landmarks& landmarks, const Options& options) {
   const std::string what = options.seen.string();
   const std::vector<exchange::XregProjection> projections = exchange::read_xreg(options.seen);
   if (options.names.size() != projections.size())
-    throw Error(formatted("{}: has {} projections; give in names as many, got {}", what, projections.size(),
+    throw Error(formatted("{}: has {} projections; give as many names, got {}", what, projections.size(),
                           options.names.size()));
   for (std::size_t i = 0; i < projections.size(); ++i) {
     check_item_name("view", options.names[i]);
     for (const auto& shown : exchange::landmarks_of(projections[i], exchange::mirror_of(options.mirror))) {
       const auto is_it = [&](const Landmarks::Point& point) { return point.name == shown.name; };
       if (std::none_of(landmarks.points.begin(), landmarks.points.end(), is_it))
-        throw Error(formatted("{}: projection {} shows '{}', which {} has not; give its place in the CT there", what, i,
-                              shown.name, options.path.string()));
+        throw Error(formatted("{}: projection {} shows '{}', but {} does not have it; give its place in the CT there",
+                              what, i, shown.name, options.path.string()));
       landmarks.seen.push_back({shown.name, options.names[i], shown.pixel});
     }
   }

@@ -10,7 +10,6 @@
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/track/sequence.hpp"
 #include "video.hpp"
-#include "video_container.hpp"
 
 namespace {
 
@@ -32,9 +31,9 @@ std::vector<Image> read_images(const fs::path& path, const std::string& pattern,
                                Context& context) {
   if (!fs::is_directory(path)) {
     if (!pattern.empty())
-      throw Error(path.string() + ": a pattern chooses files of a folder, but this is no folder; leave it out");
-    const char* const container = read_sequence::video_container(path);
-    if (container) return read_sequence::read_video(path, container, options);
+      throw Error(path.string() + ": a pattern chooses files of a folder, but this is not a folder; leave it out");
+    const char* const container = read::video_container(path);
+    if (container) return read::read_video(path, container, options);
     files::warn_of_pixels(path, context);
     return files::read_image_frames(path, options);
   }
@@ -67,16 +66,16 @@ List<SequenceFrame> sequence(const List<Camera>* cameras, const Options& options
     if (images.size() != frames.size())
       throw Error(formatted("view '{}' has {} frames, but view '{}' has {} ({}); all views must show the same moments",
                             name, images.size(), options.names.front(), frames.size(), options.images.at(i).string()));
-    exchange::ViewSource source{name,
-                                {},
-                                cameras ? &exchange::camera_of_view(name, *cameras) : nullptr,
-                                cameras ? fs::path() : options.cameras.at(i),
-                                options.calibration};
+    read::ViewSource source{name,
+                            {},
+                            cameras ? &read::camera_of_view(name, *cameras) : nullptr,
+                            cameras ? fs::path() : options.cameras.at(i),
+                            options.calibration};
     source.scale = options.scale;
-    const exchange::ViewCamera camera = exchange::read_view_camera(source, images.front(), context);
+    const read::ViewCamera camera = read::read_view_camera(source, images.front(), context);
     for (std::size_t k = 0; k < images.size(); ++k) {
       context.check_cancelled();
-      frames[k].views.push_back(exchange::view_of(name, std::move(images[k]), camera));
+      frames[k].views.push_back(read::view_of(name, std::move(images[k]), camera));
       context.progress(double(k + 1) / double(images.size()), name);
     }
   }

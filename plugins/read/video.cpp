@@ -11,7 +11,6 @@
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
-#include "video_picture.hpp"
 
 extern "C" {
 #include <libavcodec/avcodec.h>
@@ -19,7 +18,7 @@ extern "C" {
 #include <libavutil/display.h>
 }
 
-namespace marrow::read_sequence {
+namespace marrow::read {
 namespace {
 
 namespace fs = std::filesystem;
@@ -200,4 +199,4 @@ std::vector<Image> read_video(const fs::path& path, const char* container, const
   return images;
 }
 
-}  // namespace marrow::read_sequence
+}  // namespace marrow::read

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "video_container.hpp"
+#include "video.hpp"
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <string>
 #include <string_view>
 
 #include "marrow/base/error.hpp"
+#include "marrow/toolbox/files/header_lines.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 
-namespace marrow::read_sequence {
+namespace marrow::read {
 namespace {
 
 namespace fs = std::filesystem;
@@ -74,9 +74,7 @@ std::string name_of_list(std::string_view head) {
 }
 
 bool is_named_like_a_video(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return char(std::tolower(c)); });
+  const std::string extension = files::in_small_letters(path.extension().string());
   constexpr std::array kKnown{".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg", ".ts", ".m2ts"};
   return std::find(kKnown.begin(), kKnown.end(), extension) != kKnown.end();
 }
@@ -135,9 +133,9 @@ const char* video_container(const fs::path& path) {
   const char* const container = container_of(head);
   if (!container && is_named_like_a_video(path))
     throw Error(path.string() +
-                ": is no video, or is damaged at its start; read are AVI, MP4, MOV, MKV, WebM, WMV and MPEG");
+                ": is not a video, or is damaged at its start; marrow reads AVI, MP4, MOV, MKV, WebM, WMV and MPEG");
   if (container && container == "mov"sv) MovBoxes(file).check(0, file.size());
   return container;
 }
 
-}  // namespace marrow::read_sequence
+}  // namespace marrow::read

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "video_picture.hpp"
+#include "video.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@ extern "C" {
 #include <libavutil/pixdesc.h>
 }
 
-namespace marrow::read_sequence {
+namespace marrow::read {
 namespace {
 
 /// What turns stored levels into levels from 0 to the highest of their bits. Most videos with colours keep black at 16
@@ -75,4 +75,4 @@ std::optional<cv::Mat> grey_of(const AVFrame& frame) {
   return grey;
 }
 
-}  // namespace marrow::read_sequence
+}  // namespace marrow::read

@@ -22,7 +22,7 @@ struct Options {
 marrow::View view(const marrow::Camera* camera, const Options& options, marrow::Context& context) {
   if (!camera && options.camera.empty())
     throw marrow::Error("view '" + options.name + "': the node that is wired to 'camera' gave none");
-  marrow::View view = marrow::exchange::read_view_files(
+  marrow::View view = marrow::read::read_view_files(
       {options.name, options.image, camera, options.camera, options.calibration, options.frame, options.mirror,
        options.projection, options.pixel_mm, options.corner_mm, options.scale},
       context);

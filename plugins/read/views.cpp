@@ -22,7 +22,7 @@ struct Options {
 /// The number of the view's projection; -1 if none are named.
 int projection_of(const Options& options, std::size_t view) {
   if (options.projections.empty()) return -1;
-  return marrow::exchange::projection_number(options.projections.at(view), "view '" + options.names[view] + "'");
+  return marrow::read::projection_number(options.projections.at(view), "view '" + options.names[view] + "'");
 }
 
 marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, const Options& options,
@@ -31,12 +31,11 @@ marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, co
   marrow::List<marrow::View> views;
   for (std::size_t i = 0; i < options.names.size(); ++i) {
     const std::string& name = options.names[i];
-    views.add(name,
-              marrow::exchange::read_view_files(
-                  {name, options.images.at(i), cameras ? &marrow::exchange::camera_of_view(name, *cameras) : nullptr,
-                   cameras ? std::filesystem::path() : options.cameras.at(i), options.calibration, options.frame,
-                   options.mirror, projection_of(options, i), options.pixel_mm, options.corner_mm, options.scale},
-                  context));
+    views.add(name, marrow::read::read_view_files(
+                        {name, options.images.at(i), cameras ? &marrow::read::camera_of_view(name, *cameras) : nullptr,
+                         cameras ? std::filesystem::path() : options.cameras.at(i), options.calibration, options.frame,
+                         options.mirror, projection_of(options, i), options.pixel_mm, options.corner_mm, options.scale},
+                        context));
     for (const std::string& doubt : marrow::files::doubts_about_sides(options.images.at(i), options.frame))
       context.warn(doubt);
     marrow::files::warn_of_pixels(options.images.at(i), context);

@@ -9,6 +9,7 @@
 
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
+#include "marrow/toolbox/files/header_lines.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 #include "marrow/write/picture_out.hpp"
 
@@ -27,11 +28,11 @@ struct ViewFiles {
 ViewFiles write_view_files(const marrow::View& view, const fs::path& folder, const std::string& stem) {
   const std::string dot = stem.empty() ? "" : stem + ".";
   ViewFiles files{(stem.empty() ? "image" : stem) + image_name(view.image), dot + "camera.yaml", ""};
-  marrow::files::write_pixels(folder / files.image, view.image.pixels);
+  marrow::write::write_pixels(folder / files.image, view.image.pixels);
   marrow::files::write_plainly(folder / files.camera, {marrow::files::camera(view.camera)});
   if (!view.mask.empty()) {
     files.mask = dot + "mask.png";
-    marrow::files::write_pixels(folder / files.mask, view.mask);
+    marrow::write::write_pixels(folder / files.mask, view.mask);
   }
   return files;
 }
@@ -48,17 +49,11 @@ bool is_plain(const std::string& name) {
          std::all_of(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
 }
 
-/// On some file systems, names that differ only in capital letters mean the same file.
-std::string in_small_letters(std::string name) {
-  for (char& c : name)
-    if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
-  return name;
-}
-
-/// The file names of the views. A view's own name is used if it is plain, otherwise a number that no other view has.
+/// The file names of the views. A view's own name is used if it is plain, otherwise a number that no other view has. On
+/// some file systems, names that differ only in capital letters mean the same file.
 std::vector<std::string> file_stems(const std::vector<std::string>& names) {
   std::vector<std::string> stems, taken;
-  for (const std::string& name : names) taken.push_back(in_small_letters(name));
+  for (const std::string& name : names) taken.push_back(marrow::files::in_small_letters(name));
   for (std::size_t i = 0; i < names.size(); ++i) {
     std::string stem = names[i];
     for (std::size_t number = i + 1;
@@ -119,9 +114,9 @@ void check_case(const marrow::Case& value, const std::string& path) {
   check_names(value.views.names(), "view");
   std::map<std::string, std::string> files;  // the key is in small letters
   for (const std::string& name : value.views.names())
-    if (const auto [other, is_new] = files.emplace(in_small_letters(name), name); !is_new)
+    if (const auto [other, is_new] = files.emplace(marrow::files::in_small_letters(name), name); !is_new)
       throw marrow::Error(path + ": the views '" + other->second + "' and '" + name +
-                          "' are one file to some file systems; rename one of them");
+                          "' are the same file on some file systems; rename one of them");
   check_names(value.seeds.names(), "fragment");
   const auto check = [&](const std::vector<std::string>& names, const std::string& what) {
     for (const std::string& name : names)
@@ -137,7 +132,7 @@ void write_case(const marrow::Case& value, const std::string& path) {
   check_case(value, path);
   marrow::files::write_atomically(path, [&](const fs::path& folder) {
     fs::create_directory(folder);
-    marrow::files::write_grid(folder / "ct.mha", value.ct.grid, value.ct.values);
+    marrow::write::write_grid(folder / "ct.mha", value.ct.grid, value.ct.values);
     YAML::Emitter out;
     out << BeginMap << Key << "marrow-case" << Value << 1 << Key << "ct" << Value << "ct.mha";
     put_views(out, value, folder);

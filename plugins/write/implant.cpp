@@ -4,13 +4,13 @@
 #include <cmath>
 #include <cstring>
 #include <marrow/plugin.hpp>
-#include <nlohmann/json.hpp>
 
 #include <Eigen/Geometry>
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
 #include "marrow/toolbox/geometry/locking_plan.hpp"
+#include "marrow/write/json_out.hpp"
 
 namespace {
 
@@ -82,7 +82,7 @@ void plan(const LockingPlan& plan, const std::string& path) {
                               {"alpha_deg", drill.alpha_deg},
                               {"beta_deg", drill.beta_deg},
                               {"doubts", drill.doubts}});
-  marrow::files::write_text(path, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  marrow::write::write_json(path, json);
 }
 
 }  // namespace

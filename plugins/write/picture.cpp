@@ -8,14 +8,14 @@
 namespace {
 
 void write_png(const std::string& path, const cv::Mat& pixels) {
-  marrow::files::write_atomically(path, [&](const auto& temporary) { marrow::files::write_pixels(temporary, pixels); });
+  marrow::files::write_atomically(path, [&](const auto& temporary) { marrow::write::write_pixels(temporary, pixels); });
 }
 
 /// 8 and 16 bits are kept as they are. PNG has no float, so a float image is scaled: its least value becomes 0, its
 /// greatest 65535.
 void image(const marrow::Image& image, const std::string& path) {
   if (image.pixels.depth() != CV_32F) return write_png(path, image.pixels);
-  marrow::files::check_finite_pixels(image.pixels, path);
+  marrow::write::check_finite_pixels(image.pixels, path);
   double least = 0, greatest = 0;
   cv::minMaxLoc(image.pixels, &least, &greatest);
   const double scale = greatest > least ? 65535 / (greatest - least) : 0;

@@ -5,10 +5,9 @@
 #include <cstring>
 #include <marrow/base/base64.hpp>
 #include <marrow/plugin.hpp>
-#include <nlohmann/json.hpp>
 
-#include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/samples_out.hpp"
+#include "marrow/write/json_out.hpp"
 
 namespace {
 
@@ -73,7 +72,7 @@ void scene(const marrow::Scene& scene, const std::string& path) {
             {{"mesh", i}, {"name", placement.name}, {"world_from_model", rows(placement.world_from_model)}});
   }
   for (const auto& view : scene.views) json["views"].push_back(json_of(view));
-  marrow::files::write_text(path, json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  marrow::write::write_json(path, json, -1);
 }
 
 void landscape(const marrow::Landscape& landscape, const std::string& path) {
@@ -86,7 +85,7 @@ void landscape(const marrow::Landscape& landscape, const std::string& path) {
     if (profile.truth) one["truth"] = *profile.truth;
     json["profiles"].push_back(one);
   }
-  marrow::files::write_text(path, json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  marrow::write::write_json(path, json, -1);
 }
 
 }  // namespace

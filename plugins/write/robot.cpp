@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes what a robot and its guide know, as JSON.
 #include <marrow/plugin.hpp>
-#include <nlohmann/json.hpp>
 
-#include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/robotics/guide_state.hpp"
 #include "marrow/toolbox/robotics/robot_state.hpp"
+#include "marrow/write/json_out.hpp"
 
 namespace {
 
 using namespace marrow;
 using nlohmann::ordered_json;
+using write::write_json;
 
 ordered_json json_of(const RigidTransform& transform) {
   ordered_json rows = ordered_json::array();
@@ -22,34 +22,29 @@ ordered_json json_of(const RigidTransform& transform) {
 
 ordered_json json_of(const robot::Load& load) { return {{"force_N", load.force_n}, {"torque_Nm", load.torque_nm}}; }
 
-void write(const ordered_json& json, const std::string& path) {
-  files::write_text(path, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-}
-
 void report(const robot::RobotReport& report, const std::string& path) {
-  write({{"done", json_of(report.done)},
-         {"robot_from_world", json_of(report.robot_from_world)},
-         {"load", json_of(report.load)},
-         {"largest_load", json_of(report.largest_load)},
-         {"warning", report.is_warning},
-         {"stopped", report.stopped}},
-        path);
+  write_json(path, {{"done", json_of(report.done)},
+                    {"robot_from_world", json_of(report.robot_from_world)},
+                    {"load", json_of(report.load)},
+                    {"largest_load", json_of(report.largest_load)},
+                    {"warning", report.is_warning},
+                    {"stopped", report.stopped}});
 }
 
 void robot_state(const robot::RobotState& state, const std::string& path) {
-  write({{"moves", state.moves},
-         {"base_from_platform", json_of(state.base_from_platform)},
-         {"world_from_base", json_of(state.world_from_base)},
-         {"world_from_ct", json_of(state.world_from_ct)}},
-        path);
+  write_json(path, {{"moves", state.moves},
+                    {"base_from_platform", json_of(state.base_from_platform)},
+                    {"world_from_base", json_of(state.world_from_base)},
+                    {"world_from_ct", json_of(state.world_from_ct)}});
 }
 
 void guide_state(const robot::GuideState& state, const std::string& path) {
   ordered_json moves = ordered_json::array();
   for (const robot::Move& move : state.moves)
     moves.push_back({{"told", json_of(move.told)}, {"seen", json_of(move.seen)}});
-  write({{"pairs", state.pairs}, {"images", state.images}, {"errors_in_tolerances", state.errors}, {"moves", moves}},
-        path);
+  write_json(
+      path,
+      {{"pairs", state.pairs}, {"images", state.images}, {"errors_in_tolerances", state.errors}, {"moves", moves}});
 }
 
 }  // namespace

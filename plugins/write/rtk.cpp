@@ -18,7 +18,7 @@ struct Options {
 
 RtkFile rtk(const List<Camera>* cameras, const List<View>* views, const Options& options) {
   std::vector<Camera> all;
-  for (const Camera& camera : exchange::named_cameras(cameras, views)) all.push_back(camera);
+  for (const Camera& camera : write::named_cameras(cameras, views)) all.push_back(camera);
   return {exchange::rtk_geometry(all, exchange::pixel_mm(options.pixel_mm, "write.rtk"))};
 }
 

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
 #include <marrow/plugin.hpp>
-#include <nlohmann/json.hpp>
 
-#include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/escaped_name.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
+#include "marrow/write/json_out.hpp"
 
 namespace {
 
@@ -37,8 +36,7 @@ void verdict(const marrow::Verdict& verdict, const std::string& path) {
 }
 
 void stop(const marrow::Stop& stop, const std::string& path) {
-  const nlohmann::ordered_json json = {{"stops", stop.stops}, {"reason", stop.reason}};
-  write_text(path, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  marrow::write::write_json(path, {{"stops", stop.stops}, {"reason", stop.reason}});
 }
 
 /// A file holds the landmarks of one fragment, and is named after it.
@@ -51,7 +49,7 @@ void metrics(const marrow::Metrics& metrics, const std::string& path) {
   nlohmann::ordered_json json = {{"metrics", nlohmann::ordered_json::array()}};
   for (const marrow::Metric& metric : metrics.items)
     json["metrics"].push_back({{"name", metric.name}, {"value", metric.value}, {"unit", metric.unit}});
-  write_text(path, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  marrow::write::write_json(path, json);
 }
 
 }  // namespace

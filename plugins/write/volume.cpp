@@ -9,12 +9,12 @@ namespace {
 void volume(const marrow::Volume& volume, const std::string& path) {
   marrow::check_volume(volume, path);
   marrow::files::write_atomically(
-      path, [&](const auto& temporary) { marrow::files::write_grid(temporary, volume.grid, volume.values); });
+      path, [&](const auto& temporary) { marrow::write::write_grid(temporary, volume.grid, volume.values); });
 }
 
 void signed_field(const marrow::SignedField& field, const std::string& path) {
   marrow::files::write_atomically(
-      path, [&](const auto& temporary) { marrow::files::write_grid(temporary, field.grid, field.values_mm); });
+      path, [&](const auto& temporary) { marrow::write::write_grid(temporary, field.grid, field.values_mm); });
 }
 
 }  // namespace

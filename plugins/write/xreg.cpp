@@ -27,7 +27,7 @@ void check_views(const Landmarks& landmarks, const List<Camera>& cameras) {
 
 XregFile xreg(const List<Camera>* cameras, const List<View>* views, const Landmarks* landmarks,
               const Options& options) {
-  const List<Camera> all = exchange::named_cameras(cameras, views);
+  const List<Camera> all = write::named_cameras(cameras, views);
   const Eigen::Vector2d pixel_mm = exchange::pixel_mm(options.pixel_mm, "write.xreg");
   if (landmarks) check_views(*landmarks, all);
   std::vector<XregProjection> projections;

@@ -3,10 +3,12 @@
 
 #include "marrow/toolbox/files/yaml_values.hpp"
 
-namespace marrow::files {
+namespace marrow::read {
+
+using files::YamlMap;
 
 Calibration read_calibration_file(const std::filesystem::path& path) {
-  YamlFile file(path);
+  files::YamlFile file(path);
   const YamlMap map(
       file, file.root(), "calibration",
       {"marrow-calibration", "width_px", "height_px", "intrinsics", "radial_distortion", "deviation", "residual_px"});
@@ -40,4 +42,4 @@ Calibration read_calibration_file(const std::filesystem::path& path) {
   return calibration;
 }
 
-}  // namespace marrow::files
+}  // namespace marrow::read

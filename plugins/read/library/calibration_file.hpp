@@ -4,10 +4,10 @@
 
 #include "marrow/domain/calibration.hpp"
 
-namespace marrow::files {
+namespace marrow::read {
 
 /// Reads a calibration file in the format that marrow writes. Throws Error if it cannot be read, or for missing or
 /// wrong values.
 Calibration read_calibration_file(const std::filesystem::path& path);
 
-}  // namespace marrow::files
+}  // namespace marrow::read

@@ -6,9 +6,10 @@
 #include "marrow/read/projections.hpp"
 #include "marrow/toolbox/exchange/plastimatch_camera.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
+#include "marrow/toolbox/files/header_lines.hpp"
 #include "marrow/toolbox/files/length_units.hpp"
 
-namespace marrow::exchange {
+namespace marrow::read {
 namespace {
 
 void check_needed(const std::filesystem::path& path, const CameraReading& reading, CameraFormat format) {
@@ -20,7 +21,7 @@ void check_needed(const std::filesystem::path& path, const CameraReading& readin
   check(reading.projection >= 0, has_projections, "projection");
   check(!reading.size.pixel_mm.empty(), is_rtk, "pixel_mm");
   check(!reading.size.corner_mm.empty(), is_rtk, "corner_mm");
-  check(reading.mirror != Mirror::none, has_projections, "mirror");
+  check(reading.mirror != exchange::Mirror::none, has_projections, "mirror");
   if (reading.scale != 1 && format == CameraFormat::own)
     throw Error(path.string() + ": scale is not for marrow's cameras, whose lengths are in mm; leave it out");
 }
@@ -35,13 +36,12 @@ int only_projection(const std::filesystem::path& path) {
 }  // namespace
 
 CameraFormat camera_format(const std::filesystem::path& path) {
-  std::string end = path.extension().string();
-  for (char& c : end) c = char(std::tolower(static_cast<unsigned char>(c)));
+  const std::string end = files::in_small_letters(path.extension().string());
   if (end == ".yaml" || end == ".yml") return CameraFormat::own;
   const Projections projections = projections_in(path);
   if (projections == Projections::rtk) return CameraFormat::rtk;
   if (projections == Projections::xreg) return CameraFormat::xreg;
-  return is_plastimatch_camera(path) ? CameraFormat::plastimatch : CameraFormat::xmalab;
+  return exchange::is_plastimatch_camera(path) ? CameraFormat::plastimatch : CameraFormat::xmalab;
 }
 
 DistortedCamera read_camera(const std::filesystem::path& path, const CameraReading& reading) {
@@ -52,8 +52,9 @@ DistortedCamera read_camera(const std::filesystem::path& path, const CameraReadi
     const int number = reading.projection >= 0 ? reading.projection : only_projection(path);
     found.camera = read_projections(path, {number}, reading.size, reading.mirror, reading.scale)[0];
   } else {
-    found = format == CameraFormat::plastimatch ? DistortedCamera{read_plastimatch_camera(path, reading.size), {}}
-                                                : files::read_camera_file(path);
+    found = format == CameraFormat::plastimatch
+                ? DistortedCamera{exchange::read_plastimatch_camera(path, reading.size), {}}
+                : files::read_camera_file(path);
     found.camera.camera_from_world.translation_mm *= reading.scale;
   }
   if (reading.size.size_px.empty()) return found;
@@ -70,4 +71,4 @@ std::string doubt_about_unit(const std::filesystem::path& path, const Camera& ca
   return doubt.empty() ? doubt : path.string() + ": " + doubt;
 }
 
-}  // namespace marrow::exchange
+}  // namespace marrow::read

@@ -7,7 +7,7 @@
 #include "marrow/domain/calibration.hpp"
 #include "marrow/toolbox/exchange/camera_matrix.hpp"
 
-namespace marrow::exchange {
+namespace marrow::read {
 
 /// `own` is marrow's YAML.
 enum class CameraFormat { own, xmalab, plastimatch, rtk, xreg };
@@ -18,10 +18,10 @@ CameraFormat camera_format(const std::filesystem::path& path);
 
 /// What a file of another program leaves open.
 struct CameraReading {
-  int projection = -1;           ///< RTK and xReg: its number, from 0; -1: the file must hold only one
-  ImageSize size;                ///< size_px: plastimatch and RTK; the others: RTK
-  Mirror mirror = Mirror::none;  ///< RTK and xReg: how the image was turned over
-  double scale = 1;              ///< all but marrow's YAML: converts the file's unit to mm
+  int projection = -1;       ///< RTK and xReg: its number, from 0; -1: the file must hold only one
+  exchange::ImageSize size;  ///< size_px: plastimatch and RTK; the others: RTK
+  exchange::Mirror mirror = exchange::Mirror::none;  ///< RTK and xReg: how the image was turned over
+  double scale = 1;                                  ///< all but marrow's YAML: converts the file's unit to mm
 };
 
 /// The camera in a file of any format. Only marrow's own YAML holds a distortion. `size.size_px` may be given for any
@@ -33,4 +33,4 @@ DistortedCamera read_camera(const std::filesystem::path& path, const CameraReadi
 /// is always in mm.
 std::string doubt_about_unit(const std::filesystem::path& path, const Camera& camera, double scale);
 
-}  // namespace marrow::exchange
+}  // namespace marrow::read

@@ -7,8 +7,9 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/exchange/rtk_geometry.hpp"
 #include "marrow/toolbox/exchange/xreg_file.hpp"
+#include "marrow/toolbox/files/header_lines.hpp"
 
-namespace marrow::exchange {
+namespace marrow::read {
 namespace {
 
 /// The cameras of the projections with these numbers, or of all. `camera(one, what)` makes one.
@@ -32,8 +33,7 @@ std::vector<Camera> cameras_of(const std::vector<Projection>& all, std::vector<i
 }  // namespace
 
 Projections projections_in(const std::filesystem::path& path) {
-  std::string end = path.extension().string();
-  for (char& c : end) c = char(std::tolower(static_cast<unsigned char>(c)));
+  const std::string end = files::in_small_letters(path.extension().string());
   return end == ".xml" ? Projections::rtk : end == ".h5" || end == ".hdf5" ? Projections::xreg : Projections::none;
 }
 
@@ -44,27 +44,27 @@ int projection_number(double number, const std::string& what) {
 }
 
 std::size_t count_projections(const std::filesystem::path& path) {
-  return projections_in(path) == Projections::rtk ? read_rtk(path).size() : read_xreg(path).size();
+  return projections_in(path) == Projections::rtk ? exchange::read_rtk(path).size() : exchange::read_xreg(path).size();
 }
 
 std::vector<Camera> read_projections(const std::filesystem::path& path, const std::vector<int>& numbers,
-                                     const ImageSize& size, Mirror mirror, double scale) {
+                                     const exchange::ImageSize& size, exchange::Mirror mirror, double scale) {
   if (projections_in(path) == Projections::none)
     throw Error(path.string() + ": expected RTK's geometry (.xml) or xReg's projection data (.h5)");
-  ImageSize in_file = size;  // in the file's unit, as RTK's distances are
+  exchange::ImageSize in_file = size;  // in the file's unit, as RTK's distances are
   for (double& side : in_file.pixel_mm) side /= scale;
   for (double& place : in_file.corner_mm) place /= scale;
   std::vector<Camera> cameras = projections_in(path) == Projections::rtk
-                                    ? cameras_of(read_rtk(path), numbers, path.string(),
-                                                 [&](const RtkProjection& one, const std::string& what) {
+                                    ? cameras_of(exchange::read_rtk(path), numbers, path.string(),
+                                                 [&](const exchange::RtkProjection& one, const std::string& what) {
                                                    return camera_of(one, in_file, mirror, what);
                                                  })
-                                    : cameras_of(read_xreg(path), numbers, path.string(),
-                                                 [&](const XregProjection& one, const std::string& what) {
+                                    : cameras_of(exchange::read_xreg(path), numbers, path.string(),
+                                                 [&](const exchange::XregProjection& one, const std::string& what) {
                                                    return camera_of(one, mirror, what);
                                                  });
   for (Camera& camera : cameras) camera.camera_from_world.translation_mm *= scale;
   return cameras;
 }
 
-}  // namespace marrow::exchange
+}  // namespace marrow::read

@@ -6,7 +6,7 @@
 
 #include "marrow/toolbox/exchange/camera_matrix.hpp"
 
-namespace marrow::exchange {
+namespace marrow::read {
 
 /// Files that hold the cameras of several projections, by the end of their names: RTK's geometry (.xml) and xReg's
 /// projection data (.h5, .hdf5).
@@ -24,6 +24,6 @@ std::size_t count_projections(const std::filesystem::path& path);
 /// `scale` converts the file's unit to mm. Throws Error as the readers of the two formats do, and if there is no such
 /// projection.
 std::vector<Camera> read_projections(const std::filesystem::path& path, const std::vector<int>& numbers,
-                                     const ImageSize& size, Mirror mirror, double scale);
+                                     const exchange::ImageSize& size, exchange::Mirror mirror, double scale);
 
-}  // namespace marrow::exchange
+}  // namespace marrow::read

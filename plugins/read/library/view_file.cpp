@@ -7,14 +7,15 @@
 #include "marrow/read/camera_file.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 
-namespace marrow::exchange {
+namespace marrow::read {
 namespace {
 
 /// Some formats do not give the size of the images: then it is taken from the image.
 DistortedCamera camera_in_file(const ViewSource& source, const Image& image, const Context& context) {
-  CameraReading reading{source.projection, {{}, source.pixel_mm, source.corner_mm}, Mirror::none, source.scale};
+  CameraReading reading{
+      source.projection, {{}, source.pixel_mm, source.corner_mm}, exchange::Mirror::none, source.scale};
   const CameraFormat format = camera_format(source.camera_file);
-  if (format == CameraFormat::rtk || format == CameraFormat::xreg) reading.mirror = mirror_of(source.mirror);
+  if (format == CameraFormat::rtk || format == CameraFormat::xreg) reading.mirror = exchange::mirror_of(source.mirror);
   if (format == CameraFormat::rtk || format == CameraFormat::plastimatch)
     reading.size.size_px = {double(image.width()), double(image.height())};
   const DistortedCamera found = read_camera(source.camera_file, reading);
@@ -47,8 +48,8 @@ ViewCamera read_view_camera(const ViewSource& source, const Image& image, const 
   if (!camera.camera.distortion.is_none())
     throw Error("view '" + source.name + "': both " + source.camera_file.string() + " and " +
                 source.calibration.string() +
-                " tell of a distortion; it is removed only once: take it out of one of them");
-  camera.calibration = files::read_calibration_file(source.calibration);
+                " give a distortion, which can be removed only once; delete it from one of them");
+  camera.calibration = read::read_calibration_file(source.calibration);
   return camera;
 }
 
@@ -72,4 +73,4 @@ View read_view_files(const ViewSource& source, const Context& context) {
   return view_of(source.name, std::move(image), camera);
 }
 
-}  // namespace marrow::exchange
+}  // namespace marrow::read

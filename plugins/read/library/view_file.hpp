@@ -10,7 +10,7 @@
 #include "marrow/domain/list.hpp"
 #include "marrow/runtime/node/context.hpp"
 
-namespace marrow::exchange {
+namespace marrow::read {
 
 /// The files of a view. The camera is `*camera` if that is not null, else it is read from `camera_file`.
 struct ViewSource {
@@ -45,4 +45,4 @@ View view_of(const std::string& name, Image image, const ViewCamera& camera);
 /// Reads a view. Throws Error as the functions above do, or if the image cannot be read.
 View read_view_files(const ViewSource& source, const Context& context);
 
-}  // namespace marrow::exchange
+}  // namespace marrow::read

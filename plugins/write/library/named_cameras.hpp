@@ -4,7 +4,7 @@
 #include "marrow/domain/list.hpp"
 #include "marrow/toolbox/exchange/camera_matrix.hpp"
 
-namespace marrow::exchange {
+namespace marrow::write {
 
 /// The cameras of a node that takes either cameras or views. Throws Error if it got neither, or if check_camera()
 /// refuses one of them.
@@ -18,4 +18,4 @@ inline List<Camera> named_cameras(const List<Camera>* cameras, const List<View>*
   return named;
 }
 
-}  // namespace marrow::exchange
+}  // namespace marrow::write

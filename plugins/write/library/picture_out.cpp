@@ -8,7 +8,7 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/samples_out.hpp"
 
-namespace marrow::files {
+namespace marrow::write {
 
 void check_finite_pixels(const cv::Mat& pixels, const std::filesystem::path& path) {
   if (pixels.type() != CV_32FC1) return;
@@ -27,10 +27,10 @@ void write_pixels(const std::filesystem::path& path, const cv::Mat& pixels) {
   check_finite_pixels(whole, path);
   const int channels = whole.channels();
   if (whole.depth() == CV_8U && (channels == 1 || channels == 3))
-    return write_png(path, whole.cols, whole.rows, channels, Sample::u8, whole.data);
+    return files::write_png(path, whole.cols, whole.rows, channels, files::Sample::u8, whole.data);
   if (whole.depth() == CV_16U && (channels == 1 || channels == 3))
-    return write_png(path, whole.cols, whole.rows, channels, Sample::u16, whole.data);
-  if (whole.type() == CV_32FC1) return write_float_tiff(path, whole.cols, whole.rows, whole.ptr<float>());
+    return files::write_png(path, whole.cols, whole.rows, channels, files::Sample::u16, whole.data);
+  if (whole.type() == CV_32FC1) return files::write_float_tiff(path, whole.cols, whole.rows, whole.ptr<float>());
   throw Error(path.string() + ": expected pixels of one or three channels of 8 or 16 bits, or one of float");
 }
 
@@ -48,14 +48,14 @@ void write_grid(const std::filesystem::path& path, const Grid& grid, const std::
                   "infinities where the volume is made",
                   path.string(), at % row, at % slice / row, at / slice));
   }
-  GridOut out;
+  files::GridOut out;
   for (std::size_t k = 0; k < 3; ++k) {
     out.size[k] = grid.size[k];
     out.spacing_mm[k] = grid.spacing_mm[Eigen::Index(k)];
     out.origin_mm[k] = grid.origin_mm[Eigen::Index(k)];
     for (std::size_t row = 0; row < 3; ++row) out.axes[k][row] = grid.direction(Eigen::Index(row), Eigen::Index(k));
   }
-  write_mha(path, out, values.data());
+  files::write_mha(path, out, values.data());
 }
 
-}  // namespace marrow::files
+}  // namespace marrow::write

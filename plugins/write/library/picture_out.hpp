@@ -5,7 +5,7 @@
 #include "marrow/domain/image.hpp"
 #include "marrow/domain/volume.hpp"
 
-namespace marrow::files {
+namespace marrow::write {
 
 /// Throws Error, with the file's name, if the pixels are float and one of them is NaN or infinite: no reader takes it.
 void check_finite_pixels(const cv::Mat& pixels, const std::filesystem::path& path);
@@ -20,4 +20,4 @@ void write_pixels(const std::filesystem::path& path, const cv::Mat& pixels);
 /// written.
 void write_grid(const std::filesystem::path& path, const Grid& grid, const std::vector<float>& values);
 
-}  // namespace marrow::files
+}  // namespace marrow::write

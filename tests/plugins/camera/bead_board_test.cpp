@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From images to the calibration: the beads are found, told apart, and the device comes out.
+// From images to the calibration: the beads are found and told apart, and the device is calibrated from them.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -41,7 +41,7 @@ Exposed expose(std::uint64_t seed, int views, const phantom::DeviceOptions& devi
   return exposed;
 }
 
-/// An image of one bead of exactly known place.
+/// An image of one bead whose place is known exactly.
 Image one_bead(double u, double v, double diameter, double gradient) {
   cv::Mat1f grey(64, 64);
   for (int y = 0; y < 64; ++y)
@@ -236,7 +236,7 @@ TEST(BeadBoard, WritesWhatReadCalibrationReads) {
   calibration.distortion_deviation = {0.01, 0.02, 0};
   calibration.residual_px = 0.21;
   writing::write(calibration, folder / "c.yaml");
-  const Calibration back = files::read_calibration_file(folder / "c.yaml");
+  const Calibration back = read::read_calibration_file(folder / "c.yaml");
   EXPECT_EQ(back.intrinsics, calibration.intrinsics);
   EXPECT_EQ(back.distortion.k, calibration.distortion.k);
   EXPECT_EQ(back.focal_deviation_px, calibration.focal_deviation_px);

@@ -35,8 +35,8 @@ double pattern(const Eigen::Vector2d& pixel) {
   return 128 + 50 * std::sin(0.11 * pixel.x()) + 50 * std::cos(0.13 * pixel.y());
 }
 
-/// What the device sees of the pattern: every pixel's ideal place is searched, so nothing of the code under test is
-/// used but the forward model.
+/// The pattern as the device sees it. The ideal place of each pixel is found by a search, so only the forward model of
+/// the tested code is used.
 cv::Mat1f as_taken() {
   cv::Mat1f image(kHeight, kWidth);
   for (int v = 0; v < kHeight; ++v)
@@ -202,7 +202,7 @@ TEST(Calibration, Refusals) {
   EXPECT_SAYS(view_from(nullptr, {"a", folder / "a.tif", folder / "plain.yaml", folder / "c.yaml"}),
               "the radial distortion folds the image");
   put(folder / "c.yaml", with(calibration_text(), "[3, 10, 0]", "[3, 10]"));
-  EXPECT_SAYS(marrow::files::read_calibration_file(folder / "c.yaml"),
+  EXPECT_SAYS(marrow::read::read_calibration_file(folder / "c.yaml"),
               "c.yaml:5:20: calibration: radial_distortion: expected 3 numbers");
 }
 

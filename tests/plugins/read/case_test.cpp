@@ -129,13 +129,14 @@ TEST_F(ReadCase, StartsOfAFragmentWhoseNameIsNoFileName) {
 TEST_F(ReadCase, StartsThatAreMissing) {
   const TemporaryFolder starts;
   const auto message = [&](const auto& place) { return message_of([&] { case_at(folder.path(), place); }); };
-  EXPECT_EQ(message(starts / "nowhere"), (starts / "nowhere").string() +
-                                             ": expected a folder with a pose for each fragment, such as the output "
-                                             "'pose' of a run");
+  EXPECT_EQ(message(starts / "nowhere"),
+            (starts / "nowhere").string() +
+                ": expected a folder with a pose for each fragment, such as the output 'pose' of a run");
   put(starts / "proximal.yaml", kPose);
-  EXPECT_EQ(message(starts.path()), starts.path().string() +
-                                        ": there is no pose of the fragment 'distal'; a pose file is named after its "
-                                        "fragment, such as distal.yaml");
+  EXPECT_EQ(
+      message(starts.path()),
+      starts.path().string() +
+          ": there is no pose of the fragment 'distal'; a pose file is named after its fragment, such as distal.yaml");
 }
 
 TEST_F(ReadCase, CtWithWhatItsFileDoesNotSay) {
@@ -145,15 +146,16 @@ TEST_F(ReadCase, CtWithWhatItsFileDoesNotSay) {
   EXPECT_EQ(read().ct.values[0], 40 - 1024);
 }
 
-// What was zero in a mask may not be zero after a compression with loss.
+// After a lossy compression, zeros of a mask may have other values.
 TEST_F(ReadCase, AMaskIsStoredWithoutLoss) {
   auto elements = marrow::test::fluoroscopy();
   elements[0x00282110] = "CS:01";  // LossyImageCompression
   put(folder / "mask.png", marrow::test::dicom_file(elements));
   const std::string message = message_of([&] { read(); });
-  EXPECT_NE(message.find("mask: was compressed with loss (JPEG or the like), so what was zero may be so no more; save "
-                         "the mask as PNG"),
-            std::string::npos)
+  EXPECT_NE(
+      message.find(
+          "mask: was compressed with loss (JPEG or the like), so its zeros may have changed; save the mask as PNG"),
+      std::string::npos)
       << message;
 }
 
@@ -268,7 +270,7 @@ TEST_F(ReadCase, DamagedCaseFilesAreDiagnosed) {
   EXPECT_NE(said("a: &a [*a]\n"), "");
 }
 
-// Each line of the file is damaged in turn: the case is read or a fault names case.yaml, and nothing crashes.
+// Each line of the file is damaged in turn. Either the case is read or a fault names case.yaml; nothing crashes.
 TEST_F(ReadCase, MutationsAreReadOrDiagnosed) {
   std::uint32_t state = 1;
   const auto random = [&](std::size_t below) {

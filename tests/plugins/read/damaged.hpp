@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The common part of the tests of damaged files. Files of each format are cut off at random places, bytes of their
-// headers are flipped, or their sizes lie. A hundred copies of each format must be read, or refused with an error that
-// names the file, within 64 MB. Files that are made to harm are in hostile_*_test.cpp.
+// headers are flipped, or their sizes are wrong. A hundred copies of each format must be read, or refused with an error
+// that names the file, within 64 MB. Files that are made to harm are in hostile_*_test.cpp.
 #include <gtest/gtest.h>
 
 #include <cstdio>

@@ -49,7 +49,7 @@ TEST(Damaged, Texts) {
                              "marrow-calibration: 1\nwidth_px: 640\nheight_px: 480\nintrinsics: [[1000, 0, 320], [0, "
                              "1001, 240], [0, 0, 1]]\nradial_distortion: [0.1, 0, 0]\n",
                              {{"640", "1e10"}, {"[0.1, 0, 0]", "[-100, 0, 0]"}}),
-                 [](const Path& path) { marrow::files::read_calibration_file(path); });
+                 [](const Path& path) { marrow::read::read_calibration_file(path); });
   expect_handled(folder,
                  text_sample("board.yaml", bytes_of(Path(MARROW_SOURCE_DIR) / "pipelines/calibration/board.yaml"),
                              {{"[-23, -47.5, 0]", "[-23, -47.5]"}, {"diameter_mm: 3", "diameter_mm: 1e30"}}),
@@ -100,7 +100,7 @@ TEST(Damaged, Case) {
   const std::string text =
       "marrow-case: 1\nct: ct.mha\nviews:\n  - {name: frontal, image: a.png, camera: a.yaml}\nfragments:\n  distal: "
       "{seeds: [[1, 2, 3]], register: true}\n";
-  shipped::definition_of("read.case");  // so that its library does not count as what reading takes
+  shipped::definition_of("read.case");  // so that loading its library does not count as memory for reading
   const auto read = [&](const Path&) { case_at(folder / "case"); };
   expect_handled(
       folder,

@@ -12,7 +12,7 @@ namespace dicom_polarity_test {
 
 using namespace marrow::test;
 
-/// Two frames of 3 x 2 pixels that differ in the last pixel only.
+/// Two frames of 3 x 2 pixels that differ only in the last pixel.
 Elements two_frames(int bits_stored, std::uint32_t last, std::uint32_t last_of_second, const Elements& changed) {
   const bool is_short = bits_stored > 8;
   std::string pixels;

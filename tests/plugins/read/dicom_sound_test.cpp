@@ -70,7 +70,7 @@ TEST_F(DicomSound, ColoursFromATableAreOnlyCalledColours) {
   expect_refused(dicom_file(but(fluoroscopy(), palette)), "x.dcm: has 3 channels; an X-ray image has one");
 }
 
-// Four pixels share a colour, so there are 1.5 values per pixel.
+// Four pixels share a colour, so a pixel has 1.5 values on average.
 TEST_F(DicomSound, ColoursWithFewerBytesAreOnlyCalledColours) {
   const Elements colours{{0x00280002, "US:3"}, {0x00280004, "CS:YBR_PARTIAL_420"},
                          {0x00280100, "US:8"}, {0x00280101, "US:8"},

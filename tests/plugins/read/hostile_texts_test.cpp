@@ -105,7 +105,8 @@ void write_strip(const TemporaryFolder& folder, int squares) {
   put(folder / "a.stl", stl);
 }
 
-/// Processor time, which does not count what other programs take; the least of five, since they take from its caches.
+/// Processor time does not count other programs. The least of five runs is taken, because other programs share the
+/// caches.
 double seconds_to_read(const Path& path) {
   double least = 1e9;
   for (int i = 0; i < 5; ++i) {
@@ -190,7 +191,7 @@ TEST_F(HostileTexts, CasesThatHarm) {
   write_itk(here / "real/ct.mha",
             ItkGrid<std::int16_t>{.size = {3, 3, 3}, .samples = std::vector<std::int16_t>(27, 40)});
   std::filesystem::create_directory_symlink("real", here / "ct");
-  shipped::definition_of("read.case");  // so that its library does not count as what reading takes
+  shipped::definition_of("read.case");  // so that loading its library does not count as reading
   const auto expect = [&](const std::string& text, const std::string& said) {
     put(here / "case.yaml", text);
     EXPECT_REFUSED(case_at(here), "case.yaml", said);

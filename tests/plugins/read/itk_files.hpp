@@ -35,7 +35,7 @@ struct DicomSlice {
 };
 void write_dicom(const std::filesystem::path& path, const DicomSlice& slice);
 
-/// Writes the image of a DICOM file anew in another transfer syntax.
+/// Writes the image of a DICOM file again in another transfer syntax.
 void compress_dicom(const std::filesystem::path& from, const std::filesystem::path& to,
                     const std::string& transfer_syntax);
 

@@ -67,8 +67,7 @@ fragments:
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 13) << "7 faults, a line of the file under each:\n" << said;
 }
 
-// Many points, none of which is known: what is wrong with the first fifty is said, without comparing all names with
-// each other.
+// Many unknown points: only the first fifty are reported, without comparing all names with each other.
 TEST(ReadLandmarks, ManyNamesTakeNoLongTime) {
   const TemporaryFolder folder;
   std::string points, tracked;

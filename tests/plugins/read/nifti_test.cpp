@@ -80,15 +80,15 @@ TEST_F(TwoPlaces, SformBesideTheQform) {
   EXPECT_FLOAT_EQ(float(grid_of(replaced(with_codes(3, 1), place(2, 3), number(0.001f))).origin_mm[2]), 0.001f);
 }
 
-// nibabel refuses such a quaternion too, from a squared length of 1 + 3.6e-7 on. Scaled to 1 it would be another turn.
+// nibabel refuses such a quaternion, too, if its squared length is 1 + 3.6e-7 or more. Scaled to 1 it would be another
+// turn.
 TEST_F(TwoPlaces, QuaternionLongerThanARotationHas) {
   const auto turned = [&](float b, float c, float d) {
     return replaced(with_codes(0, 1), 256, number(b) + number(c) + number(d));
   };
-  expect_refused(
-      turned(1.32f, 0, 0),
-      "the quaternion (b, c, d) of its qform has the length 1.32, but that of a rotation is at most 1; it is "
-      "damaged, or was written wrongly: export it again, or set qform_code to 0 if its sform is right");
+  expect_refused(turned(1.32f, 0, 0),
+                 "the quaternion (b, c, d) of its qform has the length 1.32, but that of a rotation is at most 1; it "
+                 "is damaged, or was written wrongly: export it again, or set qform_code to 0 if its sform is right");
   expect_refused(turned(0.6f, 0.6f, 0.6f), "has the length 1.03923");
   expect_refused(turned(0.71f, 0.71f, 0), "has the length 1.00409");
   // A half turn about x, with float's rounding: RAS (x, -y, -z), so LPS has the other signs of x and y.

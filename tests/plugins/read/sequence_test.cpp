@@ -112,10 +112,10 @@ TEST_F(ReadSequence, FoldersInFoldersByAPattern) {
   take(folder / "deep");
   EXPECT_SAYS(frames(), "deep: no image (PNG, TIFF, DICOM, ...) is in it; the folder is empty");
   options["patterns"] = Texts{"*/a/image.png"};
-  EXPECT_SAYS(frames(),
-              "deep: image 3 is missing between '2/a/image.png' and '10/a/image.png'; a bone is followed in "
-              "even steps of time: put a blank image of the same size there, or move the images behind the "
-              "gap to a folder of their own");
+  EXPECT_SAYS(
+      frames(),
+      "deep: image 3 is missing between '2/a/image.png' and '10/a/image.png'; a bone is followed in even steps of "
+      "time: put a blank image of the same size there, or move the images behind the gap to a folder of their own");
   std::filesystem::rename(folder / "deep" / "10", folder / "deep" / "3");
   EXPECT_EQ(greys(), (std::vector<int>{1, 2, 10}));
 }
@@ -136,7 +136,7 @@ TEST_F(ReadSequence, PagesOfATiffAndFramesOfADicomFile) {
   take(folder / "run.dcm");
   EXPECT_EQ(greys(), (std::vector<int>{101, 257, 101}));
   options["patterns"] = Texts{"*"};
-  EXPECT_SAYS(frames(), "run.dcm: a pattern chooses files of a folder, but this is no folder; leave it out");
+  EXPECT_SAYS(frames(), "run.dcm: a pattern chooses files of a folder, but this is not a folder; leave it out");
 }
 
 class Video : public ReadSequence {
@@ -170,14 +170,14 @@ TEST_F(Video, ThatIsCutOffIsNotTakenForAShorterOne) {
   options["last"] = std::int64_t(3);
   EXPECT_EQ(greys().size(), 3u);
   put(video, "no video at all");
-  EXPECT_SAYS(frames(), "run.avi: is no video, or is damaged at its start");
+  EXPECT_SAYS(frames(), "run.avi: is not a video, or is damaged at its start");
 }
 
 TEST_F(ReadSequence, DiagnosesFaults) {
   put_image(folder / "both" / "b_11.png", 1, 5);
-  EXPECT_SAYS(frames(),
-              "b_11.png: frame 3 has 6 x 5 pixels of 8 bits, but the first one 6 x 4 of 8; all frames of a "
-              "view must be alike");
+  EXPECT_SAYS(
+      frames(),
+      "b_11.png: frame 3 has 6 x 5 pixels of 8 bits, but the first one 6 x 4 of 8; all frames of a view must be alike");
   std::filesystem::remove(folder / "both" / "b_12.png");
   put_image(folder / "both" / "b_11.png", 1);
   EXPECT_SAYS(frames(), "view 'b' has 3 frames, but view 'a' has 4 (");
@@ -186,8 +186,8 @@ TEST_F(ReadSequence, DiagnosesFaults) {
   EXPECT_SAYS(frames(), "both: two images have the same number: 'b_012.png' and 'b_12.png'; remove one of them");
   options["patterns"] = Texts{"*.png", "b_*.png"};
   EXPECT_SAYS(frames(),
-              "both: the images differ in more than a number: 'a_10.png' and 'b_9.png'; name those of one "
-              "sequence by a pattern, as 'frontal_*.png'");
+              "both: the images differ in more than a number: 'a_10.png' and 'b_9.png'; name those of one sequence by "
+              "a pattern, as 'frontal_*.png'");
   options["patterns"] = Texts{"c_*.png", "b_*.png"};
   EXPECT_SAYS(frames(),
               "both: no file in it fits the pattern 'c_*.png'; there are 'a_10.png', 'a_11.png', 'a_12.png', "

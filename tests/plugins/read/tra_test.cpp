@@ -74,7 +74,7 @@ TEST_F(ReadTra, IsWrittenTheSameUnderAnyLocale) {
   EXPECT_EQ(written(), before);
 }
 
-// pandas and others write NaN as an empty cell. If such a line were passed over, all later frames would move by one.
+// pandas and others write NaN as an empty cell. If such a line were skipped, all later frames would move by one.
 TEST_F(ReadTra, ALineOfEmptyCellsIsAFrameWithoutAPose) {
   const auto out = read(kQuarter + std::string(15, ',') + "\n" + kQuarter + "\n");
   EXPECT_EQ(out.at("poses").as_list<marrow::Pose>().names(), (std::vector<std::string>{"0001", "0003"}));

@@ -123,8 +123,8 @@ TEST_F(DeepVideo, AFrameThatCannotBeDecodedIsNamed) {
   video.codec = "ZZZZ";
   put(folder / "odd.avi", avi_file(video));
   EXPECT_SAYS(read("odd.avi"),
-              "odd.avi: its frames are compressed by 'ZZZZ', for which FFmpeg has no decoder here; "
-              "convert it, to FFV1 for example");
+              "odd.avi: its frames are compressed by 'ZZZZ', for which FFmpeg has no decoder here; convert it, to FFV1 "
+              "for example");
 }
 
 // Frames in other files are not part of the key of the result: a change of them would go unnoticed.
@@ -145,8 +145,9 @@ TEST_F(DeepVideo, ListsOfOtherFilesAreRefused) {
                                   "itself, or a folder of images");
     }
   put(folder / "no.mov", "hello");
-  EXPECT_SAYS(read("no.mov"),
-              "no.mov: is no video, or is damaged at its start; read are AVI, MP4, MOV, MKV, WebM, WMV and MPEG");
+  EXPECT_SAYS(
+      read("no.mov"),
+      "no.mov: is not a video, or is damaged at its start; marrow reads AVI, MP4, MOV, MKV, WebM, WMV and MPEG");
 }
 
 // FFmpeg takes a name with % for a pattern of many images. Here the file's content alone counts.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is written atomically, where memory ends: at each allocation in turn.
+// Atomic writing when memory runs out, at each allocation in turn.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -35,7 +35,7 @@ TEST(AtomicWrite, LeavesOldOrNewWhereAnAllocationFails) {
       const std::string found = marrow::test::bytes_of(path);
       EXPECT_TRUE(found == "new" || (!done && found == "old")) << name << ", allocation " << number << ": " << found;
       for (const fs::directory_entry& entry : fs::directory_iterator(path.parent_path()))
-        EXPECT_NE(entry.path().filename().string().rfind(".part", 0), 0u) << entry.path();
+        EXPECT_NE(entry.path().filename().string().rfind(".tmp-", 0), 0u) << entry.path();
     }
     EXPECT_GT(number, 5);
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cases as read.case reads them back. No case that can be written has names so odd as some of those that file_stems()
-// is asked about, so it is called itself.
+// Cases as read.case reads them back. file_stems() is called itself with names that are too odd for any case that can
+// be written.
 #include "plugins/write/case.cpp"
 
 #include <gtest/gtest.h>

@@ -97,7 +97,7 @@ TEST(WriteCase, DiagnosesWhatReadCaseWouldNotTake) {
   value = example();
   value.views.add("Frontal", example_view("Frontal", CV_8U, 0));
   EXPECT_SAYS(write(value, path),
-              "case: the views 'frontal' and 'Frontal' are one file to some file systems; rename one of them");
+              "case: the views 'frontal' and 'Frontal' are the same file on some file systems; rename one of them");
   value.views = {};
   for (const char* name : {"View-2", "a/b"}) value.views.add(name, example_view(name, CV_8U, 0));
   write(value, folder / "other");

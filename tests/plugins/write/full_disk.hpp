@@ -27,8 +27,8 @@ class FullDisk {
   void (*signal_)(int);
 };
 
-/// That a writer which cannot finish says so with the file's name, keeps what was there before, and leaves nothing
-/// else. The result of `write` must need more than `bytes`.
+/// Expects that a writer that cannot finish names the file in its error, keeps the old file, and leaves nothing else.
+/// The result of `write` must need more than `bytes`.
 template <class Write>
 void expect_full_disk_is_diagnosed(const TemporaryFolder& folder, const std::string& name, rlim_t bytes, Write write) {
   const auto path = folder / name;
@@ -39,7 +39,7 @@ void expect_full_disk_is_diagnosed(const TemporaryFolder& folder, const std::str
     message = message_of([&] { write(path.string()); });
   }
   EXPECT_NE(message.find(path.string() + ": cannot be written"), std::string::npos) << "it said: " << message;
-  EXPECT_EQ(message.find(".part"), std::string::npos) << message;
+  EXPECT_EQ(message.find(".tmp-"), std::string::npos) << message;
   EXPECT_EQ(bytes_of(path), "what was there before");
   for (const auto& entry : std::filesystem::directory_iterator(folder.path())) EXPECT_EQ(entry.path(), path);
   EXPECT_SAYS(write((folder / "absent" / name).string()), "there is no folder");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What no reader takes is not written: surfaces with wrong corners, and numbers that are none.
+// What no reader takes is not written: surfaces with wrong corners, and numbers that are not finite.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -22,7 +22,7 @@ marrow::Mesh good() {
   return {{{0, 0, 0}, {10, 0, 0}, {0, 20, 0}, {0, 0, 30}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}, "ct"};
 }
 
-/// The surfaces that no writer may take, and what is said of them.
+/// The surfaces that every writer must refuse, with the messages.
 std::vector<std::pair<marrow::Mesh, std::string>> bad_meshes() {
   std::vector<std::pair<marrow::Mesh, std::string>> meshes;
   marrow::Mesh mesh = good();
@@ -93,7 +93,7 @@ TEST(WriteNotFinite, Images) {
     const marrow::View view = view_with(value);
     expect_refused(folder, view.image, "a.png", text);
     EXPECT_SAYS((write(view, folder / "view"), 0), "pixel (3, 2) is not a finite number");
-    EXPECT_SAYS((marrow::files::write_pixels(folder / "a.tif", view.image.pixels), 0), text);
+    EXPECT_SAYS((marrow::write::write_pixels(folder / "a.tif", view.image.pixels), 0), text);
   }
   expect_refused(folder, marrow::EdgeMap{6, 4, {{float(kNone), 1, 1, 0, 50}}}, "edges.png",
                  "cannot be written, because the place of an edge is not a finite number");

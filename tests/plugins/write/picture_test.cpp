@@ -64,12 +64,12 @@ TEST(WritePicture, ColoursAndFaults) {
 TEST(WritePicture, FloatTiffIsWholeOrAnError) {
   const TemporaryFolder folder;
   const cv::Mat pixels = noise(CV_32F, 1);
-  marrow::files::write_pixels(folder / "whole.tif", pixels);
+  marrow::write::write_pixels(folder / "whole.tif", pixels);
   EXPECT_EQ(cv::countNonZero(marrow::files::read_image_file(folder / "whole.tif").pixels != pixels), 0);
   const auto size = std::filesystem::file_size(folder / "whole.tif");
   for (const std::uintmax_t bytes : {std::uintmax_t(0), size / 2, size - 100, size - 1}) {
     const marrow::test::FullDisk full(bytes);
-    EXPECT_SAYS((marrow::files::write_pixels(folder / "half.tif", pixels), 0), "half.tif: cannot be written");
+    EXPECT_SAYS((marrow::write::write_pixels(folder / "half.tif", pixels), 0), "half.tif: cannot be written");
   }
 }
 

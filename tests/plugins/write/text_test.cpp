@@ -56,7 +56,7 @@ TEST(WriteText, PoseOfAnImplantReadsBackTheSame) {
   EXPECT_EQ(read.world_from_model.source, "implant");
 }
 
-// The run writes a list's items to files whose names are escaped. What is in the file is for people.
+// A run writes a list's items to files with escaped names. The content of a file is for people.
 TEST(WriteText, LandmarksNameTheirFragmentAsItIs) {
   const TemporaryFolder folder;
   marrow::Landmarks landmarks;

@@ -78,7 +78,7 @@ class RequestsTest(Moving, BenchTest):
             row = content[256 * 256 * at :][:256]
             self.assertEqual(row, b"\xff" * (64 * frame) + b"\0" * (256 - 64 * frame))
         self.assertIn(
-            "a pattern chooses files of a folder, but this is no folder; leave it out",
+            "a pattern chooses files of a folder, but this is not a folder; leave it out",
             self.opened({"frontal": {**film, "pattern": "*.tif"}, "lateral": film})["error"],
         )
 

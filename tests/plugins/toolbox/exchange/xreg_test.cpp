@@ -99,7 +99,7 @@ TEST(Xreg, LandmarksAsImagesShowThem) {
   EXPECT_EQ(landmarks_at(folder / "p.fcsv", {{"seen", kFile.string()}, {"names", views}}).seen[0].pixel,
             Eigen::Vector2d(124.5, 29.5));
   EXPECT_SAYS(landmarks_at(folder / "p.fcsv", {{"seen", kFile.string()}}),
-              "xreg-by-h5py.h5: has 3 projections; give in names as many, got 0");
+              "xreg-by-h5py.h5: has 3 projections; give as many names, got 0");
   put(folder / "p.fcsv", with(kPoints, "FH-r", "GSN-r"));
   EXPECT_SAYS(landmarks_at(folder / "p.fcsv", {{"seen", kFile.string()}, {"names", views}}),
               "xreg-by-h5py.h5: projection 0 shows 'FH-r', which ");
@@ -172,10 +172,9 @@ TEST(Xreg, DiagnosesFaults) {
     EXPECT_REFUSED(read(folder / "a.h5", 0, "none"), "a.h5", said);
   };
   using P = XregProjection;
-  expect(
-      [](P& p) { p.frame = "origin-at-isocentre"; },
-      "a.h5: proj-000/cam/cam-coord-frame-type: expected origin-at-focal-pt-det-pos-z, origin-at-focal-pt-det-neg-z or "
-      "origin-on-det, got 'origin-at-isocentre'");
+  expect([](P& p) { p.frame = "origin-at-isocentre"; },
+         "a.h5: proj-000/cam/cam-coord-frame-type: expected origin-at-focal-pt-det-pos-z, origin-at-focal-pt-det-neg-z "
+         "or origin-on-det, got 'origin-at-isocentre'");
   expect([](P& p) { p.height_px = 0; }, "a.h5: proj-000/cam/num-rows: expected 1 to 65536 pixels, got 0");
   expect([](P& p) { p.width_px = 70000; }, "a.h5: proj-000/cam/num-cols: expected 1 to 65536 pixels, got 70000");
   expect([](P& p) { p.row_spacing_mm = 0; },

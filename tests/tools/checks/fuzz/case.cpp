@@ -37,7 +37,7 @@ void read(char format, std::string_view text) {
   if (format == 'c') put("case/case.yaml", text), read_case({marrow::fuzz::folder() / "case", {}}, context);
   if (format == 'm') marrow::files::read_camera_file(put("a.yaml", text));
   if (format == 'x') marrow::files::read_camera_file(put("a.txt", text));
-  if (format == 'k') marrow::files::read_calibration_file(put("a.yaml", text));
+  if (format == 'k') marrow::read::read_calibration_file(put("a.yaml", text));
   if (format == 'b') marrow::calibration::read_board_file(put("a.yaml", text));
   if (format == 'p') marrow::files::read_points_file(put("a.yaml", text));
   if (format == 'l') marrow::fuzz::read_landmarks(put("a.yaml", text));

@@ -21,7 +21,7 @@ void read(char format, std::string_view text) {
   if (format == 't') read_itk_transform(put("a.tfm", text), "world", "ct");
   if (format == 'o') read_surface_file(put("a.obj", text), 1, marrow::Context());
   if (format == 'p') read_plastimatch_camera(put("a.txt", text), size);
-  if (format == 'r') read_projections(put("a.xml", text), {}, size, Mirror::upside_down, 1);
+  if (format == 'r') marrow::read::read_projections(put("a.xml", text), {}, size, Mirror::upside_down, 1);
 }
 
 }  // namespace
