@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of bones that are followed through frames (docs/method.md, "Following a bone")."""
+"""Figures of bones that are followed through frames (docs/tracking.md)."""
 import numpy as np
 from scipy.spatial.transform import Rotation
 

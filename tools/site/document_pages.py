@@ -23,6 +23,7 @@ GROUPS = {
         "comparing",
         "verdict",
         "repetition",
+        "tracking",
         "python",
         "simulation",
         "nailing",

@@ -2,7 +2,7 @@
 #pragma once
 // An error-state Kalman filter on SE(3) for a bone of constant velocity with white acceleration, and its smoother. The
 // acceleration is white from moment to moment. If it were constant during each frame and large compared with the noise
-// of the poses, it alone would explain any pose, and the filter would nearly oscillate (docs/method.md). Sola,
+// of the poses, it alone would explain any pose, and the filter would nearly oscillate (docs/tracking.md). Sola,
 // Quaternion kinematics for the error-state Kalman filter, arXiv 1711.02508, 2017; Rauch, Tung, Striebel, AIAA Journal
 // 3(8), 1965. The error is a small motion as defined at Pose and a difference of velocities.
 #include <optional>
