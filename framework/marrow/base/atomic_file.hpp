@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How marrow writes what is whole or not there: under a temporary name, and then renamed.
+// How marrow writes files that are whole or not there: under a temporary name, and then renamed.
 #include <filesystem>
 #include <functional>
 
@@ -9,8 +9,8 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// A temporary name for a file or folder that is renamed to `final` when it is complete: FINAL.tmp-PROCESS-NUMBER, by
-/// which a clean-up knows what it was to become and who writes it. Each call returns a new name.
+/// A temporary name for a file or folder that is renamed to `final` when it is complete: FINAL.tmp-PROCESS-NUMBER. It
+/// tells a clean-up what the file was to become and who writes it. Each call returns a new name.
 std::filesystem::path temporary_beside(const std::filesystem::path& final);
 /// The same for a folder that people look into: .tmp-PROCESS-NUMBER, hidden, and short however long the final name is.
 std::filesystem::path hidden_beside(const std::filesystem::path& final);
@@ -32,8 +32,8 @@ class AtomicFile {
 
   /// Its errno is set if the file is not open.
   const Descriptor& descriptor() const { return descriptor_; }
-  /// Puts the file in its place; if it is to be durable, waits until it is on the disk. Returns false, with errno, if
-  /// that is not possible.
+  /// Puts the file in its place. If `is_durable`, waits until it is on the disk. Returns false, with errno, if that is
+  /// not possible.
   bool finish(bool is_durable = false);
 
  private:

@@ -9,7 +9,7 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// Closes an open file at the end. Counts as its number in calls of the system; a negative number is no open file.
+/// Owns an open file and closes it at the end. Converts to its number, which is negative if no file is open.
 class Descriptor {
  public:
   Descriptor() = default;

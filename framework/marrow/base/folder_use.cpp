@@ -43,7 +43,7 @@ void rename_unused(const fs::path& folder, const fs::path& to, std::error_code& 
     error = std::make_error_code(std::errc::device_or_resource_busy);
     return;
   }
-  // If it was gone, or another process renamed it until it was locked, a new one may be there, which is not locked.
+  // If it was missing, or another process renamed it before it was locked, a new folder may be there, without a lock.
   if (is_gone || (held.is_open() && !is_still(held, folder))) {
     error = std::make_error_code(std::errc::no_such_file_or_directory);
     return;

@@ -32,7 +32,7 @@ struct Stat {
   unsigned long long start = 0;  ///< clock ticks after the boot
 };
 
-/// Nothing if /proc is not there, or shows another namespace's processes: then its numbers mean other processes.
+/// Nothing if /proc is missing or shows the processes of another namespace, whose numbers mean other processes.
 std::optional<Stat> stat_of(pid_t process) {
   std::error_code error;
   if (fs::read_symlink("/proc/self", error) != formatted("{}", getpid()) || error) return std::nullopt;
@@ -115,7 +115,7 @@ std::optional<Parts> parts_of(std::string_view identity) {
 const std::string& this_process() {
   static std::mutex mutex;
   static pid_t process = 0;
-  static const std::string* identity = nullptr;  // an older one stays: somebody may still use it
+  static const std::string* identity = nullptr;  // never deleted: a caller may still use an older one
   const std::scoped_lock lock(mutex);
   if (process != getpid()) {  // at first, and after a fork
     process = getpid();

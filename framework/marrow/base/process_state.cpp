@@ -26,7 +26,7 @@
 
 namespace marrow {
 
-/// They have a name because ProcessState::Parts, which is known outside of this file, holds them.
+/// Not an unnamed namespace, because ProcessState::Parts, which the header declares, has members of these types.
 namespace process_parts {
 
 /// The folder at which all relative paths start. If a plugin's library changed it, inputs would be read and results
@@ -124,7 +124,7 @@ class SignalHandlers {
   }
 
  private:
-  static constexpr int kEnd = 32;  // from here on there are those of libraries
+  static constexpr int kEnd = 32;  // the signals from here on belong to libraries
   std::array<struct sigaction, kEnd> actions_{};
 };
 
@@ -182,7 +182,7 @@ class Limits {
   std::array<rlimit, kWhich.size()> before_{};
 };
 
-/// Which permissions new files do not get. It can be asked for without changing it only through /proc.
+/// Which permissions new files do not get. Only /proc tells it without changing it.
 class PermissionsMask {
  public:
   PermissionsMask() {
@@ -291,7 +291,7 @@ void ProcessState::keep_during(const std::function<void()>& code) {
 }
 
 void ProcessState::keep_for_process(const std::function<void()>& start) {
-  constexpr int kMostTimes = 10;  // whoever changes the state all the time fails for it
+  constexpr int kMostTimes = 10;  // code that keeps changing the state fails by itself
   for (int time = 0; time < kMostTimes; ++time) {
     const long before = changes_;
     start();

@@ -17,8 +17,7 @@ namespace MARROW_EXPORT marrow {
 /// The state of this process as it must stay while nodes run. Safe to use from several threads.
 class ProcessState {
  public:
-  /// The one of all runs that go on in this process. It is the state in which the process is when the first of them
-  /// begins.
+  /// The state that all current runs in this process share: the state at the beginning of the first of them.
   static std::shared_ptr<ProcessState> of_runs();
 
   ProcessState();
@@ -30,13 +29,13 @@ class ProcessState {
   /// Both are part of the state.
   void set_up_opencv();
 
-  /// Calls plugin code. If the state changes meanwhile, it is put back, and the code is called once more while no other
-  /// code runs, which may have changed it. Throws Error, with what was changed, if it changes again. What the code
-  /// throws is thrown.
+  /// Calls plugin code. If the state changes meanwhile, puts it back and calls the code once more, now alone, because
+  /// other code may have changed the state. Throws Error, with what was changed, if it changes again. Passes on
+  /// exceptions of the code.
   void keep_during(const std::function<void()>& code);
 
-  /// Calls code that starts a process, which takes over the state. If the state changes meanwhile, it is put back, and
-  /// the code is called again. Calls of plugin code may contain such calls.
+  /// Calls code that starts a process, which inherits the state. If the state changes meanwhile, puts it back and calls
+  /// the code again. Calls of plugin code may contain such calls.
   void keep_for_process(const std::function<void()>& start);
 
   /// Puts back what has changed. Returns what that was, in words; an empty text if nothing has.

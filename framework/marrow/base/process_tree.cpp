@@ -34,7 +34,7 @@ double resident_mb(pid_t process) {
   return resident * double(sysconf(_SC_PAGESIZE)) / 1e6;
 }
 
-/// A page that several processes share counts for each of them with its part. The resident memory if that is not told.
+/// Of a page that several processes share, each counts its part. The resident memory if the system does not tell this.
 double proportional_mb(pid_t process) {
   std::ifstream stream(proc_folder(process) + "/smaps_rollup");
   for (std::string word; stream >> word;)

@@ -9,19 +9,19 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// From now on, a process whose parent ends becomes a child of this process, if it comes from it. So whatever this
+/// From now on, a descendant of this process whose parent ends becomes a child of this process. So whatever this
 /// process starts stays in its tree.
 void keep_descendants();
 
-/// What a process started, directly or through others, and what of it has not ended.
+/// All processes that a process started, directly or through others, and that have not ended.
 std::vector<pid_t> descendants_of(pid_t process);
 
 /// Kills a process, its group, and what it started, also what left the group. Must be called before the process is
 /// waited for: until then, no other process or group has its number.
 void kill_tree(pid_t process);
 
-/// Resident memory of a process and its descendants. Memory that they share counts once, where the system tells, and is
-/// counted so only if the plain sum exceeds `enough_mb`: it takes longer.
+/// Resident memory of a process and its descendants. If the plain sum exceeds `enough_mb`, shared memory is
+/// counted only once, as far as the system reports it; this takes longer.
 double memory_of_tree_mb(pid_t process, double enough_mb);
 
 }  // namespace marrow

@@ -20,7 +20,7 @@ struct YamlEntry {
   YAML::Node value;
 };
 
-/// Reads YAML files that people write. Each fault (domain/yaml.hpp) becomes a diagnostic at its place.
+/// Reads YAML files that people write. Each fault (base/yaml.hpp) becomes a diagnostic at its place.
 class StrictYaml {
  public:
   StrictYaml(std::string file, Diagnostics& diagnostics) : file_(std::move(file)), diagnostics_(diagnostics) {}

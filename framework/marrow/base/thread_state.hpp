@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What each thread has for itself, and what a node that runs on it could leave behind for the next one.
+// The state of a single thread, which one node could leave changed for the next node on the same thread.
 #include <fenv.h>
 #include <locale.h>
 #include <signal.h>
@@ -11,8 +11,8 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// As long as it lives, this thread calculates with numbers as every program does that changes nothing: rounding to
-/// nearest, tiny numbers are kept, nothing traps. Afterwards it calculates as it did before.
+/// While it lives, this thread calculates with the default settings: it rounds to nearest, keeps tiny numbers and traps
+/// nothing. Afterwards its earlier settings hold again.
 class UsualArithmetic {
  public:
   UsualArithmetic();

@@ -26,20 +26,20 @@ struct IndexedLibrary {
       Fields<&IndexedLibrary::info, &IndexedLibrary::files, &IndexedLibrary::folders, &IndexedLibrary::groups>;
 };
 
-/// The descriptions of the libraries of one folder, in one file of the user's cache. They are what library_info()
-/// returned at an earlier start, so that a start only asks whether all that they were made from is as it was: the
-/// library, its manifest, the libraries that it links and the folders that were searched, by their size, number and
-/// times; and by the owners and modes of the folders above. A library of which anything changed is not found here. A
-/// file that is damaged or of another build counts as none.
+/// The descriptions of the libraries of one folder, in one file of the user's cache: what library_info() returned at an
+/// earlier start. A later start only asks whether anything has changed that a description was made from. It compares
+/// size, inode and times of the library, its manifest, the libraries that it links and the folders that were searched,
+/// and the owners and modes of the folders above. If anything has changed, the library is not found here. A file of the
+/// cache that is damaged, or that another build wrote, is ignored.
 class LibraryIndex {
  public:
   explicit LibraryIndex(const std::filesystem::path& folder);
 
-  /// The description of a library; nothing if it is not known or may be another one now.
+  /// The description of a library; nothing if it is not known or may have changed.
   std::optional<LibraryInfo> find(const std::filesystem::path& library);
-  /// Writes the descriptions of all libraries of the folder, if there are new ones that can be kept. Not kept are
-  /// refused libraries, those in Python, and those of which a file changed so shortly ago that its next change might
-  /// not show.
+  /// Writes the descriptions of all libraries of the folder, if there are new ones that can be kept. It keeps
+  /// no refused libraries, none in Python, and none with a file that changed so recently that its next change might not
+  /// show.
   void keep(std::span<const LibraryInfo> all);
   /// Removes the file of a folder.
   static void forget(const std::filesystem::path& folder);

@@ -21,15 +21,14 @@ constexpr std::size_t kMostManifest_bytes = 4 << 20;
 std::string manifest_text(const LibraryInfo& info);
 /// Reads the text of a manifest. Throws as library_from_json() does.
 LibraryInfo manifest_from_text(const std::string& text);
-/// The text of an object, with a checksum of the text that follows the checksum. By it an edited manifest is noticed.
+/// The text of an object, with a checksum of the text that follows it, so that an edited manifest is noticed.
 std::string with_checksum(const nlohmann::json& document);
 
-/// What a process that is no library says about its nodes, a list of json_of(). It is checked as strictly as a
-/// manifest.
+/// Reads the nodes that a Python process declares, a list of json_of(). They are checked as strictly as a manifest.
 LibraryInfo info_of_nodes(const nlohmann::json& nodes);
 
 /// The first difference between what a library registers and its description, with both values; empty if there is none.
-/// The files of the library, and of those that it links, are not compared.
+/// Does not compare the file of the library, or the libraries that it links.
 std::string difference(const LibraryInfo& described, const LibraryInfo& registered);
 
 }  // namespace marrow

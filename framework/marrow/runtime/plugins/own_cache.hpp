@@ -6,15 +6,15 @@
 
 namespace marrow {
 
-/// The folder in which what is known about libraries is kept: marrow/libraries in the user's cache folder. Empty if
-/// there is none, or if it is not the user's alone. `make`: makes it, unless others could change the folders above it.
+/// The folder that keeps descriptions of libraries: marrow/libraries in the user's cache folder. Empty if there is
+/// none, or if it is not the user's alone. `make`: makes it, unless others could change the folders above it.
 std::filesystem::path own_cache_folder(bool make);
 
 /// The text of a file in this folder. Nothing if it is not there, is longer than `most_bytes` or belongs to someone
 /// else.
 std::optional<std::string> own_cached_text(const std::string& name, std::size_t most_bytes);
 
-/// Writes a file in this folder, for the user alone. This is only a cache: where it cannot be written, nothing is kept.
+/// Writes a file in this folder, for the user alone. If it cannot be written, nothing is kept: it is only a cache.
 void keep_in_own_cache(const std::string& name, const std::string& text);
 
 /// Removes a file in this folder.

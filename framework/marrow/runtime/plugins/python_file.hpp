@@ -28,7 +28,7 @@ LibraryInfo python_file_info(const std::filesystem::path& file, const Digest& fr
 /// The nodes of a file. Their calls start Python processes. Throws Error if the file is not as `described`.
 std::unique_ptr<Plugin> load_python_file(const LibraryInfo& described);
 
-/// Digest of a Python file, of all that its description links, and of what is in the searched folders now. Throws Error
+/// Digest of a Python file, of all files that it loads, and of what is in the searched folders now. Throws Error
 /// if one of the files is gone.
 Digest digest_of_python(const LibraryInfo& described);
 
@@ -37,12 +37,12 @@ struct LoadedByPython {
   std::set<std::string> files;
   std::map<std::string, std::set<std::string>> searched;  ///< the names, by the folder
 
-  /// Takes over what is not in the description; returns whether there was anything.
+  /// Adds what is not in the description. Returns whether there was anything.
   bool add_new(const nlohmann::json& answer, const LibraryInfo& described);
 };
 
-/// Adds what a process did that its description does not say to the kept description. From now on is_fully_described()
-/// is false for this description: its build id does not cover what was added.
+/// Adds to the kept description what a process has loaded besides. From now on is_fully_described() is false for
+/// `described`, because its build id does not cover what was added.
 void add_to_description(const LibraryInfo& described, const LoadedByPython& more_loaded);
 bool is_fully_described(const LibraryInfo& described);
 

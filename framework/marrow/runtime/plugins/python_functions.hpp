@@ -12,7 +12,7 @@ class PythonFunction {
                  const std::vector<OptionValue>& options);
 
   const std::string& name() const { return node_.name; }
-  /// Has a process make the function, so that what is wrong with its inputs is said at once.
+  /// Has a process make the function, so that a fault of its inputs is reported at once.
   nlohmann::json make(Context& context) const;
   /// Has a process answer a request about the function, as PythonNodes::ask() does.
   nlohmann::json ask(nlohmann::json request, std::vector<Value>* outputs = nullptr,

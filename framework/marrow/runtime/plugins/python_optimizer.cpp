@@ -16,7 +16,7 @@ class PythonOptimizer : public Optimizer {
  public:
   explicit PythonOptimizer(PythonFunction function) : function_(std::move(function)) {}
 
-  /// The result is the best point that the process asked for. Numbers that are not finite become null on the way.
+  /// The result is the best point whose value the process asked for. JSON writes numbers that are not finite as null.
   MinimisationResult minimise(const MinimisationProblem& problem) const override {
     MinimisationResult result;
     result.x = problem.start;

@@ -25,8 +25,8 @@ std::filesystem::path python_package_folder();
 std::vector<std::string> python_settings();
 
 /// A process that holds the nodes of `file` (python/marrow/node_process.py). Its descriptor 3 is the open file `made`,
-/// through which it hands values over. From descriptor 4, `replies`, it reads the replies to its questions; a process
-/// that asks none needs no such file, -1. Hashes of texts have no random seed there, and numerical libraries use one
+/// through which it hands values over. From descriptor 4, `replies`, it reads the replies to its questions; `replies`
+/// is -1 for a process that asks none. Hashes of texts have no random seed there, and numerical libraries use one
 /// thread. Throws Error if others may write to a folder of the search path.
 WorkerSettings python_process(const std::filesystem::path& file, int made, int replies = -1);
 

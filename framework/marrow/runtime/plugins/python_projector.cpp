@@ -77,7 +77,7 @@ class PythonProjector : public RadiographProjector {
  private:
   static constexpr double kNearest_mm = 1;
 
-  /// The values of the pixels, which the request describes. 0 outside of the region.
+  /// The values of the pixels that the request describes; 0 outside of the region.
   std::vector<float> drawn(const Camera& camera, const RigidTransform& world_from_model,
                            const std::vector<Eigen::Vector2d>& pixels, json request) const {
     std::vector<float> values(pixels.size());

@@ -4,9 +4,9 @@
 
 namespace marrow {
 
-/// The folders of the run paths (DT_RUNPATH, DT_RPATH) of a loaded library, and of those that it needs, in which the
-/// loader looked for a library that was found elsewhere, with the names of the libraries. Folders in LD_LIBRARY_PATH
-/// are left out, and libraries that the framework needs, because they were loaded before.
+/// The folders of run paths (DT_RUNPATH, DT_RPATH) in which the loader looked in vain for what a loaded library needs,
+/// directly or indirectly, each with the names of these libraries. Leaves out folders in LD_LIBRARY_PATH, and libraries
+/// that the framework needs: they were loaded before.
 std::vector<SearchedFolder> run_path_folders(void* handle);
 
 }  // namespace marrow

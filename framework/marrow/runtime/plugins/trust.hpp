@@ -26,8 +26,8 @@ std::filesystem::path trusted_path(const std::filesystem::path& library);
 
 /// The same rule for files that are loaded together with a plugin: libraries that it links, modules that it imports.
 /// Returns a sentence that begins with a verb and names the first file that others could change, or an empty text.
-/// Files of the system are those that marrow itself needs. The user `also` is trusted, too: who owns the interpreter of
-/// Python nodes could change that as well.
+/// Files of the system are not checked: marrow itself needs them. The user `also` is trusted, too: whoever owns the
+/// interpreter of Python nodes could change that as well.
 std::string untrusted_among(const std::vector<std::filesystem::path>& files, uid_t also = 0);
 
 /// Whether MARROW_TRUST_ALL_PLUGINS is 1.

@@ -26,9 +26,9 @@ struct SharedInput {
 class SharedInputs {
  public:
   explicit SharedInputs(std::uint64_t most_bytes) : most_bytes_(most_bytes) {}
-  /// The packed data of one item that is here. Throws Error if there is no memory to share.
+  /// The packed data of one item. Throws Error if there is no memory to share.
   std::shared_ptr<const SharedInput> share(const Value& item);
-  /// The numbers of all that is kept: what a process has mapped besides these, it need not keep.
+  /// The numbers of all that is kept. A process may unmap everything else.
   std::vector<std::uint64_t> numbers() const;
 
   /// Those of this process.
@@ -37,7 +37,7 @@ class SharedInputs {
  private:
   struct Entry {
     std::weak_ptr<const void> data;
-    const void* address = nullptr;  ///< with the type it tells the value, as long as its data live
+    const void* address = nullptr;  ///< with the type, it identifies the value while its data live
     std::string type;
     std::shared_ptr<const SharedInput> packed;
   };
@@ -46,7 +46,7 @@ class SharedInputs {
 
   std::uint64_t most_bytes_;
   mutable std::mutex mutex_;
-  std::list<Entry> entries_;  ///< the one that was used last comes first
+  std::list<Entry> entries_;  ///< the most recently used comes first
   std::uint64_t last_number_ = 0;
 };
 

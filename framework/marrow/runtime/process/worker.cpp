@@ -123,7 +123,7 @@ int status_of_ended(pid_t process) {
 Worker::Worker(const WorkerSettings& settings) {
   auto input = make_pipe(), output = make_pipe();
   ProcessState::of_runs()->keep_for_process([&] {
-    close();  // one that took over what a node had changed
+    close();  // an earlier one, which inherited what a node had changed
     process_ = start(settings, input.read_end, output.write_end);
   });
   to_ = std::move(input.write_end);

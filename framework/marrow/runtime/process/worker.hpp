@@ -126,7 +126,7 @@ using WorkerTask = std::function<nlohmann::json(const nlohmann::json& request, W
 /// that it starts reads a request.
 int serve_worker(const std::map<std::string, WorkerTask>& tasks);
 
-/// A sentence for a process that got SIGKILL, which no program sends to itself by a fault: not its work is to blame.
+/// A sentence for a process that got SIGKILL. No fault of a program sends that signal, so its work is not to blame.
 std::string killed_from_outside(const std::string& process);
 
 /// The program marrow-worker, in the folder `marrow` next to the framework's library.
