@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 }  // namespace
 
-/// Also true for a bind mount, which has the same device as the folder around it.
+/// Also true for a bind mount, although it has the same device as the folder around it.
 bool is_mount(const fs::path& path) {
   struct statx status {};
   return statx(AT_FDCWD, path.c_str(), AT_SYMLINK_NOFOLLOW | AT_NO_AUTOMOUNT, STATX_TYPE, &status) == 0 &&

@@ -21,7 +21,7 @@ int threads_here() {
   return count;
 }
 
-/// Waits for the threads of this process to be gone: a joined thread still counts until the system is done with it.
+/// Waits until the threads of this process are gone: a joined thread still counts until the system has removed it.
 void wait_until_gone(int threads_before) {
   for (int tries = 0; tries < 500 && threads_here() > threads_before; ++tries)
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -46,7 +46,7 @@ int threads_at_once(int wanted) {
 }  // namespace
 
 int threads_to_be_had(int wanted) {
-  static std::atomic<int> kept{0};  // TBB keeps the threads that it once had
+  static std::atomic<int> kept{0};  // TBB keeps the threads that it has started
   if (wanted <= kept) return wanted;
   int had = 0;
   for (int tries = 0; had == 0 && tries < 10; ++tries) {

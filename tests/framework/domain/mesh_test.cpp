@@ -98,11 +98,11 @@ TEST(Mesh, SamplesAreUniformInATriangle) {
   mesh.triangles = {{0, 1, 2}, {3, 2, 1}};
   const auto points = sample_surface(mesh, 3600);
   ASSERT_EQ(points.size(), 3600u);
-  // The square in 36 parts, of which the diagonal halves six.
+  // The square in 36 parts; the diagonal halves six of them.
   std::array<int, 36> inside{};
   for (const Vector3d& point : points) ++inside[std::size_t(int(point.y()) * 6 + int(point.x()))];
   for (std::size_t i = 0; i < 36; ++i) EXPECT_NEAR(inside[i], 100, 12) << i;
-  // The first half of the points lies in the first triangle; each stands for as much area, beginning and ending with
+  // The first half of the points is in the first triangle. Each represents the same area, beginning and ending with
   // half of it.
   EXPECT_LT(points[1799].x() + points[1799].y(), 6);
   EXPECT_GT(points[1800].x() + points[1800].y(), 6);

@@ -24,7 +24,7 @@ bool is_of_the_system(const std::string& file);
 /// people build themselves, it includes the content. Throws Error if the file cannot be read.
 Digest identity_of(const LinkedLibrary& library);
 
-/// The identities of framework_libraries(). They are found out once: what this process has loaded stays as it is.
+/// The identities of framework_libraries(), computed once: what this process has loaded does not change.
 const std::vector<Digest>& framework_identities();
 
 /// Another file in LD_LIBRARY_PATH that has the same name up to the version; empty if there is none. The loader may

@@ -27,7 +27,7 @@ std::vector<std::string> folders_of_run_path(const std::string& run_path, const 
     for (const std::string name : {"${ORIGIN}", "$ORIGIN"})
       for (std::size_t at; (at = folder.find(name)) != std::string::npos;)
         folder.replace(at, name.size(), library.parent_path().string());
-    if (folder.empty() || folder[0] != '/') continue;  // a relative one is no place that a key could cover
+    if (folder.empty() || folder[0] != '/') continue;  // where a relative one leads depends on the working folder
     for (const char* variant : kVariants) folders.push_back((fs::path(folder) / variant).lexically_normal().string());
   }
   return folders;

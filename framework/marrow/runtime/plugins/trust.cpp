@@ -60,8 +60,8 @@ std::string mode_text(mode_t mode) { return formatted("{:04o}", mode & 07777); }
 /// group itself may have nothing to do with it.
 bool has_access_list(const fs::path& path) { return getxattr(path.c_str(), "system.posix_acl_access", nullptr, 0) > 0; }
 
-/// What lets others change a file or the entries of a folder; empty if nothing does. In a folder further above, a
-/// sticky bit keeps others from replacing what is not theirs.
+/// What lets others change a file or the entries of a folder; empty if nothing does. In a folder above, a sticky bit
+/// keeps others from replacing files that they do not own.
 std::string fault_of(const fs::path& path, bool is_above, uid_t also) {
   struct stat status {};
   if (stat(path.c_str(), &status) != 0) return "cannot be read: " + std::string(std::strerror(errno));

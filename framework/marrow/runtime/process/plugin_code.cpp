@@ -36,7 +36,7 @@ class RunningCode {
 
   /// Whether code of a plugin ends the process on this thread. If so, says it.
   bool ends_process() {
-    if (is_left_to_parent_ || process_ != getpid()) return false;  // in a forked process nobody would unlock the mutex
+    if (is_left_to_parent_ || process_ != getpid()) return false;  // after a fork, no thread would unlock the mutex
     std::unique_lock lock(mutex_);
     const auto own = std::find_if(running_.begin(), running_.end(),
                                   [](const PluginCode* code) { return code->thread_ == std::this_thread::get_id(); });

@@ -35,7 +35,7 @@ class Search : public marrow::Optimizer {
           Eigen::VectorXd x = result.x;
           x[i] += sign * step * problem.initial_step[i];
           const double v = value(x);
-          if (v >= result.value) continue;  // of what is not a number, never
+          if (v >= result.value) continue;  // never true for NaN
           result.x = x;
           result.value = v;
           any = true;
