@@ -2,13 +2,13 @@
 #include <cmath>
 #include <marrow/domain/features.hpp>
 
-#include "intensity_behaviour.hpp"
+#include "blob_scene.hpp"
 #include "other_fragment.hpp"
 #include "shipped.hpp"
 
 namespace drr_edges_test {
 
-using intensity_behaviour::at;
+using blob_scene::at;
 using marrow::RadiographProjector;
 using pixelwise_projector::PixelwiseProjector;
 
@@ -66,7 +66,7 @@ shipped::Inputs inputs(double u, float direction = -1) {
   marrow::List<marrow::EdgeMap> edges;
   edges.add("frontal", map);
   return {{"projector", marrow::Value::of<RadiographProjector>(std::make_shared<const WallProjector>())},
-          {"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of()), "view")},
+          {"views", shipped::list(blob_scene::views_of(blob_scene::view_of()), "view")},
           {"edges", shipped::list(edges, "view")}};
 }
 
@@ -169,9 +169,9 @@ TEST(DrrEdges, SaysWhatIsEmpty) {
   EXPECT_EQ(said(inputs(100), 80),
             "view 'frontal': it shows no edge of the radiograph, which is empty or outside the image");
   shipped::Inputs masked = inputs(100);
-  marrow::View view = intensity_behaviour::view_of();
+  marrow::View view = blob_scene::view_of();
   view.mask = cv::Mat(170, 200, CV_8U, cv::Scalar(0));
-  masked["views"] = shipped::list(intensity_behaviour::views_of(view), "view");
+  masked["views"] = shipped::list(blob_scene::views_of(view), "view");
   EXPECT_EQ(said(masked, 0), "view 'frontal': no edge of the radiograph lies inside image and mask");
 }
 

@@ -7,7 +7,7 @@
 #include <map>
 #include <numeric>
 
-#include "intensity_behaviour.hpp"
+#include "blob_scene.hpp"
 #include "shipped.hpp"
 
 namespace formulas_test {
@@ -21,7 +21,7 @@ struct Images {
   double rendered_at(int u, int v) const { return rendered[std::size_t(v * kWidth + u)]; }
 };
 
-marrow::View view() { return intensity_behaviour::view_of(50000, 0.02, 60); }
+marrow::View view() { return blob_scene::view_of(50000, 0.02, 60); }
 
 Images images_at(double du, double dv) {
   Images images;
@@ -31,7 +31,7 @@ Images images_at(double du, double dv) {
   for (int v = 0; v < kHeight; ++v)
     for (int u = 0; u < kWidth; ++u) {
       images.seen.push_back(-std::log(image.image.pixels.at<std::uint16_t>(v, u) / brightest));
-      images.rendered.push_back(intensity_behaviour::blobs(u - du, v - dv));
+      images.rendered.push_back(blob_scene::blobs(u - du, v - dv));
     }
   return images;
 }
@@ -86,7 +86,7 @@ std::pair<double, double> range(const std::vector<double>& x) {
 }
 
 /// The projector's region is the whole image.
-class Everywhere : public intensity_behaviour::BlobProjector {
+class Everywhere : public blob_scene::BlobProjector {
  public:
   marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override {
     return {0, 0, 1, kWidth, kHeight};
@@ -99,9 +99,9 @@ double value(const std::string& measure, double du, double dv, shipped::Options 
   options["margin_px"] = std::int64_t(kMargin_px);
   const shipped::Inputs in{
       {"projector", marrow::Value::of<marrow::RadiographProjector>(std::make_shared<const Everywhere>())},
-      {"views", shipped::list(intensity_behaviour::views_of(view()), "view")}};
+      {"views", shipped::list(blob_scene::views_of(view()), "view")}};
   const marrow::Value cost = shipped::call("similarity." + measure, in, options).at("cost");
-  return cost.as<marrow::Cost>().value(intensity_behaviour::at(du, dv));
+  return cost.as<marrow::Cost>().value(blob_scene::at(du, dv));
 }
 
 const std::vector<std::pair<double, double>> kPlaces{{0, 0}, {2, -1}, {-5, 6}};
@@ -203,15 +203,14 @@ TEST(Formulas, WhatTheModelDoesNotReachCountsAsWell) {
   for (const std::string measure : {"pattern_intensity", "gradient_difference", "entropy_of_difference"}) {
     const auto near = [&](double du, double dv) {
       const shipped::Inputs in{
-          {"projector", marrow::Value::of<marrow::RadiographProjector>(
-                            std::make_shared<const intensity_behaviour::BlobProjector>())},
-          {"views",
-           shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of(50000, 0.02, 0)), "view")}};
+          {"projector",
+           marrow::Value::of<marrow::RadiographProjector>(std::make_shared<const blob_scene::BlobProjector>())},
+          {"views", shipped::list(blob_scene::views_of(blob_scene::view_of(50000, 0.02, 0)), "view")}};
       return shipped::call("similarity." + measure, in,
                            {{"pixel_step", std::int64_t(1)}, {"sigma_steps", 0.0}, {"margin_px", std::int64_t(16)}})
           .at("cost")
           .as<marrow::Cost>()
-          .value(intensity_behaviour::at(du, dv));
+          .value(blob_scene::at(du, dv));
     };
     EXPECT_LT(near(0, 0), 0.35) << measure << ": next to nothing is left";
     EXPECT_GT(near(60, 40), 0.95) << measure << ": where the image is even, the model explains nothing";

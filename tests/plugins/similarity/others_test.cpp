@@ -2,14 +2,14 @@
 // Other fragments in the same images: their shadows and their edges are left out.
 #include <marrow/domain/features.hpp>
 
-#include "intensity_behaviour.hpp"
+#include "blob_scene.hpp"
 #include "other_fragment.hpp"
 #include "shipped.hpp"
 
 namespace others_test {
 
-using intensity_behaviour::at;
-using intensity_behaviour::BlobProjector;
+using blob_scene::at;
+using blob_scene::BlobProjector;
 using marrow::Cost;
 using marrow::List;
 using marrow::OutlineProjector;
@@ -33,7 +33,7 @@ class LineProjector : public OutlineProjector {
 
 /// The image with another grey value in the square, as if another fragment were there.
 marrow::View view_with(double grey) {
-  marrow::View view = intensity_behaviour::view_of(50000, 0.02, 0);
+  marrow::View view = blob_scene::view_of(50000, 0.02, 0);
   view.image.pixels = view.image.pixels.clone();
   view.image.pixels(cv::Rect(100, 60, 30, 30)).setTo(grey);
   return view;
@@ -52,7 +52,7 @@ TEST(Others, TheirShadowsDoNotCount) {
   for (const bool is_outline : {false, true}) {
     const auto with = [&](double grey) {
       const shipped::Inputs inputs{{"projector", marrow::Value::of<RadiographProjector>(own)},
-                                   {"views", shipped::list(intensity_behaviour::views_of(view_with(grey)), "view")}};
+                                   {"views", shipped::list(blob_scene::views_of(view_with(grey)), "view")}};
       return is_outline ? with_outline(inputs, std::make_shared<const SquareOutline>()) : fragments.with(inputs);
     };
     EXPECT_NEAR(value("similarity.normalised_cross_correlation", with(9000), at(2, 1), options),
@@ -78,7 +78,7 @@ TEST(Others, TheirShadowsDoNotCountHoweverEachIsDrawn) {
   const auto with = [&](double grey) {
     marrow::View view = view_with(grey);
     view.image.pixels(cv::Rect(50, 60, 30, 30)).setTo(grey);
-    shipped::Inputs inputs = fragments.with({{"views", shipped::list(intensity_behaviour::views_of(view), "view")}});
+    shipped::Inputs inputs = fragments.with({{"views", shipped::list(blob_scene::views_of(view), "view")}});
     inputs["other_outlines"] = shipped::list(outlines, "fragment");
     inputs["others"] = shipped::list(poses, "fragment");
     return value("similarity.normalised_cross_correlation", inputs, at(2, 1), {{"sigma_steps", 0.0}});
@@ -90,7 +90,7 @@ TEST(Others, OfOutlinesItIsSaidWhatIsMissing) {
   const std::string node = "similarity.normalised_cross_correlation";
   const shipped::Inputs inputs =
       with_outline({{"projector", marrow::Value::of<RadiographProjector>(std::make_shared<const BlobProjector>())},
-                    {"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of()), "view")}},
+                    {"views", shipped::list(blob_scene::views_of(blob_scene::view_of()), "view")}},
                    std::make_shared<const SquareOutline>());
   shipped::Inputs some = inputs;
   some.erase("others");
@@ -120,7 +120,7 @@ TEST(Others, TheirEdgesDoNotCount) {
   const Fragments<OutlineProjector> fragments{std::make_shared<const LineProjector>(),
                                               std::make_shared<const SquareOutline>()};
   shipped::Inputs inputs =
-      fragments.with({{"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of()), "view")},
+      fragments.with({{"views", shipped::list(blob_scene::views_of(blob_scene::view_of()), "view")},
                       {"edges", shipped::list(edges, "view")}});
   shipped::Options options{{"reach_px", 20.0}, {"estimate_offset", false}};
   const std::string node = "similarity.contour_distance";
@@ -142,10 +142,9 @@ TEST(Others, BothWaysAndWeights) {
   }
   List<marrow::EdgeMap> edges;
   edges.add("frontal", map);
-  shipped::Inputs inputs{
-      {"projector", marrow::Value::of<OutlineProjector>(std::make_shared<const LineProjector>())},
-      {"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of()), "view")},
-      {"edges", shipped::list(edges, "view")}};
+  shipped::Inputs inputs{{"projector", marrow::Value::of<OutlineProjector>(std::make_shared<const LineProjector>())},
+                         {"views", shipped::list(blob_scene::views_of(blob_scene::view_of()), "view")},
+                         {"edges", shipped::list(edges, "view")}};
   shipped::Options options{{"reach_px", 6.0}, {"estimate_offset", false}, {"contour_spacing_px", 1.0}};
   const std::string node = "similarity.contour_distance";
   const double worst = std::sqrt(37.0) - 1;
@@ -158,8 +157,8 @@ TEST(Others, BothWaysAndWeights) {
   // A second view does not show the line. Its weight is 0.
   marrow::EdgeMap none = map;
   for (auto& edge : none.pixels) edge.u_px = 150;
-  List<marrow::View> views = intensity_behaviour::views_of(intensity_behaviour::view_of());
-  views.add("lateral", intensity_behaviour::view_of());
+  List<marrow::View> views = blob_scene::views_of(blob_scene::view_of());
+  views.add("lateral", blob_scene::view_of());
   edges.add("lateral", none);
   inputs["views"] = shipped::list(views, "view");
   inputs["edges"] = shipped::list(edges, "view");

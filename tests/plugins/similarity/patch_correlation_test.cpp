@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
-#include "intensity_behaviour.hpp"
+#include "blob_scene.hpp"
 #include "shipped.hpp"
 
 namespace patch_correlation_test {
 
-using intensity_behaviour::at;
+using blob_scene::at;
 using marrow::RadiographProjector;
 
 /// A radiograph that is a formula of the pixel, wherever the model is.
@@ -42,7 +42,7 @@ marrow::View small_view(const std::function<double(double, double)>& formula) {
 double value(const std::function<double(double, double)>& rendered, const std::function<double(double, double)>& seen) {
   const shipped::Inputs inputs{
       {"projector", marrow::Value::of<RadiographProjector>(std::make_shared<const FormulaProjector>(rendered))},
-      {"views", shipped::list(intensity_behaviour::views_of(small_view(seen)), "view")}};
+      {"views", shipped::list(blob_scene::views_of(small_view(seen)), "view")}};
   const shipped::Options options{{"pixel_step", std::int64_t(1)},
                                  {"margin_px", std::int64_t(0)},
                                  {"sigma_steps", 0.0},
@@ -52,9 +52,8 @@ double value(const std::function<double(double, double)>& rendered, const std::f
 }
 
 shipped::Inputs blob_inputs(const marrow::View& view) {
-  return {{"projector",
-           marrow::Value::of<RadiographProjector>(std::make_shared<const intensity_behaviour::BlobProjector>())},
-          {"views", shipped::list(intensity_behaviour::views_of(view), "view")}};
+  return {{"projector", marrow::Value::of<RadiographProjector>(std::make_shared<const blob_scene::BlobProjector>())},
+          {"views", shipped::list(blob_scene::views_of(view), "view")}};
 }
 
 TEST(PatchCorrelation, IsTheCorrelationOfOneSquare) {
@@ -70,7 +69,7 @@ TEST(PatchCorrelation, IsTheCorrelationOfOneSquare) {
 }
 
 TEST(PatchCorrelation, IsBestAtTheTruth) {
-  const shipped::Inputs inputs = blob_inputs(intensity_behaviour::view_of());
+  const shipped::Inputs inputs = blob_inputs(blob_scene::view_of());
   const marrow::Value cost = shipped::call("similarity.patch_correlation", inputs).at("cost");
   const auto value = [&](double u, double v) { return cost.as<marrow::Cost>().value(at(u, v)); };
   EXPECT_LT(value(0, 0), 0.05);
