@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Quantiles, and intervals of medians: by order statistics, and by the hierarchical bootstrap with the documented
 random numbers (SplitMix64; resample k has a stream of its own)."""
+import functools
+
 import numpy
 from scipy.stats import binom, norm
 from scipy.stats import t as student
@@ -84,7 +86,11 @@ def resamples_for(runs):
 
 def median_interval(cases, confidence=0.95):
     """Of the median of a variant's figure; None with too few cases."""
-    cases = [own for own in cases if own]
+    return known_median_interval(tuple(tuple(own) for own in cases if own), confidence)
+
+
+@functools.lru_cache(maxsize=4096)
+def known_median_interval(cases, confidence):
     firsts = order_statistics([own[0] for own in cases], 1 - confidence) if cases else None
     if firsts is None:
         return None

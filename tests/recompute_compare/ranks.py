@@ -4,6 +4,7 @@
 Values are fractions, as the table of the plugin writes them, so nothing is rounded: two differences are equal, or one
 is 0, where this is so in decimal numbers.
 """
+import functools
 import itertools
 import math
 from fractions import Fraction
@@ -88,6 +89,11 @@ def p_normal(ranks, smaller, zeros):
 
 def signed_rank_p(values):
     """(p, whether the positive ranks are the larger sum)"""
+    return known_signed_rank_p(tuple(values))
+
+
+@functools.lru_cache(maxsize=4096)
+def known_signed_rank_p(values):
     ranks, signs, zeros = signed_ranks(values)
     if not len(ranks):
         return 1.0, False
