@@ -199,21 +199,12 @@ std::shared_ptr<const marrow::RadiographProjector> lightfield(const marrow::Volu
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.node("project.lightfield", lightfield)
-      .summary(
-          "Radiographs interpolated from line integrals that are computed once around each view (LaRose 2001; "
-          "Russakoff et al., IEEE Trans Med Imaging 2005)")
-      .in("volume", "CT")
-      .in("field", "signed field of one fragment; everything else is left out")
+  auto node = plugin.node("project.lightfield", lightfield);
+  marrow::rays::declare<Options>(
+      node.summary("Radiographs interpolated from line integrals that are computed once around each view (LaRose 2001; "
+                   "Russakoff et al., IEEE Trans Med Imaging 2005); rays that are not in the table are integrated by "
+                   "Joseph's method"))
       .in("views", "views around which integrals are stored", marrow::over("view"))
-      .out("projector",
-           "draws the radiograph for any camera and pose; rays that are not in the table are integrated by Joseph's "
-           "method")
-      .option("below_hu", &Options::below_hu, "voxels below this do not attenuate", marrow::unit("HU"))
-      .option("background_hu", &Options::background_hu,
-              "value that counts as no attenuation: that of air, or of the tissue around the bone", marrow::unit("HU"))
-      .option("margin_mm", &Options::margin_mm, "voxels farther than this outside the field do not attenuate",
-              marrow::at_least(0))
       .option("max_rotation_deg", &Options::max_rotation_deg,
               "largest rotation of the bone that the table covers, from CT axes parallel to the world's axes",
               marrow::at_least(0), marrow::at_most(40))

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#pragma once
-// What every outline must satisfy. The test of each projector calls these functions with its own tolerance in pixels.
+// What every projector of outlines must satisfy, with its own tolerance in pixels.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -9,15 +8,30 @@
 #include <marrow/domain/volume.hpp>
 #include <memory>
 
+#include "tests/plugins/project/made.hpp"
 #include "tests/plugins/project/shapes.hpp"
 
-namespace outline_behaviour {
+namespace outlines_test {
 
-using Make = std::function<std::shared_ptr<const marrow::OutlineProjector>(const marrow::Mesh&, const marrow::Volume*)>;
+struct Node {
+  const char* name;
+  double tolerance_px, model_tolerance_px;
+};
+void PrintTo(const Node& node, std::ostream* stream) { *stream << node.name; }
+
+class Outlines : public testing::TestWithParam<Node> {
+ protected:
+  static std::shared_ptr<const marrow::OutlineProjector> make(const marrow::Mesh& mesh, const marrow::Volume* volume) {
+    return made::outlines(std::string("project.") + GetParam().name, mesh, volume);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(, Outlines, testing::Values(Node{"silhouette", 0.8, 4}, Node{"silhouette_edges", 0.02, 0.01}),
+                         [](const auto& info) { return info.param.name; });
 
 /// The outline of a sphere is the circle (ellipse) where the cone of tangent rays meets the detector: half angle asin(r
 /// / d).
-inline void sphere_is_its_tangent_cone(const Make& make, double tolerance_px, double model_tolerance_px) {
+TEST_P(Outlines, SphereIsItsTangentCone) {
+  const auto [name, tolerance_px, model_tolerance_px] = GetParam();
   const marrow::Mesh mesh = shapes::sphere(30);
   const auto projector = make(mesh, nullptr);
   const marrow::Camera camera = shapes::c_arm(0);
@@ -46,7 +60,7 @@ inline void sphere_is_its_tangent_cone(const Make& make, double tolerance_px, do
 }
 
 /// Of two spheres one behind the other only the outer outline counts; side by side, both.
-inline void hidden_parts_are_left_out(const Make& make) {
+TEST_P(Outlines, HiddenPartsAreLeftOut) {
   marrow::Mesh mesh = shapes::sphere(30);
   const marrow::Mesh second = shapes::sphere(15);
   const auto offset = std::uint32_t(mesh.vertices_mm.size());
@@ -64,7 +78,7 @@ inline void hidden_parts_are_left_out(const Make& make) {
 }
 
 /// A cylinder that goes through both ends of its CT: the sides count, the two ends do not.
-inline void ends_of_the_volume_are_left_out(const Make& make) {
+TEST_P(Outlines, EndsOfTheVolumeAreLeftOut) {
   const marrow::Mesh mesh = shapes::cylinder(14, 100);
   marrow::Volume volume;
   volume.grid.size = {61, 61, 101};
@@ -98,7 +112,7 @@ inline void ends_of_the_volume_are_left_out(const Make& make) {
   EXPECT_EQ(refusal(), "the mesh is in frame 'ct', but the volume in frame 'mr'; give those that belong together");
 }
 
-inline void keeps_inside_the_image(const Make& make) {
+TEST_P(Outlines, KeepsInsideTheImage) {
   const marrow::Mesh mesh = shapes::cylinder(14, 400);
   const auto projector = make(mesh, nullptr);
   const auto points = projector->outline(shapes::c_arm(0), shapes::centred_at({0, 0, 200}), 1);
@@ -111,7 +125,7 @@ inline void keeps_inside_the_image(const Make& make) {
   EXPECT_TRUE(projector->outline(shapes::c_arm(0), shapes::centred_at({0, 2000, 0}), 1).empty()) << "behind the source";
 }
 
-inline void refuses_nonsense(const Make& make) {
+TEST_P(Outlines, RefusesNonsense) {
   try {
     make(marrow::Mesh{}, nullptr);
     FAIL();
@@ -122,4 +136,40 @@ inline void refuses_nonsense(const Make& make) {
   EXPECT_THROW(make(mesh, nullptr)->outline(shapes::c_arm(0), shapes::centred_at({0, 0, 10}), 0), marrow::Error);
 }
 
-}  // namespace outline_behaviour
+std::shared_ptr<const marrow::OutlineProjector> exact_outline(const marrow::Mesh& mesh) {
+  return made::outlines("project.silhouette_edges", mesh, nullptr);
+}
+
+TEST(SilhouetteEdges, OpenSurfaceGivesItsSidesOnly) {
+  marrow::Mesh mesh = shapes::cylinder(14, 100);
+  mesh.triangles.resize(mesh.triangles.size() - 400);  // both lids gone
+  const auto points = exact_outline(mesh)->outline(shapes::c_arm(0), shapes::centred_at({0, 0, 50}), 1);
+  EXPECT_GT(points.size(), 400u);
+  for (const auto& p : points) EXPECT_GT(std::abs(p.normal_u), 0.9);
+}
+
+TEST(SilhouetteEdges, RepeatedVerticesAreWelded) {
+  const marrow::Mesh mesh = shapes::sphere(30);
+  marrow::Mesh soup;
+  for (const auto& t : mesh.triangles) {
+    const auto first = std::uint32_t(soup.vertices_mm.size());
+    for (const auto corner : t) soup.vertices_mm.push_back(mesh.vertices_mm[corner]);
+    soup.triangles.push_back({first, first + 1, first + 2});
+  }
+  const auto pose = shapes::centred_at({0, 0, 30});
+  const auto a = exact_outline(mesh)->outline(shapes::c_arm(0), pose, 4);
+  const auto b = exact_outline(soup)->outline(shapes::c_arm(0), pose, 4);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i].u_px, b[i].u_px, 1e-3);
+}
+
+TEST(SilhouetteEdges, AgreesWithItselfOnAGridTwiceAsCoarse) {
+  const marrow::Mesh mesh = shapes::distal_femur();
+  const auto pose = shapes::centred_at({0, 0, 90});
+  const auto projector = exact_outline(mesh);
+  const auto fine = projector->outline(shapes::c_arm(90), pose, 1),
+             coarse = projector->outline(shapes::c_arm(90), pose, 2);
+  EXPECT_NEAR(double(fine.size()), 2.0 * double(coarse.size()), 0.03 * double(fine.size()));
+}
+
+}  // namespace outlines_test
