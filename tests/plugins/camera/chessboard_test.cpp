@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Calibration by a chessboard, against the simulated camera that photographed it; and photographs as views.
+// Calibration by a chessboard, compared with the simulated camera that photographed it. Photographs as views.
 #include <gtest/gtest.h>
 
 #include "marrow/simulate/photograph.hpp"
@@ -40,7 +40,7 @@ std::string refusal(const List<Picture>& photographs, const List<Picture>& place
       {{"boards", shipped::list(photographs, "photograph")}, {"placed", shipped::list(placed, "view")}}, options);
 }
 
-/// Photographs of the board held at different places, but always parallel to the image, by one camera.
+/// Photographs by one camera of the board at different places, always parallel to the image.
 List<Picture> parallel() {
   const Value arm = shipped::call("simulate.camera_arm", {}, {{"repeat_sd_deg", 0.0}}).at("arm");
   return shipped::call("simulate.chessboard", {{"arm", arm}}, {{"tilt_deg", 0.0}}, Context(3))

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A calibration that knows its focal length, hardly knows it, or does not.
+// Calibrations that determine their focal length well, hardly, or not at all.
 #include <gtest/gtest.h>
 
 #include "marrow/base/error.hpp"

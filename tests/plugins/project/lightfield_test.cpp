@@ -21,7 +21,7 @@ std::shared_ptr<const RadiographProjector> make_medium(const Volume& volume, con
       "project.lightfield", inputs(volume, field),
       {{"ray_spacing_mm", 2.0}, {"direction_spacing_deg", 1.5}, {"max_rotation_deg", 2.0}});
 }
-/// In a moment.
+/// With a coarse table, which is quick to make.
 std::shared_ptr<const RadiographProjector> make_coarse(const Volume& volume, const marrow::SignedField* field) {
   return made::projector<RadiographProjector>(
       "project.lightfield", inputs(volume, field),
@@ -64,7 +64,7 @@ TEST(LightField, FinerStepsAreMoreAccurate) {
 }
 
 TEST(LightField, OutOfRangeItIsJosephs) {
-  // Turned by 30 degrees no ray was kept.
+  // The table holds no ray for a rotation of 30 degrees.
   const shipped::Inputs in = inputs(radiograph_behaviour::cloud(), nullptr);
   const marrow::Camera& camera = radiograph_behaviour::camera(40);
   const std::vector<Eigen::Vector2f> pixels{{250, 250}, {240, 263}, {300, 222}};

@@ -28,8 +28,8 @@ class Outlines : public testing::TestWithParam<Node> {
 INSTANTIATE_TEST_SUITE_P(, Outlines, testing::Values(Node{"silhouette", 0.8, 4}, Node{"silhouette_edges", 0.02, 0.01}),
                          [](const auto& info) { return info.param.name; });
 
-/// The outline of a sphere is the circle (ellipse) where the cone of tangent rays meets the detector: half angle asin(r
-/// / d).
+/// The outline of a sphere is the circle (ellipse) where the cone of tangent rays meets the detector. The half angle of
+/// the cone is asin(r / d).
 TEST_P(Outlines, SphereIsItsTangentCone) {
   const auto [name, tolerance_px, model_tolerance_px] = GetParam();
   const marrow::Mesh mesh = shapes::sphere(30);
@@ -59,7 +59,7 @@ TEST_P(Outlines, SphereIsItsTangentCone) {
   EXPECT_LT(double(points.size()), 1.15 * circumference_px / 2);
 }
 
-/// Of two spheres one behind the other only the outer outline counts; side by side, both.
+/// Of two spheres, one behind the other, only the outer outline counts. Side by side, both count.
 TEST_P(Outlines, HiddenPartsAreLeftOut) {
   marrow::Mesh mesh = shapes::sphere(30);
   const marrow::Mesh second = shapes::sphere(15);
@@ -77,7 +77,7 @@ TEST_P(Outlines, HiddenPartsAreLeftOut) {
   EXPECT_GT(count_small(90), 40u);
 }
 
-/// A cylinder that goes through both ends of its CT: the sides count, the two ends do not.
+/// A cylinder that runs through both ends of its CT. Its sides count, its two ends do not.
 TEST_P(Outlines, EndsOfTheVolumeAreLeftOut) {
   const marrow::Mesh mesh = shapes::cylinder(14, 100);
   marrow::Volume volume;

@@ -108,7 +108,7 @@ inline void smoothed_cloud(const Make& make, double limit_mm) {
   EXPECT_LT(worst, limit_mm);
 }
 
-/// Where the rays run at right angles through an even block, the chord is its thickness.
+/// Rays at right angles to an even block: the chord is its thickness.
 inline void chord_of_a_block(const Make& make) {
   const Volume block =
       volume_of({40, 30, 50}, {1, 1, 1}, Eigen::Matrix3d::Identity(), [](const Eigen::Vector3d&) { return 500; });
@@ -155,9 +155,9 @@ inline double largest_difference_mm(const RadiographProjector& projector, double
   return largest;
 }
 
-/// Whole images, sub-sampled ones and single pixels agree, up to the interpolation of a whole image. From both sides,
-/// with rays from less than a voxel to four voxels apart: each has its own inner loop. A smooth volume is summed over
-/// fewer slices.
+/// Whole images, sub-sampled images and single pixels agree, up to the interpolation of a whole image. The views are
+/// from both sides, with rays from less than a voxel to four voxels apart, because each case has its own inner loop. A
+/// smooth volume is summed over fewer slices.
 inline void grids_and_pixels_agree(const Make& make, double limit_mm) {
   const auto projector =
       make(cloud(Eigen::AngleAxisd(0.5, Eigen::Vector3d(0, 1, 1).normalized()).toRotationMatrix()), nullptr);
