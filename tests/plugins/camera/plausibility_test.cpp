@@ -274,8 +274,8 @@ std::vector<Camera> crossed_cameras() {
   return cameras;
 }
 
-// In a view along y a mirrored image looks like points whose x axis is reversed, in one along x like points whose y
-// axis is. Only the image is the same mistake in both.
+// In a view along y, a mirrored image looks like points whose x axis is reversed. In a view along x, it looks like
+// points whose y axis is reversed. Only the mirrored image is the same mistake in both.
 TEST(Explanation, MirroredImagesAreNotReversedPoints) {
   const std::vector<Camera> cameras = crossed_cameras();
   std::vector<SeenPoints> mirrored;

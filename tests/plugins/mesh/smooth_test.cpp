@@ -42,8 +42,8 @@ TEST(Smooth, TakesNoiseAndKeepsTheVolume) {
 }
 
 TEST(Smooth, IsStableWhereverItIsAllowed) {
-  // A rough ball with vertices of many degrees. Whatever is not refused keeps its size and gets no rougher: no wave
-  // grows by more than 15 %, and a ball is a long wave.
+  // A rough ball whose vertices have different numbers of neighbours. If the options are accepted, it keeps its size
+  // and does not get rougher: no wave grows by more than 15 %, and a ball is a long wave.
   Mesh rough = shapes::sphere(25);
   std::mt19937 random(4);
   for (Vector3d& v : rough.vertices_mm)

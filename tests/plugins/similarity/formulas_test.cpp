@@ -198,8 +198,8 @@ TEST(Formulas, GradientDifference) {
 }
 
 TEST(Formulas, WhatTheModelDoesNotReachCountsAsWell) {
-  // The same value whether all of the image is compared or only the model's surroundings: the sums are over a fixed
-  // region.
+  // The value is the same whether the whole image is compared or only the model's surroundings, because the sums are
+  // over a fixed region.
   for (const std::string measure : {"pattern_intensity", "gradient_difference", "entropy_of_difference"}) {
     const auto near = [&](double du, double dv) {
       const shipped::Inputs in{
