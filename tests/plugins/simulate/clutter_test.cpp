@@ -199,21 +199,18 @@ TEST(SimulateClutter, TheKneeHasTheFemursSizeAndNeitherTouchesIt) {
   EXPECT_NEAR(end.lateral_x, 1, 0);  // a left femur: its head points to the patient's right
   const RigidTransform bone_from_world = inverse(phantom.phantom.fragments[1].world_from_bone());
   for (const Body& one : phantom.bodies) {
-    Eigen::Vector3d low = Eigen::Vector3d::Constant(1e9), high = -low;
-    for (const auto& vertex : one.surface.vertices_mm) {
-      low = low.cwiseMin(bone_from_world * vertex);
-      high = high.cwiseMax(bone_from_world * vertex);
-    }
+    Eigen::AlignedBox3d box;
+    for (const auto& vertex : one.surface.vertices_mm) box.extend(bone_from_world * vertex);
     if (one.name == "tibia") {
-      EXPECT_NEAR((high - low).x(), 2 * 37 * end.half_width_mm / 41, 3);
-      EXPECT_LT(high.z(), end.lowest_z + 12);  // only the eminence reaches between the condyles
+      EXPECT_NEAR(box.sizes().x(), 2 * 37 * end.half_width_mm / 41, 3);
+      EXPECT_LT(box.max().z(), end.lowest_z + 12);  // only the eminence reaches between the condyles
     }
     if (one.name == "patella") {
-      EXPECT_NEAR((high - low).x(), 44 * end.half_width_mm / 41, 3);
-      EXPECT_LT(0.5 * (low + high).y(), end.front_y);
+      EXPECT_NEAR(box.sizes().x(), 44 * end.half_width_mm / 41, 3);
+      EXPECT_LT(box.center().y(), end.front_y);
     }
     if (one.name == "fibula") {
-      EXPECT_GT(0.5 * (low + high).x(), end.middle_mm.x() + 25);
+      EXPECT_GT(box.center().x(), end.middle_mm.x() + 25);
     }
   }
 }

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Bodies whose path lengths and volumes are known.
+#include <Eigen/Geometry>
 #include <cmath>
 
 #include "marrow/simulate/polygonise.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 #include "tests/harness/message_of.hpp"
+#include "tests/plugins/project/shapes.hpp"
 
 namespace marrow::phantom::test {
 
@@ -44,6 +46,15 @@ inline Mesh sphere(const Eigen::Vector3d& centre, double radius, double spacing)
                     centre + reach, spacing, 1);
 }
 
+/// The extent of the vertices for which `counts` is true.
+template <class Counts>
+Eigen::AlignedBox3d extent(const Mesh& mesh, const Counts& counts) {
+  Eigen::AlignedBox3d box;
+  for (const auto& vertex : mesh.vertices_mm)
+    if (counts(vertex)) box.extend(vertex);
+  return box;
+}
+
 /// A phantom of one whole fragment that does not move.
 inline Phantom whole(Mesh outer, Mesh inner = {}) {
   Phantom phantom;
@@ -55,17 +66,6 @@ inline Phantom whole(Mesh outer, Mesh inner = {}) {
 }
 
 /// The standard geometry: source on -y for beta 0, detector 1000 mm away, isocentre at 600 mm.
-inline Camera camera(double beta_deg = 0, int size_px = 512) {
-  Camera camera;
-  camera.width_px = camera.height_px = size_px;
-  const double focal = 1000 / (0.586 * 512 / size_px), middle = 0.5 * (size_px - 1);
-  camera.intrinsics << focal, 0, middle, 0, focal, middle, 0, 0, 1;
-  Eigen::Matrix3d upright;
-  upright << 1, 0, 0, 0, 0, -1, 0, 1, 0;
-  camera.camera_from_world.rotation =
-      upright * Eigen::AngleAxisd(-radians(beta_deg), Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  camera.camera_from_world.translation_mm = {0, 0, 600};
-  return camera;
-}
+inline Camera camera(double beta_deg = 0, int size_px = 512) { return shapes::c_arm(-beta_deg, size_px); }
 
 }  // namespace marrow::phantom::test

@@ -119,11 +119,10 @@ TEST(SimulateSurface, TheCortexMayBeGivenByItsThickness) {
   EXPECT_TRUE(is_closed(bone.inner));
   // The distance field has corners, which trilinear interpolation rounds a little.
   EXPECT_NEAR(enclosed_volume_mm3(bone.inner), 34.0 * 24 * 47 + 28.0 * 18 * 44, 0.01 * 34 * 24 * 94);
-  Eigen::Vector3d low = bone.inner.vertices_mm.front(), high = low;
-  for (const auto& p : bone.inner.vertices_mm) low = low.cwiseMin(p), high = high.cwiseMax(p);
-  EXPECT_NEAR(low.z(), 3, 0.1);
-  EXPECT_NEAR(high.z(), 94, 0.1);
-  EXPECT_NEAR(high.x() - low.x(), 34, 0.2);
+  const Eigen::AlignedBox3d inside = phantom::test::extent(bone.inner, [](const auto&) { return true; });
+  EXPECT_NEAR(inside.min().z(), 3, 0.1);
+  EXPECT_NEAR(inside.max().z(), 94, 0.1);
+  EXPECT_NEAR(inside.sizes().x(), 34, 0.2);
 
   options["cortex_mm"] = std::vector<double>{20, 20, 20, 20};
   EXPECT_EQ(marrow::test::message_of([&] { surface(options); }),
@@ -131,6 +130,14 @@ TEST(SimulateSurface, TheCortexMayBeGivenByItsThickness) {
   options["inner"] = options["outer"];
   EXPECT_EQ(marrow::test::message_of([&] { surface(options); }),
             "simulate.surface: the inner surface is given by a file and by cortex_mm; give one of them");
+}
+
+TEST(SimulateSurface, TheInnerSurfaceMayBeGivenByAFile) {
+  shipped::Options options = reading(write_stl("outer.stl", test::box({0, 0, 0}, {40, 30, 100}), false));
+  options["inner"] = write_stl("inner.stl", test::box({5, 5, 5}, {35, 25, 95}), false).string();
+  const Bone bone = surface(options);
+  EXPECT_NEAR(enclosed_volume_mm3(bone.outer), 40.0 * 30 * 100, 1e-3);
+  EXPECT_NEAR(enclosed_volume_mm3(bone.inner), 30.0 * 20 * 90, 1e-3);
 }
 
 TEST(SimulateSurface, DeclaresAShareOfBoneForEachHeight) {

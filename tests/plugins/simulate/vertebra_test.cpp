@@ -8,6 +8,7 @@ namespace vertebra_test {
 
 using namespace marrow;
 using phantom::Bone;
+using phantom::test::extent;
 
 Bone vertebra(const shipped::Options& more = {}) {
   shipped::Options options{{"ripple_mm", 0.0}};
@@ -15,34 +16,22 @@ Bone vertebra(const shipped::Options& more = {}) {
   return shipped::call("simulate.vertebra", {}, options).at("bone").as<Bone>();
 }
 
-struct Extent {
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(1e9), high = Eigen::Vector3d::Constant(-1e9);
-  Eigen::Vector3d size() const { return high - low; }
-};
-template <class Counts>
-Extent extent(const Mesh& mesh, Counts counts) {
-  Extent found;
-  for (const auto& p : mesh.vertices_mm)
-    if (counts(p)) found.low = found.low.cwiseMin(p), found.high = found.high.cwiseMax(p);
-  return found;
-}
-
 TEST(SimulateVertebra, HasTheMeasuresItIsMadeFrom) {
   const Bone bone = vertebra();
   EXPECT_TRUE(is_closed(bone.outer));
   EXPECT_TRUE(is_closed(bone.inner));
-  const Extent all = extent(bone.outer, [](const auto&) { return true; });
-  EXPECT_NEAR(all.size().x(), 86, 1);  // the transverse processes
-  EXPECT_NEAR(all.low.y(), -17, 0.5);
-  EXPECT_NEAR(all.high.y(), 87 - 17, 1);                                             // the spinous process
-  const Extent front = extent(bone.outer, [](const auto& p) { return p.y() < 3; });  // of the body alone
-  EXPECT_NEAR(front.size().x(), 45, 1);
-  EXPECT_NEAR(front.size().z(), 27, 1);
+  const Eigen::AlignedBox3d all = extent(bone.outer, [](const auto&) { return true; });
+  EXPECT_NEAR(all.sizes().x(), 86, 1);  // the transverse processes
+  EXPECT_NEAR(all.min().y(), -17, 0.5);
+  EXPECT_NEAR(all.max().y(), 87 - 17, 1);                                                         // the spinous process
+  const Eigen::AlignedBox3d front = extent(bone.outer, [](const auto& p) { return p.y() < 3; });  // of the body alone
+  EXPECT_NEAR(front.sizes().x(), 45, 1);
+  EXPECT_NEAR(front.sizes().z(), 27, 1);
   // The end plates are hollow, and the wall is narrower in the middle.
   const auto near_axis = [](const auto& p) { return std::hypot(p.x(), p.y()) < 2; };
-  EXPECT_NEAR(extent(bone.outer, near_axis).size().z(), 27 - 2 * 1.5, 0.7);
-  const Extent waist = extent(bone.outer, [](const auto& p) { return p.y() < 3 && std::abs(p.z()) < 1; });
-  EXPECT_NEAR(waist.size().x(), 45 - 2 * 2.5, 1);
+  EXPECT_NEAR(extent(bone.outer, near_axis).sizes().z(), 27 - 2 * 1.5, 0.7);
+  const Eigen::AlignedBox3d waist = extent(bone.outer, [](const auto& p) { return p.y() < 3 && std::abs(p.z()) < 1; });
+  EXPECT_NEAR(waist.sizes().x(), 45 - 2 * 2.5, 1);
 }
 
 /// The places where straight lines leave the canal.
@@ -68,7 +57,7 @@ TEST(SimulateVertebra, TheCanalIsOpenAndAsWideAsStated) {
 TEST(SimulateVertebra, TheShellIsThinOnTheBody) {
   const Bone bone = vertebra({{"shell_mm", 1.5}});
   const auto wall = [](const Mesh& mesh) {
-    return extent(mesh, [](const auto& p) { return p.y() < 3 && std::abs(p.z()) < 1; }).size().x();
+    return extent(mesh, [](const auto& p) { return p.y() < 3 && std::abs(p.z()) < 1; }).sizes().x();
   };
   EXPECT_NEAR(wall(bone.outer) - wall(bone.inner), 2 * 1.5, 0.3);
 }
