@@ -73,8 +73,9 @@ def at_most(covariance, from_centre):
 
 def mean_errors(motions, from_centre):
     """The mean distance that the points move by, of each motion."""
-    turned = np.einsum("nij,pj->npi", Rotation.from_rotvec(motions[:, :3]).as_matrix(), from_centre)
-    return np.linalg.norm(turned - from_centre + motions[:, None, 3:], axis=2).mean(axis=1)
+    turned = Rotation.from_rotvec(motions[:, :3]).as_matrix() - np.eye(3)
+    by_axis = (turned[:, k] @ from_centre.T + motions[:, 3 + k, None] for k in range(3))
+    return np.sqrt(sum(one**2 for one in by_axis)).mean(axis=1)
 
 
 def between(probability, low, high):
