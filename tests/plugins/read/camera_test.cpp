@@ -34,6 +34,8 @@ TEST(ReadCamera, XmalabText) {
     EXPECT_EQ(camera.intrinsics(1, 1), 1001);
     EXPECT_EQ(camera.camera_from_world.rotation(0, 1), -1);
     EXPECT_EQ(camera.camera_from_world.translation_mm, Eigen::Vector3d(1, -2.5, 900));
+    // The camera sees the point at (-20 + 1, 10 - 2.5, 100 + 900).
+    EXPECT_LT((project(camera, {10, 20, 100}) - Eigen::Vector2d(320 - 19, 240 + 7.5 * 1.001)).norm(), 1e-9);
   }
 }
 
@@ -90,8 +92,7 @@ TEST(ReadCamera, AnglesAndDistancesThatCannotBe) {
   expect(with(kByAngles, "pixel_mm: 0.5", "pixel_mm: 0"), "pixel_mm: expected 0.001 to 100, got 0");
   expect(with(kByAngles, "isocentre_mm: 600", "isocentre_mm: 1000"),
          "cam.yaml:8:27: c_arm: source_to_isocentre_mm: the isocentre lies between source and detector; expected less "
-         "than "
-         "source_to_detector_mm");
+         "than source_to_detector_mm");
   expect(with(kByAngles, "alpha_deg: 0", "alhpa_deg: 0"), "did you mean 'alpha_deg'?");
   expect(with(kByAngles, "  alpha_deg: 0\n", ""), "alpha_deg");
   expect(kByAngles + "intrinsics: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n",

@@ -93,7 +93,7 @@ TEST_F(DicomPolarity, IsTurnedBeforeTheValuesAreScaled) {
 }
 
 // The right values are 4095 minus what pydicom reads at this pixel, 3407 and 3375.
-TEST(DicomPolarityOfRealFrames, IsTheSameInEachFrame) {
+TEST_F(DicomPolarity, IsTheSameInEachRealFrame) {
   MARROW_NEED_DATA(path, "strangers/polarity/b12_mono1_two.dcm");
   EXPECT_EQ(marrow::files::read_image_file(path, 1).pixels.at<std::uint16_t>(300, 300), 688);
   EXPECT_EQ(marrow::files::read_image_file(path, 2).pixels.at<std::uint16_t>(300, 300), 720);

@@ -86,7 +86,7 @@ TEST_F(DicomSlices, FartherThanATenthOfAMillimetreFromTheGridAreRefused) {
 }
 
 // The positions by pydicom: 20 of 0 to 11.88 mm, at most 0.0095 mm from the grid, and 6 of 736.17 to 761.25 mm.
-TEST(DicomSlicesOfRealSeries, WithRoundedPositionsAreRead) {
+TEST_F(DicomSlices, OfRealSeriesWithRoundedPositionsAreRead) {
   MARROW_NEED_DATA(folder, "strangers/slices");
   const marrow::Volume rounded = marrow::files::read_volume_file(folder / "dz0.625_dec2", {});
   EXPECT_EQ(rounded.grid.size[2], 20);

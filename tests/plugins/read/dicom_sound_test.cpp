@@ -137,7 +137,7 @@ TEST_F(DicomSound, FramesInSeveralFragmentsNeedNoTableOfOffsets) {
 }
 
 // The stored values by gdcmconv --raw and numpy are 1113 and 1120 in the middle, 30 and 47 beside it.
-TEST(DicomSoundReal, SlicesWithCompressedIconsAreRead) {
+TEST_F(DicomSound, RealSlicesWithCompressedIconsAreRead) {
   MARROW_NEED_DATA(folder, "strangers/icons");
   const marrow::Volume volume = marrow::files::read_volume_file(folder, {});
   ASSERT_EQ(volume.grid.size, (std::array<int, 3>{512, 512, 2}));

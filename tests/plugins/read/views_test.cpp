@@ -46,10 +46,12 @@ TEST_F(ReadViews, AllImagesAreTurnedOver) {
 }
 
 TEST_F(ReadViews, ImagesWithTheirCameras) {
+  put(folder / "b.txt", marrow::test::with(marrow::test::bytes_of(folder / "b.txt"), "600", "700"));
   const auto value = views();
   EXPECT_EQ(value.names(), (std::vector<std::string>{"one", "two"}));
   EXPECT_EQ(value[1].name, "two");
-  EXPECT_EQ(value[1].camera.camera_from_world.translation_mm.z(), 600);
+  EXPECT_EQ(value[0].camera.camera_from_world.translation_mm.z(), 600);
+  EXPECT_EQ(value[1].camera.camera_from_world.translation_mm.z(), 700);
 }
 
 TEST_F(ReadViews, CamerasAsValuesAreFoundByName) {

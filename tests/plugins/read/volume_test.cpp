@@ -71,6 +71,29 @@ TEST(ReadVolume, FlipVoxelSizeAndOffset) {
   EXPECT_SAYS(read(folder / "a.mha", options({1, 0, 1})), "expected positive lengths");
 }
 
+TEST(ReadVolume, ATiffNeedsTheSizeOfItsVoxels) {
+  const TemporaryFolder folder;
+  ItkGrid<std::uint16_t> stack{.size = {5, 4, 3}};
+  for (int i = 0; i < 60; ++i) stack.samples.push_back(std::uint16_t(i * 60));
+  write_itk(folder / "ct.tif", stack);
+  const marrow::Volume volume = read(folder / "ct.tif", options({0.4, 0.5, 0.6}, {}, -1024));
+  EXPECT_EQ(volume.grid.size, (std::array<int, 3>{5, 4, 3}));
+  EXPECT_EQ(volume.grid.spacing_mm, Eigen::Vector3d(0.4, 0.5, 0.6));
+  EXPECT_EQ(volume.at(4, 3, 2), 59 * 60 - 1024);
+  EXPECT_SAYS(read(folder / "ct.tif"), "a TIFF does not say how large its voxels are; give voxel_size_mm");
+}
+
+TEST(ReadVolume, ANiftiMayHoldOneSlice) {
+  const TemporaryFolder folder;
+  auto slice = turned_grid();
+  slice.size = {5, 4, 1};
+  slice.samples.resize(20);
+  write_itk(folder / "slice.nii.gz", slice, true);
+  const marrow::Volume volume = read(folder / "slice.nii.gz");
+  EXPECT_EQ(volume.grid.size, (std::array<int, 3>{5, 4, 1}));
+  EXPECT_EQ(volume.at(4, 3, 0), 19 * 37 - 1000);
+}
+
 TEST(ReadVolume, WristTiff) {
   MARROW_NEED_DATA(path, "wrist/volumes/rad_dcm_cropped.tif");
   const marrow::Volume volume = read(path, options({0.39625, 0.39625, 0.625}, {}, -1024));

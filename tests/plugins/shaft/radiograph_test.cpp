@@ -68,6 +68,12 @@ TEST_P(Shaft, FindsTheShaftOfARadiographAndRejectsCanalAndThigh) {
     }
 }
 
+TEST_P(Shaft, FindsTheShaftOfAThighThatLiesAslant) {
+  const auto scene = radiograph::shaft({5, 3, 0}, {0.8, 0.05, 1});
+  const marrow::View view = radiograph::image("frontal", radiograph::camera(0), scene, 5000, 11);
+  check_against_truth(find_shaft(find_edges(view), view), view, scene.cylinders[1]);
+}
+
 // A real knee (data of Brown University, see the data folder's README): the distal femur runs from the middle to the
 // upper left.
 TEST_P(Shaft, FindsTheFemurOfARealKnee) {
