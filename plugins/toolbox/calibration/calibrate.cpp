@@ -128,7 +128,7 @@ std::vector<int> free_columns(const CalibrationModel& model) {
 
 }  // namespace
 
-// The poses of different views are coupled only through the inner parameters, so each pose is eliminated by itself
+// The poses of different views are coupled only through the inner parameters, so each pose is eliminated separately
 // (Schur complement).
 void add_deviations(const std::vector<ViewPoints>& views, const CalibrationModel& model, CalibrationResult& result) {
   const std::vector<int> columns = free_columns(model);

@@ -19,7 +19,7 @@ namespace {
 /// Least part of a side's beads in the image that must be found. The four that define the map do not count.
 constexpr double kLeastFound = 0.6;
 constexpr std::size_t kLeastBeads = 8;  ///< least number of beads to be found per side
-/// So many hits are never by chance, if they are most of the side's beads.
+/// This many hits are no coincidence if they are most of the side's beads.
 constexpr std::size_t kSurelyFound = 12;
 /// Largest distance of a bead from its position by the projective map, due to distortion; a part of the image's width.
 constexpr double kReach = 0.02;

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plain_letters.hpp"
 
-#include <algorithm>
-#include <array>
 #include <sstream>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 namespace marrow::draw {
@@ -22,20 +19,12 @@ constexpr const char* kLetters =
     "l L l N n N n N n 'n N n O o O o O o OE oe R r R r R r S s S s S s "
     "S s T t T t T t U u U u U u U u U u U u W w Y y Y Z z Z z Z z s";
 
-constexpr std::array<std::pair<char32_t, const char*>, 14> kSigns{{{0xA0, " "},
-                                                                   {0xB0, " deg"},
-                                                                   {0xB1, "+-"},
-                                                                   {0xB2, "2"},
-                                                                   {0xB3, "3"},
-                                                                   {0xB5, "u"},
-                                                                   {0x3BC, "u"},
-                                                                   {0x2013, "-"},
-                                                                   {0x2014, "-"},
-                                                                   {0x2018, "'"},
-                                                                   {0x2019, "'"},
-                                                                   {0x201C, "\""},
-                                                                   {0x201D, "\""},
-                                                                   {0x2026, "..."}}};
+constexpr struct {
+  char32_t sign;
+  const char* plain;
+} kSigns[] = {{0xA0, " "},   {0xB0, " deg"}, {0xB1, "+-"},   {0xB2, "2"},    {0xB3, "3"},
+              {0xB5, "u"},   {0x3BC, "u"},   {0x2013, "-"},  {0x2014, "-"},  {0x2018, "'"},
+              {0x2019, "'"}, {0x201C, "\""}, {0x201D, "\""}, {0x2026, "..."}};
 
 std::vector<std::string> split(const char* words) {
   std::istringstream stream(words);

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/files/atomic_write.hpp"
 
-#include <unistd.h>
-
-#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <new>
 
+#include "marrow/base/atomic_file.hpp"
 #include "marrow/base/error.hpp"
-#include "marrow/base/number_text.hpp"
 
 namespace marrow::files {
 
@@ -21,11 +18,7 @@ void write_atomically(const fs::path& path, const std::function<void(const fs::p
   std::error_code failure;
   if (!fs::is_directory(folder, failure))
     throw Error(path.string() + ": cannot be written, there is no folder " + folder.string());
-  // Hidden, and with the same extension, because some writers choose the format by it.
-  // replace_filename() is avoided: if it runs out of memory, GCC 12 leaves a path that cannot be destroyed.
-  // With a number, because another thread may write a file of the same name.
-  static std::atomic<unsigned> count{0};
-  const fs::path temporary = folder / formatted(".part{}-{}-{}", ::getpid(), ++count, path.filename().string());
+  const fs::path temporary = hidden_beside(path);
   try {
     fill(temporary);
     // A folder may only be replaced by a folder. rename() needs the old one to be removed first.

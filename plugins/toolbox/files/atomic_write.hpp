@@ -8,9 +8,8 @@
 
 namespace marrow::files {
 
-/// Calls `fill` with a temporary path beside `path` that has the same extension. Then renames the file or folder that
-/// `fill` made to `path`. On any failure the temporary file or folder is removed, `path` is as before, and an Error
-/// that names it is thrown.
+/// Calls `fill` with a temporary path beside `path`. Then renames the file or folder that `fill` made to `path`. On any
+/// failure the temporary file or folder is removed, `path` is as before, and an Error that names it is thrown.
 void write_atomically(const std::filesystem::path& path, const std::function<void(const std::filesystem::path&)>& fill);
 
 /// Writes text atomically, as above.

@@ -24,10 +24,7 @@ class BmpBytes {
  public:
   BmpBytes(std::string what, std::string_view bytes) : what_(std::move(what)), bytes_(bytes) {}
   std::uint32_t number(std::size_t at, std::size_t width) const {
-    std::uint32_t number = 0;
-    const std::uint8_t* const place = part(at, width);
-    for (std::size_t i = width; i > 0; --i) number = number << 8 | place[i - 1];
-    return number;
+    return std::uint32_t(number_in_bytes({reinterpret_cast<const char*>(part(at, width)), width}, false));
   }
   const std::uint8_t* part(std::size_t at, std::size_t count) const {
     if (at > bytes_.size() || count > bytes_.size() - at)

@@ -78,8 +78,8 @@ bool is_kind(const std::string& kind) { return is_long(kind) || is_short(kind); 
 
 bool has_mark(FileWindow& window) { return window.holds(128, 4) && window.text(128, 4) == "DICM"; }
 
-/// Whether the first bytes are an element that a file without a start begins with: of its meta data, or one of the
-/// first of group 8. Without a kind (implicit) its length must be one of such an element.
+/// Whether a file without a start begins with an element: one of the meta data, or one of the first of group 8. If the
+/// element has no kind (implicit), its length must be that of such an element.
 bool begins_as_elements(FileWindow& window) {
   if (!window.holds(0, 12)) return false;
   const std::string kind = window.text(4, 2);
@@ -150,7 +150,7 @@ class DicomWalk {
     into_.big_endian_ = uid == "1.2.840.10008.1.2.2";
   }
   /// Some programs write elements with a kind where the transfer syntax says without, or the reverse. The first element
-  /// shows what holds: its length is never one that would read as a kind.
+  /// shows which is true, because its length never looks like a kind.
   Syntax syntax() {
     const bool is_told = window_.holds(at_, 8);
     return {is_told ? is_kind(window_.text(at_ + 4, 2)) : into_.transfer_syntax_ != "1.2.840.10008.1.2",
@@ -185,7 +185,7 @@ class DicomWalk {
     } else if (is_short(element.kind)) {
       element.length = number(2, syntax.big_endian);
     } else {
-      damaged("an element is of a kind that there is not");
+      damaged("an element is of an unknown kind");
     }
     return element;
   }

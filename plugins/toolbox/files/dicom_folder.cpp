@@ -33,8 +33,7 @@ bool is_no_slice_by_name(const fs::path& path) {
       ".sh",   ".sha1", ".sha256", ".so",  ".sqlite", ".stl",  ".svg",  ".tar",  ".tfm",  ".tif",  ".tiff",  ".toml",
       ".tra",  ".tsv",  ".ttf",    ".txt", ".url",    ".vtk",  ".vtp",  ".vtu",  ".webm", ".webp", ".wmv",   ".xls",
       ".xlsx", ".xml",  ".yaml",   ".yml", ".zip",    ".zraw"};
-  const std::string name = in_small_letters(path.filename().string()),
-                    extension = in_small_letters(path.extension().string());
+  const std::string name = in_small_letters(path.filename().string()), extension = extension_of(path);
   return name[0] == '.' || kNames.count(name) > 0 || kExtensions.count(extension) > 0 ||
          (name.size() > 7 && name.compare(name.size() - 7, 7, ".nii.gz") == 0);
 }
@@ -44,7 +43,7 @@ bool is_no_slice_by_name(const fs::path& path) {
 bool is_text_beside_slices(const fs::path& path, const std::set<std::string>& extensions_of_dicom) {
   static const std::set<std::string> kOfSlices{"",    ".bak", ".dc3", ".dcm",  ".dic", ".dicom",
                                                ".gz", ".ima", ".img", ".part", ".tmp"};
-  const std::string extension = in_small_letters(path.extension().string());
+  const std::string extension = extension_of(path);
   const bool is_number = extension.find_first_not_of(".0123456789") == std::string::npos;
   if (is_number || kOfSlices.count(extension) || extensions_of_dicom.count(extension)) return false;
   const InputFile file(path, true);
@@ -112,8 +111,7 @@ std::string why_not_dicom(const fs::path& path) {
 /// Throws Error that names all files which are not DICOM and may be the rest of a slice. The others are passed over.
 void sort_out_others(const fs::path& folder, const Content& content, SeriesFiles& files) {
   std::set<std::string> extensions;
-  for (const DicomObject& object : content.objects)
-    extensions.insert(in_small_letters(object.path.extension().string()));
+  for (const DicomObject& object : content.objects) extensions.insert(extension_of(object.path));
   std::vector<std::string> doubtful;
   for (const fs::path& path : content.others) {
     const std::string name = path.filename().string();

@@ -53,9 +53,7 @@ std::optional<std::vector<double>> binary_numbers(const std::string& bytes, Dico
   if (bytes.empty() || bytes.size() % width != 0) return std::nullopt;
   std::vector<double> numbers;
   for (std::size_t at = 0; at < bytes.size(); at += width) {
-    std::uint64_t value = 0;
-    for (std::size_t k = 0; k < width; ++k)
-      value = value << 8 | std::uint8_t(bytes[at + (big_endian ? k : width - 1 - k)]);
+    const std::uint64_t value = number_in_bytes(std::string_view(bytes).substr(at, width), big_endian);
     const double number = kind == Kind::fd   ? std::bit_cast<double>(value)
                           : kind == Kind::fl ? double(std::bit_cast<float>(std::uint32_t(value)))
                           : kind == Kind::ss ? double(std::int16_t(value))

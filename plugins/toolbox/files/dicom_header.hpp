@@ -24,6 +24,19 @@ struct DicomTag {
   std::string text() const;
 };
 
+/// Elements that several readers ask for.
+inline constexpr DicomTag kObjectClass{0x0008, 0x0016, "SOPClassUID"};
+inline constexpr DicomTag kModality{0x0008, 0x0060, "Modality"};
+inline constexpr DicomTag kPrimaryAngle{0x0018, 0x1510, "PositionerPrimaryAngle"};
+inline constexpr DicomTag kSecondaryAngle{0x0018, 0x1511, "PositionerSecondaryAngle"};
+inline constexpr DicomTag kImagePosition{0x0020, 0x0032, "ImagePositionPatient"};
+inline constexpr DicomTag kSamplesPerPixel{0x0028, 0x0002, "SamplesPerPixel", DicomTag::Kind::us};
+inline constexpr DicomTag kPhotometric{0x0028, 0x0004, "PhotometricInterpretation"};
+inline constexpr DicomTag kRows{0x0028, 0x0010, "Rows", DicomTag::Kind::us};
+inline constexpr DicomTag kColumns{0x0028, 0x0011, "Columns", DicomTag::Kind::us};
+inline constexpr DicomTag kPixelSpacing{0x0028, 0x0030, "PixelSpacing"};
+inline constexpr DicomTag kRescaleSlope{0x0028, 0x1053, "RescaleSlope"};
+
 class DicomHeader {
  public:
   /// `frame` counts from 1. It selects the values of an enhanced multi-frame file that are given for each frame.

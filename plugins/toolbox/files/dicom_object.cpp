@@ -7,15 +7,9 @@
 namespace marrow::files {
 namespace {
 
-using Kind = DicomTag::Kind;
-constexpr DicomTag kObjectClass{0x0008, 0x0016, "SOPClassUID"};
-constexpr DicomTag kObjectImageType{0x0008, 0x0008, "ImageType"};
-constexpr DicomTag kObjectModality{0x0008, 0x0060, "Modality"};
-constexpr DicomTag kObjectDescription{0x0008, 0x103E, "SeriesDescription"};
-constexpr DicomTag kObjectSeries{0x0020, 0x000E, "SeriesInstanceUID"};
-constexpr DicomTag kObjectPosition{0x0020, 0x0032, "ImagePositionPatient"};
-constexpr DicomTag kObjectRows{0x0028, 0x0010, "Rows", Kind::us};
-constexpr DicomTag kObjectSamples{0x0028, 0x0002, "SamplesPerPixel", Kind::us};
+constexpr DicomTag kImageType{0x0008, 0x0008, "ImageType"};
+constexpr DicomTag kSeriesDescription{0x0008, 0x103E, "SeriesDescription"};
+constexpr DicomTag kSeries{0x0020, 0x000E, "SeriesInstanceUID"};
 
 /// Whether the class is this one or a special kind of it.
 bool is_class(const std::string& uid, const std::string& general) {
@@ -27,13 +21,13 @@ bool is_class(const std::string& uid, const std::string& general) {
 std::string why_not_a_slice(const DicomHeader& header, const DicomObject& object) {
   const std::string& uid = object.class_uid;
   if (uid == "1.2.840.10008.1.3.10") return "a media directory";
-  if (header.text(kObjectImageType).value_or("").find("LOCALIZER") != std::string::npos) return "a localizer";
-  if (uid.empty()) return object.modality.empty() && !header.has(kObjectRows) && object.is_legible ? "no image" : "";
+  if (header.text(kImageType).value_or("").find("LOCALIZER") != std::string::npos) return "a localizer";
+  if (uid.empty()) return object.modality.empty() && !header.has(kRows) && object.is_legible ? "no image" : "";
   if (is_class(uid, "1.2.840.10008.5.1.4.1.1.2")) return {};
   if (!object.is_legible) return is_class(uid, "1.2.840.10008.5.1.4.1.1.7") ? "" : "of the class " + uid;
   if (object.modality != "CT") return object.modality.empty() ? "of no modality" : object.modality;
-  if (header.number(kObjectSamples).value_or(1) > 1) return "in colours";
-  if (!header.has(kObjectPosition)) return "without a place in the patient";
+  if (header.number(kSamplesPerPixel).value_or(1) > 1) return "in colours";
+  if (!header.has(kImagePosition)) return "without a place in the patient";
   return {};
 }
 
@@ -45,9 +39,9 @@ DicomObject dicom_object(const std::filesystem::path& path) {
   DicomObject object{path, file.media_class(), {}, {}, {}, {}, true};
   try {
     if (const auto given = header.text(kObjectClass)) object.class_uid = *given;
-    object.series = header.text(kObjectSeries).value_or("");
-    object.description = header.text(kObjectDescription).value_or("");
-    object.modality = header.text(kObjectModality).value_or("");
+    object.series = header.text(kSeries).value_or("");
+    object.description = header.text(kSeriesDescription).value_or("");
+    object.modality = header.text(kModality).value_or("");
     object.is_legible = file.fault().empty() || !object.series.empty();
     object.not_a_slice = why_not_a_slice(header, object);
   } catch (const Error&) {  // an element that is damaged; reading the slice says so

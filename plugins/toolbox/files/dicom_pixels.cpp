@@ -15,20 +15,13 @@ namespace marrow::files {
 namespace {
 
 using Kind = DicomTag::Kind;
-constexpr DicomTag kClass{0x0008, 0x0016, "SOPClassUID"};
-constexpr DicomTag kModalityOfPixels{0x0008, 0x0060, "Modality"};
-constexpr DicomTag kSamples{0x0028, 0x0002, "SamplesPerPixel", Kind::us};
-constexpr DicomTag kPhotometric{0x0028, 0x0004, "PhotometricInterpretation"};
 constexpr DicomTag kPlanes{0x0028, 0x0006, "PlanarConfiguration", Kind::us};
 constexpr DicomTag kFrames{0x0028, 0x0008, "NumberOfFrames"};
-constexpr DicomTag kRows{0x0028, 0x0010, "Rows", Kind::us};
-constexpr DicomTag kColumns{0x0028, 0x0011, "Columns", Kind::us};
 constexpr DicomTag kAllocated{0x0028, 0x0100, "BitsAllocated", Kind::us};
 constexpr DicomTag kStored{0x0028, 0x0101, "BitsStored", Kind::us};
 constexpr DicomTag kHighBit{0x0028, 0x0102, "HighBit", Kind::us};
 constexpr DicomTag kRepresentation{0x0028, 0x0103, "PixelRepresentation", Kind::us};
 constexpr DicomTag kIntercept{0x0028, 0x1052, "RescaleIntercept"};
-constexpr DicomTag kSlope{0x0028, 0x1053, "RescaleSlope"};
 constexpr DicomTag kTable{0x0028, 0x3000, "ModalityLUTSequence"};
 
 [[noreturn]] void damaged(const std::filesystem::path& path, const std::string& fault) {
@@ -52,7 +45,7 @@ void read_size(const DicomHeader& header, DicomPixels& pixels) {
   if (pixels.rows < 1 || pixels.columns < 1)
     throw Error(pixels.path.string() + ": its header does not say how large the image is; export it again");
   pixels.frames = std::max(1, whole(header, kFrames, 1));
-  pixels.channels = whole(header, kSamples);
+  pixels.channels = whole(header, kSamplesPerPixel);
   if (pixels.channels < 1 || pixels.channels > 4)
     damaged(pixels.path, formatted("its header tells of {} values per pixel", pixels.channels));
   const std::string photometric = header.text(kPhotometric).value_or("");
@@ -67,7 +60,7 @@ void read_size(const DicomHeader& header, DicomPixels& pixels) {
 void check_is_image(const DicomFile& file, const DicomHeader& header) {
   if (file.has_pixels()) return;
   if (header.has(kRows)) damaged(file.path(), "it has no pixels");
-  const std::string modality = header.text(kModalityOfPixels).value_or("");
+  const std::string modality = header.text(kModality).value_or("");
   throw Error(file.path().string() + ": holds no image" + (modality.empty() ? "" : ", it is of modality " + modality) +
               "; expected a CT slice or an X-ray image");
 }
@@ -92,13 +85,13 @@ void read_bits(const DicomHeader& header, DicomPixels& pixels) {
                   pixels.path.string(), stored, allocated, high));
   if (representation != 0 && representation != 1) damaged(pixels.path, kRepresentation.text() + " is neither 0 nor 1");
   pixels.is_signed = representation == 1;
-  const auto slope = header.number(kSlope), intercept = header.number(kIntercept);
+  const auto slope = header.number(kRescaleSlope), intercept = header.number(kIntercept);
   pixels.slope = slope.value_or(1);
   pixels.intercept = intercept.value_or(0);
   pixels.gives_slope = slope.has_value();
   pixels.gives_intercept = intercept.has_value();
   pixels.has_table = header.has(kTable);
-  if (pixels.slope == 0) damaged(pixels.path, kSlope.text() + " is 0");
+  if (pixels.slope == 0) damaged(pixels.path, kRescaleSlope.text() + " is 0");
 }
 
 /// The meaning of a value of 16 bits if only `bits_stored` of them count. std::nullopt if it needs more bits.
@@ -277,9 +270,7 @@ std::vector<std::byte> decode_rle(const CodedImage& image) {
   const std::size_t count = std::size_t(image.columns) * std::size_t(image.rows),
                     width = std::size_t(image.bits_allocated / 8);
   const auto word = [&](std::size_t at) {
-    std::uint32_t value = 0;
-    for (int k = 3; k >= 0; --k) value = value << 8 | std::uint8_t(image.bytes[at + std::size_t(k)]);
-    return std::size_t(value);
+    return std::size_t(number_in_bytes(std::string_view(image.bytes).substr(at, 4), false));
   };
   if (image.bytes.size() < 64 || word(0) != width)
     throw CodecError("the compressed pixels are not of as many parts as a pixel has bytes");
@@ -302,7 +293,7 @@ DicomPixels read_dicom_pixels(const DicomFile& file, int frame) {
   pixels.file_bytes = file.file().size();
   pixels.transfer_syntax = file.transfer_syntax();
   pixels.big_endian = file.is_big_endian();
-  if (header.text(kClass).value_or("").rfind("1.2.840.10008.5.1.4.1.1.481.2", 0) == 0)
+  if (header.text(kObjectClass).value_or("").rfind("1.2.840.10008.5.1.4.1.1.481.2", 0) == 0)
     throw Error(pixels.path.string() + ": holds a dose of radiotherapy; expected a CT slice or an X-ray image");
   check_is_image(file, header);
   read_size(header, pixels);

@@ -15,17 +15,14 @@ namespace {
 
 using Vector = std::array<double, 3>;
 
-// The largest distance of a slice from its place in an even, straight grid. The positions of neighbours that are
-// rounded to one decimal differ by just as much from that.
+// The largest distance of a slice from its place in an even, straight grid. Positions that are rounded to one decimal
+// may be this far off.
 constexpr double kFarthestOff_mm = 0.1 + 1e-6;
 
-constexpr DicomTag kModality{0x0008, 0x0060, "Modality"};
 constexpr DicomTag kPatient{0x0010, 0x0020, "PatientID"};
 constexpr DicomTag kStudy{0x0020, 0x000D, "StudyInstanceUID"};
 constexpr DicomTag kFrameOfReference{0x0020, 0x0052, "FrameOfReferenceUID"};
-constexpr DicomTag kPosition{0x0020, 0x0032, "ImagePositionPatient"};
 constexpr DicomTag kOrientation{0x0020, 0x0037, "ImageOrientationPatient"};
-constexpr DicomTag kSpacing{0x0028, 0x0030, "PixelSpacing"};
 constexpr DicomTag kRescaleType{0x0028, 0x1054, "RescaleType"};
 
 double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -54,12 +51,13 @@ Vector column(const Samples& samples, int k) {
 
 /// Reads origin and axes. The axes are made orthonormal, because headers give them with few digits.
 void place(const DicomHeader& header, Slice& slice) {
-  const auto position = header.numbers(kPosition, 3), orientation = header.numbers(kOrientation, 6),
-             spacing = header.numbers(kSpacing, 2);
+  const auto position = header.numbers(kImagePosition, 3), orientation = header.numbers(kOrientation, 6),
+             spacing = header.numbers(kPixelSpacing, 2);
   slice.is_placed = position && orientation;
   if (!slice.is_placed) return;
   if (!spacing)
-    throw Error(slice.path().string() + ": does not say how large its pixels are; " + kSpacing.text() + " is missing");
+    throw Error(slice.path().string() + ": does not say how large its pixels are; " + kPixelSpacing.text() +
+                " is missing");
   slice.samples.spacing_mm = {(*spacing)[1], (*spacing)[0], 1};  // DICOM gives the distance of rows (y) first
   std::copy(position->begin(), position->end(), slice.samples.origin_mm.begin());
   const Vector row{(*orientation)[0], (*orientation)[1], (*orientation)[2]},
@@ -149,7 +147,7 @@ double longest(const std::vector<Vector>& vectors) {
   return most;
 }
 
-/// Not from the first one, because its own position may be rounded, too.
+/// The mean is taken because the position of any single one may be rounded, too.
 double farthest_from_mean(std::vector<Vector> vectors) {
   Vector mean{};
   for (const Vector& one : vectors)
@@ -191,7 +189,7 @@ void check_places(const std::filesystem::path& folder, const std::vector<Slice>&
 void check_gaps(const std::filesystem::path& folder, const std::vector<Slice>& slices) {
   std::vector<double> gaps;
   for (std::size_t i = 1; i < slices.size(); ++i) gaps.push_back(slices[i].position_mm - slices[i - 1].position_mm);
-  // Not the mean of both middle ones: of a short gap and one with a slice missing, the short one is usual.
+  // Not the mean of the two in the middle: if a slice is missing in one of two gaps, the short one is usual.
   std::vector<double> sorted = gaps;
   const auto middle = sorted.begin() + std::ptrdiff_t((sorted.size() - 1) / 2);
   std::nth_element(sorted.begin(), middle, sorted.end());

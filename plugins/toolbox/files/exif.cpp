@@ -5,16 +5,15 @@
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
+#include "marrow/toolbox/files/input_file.hpp"
 
 namespace marrow::files {
 namespace {
 
 /// The unsigned number of `width` bytes; 0 beyond the end.
 std::uint32_t exif_number(std::string_view bytes, std::size_t at, std::size_t width, bool big_endian) {
-  std::uint32_t number = 0;
-  for (std::size_t i = 0; at <= bytes.size() && width <= bytes.size() - at && i < width; ++i)
-    number = number << 8 | static_cast<unsigned char>(bytes[at + (big_endian ? i : width - 1 - i)]);
-  return number;
+  if (at > bytes.size() || width > bytes.size() - at) return 0;
+  return std::uint32_t(number_in_bytes(bytes.substr(at, width), big_endian));
 }
 
 /// The Exif orientation (1 to 8) from the first directory of Exif data; 1 (not turned) if there is none.

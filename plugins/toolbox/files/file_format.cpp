@@ -25,7 +25,7 @@ bool has_at(std::string_view head, std::size_t at, std::string_view mark) {
   return at <= head.size() && head.substr(at, mark.size()) == mark;
 }
 
-/// The two letters of a BMP begin many texts too, so the length of its header must be one that there is.
+/// Many texts begin with the same two letters, so the length of the header must be a valid one.
 bool is_bmp(std::string_view head) {
   return has_at(head, 0, "BM") && head.size() > 18 && "\x0C\x28\x34\x38\x40\x6C\x7C"sv.find(head[14]) != head.npos &&
          has_at(head, 15, "\0\0\0"sv);
@@ -48,7 +48,7 @@ bool is_meta_image(const std::string& head) {
   return sign != text.npos && (text[sign] == '=' || text[sign] == ':');
 }
 
-/// The first bytes of a compressed file's content; empty if they cannot be had.
+/// The first bytes of a compressed file's content; empty if they cannot be unpacked.
 std::string unpacked_head(const InputFile& file) {
   std::string head(kHeadBytes, '\0');
   try {
@@ -79,8 +79,8 @@ FileFormat format_by_name(const std::filesystem::path& path) {
       {".dcm", FileFormat::dicom},      {".dicom", FileFormat::dicom},    {".ima", FileFormat::dicom},
       {".mha", FileFormat::meta_image}, {".mhd", FileFormat::meta_image}, {".nrrd", FileFormat::nrrd},
       {".nhdr", FileFormat::nrrd},      {".nii", FileFormat::nifti}};
-  std::string end = in_small_letters(path.extension().string());
-  if (end == ".gz") end = in_small_letters(path.stem().extension().string()) == ".nii" ? ".nii" : "";
+  std::string end = extension_of(path);
+  if (end == ".gz") end = extension_of(path.stem()) == ".nii" ? ".nii" : "";
   const auto known = kKnown.find(end);
   return known == kKnown.end() ? FileFormat::unknown : known->second;
 }

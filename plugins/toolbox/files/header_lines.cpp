@@ -39,6 +39,8 @@ std::string in_small_letters(std::string text) {
   return text;
 }
 
+std::string extension_of(const std::filesystem::path& path) { return in_small_letters(path.extension().string()); }
+
 std::vector<std::string> words_of(const std::string& text) {
   std::vector<std::string> words;
   for (std::size_t at = 0; (at = text.find_first_not_of(" \t", at)) != std::string::npos;) {

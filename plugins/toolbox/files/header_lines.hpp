@@ -55,6 +55,8 @@ class HeaderLines {
 
 std::string trimmed(const std::string& text);
 std::string in_small_letters(std::string text);
+/// The extension of a file's name in small letters, with its dot.
+std::string extension_of(const std::filesystem::path& path);
 std::vector<std::string> words_of(const std::string& text);
 /// The beginning of a file's text, for a message. Characters that cannot be printed become '?'.
 std::string shown(const std::string& text);

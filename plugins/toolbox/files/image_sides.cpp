@@ -13,8 +13,6 @@ namespace marrow::files {
 namespace {
 
 constexpr DicomTag kHorizontalFlip{0x0018, 0x7034, "FieldOfViewHorizontalFlip"};
-constexpr DicomTag kAngleOfPrimary{0x0018, 0x1510, "PositionerPrimaryAngle"};
-constexpr DicomTag kAngleOfSecondary{0x0018, 0x1511, "PositionerSecondaryAngle"};
 
 bool has_dicom_header(const std::filesystem::path& path) { return file_format(path) == FileFormat::dicom; }
 
@@ -40,8 +38,7 @@ std::vector<std::string> doubts_about_sides(const std::filesystem::path& image, 
     return {image.string() + ": was flipped left to right after it was taken (" + kHorizontalFlip.text() + "), and " +
             kPatientOrientation.text() + " does not say how the patient lies in it; it may be mirrored: " + advice};
   }
-  if (header.number(kAngleOfPrimary) && header.number(kAngleOfSecondary))
-    return {};  // mirrored back if it was mirrored
+  if (header.number(kPrimaryAngle) && header.number(kSecondaryAngle)) return {};  // mirrored back if it was mirrored
   return {image.string() + ": the patient's " + side_of(oriented->right) + " is on its right and the " +
           side_of(oriented->down) + " below (" + kPatientOrientation.text() +
           "), but the header does not say from where it was taken; whether it is mirrored is not known: " + advice};

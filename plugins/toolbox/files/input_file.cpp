@@ -3,7 +3,6 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -22,39 +21,29 @@ constexpr std::size_t kWindow = 16384;
 
 }  // namespace
 
-InputFile::InputFile(std::filesystem::path path, bool may_be_empty) : path_(std::move(path)) {
+InputFile::InputFile(std::filesystem::path path, bool may_be_empty)
+    : path_(std::move(path)), descriptor_(::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
+  const int reason = errno;
   const std::string what = path_.string();
-  descriptor_ = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (descriptor_ < 0) {
-    if (errno == ENOENT || errno == ENOTDIR) throw Error(what + ": there is no such file");
-    if (errno == ELOOP) throw Error(what + ": is a link that leads back to itself");
-    if (errno == ENXIO) throw Error(what + ": expected a file, this is none");
-    throw Error(what + ": cannot be read (" + std::strerror(errno) + ")");
+  if (!descriptor_.is_open()) {
+    if (reason == ENOENT || reason == ENOTDIR) throw Error(what + ": there is no such file");
+    if (reason == ELOOP) throw Error(what + ": is a link that leads back to itself");
+    if (reason == ENXIO) throw Error(what + ": expected a file, this is none");
+    throw Error(what + ": cannot be read (" + std::strerror(reason) + ")");
   }
   struct stat status {};
-  const bool is_known = ::fstat(descriptor_, &status) == 0;
-  if (is_known && S_ISREG(status.st_mode) && (status.st_size > 0 || may_be_empty)) {
-    size_ = std::uint64_t(status.st_size);
-    now_reading(path_);
-    return;
-  }
-  ::close(descriptor_);
-  throw Error(what + (is_known && S_ISREG(status.st_mode) ? ": the file is empty" : ": expected a file, this is none"));
+  if (::fstat(descriptor_, &status) != 0 || !S_ISREG(status.st_mode))
+    throw Error(what + ": expected a file, this is none");
+  if (status.st_size == 0 && !may_be_empty) throw Error(what + ": the file is empty");
+  size_ = std::uint64_t(status.st_size);
+  now_reading(path_);
 }
 
-InputFile::~InputFile() { ::close(descriptor_); }
-
 void InputFile::read(std::uint64_t at, void* to, std::size_t count) const {
-  char* place = static_cast<char*>(to);
-  while (count > 0) {
-    const ssize_t got = ::pread(descriptor_, place, std::min<std::size_t>(count, 1 << 30), off_t(at));
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) throw Error(path_.string() + ": cannot be read (" + std::strerror(errno) + ")");
-    if (got == 0) throw Error(path_.string() + ": became shorter while it was read; try again when nothing writes it");
-    place += got;
-    at += std::uint64_t(got);
-    count -= std::size_t(got);
-  }
+  const std::int64_t got = read_at(descriptor_, to, count, at);
+  if (got < 0) throw Error(path_.string() + ": cannot be read (" + std::strerror(errno) + ")");
+  if (std::size_t(got) < count)
+    throw Error(path_.string() + ": became shorter while it was read; try again when nothing writes it");
 }
 
 std::string InputFile::text(std::uint64_t at, std::size_t count) const {
@@ -84,11 +73,15 @@ const char* FileWindow::bytes(std::uint64_t at, std::size_t count) {
   return part_.data() + (at - begin_);
 }
 
-std::uint64_t FileWindow::number(std::uint64_t at, int width, bool big_endian) {
-  const char* const raw = bytes(at, std::size_t(width));
+std::uint64_t number_in_bytes(std::string_view bytes, bool big_endian) {
   std::uint64_t value = 0;
-  for (int i = 0; i < width; ++i) value = value << 8 | std::uint8_t(raw[big_endian ? i : width - 1 - i]);
+  for (std::size_t i = 0; i < bytes.size(); ++i)
+    value = value << 8 | std::uint8_t(bytes[big_endian ? i : bytes.size() - 1 - i]);
   return value;
+}
+
+std::uint64_t FileWindow::number(std::uint64_t at, int width, bool big_endian) {
+  return number_in_bytes({bytes(at, std::size_t(width)), std::size_t(width)}, big_endian);
 }
 
 std::string FileWindow::text(std::uint64_t at, std::size_t count) { return {bytes(at, count), count}; }

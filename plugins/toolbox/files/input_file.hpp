@@ -4,7 +4,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "marrow/base/descriptor.hpp"
 
 namespace marrow::files {
 
@@ -15,9 +18,6 @@ class InputFile {
   /// Throws Error unless `path` is a regular file that can be read. It must not be empty unless `may_be_empty`. Pipes
   /// and devices are refused at once, without waiting for data.
   explicit InputFile(std::filesystem::path path, bool may_be_empty = false);
-  ~InputFile();
-  InputFile(const InputFile&) = delete;
-  InputFile& operator=(const InputFile&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
   std::uint64_t size() const { return size_; }
@@ -28,7 +28,7 @@ class InputFile {
 
  private:
   std::filesystem::path path_;
-  int descriptor_ = -1;
+  Descriptor descriptor_;
   std::uint64_t size_ = 0;
 };
 
@@ -38,6 +38,9 @@ std::string read_bytes(const std::filesystem::path& path, std::uint64_t most, bo
 /// All of a file that is a text, as UTF-8 in lines that end with \n, however its writer stored it (plain_text() in
 /// domain/plain_text.hpp). Throws Error as read_bytes() does.
 std::string read_text(const std::filesystem::path& path, std::uint64_t most, bool may_be_empty = false);
+
+/// The unsigned number that these bytes hold, at most 8 of them.
+std::uint64_t number_in_bytes(std::string_view bytes, bool big_endian);
 
 /// Reads single numbers and texts at any offset of a file. It reads a larger part at once, so that neighbours need no
 /// further access. For use in one thread. The file must outlive it.

@@ -16,12 +16,7 @@ bool decode(jpeg_decompress_struct& state, JpegFailure& failure, const CodedImag
     return false;
   }
   state.out_color_space = JCS_GRAYSCALE;
-  jpeg_start_decompress(&state);
-  while (state.output_scanline < state.output_height) {
-    JSAMPROW row = reinterpret_cast<JSAMPROW>(to) + std::size_t(state.output_scanline) * std::size_t(image.columns);
-    jpeg_read_scanlines(&state, &row, 1);
-  }
-  jpeg_finish_decompress(&state);
+  read_jpeg_rows(state, to, std::size_t(image.columns));
   return true;
 }
 
@@ -37,12 +32,8 @@ std::vector<std::byte> decode_jpeg_baseline(const CodedImage& image) {
   if (marker != 0xC0) throw CodecNotRead("its pixels are compressed by another kind of JPEG than the header says");
   if (frame_precision(segments, image) != 8 || image.bits_allocated != 8) throw CodecError("baseline JPEG has 8 bits");
   std::vector<std::byte> bytes(std::size_t(image.columns) * std::size_t(image.rows));
-  JpegFailure failure;
-  jpeg_decompress_struct state{};
-  prepare(state, failure);
-  const bool good = decode(state, failure, image, bytes.data());
-  jpeg_destroy_decompress(&state);
-  if (!good) throw CodecError(failure.text);
+  JpegReader reader;
+  if (!decode(reader.state, reader.failure, image, bytes.data())) throw CodecError(reader.failure.text);
   return bytes;
 }
 

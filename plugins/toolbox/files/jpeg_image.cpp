@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::uint64_t kLargestJpeg = 1 << 30;
 
-/// Checks what libjpeg would refuse in words that fit damaged files, or pass over.
+/// Checks what libjpeg would ignore, or refuse as if the file were damaged.
 void check_segments(const std::string& what, const std::string& bytes) {
   constexpr int kExif = 0xE1, kHuffman = 0xC4, kArithmetic = 0xC8, kConditioning = 0xCC, kProgressive = 0xC2;
   JpegSegments segments(bytes);
@@ -41,24 +41,11 @@ bool read_jpeg_header(jpeg_decompress_struct& state, JpegFailure& failure, const
   return true;
 }
 
-bool read_jpeg_rows(jpeg_decompress_struct& state, JpegFailure& failure, std::byte* to, std::size_t row_bytes) {
+bool read_rows_or_fail(jpeg_decompress_struct& state, JpegFailure& failure, std::byte* to, std::size_t row_bytes) {
   if (setjmp(failure.back)) return false;
-  jpeg_start_decompress(&state);
-  while (state.output_scanline < state.output_height) {
-    JSAMPROW row = reinterpret_cast<JSAMPROW>(to) + state.output_scanline * row_bytes;
-    jpeg_read_scanlines(&state, &row, 1);
-  }
-  jpeg_finish_decompress(&state);
+  read_jpeg_rows(state, to, row_bytes);
   return true;
 }
-
-/// Frees what libjpeg holds.
-struct JpegReader {
-  JpegReader() { prepare(state, failure); }
-  ~JpegReader() { jpeg_destroy_decompress(&state); }
-  jpeg_decompress_struct state{};
-  JpegFailure failure{};
-};
 
 }  // namespace
 
@@ -85,7 +72,7 @@ Samples read_jpeg(const std::filesystem::path& path) {
                           samples.components));
   const std::size_t row_bytes = std::size_t(samples.size[0]) * std::size_t(samples.components);
   samples.bytes.resize(row_bytes * std::size_t(samples.size[1]));
-  if (!read_jpeg_rows(reader.state, reader.failure, samples.bytes.data(), row_bytes)) fail(reader.failure.text);
+  if (!read_rows_or_fail(reader.state, reader.failure, samples.bytes.data(), row_bytes)) fail(reader.failure.text);
   return samples;
 }
 

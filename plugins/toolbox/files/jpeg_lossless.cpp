@@ -72,7 +72,7 @@ class LosslessDecoder {
 
   int difference(JpegBits<8>& bits) const {
     const unsigned next = bits.peek16();
-    if (table_->bits[next] == 0) throw CodecError("the compressed pixels hold a code that there is not");
+    if (table_->bits[next] == 0) throw CodecError("the compressed pixels hold an unknown code");
     bits.skip(table_->bits[next]);
     const int category = table_->symbol[next];
     if (category == 0) return 0;

@@ -94,7 +94,7 @@ class JpegLsDecoder {
       zeros += 16;
       if (zeros > limit) break;
     }
-    if (zeros > limit - value_bits_ - 1) throw CodecError("the compressed pixels hold a code that there is not");
+    if (zeros > limit - value_bits_ - 1) throw CodecError("the compressed pixels hold an unknown code");
     const int value =
         zeros < limit - value_bits_ - 1 ? zeros << k | int(bits.take(k)) : int(bits.take(value_bits_)) + 1;
     if (value > 2 * (max_value_ + 1)) throw CodecError("the compressed pixels hold a value beyond their range");

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/files/mesh_file.hpp"
 
+#include "header_lines.hpp"
 #include "marrow/base/error.hpp"
-#include "marrow/toolbox/files/input_file.hpp"
 #include "mesh_parts.hpp"
 
 namespace marrow::files {
@@ -25,8 +25,7 @@ void SpaceMark::look_into(std::string_view comment) {
 
 MarkedMesh read_marked_mesh(const std::filesystem::path& path) {
   const std::string what = path.string();
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = char(std::tolower(static_cast<unsigned char>(c)));
+  const std::string extension = extension_of(path);
   if (extension != ".stl" && extension != ".ply")
     throw Error(what + ": not a surface that can be read; known are .stl and .ply");
   std::string bytes = read_bytes(path, kLargestFile);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // NRRD (.nrrd, .nhdr): https://teem.sourceforge.net/nrrd/format.html. The NRRD library copies fields into buffers of
 // fixed size, and opens any file that a header names. So this file has its own reader.
+#include <algorithm>
 #include <cmath>
-#include <set>
+#include <string_view>
 
 #include "header_lines.hpp"
 #include "marrow/base/error.hpp"
@@ -13,42 +14,21 @@
 namespace marrow::files {
 namespace {
 
+/// Whether the format defines a field of this name.
+bool is_field(const std::string& name) {
+  constexpr std::string_view kFields =
+      "|content|number|type|block size|dimension|space|space dimension|sizes|spacings|thicknesses|axis mins|axis maxs|"
+      "space directions|centers|kinds|labels|units|min|max|old min|old max|endian|encoding|line skip|byte skip|"
+      "sample units|space units|space origin|measurement frame|data file|";
+  return name.find('|') == std::string::npos && kFields.find("|" + name + "|") != std::string_view::npos;
+}
+
 struct NrrdHeader {
   HeaderFields fields;
   std::uint64_t end = 0;  ///< offset of samples in the same file
 };
 
 NrrdHeader read_nrrd_header(const InputFile& file) {
-  static const std::set<std::string> kKnown{"content",
-                                            "number",
-                                            "type",
-                                            "block size",
-                                            "dimension",
-                                            "space",
-                                            "space dimension",
-                                            "sizes",
-                                            "spacings",
-                                            "thicknesses",
-                                            "axis mins",
-                                            "axis maxs",
-                                            "space directions",
-                                            "centers",
-                                            "kinds",
-                                            "labels",
-                                            "units",
-                                            "min",
-                                            "max",
-                                            "old min",
-                                            "old max",
-                                            "endian",
-                                            "encoding",
-                                            "line skip",
-                                            "byte skip",
-                                            "sample units",
-                                            "space units",
-                                            "space origin",
-                                            "measurement frame",
-                                            "data file"};
   static const std::map<std::string, std::string> kSame{
       {"blocksize", "block size"},     {"axismins", "axis mins"}, {"axismaxs", "axis maxs"}, {"centerings", "centers"},
       {"oldmin", "old min"},           {"oldmax", "old max"},     {"lineskip", "line skip"}, {"byteskip", "byte skip"},
@@ -69,7 +49,7 @@ NrrdHeader read_nrrd_header(const InputFile& file) {
     if (colon != std::string::npos && line->compare(colon, 2, ":=") == 0) continue;  // a key/value note of its writer
     std::string key = in_small_letters(trimmed(line->substr(0, colon)));
     if (const auto same = kSame.find(key); same != kSame.end()) key = same->second;
-    if (colon == std::string::npos || line->find('\0') != std::string::npos || !kKnown.count(key))
+    if (colon == std::string::npos || line->find('\0') != std::string::npos || !is_field(key))
       throw Error(
           formatted("{}:{}: expected a field of a NRRD header, got '{}'; it is damaged: copy or export it again", what,
                     number, shown(*line)));
@@ -81,49 +61,22 @@ NrrdHeader read_nrrd_header(const InputFile& file) {
 
 Samples::Type nrrd_type(const HeaderFields& fields) {
   using Type = Samples::Type;
-  static const std::map<std::string, Type> kTypes{{"signed char", Type::i8},
-                                                  {"int8", Type::i8},
-                                                  {"int8_t", Type::i8},
-                                                  {"uchar", Type::u8},
-                                                  {"unsigned char", Type::u8},
-                                                  {"uint8", Type::u8},
-                                                  {"uint8_t", Type::u8},
-                                                  {"short", Type::i16},
-                                                  {"short int", Type::i16},
-                                                  {"signed short", Type::i16},
-                                                  {"signed short int", Type::i16},
-                                                  {"int16", Type::i16},
-                                                  {"int16_t", Type::i16},
-                                                  {"ushort", Type::u16},
-                                                  {"unsigned short", Type::u16},
-                                                  {"unsigned short int", Type::u16},
-                                                  {"uint16", Type::u16},
-                                                  {"uint16_t", Type::u16},
-                                                  {"int", Type::i32},
-                                                  {"signed int", Type::i32},
-                                                  {"int32", Type::i32},
-                                                  {"int32_t", Type::i32},
-                                                  {"uint", Type::u32},
-                                                  {"unsigned int", Type::u32},
-                                                  {"uint32", Type::u32},
-                                                  {"uint32_t", Type::u32},
-                                                  {"longlong", Type::i64},
-                                                  {"long long", Type::i64},
-                                                  {"long long int", Type::i64},
-                                                  {"signed long long", Type::i64},
-                                                  {"signed long long int", Type::i64},
-                                                  {"int64", Type::i64},
-                                                  {"int64_t", Type::i64},
-                                                  {"ulonglong", Type::u64},
-                                                  {"unsigned long long", Type::u64},
-                                                  {"unsigned long long int", Type::u64},
-                                                  {"uint64", Type::u64},
-                                                  {"uint64_t", Type::u64},
-                                                  {"float", Type::f32},
-                                                  {"double", Type::f64}};
-  const auto found = kTypes.find(in_small_letters(fields.text("type")));
-  if (found == kTypes.end()) fields.refuse("type", "a kind of number, as short or float");
-  return found->second;
+  static const std::pair<Type, std::vector<std::string>> kNames[] = {
+      {Type::i8, {"signed char", "int8", "int8_t"}},
+      {Type::u8, {"uchar", "unsigned char", "uint8", "uint8_t"}},
+      {Type::i16, {"short", "short int", "signed short", "signed short int", "int16", "int16_t"}},
+      {Type::u16, {"ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"}},
+      {Type::i32, {"int", "signed int", "int32", "int32_t"}},
+      {Type::u32, {"uint", "unsigned int", "uint32", "uint32_t"}},
+      {Type::i64,
+       {"longlong", "long long", "long long int", "signed long long", "signed long long int", "int64", "int64_t"}},
+      {Type::u64, {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"}},
+      {Type::f32, {"float"}},
+      {Type::f64, {"double"}}};
+  const std::string name = in_small_letters(fields.text("type"));
+  for (const auto& [type, names] : kNames)
+    if (std::find(names.begin(), names.end(), name) != names.end()) return type;
+  fields.refuse("type", "a kind of number, as short or float");
 }
 
 /// `count` vectors "(a,b,c)".

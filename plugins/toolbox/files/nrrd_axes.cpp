@@ -21,7 +21,7 @@ std::vector<std::string> items_of(const std::string& text) {
   return items;
 }
 
-/// Whether the header says of an axis that it is none of space.
+/// Whether the header says that an axis is not one of space.
 bool holds_values(const HeaderFields& fields, std::size_t axis, std::size_t axes) {
   const auto directions = items_of(in_small_letters(fields.text_or("space directions", "")));
   if (directions.size() == axes) return directions[axis] == "none";

@@ -76,15 +76,9 @@ bool read_rows(Reader& reader, png_bytepp rows) {
   return true;
 }
 
-std::size_t length_at(std::string_view bytes, std::size_t at) {
-  std::size_t number = 0;
-  for (std::size_t i = 0; i < 4; ++i) number = number << 8 | static_cast<unsigned char>(bytes[at + i]);
-  return number;
-}
-
 void check_orientation(const std::string& what, std::string_view bytes) {
   for (std::size_t at = 8; at + 12 <= bytes.size();) {
-    const std::size_t length = length_at(bytes, at);
+    const std::size_t length = std::size_t(number_in_bytes(bytes.substr(at, 4), true));
     if (length > bytes.size() - at - 12) return;  // cut off; libpng reports this if it needs the chunk
     if (bytes.substr(at + 4, 4) == "eXIf") check_not_turned(what, bytes.substr(at + 8, length));
     at += 12 + length;

@@ -18,8 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Files of a higher rank are no images beside those of a lower one: JPEG and BMP are pictures of them, and a file for
-/// volumes is a CT.
+/// Files of a higher rank do not count beside those of a lower one: JPEG and BMP are taken for pictures of them, and a
+/// file for volumes for a CT.
 std::size_t rank_of(FileFormat format) {
   if (format == FileFormat::png || format == FileFormat::tiff || format == FileFormat::dicom) return 0;
   return format == FileFormat::jpeg || format == FileFormat::bmp ? 1 : 2;
@@ -116,7 +116,7 @@ std::vector<Numbered> numbered(const fs::path& folder, const std::vector<std::st
   return files;
 }
 
-/// Numbers may go up in any step, but always in the same.
+/// Numbers may rise by steps of any size, but all steps must be equal.
 void check_steps(const fs::path& folder, const std::vector<Numbered>& files) {
   long long step = 0;
   for (std::size_t i = 1; i < files.size(); ++i) {

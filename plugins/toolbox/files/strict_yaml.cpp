@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/names.hpp"
@@ -16,25 +17,23 @@ namespace {
 constexpr std::uint64_t kLargestYaml = 16 << 20;
 constexpr std::size_t kMostValues = 1'000'000, kMostFreeKeys = 1000;
 
-std::vector<std::string> split_lines(const std::string& text) {
-  std::vector<std::string> lines(1);
-  for (char c : text) {
-    if (c == '\n')
-      lines.emplace_back();
-    else
-      lines.back() += c;
-  }
-  return lines;
+/// The list of exactly `count` numbers; nothing for anything else.
+std::optional<std::vector<double>> list_of_numbers(const YAML::Node& node, std::size_t count) {
+  if (!node.IsSequence() || node.size() != count) return std::nullopt;
+  std::vector<double> numbers;
+  for (const auto& item : node)
+    if (const auto number = yaml_number(item)) numbers.push_back(*number);
+  if (numbers.size() != count) return std::nullopt;
+  return numbers;
 }
 
 }  // namespace
 
 YamlFile::YamlFile(std::filesystem::path path) : path_(std::move(path)) {
-  const std::string text = read_text(path_, kLargestYaml, true);
-  lines_ = split_lines(text);
-  if (text.find('\0') != std::string::npos) throw Error(path_.string() + ": expected YAML text; this file is binary");
+  text_ = read_text(path_, kLargestYaml, true);
+  if (text_.find('\0') != std::string::npos) throw Error(path_.string() + ": expected YAML text; this file is binary");
   try {
-    root_ = parse_yaml(text, {false, kMostValues});
+    root_ = parse_yaml(text_, {false, kMostValues});
   } catch (const YAML::ParserException& error) {
     throw Error(describe(error.mark, "not YAML: " + error.msg.substr(0, 200)));
   } catch (const YAML::Exception& error) {
@@ -47,8 +46,11 @@ YamlFile::YamlFile(std::filesystem::path path) : path_(std::move(path)) {
 std::string YamlFile::describe(const YAML::Mark& mark, const std::string& text) const {
   if (mark.is_null()) return path_.string() + ": " + text;
   std::string message = formatted("{}:{}:{}: {}", path_.string(), mark.line + 1, mark.column + 1, text);
-  if (mark.line >= 0 && std::size_t(mark.line) < lines_.size())
-    message += "\n    " + lines_[std::size_t(mark.line)].substr(0, 120);
+  std::istringstream lines(text_);
+  std::string line;
+  int number = -1;
+  while (number < mark.line && std::getline(lines, line)) ++number;
+  if (number == mark.line) message += "\n    " + line.substr(0, 120);
   return message;
 }
 
@@ -158,11 +160,7 @@ bool YamlMap::boolean_or(const std::string& key, bool default_value) const {
 std::optional<std::vector<double>> YamlMap::numbers(const std::string& key, std::size_t count) const {
   const auto value = required(key);
   if (!value) return std::nullopt;
-  std::vector<double> numbers;
-  if (value->IsSequence() && value->size() == count)
-    for (const auto& item : *value)
-      if (const auto number = yaml_number(item)) numbers.push_back(*number);
-  if (numbers.size() == count) return numbers;
+  if (auto numbers = list_of_numbers(*value, count)) return numbers;
   fault(key, formatted("{}: expected {} numbers{}, got {}", key, count, count == 3 ? " [x, y, z]" : "",
                        yaml_described(*value)));
   return std::nullopt;
@@ -180,13 +178,9 @@ std::optional<Eigen::MatrixXd> YamlMap::matrix(const std::string& key, int rows,
   Eigen::MatrixXd matrix(rows, columns);
   bool good = value->IsSequence() && int(value->size()) == rows;
   for (int r = 0; good && r < rows; ++r) {
-    const YAML::Node row = (*value)[r];
-    good = row.IsSequence() && int(row.size()) == columns;
-    for (int c = 0; good && c < columns; ++c) {
-      const auto number = yaml_number(row[c]);
-      good = number.has_value();
-      if (good) matrix(r, c) = *number;
-    }
+    const auto row = list_of_numbers((*value)[r], std::size_t(columns));
+    good = row.has_value();
+    if (good) matrix.row(r) = Eigen::Map<const Eigen::RowVectorXd>(row->data(), columns);
   }
   if (good) return matrix;
   fault(key, formatted("{}: expected {} rows of {} numbers, got {}", key, rows, columns, yaml_described(*value)));
@@ -202,15 +196,8 @@ std::vector<Eigen::Vector3d> YamlMap::points(const std::string& key) const {
     return points;
   }
   for (const auto& item : *value) {
-    Eigen::Vector3d point;
-    bool good = item.IsSequence() && item.size() == 3;
-    for (int i = 0; good && i < 3; ++i) {
-      const auto number = yaml_number(item[i]);
-      good = number.has_value();
-      if (good) point[i] = *number;
-    }
-    if (good)
-      points.push_back(point);
+    if (const auto point = list_of_numbers(item, 3))
+      points.emplace_back(point->data());
     else
       file_.fault(item.Mark(), what_ + ": " + key + ": expected a point [x, y, z] in mm, got " + yaml_described(item));
   }

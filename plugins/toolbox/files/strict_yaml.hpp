@@ -36,7 +36,7 @@ class YamlFile {
   std::string describe(const YAML::Mark& mark, const std::string& text) const;
 
   std::filesystem::path path_;
-  std::vector<std::string> lines_;
+  std::string text_;
   YAML::Node root_;
   std::vector<std::string> faults_;
   std::size_t more_faults_ = 0;

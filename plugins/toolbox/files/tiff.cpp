@@ -19,7 +19,7 @@ void check_kind(const std::string& what, const TiffPage& page) {
                   what, page.compression));
   if (page.fill_order != 1 || (page.orientation != 1 && page.orientation != 4))
     throw Error(formatted(
-        "{}: its pixels are stored in an unusual order (FillOrder {}, Orientation {}); save it anew as a plain TIFF",
+        "{}: its pixels are stored in an unusual order (FillOrder {}, Orientation {}); save it again as a plain TIFF",
         what, page.fill_order, page.orientation));
   if (page.predictor != 1 && !(page.predictor == 2 && page.compression != 1))
     throw Error(

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <stdexcept>
 #include <unordered_set>
+#include <utility>
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
@@ -102,7 +103,7 @@ class Walk {
         const auto numbers = numbers_of(entry);
         if (numbers.empty())
           throw Error(formatted(
-              "{}: its field {} has no number of a kind that is read; it is damaged, or save it anew as a plain TIFF",
+              "{}: its field {} has no number of a kind that is read; it is damaged, or save it again as a plain TIFF",
               what(), tag));
         *place = numbers[0];
         // The samples of a pixel may have different widths and formats. This is not supported: 0 is refused later.
@@ -170,36 +171,15 @@ class Walk {
   }
 
   static std::uint64_t* place_of(TiffPage& page, std::uint64_t tag) {
-    switch (tag) {
-      case 254:
-        return &page.subfile;
-      case 256:
-        return &page.width;
-      case 257:
-        return &page.height;
-      case 258:
-        return &page.bits;
-      case 259:
-        return &page.compression;
-      case 262:
-        return &page.photometric;
-      case 266:
-        return &page.fill_order;
-      case 274:
-        return &page.orientation;
-      case 277:
-        return &page.samples;
-      case 278:
-        return &page.rows_per_strip;
-      case 284:
-        return &page.planes;
-      case 317:
-        return &page.predictor;
-      case 339:
-        return &page.format;
-      default:
-        return nullptr;
-    }
+    static constexpr std::pair<std::uint64_t, std::uint64_t TiffPage::*> kFields[] = {
+        {254, &TiffPage::subfile},        {256, &TiffPage::width},       {257, &TiffPage::height},
+        {258, &TiffPage::bits},           {259, &TiffPage::compression}, {262, &TiffPage::photometric},
+        {266, &TiffPage::fill_order},     {274, &TiffPage::orientation}, {277, &TiffPage::samples},
+        {278, &TiffPage::rows_per_strip}, {284, &TiffPage::planes},      {317, &TiffPage::predictor},
+        {339, &TiffPage::format}};
+    for (const auto& [known, place] : kFields)
+      if (known == tag) return &(page.*place);
+    return nullptr;
   }
 
   /// The numbers of an entry. They are in the entry itself or, if there are too many, elsewhere in the file.

@@ -17,8 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string lower_extension(const fs::path& path) { return in_small_letters(path.extension().string()); }
-
 VolumeSamples read_tiff_volume(const fs::path& path) {
   VolumeSamples volume{read_tiff(path), {}};
   if (volume.geometry.components != 1)
@@ -56,7 +54,7 @@ fs::path detached_header_in(const fs::path& folder) {
   std::vector<fs::path> headers, others;
   std::error_code failure, none;
   for (fs::directory_iterator entry(folder, failure), end; entry != end && !failure; entry.increment(failure)) {
-    const std::string extension = lower_extension(entry->path());
+    const std::string extension = extension_of(entry->path());
     const bool is_header = extension == ".mhd" || extension == ".nhdr";
     if (is_header || entry->is_regular_file(none)) (is_header ? headers : others).push_back(entry->path());
   }

@@ -13,28 +13,20 @@
 namespace marrow::files {
 namespace {
 
-constexpr DicomTag kModality{0x0008, 0x0060, "Modality"};
 constexpr DicomTag kDistanceSourceToDetector{0x0018, 0x1110, "DistanceSourceToDetector"};
 constexpr DicomTag kDistanceSourceToPatient{0x0018, 0x1111, "DistanceSourceToPatient"};
 constexpr DicomTag kDistanceSourceToIsocenter{0x0018, 0x9402, "DistanceSourceToIsocenter", DicomTag::Kind::fl};
 constexpr DicomTag kMagnification{0x0018, 0x1114, "EstimatedRadiographicMagnificationFactor"};
 constexpr DicomTag kImagerPixelSpacing{0x0018, 0x1164, "ImagerPixelSpacing"};
-constexpr DicomTag kPixelSpacing{0x0028, 0x0030, "PixelSpacing"};
 constexpr DicomTag kSpacingCalibration{0x0028, 0x0a02, "PixelSpacingCalibrationType"};
-constexpr DicomTag kPrimaryAngle{0x0018, 0x1510, "PositionerPrimaryAngle"};
-constexpr DicomTag kSecondaryAngle{0x0018, 0x1511, "PositionerSecondaryAngle"};
 constexpr DicomTag kPrimaryIncrement{0x0018, 0x1520, "PositionerPrimaryAngleIncrement"};
 constexpr DicomTag kSecondaryIncrement{0x0018, 0x1521, "PositionerSecondaryAngleIncrement"};
 constexpr DicomTag kPositionerMotion{0x0018, 0x1500, "PositionerMotion"};
 constexpr DicomTag kPatientPosition{0x0018, 0x5100, "PatientPosition"};
-constexpr DicomTag kPhotometric{0x0028, 0x0004, "PhotometricInterpretation"};
-constexpr DicomTag kSlope{0x0028, 0x1053, "RescaleSlope"};
 constexpr DicomTag kIntensity{0x0028, 0x1040, "PixelIntensityRelationship"};
 constexpr DicomTag kIntensitySign{0x0028, 0x1041, "PixelIntensityRelationshipSign", DicomTag::Kind::ss};
 constexpr DicomTag kFieldOfViewOrigin{0x0018, 0x7030, "FieldOfViewOrigin"};
 constexpr DicomTag kIsocentreProjection{0x0018, 0x9430, "PositionOfIsocenterProjection", DicomTag::Kind::fl};
-constexpr DicomTag kRows{0x0028, 0x0010, "Rows", DicomTag::Kind::us};
-constexpr DicomTag kColumns{0x0028, 0x0011, "Columns", DicomTag::Kind::us};
 
 /// Collects what is missing, so that one message names all.
 class Wanted {
@@ -184,7 +176,7 @@ bool is_inverted(const DicomHeader& header) {
   if (!sign) return header.text(kPhotometric).value_or("") == "MONOCHROME1";
   if (*sign != 1 && *sign != -1)
     throw Error(formatted("{}: {} is {}, expected 1 or -1", header.path().string(), kIntensitySign.text(), int(*sign)));
-  return (*sign < 0) != (header.number(kSlope).value_or(1) < 0);
+  return (*sign < 0) != (header.number(kRescaleSlope).value_or(1) < 0);
 }
 
 /// Values must be linear in the radiation, because their logarithm is taken later.
@@ -232,7 +224,7 @@ XrayGeometry geometry_of_frame(const DicomFile& file, int frame, const XrayOverr
   for (const DicomTag& tag : {kFieldOfViewOrigin, kIsocentreProjection}) {
     if (!header.has(tag)) continue;
     geometry.warnings.push_back(file.path().string() + ": " + tag.text() +
-                                " is not made use of: the ray through the isocentre is taken to meet the image's "
+                                " is not used: the ray through the isocentre is taken to meet the image's "
                                 "centre, which it does not where the image is a part of the detector; check the "
                                 "camera with known points");
     break;  // once is enough

@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cmath>
 
+#include "header_lines.hpp"
 #include "marrow/base/number_text.hpp"
 
 namespace marrow::files {
@@ -17,8 +18,7 @@ using YAML::Comment, YAML::DoubleQuoted;
 bool is_word(const std::string& text) {
   const auto is_of_word = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; };
   static const char* const kNoTexts[] = {"true", "false", "yes", "no", "on", "off", "null", "y", "n"};
-  std::string small = text;
-  for (char& c : small) c = char(std::tolower(static_cast<unsigned char>(c)));
+  const std::string small = in_small_letters(text);
   return !text.empty() && std::isalpha(static_cast<unsigned char>(text[0])) &&
          std::all_of(text.begin(), text.end(), is_of_word) &&
          std::find(std::begin(kNoTexts), std::end(kNoTexts), small) == std::end(kNoTexts);

@@ -14,7 +14,7 @@
 namespace marrow::image {
 namespace {
 
-/// About this many values of an image, at even distances, of those that count.
+/// About this many values at even distances, from the pixels that count.
 std::vector<float> sample_of(const cv::Mat& values, const cv::Mat& counts) {
   constexpr std::size_t kAbout = 65536;
   const std::size_t step = values.total() / kAbout + 1;

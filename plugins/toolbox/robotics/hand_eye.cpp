@@ -66,8 +66,8 @@ double variance_of(double squares, double freedom, double least) {
   return std::max(squares / std::max(1.0, freedom), least * least);
 }
 
-/// A matrix of information, and a little more in all directions: what nothing determines then has a variance that is
-/// huge, but a number.
+/// A matrix of information with a little more in all directions. Then what nothing determines has a huge but finite
+/// variance.
 Eigen::MatrixXd with_a_little(const Eigen::MatrixXd& information, double most) {
   return information + 1e-14 * most * Eigen::MatrixXd::Identity(information.rows(), information.cols());
 }
@@ -183,8 +183,8 @@ RobotWorld changed(const RobotWorld& start, const Eigen::VectorXd& by) {
           changed(start.base_from_world, Eigen::Vector3d::Zero(), by.tail<6>())};
 }
 
-/// What A X and Z B differ by at each station: the rotation in units of `rotation_rad`, then the shift in units of
-/// `shift_mm`.
+/// The differences between A X and Z B at each station: the rotation in units of `rotation_rad`, then the shift in
+/// units of `shift_mm`.
 Eigen::VectorXd differences(const std::vector<Station>& stations, const RobotWorld& found, double rotation_rad,
                             double shift_mm) {
   Eigen::VectorXd all(6 * Eigen::Index(stations.size()));

@@ -2,6 +2,8 @@
 #pragma once
 // How muscles and bones resist a fragment that is moved. A plain model: the numbers are chosen so that forces are of
 // the size that was measured at femoral shafts (Gosling et al., J Orthop Res 23, 2005: 396 N along the shaft).
+#include <cmath>
+
 #include "marrow/base/fields.hpp"
 #include "marrow/domain/transform.hpp"
 
@@ -33,6 +35,11 @@ struct Load {
 
 /// The load on a fragment that is displaced from its right place by `displacement` (r [rad], t [mm]) along its own
 /// axes, the last of which points to the other fragment, and whose bone sticks in the other's by `overlap_mm`.
-Load load_of(const SoftTissue& tissue, const Vector6d& displacement, double overlap_mm);
+inline Load load_of(const SoftTissue& tissue, const Vector6d& displacement, double overlap_mm) {
+  const double longer_mm = -displacement[5];
+  const double along = tissue.tone_n * std::exp(longer_mm / tissue.stretch_mm) + tissue.bone_n_per_mm * overlap_mm,
+               across = tissue.side_n_per_mm * displacement.segment<2>(3).norm();
+  return {std::hypot(along, across), tissue.turn_nm_per_deg * degrees(displacement.head<3>().norm())};
+}
 
 }  // namespace marrow::robot

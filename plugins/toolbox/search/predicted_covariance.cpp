@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "marrow/domain/decompositions.hpp"
 #include "speaking_blocks.hpp"
@@ -20,7 +19,6 @@ constexpr double kFlat = 0.1, kFlatLater = 0.5;  // in units of the wanted rise:
 constexpr double kWantedRise = 10;               // of the cost by a step, in units of its noise
 constexpr int kMostRounds = 5;
 constexpr double kMostVariance = 100 * 100;  // in squared steps; used for directions that nothing determines
-constexpr double kMattersBelow = 12;         // rise of a cost along the least certain direction, in units of its noise
 
 }  // namespace
 
@@ -68,7 +66,7 @@ PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform&
       set_exact();
       return;
     }
-    // After the first round, those directions that are still open have no curvature to look at.
+    // Directions that are still open after the first round have no curvature.
     const auto left_out = round > 1 ? std::count(open_.begin(), open_.end(), true) : 0;
     const double least_curvature = eigen_of_symmetric(h).values[left_out] / wanted_rise_, wanted_before = wanted_rise_;
     wanted_rise_ = std::min(wanted_rise_, kWantedRise * noise_);
@@ -82,7 +80,7 @@ PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform&
   widen();
 }
 
-/// Whether leaving out a block changes the cost for one or two blocks only, at the pose and near it. Then nothing tells
+/// Whether only one or two blocks change the cost when they are left out, at the pose and near it. Then nothing tells
 /// how far the minimum would move without them. Nearly always the pose itself is enough.
 bool PredictedCovariance::rests_on_few_blocks() {
   std::set<Eigen::Index> speak = blocks_that_speak(at_pose_, value_);
@@ -110,9 +108,9 @@ bool PredictedCovariance::is_regular(const Matrix6d& hessian) {
   return eigenvalues[0] > kRounding * eigenvalues[5];
 }
 
-/// By the cost's own derivatives, where it has them. They say little if a direction is nearly flat over many degrees or
-/// millimetres, or flat without one of the blocks, or if only one or two blocks count, or if the cost does not rise as
-/// they say. Then nothing is set, and the result is false.
+/// Sets the covariance from the cost's own derivatives. Returns false, and sets nothing, if the cost has none or they
+/// say little: a direction is nearly flat over many degrees or millimetres, or flat without one of the blocks; only one
+/// or two blocks count; or the cost does not rise as the derivatives say.
 bool PredictedCovariance::differentiate() {
   constexpr double kMostDeviation = 8;  // degrees or mm
   const std::vector<Cost::Expansion> without_block = cost_.expansion_without_each_block(pose_, frame_);
@@ -173,7 +171,7 @@ void PredictedCovariance::set_exact() {
   set_covariance(undetermined);
 }
 
-/// Steps that are nearly right save most of the search for them.
+/// Takes first steps from the curvature of the cost. They are nearly right, which saves most of the search.
 void PredictedCovariance::guess_steps() {
   const auto about = cost_.expansion(pose_, frame_);
   if (!about) return;
@@ -186,7 +184,7 @@ void PredictedCovariance::guess_steps() {
   }
 }
 
-/// A step that is too long or too short gets the length that a parabola would have, at most eight times less or more.
+/// Changes a step that is too long or too short to the length that fits a parabola, by a factor of 8 at most.
 void PredictedCovariance::choose_steps() {
   constexpr double kMostChange = 8;
   std::array<int, 6> evaluations{};
@@ -241,7 +239,7 @@ Matrix6d PredictedCovariance::hessian_of(double value, const Vector6d& rises,
   return h;
 }
 
-/// Of the mean cost without a block.
+/// The Hessian of the mean cost without a block.
 Matrix6d PredictedCovariance::hessian(const Eigen::MatrixXd& at_diagonals) const {
   return hessian_of(at_pose_.mean(), rises_, at_diagonals.colwise().mean());
 }
@@ -261,7 +259,7 @@ Eigen::MatrixXd PredictedCovariance::without_each_block(const std::vector<RigidT
 }
 
 /// The gradients, in units of the steps, of the changes that leaving out a block makes. One block in each row. What all
-/// blocks have in common is the slope of the whole cost, which is none at a minimum.
+/// blocks have in common is taken away: it is the slope of the whole cost, which is 0 at a minimum.
 Eigen::Matrix<double, Eigen::Dynamic, 6> PredictedCovariance::gradients() const {
   Eigen::Matrix<double, Eigen::Dynamic, 6> gradients(at_pose_.size(), 6);
   for (int axis = 0; axis < 6; ++axis) {
@@ -271,7 +269,7 @@ Eigen::Matrix<double, Eigen::Dynamic, 6> PredictedCovariance::gradients() const 
   return gradients;
 }
 
-/// The next steps go along the eigenvectors of the Hessian, which keep the directions that are open.
+/// Turns the steps to the eigenvectors of the Hessian. Open directions stay open.
 void PredictedCovariance::turn_steps(const Matrix6d& hessian) {
   const SymmetricEigen<6> eigen = eigen_of_symmetric(hessian);
   const std::array<bool, 6> were_open = open_;
@@ -320,9 +318,9 @@ void PredictedCovariance::move_without_each_block(const Eigen::MatrixXd& at_diag
 }
 
 void PredictedCovariance::set_covariance(const Matrix6d& undetermined) {
-  constexpr double kNone = 1e-6;  // degrees or mm; no images tell as little
+  constexpr double kNone = 1e-6;  // degrees or mm; no images determine a pose so exactly
   if (in_units_.diagonal().maxCoeff() < kNone * kNone) in_units_.diagonal().setConstant(kLeastStep * kLeastStep);
-  // What is known to hundreds of degrees or millimetres is not known, however large the number.
+  // A deviation of hundreds of degrees or millimetres means that nothing is known, however large it is.
   const Vector6d most = Vector6d::Constant(kMostVariance * kMostStep * kMostStep);
   const Vector6d share = most.cwiseQuotient(in_units_.diagonal().cwiseMax(most)).cwiseSqrt();
   in_units_ = (share.asDiagonal() * in_units_ * share.asDiagonal()).eval();
@@ -331,98 +329,6 @@ void PredictedCovariance::set_covariance(const Matrix6d& undetermined) {
   covariance_ = unit.asDiagonal() * (in_units_ + undetermined) * unit.asDiagonal();
   for (int axis = 0; axis < 6; ++axis)
     undetermined_[std::size_t(axis)] = undetermined(axis, axis) > in_units_(axis, axis);
-}
-
-/// The density exp(-cost / noise) along the eigenvector of the largest eigenvalue, out to twelve standard deviations.
-void PredictedCovariance::widen() {
-  constexpr int kSide = 12;
-  constexpr double kReach = 12;
-  constexpr double kLeastRatio = 2;  // of the variances; less is the roughness of the cost
-  const SymmetricEigen<6> eigen = eigen_of_symmetric(in_units_);
-  const double variance = eigen.values[5];
-  if (!(variance > 0) || !(noise_ > 0)) return;
-  const double step = std::min(kReach * std::sqrt(variance), kMostStep) / kSide;
-  const std::vector<RigidTransform> poses = line(eigen.vectors.col(5), step, kSide);
-  const std::vector<double> values = values_along(poses);
-  find_other_minima(poses, values);
-  const double of_density = variance_of_density(values, step);
-  if (of_density < kLeastRatio * variance) return;
-  Vector6d unit = eigen.vectors.col(5);
-  unit.head<3>() *= radians(1);
-  *covariance_ += (of_density - variance) * unit * unit.transpose();
-}
-
-/// The same for turns about the long axis, out to the longest step. Derivatives are of one place, but about the axis of
-/// a body of revolution facets alone make the minimum, and others lie all around.
-void PredictedCovariance::look_around() {
-  constexpr int kLong = 2;
-  constexpr double kLeastStep_deg = 0.25, kLeastRatio = 2;
-  if (!(noise_ > 0)) return;
-  const int side = int(kMostStep / std::max(std::sqrt(in_units_(kLong, kLong)), kLeastStep_deg)) / 2 * 2;
-  const double step = kMostStep / std::max(side, 1);
-  const double of_density = variance_of_density(values_along(line(Vector6d::Unit(kLong), step, side)), step);
-  const double now = (*covariance_)(kLong, kLong) * degrees(1) * degrees(1);
-  if (of_density < kLeastRatio * now) return;
-  (*covariance_)(kLong, kLong) = of_density * radians(1) * radians(1);
-}
-
-/// Poses along a direction, `side` to either side of the pose.
-std::vector<RigidTransform> PredictedCovariance::line(const Vector6d& direction, double step, int side) const {
-  std::vector<RigidTransform> poses;
-  for (int i = -side; i <= side; ++i) poses.push_back(pose_at(i * step * direction));
-  return poses;
-}
-
-/// About the pose, of the density exp(-cost / noise) at the poses of line().
-double PredictedCovariance::variance_of_density(const std::vector<double>& values, double step) const {
-  const int side = int(values.size()) / 2;
-  double sum = 0, squares = 0;
-  for (int i = -side; i <= side; ++i) {
-    const double density = std::exp(-std::max(0.0, values[std::size_t(i + side)] - value_) / noise_);
-    sum += density;
-    squares += density * (i * step) * (i * step);
-  }
-  return squares / sum;
-}
-
-/// The cost at poses on a line, a standard deviation or less apart. Every second comes first. Those between are
-/// computed only beside a cost that could matter, and are infinite elsewhere.
-std::vector<double> PredictedCovariance::values_along(const std::vector<RigidTransform>& poses) {
-  std::vector<double> values(poses.size(), std::numeric_limits<double>::infinity());
-  const auto compute = [&](const std::vector<std::size_t>& chosen) {
-    std::vector<RigidTransform> at;
-    for (const std::size_t i : chosen) at.push_back(poses[i]);
-    const std::vector<double> computed = cost_.values(at);
-    for (std::size_t k = 0; k < chosen.size(); ++k) values[chosen[k]] = computed[k];
-    evaluations_ += int(chosen.size());
-  };
-  std::vector<std::size_t> chosen;
-  for (std::size_t i = 0; i < poses.size(); i += 2) chosen.push_back(i);
-  compute(chosen);
-  chosen.clear();
-  for (std::size_t i = 1; i + 1 < poses.size(); i += 2)
-    if (std::min(values[i - 1], values[i + 1]) < value_ + kMattersBelow * noise_) chosen.push_back(i);
-  compute(chosen);
-  return values;
-}
-
-/// `poses` lie on a line through the pose, which is in the middle, a standard deviation or less apart.
-void PredictedCovariance::find_other_minima(const std::vector<RigidTransform>& poses,
-                                            const std::vector<double>& values) {
-  constexpr std::size_t kMost = 2;
-  constexpr int kNear = 1;          // poses at both sides that belong to the pose's own minimum
-  constexpr double kMostRise = 10;  // in units of the cost's noise
-  static_assert(kMostRise < kMattersBelow);
-  const int count = int(values.size()), middle = count / 2;
-  std::vector<int> found;
-  for (int i = 1; i + 1 < count; ++i) {
-    const double here = values[std::size_t(i)];
-    if (std::abs(i - middle) > kNear && here < values[std::size_t(i - 1)] && here <= values[std::size_t(i + 1)] &&
-        here < value_ + kMostRise * noise_)
-      found.push_back(i);
-  }
-  std::sort(found.begin(), found.end(), [&](int a, int b) { return values[std::size_t(a)] < values[std::size_t(b)]; });
-  for (std::size_t i = 0; i < std::min(kMost, found.size()); ++i) other_minima_.push_back(poses[std::size_t(found[i])]);
 }
 
 }  // namespace marrow::search

@@ -172,9 +172,9 @@ double size_of(const PredictedCovariance& predicted) {
 }
 
 /// A cost whose own derivatives do not tell how it rises is rough: a few hundredths of a degree away, the same
-/// prediction may be several times as large. So it is made at five poses next to each other, and the middle one is
-/// taken. It belongs to the pose, not to the point of the rough ground at which the search happened to stop. What
-/// nothing determines stays so.
+/// prediction may be several times as large. So it is made at five poses next to each other, and the median is taken.
+/// This depends on the pose, and not on the point of the rough ground where the search happened to stop. What nothing
+/// determines stays undetermined.
 PredictedCovariance on_rough_ground(const PredictedCovariance& at_pose, const Cost& cost, const RigidTransform& pose,
                                     const FragmentFrame& frame, int& evaluations) {
   constexpr double kStep = 0.03;  // degrees and mm

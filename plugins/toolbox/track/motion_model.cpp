@@ -18,8 +18,8 @@ Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
   return matrix;
 }
 
-/// The small motion after a motion that adding to the motion's numbers amounts to: for rotations the right Jacobian of
-/// SO(3) (Sola, eq. 183), for translations the rotation back.
+/// Turns a small change of a motion's numbers into the small motion that follows the motion: by the right Jacobian of
+/// SO(3) for rotations (Sola, eq. 183), and by the inverse rotation for translations.
 Matrix6d of_addition(const Vector6d& motion) {
   const Eigen::Vector3d turn = motion.head<3>();
   const double angle = turn.norm();

@@ -47,7 +47,7 @@ std::array<double, 16> numbers_of(const Line& line) {
   return numbers;
 }
 
-/// Whether there is a comma, and between commas nothing but blanks: programs for tables write NaN so.
+/// Whether the line has commas with only blanks between them. Programs for tables write NaN in this way.
 bool has_only_empty_cells(std::string_view text) {
   return text.find(',') != std::string_view::npos && text.find_first_not_of(", \t") == std::string_view::npos;
 }

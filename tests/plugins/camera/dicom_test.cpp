@@ -199,7 +199,7 @@ TEST(DicomCamera, WarnsWhereTheCentreMayLieElsewhere) {
     const Read warned = read(with(fluoroscopy(), tag, value));
     ASSERT_EQ(warned.warnings.size(), 1u) << name;
     EXPECT_NE(warned.warnings[0].find(std::string(name) +
-                                      " is not made use of: the ray through the isocentre is taken to meet"),
+                                      " is not used: the ray through the isocentre is taken to meet"),
               std::string::npos)
         << warned.warnings[0];
   }

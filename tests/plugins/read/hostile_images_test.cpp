@@ -138,7 +138,7 @@ TEST_F(HostileDicom, KindsOfValuesThatThereAreNot) {
   const std::string good = dicom_file(image_of(16));
   for (const char* kind : {"XX", "DX", "cs", "UX"})
     expect(with(good, std::string("\x08\0\x60\0", 4) + "CS", std::string("\x08\0\x60\0", 4) + kind),
-           "an element is of a kind that there is not");
+           "an element is of an unknown kind");
 }
 
 TEST_F(HostileDicom, BytesInWordsOfTheOtherOrder) {

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// How the cost runs along a line through the pose, farther than its derivatives tell.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "marrow/domain/decompositions.hpp"
+#include "predicted_covariance.hpp"
+
+namespace marrow::search {
+namespace {
+
+constexpr double kMattersBelow = 12;  // rise of a cost along the least certain direction, in units of its noise
+
+}  // namespace
+
+/// Widens the covariance by the density exp(-cost / noise) along the eigenvector of the largest eigenvalue, out to
+/// twelve standard deviations.
+void PredictedCovariance::widen() {
+  constexpr int kSide = 12;
+  constexpr double kReach = 12;
+  constexpr double kLeastRatio = 2;  // of the variances; less is the roughness of the cost
+  const SymmetricEigen<6> eigen = eigen_of_symmetric(in_units_);
+  const double variance = eigen.values[5];
+  if (!(variance > 0) || !(noise_ > 0)) return;
+  const double step = std::min(kReach * std::sqrt(variance), kMostStep) / kSide;
+  const std::vector<RigidTransform> poses = line(eigen.vectors.col(5), step, kSide);
+  const std::vector<double> values = values_along(poses);
+  find_other_minima(poses, values);
+  const double of_density = variance_of_density(values, step);
+  if (of_density < kLeastRatio * variance) return;
+  Vector6d unit = eigen.vectors.col(5);
+  unit.head<3>() *= radians(1);
+  *covariance_ += (of_density - variance) * unit * unit.transpose();
+}
+
+/// The same for turns about the long axis, out to the longest step. Derivatives describe one place only, but for a body
+/// of revolution only the facets make the minimum, and there are others all around.
+void PredictedCovariance::look_around() {
+  constexpr int kLong = 2;
+  constexpr double kLeastStep_deg = 0.25, kLeastRatio = 2;
+  if (!(noise_ > 0)) return;
+  const int side = int(kMostStep / std::max(std::sqrt(in_units_(kLong, kLong)), kLeastStep_deg)) / 2 * 2;
+  const double step = kMostStep / std::max(side, 1);
+  const double of_density = variance_of_density(values_along(line(Vector6d::Unit(kLong), step, side)), step);
+  const double now = (*covariance_)(kLong, kLong) * degrees(1) * degrees(1);
+  if (of_density < kLeastRatio * now) return;
+  (*covariance_)(kLong, kLong) = of_density * radians(1) * radians(1);
+}
+
+/// Poses along a direction, `side` to either side of the pose.
+std::vector<RigidTransform> PredictedCovariance::line(const Vector6d& direction, double step, int side) const {
+  std::vector<RigidTransform> poses;
+  for (int i = -side; i <= side; ++i) poses.push_back(pose_at(i * step * direction));
+  return poses;
+}
+
+/// The variance, about the pose, of the density exp(-cost / noise) at the poses of line().
+double PredictedCovariance::variance_of_density(const std::vector<double>& values, double step) const {
+  const int side = int(values.size()) / 2;
+  double sum = 0, squares = 0;
+  for (int i = -side; i <= side; ++i) {
+    const double density = std::exp(-std::max(0.0, values[std::size_t(i + side)] - value_) / noise_);
+    sum += density;
+    squares += density * (i * step) * (i * step);
+  }
+  return squares / sum;
+}
+
+/// The cost at poses on a line, a standard deviation or less apart. Every second one is computed first. Those between
+/// are computed only beside a cost that could matter, and are infinite elsewhere.
+std::vector<double> PredictedCovariance::values_along(const std::vector<RigidTransform>& poses) {
+  std::vector<double> values(poses.size(), std::numeric_limits<double>::infinity());
+  const auto compute = [&](const std::vector<std::size_t>& chosen) {
+    std::vector<RigidTransform> at;
+    for (const std::size_t i : chosen) at.push_back(poses[i]);
+    const std::vector<double> computed = cost_.values(at);
+    for (std::size_t k = 0; k < chosen.size(); ++k) values[chosen[k]] = computed[k];
+    evaluations_ += int(chosen.size());
+  };
+  std::vector<std::size_t> chosen;
+  for (std::size_t i = 0; i < poses.size(); i += 2) chosen.push_back(i);
+  compute(chosen);
+  chosen.clear();
+  for (std::size_t i = 1; i + 1 < poses.size(); i += 2)
+    if (std::min(values[i - 1], values[i + 1]) < value_ + kMattersBelow * noise_) chosen.push_back(i);
+  compute(chosen);
+  return values;
+}
+
+/// `poses`: on a line, a standard deviation or less apart, with the pose itself in the middle.
+void PredictedCovariance::find_other_minima(const std::vector<RigidTransform>& poses,
+                                            const std::vector<double>& values) {
+  constexpr std::size_t kMost = 2;
+  constexpr int kNear = 1;          // poses at both sides that belong to the pose's own minimum
+  constexpr double kMostRise = 10;  // in units of the cost's noise
+  static_assert(kMostRise < kMattersBelow);
+  const int count = int(values.size()), middle = count / 2;
+  std::vector<int> found;
+  for (int i = 1; i + 1 < count; ++i) {
+    const double here = values[std::size_t(i)];
+    if (std::abs(i - middle) > kNear && here < values[std::size_t(i - 1)] && here <= values[std::size_t(i + 1)] &&
+        here < value_ + kMostRise * noise_)
+      found.push_back(i);
+  }
+  std::sort(found.begin(), found.end(), [&](int a, int b) { return values[std::size_t(a)] < values[std::size_t(b)]; });
+  for (std::size_t i = 0; i < std::min(kMost, found.size()); ++i) other_minima_.push_back(poses[std::size_t(found[i])]);
+}
+
+}  // namespace marrow::search
