@@ -15,7 +15,7 @@ ROOMS = """
 TOPICS = {
     "calibration": {"files"},
     "draw": {"image"},
-    "exchange": {"files"},
+    "exchange": {"files", "vtk"},
     "match": {"image"},
     "phantom": {"calibration", "files"},
     "track": {"files"},

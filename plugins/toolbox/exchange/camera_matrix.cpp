@@ -66,6 +66,13 @@ Eigen::Vector2d corner_mm(const ImageSize& size, const std::string& what) {
   return {size.corner_mm[0], size.corner_mm[1]};
 }
 
+std::optional<Eigen::Matrix3d> rotation_near(const Eigen::Matrix3d& matrix) {
+  const Eigen::Matrix3d nearest = nearest_orthogonal(matrix);
+  const double defect = (nearest - matrix).cwiseAbs().maxCoeff();
+  if (!(defect < 1e-4) || nearest.determinant() < 0) return std::nullopt;
+  return defect < 1e-12 ? matrix : nearest;
+}
+
 Camera camera_of(const Eigen::Matrix<double, 3, 4>& pixel_from_world, const Eigen::Vector2i& size_px, Mirror mirror,
                  const std::string& what) {
   const double scale = pixel_from_world.row(2).head<3>().norm();
@@ -73,7 +80,7 @@ Camera camera_of(const Eigen::Matrix<double, 3, 4>& pixel_from_world, const Eige
     throw Error(what + ": its matrix does not project along rays from a source; it is damaged, or of parallel rays");
   const Eigen::Matrix<double, 3, 4> p = turning(mirror, size_px.x(), size_px.y()) * pixel_from_world / scale;
   const Eigen::RowVector3d z = p.row(2).head<3>();
-  // Rows of the camera's axes, one after the other: what is left of a row is along the next axis.
+  // Decomposes P row by row: what the axes found so far leave of a row is along the next axis.
   const double v0 = p.row(1).head<3>().dot(z);
   const Eigen::RowVector3d y_scaled = p.row(1).head<3>() - v0 * z;
   const double f_v = y_scaled.norm();

@@ -2,6 +2,7 @@
 #pragma once
 // Cameras of other programs: what their readers and writers share.
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,10 @@ struct ImageSize {
 Eigen::Vector2i size_px(const ImageSize& size, const std::string& what);
 Eigen::Vector2d pixel_mm(const std::vector<double>& numbers, const std::string& what);
 Eigen::Vector2d corner_mm(const ImageSize& size, const std::string& what);
+
+/// The rotation that a matrix with few digits stands for: the nearest one, or the matrix itself if it is exact to
+/// 1e-12. std::nullopt if an element differs by 1e-4 or more, because the matrix scales, shears or mirrors.
+std::optional<Eigen::Matrix3d> rotation_near(const Eigen::Matrix3d& matrix);
 
 /// The camera with pixel ~ P (x, 1), for images that are turned over as `mirror` says. P counts pixels from the centre
 /// of the first one, and its third coordinate must be positive in front of the source. Throws Error if P is singular,

@@ -48,7 +48,7 @@ void Hdf5Reader::refuse(const std::string& key, const std::string& what) const {
 }
 
 bool Hdf5Reader::has(const std::string& key) const {
-  // Each group on the way must be there, or HDF5 takes the question for an error. A link may lead to another file.
+  // Asks for each group on the way, because HDF5 reports an error if one is missing. A link may lead to another file.
   for (std::size_t at = key.find('/', 1);; at = key.find('/', at + 1)) {
     const std::string part = key.substr(0, at);
     if (H5Lexists(file_, part.c_str(), H5P_DEFAULT) <= 0) return false;

@@ -10,8 +10,8 @@
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/domain/decompositions.hpp"
-#include "marrow/toolbox/files/input_file.hpp"
+#include "marrow/toolbox/exchange/camera_matrix.hpp"
+#include "marrow/toolbox/files/header_lines.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 
 namespace marrow::exchange {
@@ -121,13 +121,12 @@ Eigen::Matrix3d rotation_of(const Lines& lines, const std::vector<double>& p, co
     expect_count(lines, lines.parameters_line, 12, p.size(), "parameters");
     Eigen::Matrix3d matrix;
     for (int i = 0; i < 9; ++i) matrix(i / 3, i % 3) = p[std::size_t(i)];
-    const Eigen::Matrix3d nearest = nearest_orthogonal(matrix);
-    const double defect = (nearest - matrix).cwiseAbs().maxCoeff();
-    if (defect > 1e-4 || nearest.determinant() < 0)
+    const auto rotation = rotation_near(matrix);
+    if (!rotation)
       lines.refuse(
           lines.parameters_line,
           "the matrix scales, shears or mirrors, but a pose is a rotation and a translation; register rigidly");
-    return defect < 1e-12 ? matrix : nearest;  // a few digits only: the nearest rotation
+    return *rotation;
   }
   expect_count(lines, lines.parameters_line, 6, p.size(), "parameters");
   const Eigen::Vector3d first(p[0], p[1], p[2]);
@@ -138,8 +137,7 @@ Eigen::Matrix3d rotation_of(const Lines& lines, const std::vector<double>& p, co
 }  // namespace
 
 bool is_itk_transform_file(const std::filesystem::path& path) {
-  std::string end = path.extension().string();
-  for (char& c : end) c = char(std::tolower(static_cast<unsigned char>(c)));
+  const std::string end = files::extension_of(path);
   return end == ".tfm" || end == ".txt";
 }
 

@@ -10,7 +10,7 @@
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/toolbox/files/input_file.hpp"
+#include "marrow/toolbox/files/header_lines.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 
 namespace marrow::exchange {
@@ -111,7 +111,8 @@ struct Header {
 };
 
 /// 3D Slicer 5 ends a row with two cells more than it names columns, some versions after an empty one: whether the
-/// point is placed (0 to 3, 2 if it is), and whether a program made it (0 or 1). Nothing if the row does not end so.
+/// point is placed (0 to 3, 2 if it is), and whether a program made it (0 or 1). Nothing if the row ends in another
+/// way.
 std::optional<double> status_of(const std::vector<std::string>& cells, const Header& header) {
   if (cells.size() < header.columns + 2) return std::nullopt;
   const auto is_empty = [](const std::string& cell) { return cell.find_first_not_of(' ') == std::string::npos; };
@@ -121,9 +122,9 @@ std::optional<double> status_of(const std::vector<std::string>& cells, const Hea
   return is_known ? status : std::nullopt;
 }
 
-/// Whether cells that are neither coordinates nor texts hold what they never do: a flag that is not 0 or 1, an axis
-/// that is longer than 1, or an angle about no axis.
-bool holds_what_cannot_be(const std::vector<std::string>& cells, const Header& header) {
+/// Whether cells other than coordinates and texts hold impossible values: a flag that is not 0 or 1, an axis that is
+/// longer than 1, or an angle about no axis.
+bool holds_impossible_values(const std::vector<std::string>& cells, const Header& header) {
   const auto number = [&](std::size_t place) { return place < cells.size() ? number_in(cells[place]) : std::nullopt; };
   for (const std::size_t flag : header.of_flags)
     if (const auto value = number(flag); value && *value != 0 && *value != 1) return true;
@@ -134,11 +135,11 @@ bool holds_what_cannot_be(const std::vector<std::string>& cells, const Header& h
   return longest > 1 || (longest == 0 && std::abs(number(header.of_orientation[0]).value_or(0)) > 1);
 }
 
-/// Whether a number with a decimal comma may have become two cells, so that the coordinates and the label are not where
-/// the columns say. A row may lack cells at its end, or have an empty one there, where the label shows that nothing has
+/// Whether a number with a decimal comma may have become two cells, which moves the coordinates and the label to other
+/// columns. A row may also lack cells at its end, or have an empty one there. Then the label shows that nothing has
 /// moved.
 bool may_be_shifted(const std::vector<std::string>& cells, const Header& header, bool has_status) {
-  if (holds_what_cannot_be(cells, header)) return true;
+  if (holds_impossible_values(cells, header)) return true;
   if (cells.size() == header.columns + (has_status ? 2 : 0)) return false;
   return (cells.size() > header.columns && !has_status) || number_in(cells[header.label]).has_value();
 }
@@ -165,10 +166,9 @@ std::optional<MarkedPoint> point_of(const std::string& text, const Header& heade
 }
 
 /// In small or capital letters.
-bool ends_with(const std::filesystem::path& path, const std::string& end) {
-  std::string name = path.filename().string();
-  for (char& c : name) c = char(std::tolower(static_cast<unsigned char>(c)));
-  return name.size() > end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0;
+bool ends_with(const std::filesystem::path& path, std::string_view end) {
+  const std::string name = files::in_small_letters(path.filename().string());
+  return name.size() > end.size() && name.ends_with(end);
 }
 
 std::string quoted(const std::string& text) {

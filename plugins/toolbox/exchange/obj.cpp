@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Wavefront OBJ: lines "v x y z" and "f 1 2 3". Of a corner "7/2/5" the first number names the vertex. Numbers begin at
 // 1; negative ones count back from the last vertex. Normals, textures, groups and materials are passed over. A line of
-// numbers that ends with \ goes on in the next one.
+// numbers that ends with \ continues in the next one.
 #include <algorithm>
 #include <charconv>
 #include <string_view>

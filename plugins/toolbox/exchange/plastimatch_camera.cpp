@@ -8,7 +8,6 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/plain_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/domain/decompositions.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 
@@ -93,14 +92,14 @@ Camera read_plastimatch_camera(const std::filesystem::path& path, const ImageSiz
   text.title("Intrinsic");
   const Matrix34 intrinsic = text.numbers<3, 4>("a row of the intrinsic matrix");
   const Eigen::Matrix3d k = intrinsic.leftCols<3>();
-  const Eigen::Matrix3d nearest = nearest_orthogonal(extrinsic.topLeftCorner<3, 3>());
+  const auto rotation = rotation_near(extrinsic.topLeftCorner<3, 3>());
   const Matrix34 product = intrinsic * extrinsic;
   for (int r = 0; r < 3; ++r)  // the file has 9 digits
     if (!((product.row(r) - matrix.row(r)).norm() <= 1e-5 * matrix.row(r).norm()))
       throw Error(formatted(
           "{}: row {} of its matrix is not that of Intrinsic times Extrinsic; one of them was changed: write it again",
           what, r + 1));
-  if (!((nearest - extrinsic.topLeftCorner<3, 3>()).cwiseAbs().maxCoeff() < 1e-4) || nearest.determinant() < 0)
+  if (!rotation)
     throw Error(what + ": its extrinsic matrix is no rotation and translation; it is damaged: write it again");
   if (!(k(2, 2) > 0) || !(k(0, 0) > 0) || !(k(1, 1) > 0) || k(1, 0) != 0 || k(2, 0) != 0 || k(2, 1) != 0)
     throw Error(what +
@@ -112,9 +111,7 @@ Camera read_plastimatch_camera(const std::filesystem::path& path, const ImageSiz
   camera.height_px = pixels.y();
   camera.intrinsics = k / k(2, 2);
   camera.intrinsics.block<2, 1>(0, 2) += centre_px;
-  camera.camera_from_world.rotation = (nearest - extrinsic.topLeftCorner<3, 3>()).cwiseAbs().maxCoeff() < 1e-12
-                                          ? extrinsic.topLeftCorner<3, 3>()
-                                          : nearest;
+  camera.camera_from_world.rotation = *rotation;
   camera.camera_from_world.translation_mm = extrinsic.topRightCorner<3, 1>();
   check_camera(camera, what);
   return camera;

@@ -1,21 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// RTK's geometry in XML. What holds for all projections stands before the first one; a projection that does not name an
-// element has that of the one before.
-#include "rtk_file.hpp"
-
+// RTK's geometry in XML. Values for all projections come before the first one. A projection without an element has the
+// value of the projection before.
 #include <expat.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <memory>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/toolbox/exchange/rtk_geometry.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
+#include "marrow/toolbox/files/yaml_text.hpp"
 
 namespace marrow::exchange {
 namespace {
@@ -23,6 +25,19 @@ namespace {
 constexpr std::uint64_t kMostBytes = 256u << 20;
 constexpr double kLargest = 1e7;  // no angle, no distance, and no number of a matrix of such distances is larger
 constexpr const char* kRoot = "RTKThreeDCircularGeometry";
+
+/// The elements of RTK's file, and where their numbers go.
+constexpr std::array<std::pair<const char*, double RtkProjection::*>, 9> kRtkElements{{
+    {"SourceToIsocenterDistance", &RtkProjection::source_to_isocentre_mm},
+    {"SourceToDetectorDistance", &RtkProjection::source_to_detector_mm},
+    {"GantryAngle", &RtkProjection::gantry_deg},
+    {"OutOfPlaneAngle", &RtkProjection::out_of_plane_deg},
+    {"InPlaneAngle", &RtkProjection::in_plane_deg},
+    {"SourceOffsetX", &RtkProjection::source_x_mm},
+    {"SourceOffsetY", &RtkProjection::source_y_mm},
+    {"ProjectionOffsetX", &RtkProjection::projection_x_mm},
+    {"ProjectionOffsetY", &RtkProjection::projection_y_mm},
+}};
 
 class RtkReader {
  public:
@@ -158,6 +173,25 @@ class RtkReader {
 
 std::vector<RtkProjection> read_rtk(const std::filesystem::path& path) {
   return RtkReader(path).read(files::read_bytes(path, kMostBytes));
+}
+
+std::string rtk_geometry(const std::vector<Camera>& cameras, const Eigen::Vector2d& pixel_mm) {
+  std::string text = "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<RTKThreeDCircularGeometry version=\"3\">\n";
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const RtkProjection p = projection_of(cameras[i], pixel_mm, formatted("camera {}", i + 1));
+    text += "  <Projection>\n";
+    for (const auto& [name, member] : kRtkElements)
+      text += "    <" + std::string(name) + ">" + files::number(p.*member) + "</" + name + ">\n";
+    text += "    <Matrix>\n";
+    const Eigen::Matrix<double, 3, 4> matrix = rtk_matrix(p);
+    for (int row = 0; row < 3; ++row) {
+      text += "     ";
+      for (int column = 0; column < 4; ++column) text += " " + files::number(matrix(row, column));
+      text += "\n";
+    }
+    text += "    </Matrix>\n  </Projection>\n";
+  }
+  return text + "</RTKThreeDCircularGeometry>\n";
 }
 
 }  // namespace marrow::exchange

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What RTK's angles, distances and offsets mean (RTK's documentation, "RTK geometry"), and its file as it is written.
+// What RTK's angles, distances and offsets mean (RTK's documentation, "RTK geometry").
 #include "marrow/toolbox/exchange/rtk_geometry.hpp"
 
 #include <Eigen/Geometry>
@@ -8,7 +8,6 @@
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
-#include "rtk_file.hpp"
 
 namespace marrow::exchange {
 namespace {
@@ -35,7 +34,21 @@ void set_angles(RtkProjection& p, const Eigen::Matrix3d& axes) {
   }
 }
 
-/// The projection of a camera whose images are turned upside down: v and the axis towards the source change their sign.
+}  // namespace
+
+Matrix34 rtk_matrix(const RtkProjection& p) {
+  Eigen::Matrix4d rotation = Eigen::Matrix4d::Identity(), to_source = Eigen::Matrix4d::Identity();
+  rotation.topLeftCorner<3, 3>() = detector_axes(p);
+  to_source.topRightCorner<2, 1>() << -p.source_x_mm, -p.source_y_mm;
+  Matrix34 magnification;
+  magnification << -p.source_to_detector_mm, 0, 0, 0,  //
+      0, -p.source_to_detector_mm, 0, 0,               //
+      0, 0, 1, -p.source_to_isocentre_mm;
+  Eigen::Matrix3d to_detector = Eigen::Matrix3d::Identity();
+  to_detector.topRightCorner<2, 1>() << p.source_x_mm - p.projection_x_mm, p.source_y_mm - p.projection_y_mm;
+  return to_detector * magnification * to_source * rotation;
+}
+
 RtkProjection projection_of(const Camera& camera, const Eigen::Vector2d& pixel_mm, const std::string& what) {
   const Eigen::Matrix3d& k = camera.intrinsics;
   const Eigen::Vector2d focal_mm(k(0, 0) * pixel_mm.x(), k(1, 1) * pixel_mm.y());
@@ -59,21 +72,6 @@ RtkProjection projection_of(const Camera& camera, const Eigen::Vector2d& pixel_m
   return p;
 }
 
-}  // namespace
-
-Matrix34 rtk_matrix(const RtkProjection& p) {
-  Eigen::Matrix4d rotation = Eigen::Matrix4d::Identity(), to_source = Eigen::Matrix4d::Identity();
-  rotation.topLeftCorner<3, 3>() = detector_axes(p);
-  to_source.topRightCorner<2, 1>() << -p.source_x_mm, -p.source_y_mm;
-  Matrix34 magnification;
-  magnification << -p.source_to_detector_mm, 0, 0, 0,  //
-      0, -p.source_to_detector_mm, 0, 0,               //
-      0, 0, 1, -p.source_to_isocentre_mm;
-  Eigen::Matrix3d to_detector = Eigen::Matrix3d::Identity();
-  to_detector.topRightCorner<2, 1>() << p.source_x_mm - p.projection_x_mm, p.source_y_mm - p.projection_y_mm;
-  return to_detector * magnification * to_source * rotation;
-}
-
 Camera camera_of(const RtkProjection& projection, const ImageSize& size, Mirror mirror, const std::string& what) {
   const Eigen::Vector2i pixels = size_px(size, what);
   const Eigen::Vector2d spacing = pixel_mm(size.pixel_mm, what), corner = corner_mm(size, what);
@@ -83,25 +81,6 @@ Camera camera_of(const RtkProjection& projection, const ImageSize& size, Mirror 
     pixel_from_mm(i, 2) = -corner[i] / spacing[i];
   }
   return camera_of(Matrix34(-pixel_from_mm * rtk_matrix(projection)), pixels, mirror, what);
-}
-
-std::string rtk_geometry(const std::vector<Camera>& cameras, const Eigen::Vector2d& pixel_mm) {
-  std::string text = "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<RTKThreeDCircularGeometry version=\"3\">\n";
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
-    const RtkProjection p = projection_of(cameras[i], pixel_mm, formatted("camera {}", i + 1));
-    text += "  <Projection>\n";
-    for (const auto& [name, member] : kRtkElements)
-      text += "    <" + std::string(name) + ">" + files::number(p.*member) + "</" + name + ">\n";
-    text += "    <Matrix>\n";
-    const Matrix34 matrix = rtk_matrix(p);
-    for (int row = 0; row < 3; ++row) {
-      text += "     ";
-      for (int column = 0; column < 4; ++column) text += " " + files::number(matrix(row, column));
-      text += "\n";
-    }
-    text += "    </Matrix>\n  </Projection>\n";
-  }
-  return text + "</RTKThreeDCircularGeometry>\n";
 }
 
 }  // namespace marrow::exchange

@@ -30,6 +30,10 @@ std::vector<RtkProjection> read_rtk(const std::filesystem::path& path);
 /// a size is missing.
 Camera camera_of(const RtkProjection& projection, const ImageSize& size, Mirror mirror, const std::string& what);
 
+/// The projection of a camera whose images are turned upside down and centred on the detector. Throws Error if the
+/// camera's pixels have another size than `pixel_mm`, or are skewed. `what` names the camera.
+RtkProjection projection_of(const Camera& camera, const Eigen::Vector2d& pixel_mm, const std::string& what);
+
 /// A whole file with these cameras, for images that are turned upside down and centred on the detector, as camera_of()
 /// takes them with Mirror::upside_down and no `corner_mm`. Throws Error if a camera's pixels have another size than
 /// `pixel_mm`, or are skewed.

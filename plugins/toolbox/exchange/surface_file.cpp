@@ -6,6 +6,7 @@
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
+#include "marrow/toolbox/files/header_lines.hpp"
 #include "marrow/toolbox/files/length_units.hpp"
 #include "polygons_file.hpp"
 #include "surface_shape.hpp"
@@ -14,8 +15,7 @@ namespace marrow::exchange {
 namespace {
 
 files::MarkedMesh marked_mesh(const std::filesystem::path& path) {
-  std::string end = path.extension().string();
-  for (char& c : end) c = char(std::tolower(static_cast<unsigned char>(c)));
+  const std::string end = files::extension_of(path);
   if (end == ".stl" || end == ".ply") return files::read_marked_mesh(path);
   if (end != ".obj" && end != ".vtp")
     throw Error(path.string() + ": not a surface that can be read; known are .stl, .ply, .obj and .vtp");
@@ -33,7 +33,7 @@ void turn(Mesh& mesh, SurfaceShape& shape, const std::vector<std::uint32_t>& par
     if (is_turned[shape.part_of_triangle[i]]) std::swap(mesh.triangles[i][1], mesh.triangles[i][2]);
 }
 
-/// Of an open surface only: the volume under it as seen from the middle of its corners.
+/// For open surfaces: whether the volume between the surface and the mean of its corners is negative.
 bool seems_to_face_inwards(const Mesh& mesh) {
   Mesh centred = mesh;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();

@@ -29,7 +29,7 @@ std::vector<EdgeOfTriangle> sorted_edges(const Mesh& mesh) {
   return edges;
 }
 
-/// Which triangles hang together.
+/// Which triangles are connected.
 class Parts {
  public:
   explicit Parts(std::size_t triangles) : parent_(triangles) { std::iota(parent_.begin(), parent_.end(), 0u); }
@@ -47,7 +47,7 @@ class Parts {
 };
 
 void add_volumes(const Mesh& mesh, SurfaceShape& shape) {
-  std::vector<Eigen::Vector3d> origins;  // of each part, because a far one would cost digits
+  std::vector<Eigen::Vector3d> origins;  // one for each part: a far one would cost digits
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const auto& [a, b, c] = mesh.triangles[i];
     const std::uint32_t part = shape.part_of_triangle[i];
@@ -113,7 +113,7 @@ std::vector<std::uint32_t> parts_inside_out(const Mesh& mesh, const SurfaceShape
   for (const std::uint32_t part : inward) {
     const auto first = std::find(shape.part_of_triangle.begin(), shape.part_of_triangle.end(), part);
     const auto& [a, b, c] = mesh.triangles[std::size_t(first - shape.part_of_triangle.begin())];
-    // Not a middle of any kind, because the ray from there might meet edges of regular surfaces.
+    // Not the centre, because a ray from there might meet edges of regular surfaces.
     const Eigen::Vector3d point =
         0.5137 * mesh.vertices_mm[a] + 0.2713 * mesh.vertices_mm[b] + 0.215 * mesh.vertices_mm[c];
     if (outward_parts_around(point, mesh, shape) <= 0) found.push_back(part);

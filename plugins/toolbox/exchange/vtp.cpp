@@ -5,7 +5,6 @@
 #include <vtkLogger.h>
 #include <vtkNew.h>
 #include <vtkOutputWindow.h>
-#include <vtkPoints.h>
 #include <vtkPolyData.h>
 #include <vtkSmartPointer.h>
 #include <vtkStringArray.h>
@@ -22,12 +21,13 @@
 #include "marrow/base/printable.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
+#include "marrow/toolbox/vtk/poly_data.hpp"
 #include "polygons_file.hpp"
 
 namespace marrow::exchange {
 namespace {
 
-/// Keeps the first complaint of any part of VTK, which it would else print.
+/// Keeps the first complaint of VTK, instead of printing it.
 class Complaints : public vtkOutputWindow {
  public:
   static Complaints* New() { return new Complaints; }
@@ -52,7 +52,7 @@ class Complaints : public vtkOutputWindow {
   std::string first_;
 };
 
-/// Takes VTK's complaints while it lives.
+/// Receives VTK's complaints during its lifetime.
 class Listening {
  public:
   explicit Listening(Complaints* complaints) : before_(vtkOutputWindow::GetInstance()) {
@@ -171,20 +171,10 @@ FilePolygons read_vtp(const std::filesystem::path& path) {
 
 std::string vtp_bytes(const Mesh& mesh) {
   check_mesh(mesh, "the surface cannot be written as .vtp");
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  for (const Eigen::Vector3d& vertex : mesh.vertices_mm) points->InsertNextPoint(vertex.data());
-  vtkNew<vtkCellArray> faces;
-  for (const auto& triangle : mesh.triangles) {
-    const vtkIdType corners[3] = {vtkIdType(triangle[0]), vtkIdType(triangle[1]), vtkIdType(triangle[2])};
-    faces->InsertNextCell(3, corners);
-  }
   vtkNew<vtkStringArray> space;
   space->SetName("SPACE");
   space->InsertNextValue("LPS");
-  vtkNew<vtkPolyData> data;
-  data->SetPoints(points);
-  data->SetPolys(faces);
+  const auto data = vtk::poly_data(mesh);
   data->GetFieldData()->AddArray(space);
   vtkNew<vtkXMLPolyDataWriter> writer;
   writer->SetInputData(data);

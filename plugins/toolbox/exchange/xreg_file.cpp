@@ -8,7 +8,6 @@
 #include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/domain/decompositions.hpp"
 
 namespace marrow::exchange {
 namespace {
@@ -55,8 +54,7 @@ XregProjection read_camera(const Hdf5Reader& file, const std::string& where) {
   p.column_spacing_mm = spacing_mm(file, where + "col-spacing");
   p.intrinsic = matrix<3>(file, where + "intrinsic");
   p.extrinsic = matrix<4>(file, where + "extrinsic");
-  const Eigen::Matrix3d rotation = p.extrinsic.topLeftCorner<3, 3>(), nearest = nearest_orthogonal(rotation);
-  if (!((nearest - rotation).cwiseAbs().maxCoeff() < 1e-4) || nearest.determinant() < 0 ||
+  if (!rotation_near(p.extrinsic.topLeftCorner<3, 3>()) ||
       (p.extrinsic.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() > 1e-9)
     file.refuse(where + "extrinsic", "expected a rotation and a translation as a 4x4 matrix; the file is damaged");
   if ((p.intrinsic.row(2) - Eigen::RowVector3d(0, 0, 1)).cwiseAbs().maxCoeff() > 1e-9 || p.intrinsic(1, 0) != 0)
@@ -92,8 +90,7 @@ Camera camera_of(const XregProjection& p, Mirror mirror, const std::string& what
   const Eigen::Vector2i pixels(p.width_px, p.height_px);
   if (p.frame == kPositiveZ && mirror == Mirror::none && p.intrinsic(0, 0) > 0 && p.intrinsic(1, 1) > 0) {
     Camera camera{p.width_px, p.height_px, p.intrinsic, {"camera", "world"}};  // as it is, to the last bit
-    const Eigen::Matrix3d rotation = p.extrinsic.topLeftCorner<3, 3>(), nearest = nearest_orthogonal(rotation);
-    camera.camera_from_world.rotation = (nearest - rotation).cwiseAbs().maxCoeff() < 1e-12 ? rotation : nearest;
+    camera.camera_from_world.rotation = rotation_near(p.extrinsic.topLeftCorner<3, 3>()).value();
     camera.camera_from_world.translation_mm = p.extrinsic.topRightCorner<3, 1>();
     check_camera(camera, what);
     return camera;
