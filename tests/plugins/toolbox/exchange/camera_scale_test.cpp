@@ -71,19 +71,15 @@ TEST_F(CameraScale, NamesTheUnitThatItLooksLike) {
     call("read.camera", {{"path", at("cm.txt")}, {"scale", scale}});
     return said;
   };
-  EXPECT_NE(doubt(0.01).find("is 0.88 mm from the world's origin, where devices have 200 to 5000; looks like m: give "
-                             "scale: 10\n"),
-            std::string::npos)
-      << said;
-  EXPECT_NE(
-      doubt(0.2).find("is 17.6 mm from the world's origin, where devices have 200 to 5000; looks like inches: give "
-                      "scale: 5.08\n"),
-      std::string::npos)
-      << said;
-  EXPECT_NE(doubt(1e4).find("is 8.8e+05 mm from the world's origin, where devices have 200 to 5000; looks like "
-                            "micrometres: give scale: 10\n"),
-            std::string::npos)
-      << said;
+  EXPECT_CONTAINS(doubt(0.01),
+                  "is 0.88 mm from the world's origin, where devices have 200 to 5000; looks like m: give "
+                  "scale: 10\n");
+  EXPECT_CONTAINS(doubt(0.2),
+                  "is 17.6 mm from the world's origin, where devices have 200 to 5000; looks like inches: give "
+                  "scale: 5.08\n");
+  EXPECT_CONTAINS(doubt(1e4),
+                  "is 8.8e+05 mm from the world's origin, where devices have 200 to 5000; looks like "
+                  "micrometres: give scale: 10\n");
   EXPECT_EQ(doubt(2.3), "");    // 202 mm
   EXPECT_EQ(doubt(56.8), "");   // 4999 mm
   EXPECT_NE(doubt(2.27), "");   // 199.8 mm
@@ -135,9 +131,8 @@ TEST_F(CameraScale, OfACase) {
   EXPECT_LT((views[0].camera.camera_from_world.translation_mm - kInMm).norm(), 1e-12);
   EXPECT_EQ(said, "");
   put(folder / "case/case.yaml", text("{file: cm.txt, scale: 0}"));
-  EXPECT_NE(shipped::refusal("read.case", {}, {{"path", at("case")}})
-                .find("scale: expected a factor of at least 1e-6, such as 10 for cm"),
-            std::string::npos);
+  EXPECT_CONTAINS(shipped::refusal("read.case", {}, {{"path", at("case")}}),
+                  "scale: expected a factor of at least 1e-6, such as 10 for cm");
 }
 
 TEST_F(CameraScale, OfAGeometryWhoseOptionsAreInMm) {

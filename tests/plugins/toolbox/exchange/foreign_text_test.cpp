@@ -16,12 +16,6 @@ using namespace marrow::test;
 using marrow::hash_of;
 using Path = std::filesystem::path;
 
-std::string with_line_ends(const std::string& text, const std::string& line_end) {
-  std::string result;
-  for (const char c : text) result += c == '\n' ? line_end : std::string(1, c);
-  return result;
-}
-
 /// By hand: in UTF-16 an ASCII character is its byte and a zero, in the order that the first two bytes show.
 std::string utf16(const std::string& ascii, bool big_endian) {
   std::string result = big_endian ? "\xFE\xFF" : "\xFF\xFE";

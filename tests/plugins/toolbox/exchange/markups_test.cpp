@@ -133,8 +133,8 @@ TEST(Markups, WhatIsWrittenIsReadBackExactly) {
     ASSERT_EQ(read.names(), std::vector<std::string>{"distal part"}) << name;
     EXPECT_EQ(marrow::hash_of(read[0]), marrow::hash_of(seeds)) << name;
   }
-  EXPECT_NE(bytes_of(folder / "s.mrk.json").find("\"coordinateSystem\": \"LPS\""), std::string::npos);
-  EXPECT_NE(bytes_of(folder / "s.fcsv").find("# CoordinateSystem = LPS\n"), std::string::npos);
+  EXPECT_CONTAINS(bytes_of(folder / "s.mrk.json"), "\"coordinateSystem\": \"LPS\"");
+  EXPECT_CONTAINS(bytes_of(folder / "s.fcsv"), "# CoordinateSystem = LPS\n");
   EXPECT_TRUE(shipped::declares("write.markups", marrow::exactly_one({"in.landmarks", "in.seeds"})));
 }
 

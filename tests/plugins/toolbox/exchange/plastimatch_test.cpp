@@ -161,22 +161,18 @@ TEST(Plastimatch, DiagnosesFaults) {
     all["path"] = (folder / "c.txt").string();
     return shipped::refusal("read.camera", {}, all);
   };
-  EXPECT_NE(refusal({{"mirror", "left_right"}}).find("mirror is not for this format of cameras; leave it out"),
-            std::string::npos);
-  EXPECT_NE(refusal({{"projection", 1LL}}).find("projection is not for this format of cameras"), std::string::npos);
-  EXPECT_NE(refusal({{"pixel_mm", std::vector<double>{1}}}).find("pixel_mm is not for this format"), std::string::npos);
-  EXPECT_NE(shipped::refusal("write.plastimatch", {{"camera", shipped::item(oblique_camera())}},
-                             {{"pixel_mm", std::vector<double>{-1}}})
-                .find("pixel_mm: expected a size in mm between 1e-6 and 1000, got -1"),
-            std::string::npos);
-  EXPECT_NE(shipped::refusal("write.plastimatch", {{"camera", shipped::item(oblique_camera())}},
-                             {{"pixel_mm", std::vector<double>{1, 1, 1}}})
-                .find("pixel_mm: expected [width, height], or one number for square pixels, got 3"),
-            std::string::npos);
+  EXPECT_CONTAINS(refusal({{"mirror", "left_right"}}), "mirror is not for this format of cameras; leave it out");
+  EXPECT_CONTAINS(refusal({{"projection", 1LL}}), "projection is not for this format of cameras");
+  EXPECT_CONTAINS(refusal({{"pixel_mm", std::vector<double>{1}}}), "pixel_mm is not for this format");
+  EXPECT_CONTAINS(shipped::refusal("write.plastimatch", {{"camera", shipped::item(oblique_camera())}},
+                                   {{"pixel_mm", std::vector<double>{-1}}}),
+                  "pixel_mm: expected a size in mm between 1e-6 and 1000, got -1");
+  EXPECT_CONTAINS(shipped::refusal("write.plastimatch", {{"camera", shipped::item(oblique_camera())}},
+                                   {{"pixel_mm", std::vector<double>{1, 1, 1}}}),
+                  "pixel_mm: expected [width, height], or one number for square pixels, got 3");
 }
 
-// A matrix whose factors agree with it, but are no camera's.
-// What a format does not need would be ignored.
+// A format would ignore an option that it does not need.
 TEST(Plastimatch, DiagnosesOptionsThatAFormatDoesNotNeed) {
   const TemporaryFolder folder;
   put(folder / "c.yaml", "marrow-camera: 1\n");
@@ -196,10 +192,9 @@ TEST(Plastimatch, DiagnosesOptionsThatAFormatDoesNotNeed) {
   expect("c.yaml", {"mirror", "upside_down"}, "mirror");
   marrow::Image image;
   image.pixels = cv::Mat(4, 4, CV_8U, cv::Scalar(0));
-  EXPECT_NE(shipped::refusal("read.camera", {{"image", shipped::item(image)}},
-                             {{"path", (kData / "xreg-by-h5py.h5").string()}})
-                .find("this camera is of images of 200 x 160 pixels, but the image has 4 x 4"),
-            std::string::npos);
+  EXPECT_CONTAINS(shipped::refusal("read.camera", {{"image", shipped::item(image)}},
+                                   {{"path", (kData / "xreg-by-h5py.h5").string()}}),
+                  "this camera is of images of 200 x 160 pixels, but the image has 4 x 4");
 }
 
 TEST(Plastimatch, DiagnosesThatThereIsNothingToWrite) {
@@ -210,6 +205,7 @@ TEST(Plastimatch, DiagnosesThatThereIsNothingToWrite) {
     EXPECT_EQ(shipped::refusal(node, {}, options), "the node that is wired to 'cameras' or 'views' gave none");
 }
 
+// Here the matrix agrees with its factors.
 TEST(Plastimatch, DiagnosesFactorsThatAreNoCamera) {
   const TemporaryFolder folder;
   const auto text = [](const char* matrix, const char* extrinsic, const char* intrinsic) {

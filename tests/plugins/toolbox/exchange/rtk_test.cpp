@@ -66,7 +66,7 @@ TEST(Rtk, TheOriginOfTheImageAndTheOtherWayToTurnIt) {
   EXPECT_LT((project(wide, {10, 5, 100}) - Eigen::Vector2d((50.0 / 3 + 12.5) / 0.25, kSeen.y())).norm(), 1e-9);
 }
 
-// A projection that does not name an element has that of the one before.
+// A projection without an element has the value of the projection before.
 TEST(Rtk, ProjectionsByNumber) {
   const TemporaryFolder folder;
   put(folder / "g.xml", with(file("<SourceOffsetX>3</SourceOffsetX>"), "</RTK",
@@ -183,16 +183,14 @@ TEST(Rtk, DiagnosesCamerasThatItCannotHold) {
     return shipped::refusal("write.rtk", {{"cameras", shipped::list(one, "view")}},
                             {{"pixel_mm", std::move(pixel_mm)}});
   };
-  EXPECT_NE(refusal(cameras()[0], {0.5})
-                .find("camera 1: pixel_mm: with these pixels the detector is 1250 mm from the "
-                      "source by the width and 1000 mm by the height; give the pixel's true"),
-            std::string::npos);
+  EXPECT_CONTAINS(refusal(cameras()[0], {0.5}),
+                  "camera 1: pixel_mm: with these pixels the detector is 1250 mm from the "
+                  "source by the width and 1000 mm by the height; give the pixel's true");
   marrow::Camera askew = cameras()[0];
   askew.intrinsics(0, 1) = 5;
-  EXPECT_NE(refusal(askew, {0.4, 0.5})
-                .find("camera 1: its pixels are askew (the camera matrix has 5 in its first row's "
-                      "second place), which RTK's geometry cannot hold"),
-            std::string::npos);
+  EXPECT_CONTAINS(refusal(askew, {0.4, 0.5}),
+                  "camera 1: its pixels are askew (the camera matrix has 5 in its first row's "
+                  "second place), which RTK's geometry cannot hold");
 }
 
 }  // namespace rtk_test

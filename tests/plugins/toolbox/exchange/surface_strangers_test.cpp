@@ -88,12 +88,6 @@ std::string upper(std::string text) {
   return text;
 }
 
-std::string with_line_ends(const std::string& text, const std::string& end) {
-  std::string changed;
-  for (const char c : text) changed += c == '\n' ? end : std::string(1, c);
-  return changed;
-}
-
 TEST(SurfaceFrames, AMarkOfRasTurnsEveryFormat) {
   const TemporaryFolder folder;
   const std::string slicer = "3D Slicer output. SPACE=";
@@ -130,7 +124,7 @@ TEST(SurfaceFrames, TheFirstMarkCountsAndAContradictionIsSaid) {
   put(folder / "a.obj", "# SPACE=RAS\n# was SPACE=LPS\n" + kObj);
   std::string said;
   expect_tetrahedron(read(folder / "a.obj", &said), "RAS first", -1);
-  EXPECT_NE(said.find("the first, RAS, is taken"), std::string::npos) << said;
+  EXPECT_CONTAINS(said, "the first, RAS, is taken");
 }
 
 // By VTK and numpy: with x and y negated, the 456 vertices of each RAS file are those of LPS_bin.stl bit for bit, and

@@ -8,6 +8,21 @@
 
 namespace marrow::test {
 
+/// Expects that a text holds another; both are shown if it does not.
+#define EXPECT_CONTAINS(text, part) EXPECT_PRED2(marrow::test::contains, text, part)
+inline bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+/// Files of other programs, beside the tests that read them.
+inline const std::filesystem::path kData =
+    std::filesystem::path(MARROW_SOURCE_DIR) / "tests/plugins/toolbox/exchange/data";
+
+/// The text with other ends of its lines than \n.
+inline std::string with_line_ends(const std::string& text, const std::string& line_end) {
+  std::string result;
+  for (const char c : text) result += c == '\n' ? line_end : std::string(1, c);
+  return result;
+}
+
 /// Calls write.NODE with one input, writes what it gives by its writer, and returns the file's bytes.
 template <class File, class T>
 std::string written_by(const std::string& node, const std::string& port, const T& value,

@@ -84,9 +84,8 @@ TEST_F(ViewCamera, EachViewHasItsProjection) {
   expect_same(views[1].camera, camera(folder / "g.xml", sized));
   shipped::Options half = options;
   half["projections"] = std::vector<double>{1, 0.5};
-  EXPECT_NE(
-      shipped::refusal("read.views", {}, half).find("view 'b': projections: expected whole numbers from 0, got 0.5"),
-      std::string::npos);
+  EXPECT_CONTAINS(shipped::refusal("read.views", {}, half),
+                  "view 'b': projections: expected whole numbers from 0, got 0.5");
 }
 
 TEST_F(ViewCamera, WhatIsMissingOrTooMuchIsSaid) {
@@ -97,21 +96,16 @@ TEST_F(ViewCamera, WhatIsMissingOrTooMuchIsSaid) {
   EXPECT_EQ(refusal(kXreg, 200, 160), kXreg.string() +
                                           ": has 3 projections; say by its number, counted from 0, "
                                           "which one is meant (projection)");
-  EXPECT_NE(refusal(folder / "g.xml", 101, 81).find("g.xml: has 2 projections; say by its number"), std::string::npos);
-  EXPECT_NE(refusal(kXreg, 200, 160, {{"projection", 1LL}}).find("its images are seen from the detector"),
-            std::string::npos);
-  EXPECT_NE(refusal(kXreg, 20, 160, {{"projection", 0LL}})
-                .find("the image has 20 x 160 pixels, but its camera is for 200 x 160"),
-            std::string::npos);
-  EXPECT_NE(refusal(kXreg, 200, 160, {{"projection", 0LL}, {"pixel_mm", std::vector<double>{1}}})
-                .find("pixel_mm is not for this format of cameras; leave it out"),
-            std::string::npos);
-  EXPECT_NE(refusal(folder / "g.xml", 101, 81, {{"projection", 0LL}, {"mirror", "upside_down"}})
-                .find("needs the size of a pixel on the detector; give pixel_mm"),
-            std::string::npos);
+  EXPECT_CONTAINS(refusal(folder / "g.xml", 101, 81), "g.xml: has 2 projections; say by its number");
+  EXPECT_CONTAINS(refusal(kXreg, 200, 160, {{"projection", 1LL}}), "its images are seen from the detector");
+  EXPECT_CONTAINS(refusal(kXreg, 20, 160, {{"projection", 0LL}}),
+                  "the image has 20 x 160 pixels, but its camera is for 200 x 160");
+  EXPECT_CONTAINS(refusal(kXreg, 200, 160, {{"projection", 0LL}, {"pixel_mm", std::vector<double>{1}}}),
+                  "pixel_mm is not for this format of cameras; leave it out");
+  EXPECT_CONTAINS(refusal(folder / "g.xml", 101, 81, {{"projection", 0LL}, {"mirror", "upside_down"}}),
+                  "needs the size of a pixel on the detector; give pixel_mm");
   put(folder / "c.yaml", "marrow-camera: 1\n");
-  EXPECT_NE(refusal(folder / "c.yaml", 4, 4, {{"projection", 0LL}}).find("projection is not for this format"),
-            std::string::npos);
+  EXPECT_CONTAINS(refusal(folder / "c.yaml", 4, 4, {{"projection", 0LL}}), "projection is not for this format");
   shipped::Options wired = with_image("", 4, 4, {{"projection", 0LL}, {"name", "ap"}});
   wired.erase("camera");
   marrow::Camera any{4, 4, Eigen::Vector3d(10, 10, 1).asDiagonal(), {"camera", "world"}};
@@ -145,7 +139,7 @@ class CaseCamera : public ViewCamera {
   void expect_said(const std::string& camera, const std::string& expected) {
     put_case(camera, 200, 160);
     const std::string said = message_of([&] { case_at(folder.path()); });
-    EXPECT_NE(said.find(expected), std::string::npos) << "it said: " << said;
+    EXPECT_CONTAINS(said, expected) << "it said: " << said;
   }
 };
 

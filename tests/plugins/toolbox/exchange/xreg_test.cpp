@@ -13,8 +13,7 @@ using marrow::exchange::XregProjection;
 
 // Made with h5py as xReg lays its files out, with a projection in each of the three frames of cameras, images of 200 x
 // 160 pixels, f = 2000 px and pixels of 0.5 mm. The camera is 800 mm from the origin.
-const std::filesystem::path kFile =
-    std::filesystem::path(MARROW_SOURCE_DIR) / "tests/plugins/toolbox/exchange/data/xreg-by-h5py.h5";
+const std::filesystem::path kFile = kData / "xreg-by-h5py.h5";
 
 marrow::Camera read(const std::filesystem::path& path, int projection, const std::string& mirror) {
   return read_by<marrow::Camera>("read.camera", path, {{"projection", (long long)(projection)}, {"mirror", mirror}});
@@ -63,16 +62,13 @@ TEST(Xreg, SeveralProjectionsAtOnce) {
     options["path"] = kFile.string();
     return shipped::refusal("read.cameras", {}, options);
   };
-  EXPECT_NE(refusal("projections", std::vector<double>{2, 3}).find("there is no projection 3"), std::string::npos);
-  EXPECT_NE(refusal("projections", std::vector<double>{2, 0.5})
-                .find("projections: expected whole numbers from 0, got 0.500000"),
-            std::string::npos);
-  EXPECT_NE(refusal("image_size_px", std::vector<double>{2, 3})
-                .find("says itself how large its images are; leave out image_size_px"),
-            std::string::npos);
-  EXPECT_NE(shipped::refusal("read.cameras", {}, {{"path", "a.txt"}, {"names", std::vector<std::string>{"a"}}})
-                .find("a.txt: expected RTK's geometry (.xml) or xReg's projection data (.h5)"),
-            std::string::npos);
+  EXPECT_CONTAINS(refusal("projections", std::vector<double>{2, 3}), "there is no projection 3");
+  EXPECT_CONTAINS(refusal("projections", std::vector<double>{2, 0.5}),
+                  "projections: expected whole numbers from 0, got 0.500000");
+  EXPECT_CONTAINS(refusal("image_size_px", std::vector<double>{2, 3}),
+                  "says itself how large its images are; leave out image_size_px");
+  EXPECT_CONTAINS(shipped::refusal("read.cameras", {}, {{"path", "a.txt"}, {"names", std::vector<std::string>{"a"}}}),
+                  "a.txt: expected RTK's geometry (.xml) or xReg's projection data (.h5)");
 }
 
 marrow::Landmarks landmarks_at(const std::filesystem::path& points, shipped::Options options) {
@@ -156,10 +152,9 @@ TEST(Xreg, DiagnosesWhatCannotBeWritten) {
                             {{"pixel_mm", std::vector<double>{0.4, 0.5}}});
   };
   landmarks.seen[0].view = "oblique";
-  EXPECT_NE(refusal().find("landmark 'head' is seen in view 'oblique', which has no camera here; wire all cameras"),
-            std::string::npos);
+  EXPECT_CONTAINS(refusal(), "landmark 'head' is seen in view 'oblique', which has no camera here; wire all cameras");
   landmarks.seen[0] = {"a/b", "lateral", {1, 2}};
-  EXPECT_NE(refusal().find("landmark 'a/b': a file of xReg cannot hold a name with '/'; rename it"), std::string::npos);
+  EXPECT_CONTAINS(refusal(), "landmark 'a/b': a file of xReg cannot hold a name with '/'; rename it");
 }
 
 TEST(Xreg, DiagnosesFaults) {
