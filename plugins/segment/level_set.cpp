@@ -123,8 +123,8 @@ List<SignedField> level_set_fields(const Volume& volume, const List<Seeds>& seed
   for (std::size_t f = 0; f < fronts.size(); ++f) {
     if (fronts[f].has_vanished())
       throw Error("fragment '" + seeds.name(f) +
-                  "': the front vanished, as its seeds lie too close to the edge of "
-                  "the bone; move them towards the middle of the cortical or spongy bone");
+                  "': the front vanished, as its seeds lie too close to the edge of the bone; move them towards the "
+                  "middle of the cortical or spongy bone");
     if (!seeds[f].wanted) continue;
     fronts[f].finish();
     fields.add(seeds.name(f), SignedField{volume.grid, fronts[f].values_mm()});

@@ -103,8 +103,8 @@ List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds,
     context.progress(0.4 + 0.6 * double(f) / double(seeds.size()), seeds.name(f));
     if (!growth.has_any(f))
       throw Error(
-          formatted("seeds of fragment '{}': none of them lies in bone of {} HU or more that no other "
-                    "fragment has taken; add a point in brighter bone, or lower threshold_hu",
+          formatted("seeds of fragment '{}': none of them lies in bone of {} HU or more that no other fragment has "
+                    "taken; add a point in brighter bone, or lower threshold_hu",
                     seeds.name(f), int(options.threshold_hu)));
     if (!seeds[f].wanted) continue;
     const segment::Mask mask =

@@ -57,10 +57,10 @@ void check_claims(const List<Seeds>& seeds, const Options& options, const std::v
   for (std::uint8_t fragment : owner) has_bone[fragment] = true;
   for (std::size_t f = 0; f < seeds.size(); ++f)
     if (!has_bone[f])
-      throw Error(formatted(
-          "seeds of fragment '{}': none of them lies in bone of {} HU or more that no other fragment has taken; "
-          "add a point in cortical bone, or lower threshold_hu",
-          seeds.name(f), int(options.threshold_hu)));
+      throw Error(
+          formatted("seeds of fragment '{}': none of them lies in bone of {} HU or more that no other fragment has "
+                    "taken; add a point in cortical bone, or lower threshold_hu",
+                    seeds.name(f), int(options.threshold_hu)));
 }
 
 /// Gives the largest connected component of bright voxels to fragment 0.

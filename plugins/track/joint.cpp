@@ -80,12 +80,11 @@ MARROW_PLUGIN(plugin) {
       .summary("Angles and shifts between two bones, frame by frame (Grood and Suntay; helical axis)")
       .in("proximal", "the upper bone after each frame", over("frame"))
       .in("distal", "the lower bone after each frame, of the same CT", over("frame"))
-      .out(
-          "metrics",
-          "flexion, adduction and internal rotation of a right joint (of a left one, the last two change sign); shifts "
-          "of the lower bone to the right, to the front and apart; turn about and shift along the helical axis since "
-          "the first frame",
-          over("frame"))
+      .out("metrics",
+           "flexion, adduction and internal rotation of a right joint (of a left one, the last two change sign); "
+           "shifts of the lower bone to the right, to the front and apart; turn about and shift along the helical axis "
+           "since the first frame",
+           over("frame"))
       .figures({"flexion_deg", "adduction_deg", "internal_rotation_deg", "right_mm", "front_mm", "distraction_mm",
                 "helical_deg", "helical_shift_mm"})
       .option("centre_mm", &Options::centre_mm, "point of the joint in the CT, whose shift is given")

@@ -28,10 +28,10 @@ MARROW_PLUGIN(plugin) {
       .in("camera", "the camera")
       .in("view", "the view whose camera it is")
       .out("matrix", "the projection matrix, and its factors")
-      .option("pixel_mm", &Options::pixel_mm,
-              "width and height of a pixel on the detector, from which its distance follows; one number for square "
-              "pixels",
-              required())
+      .option(
+          "pixel_mm", &Options::pixel_mm,
+          "width and height of a pixel on the detector, from which its distance follows; one number for square pixels",
+          required())
       .relation(exactly_one({"in.camera", "in.view"}));
   plugin.writer<PlastimatchFile>(".txt", exchange::write_file, "projection matrix of plastimatch");
 }

@@ -47,8 +47,8 @@ inline std::vector<std::vector<Eigen::Vector3d>> seed_indices(const marrow::Volu
             if (volume.grid.contains(x, y, z)) sum += volume.at(x, y, z), ++count;
       if (sum / count < least_hu) {
         const std::string value = formatted(
-            " is not in bone: the CT shows {:.0f} HU there, at least {:.0f} HU expected; move it "
-            "into cortical or spongy bone",
+            " is not in bone: the CT shows {:.0f} HU there, at least {:.0f} HU expected; move it into cortical or "
+            "spongy bone",
             sum / count, least_hu);
         throw Error(fragment + where + value);
       }

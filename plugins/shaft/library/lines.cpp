@@ -23,8 +23,8 @@ void check_inputs(const EdgeMap& edges, const View& view) {
                           what, edges.width_px, edges.height_px, view.camera.width_px, view.camera.height_px));
   if (edges.pixels.empty())
     throw Error(what +
-                "the edge map is empty, so there is no shaft in it; look at the image, and lower the "
-                "thresholds of the edge detector");
+                "the edge map is empty, so there is no shaft in it; look at the image, and lower the thresholds of the "
+                "edge detector");
   for (const EdgePixel& edge : edges.pixels)
     if (!std::isfinite(edge.u_px) || !std::isfinite(edge.v_px) || !std::isfinite(edge.direction_u) ||
         !std::isfinite(edge.direction_v))

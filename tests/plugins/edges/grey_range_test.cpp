@@ -120,10 +120,10 @@ TEST(GreyRange, AnOffsetDoesNotMoveEdges) {
     const Found right(node, true_floats), found(node, shifted);
     EXPECT_TRUE(right.lines.empty()) << node;
     ASSERT_EQ(found.lines.size(), 1u) << node;
-    EXPECT_NE(found.lines[0].find("pixels are negative, down to -2000, which is taken as the grey value where no light "
-                                  "falls; edges may be off by a fraction of a pixel, so give the detector's own grey "
-                                  "values"),
-              std::string::npos)
+    EXPECT_NE(
+        found.lines[0].find("pixels are negative, down to -2000, which is taken as the grey value where no light "
+                            "falls; edges may be off by a fraction of a pixel, so give the detector's own grey values"),
+        std::string::npos)
         << found.lines[0];
     EXPECT_LT(farthest_px(right.edges, found.edges), 0.02) << node;
   }

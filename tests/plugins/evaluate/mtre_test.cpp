@@ -48,8 +48,8 @@ TEST(Mtre, SaysWhatIsWrong) {
   EXPECT_EQ(
       shipped::refusal("evaluate.mtre",
                        {{"pose", shipped::item(shifted(0, 0, 0))}, {"truth", exact()}, {"model", shipped::item(line)}}),
-      "model: the surface has no area, as all its triangles are points or lines; check the file or the node that "
-      "it is from");
+      "model: the surface has no area, as all its triangles are points or lines; check the file or the node that it is "
+      "from");
   marrow::Pose pose;
   pose.world_from_model.source = "mri";
   EXPECT_EQ(

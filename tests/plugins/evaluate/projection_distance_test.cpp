@@ -89,7 +89,7 @@ TEST(ProjectionDistance, SaysWhatIsWrong) {
     far.add(view.name, view);
   }
   EXPECT_EQ(refusal(kProjection, shifted(0, 0, 0), far),
-            "view 'frontal': a target does not lie in front of the X-ray source at the true pose; is the truth of "
+            "view 'frontal': a target does not lie in front of the X-ray source at the true pose; is the truth in "
             "another world frame?");
 }
 

@@ -147,10 +147,9 @@ TEST(EvaluateShaftLines, WithoutABoneThereTheyCannotBeCompared) {
   Listener listener;
   EXPECT_TRUE(compared(borders(frontal()), {}, {}, listener).is_absent());
   ASSERT_EQ(listener.warnings.size(), 1u);
-  EXPECT_EQ(
-      listener.warnings[0],
-      "view 'frontal': no fragment of known pose lies where the pair of borders was found, so there is nothing to "
-      "compare it with");
+  EXPECT_EQ(listener.warnings[0],
+            "view 'frontal': no fragment of known pose lies where the pair of borders was found, so there is nothing "
+            "to compare it with");
 }
 
 }  // namespace shaft_lines_test

@@ -117,7 +117,7 @@ TEST(Misalignment, TheLimbMayLieOtherwiseInTheCt) {
   EXPECT_EQ(shipped::refusal("fracture.misalignment", inputs(poses(moved)),
                              {{"up", std::vector<double>{0, 1, 0}}, {"front", std::vector<double>{-1, 0, 0}}}),
             "the bone's long axis runs from the patient's left to the right in the CT, so its frontal plane is not "
-            "known; give 'front' and 'up' as they are for this limb in the CT");
+            "known; give the 'front' and 'up' of this limb in the CT");
 }
 
 /// Half of the tubes' facing ends is exactly the fracture's middle, by symmetry.

@@ -43,10 +43,10 @@ TEST(Reduction, IsAboutTheFragmentsMiddleEvenIfThePoseDoesNotSayWhereThatIs) {
   EXPECT_EQ(found.at("pose").as<marrow::Pose>().frame.origin_mm, middle_mm);
   shipped::Inputs without = inputs(given);
   without.erase("models");
-  EXPECT_EQ(shipped::refusal("fracture.reduction", without),
-            "the pose of 'distal' does not say where the fragment's middle is and how its long axis runs, as a matrix "
-            "alone does not; wire the surfaces of both fragments to 'models', or give the node that reads the pose its "
-            "model");
+  EXPECT_EQ(
+      shipped::refusal("fracture.reduction", without),
+      "the pose of 'distal' does not say where the fragment's middle is and how its long axis runs, as a matrix alone "
+      "does not; wire the surfaces of both fragments to 'models', or give the node that reads the pose its model");
 }
 
 }  // namespace reduction_test

@@ -137,14 +137,13 @@ TEST(OpenLoop, AMoveByARobotWhosePlaceIsHardlyKnownIsRefused) {
   for (const std::string method : {"ax_zb", "ax_xb"}) {
     const Scene made = with_noise(scene(), 0.5, 1);
     const std::string text = shipped::refusal("guide.open_loop", inputs(made), {{"method", method}});
-    EXPECT_TRUE(
-        text.starts_with("the stations do not tell well enough where the robot is: this move would leave the "
-                         "fragment "))
+    EXPECT_TRUE(text.starts_with(
+        "the stations do not tell well enough where the robot is: this move would leave the fragment "))
         << method << ": " << text;
     EXPECT_TRUE(
-        text.ends_with(" mm from its place (one standard deviation), at most 2 degrees and 2 mm are allowed; "
-                       "turn the robot further between stations, about axes that are at least 30 degrees "
-                       "apart, or raise max_deviation_deg and max_deviation_mm"))
+        text.ends_with(" mm from its place (one standard deviation), at most 2 degrees and 2 mm are allowed; turn the "
+                       "robot further between stations, about axes that are at least 30 degrees apart, or raise "
+                       "max_deviation_deg and max_deviation_mm"))
         << method << ": " << text;
     EXPECT_EQ(shipped::refusal("guide.open_loop", inputs(made),
                                {{"method", method}, {"max_deviation_deg", 90.0}, {"max_deviation_mm", 1000.0}}),
@@ -162,10 +161,10 @@ TEST(OpenLoop, SaysThatThePosesDoNotShowTheFragmentsMiddle) {
     without.add(made.poses.name(i), pose);
   }
   made.poses = without;
-  EXPECT_EQ(shipped::refusal("guide.open_loop", inputs(made)),
-            "the pose of 'distal' does not say where the fragment's middle is and how its long axis runs, as a matrix "
-            "alone does not; wire the surfaces of both fragments to 'models', or give the node that reads the pose its "
-            "model");
+  EXPECT_EQ(
+      shipped::refusal("guide.open_loop", inputs(made)),
+      "the pose of 'distal' does not say where the fragment's middle is and how its long axis runs, as a matrix alone "
+      "does not; wire the surfaces of both fragments to 'models', or give the node that reads the pose its model");
 }
 
 TEST(OpenLoop, NeedsHandAndTargetOfTheSameStations) {

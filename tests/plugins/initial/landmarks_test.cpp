@@ -157,7 +157,7 @@ TEST(Landmarks, WarnsOfExchangedNames) {
   std::swap(landmarks.seen[0].pixel, landmarks.seen[1].pixel);
   const marrow::Pose pose = found(landmarks);
   ASSERT_EQ(pose.warnings.size(), 1u);
-  EXPECT_NE(pose.warnings[0].find("where 1 px were expected; are two names exchanged, or is a camera wrong?"),
+  EXPECT_NE(pose.warnings[0].find("but 1 px were expected; are two names exchanged, or is a camera wrong?"),
             std::string::npos)
       << pose.warnings[0];
   EXPECT_GT(pose.cost, 3);

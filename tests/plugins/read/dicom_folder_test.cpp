@@ -185,8 +185,8 @@ TEST_F(DicomFolder, AllFilesThatMayBeDamagedSlicesAreNamedAtOnce) {
   put_file("IM8", "<html>not found</html>");
   put_file("IM9.dcm", std::string(500, '\1'));
   EXPECT_SAYS(read(),
-              "holds 3 files beside the slices that are no whole DICOM files; those that are slices are damaged "
-              "at their start: fetch them again, and remove the others from the folder:");
+              "holds 3 files beside the slices that are no whole DICOM files; those that are slices are damaged at "
+              "their start: fetch them again, and remove the others from the folder:");
   for (const char* line :
        {"\n    IM7: this file in the series' folder is no whole DICOM file (it is empty)",
         "\n    IM8: this file in the series' folder is no whole DICOM file (it has 22 bytes, at least",

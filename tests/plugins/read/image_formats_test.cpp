@@ -60,10 +60,8 @@ std::string from_hex(const std::string& digits) {
 // one.
 const std::string kJpeg = from_hex(
     "ffd8ffe000104a46494600010100000100010000ffdb0043000101010101010101010101010101010101010101010101010101010101010101"
-    "01"
-    "01010101010101010101010101010101010101010101010101010101010101ffc0000b080008001001011100ffc40015000101000000000000"
-    "00"
-    "000000000000000a0bffc40014100100000000000000000000000000000000ffda0008010100003f0031ea583fffd9");
+    "0101010101010101010101010101010101010101010101010101010101010101ffc0000b080008001001011100ffc400150001010000000000"
+    "0000000000000000000a0bffc40014100100000000000000000000000000000000ffda0008010100003f0031ea583fffd9");
 
 TEST_F(ImageFormats, TheContentTellsTheFormatWhateverTheName) {
   write_itk(folder / "a.png", ramp<std::uint16_t>({7, 5}, 1801));
@@ -99,8 +97,8 @@ TEST_F(ImageFormats, FilesForVolumesHoldImagesToo) {
   EXPECT_EQ(read("signed.tif").at<float>(4, 6), -3400);
   read("a.nii", 1);
   expect_warned(
-      "a.nii: NIfTI does not say which row of an image is the upper one; the first that is stored is taken as "
-      "the upper one, as ITK writes it: compare it with the anatomy, or save it as PNG");
+      "a.nii: NIfTI does not say which row of an image is the upper one; the first that is stored is taken as the "
+      "upper one, as ITK writes it: compare it with the anatomy, or save it as PNG");
   read("a.mha", 1);
   EXPECT_EQ(warnings, "");
 }
@@ -175,8 +173,8 @@ TEST_F(ImageFormats, BmpAsFrameGrabbersWriteIt) {
   put(folder / "c.bmp",
       bmp(24, "\x28\x28\x28\x32\x32\x32\xC8\xC8\xC8\0\0\0\x0A\x0A\x0A\x01\x02\x03\x1E\x1E\x1E\0\0\0"s));
   EXPECT_SAYS(read("c.bmp"),
-              "c.bmp: has colours: the pixel at column 2 of row 1 has red 3, green 2, blue 1; an X-ray "
-              "image is grey: save it as grey levels");
+              "c.bmp: has colours: the pixel at column 2 of row 1 has red 3, green 2, blue 1; an X-ray image is grey: "
+              "save it as grey levels");
   put(folder / "rle.bmp", bmp(8, "\x03\x0A\0\x01"s, grey, 2, 1));
   EXPECT_SAYS(read("rle.bmp"), "rle.bmp: is a BMP of 8 bits stored by method 1, which is not read; save it as PNG");
   put(folder / "none.bmp", bmp(8, "\x28\x32\xC8\0\x0A\x14\x1E\0"s, grey.substr(0, 100 * 4)));
@@ -199,9 +197,8 @@ TEST_F(ImageFormats, EqualColoursAreGrey) {
       EXPECT_TRUE(are_equal(read(name), right)) << name << " " << components;
       colours.samples[components * 4 + 1] = 49;
       write_itk(folder / name, colours);
-      EXPECT_SAYS(read(name), std::string(name) +
-                                  ": has colours: the pixel at column 2 of row 2 has red 50, green 49, "
-                                  "blue 50");
+      EXPECT_SAYS(read(name),
+                  std::string(name) + ": has colours: the pixel at column 2 of row 2 has red 50, green 49, blue 50");
     }
   ItkGrid<std::uint16_t> deep{.size = {2, 1}, .samples = {999, 999, 999, 60000, 60000, 60000}, .components = 3};
   write_itk(folder / "deep.png", deep);
@@ -209,8 +206,8 @@ TEST_F(ImageFormats, EqualColoursAreGrey) {
   ItkGrid<std::uint8_t> glass{.size = {2, 1}, .samples = {9, 9, 9, 255, 8, 8, 8, 254}, .components = 4};
   write_itk(folder / "glass.png", glass);
   EXPECT_SAYS(read("glass.png"),
-              "glass.png: is transparent in places: the pixel at column 2 of row 1 has the opacity "
-              "254, expected 255; save it without transparency (an alpha channel)");
+              "glass.png: is transparent in places: the pixel at column 2 of row 1 has the opacity 254, expected 255; "
+              "save it without transparency (an alpha channel)");
 }
 
 TEST_F(ImageFormats, WhatIsNoImageIsNamed) {
@@ -218,8 +215,7 @@ TEST_F(ImageFormats, WhatIsNoImageIsNamed) {
        {std::pair{"GIF89a", "is a GIF picture, not an image that can be read; save it as PNG"},
         {"%PDF-1.4", "is a PDF document, not an image that can be read"},
         {"some text",
-         "not an image that can be read; known are PNG, TIFF, JPEG, BMP, "
-         "DICOM, MetaImage, NRRD and NIfTI"}}) {
+         "not an image that can be read; known are PNG, TIFF, JPEG, BMP, DICOM, MetaImage, NRRD and NIfTI"}}) {
     put(folder / "a", content);
     EXPECT_SAYS(read("a"), "a: " + std::string(words));
   }

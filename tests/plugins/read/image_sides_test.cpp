@@ -97,10 +97,10 @@ TEST_F(ImageSides, ACameraOfAnglesDecides) {
   EXPECT_EQ(said(elements, camera_at(20, 30)), Doubts());
   const Doubts mirrored = said(elements, camera_at(0, 180));
   ASSERT_EQ(mirrored.size(), 1u);
-  EXPECT_EQ(mirrored[0],
-            "/a.dcm: is mirrored: by its header (PatientOrientation (0020,0020)) the patient's right is on the right "
-            "and the feet below, as nobody sees it from the source of this camera; mirror the image, or correct the "
-            "angles");
+  EXPECT_EQ(
+      mirrored[0],
+      "/a.dcm: is mirrored: by its header (PatientOrientation (0020,0020)) the patient's right is on the right and the "
+      "feet below, as nobody sees it from the source of this camera; mirror the image, or correct the angles");
   elements[kOrientation] = "CS:L\\F";
   EXPECT_EQ(said(elements, camera_at(0, 0)).size(), 1u);
   EXPECT_EQ(said(elements, camera_at(0, 180)), Doubts());

@@ -96,10 +96,9 @@ TEST(ReadPose, DiagnosesFaults) {
   expect(kPose + "covariance: [[1]]\n", "covariance: expected 6 rows of 6 numbers");
   const std::string of_five =
       "[0, 1, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0], [0, 0, 0, 0, 1, 0], [0, 0, 0, 0, 0, 1]]\n";
-  expect(
-      kPose + "covariance: [[-1, 0, 0, 0, 0, 0], " + of_five,
-      "p.yaml:6:13: pose: covariance: the covariance has the negative variance -1 in row 1, column 1; a covariance is "
-      "symmetric and has no negative eigenvalue");
+  expect(kPose + "covariance: [[-1, 0, 0, 0, 0, 0], " + of_five,
+         "p.yaml:6:13: pose: covariance: the covariance has the negative variance -1 in row 1, column 1; a covariance "
+         "is symmetric and has no negative eigenvalue");
   expect(kPose + "covariance: [[1, 0, 0, 0, 0, 0.5], " + of_five,
          "p.yaml:6:13: pose: covariance: the covariance is not symmetric: 0.5 in row 1, column 6, but 0 in row 6, "
          "column 1; a covariance is symmetric and has no negative eigenvalue");
@@ -167,9 +166,9 @@ TEST(ReadPose, RefusesAModelInAnotherFrame) {
   put(folder / "p.yaml", kPose);
   marrow::Mesh mesh = oblique_box();
   mesh.frame = "elsewhere";
-  EXPECT_EQ(shipped::refusal("read.pose", {{"model", shipped::item(mesh)}}, {{"path", (folder / "p.yaml").string()}}),
-            "the model is in the frame 'elsewhere', but the pose takes points in 'ct'; give the model that was "
-            "registered");
+  EXPECT_EQ(
+      shipped::refusal("read.pose", {{"model", shipped::item(mesh)}}, {{"path", (folder / "p.yaml").string()}}),
+      "the model is in the frame 'elsewhere', but the pose takes points in 'ct'; give the model that was registered");
 }
 
 }  // namespace pose_test

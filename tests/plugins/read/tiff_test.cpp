@@ -51,8 +51,7 @@ std::vector<Page> pages_of(std::size_t count, const std::string& description_of_
 
 std::string ome(const std::string& sizes, const std::string& data = "<TiffData/>") {
   return "<?xml version=\"1.0\"?><OME xmlns=\"http://www.openmicroscopy.org/Schemas/OME/2016-06\"><Image "
-         "ID=\"Image:0\">"
-         "<Pixels " +
+         "ID=\"Image:0\"><Pixels " +
          sizes + ">" + data + "</Pixels></Image></OME>";
 }
 

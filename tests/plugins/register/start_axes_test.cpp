@@ -66,8 +66,8 @@ TEST(StartAxes, AreThoseOfTheModelIfTheStartHasNone) {
   }
   Trial trial(true);
   EXPECT_EQ(trial.run("register.multiresolution").warnings,
-            std::vector<std::string>{"axial rotation is poorly determined by these images: its predicted standard "
-                                     "deviation is 4 degrees"});
+            std::vector<std::string>{
+                "axial rotation is poorly determined by these images: its predicted standard deviation is 4 degrees"});
 }
 
 TEST(StartAxes, WithoutAModelNobodySpeaksOfALongAxis) {
@@ -110,9 +110,9 @@ TEST(StartAxes, RefusesTheModelOfAnotherBone) {
   Trial trial(true);
   trial.mesh.frame = "elsewhere";
   trial.inputs["model"] = shipped::item(trial.mesh);
-  EXPECT_EQ(shipped::refusal("register.multiresolution", trial.inputs),
-            "the model is in the frame 'elsewhere', but the pose takes points in 'ct'; give the model that was "
-            "registered");
+  EXPECT_EQ(
+      shipped::refusal("register.multiresolution", trial.inputs),
+      "the model is in the frame 'elsewhere', but the pose takes points in 'ct'; give the model that was registered");
 }
 
 TEST(StartAxes, WarningsOfTheStartAreNotOfThePose) {

@@ -74,12 +74,11 @@ TEST(Hexapod, AMotionBeyondTheLimitsIsRefused) {
             }),
             "motion 'up' is outside the hexapod's workspace: leg 1 would be 565.7 mm long, its limits are 419.6 mm and "
             "539.6 mm; give a smaller motion");
-  EXPECT_EQ(
-      message_of([&] {
-        robot::check_workspace(hexapod, {60, 5}, pose({0, 0, 20}, {0, 0, 400}), "motion 'turn'");
-      }),
-      "motion 'turn' is outside the hexapod's workspace: leg 1 would turn by 12.5 degrees in its joint, its limit "
-      "is 5.0 degrees; give a smaller motion");
+  EXPECT_EQ(message_of([&] {
+              robot::check_workspace(hexapod, {60, 5}, pose({0, 0, 20}, {0, 0, 400}), "motion 'turn'");
+            }),
+            "motion 'turn' is outside the hexapod's workspace: leg 1 would turn by 12.5 degrees in its joint, its "
+            "limit is 5.0 degrees; give a smaller motion");
   EXPECT_EQ(message_of([&] { robot::check_workspace(hexapod, {60, 40}, hexapod.base_from_home, "home"); }), "");
 }
 

@@ -151,10 +151,10 @@ TEST(Robot, RefusesWhatItCannotGrip) {
   EXPECT_TRUE(
       text.ends_with("its limit is 400 N; does its bone stick in the other fragment? Begin with the fragments apart"))
       << text;
-  EXPECT_EQ(shipped::refusal("robot.hexapod", {{"phantom", shipped::item(broken({0, 0, 0}, {0, 0, -5}))}},
-                             {{"moved", "proximal"}, {"reference", "distal"}}),
-            "robot.hexapod: the robot holds the distal fragment, and the proximal one stays; got 'proximal' and "
-            "'distal'");
+  EXPECT_EQ(
+      shipped::refusal("robot.hexapod", {{"phantom", shipped::item(broken({0, 0, 0}, {0, 0, -5}))}},
+                       {{"moved", "proximal"}, {"reference", "distal"}}),
+      "robot.hexapod: the robot holds the distal fragment, and the proximal one stays; got 'proximal' and 'distal'");
   Phantom whole = broken({0, 0, 0}, {0, 0, -5});
   whole.fracture = {};
   EXPECT_EQ(shipped::refusal("robot.hexapod", {{"phantom", shipped::item(whole)}}),

@@ -87,10 +87,9 @@ TEST(Threshold, ASeedInSparseSpongyBoneIsGoodBesideOneInCortex) {
   EXPECT_GT(marrow::sample_trilinear(volume.grid, fields[0].values_mm, volume.grid.index_from_point(at_height(4))), 0);
   List<Seeds> only_spongy;
   only_spongy.add("distal", Seeds{"distal", {at_height(4)}});
-  EXPECT_EQ(
-      shipped::refusal(kNode, segmented::inputs(volume, only_spongy)),
-      "seeds of fragment 'distal': none of them lies in bone of 250 HU or more that no other fragment has taken; add a "
-      "point in cortical bone, or lower threshold_hu");
+  EXPECT_EQ(shipped::refusal(kNode, segmented::inputs(volume, only_spongy)),
+            "seeds of fragment 'distal': none of them lies in bone of 250 HU or more that no other fragment has taken; "
+            "add a point in cortical bone, or lower threshold_hu");
 }
 
 // What the level set is for: level_set_test.cpp segments the same CT to 0.1 mm. (Higher thresholds find no spongy bone

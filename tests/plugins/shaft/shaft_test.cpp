@@ -19,8 +19,7 @@ TEST_P(Shaft, DeclaresADeviationForEachWidth) {
 TEST_P(Shaft, SaysWhatIsWrongWithItsInputs) {
   EXPECT_EQ(message_of([&] { find_shaft(no_edges(), empty_view()); }),
             "view 'frontal': the edge map is empty, so there is no shaft in it; look at the image, and lower the "
-            "thresholds of the edge "
-            "detector");
+            "thresholds of the edge detector");
   marrow::EdgeMap edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);
   EXPECT_EQ(

@@ -77,13 +77,13 @@ TEST_F(TrackKeyframes, SaysWhatIsWrong) {
   EXPECT_EQ(refusal("femur.tra"),
             "femur.tra: expected a folder with a file BONE.tra for each bone that has keyframes (name the folder, not "
             "a file in it)");
-  EXPECT_EQ(refusal("nowhere"),
-            "nowhere: expected a folder with a file BONE.tra for each bone that has keyframes; there is no such "
-            "folder");
+  EXPECT_EQ(
+      refusal("nowhere"),
+      "nowhere: expected a folder with a file BONE.tra for each bone that has keyframes; there is no such folder");
   std::filesystem::create_directory(folder / "empty");
-  EXPECT_EQ(refusal("empty"),
-            "empty: there is no .tra file in it; a file of keyframes is named after its bone, one of 'femur', "
-            "'left/tibia'");
+  EXPECT_EQ(
+      refusal("empty"),
+      "empty: there is no .tra file in it; a file of keyframes is named after its bone, one of 'femur', 'left/tibia'");
 }
 
 class TrackPredict : public testing::Test {
@@ -156,10 +156,9 @@ TEST_F(TrackPredict, WithoutAKeyframeInTheFrameItIsAsBefore) {
 TEST_F(TrackPredict, RefusesAFrameBehindTheLastLine) {
   const AutoscoperTrack keyframes{{keyframe, std::nullopt}};
   state.frame = 1;
-  EXPECT_EQ(
-      shipped::refusal("track.predict", {{"state", item(state)}, {"keyframes", item(keyframes)}}),
-      "there are keyframes for 2 frames, but this is frame 3; give a line for each frame, with NaN where there is "
-      "no keyframe");
+  EXPECT_EQ(shipped::refusal("track.predict", {{"state", item(state)}, {"keyframes", item(keyframes)}}),
+            "there are keyframes for 2 frames, but this is frame 3; give a line for each frame, with NaN where there "
+            "is no keyframe");
 }
 
 // A bone that jumps, as after a gap in the recording: without a keyframe it stays lost, with one it is found at once.

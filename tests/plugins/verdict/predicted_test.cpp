@@ -125,10 +125,10 @@ TEST(VerdictPredicted, IsTheSameEachTime) {
 TEST(VerdictPredicted, RefusesAnotherBonesSurface) {
   marrow::Mesh mesh = box();
   mesh.frame = "elsewhere";
-  EXPECT_EQ(shipped::refusal("verdict.predicted",
-                             {{"pose", shipped::item(pose_with({0, 0, 1, 0, 0, 1}))}, {"model", shipped::item(mesh)}}),
-            "the model is in the frame 'elsewhere', but the pose takes points in 'ct'; give the model that was "
-            "registered");
+  EXPECT_EQ(
+      shipped::refusal("verdict.predicted",
+                       {{"pose", shipped::item(pose_with({0, 0, 1, 0, 0, 1}))}, {"model", shipped::item(mesh)}}),
+      "the model is in the frame 'elsewhere', but the pose takes points in 'ct'; give the model that was registered");
 }
 
 /// A prior that is turned by an angle about the long axis against a pose.

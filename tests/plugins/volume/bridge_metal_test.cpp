@@ -90,17 +90,17 @@ TEST(BridgeMetal, SaysWhatItCannotBridge) {
   add_metal(end, 28, 29, 16);
   const Bridged at_end(end);
   EXPECT_EQ(at_end.ct.values, end.values);
-  EXPECT_EQ(at_end.lines,
-            std::vector<std::string>{"slices 27 to 29 (z = 32.4 to 34.8 mm) show long metal at the end of the CT, so "
-                                     "there is nothing to bridge them from"});
+  EXPECT_EQ(at_end.lines, std::vector<std::string>{"slices 27 to 29 (z = 32.4 to 34.8 mm) show long metal at the end "
+                                                   "of the CT, so there is nothing to bridge them from"});
   marrow::Volume wide = ct();
   add_metal(wide, 2, 27, 4);
   add_metal(wide, 10, 18, 16);
   const Bridged too_long(wide, {{"longest_mm", 10.0}});
   EXPECT_EQ(too_long.ct.values, wide.values);
-  EXPECT_EQ(too_long.lines, std::vector<std::string>{
-                                "slices 9 to 19 (z = 10.8 to 22.8 mm) show long metal over more than longest_mm, so "
-                                "they stay as they are"});
+  EXPECT_EQ(
+      too_long.lines,
+      std::vector<std::string>{
+          "slices 9 to 19 (z = 10.8 to 22.8 mm) show long metal over more than longest_mm, so they stay as they are"});
   EXPECT_NE(Bridged(wide).ct.values, wide.values);
 }
 
