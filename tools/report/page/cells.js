@@ -18,7 +18,7 @@ const NAMES = {
 const longest = (texts, least, most) =>
     Math.min(most, texts.reduce((length, text) => Math.max(length, String(text).length), least));
 
-// The place of each text in the order of all.
+// The rank of each text among all.
 function ranks(texts) {
   const places = [];
   Rows.order(texts, (text) => text).forEach((place, rank) => (places[place] = rank));
@@ -127,7 +127,7 @@ export class Table {
         el('label', {class: 'field'}, el('span', {}, 'Text'), this.text));
   }
 
-  // What a cell is found by.
+  // The text that the filter searches.
   wordsOf(cell) {
     if (!this.words.has(cell)) {
       const {data} = this, words = [

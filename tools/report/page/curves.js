@@ -3,7 +3,7 @@
 import {el, number, svg} from './dom.js';
 import * as Plots from './plots.js';
 
-// Costs of different measures cannot be compared; scaled to 0..1 each, their shapes can.
+// Costs of different measures cannot be compared. Each is scaled to 0..1, so their shapes can.
 function scaled(costs, each) {
   if (!each) return costs;
   const low = Math.min(...costs), high = Math.max(...costs);
@@ -69,7 +69,7 @@ function drawLandscape(data, axis, unit, entries, each, width) {
 
 const having = (cells, name) => cells.filter((cell) => cell && (cell[name] || []).length);
 
-// The place for the convergence of some cells, or null where none was kept.
+// An element with the convergence of some cells, or null if none was kept.
 export function convergence(data, cells, each) {
   const kept = having(cells, 'convergence');
   return kept.length ? Plots.responsive((width) => drawConvergence(data, kept, each, width)) : null;

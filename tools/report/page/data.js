@@ -80,7 +80,7 @@ function complete(data) {
   return data;
 }
 
-// Enters what a part, or the page itself, knows of some cells besides their rows.
+// Adds to some cells what a part, or the page itself, holds besides their rows.
 export function enter(data, {materials, pictures, geometries, scenes}) {
   Object.assign(data.pictures, pictures);
   Object.assign(data.geometries, geometries);
@@ -91,7 +91,7 @@ export function enter(data, {materials, pictures, geometries, scenes}) {
   }
 }
 
-// Cells by variant, case and start, and the (case, start) pairs of which anything can be looked at.
+// Cells by variant, case and start, and the (case, start) pairs with anything to look at.
 function index(data) {
   const key = (caseIndex, start) => caseIndex * data.starts.length + start;
   data.is_run = data.kind === 'run';
@@ -142,7 +142,7 @@ export function load() {
   return index(complete(data));
 }
 
-// What became of a cell: a failed one gave no pose; a missed one gave a pose that is not a success.
+// The outcome of a cell: a failed one gave no pose; a missed one gave a pose that is no success.
 export function outcome(cell) {
   if (cell.status === 'failed') return 'failed';
   if (cell.success === true) return 'success';
@@ -154,7 +154,7 @@ export const limit = (metric) => [metric.success_above, metric.success_below].fi
 export const limitText = (metric) =>
     (metric.higher_is_better ? 'above ' : 'below ') + withUnit(limit(metric), metric.unit);
 
-// Up to which value 95 % of the runs are as good or better.
+// The value that 95 % of the runs reach or surpass.
 export const worseEnd = (metric, item) => (metric.higher_is_better ? item.p5 : item.p95);
 
 export const isBetter = (metric, value, base) => (metric.higher_is_better ? value > base : value < base);
@@ -182,7 +182,7 @@ export function valuesOf(data, variant, metric) {
       .map((cell) => ({value: cell.values[metric], cell}));
 }
 
-// Variant against baseline: the (case, start) pairs in which both gave a value.
+// The (case, start) pairs in which both variant and baseline have a value.
 export function pairedValues(data, variant, metric) {
   const finite = (cell) => cell && cell.status !== 'failed' && Number.isFinite(cell.values[metric]);
   return data.pairs.filter((pair) => finite(pair.cells[variant]) && finite(pair.cells[data.baseline]))

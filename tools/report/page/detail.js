@@ -26,7 +26,7 @@ const startError = (data, cell) =>
          [withUnit(cell.initial_error, data.initial_error.unit), el('small', {}, '  ' + data.initial_error.name)] :
          null);
 
-// Sets what shows a cell's case and start in the comparison of pictures.
+// Sets the function that shows a cell's case and start in the comparison of pictures.
 export const setLookAt = (show) => (lookAt = show);
 
 export const outcomeBadge = (cell) => el('span', {class: 'outcome ' + Data.outcome(cell)}, Data.outcome(cell));
@@ -52,7 +52,7 @@ export function values(data, cell) {
   ]);
 }
 
-// A table of many items is easier to read with a row an item.
+// A table of many items is easier to read with one row for each item.
 function upright(table) {
   if (table.columns.length <= 8 || table.columns.length <= table.rows.length) return table;
   const title = (row) => row.name + (row.unit ? ' (' + row.unit + ')' : '');
@@ -121,7 +121,7 @@ export const reason = (cell) =>
          el('div', {}, el('h3', {}, 'Why it failed'), el('pre', {class: 'reason'}, cell.reason || 'no reason given')) :
          null);
 
-// What is not there because a node failed that may fail.
+// What is missing because a node failed that may fail.
 export const absent = (cell) =>
     (cell.absent ? el('div', {}, el('h3', {}, 'What is not there'), el('pre', {class: 'reason'}, cell.absent)) : null);
 
@@ -195,7 +195,7 @@ export function open(data, cell) {
   Links.name(Links.to(cell));
 }
 
-// Says that a link leads to no cell.
+// Says that the report has no such cell.
 function openUnknown(data, name) {
   const dialog = show();
   dialog.shown = null;

@@ -9,7 +9,7 @@ const ROW_HEIGHT = 66, MOST_POINTS = 400;
 const axisTitle = (metric) => metric.label + (metric.unit ? ' (' + metric.unit + ')' : '');
 const point = (cell, tip) => ({'data-tip': tip, 'data-cell': cell.id, class: 'point'});
 
-// All points, or where they are too many evenly many of each rank and the twenty worst.
+// All points. If there are too many: points at even ranks, and the twenty worst.
 function thinned(sorted) {
   if (sorted.length <= MOST_POINTS) return sorted;
   const step = sorted.length / MOST_POINTS;
@@ -92,13 +92,13 @@ const compared = (data) => data.variants.map((_, i) => i).filter((i) => i !== da
 const comparison = (data, variant, metric) =>
     data.comparisons.find((item) => data.variantIndex(item.variant) === variant && item.metric === metric.name);
 
-// Pairs that cannot be drawn, because only one of both has a value.
+// Pairs that cannot be drawn, because only one of the two has a value.
 function lostText(item) {
   const {runs_variant_lost: own, runs_baseline_lost: others} = item || {};
   return own || others ? '; it alone lost ' + own + ', the baseline alone ' + others : '';
 }
 
-// Every pair's difference, and the estimated one with its interval.
+// The difference of every pair, and the estimate with its interval.
 export function drawDifferences(data, metricIndex, kind, width) {
   const metric = data.metrics[metricIndex], variants = compared(data);
   const rows = variants.map(
@@ -147,7 +147,7 @@ export function drawDifferences(data, metricIndex, kind, width) {
   return root;
 }
 
-// A line a pair from baseline to variant, a panel a variant.
+// A line for each pair, from baseline to variant; a panel for each variant.
 export function drawPairs(data, metricIndex, kind, width) {
   const metric = data.metrics[metricIndex], variants = compared(data),
         columns = Math.max(1, Math.min(variants.length, Math.floor(width / 250)));
@@ -188,7 +188,7 @@ export function drawPairs(data, metricIndex, kind, width) {
       }));
 }
 
-// Success in bins of the start's error: a row a variant, all of equal length.
+// Success in bins of the start's error: a row for each variant, all equally long.
 export function captureBins(data) {
   const rows = data.variants.map((_, variant) => ((data.summary[variant] || {}).capture || {}).bins || []),
         longest = rows.reduce((a, b) => (b.length > a.length ? b : a), []);

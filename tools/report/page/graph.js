@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pipeline as a layered drawing: a node lies below all that it uses; what variants change is marked.
+// The pipeline as a layered drawing: a node is below everything that it uses. What variants change is marked.
 import {el, svg} from './dom.js';
 
 const BOX = {
@@ -10,8 +10,8 @@ const BOX = {
   rise: 46
 };
 
-// Layer of each node = longest way from a node without inputs. A cycle, which a pipeline has not, ends at the node
-// count.
+// The layer of a node is the longest way to it from a node without inputs. A pipeline has no cycles; in a damaged one
+// the number of nodes is the limit.
 function layersOf(nodes, edges) {
   const layer = new Map(nodes.map((node) => [node.id, 0]));
   for (let round = 0; round < nodes.length; ++round) {
@@ -71,7 +71,7 @@ function spreadRow(row) {
   for (const item of row) item.x -= shift;
 }
 
-// Neighbours pull (order by their mean place), then the row is pushed apart again where boxes would overlap.
+// Each box moves to the mean place of its neighbours. Then boxes that overlap are pushed apart.
 function settle(row, neighbours) {
   for (const item of row) item.wish = mean(item[neighbours], item.x);
   row.sort((a, b) => a.wish - b.wish);

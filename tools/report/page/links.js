@@ -3,7 +3,7 @@
 
 export const to = (cell) => '#cell=' + String(cell.id).split('/').map(encodeURIComponent).join('/');
 
-// What an address asks for: {cell}; {unknown: text} if the report has no such cell; null if it asks for none.
+// What an address asks for: {cell}, {unknown: text} if the report has no such cell, or null if it names none.
 export function asked(data, hash) {
   const text = (/^#cell=(.+)$/.exec(hash) || [])[1];
   if (!text) return null;
@@ -16,8 +16,7 @@ export function asked(data, hash) {
   return cell ? {cell} : {unknown: plain};
 }
 
-// So that the address in the browser's bar is the cell's. Some browsers refuse it to pages from disk, which does no
-// harm.
+// Puts the cell into the address in the browser's bar. Some browsers refuse this to pages from disk; that does no harm.
 export function name(address) {
   try {
     history.replaceState(null, '', address);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Puts the page together when it has been read.
+// Puts the page together when the browser has read it.
 import * as Cells from './cells.js';
 import * as Curves from './curves.js';
 import * as Data from './data.js';
@@ -21,7 +21,7 @@ import {startTheme} from './theme.js';
 import * as Tuning from './tuning.js';
 import * as Verdict from './verdict.js';
 
-// A section with a heading, entered in the list of contents. Parts that are null are left out.
+// A section with a heading and an entry in the list of contents. Parts that are null are left out.
 function section(id, title, intro, ...parts) {
   const node =
       el('section', {id, 'aria-labelledby': id + '-title'}, el('h2', {id: id + '-title'}, title),
@@ -30,7 +30,7 @@ function section(id, title, intro, ...parts) {
   return node;
 }
 
-// Where a tenth of the runs end far off, a linear scale would press the others together.
+// If a tenth of the runs end far off, a linear scale would squeeze the others.
 function skewed(data) {
   const values = data.variants.flatMap((_, variant) => Data.valuesOf(data, variant, 0).map((item) => item.value))
                      .sort((a, b) => a - b);
@@ -175,7 +175,7 @@ function closer(data) {
     show(at);
     if (data.lookedAt[state.at].part) fetch(data.lookedAt[state.at]);
   };
-  // Loads what lies beside the page.
+  // Loads the files beside the page.
   const fetch = (pair) => {
     const again = () => data.lookedAt[state.at] === pair && draw(pair);
     Parts.load(data, pair).then(again, again);
@@ -331,7 +331,7 @@ function build(data) {
   addEventListener('hashchange', () => Detail.openAddress(data));
 }
 
-// The link of the section that is being read stands out in the list of contents.
+// Marks the section that is being read in the list of contents.
 function followScroll() {
   const links = new Map([...document.querySelectorAll('#contents a')].map((link) => [link.hash.slice(1), link]));
   const seen = new IntersectionObserver((entries) => {

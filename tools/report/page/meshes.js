@@ -50,7 +50,7 @@ function topology(mesh) {
   return mesh;
 }
 
-// Ends of the edges between a triangle that faces the eye and one that does not: what an X-ray shows as a border.
+// Both ends of each edge between a triangle that faces the eye and one that faces away: the borders in an X-ray.
 export function outline(mesh, eye) {
   const {vertices, planes, edges} = topology(mesh), front = new Uint8Array(planes.length / 4), ends = [];
   for (let face = 0; face < front.length; ++face) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What does not fit into the page lies beside it, in the folder report/: a file for each case and start, which is
-// loaded when somebody asks for it. A file is named after its content, so a page never shows that of another report. It
+// What does not fit into the page is beside it, in the folder report/: a file for each case and start, which is loaded
+// on demand. A file is named after its content, so a page never shows that of another report. It
 // has three lines: Parts.take("NAME",  /  the data as JSON  /  );
 //
 // A page from disk may load scripts, and nothing else. A page in a frame of marrow's workbench may load nothing: the
@@ -40,7 +40,7 @@ function byMessage(file) {
   });
 }
 
-// Enters a part into the data, once. Rejected if the file cannot be loaded; then it is tried again the next time.
+// Adds a part to the data, once. Rejects if the file cannot be loaded; the next call tries again.
 export async function load(data, pair) {
   const {part} = pair;
   if (!part) return;
@@ -66,7 +66,7 @@ export const missing = (data, pair) => 'Of ' + Data.pairName(data, pair) + ', pi
     ' beside it, which cannot be loaded. ' +
     'Open report.html where the comparison wrote it, or copy the folder report/ along with the page.';
 
-// What stands in the place of a picture or curve that is not loaded yet.
+// A placeholder for a picture or curve that is not loaded yet.
 export function note(data, pair, load) {
   const {part} = pair;
   if (part.loading) return el('p', {class: 'note'}, 'Being loaded (' + size(part.bytes) + ').');

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What happened to the bodies that a run repeated: a line for each pass, those that failed first in words.
+// The bodies that a run repeated: a line for each pass; failed passes come first, in words.
 import {el, withUnit} from './dom.js';
 
 const isDone = (pass) => pass.status === 'done';

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two pictures of one case laid on each other (wipe), in turn (blink) or side by side; by mouse, touch or keyboard.
+// Two pictures of one case on top of each other (wipe), in turn (blink) or side by side; by mouse, touch or keyboard.
 import * as Dom from './dom.js';
 import {el} from './dom.js';
 import * as Plots from './plots.js';
@@ -7,7 +7,7 @@ import * as Plots from './plots.js';
 const BLINK_MS = 700;  // slower than three times a second
 const ZOOMS = [['1', 'fit'], ['2', '2×'], ['4', '4×']];
 
-// One side: which variant's picture of which name.
+// One side: the choice of a variant and of a picture's name.
 function sideControls(data, letter, side, names, many, changed) {
   const variants =
       Dom.select('Variant ' + letter, data.variants.map((variant, i) => [i, variant.name]), side.variant, (value) => {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What all plots share: scales, axes, marks, legends, and drawing anew when the width changes.
+// What all plots share: scales, axes, marks, legends, and drawing again when the width changes.
 import {el, svg} from './dom.js';
 
 const MARKERS = ['circle', 'square', 'triangle', 'diamond', 'cross'];
@@ -98,7 +98,7 @@ export function frame({width, height, x, y, label, format}) {
   return {root, box, x: across, y: up};
 }
 
-// A mark whose shape, too, tells the variants apart.
+// A mark. Its shape also tells the variants apart, not only its colour.
 export function marker(variant, x, y, size, attributes) {
   const all = {fill: colour(variant), ...attributes};
   const shape = MARKERS[variant % MARKERS.length], r = size;
@@ -152,5 +152,5 @@ export function responsive(draw) {
   return place;
 }
 
-// A repeatable number in [-1, 1] from a count, for spreading points that would lie on each other.
+// A repeatable number in [-1, 1] from a count. It spreads points that would cover each other.
 export const spread = (i) => 2 * ((i * 0.6180339887) % 1) - 1;

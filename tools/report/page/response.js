@@ -9,7 +9,7 @@ const labelOf = (data, figure) => {
   return metric ? metric.label + (metric.unit ? ' [' + metric.unit + ']' : '') : figure;
 };
 
-// What the mark of a point says, such as of how many runs it is.
+// The text at the mark of a point, with its number of runs.
 function pointText(data, curve, point) {
   const shown = curve.figure === 'success' ? percent : number;
   const interval = Number.isFinite(point.low) ? ', 95 % interval ' + shown(point.low) + ' to ' + shown(point.high) : '';
@@ -47,7 +47,7 @@ function draw(data, curves, width) {
   return plot.root;
 }
 
-// Of how many runs the points are, and that some lack the figure.
+// Says how many runs each point has, and that some lack the figure.
 function runsText(curves) {
   const points = curves.flatMap((curve) => curve.points), lacking = points.filter((point) => point.runs < point.of);
   const sum = (list, key) => list.reduce((all, point) => all + point[key], 0);

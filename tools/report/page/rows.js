@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A table of any number of rows: only those that are seen are drawn, so thousands sort and filter at once. It says how
-// many rows it has and which ones these are, and the arrow keys go from row to row.
+// A table of any number of rows. Only visible rows are drawn, so thousands sort and filter at once. It tells how many
+// rows it has and which are visible. The arrow keys move from row to row.
 import * as Dom from './dom.js';
 import {el} from './dom.js';
 

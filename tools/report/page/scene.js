@@ -78,7 +78,7 @@ export class SceneView {
     this.draw();
   }
 
-  // From where all X-rays are seen from the front: the mean side of their sources.
+  // A point from which all X-rays are seen from the front: the mean side of their sources.
   facing() {
     const [x, y] = [8, 9].map((i) => -this.source.views.reduce((sum, view) => sum + view.camera_from_world[i], 0));
     return Math.hypot(x, y) > 0.01 ? Math.atan2(y, x) * 180 / Math.PI + 12 : -65;
@@ -318,7 +318,7 @@ export class SceneView {
     this.renderer.render(flat, SceneView.plain);
   }
 
-  // Where the camera that is looked through shows a point of the world, in pixels of its image. For tests.
+  // The pixel at which the camera of the present view shows a point of the world. For tests.
   pixelOf(point_mm) {
     const {view} = this.views.find((item) => item.name === this.through), {sx, sy, x, y} = this.flat(view);
     this.drawNow();
@@ -326,7 +326,7 @@ export class SceneView {
     return [((at.x - x) / sx + 1) / 2 * view.width_px - 0.5, (1 - (at.y - y) / sy) / 2 * view.height_px - 0.5];
   }
 
-  // Gives back the graphics card's memory of what was shown.
+  // Frees the memory of the graphics card.
   release() {
     for (const scene of this.world ? [this.world, this.rims, ...this.views.map((view) => view.flat)] : []) {
       scene.traverse((item) => {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sequence of a run: its pictures frame by frame, with a slider, and the way of each bone with its deviations.
+// A sequence of a run: its pictures frame by frame, with a slider, and the motion of each bone with its deviations.
 import {button, el, select, svg, withUnit} from './dom.js';
 import * as Plots from './plots.js';
 import {shown} from './shown.js';

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The head of the page: what was compared, what came out in a sentence each, and the table of the variants.
+// The head of the page: what was compared, each result as a sentence, and the table of the variants.
 import * as Data from './data.js';
 import {button, el, number, percent, probability, select, withUnit} from './dom.js';
 import * as Plots from './plots.js';
@@ -174,8 +174,8 @@ export function table(data) {
       place);
 }
 
-// Which cases are hard: each case's median and successes, a column a variant. Without limits of success, how many
-// starts have the figure.
+// Shows which cases are hard: each case's median and successes, a column for each variant. Without limits of success,
+// the number of starts with the figure.
 export function caseTable(data, metric) {
   const cells = data.variants.map(() => data.cases.map(() => []));
   for (const cell of data.cells) cells[cell.variant][cell.case].push(cell);
@@ -216,7 +216,7 @@ function difference(item, unit) {
   return {variant: 'fails more often', baseline: 'the baseline fails more often'}[item.fails_more] || '–';
 }
 
-// Without a number, a bound is a failure of one of both; without two, there are too few cases.
+// A bound that is no number stands for a failure of one of the two. If both are missing, there are too few cases.
 function interval(item, metric) {
   if (!Number.isFinite(item.low) && !Number.isFinite(item.high)) return '–';
   const failure = (is_high) => (is_high !== Boolean(metric.higher_is_better) ? 'a failure' : 'the baseline’s failure');

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How an optimizer came to the tuned options: the score of each point that it tried on the training cases. A score is
-// no mean of the figure, because failed and very bad runs count as a fixed value in it.
+// How an optimizer found the tuned options: the score of each point that it tried on the training cases. A score is
+// not the mean of the figure, because failed and very bad runs count as a fixed value.
 import * as Dom from './dom.js';
 import {el, number, svg} from './dom.js';
 import * as Plots from './plots.js';

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is to be thought of a pose: the judgement, its reasons, what would settle it, the overlays and the pose.
+// The verdict on a pose: the judgement, its reasons, what would settle it, the overlays and the pose.
 import {el, number, percent} from './dom.js';
 import * as Summary from './summary.js';
 
@@ -74,7 +74,7 @@ export const all = (data, cell) =>
 // Rates of a variant, as a bar with its interval.
 const rate = (item) => (item && item.of ? Summary.rateBar(item) : '–');
 
-// How the verdicts of each variant fared; null if none has any.
+// How good the verdicts of each variant were; null if no variant has verdicts.
 export function table(data) {
   const of = (i) => (data.summary[i] || {}).verdicts || {};
   if (!data.summary.some((item) => item.verdicts)) return null;

@@ -24,7 +24,7 @@ function place(draft, state, name, point_mm, what) {
 
 const actions = (draft, state, name) => ({
   moveTo: (point_mm) => place(draft, state, name, point_mm, 'move'),
-  // Only its place in the CT goes; the landmark and its pixels stay.
+  // Removes only its place in the CT. The landmark and its pixels stay.
   remove: () =>
       draft.change('remove the landmark ' + name + ' from the CT', (document) => delete find(document, name).model_mm)
 });

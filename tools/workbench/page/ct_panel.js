@@ -15,7 +15,7 @@ const PRESETS = [['bone', 'Bone', 400, 1800], ['soft', 'Soft tissue', 40, 400]];
 
 const numberOf = (box) => (box.value.trim() === '' ? null : Number(box.value));
 
-// How the file is read, where it does not say all itself. changed(options) gets the keys of a case's `ct`.
+// How the file is read where it does not say everything. changed(options) gets the keys of a case's `ct`.
 function optionsForm(changed) {
   const number = (label) =>
       el('label', {class: 'field'}, el('span', {}, label), el('input', {type: 'number', step: 'any', class: 'short'}));
@@ -68,7 +68,7 @@ async function choose(draft) {
 // The chooser begins beside the present CT.
 const startOf = ({document: {ct}}) => (ct ? ct.file.split('/').slice(0, -1).join('/') : '');
 
-// If the fault lists the series of a folder, a button for each.
+// A button for each series of the folder, if the fault lists them.
 const seriesIn = (draft, fault) => [...fault.matchAll(/^ +(\d+(?:\.\d+)+) \((.*)\)$/gm)].map(
     ([, uid, words]) =>
         el('p', {}, Dom.button('Read the series of ' + words, () => draft.change('choose a series', (document) => {

@@ -17,7 +17,7 @@ export class CtState extends EventTarget {
     super();
     Object.assign(this, {
       draft,
-      ct: null,  // as about_ct() of the server tells it, or null
+      ct: null,  // as about_ct() of the server describes it, or null
       fault: '',
       command: '',
       isReading: false,
@@ -26,7 +26,7 @@ export class CtState extends EventTarget {
       window: {level: 400, width: 1800},
       tool: null,          // {key, hint, place(point_mm)} or null: a click moves the crosshair
       marks: new Map(),    // name: () => [{key, point_mm, colour, label, moveTo(point_mm), remove()}]
-      pointed() {},        // is told what is under the pointer: {view, index, value_hu} or null
+      pointed() {},        // gets what is under the pointer: {view, index, value_hu} or null
       contours: new Map()  // name: {lines(axis, slice, later) => [{colour, ends}]}; ends: i, j, k of both ends of each
                            // line; later() is called when there is more
     });
@@ -60,7 +60,7 @@ export class CtState extends EventTarget {
     this.tell('ct');
   }
 
-  // int16 in HU, as slice_of() of the server tells them.
+  // int16 in HU, as slice_of() of the server gives them.
   async slice(axis, index, signal) {
     const name = this.ct.name;
     try {

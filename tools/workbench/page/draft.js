@@ -22,8 +22,8 @@ export class CaseDraft extends EventTarget {
     this.dispatchEvent(new Event('change'));
   }
 
-  // Changes a copy of the document and has it kept. `what` is shown at "Undo", such as "move landmark tip". Changes are
-  // made one after the other. Resolves to whether it was kept; if not, the page says why.
+  // Changes a copy of the document and sends it to the server. "Undo" shows `what`, such as "move landmark tip".
+  // Changes are made one after the other. Resolves to whether the server kept it; if not, the page says why.
   change(what, mutate) {
     return this.after(() => {
       const document = structuredClone(this.document);
@@ -38,7 +38,7 @@ export class CaseDraft extends EventTarget {
     return this.after(() => Ask.post('api/draft/redo', {case: this.path, revision: this.revision}));
   }
 
-  // Does something on the server with the newest revision, and takes the state that it answers.
+  // Sends a request with the newest revision, and takes over the state in the answer.
   after(action) {
     const turn = (this.last || Promise.resolve()).then(async () => {
       try {

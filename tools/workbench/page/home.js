@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The first page: what there is in the folder.
+// The first page: what the folder holds.
 import {el} from '../../report/page/dom.js';
 
 import * as Ask from './server.js';

@@ -5,7 +5,7 @@ import * as THREE from 'three';
 import {el, number, withUnit} from '../../report/page/dom.js';
 import {Orbit} from '../../report/page/orbit.js';
 
-let open = [];  // what must be given back when other outputs are shown
+let open = [];  // what must be freed when other outputs are shown
 
 function bytes(text) {
   const raw = atob(text), all = new Uint8Array(raw.length);

@@ -145,7 +145,7 @@ class Page {
                   'Change it in the text.'));
   }
 
-  // How many are given is said beside the heading, for when they are folded away.
+  // The heading says how many are given, because they may be folded away.
   countInputs() {
     const count = this.state.inputs.length;
     const given =
@@ -173,7 +173,7 @@ class Page {
     this.commands.replaceChildren(...commands.filter(Boolean).map((text) => Dom.command(text)));
   }
 
-  // What a run would do now. Without it, nothing is said about what is stale.
+  // What a run would do now. Without this, the page says nothing about stale nodes.
   async refreshPlan() {
     const count = ++this.planCount;
     this.plan = null;
@@ -267,7 +267,7 @@ class Page {
     }
   }
 
-  // Does something on the server with the present revision, and takes the state that it answers.
+  // Sends a request with the present revision, and takes over the state in the answer.
   async after(path, body) {
     try {
       this.take(await Ask.post(path, {file: this.file, revision: this.state.revision, ...body}));
@@ -300,7 +300,7 @@ class Page {
     return undefined;
   }
 
-  // Takes the newest state of the file. A text that is being edited stays.
+  // Takes over the newest state of the file. A text that is being edited stays.
   async refetch() {
     const state = await Ask.json('api/pipeline', {file: this.file});
     if (this !== page) return;
@@ -317,7 +317,7 @@ class Page {
     await this.refreshPlan();
   }
 
-  // Each second: is the file still the one that is shown?
+  // Asks each second whether the file has changed.
   async poll() {
     if (this !== page) return;
     try {

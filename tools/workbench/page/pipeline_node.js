@@ -56,7 +56,7 @@ function optionField(option, written, edit) {
               {'data-default': option.name, 'aria-label': 'Take out ' + option.name + ', so that its default holds'}));
 }
 
-// What could be wired: outputs of the other nodes that have the port's type.
+// What can be wired to a port: outputs of its type of the other nodes.
 function sources(nodes, id, port) {
   const names = [];
   for (const [other, {info}] of Object.entries(nodes)) {

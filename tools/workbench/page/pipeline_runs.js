@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The inputs of a pipeline, what of it is stale, and running that.
+// The inputs of a pipeline, its stale nodes, and the button that runs them.
 import {button, el, svg} from '../../report/page/dom.js';
 
 import * as Shell from './shell.js';

@@ -97,7 +97,7 @@ Shell.page('place', {
   ]
 });
 
-// Without a case: a list of those in the folder.
+// If no case is open: a list of the cases in the folder.
 async function choose(place) {
   const {cases} = await Ask.json('api/folder');
   place.append(

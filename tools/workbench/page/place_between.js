@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pose of a bone in a frame of a sequence, from keyframes and tracked poses. Keyframes: {FRAME: {pose, used}},
-// where `used` says that the tracked poses were found with it. Tracked: a list of poses, frame 1 first; null where it
-// is lost.
+// The pose of a bone in a frame of a sequence, from keyframes and tracked poses. Keyframes: {FRAME: {pose, used}};
+// `used`: the tracking used it. Tracked: a list of poses, frame 1 first, with null where the bone was lost.
 import {minus, moved, plus, times} from './geometry.js';
 
 // [x, y, z, w] of a motion's rotation, by its largest component.
@@ -28,7 +27,7 @@ function rotationOf([x, y, z, w]) {
   ];
 }
 
-// Along the shorter way, at constant speed.
+// Slerp: the shorter way, at constant speed.
 function slerp(a, b, share) {
   let cosine = a.reduce((sum, value, i) => sum + value * b[i], 0);
   const sign = cosine < 0 ? -1 : 1;

@@ -90,7 +90,7 @@ export class PlacedCase extends PlaceControls {
     return this.bones().length ? this.bones() : this.about.bones;
   }
 
-  // Where the bones are that are moved: the middle of all, and the long axis of the first.
+  // The place of the moved bones: the middle of all, and the long axis of the first.
   hold(poses) {
     const bones = this.watched(), middles = bones.map((bone) => Geometry.moved(poses[bone.name], bone.middle_mm));
     const middle = Geometry.times(middles.reduce(Geometry.plus, [0, 0, 0]), 1 / bones.length);
@@ -124,7 +124,7 @@ export class PlacedCase extends PlaceControls {
     this.keep(drag.kind === 'shift' ? 'move' : drag.kind === 'roll' ? 'turn about the long axis of' : 'turn');
   }
 
-  // A key or a notch of the wheel. What follows within a moment belongs to the same step.
+  // A key, or a notch of the wheel. Further ones within a moment belong to the same step.
   byKeys(view, what, motionOf) {
     if (!view || !this.bones().length) return;
     this.move(this.placed, motionOf({...this.hold(this.placed), camera: view.camera}), false);
@@ -132,7 +132,7 @@ export class PlacedCase extends PlaceControls {
     this.keyMoves = setTimeout(() => this.keep(what), 500);
   }
 
-  // Keeps the present poses as a step. Those of all bones are kept, because a case has all starts or none.
+  // Keeps the present poses of all bones as a step: a case has all starts or none.
   async keep(what) {
     clearTimeout(this.keyMoves);
     this.keyMoves = null;
@@ -220,7 +220,7 @@ export class PlacedCase extends PlaceControls {
     Shell.notice(error.message, 'fault');
   }
 
-  // Costs of the present poses, at most one request at a time. `step`: the step to note them at.
+  // Asks for the costs of the present poses, with one request at a time. `step`: the step that gets them.
   async askCosts(step) {
     if (this.sequence.isOn) return;
     if (step) this.costsFor = step;
@@ -246,7 +246,7 @@ export class PlacedCase extends PlaceControls {
     }
   }
 
-  // The present pose is judged when nothing has moved for a while.
+  // Asks for a verdict on the present pose when nothing has moved for a while.
   pause() {
     this.stopVerdict();
     if (!this.judges || this.sequence.isOn) return;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The images of a sequence's frames. They are read in blocks when one is wanted, the next block ahead of time, and the
-// blocks that were used last are kept within a limit of memory.
+// The images of a sequence's frames. They are read in blocks: the wanted one, then the next one ahead of time. The
+// blocks that were used last stay in memory, up to a limit.
 import * as Ask from './server.js';
 
 export class PlaceFrames {
@@ -28,11 +28,11 @@ export class PlaceFrames {
     if (next >= 0 && next * PlaceFrames.BLOCK < this.frames) this.load(next).catch(() => {});
   }
 
-  // A block that fails is asked for again the next time.
+  // A block that failed is requested again the next time.
   load(block) {
     const held = this.blocks.get(block) || {};
     this.blocks.delete(block);
-    this.blocks.set(block, held);  // the last one is that used last
+    this.blocks.set(block, held);  // the last one was used last
     if (!held.loading) {
       held.loading = this.read(block);
       held.loading.then((images) => {
@@ -54,7 +54,7 @@ export class PlaceFrames {
     return Object.fromEntries(images);
   }
 
-  // Those that were not used for longest go first. `block` stays.
+  // Forgets the blocks that were not used for the longest time. `block` stays.
   forget(block) {
     let bytes = [...this.blocks.values()].reduce((sum, one) => sum + (one.bytes || 0), 0);
     for (const [one, held] of [...this.blocks]) {

@@ -15,17 +15,17 @@ function pointAt(camera, pixel, at_mm) {
   return plus(origin, times(along, at_mm / turned(camera.camera_from_world, along)[2]));
 }
 
-// What lies under the pixel `from`, at the depth of `middle_mm`, comes to lie under `to`. Nothing moves in depth.
+// The point under the pixel `from`, at the depth of `middle_mm`, moves under `to`. Nothing moves in depth.
 export function shiftInView(camera, middle_mm, from, to) {
   const at_mm = depth_mm(camera, middle_mm);
   return Geometry.shift(minus(pointAt(camera, to, at_mm), pointAt(camera, from, at_mm)));
 }
 
-// As the hand of a clock, as the view shows it, about the ray through the middle.
+// Clockwise in the view, about the ray through the middle.
 export const turnInView = (camera, middle_mm, angle_rad) =>
     Geometry.rotation(minus(middle_mm, source_mm(camera)), angle_rad, middle_mm);
 
-// The angle by which a pointer went about the middle, from one pixel to another.
+// The angle about the middle between two pixels of a pointer's way.
 export function angleAbout(camera, middle_mm, from, to) {
   const centre = Geometry.pixel(camera, middle_mm);
   if (!centre) return 0;
@@ -41,13 +41,13 @@ export const shiftInDepth = (camera, middle_mm, by_mm) =>
 // About the bone's own axis.
 export const roll = (axis, middle_mm, angle_rad) => Geometry.rotation(axis, angle_rad, middle_mm);
 
-// The bone tips towards the source: about the direction of the image that is across its long axis.
+// Tips the bone towards the source: about the direction in the image that is perpendicular to its long axis.
 export function tip(camera, axis, middle_mm, angle_rad) {
   const away = unit(minus(middle_mm, source_mm(camera))), across = Geometry.cross(axis, away);
   return Geometry.rotation(length(across) > 0.05 ? across : direction(camera, [1, 0, 0]), angle_rad, middle_mm);
 }
 
-// The angle of a roll for a pointer that went across the bone's axis: a degree for each millimetre.
+// The angle of a roll: a degree for each millimetre that the pointer moved across the bone's axis.
 export function rollAngle(camera, axis, middle_mm, from, to) {
   const at_mm = depth_mm(camera, middle_mm), away = unit(minus(middle_mm, source_mm(camera)));
   const across = Geometry.cross(axis, away);

@@ -32,7 +32,7 @@ export class PlaceSequence {
     return [...found].sort((a, b) => a[0] - b[0]);
   }
 
-  // After each change of the draft, also by undo and redo. Resolves when everything is loaded.
+  // Called after each change of the draft, also by undo and redo. Resolves when everything is loaded.
   update(isKeeping) {
     return this.updated = this.refresh(isKeeping);
   }
@@ -47,7 +47,7 @@ export class PlaceSequence {
     if (!isKeeping && changed.length && !changed.includes(this.wanted)) await this.go(changed[0]);
   }
 
-  // The frames whose keyframes are not as at the last call: what "undo" changed is shown.
+  // The frames whose keyframes changed since the last call, so that the page shows what "undo" changed.
   changedFrames() {
     const now = new Map();
     for (const {name} of this.page.about.bones)
@@ -109,7 +109,7 @@ export class PlaceSequence {
     return this.arriving;
   }
 
-  // One frame is asked for at a time; after it, the newest wish.
+  // Requests one frame at a time; then the one that was wanted last.
   async arrive() {
     const {page, images} = this;
     this.isArriving = true;
@@ -186,7 +186,7 @@ export class PlaceSequence {
     const {page} = this, asked = this.request(), frames = this.frames;
     const {job, command} = await Ask.post('api/place/track', asked);
     page.showCommand(command);
-    // Events of the nodes that are called for each frame begin with the frame's number.
+    // Nodes are called for each frame; their events begin with the frame's number.
     const share = ({node, item}) => ((node || '').includes('/') ? parseInt(item, 10) / frames : undefined);
     const {tracked, poses, verdicts} = await Shell.follow('Tracking', job, share);
     if (!page.isOpen || !this.isOn) return;

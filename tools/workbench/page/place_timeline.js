@@ -48,7 +48,7 @@ export class PlaceTimeline {
       const is_kept = await page.draft.change('the sequence', (document) => {
         const before = document.sequence || {};
         document.sequence = {keyframes: {}, ...before, views, frame_rate_hz};
-        // Poses that were tracked in other images do not belong to these.
+        // Poses that were tracked in other images do not fit these.
         const isAsBefore = ([name, {images, pattern}]) => {
           const one = (before.views || {})[name] || {};
           return one.images === images && one.pattern === pattern;
@@ -97,7 +97,7 @@ export class PlaceTimeline {
     };
   }
 
-  // All of it: after a change of keyframes or tracked poses.
+  // Shows everything again, after a change of keyframes or tracked poses.
   update() {
     const {sequence, page} = this;
     this.element.hidden = !sequence.isOn;

@@ -107,7 +107,7 @@ export class PlaceView {
     this.page.dragEnded(drag);
   }
 
-  // While a bone moves, every second pixel must do where all of them take too long. On release all are drawn.
+  // While a bone moves, only every second pixel is drawn where all of them would take too long. On release all are.
   judgeSpeed(took_ms, isMoving) {
     const LONG_MS = 40, SHORT_MS = 8;
     if (!isMoving) return;
@@ -118,7 +118,7 @@ export class PlaceView {
       Object.assign(this, {isSlow: false, usual_ms: LONG_MS / 2});
   }
 
-  // Asks for bones: {BONE: pose}. There is one request at a time; after it, the newest wish is asked for.
+  // Requests pictures of bones: {BONE: pose}. One request at a time; then the one that was wanted last.
   want(poses, isMoving) {
     this.wanted = {poses: {...(this.wanted || {}).poses, ...poses}, isMoving, since: performance.now()};
     if (!this.inFlight) this.ask();
@@ -161,7 +161,7 @@ export class PlaceView {
     }
   }
 
-  // Another image than that of the case.
+  // Shows another image than the case's own.
   showImage(grey) {
     this.paint.show(grey);
     this.draw();

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points of a CT as a list that can be used by keys alone, and names that are typed.
+// Points of a CT as a list that keys alone can use, and fields for their names.
 import {button, el} from '../../report/page/dom.js';
 
 import * as Shell from './shell.js';
 
-// Seen well on grey pictures, and told apart by colour-blind readers.
+// Colours that stand out on grey pictures, and that colour-blind readers can tell apart.
 const COLOURS = ['#56b4e9', '#e69f00', '#2fd6a5', '#f08ac0', '#f0e442', '#ff8a4c', '#b9b0ff'];
 export const colour = (i) => COLOURS[i % COLOURS.length];
 
@@ -52,7 +52,7 @@ export const rename = (title, name, taken) => Shell.dialog(title, (close) => {
   return field;
 });
 
-// Fills a list anew when what it shows has changed, and leaves the focus where it was. what() says what it shows.
+// Fills a list again when its content has changed, and keeps the focus. what() says what the content is.
 export function renewed(list, what, rows) {
   const nameOf = (one) => one.dataset.tool || one.getAttribute('aria-label');
   let shown = '';

@@ -95,8 +95,8 @@ export async function follow(title, job, told) {
   }
 }
 
-// A modal dialog. Resolves to what close(value) is given, or to undefined if the user leaves it. fill(close) returns
-// its content.
+// A modal dialog. fill(close) returns its content. Resolves to the value that is passed to close(), or to undefined if
+// the user leaves it.
 export function dialog(title, fill) {
   const box = document.getElementById('dialog');
   return new Promise((resolve) => {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What several views together say about a point: where it lies, how well the views agree, and where it must lie in the
-// others. Needs Geometry.
+// What several views together say about a point: its place, how well the views agree, and where other views must show
+// it.
 import * as Geometry from './geometry.js';
 import {cross, dot, length, minus, plus, times} from './geometry.js';
 
@@ -12,9 +12,9 @@ function solved(rows, right) {
   return [0, 1, 2].map((k) => volume(...columns.map((column, j) => (j === k ? right : column))) / whole);
 }
 
-// Of `seen`, a list of {camera, pixel}, the place with the least sum of squared distances from the rays: {world_mm,
-// distance_mm: the largest distance between two rays, residuals_px: of each view}. Null for fewer than two, for rays
-// that are nearly parallel, or where the place is not in front of all sources.
+// The point with the least sum of squared distances from the rays of `seen`, a list of {camera, pixel}. Returns
+// {world_mm, distance_mm: the largest distance between two rays, residuals_px: of each view}. Null for fewer than two
+// rays, for nearly parallel ones, or if the point is not in front of all sources.
 export function triangulated(seen) {
   const rays = seen.map(({camera, pixel}) => Geometry.ray(camera, pixel));
   if (rays.length < 2) return null;
@@ -43,7 +43,7 @@ function distance(a, b) {
   return Math.abs(dot(between, normal)) / size;
 }
 
-// Where `other` shows the ray that ends in `pixel` of `camera`: the two ends of the part inside its image, or null.
+// The ray that ends in `pixel` of `camera`, as `other` sees it: both ends of the part in its image, or null.
 export function epipolarLine(camera, pixel, other) {
   const {origin, direction} = Geometry.ray(camera, pixel);
   const seen = [origin, direction].map(

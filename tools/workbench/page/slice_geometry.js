@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the voxels of a CT lie, and how its slices are shown. A CT is {size, spacing_mm, origin_mm, direction} as
+// The places of a CT's voxels, and how its slices are shown. A CT is {size, spacing_mm, origin_mm, direction} as
 // Grid of the library: an index [i, j, k] is a voxel's centre, point = origin + direction * (index * spacing), patient
 // axes LPS (x to the left, y to the back, z to the head).
 //

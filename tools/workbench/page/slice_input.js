@@ -7,7 +7,7 @@ const placeOf = (view, event) => {
   return [event.clientX - box.left, event.clientY - box.top];
 };
 
-// What dragging does: it begins with a button of the mouse, and `moved` gets the way since the last call.
+// What dragging with a mouse button does: `moved` gets the way since the last call.
 function begin(view, event) {
   const {state} = view, place = placeOf(view, event), mark = event.button === 0 && view.markAt(place);
   if (event.button === 2) {
@@ -23,7 +23,7 @@ function begin(view, event) {
 
 const pointAt = (view, place) => SliceGeometry.point(view.state.ct, view.at(place).index);
 
-// A mark follows the pointer, and the case is changed once, when it is let go.
+// A mark follows the pointer. The case changes once, on release.
 function moveMark(view, mark) {
   let to = null;
   const moving = () => (to ? [{...mark, point_mm: to}] : []);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One slice of the CT on a canvas, with all that can be done in it by mouse, touch and keys.
+// One slice of the CT on a canvas, and everything that mouse, touch and keys do in it.
 import {el} from '../../report/page/dom.js';
 
 import * as Shell from './shell.js';
@@ -57,7 +57,7 @@ export class SliceView {
     this.show();
   }
 
-  // Shows what the state says: draws now what is here, and asks for what is not.
+  // Shows what the state says: draws what is loaded, and requests the rest.
   show() {
     const {ct} = this.state;
     if (!ct || !this.view) return;

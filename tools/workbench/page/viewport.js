@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How an image lies on the screen. Places on the screen are [x, y] in CSS pixels from the top left corner of the frame
-// that shows the image; pixels are [u, v] with (0, 0) at the centre of the top left pixel.
+// The placement of an image on the screen. Places on the screen are [x, y] in CSS pixels from the top left corner of
+// the frame that shows the image; pixels are [u, v] with (0, 0) at the centre of the top left pixel.
 
 const LEAST_ZOOM = 0.02, MOST_ZOOM = 64;
 
@@ -22,7 +22,7 @@ export const toScreen = (port, pixel) =>
 export const toPixel = (port, place) =>
     scales(port).map((scale, i) => port.centre[i] + (place[i] - port.frame[i] / 2) / scale);
 
-// The pixel under `place` stays under it.
+// Zooms; the pixel under `place` stays there.
 export function zoomed(port, factor, place) {
   const zoom = Math.min(MOST_ZOOM, Math.max(LEAST_ZOOM, port.zoom * factor)), fixed = toPixel(port, place);
   const next = {...port, zoom};

@@ -18,8 +18,8 @@ const fragmentOf = (document, name) => {
   return document.fragments[name] = document.fragments[name] || {seeds: [], register: true};
 };
 
-// How the content of a file becomes a part of the document. Landmarks of the same name get the file's places, and
-// keep what the file does not say.
+// Enters the content of a file into the document. Landmarks of the same name get the places of the file; everything
+// that the file does not say stays.
 const PUT = {
   seeds(document, {seeds}) {
     for (const [name, one] of Object.entries(seeds)) Object.assign(fragmentOf(document, name), one);

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// One X-ray on the screen: it is zoomed, moved and windowed here. What else is done to it is the tool's part.
+// One X-ray on the screen: zooming, moving and windowing. The tool does everything else.
 import {el, svg} from '../../report/page/dom.js';
 
 import * as Viewport from './viewport.js';
 import * as XrayImages from './xray_images.js';
 
 // tool() gives the present tool: {press(pixel, event), key(name, step_px), marks(frame)} with optional functions.
-// press() returns {move(pixel), end(pixel), cancel()}, or nothing if the image is to be moved instead. said(text)
-// gets what is under the pointer.
+// press() returns {move(pixel), end(pixel), cancel()}, or nothing: then the pointer moves the image. said(text) gets
+// what is under the pointer.
 export function make(name, tool) {
   const canvas = el('canvas', {role: 'img', 'aria-label': 'X-ray ' + name});
   const overlay = svg('svg', {class: 'xray-marks', 'aria-hidden': 'true'});
@@ -24,7 +24,7 @@ export function make(name, tool) {
   const frame =
       {name, box, overlay, value, entry: null, port: null, window: null, pointer: null, mask: null, element: null};
 
-  // A new image gets a window of its own; one of the same size stays where it is.
+  // A new image gets its own window; an image of the same size keeps its place.
   frame.show = (entry) => {
     if (frame.entry !== entry) frame.picture = frame.shown = null;
     frame.entry = entry;
@@ -98,7 +98,7 @@ function draw(frame, canvas, tool) {
   frame.overlay.append(...tool().marks(frame).filter(Boolean));
 }
 
-// Without the sign of a zero.
+// Shows -0 as 0.
 export const tenths = (value) => value.toFixed(1).replace(/^-0\.0$/, '0.0');
 
 function tell(frame, pixel) {
@@ -184,7 +184,7 @@ const ARROWS = {
   ArrowDown: [0, 1]
 };
 
-// Whether the key means something here.
+// Whether the key has a meaning here.
 function pressed(frame, tool, event) {
   if (!frame.port || event.ctrlKey || event.metaKey) return false;
   const middle = frame.port.frame.map((side) => side / 2), [low, high] = frame.window, part = (high - low) / 20;

@@ -50,7 +50,7 @@ export function placeOf(bench, landmark) {
   return {...found, off_px: Object.fromEntries(seen.map(({view}, i) => [view, found.residuals_px[i]]))};
 }
 
-// How far the fitted pose has the landmark from where each view shows it.
+// The distance in each view between the marked landmark and the one of the fitted pose.
 export function fitOff(bench, landmark) {
   if (!bench.fit || !landmark.model_mm) return null;
   const world_mm = Geometry.moved(bench.fit.world_from_ct, landmark.model_mm);
@@ -61,7 +61,7 @@ export function fitOff(bench, landmark) {
   return off.length ? Math.max(...off) : null;
 }
 
-// Has the place that was moved written, once the keys rest or something else is done.
+// Writes the moved place, once no key was pressed for a while or something else is done.
 export function commit(bench) {
   clearTimeout(bench.pause);
   const live = bench.live;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Masks of X-rays: zero where a view may not be used. A stroke is kept as one change of the case.
+// Masks of X-rays: zero where a view must not be used. Each stroke is one change of the case.
 import {svg} from '../../report/page/dom.js';
 
 import * as Geometry from './geometry.js';
@@ -18,7 +18,7 @@ function blank(width_px, height_px, used) {
   return mask;
 }
 
-// Paints the part of the picture anew whose corners are given.
+// Paints the part of the picture with these corners again.
 function show({width_px, used, picture}, left, top, right, bottom) {
   if (right <= left || bottom <= top) return;
   const part = new ImageData(right - left, bottom - top), dots = new Uint32Array(part.data.buffer);
@@ -27,7 +27,7 @@ function show({width_px, used, picture}, left, top, right, bottom) {
   picture.getContext('2d').putImageData(part, left, top);
 }
 
-// Sets all pixels whose centres lie in the box around `a` and `b` that is `grow` wider, and where is_inside(u, v).
+// Sets all pixels with is_inside(u, v) whose centres are in the box of `a` and `b`, widened by `grow`.
 function fill(mask, a, b, grow, value, is_inside) {
   const {width_px, height_px, used} = mask;
   const low = [0, 1].map((i) => Math.max(0, Math.ceil(Math.min(a[i], b[i]) - grow)));
@@ -65,8 +65,8 @@ export function make(shared) {
   const known = new Map();  // by what keyOf() gives
   let working = null;       // {view, mask, what} while a stroke is being made or kept
 
-  // What the server needs to know of a view to turn its mask's file into the mask of the image that is shown, and
-  // back. Without a camera that can be used, the image is shown as its file has it.
+  // What the server needs to turn the file of a view's mask into the mask of the shown image, and back. Without a
+  // usable camera, the image is shown as its file has it.
   const sourceOf = (view) => ({image: view.image, camera: XrayImages.of(view).fault ? null : view.camera || null});
   const keyOf = (view) => JSON.stringify([view.mask, view.image, view.camera || null]);
 
@@ -103,7 +103,7 @@ export function make(shared) {
     return mask;
   }
 
-  // Has the stroke written to a file, and named by the draft.
+  // Writes the stroke to a file, and names that in the draft.
   async function keep() {
     const done = working;
     if (!done) return;

@@ -40,10 +40,10 @@ async function remove(bench, name) {
   bench.choose(null);
 }
 
-// Rounding leaves tiny numbers that mean nothing.
+// Tiny numbers are only rounding errors.
 export const figure = (value) => (value === null ? '–' : Math.abs(value) < 0.0005 ? '0.000' : Dom.number(value));
 
-// One row; update(landmark) shows its figures anew without touching its buttons.
+// One row; update(landmark) renews its figures and leaves its buttons alone.
 function row(bench, name) {
   const choose = Dom.button(
       name, () => bench.choose(bench.chosen === name ? null : name),

@@ -91,7 +91,7 @@ function sidesText(views) {
 const degrees = (value) => value.toFixed(1) + '°';
 const millimetres = (value) => Dom.number(value) + ' mm';
 
-// Numbers from which a mistake shows: [[what, figure]].
+// Numbers that reveal a mistake: [[what, figure]].
 function figuresOf(views) {
   const rows = [];
   for (const {view, camera} of views) {
@@ -125,7 +125,8 @@ function figuresOf(views) {
   return rows;
 }
 
-// Asks marrow about the cameras, once views and landmarks rest. told({warnings, command}) or told({fault}).
+// Asks marrow to check the cameras, once views and landmarks no longer change. Calls told({warnings, command}) or
+// told({fault}).
 function checking(draft, told) {
   let asked = '', timer = null, aborter = null;
   return (views) => {

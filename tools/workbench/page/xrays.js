@@ -133,7 +133,7 @@ function row(shared, tool) {
   return {element: el('div', {}, empty, place), update};
 }
 
-// Asks for the pose that the landmarks give, once they rest.
+// Asks for the pose that the landmarks give, once they no longer change.
 function fitting(shared, told) {
   let asked = '', timer = null, aborter = null;
   const ask = async (body) => {
