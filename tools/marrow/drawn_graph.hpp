@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A pipeline as it is drawn: bodies are spread out beside the nodes that run them.
+// A pipeline as a drawing: bodies are drawn beside the nodes that run them.
 #include <string>
 #include <vector>
 

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 /// One of the things that marrow's commands take or make.
 struct Thing {
-  std::optional<Wanted> kind;  ///< nothing: no command takes it by itself
+  std::optional<Wanted> kind;  ///< nothing: no command takes it alone
   std::string what, advice;
 };
 

@@ -7,8 +7,8 @@ namespace marrow::cli {
 /// What a command wants to be given.
 enum class Wanted { pipeline, experiment, run };
 
-/// Throws Error if the path names another of marrow's things than the wanted one. The error says what it is and what to
-/// do with it. Of all other paths it says nothing: who reads them says what is wrong.
+/// Throws Error if the path names something of marrow that is not the wanted thing. The error says what it is and what
+/// to do with it. All other paths pass: their reader says what is wrong.
 void expect_given(const std::filesystem::path& given, Wanted wanted);
 
 }  // namespace marrow::cli

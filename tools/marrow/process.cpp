@@ -70,8 +70,8 @@ void prepare_process() {
     if (fcntl(stream, F_GETFD) < 0 && open("/dev/null", O_RDWR) < 0) break;  // open() takes the lowest free number
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
-  // Where whoever started it ignores the end of children, the system would not keep how the workers ended. It could
-  // also give their numbers to other processes at once.
+  // The caller may ignore the end of children. Then the system would forget how workers ended, and could give their
+  // numbers to other processes at once.
   std::signal(SIGCHLD, SIG_DFL);
 }
 

@@ -7,9 +7,8 @@
 
 namespace marrow::cli {
 
-/// To be called first in main(). Standard streams that the caller closed are opened on /dev/null, so that no other file
-/// gets their numbers. If a reader goes away or a file exceeds the size limit, the write fails; the process does not
-/// end.
+/// Call this first in main(). Opens standard streams that the caller closed on /dev/null, so that no other file gets
+/// their numbers. If a reader goes away or a file exceeds the size limit, the write fails, and the process continues.
 void prepare_process();
 
 /// The exit code for main(): `code`, but 1 instead of 0 if the printed text could not be written. It is not a fault if
@@ -20,8 +19,8 @@ int with_output_written(int code);
 /// process at once.
 const std::atomic<bool>& stop_on_signals();
 
-/// The line that the first of these signals prints to stderr; empty, the default: none. At most 500 bytes are shown.
-/// Not to be called from several threads at once.
+/// Sets the line that the first of these signals prints to stderr. At most 500 bytes are shown. Empty, the default: no
+/// line. Do not call this from several threads at once.
 void say_when_stopped(const std::string& line);
 
 /// The file of this program, to be started again or to find what is installed beside it.

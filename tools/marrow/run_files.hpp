@@ -15,8 +15,8 @@ nlohmann::json read_record(const std::filesystem::path& folder);
 /// Throws Error: run.json is damaged, and why.
 [[noreturn]] void refuse_record(const std::filesystem::path& folder, const std::string& why);
 
-/// A regular file in the run's folder that a record names. Nothing if it does not exist, or if the name or a link leads
-/// out of the folder. So a page or a comparison of runs never shows other files of this machine.
+/// The regular file in the run's folder that a record names. Nothing if it does not exist, or if the name or a link
+/// leads out of the folder: a page or a comparison of runs must never show other files of this machine.
 std::optional<std::filesystem::path> file_of_run(const std::filesystem::path& folder, const std::string& name);
 
 /// Whether the name leads to something outside the folder.

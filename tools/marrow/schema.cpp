@@ -60,7 +60,7 @@ Json inputs_schema(const std::vector<KindPort>& ports) {
   return {{"type", "object"}, {"additionalProperties", false}, {"properties", properties}};
 }
 
-/// What holds for the node beside what holds for all: its options, and the inputs of its kind.
+/// The schema of one node: its options, and the inputs of its kind.
 Json node_schema(const NodeInfo& node) {
   Json with = {{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
   Json in = {{"allOf", Json::array({reference_to(inputs_of(node.kind()))})}};
@@ -181,8 +181,8 @@ std::string on_one_line(const Json& value) {
   return value.is_object() ? "{" + text + "}" : "[" + text + "]";
 }
 
-/// What fits into the line stands on it. Of what does not, each map and whatever no longer fits begins a line. A text
-/// is not broken, so a long description makes a long line.
+/// Puts as much on each line as fits. In a value that does not fit, each map begins a line, and so does each member
+/// that no longer fits. Texts are not broken, so a long description makes a long line.
 std::string laid_out(const Json& value, const std::string& margin, std::size_t column) {
   constexpr std::size_t columns = 114;  // of 120: more brackets may close at the end
   const std::string line = on_one_line(value);

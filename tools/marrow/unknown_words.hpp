@@ -9,14 +9,14 @@ class App;
 
 namespace marrow::cli {
 
-/// Throws Error if a word of the command line is empty, or an option has an empty value ("--out="): it would be taken
-/// for one that was not given.
+/// Throws Error if a word of the command line is empty, or an option has an empty value ("--out="): the program would
+/// treat it as not given.
 void expect_no_empty_word(const std::vector<std::string>& words);
-/// The first word of the command line that stands where a command is expected and is none, with the nearest one. Empty
-/// if there is no such word.
+/// A message about the first word that should be a command and is not, with the nearest command. Empty if there is no
+/// such word.
 std::string unknown_command(const CLI::App& app, const std::vector<std::string>& arguments);
-/// The first option that its command does not have, with the nearest one. `app` has read the command line. Empty if
-/// there is no such option.
+/// A message about the first option that its command does not have, with the nearest one. `app` must have read the
+/// command line. Empty if there is no such option.
 std::string unknown_option(const CLI::App& app);
 
 }  // namespace marrow::cli

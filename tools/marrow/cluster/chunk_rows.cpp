@@ -22,7 +22,7 @@ using compare::CellRow;
 
 fs::path rows_folder(const fs::path& folder) { return folder / "rows"; }
 
-/// What a row says of its cell, without what differs each time it runs.
+/// The result in a row, without what differs each time the cell runs.
 std::string result_of(CellRow row) {
   row.tries = 1;
   row.seconds.reset();
@@ -82,7 +82,7 @@ void RowsOfChunks::add_file(const fs::path& file, bool is_of_plan) {
     }
 }
 
-/// By the first "id" of the line, without reading the rest. A name with an escaped letter is read in any case.
+/// Looks only at the first "id" of the line. A name with an escaped letter is always wanted.
 bool RowsOfChunks::is_wanted(const std::string& line) const {
   constexpr std::string_view kId = R"("id":")";
   const std::size_t at = cells_.empty() ? std::string::npos : line.find(kId);

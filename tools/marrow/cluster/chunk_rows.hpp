@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The files in which the tasks of a cluster leave the rows of their cells: FOLDER/rows/CHUNK.jsonl. While a task runs,
-// its file is CHUNK.PROCESS.part, by which it is known among the processes of all hosts. It is renamed when all rows
-// are there. Each row has a digest of itself, so the rows of a task that was killed count too.
+// its file is CHUNK.PROCESS.part, a name that no other process on any host uses. It is renamed when it has all rows.
+// Each row holds its own digest, so the rows of a killed task count too.
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -40,18 +40,18 @@ std::map<std::string, bool> chunk_files(const std::filesystem::path& folder);
 /// What tasks left in a folder.
 class RowsOfChunks {
  public:
-  /// Lines that are damaged, or of another experiment, are left out. Rows of failed cells count only if they are of
-  /// this plan; `plan` may be empty. With `cells`, only rows of the cells of these names are taken: a task reads what
-  /// all others left, so it should do little for a row that it does not need.
+  /// Leaves out lines that are damaged or of another experiment. Rows of failed cells count only if they are of this
+  /// plan; `plan` may be empty. If `cells` is not empty, only rows of these cells are read completely: a task reads the
+  /// files of all others, and must not spend time on rows that it does not need.
   RowsOfChunks(const std::filesystem::path& folder, const compare::Experiment& experiment, const std::string& plan,
                std::set<std::string> cells = {});
 
-  /// A row of the cell that is done and has this key, except for the machine. Of several, one that this machine made
-  /// (its key is the same as a whole), else the first in the order of their texts. It has the names of the cell.
+  /// A row of the finished cell. Its key is `key`, but may be of another machine. Of several rows, the one that this
+  /// machine made, else the first in the order of their texts. It gets the names of the cell.
   std::optional<compare::CellRow> done(const compare::CellIndex& cell, const std::string& key) const;
-  /// Whether a row with the key of the one that is taken, except for the machine, has another result.
+  /// Whether a row with the same key as `taken`, or that of another machine, has another result.
   bool contradicts(const compare::CellIndex& cell, const compare::CellRow& taken) const;
-  /// A row of the cell that says why it failed. Of several, the first in the order of their texts.
+  /// A row that says why the cell failed. Of several, the first in the order of their texts.
   std::optional<compare::CellRow> failed(const compare::CellIndex& cell) const;
 
  private:

@@ -23,8 +23,8 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kBetweenLooks = std::chrono::seconds(2);  // at the folder, or shorter, as between questions
-constexpr int kQuestionsOfEndedTask = 3;                 // since its rows are there; then it is ended
+constexpr auto kBetweenLooks = std::chrono::seconds(2);  // at the folder; at most the time between two questions
+constexpr int kQuestionsOfEndedTask = 3;                 // after its rows are complete; then it is ended
 constexpr int kQuestionsWithoutGather = 2;  // then it has ended: a shared folder may show its last file late
 const std::set<std::string> kUsualReasons{"None", "Resources", "Priority", "Dependency", "JobArrayTaskLimit"};
 
@@ -113,7 +113,7 @@ class Follower {
                 ". What is done counts: the same command goes on from here");
   }
 
-  /// A controller that was killed may take tasks for running that ended, and hold back what waits for them.
+  /// After a controller was killed, it may believe that ended tasks still run, and hold back what waits for them.
   void end_forgotten(const Queue& queue) {
     const std::chrono::seconds end_of_task(kQuestionsOfEndedTask * profile_.ask_every_s);
     for (const std::string& task : queue.running) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How far a plan is, and following it on Slurm. The rows decide, not what the cluster says of its tasks.
+// The progress of a plan, and following it on Slurm. The rows decide, not what the cluster says about its tasks.
 #include <string>
 
 #include "cluster/plan.hpp"
@@ -22,8 +22,8 @@ std::string progress_of(const ClusterPlan& plan);
 /// Prints Gathered::lost as an error. Nothing if it is empty.
 void say_lost(const std::string& lost);
 
-/// Follows what was submitted until its report is made. Ctrl-C ends it on the cluster, too. Tasks that the cluster
-/// takes for running, although their rows have long been there, are ended. Throws Error if the report will not be made:
+/// Follows what was submitted until its report is made. Ctrl-C ends it on the cluster, too. Ends tasks that the cluster
+/// believes to be running although all their rows were written long ago. Throws Error if the report will not be made:
 /// the job that makes it has ended or is forgotten, tasks are held back, or the cluster does not answer for
 /// `silence_s`. Returns the exit code: 1 if cells are lost, 130 after Ctrl-C.
 int follow(const ClusterPlan& plan, const ClusterProfile& profile, bool quiet);

@@ -45,7 +45,7 @@ bool load_profile(const ClusterRequest& cluster, ClusterProfile& profile) {
   return diagnostics.empty();
 }
 
-/// Why a chunk has no good row of a cell, where the cluster does not say it.
+/// Why a chunk has no good row of a cell, if the cluster does not say why.
 std::string reason_of(const ClusterPlan& plan, const std::string& chunk, const std::map<std::string, bool>& files) {
   const auto file = files.find(chunk);
   if (file != files.end() && file->second)
@@ -55,7 +55,7 @@ std::string reason_of(const ClusterPlan& plan, const std::string& chunk, const s
   return file == files.end() ? "no task left its row" : "its task ended before it left its row, or it runs still";
 }
 
-/// Why cells of the plan may have no row. `of_cluster`: by the chunk's name.
+/// Why cells of the plan may have no row. `of_cluster`: the cluster's reasons, by the chunk's name.
 LostCells lost_cells(const ClusterPlan& plan, const std::map<std::string, std::string>& of_cluster) {
   const std::map<std::string, bool> files = chunk_files(plan.folder);
   LostCells lost;
@@ -68,7 +68,8 @@ LostCells lost_cells(const ClusterPlan& plan, const std::map<std::string, std::s
   return lost;
 }
 
-/// The job that gathers: submits again what left no rows, as often as the profile says; else makes tables and report.
+/// The job that gathers. Submits chunks without rows again, as often as the profile allows. Then makes tables and
+/// report.
 int gather_on_slurm(const CompareRequest& request, const ClusterRequest& cluster, const ClusterProfile& profile,
                     const Catalogue& catalogue, const Experiment& experiment, const fs::path& folder) {
   const ClusterPlan plan = latest_plan(folder);

@@ -34,23 +34,23 @@ struct ClusterPlan {
 /// How cells are grouped.
 struct ChunkRule {
   double least_minutes = 10;      ///< of one task, by the estimate
-  std::size_t most_tasks = 1000;  ///< then tasks are longer
+  std::size_t most_tasks = 1000;  ///< with more, each task gets longer instead
 };
 
-/// Cuts cells into chunks. The cells of a case stay together, as long as they are not much more than one chunk, because
-/// they share work. `numbers` are in rising order.
+/// Cuts cells into chunks. The cells of a case share work, so they stay together unless they are much more than a
+/// chunk. `numbers` are in rising order.
 std::vector<std::vector<std::size_t>> cut_into_chunks(const std::vector<std::size_t>& numbers,
                                                       std::size_t cells_of_a_case, double seconds_of_a_cell,
                                                       const ChunkRule& rule);
 
-/// Makes the plan of what is left, and writes it if something is left. Nothing is run. Throws Error if it cannot be
-/// written.
+/// Makes the plan of the cells that are left, and writes it if there are any. Runs nothing. Throws Error if it cannot
+/// be written.
 ClusterPlan make_plan(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment,
                       const std::filesystem::path& folder, const ChunkRule& rule);
 
 /// Throws Error if the file is no plan.
 ClusterPlan read_plan(const std::filesystem::path& file);
-/// The plan that was made last in a comparison's folder. Throws Error if there is none.
+/// The newest plan in a comparison's folder. Throws Error if there is none.
 ClusterPlan latest_plan(const std::filesystem::path& folder);
 /// Throws Error if the experiment, its pipelines, a plugin or a case is not what it was when the plan was made.
 void expect_as_planned(const ClusterPlan& plan, const Catalogue& catalogue, const compare::Experiment& experiment);

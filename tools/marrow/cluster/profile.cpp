@@ -62,7 +62,8 @@ class ProfileReader {
     return all;
   }
 
-  /// A name of something of the cluster. It goes into a line of shell, so it may hold only what such names hold.
+  /// The name of a partition, account or module. It becomes part of a line of shell, so only harmless characters are
+  /// allowed.
   std::string word(const YAML::Node& node, const YamlEntry& entry) {
     const auto text = yaml_.text(node, entry.place, "'" + entry.key + "'");
     const char* allowed = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.,:/+@-";

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The files beside a plan by which other programs run its chunks. GNU parallel, Snakemake and Slurm give a meaning to
-// characters in what they pass on: they call shells, and replace braces or percent signs. So no path goes through them,
-// only names made of the plan's id. Paths stand in scripts for /bin/sh, in single quotes.
+// The files beside a plan by which other programs run its chunks. GNU parallel, Snakemake and Slurm interpret the words
+// that they pass on: they call shells, and replace braces or percent signs. So they get no paths, only names made of
+// the plan's id. Paths are in scripts for /bin/sh, in single quotes.
 #include <filesystem>
 #include <string>
 #include <vector>

@@ -30,11 +30,11 @@ std::optional<Submission> read_submission(const std::filesystem::path& folder);
 void write_submission(const std::filesystem::path& folder, const Submission& submission);
 
 /// Submits the chunks that have no rows yet, cases first, and a job that gathers. `profile_file` may be empty. Throws
-/// Error with what sbatch said if it refuses, and where Slurm could write no logs; nothing stays submitted then.
+/// Error with the words of sbatch if it refuses, or if Slurm could not write logs there. Then nothing stays submitted.
 Submission submit(const ClusterPlan& plan, const ClusterProfile& profile, const std::filesystem::path& profile_file,
                   std::int64_t tries_before);
 
-/// The states of tasks that Slurm still knows, by "JOB_TASK": RUNNING, TIMEOUT, ... Ended tasks are known for some
+/// The states of tasks that Slurm still knows, by "JOB_TASK": RUNNING, TIMEOUT, ... Slurm knows ended tasks for some
 /// minutes only, or for long if the cluster keeps accounts.
 std::map<std::string, std::string> states_of(const Submission& submission);
 /// Why the chunks without rows have none, in words, by the chunk's name.
@@ -43,7 +43,7 @@ std::map<std::string, std::string> reasons_of(const ClusterPlan& plan, const Sub
 /// What Slurm says of the jobs that wait or run.
 struct Queue {
   bool is_known = false;             ///< Slurm answered
-  std::string fault;                 ///< what it said if it did not answer
+  std::string fault;                 ///< its message if it did not answer
   bool has_gather = false;           ///< the job that gathers waits or runs
   std::string held;                  ///< why a job is held back until somebody releases it; empty if none is
   std::set<std::string> reasons;     ///< why jobs wait, in its words
@@ -52,7 +52,7 @@ struct Queue {
 Queue queue_of(const Submission& submission);
 /// Ends one task, "JOB_TASK".
 void end_task(const Submission& submission, const std::string& task);
-/// Ends what is waiting or running. Throws Error with what scancel said if it cannot be told.
+/// Ends everything that waits or runs. Throws Error with the words of scancel if that fails.
 void cancel(const Submission& submission);
 
 }  // namespace marrow::cli

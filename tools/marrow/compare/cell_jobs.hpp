@@ -20,12 +20,12 @@ class CellJobs {
   std::size_t count() const { return cells_.size(); }
   const compare::CellIndex& cell(std::size_t number) const { return cells_[number]; }
   std::size_t number_of(const compare::CellIndex& cell) const;
-  /// The key of everything that the cell depends on, as it is now. It is kept for the job and for row_of().
+  /// The present key of everything that the cell depends on. It is kept for job_of() and row_of().
   const std::string& take_key(std::size_t number);
 
-  /// `what` is "cell", "time" or "draw". The key was taken before.
+  /// `what` is "cell", "time" or "draw". Call take_key() before.
   Job job_of(const char* what, std::size_t number, std::string group) const;
-  /// Jobs that make the cases of these numbers, without those that are no simulations.
+  /// Jobs that make the simulated ones of these cases.
   std::vector<Job> cases_of(const std::vector<std::size_t>& case_numbers) const;
   /// The row from a worker's answer. The answer counts only if it is about the requested cell.
   compare::CellRow row_of(const Job& job, const JobEnd& end) const;

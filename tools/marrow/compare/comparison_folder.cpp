@@ -36,8 +36,8 @@ std::string marker_text(const Owner& owner) {
   return kHead + owner.name + "\n" + (owner.file.empty() ? "" : kFile + owner.file.string() + "\n");
 }
 
-/// Nothing if the text is no marker, or one whose writer was killed before it was complete. A name has no line break,
-/// but a path may have one.
+/// Nothing if the text is no marker, or if its writer was killed before it was complete. A path may have a line break,
+/// a name cannot.
 std::optional<Owner> owner_in(const std::string& text) {
   if (!text.starts_with(kHead) || !text.ends_with('\n')) return std::nullopt;
   const std::size_t end = text.find('\n', kHead.size());
@@ -49,8 +49,8 @@ std::optional<Owner> owner_in(const std::string& text) {
   return owner;
 }
 
-/// Whether the marker's experiment is another one that is still there. One that was moved keeps its folder. On a host
-/// that does not see the old place, that cannot be told from a move.
+/// Whether the marker names another experiment whose file still exists. A moved experiment keeps its folder. A host
+/// that cannot see the old place takes it for moved.
 bool is_another(const fs::path& before, const fs::path& now) {
   std::error_code error;
   return !before.empty() && fs::exists(before, error) && !fs::equivalent(before, now, error);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Numbers of a comparison as texts, none of which says 0 of something that is not.
+// Numbers of a comparison as texts. Only zero is written as 0.
 #include <string>
 #include <vector>
 
@@ -8,8 +8,8 @@
 
 namespace marrow::cli {
 
-/// One notation for numbers that stand under each other. It has as many decimals as these numbers need: four between 1
-/// and 100, and more for smaller ones. Numbers beyond 10^7, and those so small that the decimals leave fewer than two
+/// One notation for the numbers of a column. It has as many decimals as these numbers need: four between 1 and 100, and
+/// more for smaller ones. Numbers beyond 10^7, and those so small that the decimals leave fewer than two
 /// digits of them, are written with an exponent.
 class NumberScale {
  public:

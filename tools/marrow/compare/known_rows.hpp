@@ -8,8 +8,8 @@
 
 namespace marrow::cli {
 
-/// The rows of a comparison that were made before, here or by tasks of a cluster. A row counts only with the key of
-/// what its cell depends on now, and as it was written.
+/// The rows of a comparison that were made before, here or by tasks of a cluster. A row counts only if its key is that
+/// of the cell's present dependencies, and if nobody changed it.
 class KnownRows {
  public:
   /// `plan` as for RowsOfChunks.
@@ -27,7 +27,7 @@ class KnownRows {
   void say_doubts() const;
 
  private:
-  /// Cells of which one thing is to be said: how many, and the first.
+  /// What one note says: the number of cells, and the first one.
   struct Remark {
     std::size_t cells = 0;
     std::string first;

@@ -64,8 +64,7 @@ class Pool {
   }
 
   void give_work() {
-    // A job whose process failed is tried again while nothing else runs. So no other job can be the cause, or be
-    // disturbed by it.
+    // A job whose process failed is tried again alone. So no other job can be the cause, and none is disturbed.
     const bool alone = waiting_.empty();
     if (alone && is_busy()) return;
     std::deque<Job>& source = alone ? again_ : waiting_;
@@ -109,9 +108,8 @@ class Pool {
     waiting_.push_front(std::move(job));
   }
 
-  /// The next job for a worker: a job of the worker's last group; else one of a group that no other worker is working
-  /// on; else one of a group whose first job is done. Before the first job of a group is done, a second worker would
-  /// only compute the group's shared results again.
+  /// The next job for a worker: one of its last group; else one of a group without a worker; else one of a group whose
+  /// first job is done. Before that, a second worker would only compute the group's shared results again.
   std::optional<Job> next_for(const Member& member, std::deque<Job>& source) {
     std::string& mine = groups_[&member];
     auto chosen =

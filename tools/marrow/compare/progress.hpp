@@ -6,7 +6,7 @@
 
 namespace marrow::cli {
 
-/// How far something is that has many parts, on the standard error: one line that changes on a terminal, otherwise a
+/// Shows the progress of work with many parts on the standard error: one line that changes on a terminal, otherwise a
 /// line every five seconds and one at the end.
 class Progress {
  public:

@@ -54,7 +54,7 @@ std::vector<std::string> changed_options(const Experiment& experiment) {
   return {keys.begin(), keys.end()};
 }
 
-/// Of each variant, by its name, the values of these options; empty for one that the variant does not change.
+/// The values of these options by the variant's name; empty for an option that the variant does not change.
 std::map<std::string, std::vector<std::string>> options_by_variant(const Experiment& experiment,
                                                                    const std::vector<std::string>& options) {
   std::map<std::string, std::vector<std::string>> values;
@@ -155,10 +155,10 @@ json of(const std::optional<compare::CaptureRange>& capture, std::size_t unknown
           {"bins", bins}};
 }
 
-/// Null for a bound that is no number.
+/// Null for a bound that is not finite.
 json bound(double value) { return std::isfinite(value) ? json(value) : json(); }
 
-/// Who of a comparison lost runs: "variant", "baseline", or null if the median is one of values.
+/// Who lost more runs: "variant", "baseline", or null if the median is a number.
 json who_fails_more(const compare::Comparison& comparison, bool higher_is_better) {
   if (!comparison.compared() || std::isfinite(comparison.median_difference)) return {};
   return (comparison.median_difference > 0) != higher_is_better ? "variant" : "baseline";

@@ -10,8 +10,8 @@
 
 namespace marrow::cli {
 
-/// The cases and starts in which every variant was done and no node failed. A variant that was so in none does not
-/// count. Only over these can amounts of work be compared: who fails in the hard cases would else seem to be faster.
+/// The cases and starts in which every variant was done and no node failed. A variant for which there are none does not
+/// count. Only these allow to compare amounts of work: otherwise a variant that fails in hard cases would seem faster.
 std::set<std::pair<std::string, std::string>> places_done_by_all(const std::vector<RowsOfVariant>& rows);
 
 /// The cells that are timed: of each variant those of the same cases and starts.
@@ -31,7 +31,7 @@ class TimedCells {
  private:
   std::size_t asked_, variants_;
   std::size_t places_ = 0, lost_ = 0;
-  bool has_fewer_ = false;   ///< than was asked for, because some failed
+  bool has_fewer_ = false;   ///< fewer than requested, because some failed
   std::string without_any_;  ///< names of variants that were done nowhere
   std::vector<std::size_t> numbers_;
 };

@@ -85,7 +85,7 @@ class Tuner {
     return made_;
   }
 
-  /// What the cells of all points depend on, as it was for the first that needed it.
+  /// The dependencies of the cells of all points, each as the first cell found it.
   const compare::Dependencies& dependencies() const { return dependencies_; }
 
  private:
@@ -127,8 +127,8 @@ class Tuner {
     if (!is_quiet_) std::fprintf(stderr, "marrow: %s\n", printable(text).c_str());
   }
 
-  /// Why the pipeline does not take the values of the only variant; empty if it does. Each value alone may be good,
-  /// and not go with another, as a lower threshold above the upper one.
+  /// Why the pipeline refuses the values of the only variant; empty if it does not. Values that are good alone may not
+  /// fit together, such as a lower threshold above the upper one.
   std::string fault_of(const Experiment& at_point) const {
     Diagnostics faults;
     read_pipeline(at_point.pipeline, arguments_of(at_point, {0, 0, 0}, "case"), catalogue_, faults, true);

@@ -13,10 +13,10 @@ namespace marrow::cli {
 /// The training cases and starts at one point.
 struct TuningPoint {
   std::vector<double> values;  ///< of the options; empty for the variant of the file
-  /// What the optimizer makes good: the mean over all runs, where each that failed, or is worse, counts as
-  /// TuneRule::failed_as. So it is no mean of the figure.
+  /// What the optimizer improves: the mean over all runs, where each failed or worse run counts as TuneRule::failed_as.
+  /// So it is not the mean of the figure.
   double score = 0;
-  std::optional<double> mean;  ///< over the runs that have the figure, as it is; nothing if none has it
+  std::optional<double> mean;  ///< of the unchanged figure, over the runs that have it; nothing if none has it
   std::size_t runs = 0;
   std::size_t failed = 0;    ///< runs without the figure: the cell failed, or a node in it that may fail
   std::size_t capped = 0;    ///< runs whose figure is worse than TuneRule::failed_as

@@ -8,8 +8,8 @@
 
 namespace marrow::cli {
 
-/// Checks that nothing changed while a comparison ran. Each process of a comparison reads the files for itself. If a
-/// file changes meanwhile, the processes do not all use the same content.
+/// Checks that nothing changed while a comparison ran. Each process of a comparison reads the files itself. If a file
+/// changes meanwhile, not all processes use the same content.
 class Unchanged {
  public:
   enum class Cases { all, held_out };

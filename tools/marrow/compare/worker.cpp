@@ -22,9 +22,8 @@ using nlohmann::json;
   throw Error(what + " changed while the comparison ran; run it again");
 }
 
-/// The requested cell. Cases and files may have changed between the time when the main process read the experiment and
-/// the time when this process read it. So a request has the cell's name and the key of everything that the cell depends
-/// on.
+/// The requested cell. Cases and files may change between the reading of the experiment by the main process and by this
+/// one. So a request has the cell's name and the key of everything that the cell depends on.
 CellIndex cell_in(CellRunner& runner, const json& asked) {
   const std::string id = asked.at("cell");
   const auto cell = compare::cell_of(runner.experiment(), id);
@@ -54,8 +53,7 @@ std::function<void(const RunEvent&)> observer_of(WorkerReports& reports) {
   };
 }
 
-/// The result of a task. If the system gave it no process, the reason instead, because this is not a failure of the
-/// cell.
+/// The result of a task. If the system gave it no process, the reason instead: the cell itself did not fail.
 json with_processes(const std::function<json()>& task) {
   const long before = calls_without_process();
   try {

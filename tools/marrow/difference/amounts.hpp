@@ -18,7 +18,7 @@ struct Amount {
 /// For two items of a type that all plugins share. `lines` is empty if the type is another one, or if the types differ.
 Amount amount_of(const Value& before, const Value& now);
 
-/// For values of which only the bytes are known. `what` names the bytes in the text.
+/// For values that are known only as bytes. `what` names the bytes in the text.
 Amount amount_of_bytes(const std::string& before, const std::string& now, const std::string& what);
 /// The same for two files, which may be larger than the memory.
 Amount amount_of_files(const std::filesystem::path& before, const std::filesystem::path& now);

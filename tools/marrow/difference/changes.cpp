@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A number in its shortest form with the same value. Resolved pipelines hold numbers with 17 digits.
+/// A number in the shortest form with the same value: resolved pipelines hold numbers with 17 digits.
 std::string shortened(const std::string& text) {
   if (text.starts_with("[") && text.ends_with("]")) {
     std::string result;
@@ -67,7 +67,7 @@ std::vector<std::string> paths_in(const std::string& text) {
   return paths;
 }
 
-/// The contents of the files that an option named, without their names. Nothing if they are not what they were.
+/// The contents of the files that an option named, without their names. Nothing if they have changed since the run.
 std::optional<std::multiset<std::string>> contents_of(const NamedContent& named) {
   std::multiset<std::string> contents;
   Hasher hasher;  // as contents_of_options() makes the digest

@@ -38,7 +38,7 @@ std::vector<std::string> references_in(const YAML::Node& value) {
   return references;
 }
 
-/// What the nodes of a body are given from outside, by node or node.output of the body.
+/// What the nodes of a body get from outside, by node or node.output of the body.
 struct GivenToBody {
   std::map<std::string, std::vector<std::string>> from, from_pass_before;
 };
@@ -166,7 +166,7 @@ YAML::Node pipeline_of(const fs::path& file) {
   return pipeline;
 }
 
-/// What decides how a body is run, as if it were options of the node.
+/// Takes what decides how a body runs as options of the node.
 void read_repetition(const YAML::Node& written, RecordedNode& node) {
   node.uses = "repeat";
   for (const char* key : {"over", "at_most", "until", "if_pass_fails"})

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Templates of files, as they are installed in share/marrow beside the program, and what is made of them.
+// Templates of files, which are installed in share/marrow, and the projects made from them.
 #include <filesystem>
 #include <map>
 #include <string>
@@ -21,7 +21,7 @@ std::string replaced(std::string text, const Replacements& replacements);
 /// All files of a folder of templates, with replacements in their texts. `gitignore` becomes `.gitignore`.
 Files filled_templates(const std::filesystem::path& folder, const Replacements& replacements);
 
-/// Throws Error if there is anything at the place.
+/// Throws Error if the place is taken.
 void expect_free(const std::filesystem::path& place);
 
 /// Writes all files into a new folder, or nothing: the `wanted` one, or if that is empty, `otherwise`. Returns the

@@ -23,7 +23,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::size_t kMostKept = 200'000;
 constexpr auto kUntilKilled = std::chrono::seconds(10);
 
-/// Starts the program in a process group of its own, so that Ctrl-C reaches only this process.
+/// Starts the program in its own process group, so that Ctrl-C reaches only this process.
 pid_t started(const std::vector<std::string>& command, int output) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);

@@ -32,7 +32,7 @@ struct WatchRequest {
   fs::path folder;  ///< empty = runs/NAME-watch
 };
 
-/// What a program that failed printed, with what it was to do.
+/// The output of a program that failed. `what` says what it should have done.
 std::string shown_fault(const std::string& what, const ChildEnd& end) {
   return formatted("{} (exit code {})\n\n{}", what, end.code, printable_lines(end.said));
 }
@@ -101,7 +101,7 @@ class Watch {
 
   bool changed() { return sources_changed() || states_of(files_) != ran_with_; }
 
-  /// Asked while a program runs: whether it works on what is out of date.
+  /// Called while a program runs: whether what it works on is out of date.
   bool should_stop() {
     restart_ = !stop_ && changed();
     return stop_ || restart_;
@@ -129,7 +129,7 @@ class Watch {
 
   void note_files() {
     WatchedFiles files = files_of(request_.pipeline);
-    // A pipeline with a fault may not tell all of its files, so those that were known stay.
+    // A pipeline with a fault may hide some of its files, so the files that were known stay.
     files.paths.insert(files.paths.end(), files_.paths.begin(), files_.paths.end());
     std::sort(files.paths.begin(), files.paths.end());
     files.paths.erase(std::unique(files.paths.begin(), files.paths.end()), files.paths.end());
