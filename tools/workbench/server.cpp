@@ -5,6 +5,7 @@
 
 #include <charconv>
 #include <chrono>
+#include <memory>
 #include <thread>
 
 #include "marrow/base/number_text.hpp"
@@ -41,6 +42,16 @@ void refuse(httplib::Response& response, int status, const std::string& text) {
   response.status = status;
   response.set_content(json{{"error", printable_lines(text)}}.dump(-1, ' ', false, json::error_handler_t::replace),
                        "application/json");
+}
+
+/// As it is: httplib compresses what set_content() is given, and that takes a second for the scripts of a page.
+void send_whole(const std::shared_ptr<const std::string>& content, const std::string& type,
+                httplib::Response& response) {
+  if (content->empty()) return response.set_content("", type);
+  const auto part = [content](std::size_t begin, std::size_t length, httplib::DataSink& sink) {
+    return sink.write(content->data() + begin, length);
+  };
+  response.set_content_provider(content->size(), type, part);
 }
 
 Request request_of(const httplib::Request& asked) {
@@ -146,7 +157,7 @@ struct Server::Parts {
         response.headers.erase(name);  // the default one, which would count as well
         response.set_header(name, value);
       }
-      response.set_content(std::move(answer.body), answer.type);
+      send_whole(std::make_shared<const std::string>(std::move(answer.body)), answer.type, response);
     } catch (const Conflict& error) {
       refuse(response, 409, error.what());
     } catch (const std::bad_alloc&) {
@@ -175,9 +186,9 @@ void Server::post(const std::string& path, Handler handler) {
 }
 
 void Server::page(const std::string& path, const std::string& type, std::string text) {
-  parts_->http.Get(path, [type, text = std::move(text)](const httplib::Request&, httplib::Response& response) {
-    response.set_content(text, type);
-  });
+  parts_->http.Get(path,
+                   [type, content = std::make_shared<const std::string>(std::move(text))](
+                       const httplib::Request&, httplib::Response& response) { send_whole(content, type, response); });
 }
 
 void Server::listen(int port) {
