@@ -27,6 +27,5 @@ PYBIND11_MODULE(_core, module) {
   python::bind_catalogue(module);
   python::bind_pipelines(module);
   python::bind_runs(module);
-  python::bind_experiments(module);
   python::bind_worker(module);
 }

@@ -4,6 +4,7 @@
 #include <pybind11/stl.h>
 
 #include "marrow/base/error.hpp"
+#include "marrow/compare/experiment.hpp"
 #include "marrow/runtime/pipeline/judged_poses.hpp"
 #include "marrow/runtime/pipeline/one_node.hpp"
 #include "marrow/runtime/run/run_folder.hpp"
@@ -33,6 +34,18 @@ py::tuple read(const std::string& file, const Texts& inputs, const Texts& change
     made->pipeline = read_pipeline(file, made->arguments, *made->known, diagnostics, inputs_required);
   }
   return with_faults(std::move(made), diagnostics);
+}
+
+/// Reads an experiment. Returns its name, its faults and all of them as one text.
+py::tuple read_experiment(const std::string& file) {
+  const auto known = catalogue();
+  Diagnostics diagnostics;
+  std::string name;
+  {
+    const py::gil_scoped_release release;  // it reads the pipeline of each variant
+    name = compare::read_experiment(file, *known, diagnostics).name;
+  }
+  return py::make_tuple(name, list_of(diagnostics), diagnostics.text());
 }
 
 const PortInfo* port_of(const NodeInfo& info, const std::string& name) {
@@ -155,6 +168,7 @@ void bind_pipelines(py::module_& module) {
       .def("resolved_yaml", [](const ReadPipeline& self) { return resolved_yaml(self.pipeline); });
   module.def("read", &read, py::arg("file"), py::arg("inputs"), py::arg("changes"), py::arg("inputs_required"));
   module.def("read_node", &read_node, py::arg("name"), py::arg("inputs"), py::arg("options"));
+  module.def("read_experiment", &read_experiment, py::arg("file"));
 }
 
 }  // namespace marrow::python

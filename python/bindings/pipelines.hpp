@@ -35,6 +35,5 @@ py::list list_of(const Diagnostics& diagnostics, const NodeInfo* called = nullpt
 void bind_catalogue(py::module_& module);
 void bind_pipelines(py::module_& module);
 void bind_runs(py::module_& module);
-void bind_experiments(py::module_& module);
 
 }  // namespace marrow::python

@@ -7,7 +7,7 @@ import numpy
 from . import _core
 from .declaration import Declaration
 from .errors import Error
-from .problem import BudgetSpent, Problem
+from .problem import BudgetSpent, Problem, shape_text
 
 _MOST = 8  # functions that are kept; others are made again
 
@@ -52,7 +52,7 @@ def costs(node: Declaration, cost: Any, request: Dict[str, Any]) -> List[float]:
     poses = _transforms(request["poses"])
     values = _core.array_of_real(cost(poses), "float64", "%s: costs" % name)
     if values.shape != (len(poses),):
-        raise Error("%s: expected %d costs, got %s" % (name, len(poses), _shape(values)))
+        raise Error("%s: expected %d costs, got %s" % (name, len(poses), shape_text(values)))
     if not numpy.isfinite(values).all():
         raise Error("%s: a cost is not finite; give the worst value where nothing can be compared" % name)
     listed: List[float] = values.tolist()
@@ -73,7 +73,7 @@ def radiograph(node: Declaration, made: Any, request: Dict[str, Any]) -> Any:
     drawn = made[0](seen_by, _transforms(request["pose"])[0], pixels)
     values = _core.array_of_real(drawn, "float32", "%s: values of the pixels" % name)
     if values.shape != (len(pixels),):
-        raise Error("%s: expected the values of %d pixels, got %s" % (name, len(pixels), _shape(values)))
+        raise Error("%s: expected the values of %d pixels, got %s" % (name, len(pixels), shape_text(values)))
     if not numpy.isfinite(values).all() or (values < 0).any():
         raise Error("%s: a value of the radiograph is below 0 or not finite; give 0 where the model is missed" % name)
     return _core.Image(values[None])
@@ -114,7 +114,3 @@ def _pixels(request: Dict[str, Any]) -> Any:
     u_px, v_px, step_px = request["grid"]
     rows, columns = numpy.mgrid[0 : request["rows"], 0 : request["columns"]]
     return numpy.column_stack([u_px + step_px * columns.ravel(), v_px + step_px * rows.ravel()])
-
-
-def _shape(values: Any) -> str:
-    return " x ".join(map(str, values.shape)) or "one number"

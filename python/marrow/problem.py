@@ -61,7 +61,7 @@ class Problem:
         asked = _numbers(points, "points")
         size = len(self.start)
         if asked.ndim not in (1, 2) or asked.shape[-1] != size:
-            got = " x ".join(map(str, asked.shape)) or "one number"
+            got = shape_text(asked)
             raise Error("expected points of %d numbers, [N, %d] or [%d], got %s" % (size, size, size, got))
         rows = asked.reshape(-1, size)
         if not numpy.isfinite(rows).all():
@@ -78,8 +78,7 @@ class Problem:
     def _values(self, points: Any) -> Any:
         values = _numbers(self._function(points), "values of the function")
         if values.shape != (len(points),):
-            got = " x ".join(map(str, values.shape)) or "one number"
-            raise Error("the function gave %s for %d points" % (got, len(points)))
+            raise Error("the function gave %s for %d points" % (shape_text(values), len(points)))
         self.evaluations += len(points)
         values[~numpy.isfinite(values)] = numpy.inf
         least = int(values.argmin())
@@ -102,8 +101,13 @@ class Problem:
             raise Error("the optimizer needs a positive, finite step_tolerance, got %g" % self.step_tolerance)
 
 
+def shape_text(array: Any) -> str:
+    """The shape of an array in words."""
+    return " x ".join(map(str, array.shape)) or "one number"
+
+
 def _numbers(given: Any, what: str) -> Any:
-    """A copy as an array of numbers, of which none got lost."""
+    """A copy as an array of numbers. Raises Error if a number would get lost."""
     return numpy.array(_core.array_of_real(given, "float64", "the optimizer: " + what))
 
 

@@ -4,9 +4,11 @@ import atexit
 import os
 import pathlib
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
+import threading
 
 from harness import BUILD, MARROW, SHARED_CACHE, SOURCE, TEST_PLUGINS  # noqa: F401
 from harness.program import Case, main, wait_until  # noqa: F401
@@ -36,6 +38,15 @@ def small_case():
             os.environ["MARROW_CACHE"] = own
         _made["case"] = (SCRATCH / "simulated" / "outputs" / "case", result["case"])
     return _made["case"]
+
+
+def interrupt(test, call, after_s=0.5):
+    """Calls while a SIGINT comes, which must end the call."""
+    timer = threading.Timer(after_s, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    with test.assertRaises(KeyboardInterrupt):
+        call()
+    timer.join()
 
 
 def program(*arguments, cwd=None):

@@ -1,6 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the nodes are called that make models, features and poses: (inputs, options) by the node's name."""
 
+GREY_VALUES = (  # costs that compare a radiograph with the image
+    "entropy_of_difference",
+    "gradient_correlation",
+    "gradient_difference",
+    "gradient_orientation",
+    "metal_gradient_correlation",
+    "mutual_information",
+    "normalised_cross_correlation",
+    "patch_correlation",
+    "patch_gradient_correlation",
+    "pattern_intensity",
+)
+
 
 def calls(s):
     def views_and(**more):
@@ -38,18 +51,7 @@ def calls(s):
     made.update(
         {
             "similarity.%s" % name: lambda: (views_and(projector=s.drr, **others(False)), {})
-            for name in (
-                "entropy_of_difference",
-                "gradient_correlation",
-                "gradient_difference",
-                "gradient_orientation",
-                "metal_gradient_correlation",
-                "mutual_information",
-                "normalised_cross_correlation",
-                "patch_correlation",
-                "patch_gradient_correlation",
-                "pattern_intensity",
-            )
+            for name in GREY_VALUES
         }
     )
 

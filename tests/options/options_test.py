@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each option of each node changes an output, or is refused, or is listed with the reason why it does neither."""
 import keyword
-import time
 import unittest
 
 import calls_of_bones  # noqa: E402
@@ -9,7 +8,6 @@ import calls_of_files  # noqa: E402
 import calls_of_simulation  # noqa: E402
 from alternatives import alternatives  # noqa: E402
 from digests import digest_of  # noqa: E402
-from no_effect import NO_EFFECT  # noqa: E402
 from harness.package import main, marrow
 from harness.sample import sample
 from scene import Scene  # noqa: E402
@@ -20,6 +18,7 @@ SCENE = Scene()
 CALLS = {}
 for module in (calls_of_bones, calls_of_simulation, calls_of_files):
     CALLS.update(module.calls(SCENE))
+NO_EFFECT = {}  # options that change no output, each with the reason
 OF_TESTS = ("test.", "parse.test_")
 NODES = {name: marrow._core.node_info(name) for name in marrow._core.node_names() if not name.startswith(OF_TESTS)}
 

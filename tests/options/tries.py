@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Values for options that cannot be guessed, or that count only together with others: by node.option, a function of the
 scene that gives sets of options. A key "in.NAME" is an input."""
+from calls_of_bones import GREY_VALUES
 from files_of_scene import surface_of, written
 
 
@@ -142,22 +143,7 @@ for _node in ("simulate.hexapod", "simulate.photograph"):
     TRIES[_node + ".fragment"] = one(to="proximal")
 TRIES["robot.hexapod.moved"] = one(reference="distal", to="proximal")
 TRIES["robot.hexapod.reference"] = one(to="nobody")
-for _node in (
-    "contour_distance",
-    "drr_edges",
-    "entropy_of_difference",
-    "gradient_correlation",
-    "gradient_difference",
-    "gradient_orientation",
-    "gradient_projection",
-    "metal_gradient_correlation",
-    "mutual_information",
-    "normalised_cross_correlation",
-    "patch_correlation",
-    "patch_gradient_correlation",
-    "pattern_intensity",
-    "ray_to_surface",
-):
+for _node in (*GREY_VALUES, "contour_distance", "drr_edges", "gradient_projection", "ray_to_surface"):
     TRIES["similarity.%s.weights" % _node] = one(to=[1, 3])
 for _node in ("hough_pairs", "line_segments", "ransac"):
     TRIES["shaft.%s.width_mm" % _node] = one(to=[20])

@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Functions that nodes make, called from Python: costs, optimizers and projectors."""
 import itertools
-import os
-import signal
 import threading
 import time
 
 import numpy
-from harness.package import main, marrow, small_case
-from written_nodes import Written, view
+from harness.package import interrupt, main, marrow, small_case
+from written_nodes import Written, camera, view
 
 SLOW = """import time
 
@@ -54,23 +52,7 @@ def ball(radius_mm=20):
     )
 
 
-def camera():
-    away = numpy.eye(4)
-    away[2, 3] = 600
-    return marrow.Camera(128, 96, [[1000, 0, 63.5], [0, 1000, 47.5], [0, 0, 1]], away)
-
-
-class Functions(Written):
-    def interrupted(self, call):
-        """Calls while a SIGINT comes, which must end the call."""
-        timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
-        timer.start()
-        with self.assertRaises(KeyboardInterrupt):
-            call()
-        timer.join()
-
-
-class Costs(Functions):
+class Costs(Written):
     def test_a_cost_says_what_it_says_in_a_pipeline(self):
         cost, _, truth, _ = contour()
         self.assertEqual((type(cost), cost.type, repr(cost)), (marrow.Cost, "cost", "<marrow cost>"))
@@ -118,7 +100,7 @@ class Costs(Functions):
             marrow.similarity.slow([view()], fails=True)(numpy.eye(4))
         cost = marrow.similarity.slow([view()])
         poses = numpy.tile(numpy.eye(4), (32000, 1, 1))  # would take 200 s
-        self.interrupted(lambda: cost(poses))
+        interrupt(self, lambda: cost(poses))
 
     def test_other_threads_go_on_while_a_cost_is_computed(self):
         self.plugin(SLOW)
@@ -134,7 +116,7 @@ class Costs(Functions):
         self.assertGreater(turns, 5)  # where the cost holds the others up, one or two
 
 
-class Optimizers(Functions):
+class Optimizers(Written):
     def test_it_finds_the_least_of_a_function(self):
         asked = []
 
@@ -175,10 +157,10 @@ class Optimizers(Functions):
         with self.assertRaisesRegex(marrow.Error, "one positive initial step per coordinate"):
             optimizer.minimise(lambda x: 0, [0, 0], [1])
         falls = itertools.count(0, -1)  # so that it does not end by itself
-        self.interrupted(lambda: optimizer.minimise(lambda x: time.sleep(0.1) or next(falls), [0], [1]))
+        interrupt(self, lambda: optimizer.minimise(lambda x: time.sleep(0.1) or next(falls), [0], [1]))
 
 
-class Projectors(Functions):
+class Projectors(Written):
     def test_a_radiograph_of_a_ball_is_as_thick_as_the_ball(self):
         projector = marrow.project.joseph(ball())
         seen = projector(camera(), numpy.eye(4))

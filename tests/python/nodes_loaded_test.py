@@ -11,8 +11,8 @@ import subprocess
 import sys
 import zipfile
 
-from harness.package import main, marrow
-from written_nodes import Written, view
+from harness.package import main
+from written_nodes import Written
 
 NODE = """
 %s
@@ -48,13 +48,6 @@ class Loaded(Written):
         finally:
             os.environ.clear()
             os.environ.update(before)
-
-    def found(self):
-        """The value, and whether it was made anew."""
-        told = []
-        marrow.find_plugins_again()
-        figures = marrow.own.value.using(keep=True, progress=told.append)(view())
-        return figures["value"], any(event["event"] == "started" for event in told)
 
     def kept(self, value):
         """Runs until the result is kept, which it is once everything that it depends on is known."""

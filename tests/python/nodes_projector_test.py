@@ -2,7 +2,7 @@
 """Projectors of radiographs written in Python: marrow asks for the pixels of a picture, and costs compare it."""
 import numpy
 from harness.package import main, marrow
-from written_nodes import Written
+from written_nodes import Written, camera
 
 BALL = """
 @marrow.projector("project.ball", summary="the chords of a ball", seconds=5)
@@ -26,12 +26,6 @@ def ball(
         return draw
     return draw, (corners[:, :2] if answer == "flat box" else corners)
 """
-
-
-def camera():
-    away = numpy.eye(4)
-    away[2, 3] = 600
-    return marrow.Camera(128, 96, [[1000, 0, 63.5], [0, 1000, 47.5], [0, 0, 1]], away)
 
 
 def shifted(x, y, z):

@@ -16,13 +16,6 @@ def value(view: Annotated[marrow.View, "view"]) -> Annotated[marrow.Metrics, mar
 
 
 class Stale(Written):
-    def found(self):
-        """The value, and whether it was made anew."""
-        told = []
-        marrow.find_plugins_again()
-        figures = marrow.own.value.using(keep=True, progress=told.append)(view())
-        return figures["value"], any(event["event"] == "started" for event in told)
-
     def test_a_result_is_kept_until_the_file_changes(self):
         text = NODE % 'return marrow.Metrics({"value": %d})'
         self.plugin(text % 1)

@@ -8,7 +8,7 @@ import threading
 import time
 
 import numpy
-from harness.package import FEMUR, Case, main, marrow, small_case
+from harness.package import FEMUR, Case, interrupt, main, marrow, small_case
 
 LONG = """marrow: 1
 nodes:
@@ -19,26 +19,18 @@ outputs: {b: b}
 
 
 class Stopping(Case):
-    def interrupt(self, call, signal_after_s=0.5):
-        """Calls while a SIGINT comes, which must end the call."""
-        timer = threading.Timer(signal_after_s, os.kill, (os.getpid(), signal.SIGINT))
-        timer.start()
-        with self.assertRaises(KeyboardInterrupt):
-            call()
-        timer.join()
-
     def test_ctrl_c_stops_a_run_and_no_handler_changes(self):
         pipeline = marrow.Pipeline(self.write("long.yaml", LONG % 300))
         handler = signal.getsignal(signal.SIGINT)
-        self.interrupt(lambda: pipeline.run(keep=False))
+        interrupt(self, lambda: pipeline.run(keep=False))
         self.assertIs(signal.getsignal(signal.SIGINT), handler)
-        self.interrupt(lambda: time.sleep(300))  # outside of a run it does what it did before
+        interrupt(self, lambda: time.sleep(300))  # outside of a run it does what it did before
         short = marrow.Pipeline(self.write("short.yaml", LONG % 0.01))
         self.assertEqual(short.run(keep=False).nodes["b"].status, "done")
 
     def test_ctrl_c_stops_a_node(self):
         work = marrow.test.work.using()
-        self.interrupt(lambda: work(marrow.test.constant(), value=300))
+        interrupt(self, lambda: work(marrow.test.constant(), value=300))
 
     def test_a_handler_of_ones_own_is_called_and_may_go_on(self):
         seen = []

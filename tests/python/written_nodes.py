@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests of nodes written in Python share: a folder of plugins, and small views."""
+"""What the tests of nodes written in Python share: a folder of plugins, small views, and a camera."""
 import os
 import pathlib
 import subprocess
@@ -20,6 +20,13 @@ def view(seed=1, width_px=60, height_px=40):
     return marrow.View(pixels, camera, name="frontal")
 
 
+def camera():
+    """A camera 600 mm from the origin of the world."""
+    away = numpy.eye(4)
+    away[2, 3] = 600
+    return marrow.Camera(128, 96, [[1000, 0, 63.5], [0, 1000, 47.5], [0, 0, 1]], away)
+
+
 def processes(file):
     """The numbers of the Python processes that hold the nodes of a file."""
     found = []
@@ -35,7 +42,7 @@ def processes(file):
 
 
 class Written(Case):
-    """Each test has a folder of plugins and a cache of descriptions of its own."""
+    """Each test has its own folder of plugins and cache of descriptions."""
 
     def setUp(self):
         super().setUp()
@@ -56,6 +63,13 @@ class Written(Case):
         marrow.find_plugins_again()
         return file
 
+    def found(self):
+        """The value of the node own.value, and whether it was made again."""
+        told = []
+        marrow.find_plugins_again()
+        figures = marrow.own.value.using(keep=True, progress=told.append)(view())
+        return figures["value"], any(event["event"] == "started" for event in told)
+
     def program(self, *arguments, code=0):
         """Runs marrow's program; returns what it printed."""
         done = subprocess.run([str(MARROW), *map(str, arguments)], capture_output=True, text=True, cwd=self.scratch)
@@ -63,4 +77,4 @@ class Written(Case):
         return done.stdout + done.stderr
 
 
-__all__ = ["HEAD", "SCRATCH", "Written", "processes", "view"]
+__all__ = ["HEAD", "SCRATCH", "Written", "camera", "processes", "view"]
