@@ -30,7 +30,7 @@ std::array<std::pair<const char*, json*>, 3> groups_of(ReportMaterial& material)
   return {{{"pictures", &material.pictures}, {"geometries", &material.geometries}, {"scenes", &material.scenes}}};
 }
 
-/// The bytes by which `data` grows if a place is entered. What another place has brought already counts nothing.
+/// The bytes by which `data` grows if a place is added. What another place has already added does not count.
 std::size_t growth(const json& data, Place& place) {
   std::size_t bytes = text_of(place.cells).size();
   for (const auto& [name, group] : groups_of(place.material))
@@ -66,7 +66,7 @@ json written_beside(Place place, const fs::path& folder) {
   return {{"case", place.case_index}, {"start", place.start}, {"file", name}, {"bytes", text.size()}, {"kinds", kinds}};
 }
 
-/// The next place among the shown cells, from `at` on, which is moved behind it.
+/// The next place among the shown cells from `at` on. Moves `at` behind it.
 Place next_place(const compare::CellRunner& runner, const std::vector<CellIndex>& shown, std::size_t& at) {
   Place place{shown[at].case_index, shown[at].start, json::array(), {}};
   for (; at < shown.size() && shown[at].case_index == place.case_index && shown[at].start == place.start; ++at) {

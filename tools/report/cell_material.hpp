@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a comparison's page has of single cells: a row of each, and pictures, curves and 3D views of some. As many of
-// these go into the page as its size allows; the others lie beside it, in the folder report/.
+// The single cells on a comparison's page: a row for each, and pictures, curves and 3D views of some. The page holds as
+// many of these as its size allows; the others are beside it, in the folder report/.
 #include <cstddef>
 #include <filesystem>
 #include <nlohmann/json.hpp>

@@ -12,10 +12,10 @@ namespace {
 using compare::CellRow;
 using nlohmann::json;
 
-/// As many as tell cells apart; the tables have all of them.
+/// Enough digits to tell cells apart; the tables have all.
 constexpr std::size_t kKeyDigits = 12;
 
-/// With nine digits: what the tables for other programs have, and half as long as the exact number.
+/// With nine digits, like the tables for other programs: half as long as the exact number.
 json rounded(const std::optional<double>& value) {
   if (!value) return {};
   return parsed_number(formatted("{:.9g}", *value)).value();

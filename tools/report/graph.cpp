@@ -9,7 +9,7 @@ namespace {
 
 using nlohmann::json;
 
-/// How a body is run, as if it were options of the node.
+/// How a body runs, as options of the node.
 std::map<std::string, std::string> options_of_repetition(const Repetition& repetition) {
   std::map<std::string, std::string> options{{"passes", passes_text(repetition)},
                                              {"if_pass_fails", repetition.goes_on ? "go_on" : "end"}};

@@ -87,7 +87,7 @@ std::vector<std::string> cells_of(const std::string& line) {
   return cells;
 }
 
-/// The way of a bone from the table of a trajectory, by the names of its columns. Throws for another table.
+/// The motion of a bone from the table of a trajectory, by the names of its columns. Throws for another table.
 json trajectory_of(const std::string& text, const std::string& name) {
   static const std::vector<std::string> kAxes{"frontal_deg", "lateral_deg", "axial_deg",
                                               "frontal_mm",  "lateral_mm",  "along_mm"};
@@ -146,7 +146,7 @@ void ReportMaterial::add_json(const json& file, json& cell) {
   for (json& view : scene["views"]) {
     const std::string image = view["image"];
     if (!image.starts_with("data:image/"))
-      throw Error("an image of the scene is not in the file itself");  // a browser would load an address from elsewhere
+      throw Error("an image of the scene is not in the file itself");  // a browser would load anything from an address
     view["image"] = id_of(image);
     pictures[id_of(image)] = image;
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Writes one HTML file that shows a run or a comparison and needs no other file; of a large comparison, further
-// pictures lie beside it. The page is in tools/report; data.js there describes the data.
+// Writes one HTML file that shows a run or a comparison and needs no other file. For a large comparison, further
+// pictures are beside it. data.js in tools/report/page describes the data.
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -35,8 +35,7 @@ struct ReportMaterial {
   void add_json(const nlohmann::json& file, nlohmann::json& cell);
 };
 
-/// A PNG file as a data URL, converted to WebP with a longer side of at most `size_px`. Throws Error if it is not a
-/// PNG.
+/// A PNG file as a data URL, converted to WebP with a longer side of at most `size_px`. Throws Error if it is no PNG.
 std::string picture_url(const std::filesystem::path& png_file, int size_px);
 
 /// Writes the page with these data.
@@ -60,7 +59,7 @@ nlohmann::json machine_of(const nlohmann::json& run_record);
 std::string shell_word(const std::string& text);
 /// The same for a path. It is never taken for an option.
 std::string shell_path(const std::filesystem::path& path);
-/// Any text as one word of a script for /bin/sh, in single quotes, in which no character has a meaning.
+/// Any text as one word of a script for /bin/sh, in single quotes, where no character is special.
 std::string script_word(const std::string& text);
 
 /// Writes FOLDER/report.html of a comparison. `shown`: the cells whose pictures were made, those of a case and start

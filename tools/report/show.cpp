@@ -99,7 +99,7 @@ std::string reason_of(const json& record) {
   return "it was stopped before it was done";
 }
 
-/// A line for each node that failed and may: the run went on without it.
+/// A line for each node that failed but may fail: the run continued without it.
 std::string absent_of(const json& record) {
   std::string text;
   for (const json& node : record.value("nodes", json::array()))

@@ -12,7 +12,7 @@
 namespace marrow::workbench {
 namespace {
 
-/// Takes the same time for any text of the same length, so that nobody can guess the secret digit by digit.
+/// Takes the same time for all texts of one length, so that nobody can guess the secret digit by digit.
 bool is_same(const std::string& a, const std::string& b) {
   if (a.size() != b.size()) return false;
   unsigned difference = 0;
@@ -20,7 +20,7 @@ bool is_same(const std::string& a, const std::string& b) {
   return difference == 0;
 }
 
-/// Of "a=1; name=value; b=2" the value; empty if there is none.
+/// The value in "a=1; name=value; b=2"; empty if the name is missing.
 std::string value_of_cookie(const std::string& cookies, const std::string& name) {
   for (std::size_t begin = 0; begin < cookies.size();) {
     std::size_t end = cookies.find(';', begin);

@@ -9,7 +9,7 @@
 
 namespace marrow::workbench {
 
-/// What a request says about itself. Headers that it does not have are empty.
+/// What a request says about itself. Missing headers are empty.
 struct Asked {
   bool changes = false;  ///< a method other than GET
   std::string host, origin, fetch_site, cookie, content_type;
@@ -24,10 +24,10 @@ class Access {
  public:
   /// `token` opens the page once, `session` is the cookie's value.
   explicit Access(std::string token = random_secret(), std::string session = random_secret());
-  /// To be called once, before any request.
+  /// Call this once, before any request.
   void listen_on(int port) { port_ = port; }
 
-  /// "http://127.0.0.1:PORT/?token=..."; `place` is put behind it, such as "#case=cases/7".
+  /// "http://127.0.0.1:PORT/?token=...", with `place` at its end, such as "#case=cases/7".
   std::string address(const std::string& place) const;
   /// Why the request is refused, as a sentence for people; empty if it may go on. A request without the cookie may only
   /// hand in the token.

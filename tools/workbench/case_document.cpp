@@ -18,7 +18,7 @@ namespace {
 
 using nlohmann::json;
 
-/// Numbers and truth values become such; everything else a text.
+/// Numbers and truth values keep their type; everything else becomes a text.
 json json_of_scalar(const YAML::Node& node) {
   if (node.Tag() == "!") return node.Scalar();  // it was quoted
   bool truth = false;

@@ -19,7 +19,7 @@ bool is_row(const json& list) {
   return std::none_of(list.begin(), list.end(), [](const json& item) { return item.is_structured(); });
 }
 
-/// Any value. Texts are quoted, so that none is taken for a number or a truth value; lists of numbers are in one line.
+/// Any value. Texts are quoted, so that YAML reads none as a number or a truth value. Lists of numbers are on one line.
 void put(YAML::Emitter& out, const json& value) {
   if (value.is_array()) {
     if (is_row(value)) out << YAML::Flow;
@@ -154,7 +154,8 @@ std::string case_yaml(const PlannedCase& plan) {
 std::string landmarks_yaml(const json& document) {
   std::map<std::string, std::vector<json>> by_fragment;
   for (const json& landmark : document.value("landmarks", json::array())) {
-    if (!landmark.contains("model_mm") || !landmark["model_mm"].is_array()) continue;  // it has no place yet
+    if (!landmark.contains("model_mm") || !landmark["model_mm"].is_array())
+      continue;  // it has no position in the CT yet
     const json given = landmark.value("fragment", json());
     const std::string fragment = given.is_string() ? given.get<std::string>() : only_fragment(document);
     if (fragment.empty())

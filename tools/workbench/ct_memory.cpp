@@ -38,7 +38,7 @@ std::uintmax_t most_ct_bytes() {
 }
 
 void CtMemory::check_size(std::uintmax_t file_bytes) const {
-  const std::uintmax_t needed = 2 * file_bytes;  // samples of 16 bits become such of 32
+  const std::uintmax_t needed = 2 * file_bytes;  // samples of 16 bits become samples of 32
   if (needed > most_bytes_)
     throw Error("this CT would take about " + gigabytes(needed) + " of memory, and at most " + gigabytes(most_bytes_) +
                 " are used for CTs here; cut it to the bone, or store it with larger voxels");

@@ -6,7 +6,7 @@
 
 namespace marrow::workbench {
 
-/// Size and time of change of a CT's file, or of all files of its folder: while they are the same, so is the content.
+/// Size and time of change of a CT's file, or of all files of its folder. While these stay, the content does, too.
 struct FilesOfCt {
   std::uintmax_t bytes = 0;
   std::string description;
@@ -18,7 +18,7 @@ struct FilesOfCt {
   void add(const std::filesystem::path& file);
 };
 
-/// How CtMemory knows a CT: by its place, its files, and the options of a case's `ct`.
+/// The `content` of a CT for CtMemory: its place, its files, and the options of a case's `ct`.
 std::string content_of_ct(const std::filesystem::path& place, nlohmann::json ct, const FilesOfCt& files);
 
 /// POST /api/ct/open, GET /api/ct/slice

@@ -27,7 +27,7 @@ std::string file_name(const std::string& case_path) {
   return (name.empty() ? "%" : name) + ".jsonl";
 }
 
-/// Appends a line and has it on the disk. On any failure the file is as before, and an Error is thrown.
+/// Appends a line and waits until it is on the disk. On any failure, restores the file and throws Error.
 void append_line(const fs::path& file, const std::string& line) {
   fs::create_directories(file.parent_path());
   const Descriptor descriptor(open(file.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644));
@@ -45,7 +45,7 @@ void append_line(const fs::path& file, const std::string& line) {
 
 void Drafts::apply(Draft& draft, const json& line) {
   if (line.contains("document")) {
-    if (draft.saved > int(draft.at)) draft.saved = -1;  // what was saved can be reached no more
+    if (draft.saved > int(draft.at)) draft.saved = -1;  // undo and redo no longer lead to what was saved
     draft.steps.resize(draft.steps.empty() ? 0 : draft.at + 1);
     draft.steps.push_back({line.value("what", ""), line["document"]});
     draft.at = draft.steps.size() - 1;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Cases that are being made. Each change is written at once, so that a crash or a closed tab loses nothing, and each
-// can be taken back. The drafts are in .marrow/drafts of the opened folder: a case's own folder holds only the case.
+// Cases that are being made. Each change is written at once, so that a crash or a closed tab loses nothing. Each change
+// can be undone. The drafts are in .marrow/drafts of the opened folder: a case's own folder holds only the case.
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -14,20 +14,20 @@ namespace marrow::workbench {
 
 /// A draft's document has the keys of case.yaml (docs/case.md), with these differences: paths are relative to the
 /// opened folder; `ct` is always a map or null; the poses `start` are 4 x 4 matrices; and there are `landmarks: [{name,
-/// fragment, model_mm, pixels: {view: [u, v]}, tracked_mm}]`, of which only the name must be there.
+/// fragment, model_mm, pixels: {view: [u, v]}, tracked_mm}]`, where only the name is required.
 class Drafts {
  public:
   explicit Drafts(const OpenedFolder& folder) : folder_(folder) {}
 
-  /// {case, revision, document, undo, redo, is_saved}: `undo` and `redo` say what would be taken back or made again, or
-  /// are null. A case without a draft begins with its case.yaml, or empty. Throws Error if that cannot be read.
+  /// {case, revision, document, undo, redo, is_saved}: `undo` and `redo` name the change that they would undo or redo,
+  /// or are null. A case without a draft begins with its case.yaml, or empty. Throws Error if that cannot be read.
   nlohmann::json open(const std::string& case_path);
   /// Each returns what open() does then. Throws Conflict unless `revision` is the newest, and Error if the change
   /// cannot be written: then nothing has changed.
   nlohmann::json change(const std::string& case_path, int revision, const std::string& what, nlohmann::json document);
   nlohmann::json undo(const std::string& case_path, int revision);
   nlohmann::json redo(const std::string& case_path, int revision);
-  /// To be called when the document of this revision was written as a case.
+  /// Call this when the document of this revision was written as a case.
   nlohmann::json mark_saved(const std::string& case_path, int revision);
 
  private:
@@ -41,7 +41,7 @@ class Drafts {
     std::size_t at = 0;        ///< the step that is shown
     int revision = 0;          ///< the number of changes
     int saved = -1;            ///< the step that case.yaml holds; -1: none
-    std::uintmax_t bytes = 0;  ///< of the file; another one means that another program changed it
+    std::uintmax_t bytes = 0;  ///< size of the file; if it differs, another program changed the file
   };
   Draft& find(const std::string& case_path);
   Draft& find(const std::string& case_path, int revision);

@@ -59,7 +59,7 @@ Descriptor opened(const fs::path& file, int flags) {
   return descriptor;
 }
 
-/// Has a file or a folder's list of names on the disk, so that it outlives a loss of power.
+/// Writes a file or a folder's list of names to the disk, so that it survives a loss of power.
 void settle(const Descriptor& place) {
   if (fsync(place) != 0 && errno != EINVAL) fail();  // some file systems cannot
 }
@@ -67,7 +67,7 @@ void settle(const fs::path& folder) { settle(opened(folder, O_RDONLY)); }
 
 constexpr int kNewFile = O_WRONLY | O_CREAT | O_EXCL;
 
-/// As fs::copy_file(), which calls a full disk an input/output error.
+/// Like fs::copy_file(), which reports a full disk as an input/output error.
 void copy_whole(const fs::path& from, const fs::path& to) {
   const Descriptor source = opened(from, O_RDONLY), copy = opened(to, kNewFile);
   std::vector<char> bytes(1 << 20);
@@ -107,8 +107,8 @@ void write_text(const fs::path& to, const std::string& text) {
   settle(file);
 }
 
-/// Whether the process that a folder's name says has ended. If that cannot be known, because it runs elsewhere or the
-/// host was started anew, it counts as ended after a day. An older marrow wrote only its number.
+/// Whether the process in a folder's name has ended. If that is unknown, because it runs elsewhere or the host was
+/// restarted, it counts as ended after a day. An older marrow wrote only the process's number.
 bool is_left_over(const fs::path& folder, const std::string& name) {
   const std::string writer = name.substr(std::strlen(kStaging), name.rfind('-') - std::strlen(kStaging));
   if (is_identity(writer)) {
@@ -122,7 +122,7 @@ bool is_left_over(const fs::path& folder, const std::string& name) {
   return process > 0 && kill(process, 0) != 0 && errno == ESRCH;
 }
 
-/// Folders that a crash left behind. Another host or container may be saving the same case just now.
+/// Removes folders that a crash left behind. Another host or container may be saving the same case now.
 void remove_left_over(const fs::path& place) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(place, error)) {
@@ -139,7 +139,7 @@ void move_new(const fs::path& from, const fs::path& to) {
   fs::rename(from, to);  // a file system that does not know the flag
 }
 
-/// Moves what is new to its place. What it has moved is taken back if it cannot go on.
+/// Moves what is new to its place. If it cannot continue, it takes back what it has moved.
 void move_in(const fs::path& staging, const fs::path& place, const PlannedCase& plan, bool has_landmarks) {
   const fs::path old_landmarks = staging / "landmarks.before";
   std::error_code none;
@@ -161,7 +161,7 @@ void move_in(const fs::path& staging, const fs::path& place, const PlannedCase& 
     fs::rename(staging / "case.yaml", place / "case.yaml");
   } catch (...) {
     for (const fs::path& file : moved) fs::remove_all(file, none);
-    if (!are_landmarks_changed) throw;  // what is there now may be of another one that saves the case just now
+    if (!are_landmarks_changed) throw;  // what is there may come from another process that is saving the case
     if (fs::exists(old_landmarks, none))
       fs::rename(old_landmarks, place / "landmarks.yaml", none);
     else
@@ -218,7 +218,7 @@ void write_case_files(const fs::path& place, const PlannedCase& plan, const std:
                  (error.code() == std::errc::no_space_on_device ? "; make room and try again" : ""));
   } catch (const std::exception& error) {
     clean();
-    std::string text = error.what();  // the hidden folder tells nobody anything
+    std::string text = error.what();  // nobody knows the hidden folder
     for (std::size_t at; !staging.empty() && (at = text.find(staging.string())) != std::string::npos;)
       text.replace(at, staging.string().size(), place.string());
     throw failed(text);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Work that takes longer than a request: it goes on in a thread of its own, and the page asks how far it is.
+// Work that takes longer than a request. It runs in its own thread, and the page asks for its progress.
 #include <atomic>
 #include <condition_variable>
 #include <functional>
@@ -13,7 +13,7 @@
 
 namespace marrow::workbench {
 
-/// What a job tells while it works. Methods may be called from several threads.
+/// The reports of a running job. Methods may be called from several threads.
 class Job {
  public:
   Job(std::string title, std::string command) : title_(std::move(title)), command_(std::move(command)) {}
@@ -43,8 +43,8 @@ class Jobs {
  public:
   /// Stops all jobs and waits for them.
   ~Jobs();
-  /// Begins it in a thread of its own and returns its name. What `work` returns is the job's result; an exception makes
-  /// it fail. `command` is what does the same in a shell, or empty. Throws Error if too many jobs are running.
+  /// Starts a job in its own thread and returns its name. What `work` returns is the job's result; an exception makes
+  /// it fail. `command` does the same in a shell, or is empty. Throws Error if too many jobs are running.
   std::string start(const std::string& title, const std::string& command, std::function<nlohmann::json(Job&)> work);
   /// Throws Error if there is no such job.
   std::shared_ptr<Job> find(const std::string& name) const;

@@ -62,7 +62,7 @@ bool says_same(const YAML::Node& a, const YAML::Node& b) {
   return true;
 }
 
-/// Whether '#' begins a comment here; in quotes it may not, which then costs no more than a sentence too many.
+/// Whether '#' begins a comment here. In quotes it may be wrong, which only tells of one lost comment too many.
 bool is_comment(const std::string& text, std::size_t at) {
   return text[at] == '#' && (at == 0 || text[at - 1] == ' ' || text[at - 1] == '\t' || text[at - 1] == '\n');
 }
@@ -86,7 +86,7 @@ class Merge {
 
   std::string text() {
     merge_maps(older_.root(), newer_.root());
-    // From the end on. Of two at the same place, the one that was found first comes first in the text.
+    // From the end. Of two changes at the same place, the one that was found first comes first in the text.
     std::reverse(changes_.begin(), changes_.end());
     std::stable_sort(changes_.begin(), changes_.end(), [](const auto& a, const auto& b) { return a.begin > b.begin; });
     std::string text = older_.text();
@@ -105,7 +105,7 @@ class Merge {
     return found == entries.end() ? nullptr : &*found;
   }
 
-  /// The text of a value in the newer text, with the space in front, or on lines of its own that begin at this column.
+  /// The text of a value in the newer text: with the space before it, or on separate lines that begin at this column.
   std::string value_text(const YamlEntryText& entry, std::size_t column) const {
     const std::string text = newer_.text().substr(entry.value_begin, entry.value_end - entry.value_begin);
     if (newer_.text().substr(entry.colon, entry.value_begin - entry.colon).find('\n') == std::string::npos)

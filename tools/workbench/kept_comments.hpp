@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Writing a YAML file anew without losing what people wrote beside its values.
+// Writing a YAML file again without losing what people wrote beside its values.
 #include <string>
 #include <vector>
 
@@ -8,14 +8,13 @@ namespace marrow::workbench {
 
 struct KeptText {
   std::string text;
-  std::vector<std::string> lost;  ///< comments of the older text that are not in it, each from its '#' on
+  std::vector<std::string> lost;  ///< comments of the older text that are missing in it, each from its '#'
 };
 
-/// A text that says what `newer` says, in the words of `older` wherever both say the same: comments, layout and order
-/// of those parts stay. Maps are compared key by key; of lists of maps with a `name`, the items that both begin with. A
-/// transform may be written by a rotation and a shift in one and by a matrix in the other. Where `older` cannot be
-/// changed part by part (it is no YAML, or has anchors), the result is `newer` under the comments that `older` begins
-/// with.
+/// A text with the content of `newer`. Parts with the same content in both are taken from `older`, with their comments,
+/// layout and order. Maps are compared key by key. In lists of maps with a `name`, the items at the beginning of both
+/// are compared. A transform may be a rotation and a shift in one text and a matrix in the other. If `older` cannot be
+/// changed part by part (it is not YAML, or has anchors), the result is `newer` below the first comments of `older`.
 KeptText with_comments_of(const std::string& older, const std::string& newer);
 
 }  // namespace marrow::workbench

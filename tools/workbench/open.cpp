@@ -69,7 +69,7 @@ Target target_of(const fs::path& place) {
   throw Error(printable(place.string()) + ": open a folder, a case.yaml or a pipeline");
 }
 
-/// Starts the desktop's browser and does not wait for it. Nothing is said if there is none: the address is printed.
+/// Starts the desktop's browser and does not wait for it. Silent if there is none: the address is printed anyway.
 void start_browser(const std::string& address) {
   const pid_t child = fork();
   if (child != 0) {

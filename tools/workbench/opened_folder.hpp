@@ -13,16 +13,16 @@ class OpenedFolder {
   explicit OpenedFolder(const std::filesystem::path& folder);
 
   const std::filesystem::path& path() const { return folder_; }
-  /// The place of a path that is relative to the folder; "" is the folder itself. It need not exist. Links are
-  /// resolved. Throws Error if it leads out of the folder.
+  /// The place of a path relative to the folder, with links resolved; "" is the folder itself. It need not exist.
+  /// Throws Error if the path leads out of the folder.
   std::filesystem::path inside(const std::string& relative) const;
   /// The path relative to the folder, with '/'.
   std::string relative(const std::filesystem::path& path) const;
 
   /// {path, folders: [name], files: [{name, bytes}]} of a folder, each sorted by name. Hidden ones are left out.
   nlohmann::json listing(const std::string& relative) const;
-  /// What there is to work on, at most four folders deep: {cases, pipelines, experiments, runs, comparisons}, each a
-  /// sorted list of relative paths; `is_cut` if there are too many files to look at them all.
+  /// What the folder offers, at most four folders deep: {cases, pipelines, experiments, runs, comparisons}, each a
+  /// sorted list of relative paths. `is_cut`: there are too many files to look at all.
   nlohmann::json contents() const;
 
  private:

@@ -31,7 +31,7 @@ bool has_comment(const std::string& text, std::size_t begin, std::size_t end) {
   return text.substr(begin, end - begin).find('#') != std::string::npos;
 }
 
-/// `entry` with another value. A value on lines of its own becomes one behind the colon.
+/// `entry` with another value. The new value follows the colon, even if the old one was on separate lines.
 std::string with_value(const YamlText& yaml, const YamlEntryText& entry, const std::string& value) {
   const std::string& text = yaml.text();
   const bool is_below = text.substr(entry.colon, entry.value_begin - entry.colon).find('\n') != std::string::npos;
@@ -85,14 +85,14 @@ std::string without_entry_in_braces(const YamlText& yaml, const Entries& entries
   return replaced(rest, comma, comma + 1, "");
 }
 
-/// A map without one of its entries, of which it has several.
+/// A map without one of its entries. It must have several.
 std::string without_entry(const YamlText& yaml, const YAML::Node& map, const std::string& key) {
   const Entries entries = yaml.entries(map);
   const YamlEntryText& entry = *find(entries, key);
   if (yaml.is_flow(map)) return without_entry_in_braces(yaml, entries, std::size_t(&entry - entries.data()));
   const std::string& text = yaml.text();
   const std::size_t begin = yaml.line_begin(entry.key_begin), end = yaml.line_end(entry.value_end);
-  if (end == text.size() && begin > 0)  // the last line has no line break; the one before it goes
+  if (end == text.size() && begin > 0)  // the last line has no line break, so remove the one before it
     return replaced(text, yaml.line_end(begin - 1), end, "");
   return replaced(text, begin, std::min(text.size(), text.find('\n', end) + 1), "");
 }

@@ -11,7 +11,7 @@ struct PipelineEdit {
   What what = What::option;
   std::string node;
   std::string name;                  ///< of the option or of the input
-  std::optional<std::string> value;  ///< as YAML on one line; nothing: what is written there is taken out
+  std::optional<std::string> value;  ///< as YAML on one line; nothing: remove the entry
 
   /// What --set calls it: "edges.low", "edges.in.view", "edges.uses".
   std::string key() const;
@@ -19,12 +19,12 @@ struct PipelineEdit {
   std::string in_words() const;
 };
 
-/// The text after the edit. Another `uses` also takes out the options that were written for the node before, as --set
-/// does. Throws Error, and the text is left alone, if the node is not there, the file has anchors, or the edited text
-/// would not read back as the same pipeline with only this change.
+/// The text after the edit. Like --set, another `uses` also removes the options of the old node. Throws Error if the
+/// node does not exist, the file has anchors, or the edited text would not read back as the same pipeline with only
+/// this change.
 std::string edited_text(const std::string& text, const PipelineEdit& edit);
 
-/// A text as a YAML scalar that reads back as this text: plain where possible, otherwise in double quotes.
+/// A YAML scalar that reads back as this text: plain if possible, otherwise in double quotes.
 std::string yaml_scalar(const std::string& text);
 
 }  // namespace marrow::workbench

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Pipeline files that are being edited: their text, and the changes that can be taken back. The file is the truth: when
-// another program changes it, this shows here, and is a change like any other.
+// Pipeline files that are being edited: their text, and the changes that can be undone. The file decides: a change by
+// another program counts like any other change.
 #include <functional>
 #include <map>
 #include <mutex>
@@ -17,8 +17,8 @@ class PipelineFiles {
  public:
   explicit PipelineFiles(const OpenedFolder& folder) : folder_(folder) {}
 
-  /// {file, text, revision, undo, redo}: `undo` and `redo` say what would be taken back or made again, or are null. The
-  /// revision is the digest of the text. Throws Error if the file cannot be read.
+  /// {file, text, revision, undo, redo}: `undo` and `redo` name the change that they would undo or redo, or are null.
+  /// The revision is the digest of the text. Throws Error if the file cannot be read.
   nlohmann::json open(const std::string& file);
   std::string revision(const std::string& file) const;
   /// Writes what `changed` makes of the text, and returns what open() does then. Throws Conflict unless the file is of

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the page "Place" keeps in memory of a case: its views, and of each bone the projectors and costs.
+// What the page "Place" keeps of a case in memory: its views, and the projectors and costs of each bone.
 #include <map>
 #include <memory>
 #include <mutex>
@@ -19,7 +19,7 @@ struct PlacedBone {
   std::string name;
   std::shared_ptr<const RadiographProjector> radiograph;
   std::shared_ptr<const OutlineProjector> outline;
-  std::shared_ptr<const Cost> contour, grey_values;  ///< coarser and faster than those of a registration
+  std::shared_ptr<const Cost> contour, grey_values;  ///< coarser and faster than in a registration
   FragmentFrame frame;
   RigidTransform start;     ///< world_from_model to begin with
   std::string start_is;     ///< where it comes from, in words
@@ -32,7 +32,7 @@ struct PlacedCase {
   List<View> views;
   std::vector<PlacedBone> bones;
 
-  /// Throw Error if there is none of that name.
+  /// Both throw Error if the name is unknown.
   const View& view(const std::string& name) const;
   const PlacedBone& bone(const std::string& name) const;
 };
@@ -43,7 +43,7 @@ std::shared_ptr<const PlacedCase> open_case(const std::string& path, const Workb
 /// The cases that were opened last. All methods may be called from several threads.
 class PlacedCases {
  public:
-  /// Keeps it, and forgets all but the last two, because each holds a CT.
+  /// Keeps a case, and forgets all but the last two: each holds a CT.
   void keep(std::shared_ptr<const PlacedCase> one);
   /// Throws Conflict if it is not there: the page then opens it again.
   std::shared_ptr<const PlacedCase> find(const std::string& path) const;
@@ -56,11 +56,11 @@ class PlacedCases {
 /// A placement of a request: a 4 x 4 matrix as rows. Throws Error unless it is a rigid motion.
 RigidTransform placement_of(const nlohmann::json& matrix);
 
-/// The point nearest to the middle rays of all views: where the views look at.
+/// The point nearest to the middle rays of all views.
 Eigen::Vector3d common_centre_mm(const List<View>& views);
 
-/// The image as 8 bit, every `step_px`-th pixel as the mean of its square. From dark to bright as in the image, without
-/// the darkest and brightest half per cent.
+/// The image as 8 bit: each square of `step_px` pixels becomes its mean. Dark and bright are as in the image; the
+/// darkest and brightest half per cent are cut off.
 std::string grey_bytes(const View& view, int step_px);
 
 /// What a request wants to see of a bone in a view.
@@ -78,14 +78,14 @@ std::string overlay_bytes(const OverlayWish& wish, nlohmann::json& about);
 /// {contour: {value, views: {NAME: value}}, grey_values: {...}} of a bone: smaller is better.
 nlohmann::json costs_of(const PlacedCase& placed, const PlacedBone& bone, const RigidTransform& world_from_model);
 
-/// The poses {BONE: matrix} that a request has by this name. Throws Error unless each is a rigid motion.
+/// The poses {BONE: matrix} of this name in a request. Throws Error unless each is a rigid motion.
 std::map<std::string, RigidTransform> poses_in(const Request& request, const char* name = "poses");
 
 /// A pose file BONE.yaml for each bone, as texts by name. Throws Error if the pose of a bone is missing.
 std::map<std::string, std::string> start_files(const PlacedCase& placed,
                                                const std::map<std::string, RigidTransform>& poses);
-/// Writes files into a new folder `INTO/CASE/NUMBER` of the opened folder, and returns its path relative to that. A
-/// folder that holds the same files is taken again.
+/// Writes files into a new folder `INTO/CASE/NUMBER` of the opened folder, and returns its relative path. If a folder
+/// already holds the same files, uses that.
 std::string write_placement(const OpenedFolder& folder, const std::string& into, const PlacedCase& placed,
                             const std::map<std::string, std::string>& texts);
 /// Writes a pose file for each bone in this way.

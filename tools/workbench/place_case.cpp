@@ -27,7 +27,7 @@ bool is_seen(const List<View>& views, const Eigen::Vector3d& middle_mm) {
   return true;
 }
 
-/// The poses of those bones for which the pipeline found one.
+/// The poses that the pipeline found, by bone.
 List<Pose> poses_of(const Value& value) {
   List<Pose> poses;
   for (std::size_t i = 0; i < value.items.size(); ++i)
@@ -83,7 +83,7 @@ double brightest_mm(const PlacedBone& bone, const List<View>& views) {
 }  // namespace
 
 Eigen::Vector3d common_centre_mm(const List<View>& views) {
-  Eigen::Matrix3d sum = 1e-9 * Eigen::Matrix3d::Identity();  // so that one view alone has a centre, too
+  Eigen::Matrix3d sum = 1e-9 * Eigen::Matrix3d::Identity();  // so that a single view has a centre, too
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for (const View& view : views) {
     const Eigen::Vector3d along =

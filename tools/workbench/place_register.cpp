@@ -26,7 +26,7 @@ using nlohmann::json;
 /// The option by which a node that reads a case takes other starts.
 constexpr const char* kStarts = "starts";
 
-/// The node that reads the case and can be given other starts; "" if there is none.
+/// The node that reads the case and takes other starts; "" if there is none.
 std::string node_with_starts(const Pipeline& pipeline) {
   for (const PipelineNode& node : pipeline.nodes)
     for (const OptionInfo& option : node.info.options)
@@ -74,13 +74,13 @@ json json_of(const Verdict& verdict) {
       {"remedies", verdict.remedies}};
 }
 
-/// A path as the command line is given it in the opened folder.
+/// A path as written on a command line in the opened folder.
 std::string shown_path(const OpenedFolder& folder, const fs::path& path) {
   const std::string relative = path.lexically_relative(folder.path()).generic_string();
   return relative.empty() || relative.starts_with("..") ? path.string() : relative;
 }
 
-/// Whether the files of a folder are these. Folders in it do not count.
+/// Whether a folder holds exactly these files, apart from folders.
 bool holds_only(const fs::path& folder, const std::map<std::string, std::string>& texts) {
   std::size_t count = 0;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) count += entry.is_regular_file();
@@ -150,7 +150,7 @@ json pipelines_from_starts(const Workbench& workbench) {
       if (node_with_starts(pipeline).empty() || outputs_of_type(pipeline, TypeInfo::of<Pose>()).empty()) continue;
       found.push_back(
           {{"file", shown_path(workbench.folder, file)}, {"name", file.stem().string()}, {"help", pipeline.help}});
-    } catch (const std::exception&) {  // it takes no case, or has faults: it cannot be chosen here
+    } catch (const std::exception&) {  // it takes no case, or has faults, so it is not offered
     }
   }
   return found;

@@ -20,14 +20,14 @@ struct ViewFrames {
 /// {VIEW: {images, pattern}} for each view of the case, in its order. Throws Error if one is missing.
 std::vector<ViewFrames> frames_in(const nlohmann::json& views, const PlacedCase& placed);
 
-/// The camera file of a view, as case.yaml names it or has it in place.
+/// The camera file of a view: the one that case.yaml names, or one with the camera in case.yaml.
 std::filesystem::path camera_file_of(const Workbench& workbench, const PlacedCase& placed, const std::string& view);
 
 /// The number of frames, which is the same in all views. Images of folders are not opened, except the first. Throws
 /// Error if a view cannot be read, or if the views have unlike numbers of frames.
 int count_frames(const Workbench& workbench, const PlacedCase& placed, const std::vector<ViewFrames>& views, Job& job);
 
-/// What the bones are followed through and from.
+/// A sequence, and the poses from which the bones are tracked through it.
 struct TrackWish {
   std::vector<ViewFrames> views;
   double frame_rate_hz = 30;

@@ -14,8 +14,8 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-/// A report may come from somebody else, and its scripts are in the page itself. So it is shown as a page of no origin:
-/// it reaches neither this server nor anything else, and can only draw.
+/// A report may come from somebody else and contains scripts. So it is shown as a page without origin: it reaches
+/// neither this server nor anything else, and can only draw.
 constexpr const char* kReportPolicy =
     "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
@@ -24,7 +24,7 @@ std::string in_folder(const Workbench& workbench, const std::string& command) {
   return "cd " + cli::shell_path(workbench.folder.path()) + " && marrow " + command;
 }
 
-/// The name of a downloaded file. A header holds no other characters.
+/// The name of a downloaded file, reduced to characters that a header may hold.
 std::string download_name(const std::string& result) {
   std::string name;
   for (const char c : fs::path(result).filename().string())
@@ -73,7 +73,7 @@ void add_results_page(Server& server, Workbench& workbench) {
   server.post("/api/results/report", [&](const Request& request) {
     const std::string result = request.text("folder");
     report_of(workbench.folder, result);
-    const bool is_run = fs::exists(workbench.folder.inside(result) / "run.json");  // a comparison writes its own report
+    const bool is_run = fs::exists(workbench.folder.inside(result) / "run.json");  // a comparison wrote its own report
     return json_answer({{"command", is_run ? in_folder(workbench, "show " + cli::shell_path(result)) : ""}});
   });
   server.get("/results/report.html", [&](const Request& request) { return report_answer(workbench, request); });

@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-/// Reads the written case as a pipeline does, and looks whether its seeds lie in the CT.
+/// Reads the written case as a pipeline does, and checks that its seeds are in the CT.
 void check_case(const fs::path& place, bool has_landmarks, const Workbench& workbench, Job& job) {
   PipelineCall call{.file = workbench_pipeline("case"), .only = {"ct", "seeds", "views"}, .keep = false};
   call.arguments.inputs.push_back({"case", place.string()});
@@ -48,7 +48,7 @@ json document_after(const PlannedCase& plan, const std::string& case_path) {
   return document;
 }
 
-/// The texts of a case's files, with the comments of those that are there.
+/// The texts of a case's files, with the comments of the existing ones.
 struct CaseTexts {
   std::string case_yaml, landmarks_yaml;
   std::vector<std::string> lost;  ///< comments that are not kept

@@ -8,14 +8,14 @@
 
 namespace marrow::workbench {
 
-/// How many voxels along each axis become one, so that about `most_voxels` are left; 1, 1, 1 if there are no more.
+/// How many voxels along each axis become one, so that about `most_voxels` are left; 1, 1, 1 if there are not more.
 std::array<int, 3> coarse_steps(const Grid& grid, double most_voxels);
 
 /// Means of blocks of step[0] x step[1] x step[2] voxels.
 Volume coarser(const Volume& volume, const std::array<int, 3>& step);
 
-/// Where the field is zero in a slice across an axis of the CT's grid: both ends of each line, in indices of the CT's
-/// two other axes, the lower one first. The field's grid has the CT's axes, but may be coarser.
+/// The zero line of the field in a slice perpendicular to an axis of the CT's grid: both ends of each segment, in
+/// indices of the CT's other two axes, the lower one first. The field's grid has the CT's axes, but may be coarser.
 std::vector<float> outline_in_slice(const SignedField& field, const Grid& ct, int axis, int index);
 
 }  // namespace marrow::workbench

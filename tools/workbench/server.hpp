@@ -29,13 +29,13 @@ struct Request {
 struct Answer {
   std::string body;
   std::string type = "application/json";
-  std::vector<std::pair<std::string, std::string>> headers = {};  ///< in the place of the server's own of that name
+  std::vector<std::pair<std::string, std::string>> headers = {};  ///< these replace the server's own of the same name
 };
 Answer json_answer(const nlohmann::json& value);
 /// Bytes as they are, for pixels. `about` goes into the header X-Marrow-About as JSON.
 Answer bytes_answer(std::string bytes, const nlohmann::json& about = {});
 
-/// What is asked for is no longer so, for example because another tab changed it. The answer is 409.
+/// A request relies on a state that has changed, for example by another tab. The answer is 409.
 class Conflict : public Error {
  public:
   using Error::Error;

@@ -28,7 +28,7 @@ std::string text_of(const fs::path& file) {
   return text;
 }
 
-/// What may name working files: all drafts with all their steps. A case names copies of its own.
+/// The texts that may name working files: all drafts with all their steps. A case names its own copies.
 std::string texts_of_drafts(const fs::path& drafts) {
   std::string texts;
   for (const fs::directory_entry& entry : fs::directory_iterator(drafts))

@@ -12,16 +12,16 @@
 
 namespace marrow::workbench {
 
-/// Text of a value that is given by `--set`: a JSON string or list, in which '$' stands for itself.
+/// A value as text for `--set`: a JSON string or list, with '$' escaped.
 std::string set_text(const nlohmann::json& value);
 
-/// The camera file of a view: the one that `camera` names by {file}; or one in .marrow/drafts with the keys that are
-/// written in place, or with the camera of a file of another program, if `camera` has further keys for that. Throws
-/// Error if there is none, or if that cannot be read.
+/// The camera file of a view: the file that `camera` names by {file}, or a file in .marrow/drafts. The latter holds the
+/// keys in `camera` itself, or the camera of another program's file if `camera` has the keys for that. Throws Error if
+/// there is no camera, or if it cannot be read.
 std::filesystem::path camera_file(const Workbench& workbench, const nlohmann::json& camera, const std::string& image);
 
-/// The camera of a view, with the distortion that is still in its image; only marrow's own files hold one, and of
-/// others the result is empty. Throws Error if it cannot be read.
+/// The camera of a view, with the distortion that is still in its image. Only marrow's own files hold one; for others
+/// the result is empty. Throws Error if it cannot be read.
 DistortedCamera distorted_camera(const Workbench& workbench, const nlohmann::json& camera, const std::string& image);
 
 /// A camera as a draft's document has it.
@@ -30,7 +30,7 @@ nlohmann::json camera_json(const Camera& camera);
 /// The overrides that name these views, a list of {name, image, camera}, for the node `views` of a pipeline.
 std::vector<Override> overrides_of(const Workbench& workbench, const nlohmann::json& views);
 
-/// A run of a small pipeline that is waited for: its outputs and its warnings.
+/// A run of a small pipeline, during the request: its outputs and its warnings.
 struct Ran {
   std::map<std::string, Value> outputs;
   std::vector<std::string> warnings;
@@ -41,7 +41,7 @@ Ran run(const PipelineCall& call, const Workbench& workbench);
 /// The run that reads an image alone. `image` is relative to the opened folder.
 PipelineCall image_call(const Workbench& workbench, const std::string& image);
 
-/// Each adds a part of the requests.
+/// Each function adds a part of the requests.
 void add_xray_views(Server& server, Workbench& workbench);
 void add_xray_checks(Server& server, Workbench& workbench);
 void add_xray_masks(Server& server, Workbench& workbench);

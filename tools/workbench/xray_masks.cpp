@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Painted masks. They lie in .marrow/drafts until the case is saved, each under the digest of its content, so that
-// undoing a stroke finds the mask as it was. A mask's file belongs to the image as that is stored (docs/case.md), but
-// the page shows, and paints on, the image as a pipeline gets it: mirrored back, and straightened.
+// Painted masks. They are in .marrow/drafts until the case is saved, each under the digest of its content, so that
+// undoing a stroke finds the old mask. A mask's file fits the image file (docs/case.md). But the page shows the image
+// as a pipeline gets it, mirrored back and straightened, and paints on that.
 #include <cstdint>
 #include <opencv2/core.hpp>
 
@@ -19,13 +19,13 @@ namespace {
 
 using nlohmann::json;
 
-/// How an image differs from its file when the page shows it.
+/// How the shown image differs from its file.
 struct Shown {
   bool is_mirrored = false;
   DistortedCamera camera;  ///< without distortion if the image is not straightened
 };
 
-/// Of the request's {image, camera}; `camera` is null if the image is shown without it.
+/// From the request's {image, camera}; `camera` is null if the image is shown without it.
 Shown shown_in(const Workbench& workbench, const Request& request) {
   Shown shown;
   shown.is_mirrored = files::is_mirrored_as_read(workbench.folder.inside(request.text("image")));

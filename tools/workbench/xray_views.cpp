@@ -37,8 +37,8 @@ std::string pixels_of(const Image& image, json& about) {
   return bytes;
 }
 
-/// The warnings of a run that read a view, and what its header lets one doubt. A camera of angles has the patient's
-/// axes, so the header can be compared with it; then nothing else needs to be said.
+/// The warnings of a run that read a view, and doubts from its header. A camera of angles has the patient's axes, so
+/// the header can be compared with it; then this comparison is enough.
 std::vector<std::string> with_sides(std::vector<std::string> warnings, const std::filesystem::path& image,
                                     const json& written, const Camera& camera) {
   if (!written.contains("c_arm")) return warnings;

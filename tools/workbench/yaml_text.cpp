@@ -130,7 +130,7 @@ std::size_t YamlText::end_of_quoted(std::size_t at) const {
   return text_.size();
 }
 
-/// A text behind | or >: it goes on as long as lines are empty or indented more than its key.
+/// A text behind | or >. It continues while lines are empty or indented more than its key.
 std::size_t YamlText::end_of_literal(std::size_t at, std::size_t parent_column) const {
   std::size_t end = line_end(at);
   for (std::size_t line = next_line(at); line < text_.size(); line = next_line(line)) {
@@ -157,7 +157,7 @@ std::size_t YamlText::end_of_plain_line(std::size_t at, bool in_flow) const {
 
 std::size_t YamlText::end_of_plain(std::size_t at, bool in_flow, std::size_t parent_column) const {
   std::size_t end = end_of_plain_line(at, in_flow);
-  // It may go on in the next lines. A key never does: its parent's column is given as the end of the text.
+  // It may continue on the next lines. A key never does: its parent's column is then the end of the text.
   while (parent_column < text_.size() && behind_spaces(end) == line_end(end)) {
     std::size_t line = next_line(end);
     while (line < text_.size() && is_break(text_[behind_spaces(line)])) line = next_line(line);
@@ -169,7 +169,7 @@ std::size_t YamlText::end_of_plain(std::size_t at, bool in_flow, std::size_t par
   return end;
 }
 
-/// The place behind the brace or bracket that closes the one at this place.
+/// The place behind the brace or bracket that closes the one here.
 std::size_t YamlText::end_of_flow(std::size_t at) const {
   int depth = 0;
   for (std::size_t i = at; i < text_.size();) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Where the parts of a YAML text are, so that one part can be replaced and all others stay as they are written.
-// yaml-cpp says where a value begins; this finds where it ends.
+// Finds the parts of a YAML text, so that one part can be replaced while all others stay. yaml-cpp says where a value
+// begins; this finds its end.
 #include <yaml-cpp/yaml.h>
 #include <string>
 #include <vector>
@@ -12,7 +12,7 @@ namespace marrow::workbench {
 struct YamlEntryText {
   std::string key;
   std::size_t key_begin = 0, colon = 0;
-  std::size_t value_begin = 0, value_end = 0;  ///< both behind the colon if nothing is written there
+  std::size_t value_begin = 0, value_end = 0;  ///< both are behind the colon if the value is empty
   YAML::Node value;
 };
 
@@ -25,7 +25,7 @@ class YamlText {
   const YAML::Node& root() const { return root_; }
   /// The entries of a map in their order. Throws Error if they cannot be told apart in the text.
   std::vector<YamlEntryText> entries(const YAML::Node& map) const;
-  /// Whether the map is written in braces.
+  /// Whether the map is in braces.
   bool is_flow(const YAML::Node& map) const;
   /// The place of the closing brace of a map in braces.
   std::size_t closing_brace(const YAML::Node& map) const;
