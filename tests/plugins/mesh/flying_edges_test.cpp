@@ -19,17 +19,6 @@ Mesh flying_edges(const SignedField& field, const shipped::Options& options = {}
   return mesh_shapes::meshed(kNode, field, options);
 }
 
-TEST(FlyingEdges, SphereInATurnedGrid) {
-  const mesh_shapes::Distance distance = [](const Vector3d& p) { return mesh_shapes::sphere(p, 15); };
-  const Mesh mesh = flying_edges(mesh_shapes::field_of(mesh_shapes::turned_grid({48, 48, 40}), distance));
-  EXPECT_EQ(mesh.frame, "scanner");
-  EXPECT_TRUE(marrow::is_closed(mesh));
-  EXPECT_EQ(mesh_shapes::euler_number(mesh), 2);
-  EXPECT_LT(mesh_shapes::largest_error_mm(mesh, distance), 0.012);
-  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (4.0 / 3 * kPi * 15 * 15 * 15), 1, 3e-3);
-  EXPECT_TRUE(mesh_shapes::normals_point_outward(mesh, distance));
-}
-
 TEST(FlyingEdges, ClosesHalfAVoxelBeyondTheBorder) {
   marrow::Grid grid;
   grid.size = {40, 40, 11};
@@ -48,17 +37,5 @@ TEST(FlyingEdges, KeepsTheLargestPart) {
   EXPECT_EQ(mesh_shapes::euler_number(largest), 2);
   EXPECT_NEAR(marrow::enclosed_volume_mm3(largest) / (4.0 / 3 * kPi * 14 * 14 * 14), 1, 3e-3);
 }
-
-TEST(FlyingEdges, EveryPatternIsAClosedManifold) {
-  for (const bool around : {false, true})
-    for (unsigned inside = 0; inside < 256; ++inside) {
-      if (inside == (around ? 255u : 0u)) continue;  // no surface
-      EXPECT_TRUE(
-          marrow::is_manifold(flying_edges(mesh_shapes::pattern_field(inside, around), {{"largest_only", false}})))
-          << "pattern " << inside;
-    }
-}
-
-TEST(FlyingEdges, SaysWhatIsWrongWithAField) { mesh_shapes::expect_texts_for_bad_fields(kNode); }
 
 }  // namespace flying_edges_test

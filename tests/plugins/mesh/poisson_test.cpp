@@ -22,25 +22,6 @@ Mesh poisson(const SignedField& field, const shipped::Options& options = {}) {
   return mesh_shapes::meshed(kNode, field, options);
 }
 
-TEST(Poisson, SphereInATurnedGrid) {
-  const mesh_shapes::Distance distance = [](const Vector3d& p) { return mesh_shapes::sphere(p, 15); };
-  const Mesh mesh = poisson(mesh_shapes::field_of(mesh_shapes::turned_grid({48, 48, 40}), distance));
-  EXPECT_EQ(mesh.frame, "scanner");
-  EXPECT_TRUE(marrow::is_manifold(mesh));
-  EXPECT_EQ(mesh_shapes::euler_number(mesh), 2);
-  EXPECT_LT(mesh_shapes::largest_error_mm(mesh, distance), 0.05);
-  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (4.0 / 3 * kPi * 15 * 15 * 15), 1, 2e-3);
-  EXPECT_TRUE(mesh_shapes::normals_point_outward(mesh, distance));
-}
-
-TEST(Poisson, Torus) {
-  const mesh_shapes::Distance distance = [](const Vector3d& p) { return mesh_shapes::torus(p, 12, 5); };
-  const Mesh mesh = poisson(mesh_shapes::field_of(mesh_shapes::turned_grid({50, 50, 50}), distance));
-  EXPECT_TRUE(marrow::is_manifold(mesh));
-  EXPECT_EQ(mesh_shapes::euler_number(mesh), 0);
-  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (2 * kPi * kPi * 12 * 25), 1, 5e-3);
-}
-
 TEST(Poisson, ClosesABoneThatIsCutByTheBorder) {
   const auto field = mesh_shapes::field_of(mesh_shapes::turned_grid({48, 48, 24}),
                                            [](const Vector3d& p) { return p.head<2>().norm() - 9; });
@@ -93,7 +74,5 @@ TEST(Poisson, NoiseIsClosedOrRefusedInWords) {
   }
   std::printf("%d of 12 fields of noise refused\n", refused);
 }
-
-TEST(Poisson, SaysWhatIsWrongWithAField) { mesh_shapes::expect_texts_for_bad_fields(kNode); }
 
 }  // namespace poisson_test

@@ -79,30 +79,6 @@ inline marrow::Mesh meshed(const std::string& node, const marrow::SignedField& f
   return shipped::call(node, {{"field", shipped::item(field)}}, options).at("mesh").as<marrow::Mesh>();
 }
 
-inline std::string refusal(const std::string& node, const marrow::SignedField& field) {
-  return shipped::refusal(node, {{"field", shipped::item(field)}});
-}
-
-/// Every mesher refuses a bad field with the same message.
-inline void expect_texts_for_bad_fields(const std::string& node) {
-  EXPECT_EQ(refusal(node, {}),
-            "field: 0 values do not fill a grid of 0 x 0 x 0 voxels; wire the output of a segment node");
-  marrow::SignedField field;
-  field.grid.size = {3, 3, 3};
-  field.values_mm.assign(27, 2.f);
-  EXPECT_EQ(refusal(node, field),
-            "field: there is no surface, as no value is negative (inside); the segmentation found nothing: check its "
-            "seeds and thresholds");
-  field.values_mm.assign(27, -2.f);
-  EXPECT_EQ(refusal(node, field),
-            "field: there is no surface, as every value is negative (inside); the segmentation ran over the whole "
-            "volume: raise its threshold");
-  field.values_mm[13] = std::nanf("");
-  EXPECT_EQ(refusal(node, field), "field: some values are not finite numbers; a signed distance in mm was expected");
-  field.values_mm[13] = -INFINITY;
-  EXPECT_EQ(refusal(node, field), "field: some values are not finite numbers; a signed distance in mm was expected");
-}
-
 /// Euler's number of a closed mesh: vertices - edges + faces, 2 for a sphere, 0 for a torus.
 inline long euler_number(const marrow::Mesh& mesh) {
   return long(mesh.vertices_mm.size()) - long(mesh.triangles.size()) * 3 / 2 + long(mesh.triangles.size());

@@ -20,16 +20,6 @@ Mesh nets(const SignedField& field, bool largest_only = true, int relaxation = 0
   return mesh_shapes::meshed(kNode, field, {{"largest_only", largest_only}, {"relaxation", std::int64_t{relaxation}}});
 }
 
-TEST(SurfaceNets, EveryPatternIsAClosedManifold) {
-  for (const bool around : {false, true})
-    for (unsigned inside = 0; inside < 256; ++inside) {
-      if (inside == (around ? 255u : 0u)) continue;  // no surface
-      const Mesh mesh = nets(mesh_shapes::pattern_field(inside, around), false);
-      EXPECT_TRUE(marrow::is_manifold(mesh)) << "pattern " << inside << (around ? " in the inside" : "");
-      EXPECT_GT(marrow::enclosed_volume_mm3(mesh), 0);
-    }
-}
-
 TEST(SurfaceNets, NoiseIsAClosedManifold) {
   for (unsigned seed = 0; seed < 40; ++seed) {
     const auto field = mesh_shapes::noise_field({17, 14, 13}, seed, 0.2 + 0.015 * seed);
@@ -50,23 +40,6 @@ TEST(SurfaceNets, AFaceThatIsCrossedTwiceByTheSameTwoLoopsIsSplit) {
   int split = 0;
   for (const auto& v : mesh.vertices_mm) split += (v - Vector3d(2.5, 2.5, 2)).head<2>().norm() < 0.4 && v.z() == 2;
   EXPECT_EQ(split, 2) << "one vertex for each crossing of the face";
-}
-
-TEST(SurfaceNets, SphereInATurnedGrid) {
-  const mesh_shapes::Distance distance = [](const Vector3d& p) { return mesh_shapes::sphere(p, 15); };
-  const Mesh mesh = nets(mesh_shapes::field_of(mesh_shapes::turned_grid({48, 48, 40}), distance));
-  EXPECT_EQ(mesh.frame, "scanner");
-  EXPECT_EQ(mesh_shapes::euler_number(mesh), 2);
-  EXPECT_LT(mesh_shapes::largest_error_mm(mesh, distance), 0.05);
-  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (4.0 / 3 * kPi * 15 * 15 * 15), 1, 5e-3);
-  EXPECT_TRUE(mesh_shapes::normals_point_outward(mesh, distance));
-}
-
-TEST(SurfaceNets, Torus) {
-  const mesh_shapes::Distance distance = [](const Vector3d& p) { return mesh_shapes::torus(p, 12, 5); };
-  const Mesh mesh = nets(mesh_shapes::field_of(mesh_shapes::turned_grid({50, 50, 50}), distance));
-  EXPECT_EQ(mesh_shapes::euler_number(mesh), 0);
-  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (2 * kPi * kPi * 12 * 25), 1, 1.5e-2);
 }
 
 TEST(SurfaceNets, KeepsApartWhatOneSampleParts) {
@@ -111,7 +84,5 @@ TEST(SurfaceNets, SameBytesAtAnyNumberOfThreads) {
   EXPECT_EQ(one.triangles, two.triangles);
   EXPECT_EQ(one.vertices_mm, two.vertices_mm);
 }
-
-TEST(SurfaceNets, SaysWhatIsWrongWithAField) { mesh_shapes::expect_texts_for_bad_fields(kNode); }
 
 }  // namespace surface_nets_test
