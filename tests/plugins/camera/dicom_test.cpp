@@ -198,9 +198,9 @@ TEST(DicomCamera, WarnsWhereTheCentreMayLieElsewhere) {
                                          {0x00189430u, "FL:510", "PositionOfIsocenterProjection (0018,9430)"}}) {
     const Read warned = read(with(fluoroscopy(), tag, value));
     ASSERT_EQ(warned.warnings.size(), 1u) << name;
-    EXPECT_NE(warned.warnings[0].find(std::string(name) +
-                                      " is not used: the ray through the isocentre is taken to meet"),
-              std::string::npos)
+    EXPECT_NE(
+        warned.warnings[0].find(std::string(name) + " is not used: the ray through the isocentre is taken to meet"),
+        std::string::npos)
         << warned.warnings[0];
   }
 }
