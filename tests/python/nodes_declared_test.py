@@ -176,7 +176,7 @@ def own(view: marrow.View, *, low: Annotated[float, "low"] = 3) -> marrow.EdgeMa
                 "nokind.own: the kind does not name the output; name it",
             ),
             ("# @marrow.node\n", "it declares no node; write @marrow.node before a function"),
-            ("import os  # @marrow.node\nos.kill(os.getpid(), 11)\n", "crashed while it was imported (Segmentation"),
+            ("import os  # @marrow.node\nos.kill(os.getpid(), 11)\n", "crashed while being imported (Segmentation"),
             ("import os  # @marrow.node\nos._exit(3)\n", "ended the process that imported it"),
         ):
             with self.subTest(expected):

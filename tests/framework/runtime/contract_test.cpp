@@ -54,7 +54,7 @@ TEST(Contract, AnotherVersionOfAType) {
   NodeInfo old = node<marrow::View, marrow::EdgeMap>("view", "edges");
   ++old.inputs[0].type.version;
   EXPECT_EQ(faults(old),
-            Faults{"input 'view': the kind 'edges' has it as view, not another version of that type; build both anew"});
+            Faults{"input 'view': the kind 'edges' has it as view, not another version of that type; build both again"});
 }
 
 TEST(Contract, AMissingOutput) {

@@ -115,7 +115,7 @@ TEST_F(LibraryTest, StaleManifestIsNoticed) {
   const fs::path file = copy_good(true);
   std::ofstream(file, std::ios::app | std::ios::binary) << "another build";
   const marrow::LibraryInfo info = marrow::library_info(file, framework);
-  EXPECT_EQ(info.note, "its manifest is stale (it belongs to another build of the library), so it was described anew");
+  EXPECT_EQ(info.note, "its manifest is stale (it belongs to another build of the library), so it was described again");
   EXPECT_GT(info.nodes.size(), 5u);
 }
 TEST_F(LibraryTest, EditedManifestIsNoticed) {
@@ -124,13 +124,13 @@ TEST_F(LibraryTest, EditedManifestIsNoticed) {
   text.replace(text.find("Keeps a core busy"), 5, "Burns");
   std::ofstream(manifest) << text;
   EXPECT_EQ(marrow::library_info(file, framework).note,
-            "its manifest is not used (it was edited by hand), so it was described anew");
+            "its manifest is not used (it was edited by hand), so it was described again");
 }
 TEST_F(LibraryTest, DamagedManifestIsNoticed) {
   const fs::path file = copy_good(true);
   std::ofstream(fs::path(file).replace_extension(".json")) << "{";
   EXPECT_EQ(marrow::library_info(file, framework).note,
-            "its manifest is not used (it is damaged: its text:1:2: not valid JSON), so it was described anew");
+            "its manifest is not used (it is damaged: its text:1:2: not valid JSON), so it was described again");
 }
 TEST_F(LibraryTest, BuildIdFollowsTheLibraryAndTheFramework) {
   const fs::path file = copy_good(true);
@@ -284,6 +284,17 @@ TEST_F(LinkedLibraryTest, LibrariesThatTheLoaderFindsElsewhereCount) {
   unsetenv("LD_LIBRARY_PATH");
   EXPECT_EQ(build_id(), first);
 }
+TEST_F(LinkedLibraryTest, TheSameLibraryInAnotherFolderLinksWhatIsBesideIt) {
+  const marrow::Digest first = build_id();
+  const fs::path folder = scratch.path / "another", other = folder / "linked.so";
+  put(2, "libtest_base.so", folder / "libs"), put(1, "libtest_deep.so", folder / "libs");
+  fs::copy_file(kLinked / "linked.so", other);
+  const marrow::LibraryInfo info = marrow::library_info(other, framework);
+  EXPECT_NE(info.build_id, first);
+  for (const marrow::LinkedLibrary& linked : info.linked)
+    EXPECT_FALSE(linked.path.starts_with((fs::canonical(scratch.path) / "plugins").string())) << linked.path;
+  EXPECT_EQ(build_id(), first);
+}
 /// The loader's manual (ld.so) says that the folders of a run path are searched in their order.
 TEST_F(LinkedLibraryTest, LibraryThatAppearsEarlierOnTheRunPathCounts) {
   marrow::write_manifest(marrow::library_info(file, framework));
@@ -293,7 +304,7 @@ TEST_F(LinkedLibraryTest, LibraryThatAppearsEarlierOnTheRunPathCounts) {
   const marrow::LibraryInfo other = marrow::library_info(file, framework);
   EXPECT_NE(other.build_id, first);
   EXPECT_EQ(other.note, "its manifest is stale (" + (earlier / "libtest_base.so").string() +
-                            " has appeared, in a folder that is searched earlier), so it was described anew");
+                            " has appeared, in a folder that is searched earlier), so it was described again");
   EXPECT_EQ(build_id(), other.build_id) << "from the cache";
   fs::remove_all(earlier);
   EXPECT_EQ(build_id(), first);

@@ -78,13 +78,13 @@ TEST_F(UntrustedLibraryTest, ManifestThatIsNoFileIsNotOpened) {
   const fs::path file = copy_good(false), manifest = fs::path(file).replace_extension(".json");
   ASSERT_EQ(mkfifo(manifest.c_str(), 0600), 0);
   EXPECT_EQ(marrow::library_info(file, framework).note,
-            "its manifest is not used (it is a named pipe, not a regular file), so it was described anew");
+            "its manifest is not used (it is a named pipe, not a regular file), so it was described again");
   fs::remove(manifest);
   std::ofstream(manifest) << "{}";
   fs::resize_file(manifest, std::uintmax_t(1) << 30);
   EXPECT_EQ(marrow::library_info(file, framework).note,
             "its manifest is not used (it has 1073741824 bytes, more than the 4194304 that it may have), so it was "
-            "described anew");
+            "described again");
   alarm(0);
 }
 TEST_F(UntrustedLibraryTest, UnreadableFolderIsSaid) {
@@ -191,7 +191,7 @@ TEST_F(UntrustedLibraryTest, WhatBelongsToSomebodyElse) {
   fs::permissions(manifest, fs::perms(0644));
   ASSERT_EQ(chown(manifest.c_str(), kSomebody, kSomebody), 0);
   EXPECT_EQ(marrow::library_info(file, framework).note,
-            "its manifest is not used (it " + belongs(manifest, "0644") + "), so it was described anew");
+            "its manifest is not used (it " + belongs(manifest, "0644") + "), so it was described again");
   fs::permissions(file, fs::perms(0755));
   ASSERT_EQ(chown(file.c_str(), kSomebody, kSomebody), 0);
   expect_untrusted(file, belongs(file, "0755"));

@@ -143,7 +143,7 @@ class Plugins(Case):
         self.assertIn("REFUSED  %s/pipe.so: it is a named pipe, not a regular file" % folder, text)
         self.assertIn("REFUSED  %s/socket.so: it is a socket, not a regular file" % folder, text)
         self.assertIn(
-            "note: its manifest is not used (it is a named pipe, not a regular file), so it was described anew", text
+            "note: its manifest is not used (it is a named pipe, not a regular file), so it was described again", text
         )
         self.assertIn("test.add", text, "the others still work")
         result = marrow("describe", folder / "pipe.so", timeout=240)

@@ -28,7 +28,7 @@ void check_ports(const std::vector<PortInfo>& ports, const std::vector<KindPort>
                                                [&](const TypeInfo& type) { return type.id == port.type.id; });
     faults.push_back(what + " '" + port.name + "': the kind '" + kind + "' has it as " +
                      types_text(known->types, known->axis) + ", not " +
-                     (is_old ? "another version of that type; build both anew" : types_text({port.type}, port.axis)));
+                     (is_old ? "another version of that type; build both again" : types_text({port.type}, port.axis)));
   }
 }
 

@@ -6,8 +6,12 @@
 
 #include <sys/stat.h>
 
+#include <csignal>
+#include <cstring>
+
 #include "marrow/base/error.hpp"
 #include "marrow/base/json_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/regular_file.hpp"
 #include "marrow/base/text_file.hpp"
 #include "marrow/runtime/plugins/library_index.hpp"
@@ -23,14 +27,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The name of a library's description in the cache. It depends on the framework too, because a newer framework may
-/// accept what an older one refused.
-std::string name_in_cache(const Digest& library, const Digest& framework) {
+/// The file of a description in the cache. Its name depends on the framework too, because a newer framework may accept
+/// what an older one refused.
+std::string file_in_cache(const Digest& name, const Digest& framework) {
+  Hasher hasher;
+  hasher.add(name);
+  hasher.add(framework);
+  hasher.add(search_digest());
+  return hasher.digest().hex() + ".json";
+}
+
+/// The name of a library's description in the cache. The same library in another folder may link other libraries: those
+/// beside it.
+Digest name_in_cache(const fs::path& real, const Digest& content) {
   Hasher name;
-  name.add(library);
-  name.add(framework);
-  name.add(search_digest());
-  return name.digest().hex() + ".json";
+  name.add(real.string());
+  name.add(content);
+  return name.digest();
 }
 
 /// Why a description does not belong to this very library and to the linked libraries that are here now; empty if it
@@ -69,23 +82,21 @@ std::optional<LibraryInfo> from_manifest(const fs::path& library, const Digest& 
     for (const LinkedLibrary& linked : info.linked)
       if (reason.empty() && !found_before(linked).empty()) reason = "LD_LIBRARY_PATH leads to " + found_before(linked);
     if (reason.empty()) return info;
-    note = "its manifest is stale (" + reason + "), so it was described anew";
+    note = "its manifest is stale (" + reason + "), so it was described again";
   } catch (const Error& fault) {
-    note = std::string("its manifest is not used (") + fault.what() + "), so it was described anew";
+    note = std::string("its manifest is not used (") + fault.what() + "), so it was described again";
   }
   return std::nullopt;
 }
 
-/// The description of a library from the cache; nothing if the cache has none that can be used.
-std::optional<LibraryInfo> from_cache(const Digest& digest, const Digest& framework) {
-  std::optional<LibraryInfo> info = kept_description(digest, framework);
-  return info && stale(*info, digest).empty() ? info : std::nullopt;
-}
-
-LibraryInfo describe_anew(const fs::path& file, const Digest& digest, const Digest& framework) {
+/// The description of a library from the cache, or else a new one, which is kept there.
+LibraryInfo kept_or_new(const fs::path& file, const fs::path& real, const Digest& digest, const Digest& framework) {
+  const Digest name = name_in_cache(real, digest);
+  if (std::optional<LibraryInfo> kept = kept_description(name, framework); kept && stale(*kept, digest).empty())
+    return std::move(*kept);
   LibraryInfo info = describe_library(file);
   if (info.refused.empty() && info.digest != digest) throw Error("was changed while it was described; start again");
-  if (info.digest == digest) keep_description(info, digest, framework);
+  if (info.digest == digest) keep_description(info, name, framework);
   return info;
 }
 
@@ -103,25 +114,25 @@ bool is_manifest(const fs::path& file) {
 fs::path manifest_beside(const fs::path& library) { return fs::path(library).replace_extension(".json"); }
 
 std::optional<LibraryInfo> kept_description(const Digest& name, const Digest& framework) try {
-  const std::optional<std::string> text = own_cached_text(name_in_cache(name, framework), kMostManifest_bytes);
+  const std::optional<std::string> text = own_cached_text(file_in_cache(name, framework), kMostManifest_bytes);
   return text ? std::optional(manifest_from_text(*text)) : std::nullopt;
-} catch (const Error&) {  // the library is described anew, and that description is kept instead
+} catch (const Error&) {  // the library is described again, and that description is kept instead
   return std::nullopt;
 }
 
 void keep_description(const LibraryInfo& info, const Digest& name, const Digest& framework) {
   // The reason may be outside of the library, such as another library that it needs, and may be gone next time.
   if (info.refused.starts_with("cannot be")) return;
-  keep_in_own_cache(name_in_cache(name, framework), manifest_text(info));
+  keep_in_own_cache(file_in_cache(name, framework), manifest_text(info));
 }
 
 LibraryInfo library_info(const fs::path& file, const Digest& framework) {
   if (is_python_plugin(file)) return python_file_info(file, framework);
-  const Digest digest = digest_of(RegularFile(trusted_path(file)));
+  const fs::path real = trusted_path(file);
+  const Digest digest = digest_of(RegularFile(real));
   std::string note;
   std::optional<LibraryInfo> known = from_manifest(file, digest, note);
-  if (!known) known = from_cache(digest, framework);
-  LibraryInfo info = known ? std::move(*known) : describe_anew(file, digest, framework);
+  LibraryInfo info = known ? std::move(*known) : kept_or_new(file, real, digest, framework);
   if (const std::string fault = untrusted_among(paths_of(info.linked)); !fault.empty()) throw Error(fault);
   info.file = file;
   info.note = note;
@@ -135,14 +146,25 @@ LibraryInfo library_info(const fs::path& file, const Digest& framework) {
 }
 
 void forget_description(const LibraryInfo& library) {
-  forget_in_own_cache(name_in_cache(library.digest, file_digest(framework_file())));
+  std::error_code error;
+  const Digest name = name_in_cache(fs::weakly_canonical(library.file, error), library.digest);
+  forget_in_own_cache(file_in_cache(name, file_digest(framework_file())));
   LibraryIndex::forget(library.file.parent_path());
+}
+
+std::string why_not_described(const WorkerEnd& end, const std::string& used) {
+  if (end.is_late) return formatted("did not say what it holds within {} s of being {}", kDescribeLimit_s, used);
+  if (end.is_out_of_memory) return formatted("takes more than {} MB of memory to be {}", kDescribeLimit_mb, used);
+  if (end.signal == SIGKILL) return "cannot be described: " + killed_from_outside("the process that " + used + " it");
+  if (end.signal) return formatted("crashed while being {} ({})", used, strsignal(end.signal));
+  if (end.died) return "ended the process that " + used + " it";
+  return "cannot be described: " + end.failed;
 }
 
 std::string cure_of_description(const fs::path& library) {
   std::error_code error;
   const fs::path manifest = manifest_beside(library);
-  if (!fs::exists(fs::symlink_status(manifest, error))) return "start again: it is then described anew";
+  if (!fs::exists(fs::symlink_status(manifest, error))) return "start again: it is then described again";
   return "run 'marrow describe " + library.string() + " --write', or remove " + manifest.string();
 }
 

@@ -3,10 +3,11 @@
 #include <optional>
 
 #include "marrow/runtime/plugins/library.hpp"
+#include "marrow/runtime/process/worker.hpp"
 
 namespace marrow {
 
-/// Removes the kept description of a library that turned out to be different, so that the library is described anew.
+/// Removes the kept description of a library that turned out to be different, so that the library is described again.
 void forget_description(const LibraryInfo& library);
 
 /// A description in the user's cache, by the name that keep_description() gave it; nothing if there is none. The caller
@@ -17,6 +18,11 @@ void keep_description(const LibraryInfo& info, const Digest& name, const Digest&
 
 /// Where the manifest of a library is, if it has one.
 std::filesystem::path manifest_beside(const std::filesystem::path& library);
+
+/// The limits of a process that describes a library.
+inline constexpr int kDescribeLimit_s = 20, kDescribeLimit_mb = 4096;
+/// Why such a process gave no description, for LibraryInfo::refused. `used` says what it did to the library: "loaded".
+std::string why_not_described(const WorkerEnd& end, const std::string& used);
 
 /// What a person can do about a wrong description.
 std::string cure_of_description(const std::filesystem::path& library);

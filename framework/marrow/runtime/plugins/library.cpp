@@ -7,7 +7,6 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <csignal>
 #include <cstring>
 #include <set>
 #include <tuple>
@@ -33,7 +32,6 @@ namespace marrow {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr int kDescribeLimit_s = 20, kDescribeLimit_mb = 4096;
 
 /// What differs between the plugin's stamp and ours, in words, with both values and what to do; empty if they agree.
 std::string stamp_mismatch(const AbiStamp& theirs) {
@@ -99,8 +97,8 @@ void* load_without_throwing(const char* path, int mode) noexcept {
   return load(path, mode);
 }
 
-/// What the initialisers of a library change is put back: those of one that was linked with -ffast-math make tiny
-/// numbers 0 from then on.
+/// Puts back what the initialisers of the library change. If it was linked with -ffast-math, for example, they make the
+/// processor turn tiny numbers into 0.
 void* open_library(const fs::path& file, int mode) {
   const UsualArithmetic arithmetic;
   const std::shared_ptr<ProcessState> state = ProcessState::of_runs();
@@ -162,17 +160,6 @@ LibraryInfo describe_here(const fs::path& file) {
   return info;
 }
 
-/// What a library says about itself is checked as strictly as a manifest.
-LibraryInfo described(const nlohmann::json& answer) {
-  LibraryInfo info;
-  try {
-    info = library_from_json(answer);
-  } catch (const Error& error) {
-    info.refused = std::string("describes itself in a way that cannot be used: ") + error.what();
-  }
-  return info;
-}
-
 /// Loads a library in a worker and describes it. The description may be a refusal. Throws Error if no worker can be
 /// started.
 LibraryInfo describe_apart(const fs::path& file) {
@@ -180,20 +167,12 @@ LibraryInfo describe_apart(const fs::path& file) {
   worker.ask({{"do", "describe"}, {"library", json_of_bytes(file.string())}});
   const WorkerEnd end = worker.wait({kDescribeLimit_s, kDescribeLimit_mb}, nullptr, nullptr);
   LibraryInfo info;
-  if (end.is_late)
-    info.refused = formatted("did not say what it holds within {} s of being loaded", kDescribeLimit_s);
-  else if (end.is_out_of_memory)
-    info.refused = formatted("takes more than {} MB of memory to be loaded", kDescribeLimit_mb);
-  else if (end.signal == SIGKILL)
-    info.refused = "cannot be described: " + killed_from_outside("the process that loaded it");
-  else if (end.signal)
-    info.refused = std::string("crashed while being loaded (") + strsignal(end.signal) + ")";
-  else if (end.died)
-    info.refused = "ended the process that loaded it";
-  else if (!end.failed.empty())
-    info.refused = "cannot be described: " + end.failed;
-  else
-    return described(end.answer);
+  try {
+    if (end.failed.empty()) return library_from_json(end.answer);
+    info.refused = why_not_described(end, "loaded");
+  } catch (const Error& error) {
+    info.refused = std::string("describes itself in a way that cannot be used: ") + error.what();
+  }
   return info;
 }
 
@@ -215,8 +194,8 @@ Versions versions_of(const std::vector<LinkedLibrary>& libraries) {
   return result;
 }
 
-/// Throws Error if a library does not register what its description says. Options were checked and set, and keys were
-/// made, from the description. So nothing of such a library may be called.
+/// Throws Error if a library does not register what its description says. Options were checked and keys were made from
+/// the description, so nothing of such a library may be called.
 void expect_described(const LibraryInfo& described, const LibraryInfo& registered) {
   std::string found = difference(described, registered);
   const Versions before = versions_of(described.linked), now = versions_of(registered.linked);

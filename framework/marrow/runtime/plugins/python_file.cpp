@@ -6,13 +6,10 @@
 #include <time.h>
 
 #include <algorithm>
-#include <csignal>
 #include <cstdlib>
-#include <cstring>
 #include <mutex>
 #include <set>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/base/regular_file.hpp"
 #include "marrow/runtime/plugins/descriptions.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
@@ -29,7 +26,6 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr std::size_t kMostSource_bytes = 4 << 20;
-constexpr int kPythonDescribeLimit_s = 20, kPythonDescribeLimit_mb = 4096;
 constexpr int kTries = 5;
 
 LinkedLibrary with_size(const std::string& file) { return {file, fs::file_size(file)}; }
@@ -49,15 +45,6 @@ bool is_newer(const std::string& file, const timespec& time) {
   return seconds(status.st_ctim) > seconds(time) - 0.02;  // unlike st_mtim, it cannot be set
 }
 
-std::string why_refused(const WorkerEnd& end) {
-  if (end.is_late) return formatted("did not say what it holds within {} s of being imported", kPythonDescribeLimit_s);
-  if (end.is_out_of_memory) return formatted("takes more than {} MB of memory to be imported", kPythonDescribeLimit_mb);
-  if (end.signal == SIGKILL) return "cannot be described: " + killed_from_outside("the process that imported it");
-  if (end.signal) return std::string("crashed while it was imported (") + strsignal(end.signal) + ")";
-  if (end.died) return "ended the process that imported it";
-  return "cannot be used: " + end.failed;
-}
-
 /// What a Python process says about the file. `files` receives what it loaded.
 LibraryInfo described_by_process(const fs::path& real, std::vector<std::string>& files) {
   LibraryInfo info;
@@ -66,14 +53,14 @@ LibraryInfo described_by_process(const fs::path& real, std::vector<std::string>&
   settings.quiet = true;
   Worker worker(settings);
   worker.ask({{"do", "describe"}});
-  const WorkerEnd end = worker.wait({kPythonDescribeLimit_s, kPythonDescribeLimit_mb}, nullptr, nullptr);
+  const WorkerEnd end = worker.wait({kDescribeLimit_s, kDescribeLimit_mb}, nullptr, nullptr);
   if (end.died && !end.is_late && worker.at().empty())
     throw Error(
         "cannot be described: " + python_interpreter().string() + " cannot import marrow's package from " +
         python_package_folder().string() +
         "; it must have numpy and be of the version for which the package was built (MARROW_PYTHON names another)");
   if (!end.failed.empty()) {
-    info.refused = why_refused(end);
+    info.refused = end.died ? why_not_described(end, "imported") : "cannot be used: " + end.failed;
     return info;
   }
   try {
