@@ -41,7 +41,7 @@ Character first_character(std::string_view text) {
   if (byte(0) < 0xC2 || byte(0) > 0xF4 || text.size() < size) return {};
   char32_t code = byte(0) & (0xFF >> (size + 1));
   for (std::size_t i = 1; i < size; ++i) {
-    if ((byte(i) & 0xC0) != 0x80) return {};
+    if (!goes_on(text[i])) return {};
     code = (code << 6) | (byte(i) & 0x3F);
   }
   static constexpr char32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The characters of a text in UTF-8, and those by which two names differ that look the same.
+// The characters of a text in UTF-8, and those that make two names differ although they look the same.
 #include <string>
 #include <string_view>
 
@@ -14,10 +14,13 @@ struct Character {
   bool is_valid = false;  ///< well-formed UTF-8: no overlong form, no surrogate, nothing above U+10FFFF
 };
 
-/// The first character of a text that is not empty. A byte that is no UTF-8 counts by itself.
+/// The first character of a text that is not empty. A byte that is not UTF-8 counts as a character.
 Character first_character(std::string_view text);
 
-/// C0, DEL, C1, separators of lines, and what turns the direction of writing.
+/// Whether a byte of UTF-8 goes on with a character that an earlier byte began.
+constexpr bool goes_on(char byte) { return (static_cast<unsigned char>(byte) & 0xC0) == 0x80; }
+
+/// C0, DEL, C1, line separators, and characters that change the direction of writing.
 bool is_control(char32_t code);
 
 /// Whether nothing is drawn for a character: joiners, fillers, selectors, a soft hyphen, a byte order mark.
@@ -25,8 +28,7 @@ bool is_unseen(char32_t code);
 
 /// The first character by which a name could differ from another that looks the same, as "U+200B, which cannot be
 /// seen"; empty if there is none. These are control characters, characters that are not drawn, blanks other than the
-/// space, and marks that stand beside the letter that they belong to (one name can be written with and without them:
-/// the forms NFD and NFC of Unicode).
+/// space, and combining marks. Unicode can write the same name with such marks (NFD) and without them (NFC).
 std::string odd_character_in(std::string_view name);
 
 }  // namespace marrow

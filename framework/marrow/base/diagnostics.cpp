@@ -2,11 +2,12 @@
 #include "marrow/base/diagnostics.hpp"
 
 #include <algorithm>
-#include <array>
+#include <functional>
 #include <set>
 #include <sstream>
 #include <tuple>
 
+#include "marrow/base/characters.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 
@@ -30,9 +31,7 @@ std::string line_of(const std::string& text, int line) {
 /// shown.
 std::string quoted_line(const std::string& line, int column) {
   const std::size_t at = std::min(std::size_t(std::max(0, column - 1)), line.size());
-  const auto is_inside = [&](std::size_t i) {
-    return i < line.size() && (static_cast<unsigned char>(line[i]) & 0xC0) == 0x80;
-  };
+  const auto is_inside = [&](std::size_t i) { return i < line.size() && goes_on(line[i]); };
   std::size_t begin = line.size() > kMostInLine && at > kMostInLine / 2 ? at - kMostInLine / 2 : 0;
   std::size_t end = std::min(line.size(), begin + kMostInLine);
   while (is_inside(begin)) ++begin;
@@ -43,8 +42,7 @@ std::string quoted_line(const std::string& line, int column) {
     return printable(part);
   };
   const std::string before = (begin ? "\u2026" : "") + shown(begin, at);
-  const auto is_first_byte = [](unsigned char c) { return (c & 0xC0) != 0x80; };
-  const auto width = std::size_t(std::count_if(before.begin(), before.end(), is_first_byte));
+  const auto width = std::size_t(std::count_if(before.begin(), before.end(), std::not_fn(goes_on)));
   return "  " + before + shown(at, end) + (end < line.size() ? "\u2026" : "") + "\n  " + std::string(width, ' ') +
          "^\n";
 }

@@ -47,7 +47,7 @@ std::string file_name_of(const std::string& text) {
   std::string result;
   for (std::size_t i = 0, next = 0; i < text.size(); i = next) {
     next = i + 1;
-    while (next < text.size() && (static_cast<unsigned char>(text[next]) & 0xC0) == 0x80) ++next;  // one character
+    while (next < text.size() && goes_on(text[next])) ++next;  // one character
     const std::string character = text.substr(i, next - i);
     const bool is_special =
         std::string("/\\%~").find(character) != std::string::npos || !odd_character_in(character).empty() ||
@@ -59,7 +59,7 @@ std::string file_name_of(const std::string& text) {
   hasher.add(text);
   const std::string hash = "~" + hasher.digest().hex();
   std::size_t end = kMostInFileName - hash.size();
-  while ((static_cast<unsigned char>(result[end]) & 0xC0) == 0x80) --end;
+  while (goes_on(result[end])) --end;
   return result.substr(0, end) + hash;
 }
 

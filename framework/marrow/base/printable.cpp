@@ -37,7 +37,7 @@ std::string printable_lines(std::string_view text) { return printable(text, "  "
 std::string cut(std::string_view text, std::size_t most) {
   if (text.size() <= most) return std::string(text);
   std::size_t end = most - 3;  // the ellipsis has three bytes
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
+  while (end > 0 && goes_on(text[end])) --end;
   return std::string(text.substr(0, end)) + "\u2026";
 }
 

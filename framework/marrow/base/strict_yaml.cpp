@@ -19,8 +19,7 @@ YAML::Node StrictYaml::parse(const std::string& written) {
     return parse_yaml(text);
   } catch (const YAML::ParserException& error) {
     fault({file_, error.mark.line + 1, error.mark.column + 1}, "not valid YAML: " + error.msg);
-    // The parser reports the place where the text ends or goes on strangely. The typing error is where something was
-    // left open.
+    // The parser reports where the text ends or becomes strange. The typing error is where something was left open.
     if (const auto opened = last_unclosed(text))
       fault({file_, opened->line, opened->column}, std::string("this ") + opened->mark + " is not closed");
   } catch (const YAML::Exception& error) {
@@ -87,9 +86,10 @@ std::optional<std::string> read_source(const std::filesystem::path& file, const 
   } catch (const Error& error) {
     const std::string fault = error.what();  // begins with the file's name, which the place has already
     const auto says = [&](const char* part) { return fault.find(part, file.string().size()) != std::string::npos; };
-    const char* hint = says(" is longer than ")  ? ""
-                       : says("no regular file") ? "write the text to a file and give that"
-                                                 : "check the path";
+    const bool is_stream = says(", not a regular file") && !says(" is a folder");
+    const char* hint = says(" is longer than ") ? ""
+                       : is_stream              ? "write the text to a file and give that"
+                                                : "check the path";
     diagnostics.add({file.string()}, what + fault.substr(file.string().size()), hint);
     return std::nullopt;
   }

@@ -11,6 +11,7 @@
 #include "marrow/base/atomic_file.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
+#include "marrow/base/regular_file.hpp"
 
 namespace marrow {
 namespace {
@@ -22,31 +23,18 @@ std::string reason() { return errno == ENOSPC || errno == EDQUOT ? "the disk is 
 }  // namespace
 
 std::string read_text_file(const fs::path& file, std::uintmax_t most_bytes) {
-  const auto unreadable = [&](const std::string& why) { return Error(file.string() + " cannot be read: " + why); };
-  const auto too_long = [&] {
-    return Error(formatted("{} is longer than {} MB", file.string(), most_bytes / 1'000'000));
-  };
-  struct stat info {};
-  const auto check_kind = [&] {
-    if (S_ISDIR(info.st_mode)) throw unreadable("it is a folder");
-    if (!S_ISREG(info.st_mode)) throw unreadable("it is no regular file");
-  };
-  // The kind is also checked before the file is opened, because opening a device may have an effect.
-  if (::stat(file.c_str(), &info) != 0) throw unreadable(reason());
-  check_kind();
-  const Descriptor descriptor(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
-  if (descriptor < 0 || ::fstat(descriptor, &info) != 0) throw unreadable(reason());
-  check_kind();
-  if (std::uintmax_t(info.st_size) > most_bytes) throw too_long();
-  std::string text;
-  for (std::string block(1 << 16, '\0');;) {
-    const ssize_t count = ::read(descriptor, block.data(), block.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) throw unreadable(reason());
-    if (count == 0) return text;
-    text.append(block, 0, std::size_t(count));
-    if (text.size() > most_bytes) throw too_long();
+  try {
+    const RegularFile opened(file);
+    std::string text;
+    for (std::string block(1 << 16, '\0'); opened.size() <= most_bytes && text.size() <= most_bytes;) {
+      const std::size_t count = opened.read(block.data(), block.size(), text.size());
+      if (count == 0) return text;
+      text.append(block, 0, count);
+    }
+  } catch (const Error& error) {
+    throw Error(file.string() + " " + error.what());
   }
+  throw Error(formatted("{} is longer than {} MB", file.string(), most_bytes / 1'000'000));
 }
 
 void write_text_file(const fs::path& file, const std::string& text, Kinds kinds, mode_t mode) {

@@ -171,13 +171,8 @@ std::string yaml_described(const YAML::Node& node) {
 }
 
 std::optional<double> yaml_number(const YAML::Node& node) {
-  if (!is_plain(node)) return std::nullopt;
-  const std::string& text = node.Scalar();
-  double value = 0;
-  const char* begin = text.data() + (text.starts_with("+") ? 1 : 0);
-  const auto [end, error] = std::from_chars(begin, text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
+  const std::optional<double> value = is_plain(node) ? parsed_number(node.Scalar()) : std::nullopt;
+  return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
 bool has_leading_zeros(const YAML::Node& node) {

@@ -178,9 +178,9 @@ TEST_F(ExperimentLimits, TheFileItself) {
     marrow::compare::read_experiment(file, test_catalogue(), diagnostics);
     return diagnostics.text();
   };
-  EXPECT_NE(fault(scratch.path).find("error: the experiment file cannot be read: it is a folder"), std::string::npos)
+  EXPECT_NE(fault(scratch.path).find("error: the experiment file is a folder, not a regular file"), std::string::npos)
       << diagnostics.text();
-  EXPECT_NE(fault("/dev/zero").find("error: the experiment file cannot be read: it is no regular file"),
+  EXPECT_NE(fault("/dev/zero").find("error: the experiment file is a device, not a regular file"),
             std::string::npos)
       << diagnostics.text();
   const std::string named = scratch.write("...yaml", kGood).string();

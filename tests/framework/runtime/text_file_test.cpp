@@ -51,18 +51,18 @@ TEST_F(TextFileTest, ReadsBackWhatItWrote) {
 
 TEST_F(TextFileTest, SaysWhyItDoesNotRead) {
   EXPECT_EQ(fault_in_reading(scratch.path / "none"), " cannot be read: No such file or directory");
-  EXPECT_EQ(fault_in_reading(scratch.path), " cannot be read: it is a folder");
+  EXPECT_EQ(fault_in_reading(scratch.path), " is a folder, not a regular file");
   scratch.write("long", std::string(3000001, 'x'));
   EXPECT_EQ(fault_in_reading(scratch.path / "long", 3000000), " is longer than 3 MB");
-  EXPECT_EQ(fault_in_reading("/dev/zero", 1000000), " cannot be read: it is no regular file");
+  EXPECT_EQ(fault_in_reading("/dev/zero", 1000000), " is a device, not a regular file");
 }
 
 TEST_F(TextFileTest, WaitsForNoPipe) {
   const fs::path pipe = scratch.path / "pipe", link = scratch.path / "link";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   fs::create_symlink(pipe, link);
-  EXPECT_EQ(fault_in_reading(pipe), " cannot be read: it is no regular file");
-  EXPECT_EQ(fault_in_reading(link), " cannot be read: it is no regular file");
+  EXPECT_EQ(fault_in_reading(pipe), " is a named pipe, not a regular file");
+  EXPECT_EQ(fault_in_reading(link), " is a named pipe, not a regular file");
   write_text_file(pipe, "text");
   EXPECT_EQ(read_text_file(pipe, 100), "text") << "replaced";
 }

@@ -101,21 +101,21 @@ class Records(Commands):
         for command in (["diff", "a", "b"], ["diff", "b", "a"], ["rerun", "a", "--out", "c"]):
             self.assertIn(
                 (
-                    "a/pipeline.yaml is not what 'marrow run' wrote: the pipeline cannot be read: it is no regular"
+                    "a/pipeline.yaml is not what 'marrow run' wrote: the pipeline is a named pipe, not a regular"
                     " file; run it again"
                 ),
                 self.expect(2, *command).stderr,
             )
         self.expect(0, "show", "a")
         self.assertEqual(self.shown()["experiment"]["pipeline_text"], "")
-        for name in ("a/pipeline.yaml", "/dev/zero"):
+        for name, kind in (("a/pipeline.yaml", "a named pipe"), ("/dev/zero", "a device")):
             for command in ("check", "graph", "run", "plan"):
                 self.assertEqual(
                     self.expect(2, command, name).stderr,
-                    "%s: error: the pipeline file cannot be read: it is no regular file\n  hint: write the text to a"
-                    " file and give that\n1 error\n" % name,
+                    "%s: error: the pipeline file is %s, not a regular file\n  hint: write the text to a file and give"
+                    " that\n1 error\n" % (name, kind),
                 )
-            self.assertIn("it is no regular file", self.expect(2, "compare", name, "--out", "c").stderr)
+            self.assertIn("is %s, not a regular file" % kind, self.expect(2, "compare", name, "--out", "c").stderr)
         self.assertFalse((self.scratch / "c").exists())
         (self.scratch / "out").symlink_to("/dev/stdout")
         page = subprocess.run(

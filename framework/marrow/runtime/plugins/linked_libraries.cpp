@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/file_state.hpp"
 #include "marrow/base/framework_file.hpp"
 #include "marrow/base/regular_file.hpp"
 #include "marrow/runtime/plugins/build_note.hpp"
@@ -52,12 +53,12 @@ const link_map* map_of_framework() {
   return map;
 }
 
-Digest identity_of_package(const std::string& path, const struct stat& status) try {
+Digest identity_of_package(const std::string& path, const FileState& state) try {
   Hasher hasher;
   const std::string note = build_note(RegularFile(path));
   hasher.add(note);
-  hasher.add(std::int64_t(status.st_size));
-  if (note.empty()) hasher.add(std::int64_t(status.st_mtim.tv_sec)), hasher.add(std::int64_t(status.st_mtim.tv_nsec));
+  hasher.add(std::int64_t(state.size));
+  if (note.empty()) hasher.add(std::int64_t(state.written.tv_sec)), hasher.add(std::int64_t(state.written.tv_nsec));
   return hasher.digest();
 } catch (const Error& error) {
   throw Error(path + " " + error.what());
@@ -126,23 +127,20 @@ std::vector<LinkedLibrary> linked_libraries(void* handle) {
 }
 
 Digest identity_of(const LinkedLibrary& library) {
-  struct stat status {};
-  if (stat(library.path.c_str(), &status) != 0) throw Error(library.path + " cannot be read: " + std::strerror(errno));
+  const std::optional<FileState> state = state_of(library.path);
+  if (!state) throw Error(library.path + " cannot be read: " + std::strerror(errno));
   struct Known {
-    struct stat status;
+    FileState state;
     Digest identity;
   };
   static std::mutex mutex;
   static std::map<std::string, Known> known;
   const std::scoped_lock lock(mutex);
   const auto found = known.find(library.path);
-  if (found != known.end() && found->second.status.st_ino == status.st_ino &&
-      found->second.status.st_size == status.st_size &&
-      std::memcmp(&found->second.status.st_ctim, &status.st_ctim, sizeof status.st_ctim) == 0)
-    return found->second.identity;
+  if (found != known.end() && found->second.state == *state) return found->second.identity;
   const Digest identity =
-      is_of_the_system(library.path) ? identity_of_package(library.path, status) : file_digest(library.path);
-  known[library.path] = {status, identity};
+      is_of_the_system(library.path) ? identity_of_package(library.path, *state) : file_digest(library.path);
+  known[library.path] = {*state, identity};
   return identity;
 }
 

@@ -49,13 +49,13 @@ class FilePacker : public Archive {
     }
     if (gathered_.size() + size > kGathered) flush();
     if (size >= kGathered)
-      put(static_cast<const char*>(data), size);
+      put({static_cast<const char*>(data), size});
     else
       gathered_.append(static_cast<const char*>(data), size);
     written_ += size;
   }
   void flush() {
-    put(gathered_.data(), gathered_.size());
+    put(gathered_);
     gathered_.clear();
   }
   /// Bytes for the file so far, including gathered ones.
@@ -71,14 +71,9 @@ class FilePacker : public Archive {
  private:
   static constexpr std::size_t kGathered = std::size_t(1) << 16;
 
-  void put(const char* data, std::size_t size) {
-    while (size > 0) {
-      const ssize_t count = write(descriptor_, data, std::min(size, std::size_t(1) << 30));
-      if (count < 0 && errno == EINTR) continue;
-      if (count <= 0) throw Error(std::string("cannot hand values to another process: ") + std::strerror(errno));
-      data += count;
-      size -= std::size_t(count);
-    }
+  void put(std::string_view bytes) {
+    if (!write_all(descriptor_, bytes))
+      throw Error(std::string("cannot hand values to another process: ") + std::strerror(errno));
   }
 
   int descriptor_;

@@ -5,8 +5,6 @@
 #include <cerrno>
 #include <cstring>
 
-#include <unistd.h>
-
 #include "marrow/runtime/node/types.hpp"
 
 namespace marrow {
@@ -19,15 +17,9 @@ class MemoryPacker : public Archive {
  public:
   explicit MemoryPacker(int descriptor) : descriptor_(descriptor) {}
   void bytes(const void* data, std::size_t size) override {
-    const char* next = static_cast<const char*>(data);
+    if (!write_all(descriptor_, {static_cast<const char*>(data), size}))
+      throw Error(std::string("cannot share an input with Python: ") + std::strerror(errno));
     written_ += size;
-    while (size > 0) {
-      const ssize_t count = write(descriptor_, next, std::min(size, std::size_t(1) << 30));
-      if (count < 0 && errno == EINTR) continue;
-      if (count <= 0) throw Error(std::string("cannot share an input with Python: ") + std::strerror(errno));
-      next += count;
-      size -= std::size_t(count);
-    }
   }
   std::uint64_t written() const { return written_; }
 

@@ -79,11 +79,7 @@ class Answers : public WorkerReports {
       if (message.contains(key)) shorten(message[key]);
     const std::string line = message.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
     const std::scoped_lock lock(mutex_);
-    for (std::size_t done = 0; done < line.size();) {
-      const ssize_t count = write(descriptor_, line.data() + done, line.size() - done);
-      if (count < 0 && errno != EINTR) end_process(1);  // nobody reads the answers any more
-      if (count > 0) done += std::size_t(count);
-    }
+    if (!write_all(descriptor_, line)) end_process(1);  // nobody reads the answers any more
   }
 
  private:
