@@ -76,7 +76,7 @@ class Follow(Cluster):
         said = self.wait(2).stderr
         self.assertIn("the job that gathers, 2, ended without a report; see %s/log/2.txt" % self.out, said)
         self.assertIn("the same command goes on from here", said)
-        # what a cluster prints that knows none of the numbers
+        # the output of a cluster that knows none of the numbers
         self.says("squeue", 1, "slurm_load_jobs error: Invalid job id specified\n")
         self.assertIn("no cell is left", self.compare("out", "--on", "slurm").stdout)
         # jobs of others that got the numbers are not asked for

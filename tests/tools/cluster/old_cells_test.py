@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an earlier run left of cells that tasks of a cluster made anew."""
+"""Old outputs of cells that tasks of a cluster made again."""
 import json
 import shutil
 

@@ -113,7 +113,7 @@ class Quoting(Cluster):
         return command.strip()
 
     def paste(self, command, code=0, **environment):
-        """Runs a command as a person does who copies it, in another folder than that of the plan."""
+        """Runs a command like a person who copies it, not in the folder of the plan."""
         elsewhere = self.scratch / "elsewhere"
         elsewhere.mkdir(exist_ok=True)
         result = subprocess.run(

@@ -177,7 +177,7 @@ class BadData(Case):
         self.assert_kept(out, "shaft")
 
     def assert_kept(self, out, failed):
-        """What does not need the lateral view's shaft is there, and the record says what is missing and why."""
+        """What does not need the lateral view's shaft is made, and the record says what is missing and why."""
         kept = contents(out / "outputs")
         for name in ("model/distal.ply", "edges/frontal.png", "shaft/frontal.yaml"):
             self.assertIn(name, kept)

@@ -66,5 +66,5 @@ class Comparison(Case):
         wait_until(path.exists, "%s did not come" % path)
 
     def slow(self):
-        """An experiment whose cell hangs, as long as it is let."""
+        """An experiment with a cell that hangs until its time limit."""
         return self.experiment("slow", "{hang: {m.how: hang}}")

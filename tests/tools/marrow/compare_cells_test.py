@@ -109,7 +109,7 @@ class Cells(Comparison):
         self.assertIn("1 were there already", self.marrow(0, "compare", file, "--out", "out").stdout)
 
     def test_files_that_change_while_it_runs(self):
-        # A cell that hangs and is tried twice: it goes on for two limits more.
+        # A cell that hangs and is tried twice: it takes two more time limits.
         shutil.rmtree(self.scratch / "cases" / "1")
         file = self.experiment("e", "{a: {}, hang: {m.how: hang}}")
         limit = 10 if IS_SANITIZED else 3

@@ -59,7 +59,7 @@ class Changes(Case):
             return {row["cell"]: row[column] for row in csv.DictReader(stream)}
 
     def expect_fresh(self, out):
-        """Every figure is that of its own cell, as it is by now."""
+        """Every figure is the present one of its own cell."""
         self.compare("fresh", "--no-cache")
         fresh = self.figures("fresh")
         self.assertEqual(
@@ -200,7 +200,7 @@ class Changes(Case):
         self.expect_fresh("out")
 
     def with_a_crash(self):
-        """After it another process goes on, which looks at everything for itself."""
+        """After this, another process continues and checks everything itself."""
         self.add_case("2")
         self.add_case("3")
         self.write(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of a comparison: which pictures are in it, and that what does not fit lies beside it."""
+"""The page of a comparison: which pictures it holds, and that the others are beside it."""
 import base64
 import csv
 import json

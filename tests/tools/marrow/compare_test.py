@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Comparisons as a person runs them: what goes wrong in one cell stays there, and an interrupted one goes on."""
+"""Comparisons as a person runs them: a fault in one cell stays there, and an interrupted comparison can continue."""
 import csv
 import json
 import os

@@ -43,8 +43,7 @@ class Runs(Case):
         self.assertEqual(self.diff(code, "a", "b"), "first run (was): a\nsecond run (is): b\n\n" + text)
 
     def use_version(self, version, extra=b""):
-        """A plugin that is built anew under its old name; `extra` bytes at its end give it another build id and nothing
-        else."""
+        """A plugin that is built again under its old name. `extra` bytes at its end only give it another build id."""
         folder = self.scratch / "plugins"
         folder.mkdir(exist_ok=True)
         (folder / "marrow_versions.so").unlink(missing_ok=True)

@@ -134,7 +134,7 @@ class FitVerdict(unittest.TestCase):
         self.assertEqual(self.threshold("low", [-3] * 10 + [9], [1], "--false-alarms", "0", wrong_above=0.7), 0.7)
 
     def test_no_more_right_poses_are_doubtful_than_allowed(self):
-        """Doubtful is what is above the threshold that stands in the file. The probabilities are computed here."""
+        """A pose above the threshold in the file is doubtful. The test computes the probabilities itself."""
         for name, right, share in (
             ("equal", [-3.5] * 10, 0.0),  # 0.029312...: with three digits it was 0.0293, and all ten were doubtful
             ("close", [-3.5 + 1e-7 * i for i in range(10)], 0.2),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The installed program: it is whole wherever it lies, and knows its plugins without describing them anew."""
+"""The installed program works in any folder, and knows its plugins without describing them again."""
 import os
 import subprocess
 
@@ -17,7 +17,7 @@ class Install(Case):
         self.root = self.scratch / "moved"
 
     def marrow(self, *arguments):
-        # With a cache of its own, nothing that was found out before is used.
+        # With a separate cache, it uses nothing from earlier runs.
         environment = {**os.environ, "XDG_CACHE_HOME": str(self.scratch / "cache")}
         result = subprocess.run(
             [self.root / "bin" / "marrow", *arguments],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""marrow new: what it makes works as it is, and nothing that was there is lost."""
+"""marrow new: its files work without changes, and no existing file is lost."""
 import os
 import pathlib
 import subprocess

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What stands on the command line is taken as it stands: texts, empty words, and what is given twice."""
+"""Words of the command line count literally: texts, empty words, and words that are given twice."""
 import json
 import subprocess
 
@@ -13,7 +13,7 @@ nodes:
   c: {uses: test.constant, with: {path: $data, word: $word}}
 outputs: {o: c}
 """
-# Texts in which YAML would see a comment, an anchor, a tag and so on. A file of each name is there.
+# Texts that YAML would read as a comment, an anchor, a tag and so on. For each there is a file of this name.
 TEXTS = ("a #b", "&a b", "! b", "*a", "- a", "a: b", "~", "null", "%a", "| a", " a ", "a\nb", "größe 漢")
 
 

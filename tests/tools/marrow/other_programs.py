@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests on files of other programs share: which of those programs are here, and the nodes that read files."""
+"""For tests on files of other programs: which of these programs are installed, and the nodes that read files."""
 import pathlib
 import shutil
 import unittest

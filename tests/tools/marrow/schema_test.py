@@ -91,7 +91,7 @@ timed_cells: 1
 sweep: {options: {edges.sigma_px: {range: [1, 2], scale: log, whole: false}}, grid: 2}
 stop: {width: 0.1, figure: success, most_cases: 10, look_every: 5}
 """
-# What stands in the place of its last two keys.
+# What replaces its last two keys.
 TUNE = """tune:
   options: {edges.sigma_px: {range: [1, 2], scale: log, whole: false}}
   figure: errors.distal.final.mtre_mm
@@ -224,7 +224,7 @@ class ExperimentSchema(SchemaCase):
             self.assertEqual(self.errors(EXPERIMENT.replace(*change)), [])
 
 
-# All that a case file can say, but for a camera in a file of its own and the two ways to write a transform.
+# Everything that a case file can say, except a camera in its own file and the two ways to write a transform.
 CASE = """marrow-case: 1
 ct: {file: ct.mha, voxel_size_mm: [1, 1, 1], flip: [z], value_offset_hu: 0, series_uid: "1.2"}
 views:

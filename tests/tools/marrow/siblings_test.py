@@ -173,7 +173,7 @@ def outputs_of(pipeline, node):
 
 
 def fitting(pipeline, node):
-    """The nodes that fit in place of this one as it is wired."""
+    """The nodes that fit in place of this one, with its wires."""
     result = marrow("list", "--fits", pipeline, node, "--json")
     assert result.returncode == 0, result.stderr
     return [fit["node"] for fit in json.loads(result.stdout) if fit["fits"] == "yes"]

@@ -91,7 +91,7 @@ class Watch(Case):
         self.assertTrue((self.scratch / "runs/p-watch/run-1/report.html").exists(), "the last good result stays")
         path.write_text(PIPELINE % 4)
         self.wait("runs/p-watch", "run-2/report.html")
-        # the old one goes only after the page knows the new one
+        # the old one is removed only when the page knows the new one
         wait_until(lambda: not (self.scratch / "runs/p-watch/run-1").exists(), "the old result stays")
         self.process.send_signal(signal.SIGINT)
         self.assertEqual(self.process.wait(200), 130)

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""The scene of the report's page in headless Chromium: what is drawn, and where it lies over the X-ray image.
+"""The scene of the report's page in headless Chromium: what is drawn, and at which place of the X-ray image.
 
     tests/tools/report/scene_test.py     exit code 77: skipped, with the reason
 """

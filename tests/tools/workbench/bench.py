@@ -106,7 +106,7 @@ class Server:
 
 
 class BenchTest(unittest.TestCase):
-    """Each test has a folder of its own. setUp() may be extended to fill it before open() is called."""
+    """Each test has its own folder. A subclass may fill it in setUp(), before it calls open()."""
 
     def setUp(self):
         self.scratch = pathlib.Path(tempfile.mkdtemp(prefix="marrow-open-"))

@@ -24,7 +24,7 @@ class ByKeysTest(WholeWay):
         ActionChains(self.browser.driver, duration=0).send_keys(*keys).perform()
 
     def reach(self, selector):
-        """Tab, until the focus is there."""
+        """Presses Tab until the focus is there."""
         self.css(selector)
         for _ in range(MOST_TABS):
             if self.browser.js("return !!document.activeElement.matches(%s)" % json.dumps(selector)):

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The editor of pipeline files: each change is the one that is wanted, and all else stays as it is written.
+// The editor of pipeline files: it makes each wanted change, and all other text stays.
 #include "tools/workbench/pipeline_edit.cpp"
 
 #include <gtest/gtest.h>

@@ -5,7 +5,7 @@
 
     tests/tools/workbench/place_wrist.py WRIST [PICTURES]      # WRIST: the folder with volumes, images, cameras
 
-The script stands for a person who sees where the bone belongs. It aims with the pointer at whole steps of 4 pixels and
+The script acts as a person who sees where the bone belongs. It aims with the pointer at whole steps of 4 pixels and
 2 degrees. Where the bone belongs is the placement that is shipped for pipelines/wrist-intensity.yaml, which was made
 by hand, too. The result is compared with a registration from that placement.
 """

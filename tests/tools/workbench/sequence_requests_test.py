@@ -30,7 +30,7 @@ class RequestsTest(Moving, BenchTest):
         self.assertEqual(state["error"], "")
 
     def marrow(self, *words):
-        """The command line in the open folder, with a store of its own."""
+        """The command line in the open folder, with its own store."""
         environment = {**bench.os.environ, "MARROW_CACHE": str(self.scratch / "another-store")}
         subprocess.run([MARROW, *words, "--quiet"], cwd=self.folder, check=True, env=environment)
 

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Who reaches the server of `marrow open`, and what it answers to requests that no page of its own makes."""
+"""Who can reach the server of `marrow open`, and its answers to requests that none of its pages sends."""
 import json
 import os
 import pathlib

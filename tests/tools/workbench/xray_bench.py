@@ -144,7 +144,7 @@ class XrayTest(PageTest):
                 element = self.find(selector)
                 self.browser.js("arguments[0].scrollIntoView({block: 'center'})", element)
                 return element.click()
-            except StaleElementReferenceException:  # the page was drawn anew between the two
+            except StaleElementReferenceException:  # the page was drawn again between the two
                 pass
         self.fail("%s is drawn anew again and again" % selector)
 
@@ -171,7 +171,7 @@ class XrayTest(PageTest):
         )
 
     def place(self, view, at):
-        """Where a pixel of a whole image lies on the screen."""
+        """The place of a pixel of a whole image on the screen."""
         _, (left, top, width, height) = self.box(view)
         zoom = min(width / WIDTH, height / HEIGHT)
         return left + width / 2 + zoom * (at[0] - (WIDTH - 1) / 2), top + height / 2 + zoom * (at[1] - (HEIGHT - 1) / 2)

@@ -31,7 +31,7 @@ constexpr std::size_t kHeap = 256 << 20;
 constexpr int kProcessor_s = 2, kWaiting_s = 60;  // the second only catches what sleeps: other tests run beside
 
 std::string current;     // the input that is tried
-std::string reproducer;  // where it goes when it is a finding
+std::string reproducer;  // the file for a finding
 
 /// Also from handlers of signals: no allocation here.
 [[noreturn]] void report(const char* what) {

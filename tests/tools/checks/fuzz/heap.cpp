@@ -30,7 +30,7 @@ std::size_t heap_peak() { return std::size_t(peak - start); }
 }  // namespace marrow::fuzz
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-// The program's own malloc() stands in front of the C library's, for all libraries that it loads.
+// The program's own malloc() replaces the C library's, for all libraries that it loads.
 extern "C" {
 
 void* __libc_malloc(std::size_t);

@@ -31,7 +31,7 @@ struct Input {
   Input(const std::uint8_t* data, std::size_t size) : rest(reinterpret_cast<const char*>(data), size) {}
   /// One of the letters: the first byte, where it is one of them; else the one that it falls on.
   char choice(std::string_view letters);
-  /// What stands before the first zero byte; the rest begins behind it.
+  /// The text before the first zero byte; the rest begins behind it.
   std::string_view text();
 };
 

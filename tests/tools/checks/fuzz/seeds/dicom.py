@@ -99,7 +99,7 @@ def slice_(position):
 
 
 def frames():
-    """An enhanced file of two frames whose geometry stands in functional groups."""
+    """An enhanced file of two frames with the geometry in functional groups."""
     plane = element(0x00289110, "SQ", item(element(0x00280030, "DS", "0.5\\0.5")))
     arm = element(0x00189405, "SQ", item(element(0x00181510, "DS", "10") + element(0x00181511, "DS", "5")))
     shared = element(0x52009229, "SQ", item(plane))

@@ -8,7 +8,7 @@ import scene
 
 import marrow
 
-# One level, that of the finest of the searches, from a start that is nearly right.
+# Only the finest level of the searches, from a start that is nearly right.
 SEARCH = {
     "scan_rotation_deg": 0,
     "scan_translation_mm": 0,
