@@ -193,7 +193,7 @@ TEST(Calibration, Refusals) {
   put(folder / "a.yaml", camera_text());
   put(folder / "c.yaml", calibration_text());
   EXPECT_SAYS(view_from(nullptr, {"a", folder / "a.tif", folder / "a.yaml", folder / "c.yaml"}),
-              "it is removed only once");
+              "which can be removed only once");
   put(folder / "c.yaml", with(calibration_text(), "width_px: 200", "width_px: 300"));
   put(folder / "plain.yaml", with(camera_text(), "radial_distortion: [3, 10, 0]\n", ""));
   EXPECT_SAYS(view_from(nullptr, {"a", folder / "a.tif", folder / "plain.yaml", folder / "c.yaml"}),

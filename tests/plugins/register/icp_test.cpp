@@ -141,8 +141,8 @@ TEST(Icp, SaysWhatIsWrong) {
             "the target is in the frame 'ct', but the pose to start from leads to 'world'; the target is a surface in "
             "the world");
   EXPECT_EQ(refusal(start, bone().target(), bone().target()),
-            "the model is in the frame 'world', but the pose to start from takes points in 'ct'; give the model that "
-            "the start is of");
+            "the model is in the frame 'world', but the pose to start from takes points in 'ct'; give the model of "
+            "this start");
   EXPECT_EQ(refusal(start, {}, bone().target()), "model: the surface has no triangles");
   marrow::Vector6d far = marrow::Vector6d::Zero();
   far[3] = 500;
