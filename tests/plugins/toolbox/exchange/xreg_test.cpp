@@ -98,7 +98,7 @@ TEST(Xreg, LandmarksAsImagesShowThem) {
               "xreg-by-h5py.h5: has 3 projections; give as many names, got 0");
   put(folder / "p.fcsv", with(kPoints, "FH-r", "GSN-r"));
   EXPECT_SAYS(landmarks_at(folder / "p.fcsv", {{"seen", kFile.string()}, {"names", views}}),
-              "xreg-by-h5py.h5: projection 0 shows 'FH-r', which ");
+              "xreg-by-h5py.h5: projection 0 shows 'FH-r', but ");
   EXPECT_SAYS(landmarks_at(folder / "p.fcsv", {{"names", views}}),
               "p.fcsv: names and mirror are about the file of seen; give it, or leave them out");
   put(folder / "l.yaml", "marrow-landmarks: 1\nfragments: {a: {points: {b: [1, 2, 3]}}}\n");
