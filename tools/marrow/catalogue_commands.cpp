@@ -95,7 +95,7 @@ int inspect(const std::string& name, bool yaml, bool as_json) {
   if (yaml)
     print_snippet(*node);
   else if (as_json)
-    std::printf("%s\n", node_json(*node).dump(1, ' ', false, json::error_handler_t::replace).c_str());
+    print_as_json(node_json(*node));
   else
     print_node(*node, *catalogue.library_of(name), catalogue.find_kind(node->kind()));
   return 0;
@@ -143,7 +143,7 @@ int doctor(bool as_json) {
     if (!library.note.empty()) std::printf("           note: %s\n", printable(library.note).c_str());
   }
   if (as_json)
-    std::printf("%s\n", all.dump(1, ' ', false, json::error_handler_t::replace).c_str());
+    print_as_json(all);
   else
     std::printf("\n%zu libraries, %d refused, %zu nodes\n", catalogue.libraries().size(), refused,
                 catalogue.node_names().size());
@@ -162,7 +162,7 @@ int describe(const std::filesystem::path& file, bool write) {
   }
   json all = json::array();
   for (const NodeInfo& node : info.nodes) all.push_back(node_json(node));
-  std::printf("%s\n", all.dump(1, ' ', false, json::error_handler_t::replace).c_str());
+  print_as_json(all);
   return 0;
 }
 

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "marrow/base/number_text.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/plugins/contract.hpp"
 
 namespace marrow::cli {
@@ -127,11 +128,8 @@ std::optional<double> bound_told(const OptionInfo& option, std::optional<double>
 
 std::string relation_text(const RelationInfo& relation) {
   std::vector<std::string> names;
-  std::string all;
-  for (const std::string& name : relation.names) {
-    names.push_back("'" + name + "'");
-    all += (all.empty() ? "" : ", ") + names.back();
-  }
+  for (const std::string& name : relation.names) names.push_back("'" + name + "'");
+  const std::string all = joined(names, ", ");
   switch (relation.type) {
     case RelationType::not_above:
       return names[0] + " is not above " + names[1];
@@ -152,17 +150,12 @@ std::string relation_text(const RelationInfo& relation) {
 }
 
 std::string replaces_text(const OptionInfo& option) {
-  std::string names;
-  for (const std::string& name : option.replaces) names += (names.empty() ? "'" : ", '") + name + "'";
-  return names.empty() ? "" : "takes the place of " + names + " of the functions that reach this node";
+  if (option.replaces.empty()) return "";
+  return "takes the place of '" + joined(option.replaces, "', '") + "' of the functions that reach this node";
 }
 
 std::string range_text(const OptionInfo& option) {
-  if (!option.choices.empty()) {
-    std::string text;
-    for (const std::string& choice : option.choices) text += (text.empty() ? "one of: " : ", ") + choice;
-    return text;
-  }
+  if (!option.choices.empty()) return "one of: " + joined(option.choices, ", ");
   std::string text = type_name(option.type);
   if (option.length) text = formatted("{} numbers", option.length);
   const std::optional<double> least = bound_told(option, option.minimum), most = bound_told(option, option.maximum);

@@ -3,6 +3,7 @@
 // The commands of the program, and what they share. Exit codes: 0 success, 1 a node or a library failed, 2 fault in the
 // request or in a file, 3 from `run` if nothing failed but a verdict is `wrong`, 130 stopped by Ctrl-C.
 #include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -70,6 +71,10 @@ void add_conformance(CLI::App& app, int& code);
 void add_check_worker(CLI::App& app, int& code);
 void add_describe(CLI::App& app, int& code);
 
+/// Prints a note on the standard error, on one line.
+void say_note(const std::string& text);
+/// Prints a JSON document, or with `indent` -1 a line of JSON.
+void print_as_json(const nlohmann::json& value, int indent = 1);
 /// Whether results can be kept in the store. If not, prints why, unless `quiet`.
 bool can_keep_results(const std::string& fault_of_store, bool quiet);
 /// Prints why the shared store behind a store cannot be used, if it has one, unless `quiet`.
@@ -92,19 +97,18 @@ struct RunOutcome {
   std::vector<RunFolder::Written> written;
   bool is_faulty = false;  ///< a node failed, or an output was not written
 };
-/// Runs a pipeline into a folder and shows the progress as the request wants. Of the request, threads and seed count,
-/// but not its pipeline.
+/// Runs `pipeline` into a folder and shows the progress as the request wants. Ignores the pipeline of the request.
 RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const RunRequest& request,
                    const PipelineArguments& arguments, const Store* store, RunFolder& folder);
 
 /// Throws Error if the pipeline reads a folder to which the run writes. An empty `folder` means a folder below runs/.
 void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& folder, const Store* store);
 
-/// Throws Error if no file can hold an output: a pipeline that only runs inside the program may have such outputs, but
-/// a run into a folder cannot write them.
+/// Throws Error if no file can hold an output. A pipeline that only the program itself runs may have such outputs; a
+/// run into a folder cannot write them.
 void expect_files_can_hold(const Pipeline& pipeline, const Catalogue& catalogue);
 
-/// Prints what is to be thought of each pose, with reasons and remedies; coloured on a terminal.
+/// Prints the verdict on each pose, with reasons and remedies; coloured on a terminal.
 void print_verdicts(const std::vector<NamedVerdict>& verdicts);
 
 /// What a run would do with a node, and why: "cached", "runs: ...".

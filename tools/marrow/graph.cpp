@@ -5,15 +5,10 @@
 #include "commands.hpp"
 #include "drawn_graph.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow::cli {
 namespace {
-
-std::string axes_text(const std::vector<std::string>& axes) {
-  std::string text;
-  for (const std::string& axis : axes) text += (text.empty() ? "" : " x ") + axis;
-  return text;
-}
 
 /// A text between the quotes of a DOT file.
 std::string dot_text(const std::string& text) {
@@ -33,7 +28,7 @@ void print_nodes(const Pipeline& pipeline, const std::string& margin) {
     std::printf("%s%s  (%s)%s%s%s\n", margin.c_str(), node.id.c_str(), node.info.name.c_str(),
                 node.repetition            ? ("  " + passes_text(*node.repetition)).c_str()
                 : node.mapped_axes.empty() ? ""
-                                           : ("  for each " + axes_text(node.mapped_axes)).c_str(),
+                                           : ("  for each " + joined(node.mapped_axes, " x ")).c_str(),
                 node.may_fail ? "  [may fail]" : "", needed[i] ? "" : "  [not needed]");
     for (const Wire& wire : node.wires) {
       std::string sources;
@@ -56,7 +51,7 @@ void print_text(const Pipeline& pipeline) {
   for (const PipelineOutput& output : pipeline.outputs) {
     const std::vector<std::string> axes = pipeline.axes_of(output.source);
     std::printf("    %s <- %s%s\n", output.name.c_str(), printable(output.source.text).c_str(),
-                axes.empty() ? "" : ("  (a list over " + axes_text(axes) + ")").c_str());
+                axes.empty() ? "" : ("  (a list over " + joined(axes, " x ") + ")").c_str());
   }
 }
 
@@ -67,7 +62,7 @@ void print_dot_nodes(const DrawnGraph& graph, const std::string& body, const std
     const PipelineNode& node = *drawn.node;
     const std::string axes = node.repetition            ? "\\n" + dot_text(passes_text(*node.repetition))
                              : node.mapped_axes.empty() ? ""
-                                                        : "\\nfor each " + axes_text(node.mapped_axes);
+                                                        : "\\nfor each " + joined(node.mapped_axes, " x ");
     const std::string id = dot_text(drawn.id);
     std::printf("%s\"%s\" [label=\"%s\\n%s%s%s\"];\n", margin.c_str(), id.c_str(), dot_text(node.id).c_str(),
                 dot_text(node.info.name).c_str(), axes.c_str(), node.may_fail ? "\\nmay fail" : "");

@@ -52,7 +52,7 @@ int list(const std::string& kind, bool as_json) {
     }
     std::printf("  %-34s %s\n", printable(name).c_str(), printable(node.summary).c_str());
   }
-  if (as_json) std::printf("%s\n", all.dump(1, ' ', false, json::error_handler_t::replace).c_str());
+  if (as_json) print_as_json(all);
   if (!kind.empty() && shown == 0) {
     const KindInfo* known = catalogue.find_kind(kind);
     std::fprintf(stderr, "marrow: error: no node of kind '%s'%s\n", printable(kind).c_str(),
@@ -74,7 +74,7 @@ int list_kinds(bool as_json) {
     all.push_back(kind_json(kind));
     if (!as_json) std::printf("  %-14s %s\n", printable(name).c_str(), printable(kind.summary).c_str());
   }
-  if (as_json) std::printf("%s\n", all.dump(1, ' ', false, json::error_handler_t::replace).c_str());
+  if (as_json) print_as_json(all);
   if (!as_json) note_refused(catalogue);
   return 0;
 }
@@ -116,7 +116,7 @@ int list_fits(const ListRequest& request) {
       const char* verdict = !fit.faults.empty() ? "no" : fit.missing.empty() ? "yes" : "with more";
       all.push_back({{"node", fit.node}, {"fits", verdict}, {"missing", fit.missing}, {"faults", fit.faults}});
     }
-    std::printf("%s\n", all.dump(1, ' ', false, json::error_handler_t::replace).c_str());
+    print_as_json(all);
     return 0;
   }
   std::printf("In place of '%s' in %s\n", printable(id).c_str(), printable(file).c_str());

@@ -9,6 +9,7 @@
 #include "given_path.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/run/run_folder.hpp"
 
 namespace marrow::cli {
@@ -22,7 +23,7 @@ void print_json(const Diagnostics& diagnostics) {
                     {"column", item.place.column},
                     {"message", item.message},
                     {"hint", item.hint}});
-  std::printf("%s\n", list.dump(1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  print_as_json(list);
 }
 
 }  // namespace
@@ -98,9 +99,8 @@ int check(const PipelineRequest& request, bool json) {
   std::printf("%s: good; %zu nodes, %zu outputs\n", printable(request.file.string()).c_str(), pipeline.nodes.size(),
               pipeline.outputs.size());
   for (const PipelineNode& node : pipeline.nodes) {
-    std::string axes;
-    for (const std::string& axis : node.mapped_axes) axes += (axes.empty() ? "" : " and ") + axis;
-    if (!axes.empty()) std::printf("  %s is called for each %s\n", node.id.c_str(), axes.c_str());
+    if (!node.mapped_axes.empty())
+      std::printf("  %s is called for each %s\n", node.id.c_str(), joined(node.mapped_axes, " and ").c_str());
     if (node.repetition)
       std::printf("  %s runs a body of %zu nodes: %s\n", node.id.c_str(), node.repetition->alone.nodes.size(),
                   passes_text(*node.repetition).c_str());

@@ -4,6 +4,7 @@
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -25,9 +26,8 @@ std::string planned_text(const PlannedNode& node) {
     case What::depends:
       break;
   }
-  std::string names;
-  for (const std::string& name : node.waits_for) names += (names.empty() ? "'" : ", '") + name + "'";
-  return "runs unless " + names + (node.waits_for.size() == 1 ? " comes" : " come") + " out unchanged";
+  return "runs unless '" + joined({node.waits_for.begin(), node.waits_for.end()}, "', '") +
+         (node.waits_for.size() == 1 ? "' comes" : "' come") + " out unchanged";
 }
 
 namespace {
@@ -36,7 +36,7 @@ int plan(const PipelineRequest& request, std::uint64_t seed) {
   const Catalogue catalogue;
   Pipeline pipeline;
   if (!load(request, catalogue, pipeline, true)) return 2;
-  for (const std::string& note : pipeline.notes) std::fprintf(stderr, "marrow: note: %s\n", printable(note).c_str());
+  for (const std::string& note : pipeline.notes) say_note(note);
   const Store store;
   can_keep_results(store.fault(), false);
   say_if_not_shared(store, false);

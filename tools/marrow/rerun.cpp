@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// `marrow diff` and `marrow rerun`: whether two runs have the same results.
 #include <cstdio>
 
 #include "command_options.hpp"
@@ -8,6 +9,20 @@
 
 namespace marrow::cli {
 namespace {
+
+/// The exit code: 0 if the results are the same, else 1.
+int print_findings(const Findings& findings, bool as_json) {
+  if (as_json)
+    print_as_json(json_of(findings));
+  else
+    print(findings);
+  return findings.identical() ? 0 : 1;
+}
+
+int diff(const std::filesystem::path& before, const std::filesystem::path& now, bool as_json) {
+  KnownValues values;
+  return print_findings(find_differences(read_run(before), read_run(now), values), as_json);
+}
 
 int rerun(const RerunRequest& request) {
   RunRecord before = read_run(request.run);
@@ -36,15 +51,24 @@ int rerun(const RerunRequest& request) {
   KnownValues values;
   for (const NodeRecord& node : outcome.result.nodes)
     for (const Value& output : node.outputs) values.add(output);
-  const Findings findings = find_differences(std::move(before), read_run(folder.path()), values);
-  if (request.json)
-    std::printf("%s\n", json_of(findings).dump(1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
-  else
-    print(findings);
-  return findings.identical() && !outcome.is_faulty ? 0 : 1;
+  const int code = print_findings(find_differences(std::move(before), read_run(folder.path()), values), request.json);
+  return outcome.is_faulty ? 1 : code;
 }
 
 }  // namespace
+
+void add_diff(CLI::App& app, int& code) {
+  struct Given {
+    std::filesystem::path first, second;
+    bool as_json = false;
+  };
+  const auto given = std::make_shared<Given>();
+  CLI::App* command = app.add_subcommand("diff", "say where two runs part, by how much and why");
+  command->add_option("first", given->first, "folder of a run, or of a cell of a comparison")->required();
+  command->add_option("second", given->second, "folder of the run to compare it with")->required();
+  command->add_flag("--json", given->as_json, "as JSON");
+  command->callback([given, &code] { code = diff(given->first, given->second, given->as_json); });
+}
 
 void add_rerun(CLI::App& app, int& code) {
   const auto request = std::make_shared<RerunRequest>();

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "commands.hpp"
 #include "marrow/base/printable.hpp"
@@ -70,6 +71,12 @@ void print_value(const std::string& name, const Value& value) {
 }
 
 }  // namespace
+
+void say_note(const std::string& text) { std::fprintf(stderr, "marrow: note: %s\n", printable(text).c_str()); }
+
+void print_as_json(const nlohmann::json& value, int indent) {
+  std::printf("%s\n", value.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+}
 
 void print_verdicts(const std::vector<NamedVerdict>& verdicts) {
   static constexpr const char* kColours[] = {"\033[32m", "\033[33m", "\033[31m"};  // green, yellow, red

@@ -5,7 +5,9 @@
 #include <chrono>
 #include <cstdio>
 #include <map>
+#include <mutex>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "command_options.hpp"
 #include "commands.hpp"
@@ -20,7 +22,6 @@
 #include "marrow/runtime/store/shared_store.hpp"
 #include "process.hpp"
 #include "run_event.hpp"
-#include "stop_notice.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -101,7 +102,7 @@ class RunProgress {
   }
 
   static void print_json(const RunEvent& event) {
-    std::printf("%s\n", json_of(event).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    print_as_json(json_of(event), -1);
     std::fflush(stdout);
   }
 
@@ -109,6 +110,36 @@ class RunProgress {
   RunLog& log_;
   bool is_terminal_;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+/// Keeps the text that Ctrl-C shows (say_when_stopped): what a run still waits for, and how to end it at once.
+class StopNotice {
+ public:
+  StopNotice() = default;
+  ~StopNotice() { say_when_stopped(""); }
+  StopNotice(const StopNotice&) = delete;
+  StopNotice& operator=(const StopNotice&) = delete;
+
+  /// To be told of all events of the run. Safe to use from several threads.
+  void operator()(const RunEvent& event) {
+    const std::string where = event.item.empty() ? event.node : event.node + " (" + event.item + ")";
+    const bool has_ended = event.kind == RunEvent::Kind::finished || event.kind == RunEvent::Kind::failed;
+    if (event.kind != RunEvent::Kind::started && !has_ended) return;
+    const std::scoped_lock lock(mutex_);
+    if (!has_ended)
+      running_.insert(where);
+    else if (const auto found = running_.find(where); found != running_.end())
+      running_.erase(found);
+    std::string names;
+    for (const std::string& one : running_) names += (names.empty() ? "" : ", ") + one;
+    say_when_stopped(names.empty() ? ""
+                                   : "marrow: stopping; it waits for what is running: " + printable(names) +
+                                         ". A second Ctrl-C ends it at once");
+  }
+
+ private:
+  std::mutex mutex_;
+  std::multiset<std::string> running_;
 };
 
 std::string status_text(const NodeRecord& record) {
@@ -165,7 +196,7 @@ void print_json_summary(const Pipeline& pipeline, const RunResult& result,
   for (const NamedVerdict& one : verdicts_of(pipeline, result)) {
     json verdict = json_of(one);
     verdict["event"] = "verdict";
-    std::printf("%s\n", verdict.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    print_as_json(verdict, -1);
   }
   json files = json::object(), absent = json::object();
   for (const RunFolder::Written& output : written) {
@@ -180,7 +211,7 @@ void print_json_summary(const Pipeline& pipeline, const RunResult& result,
                     {"folder", folder},
                     {"files", files},
                     {"absent", absent}};
-  std::printf("%s\n", end.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  print_as_json(end, -1);
 }
 
 }  // namespace
@@ -200,7 +231,7 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   };
   const auto note = [&](const std::string& text) {
     folder.log().keep(LogLevel::info, "", "note: " + text);
-    if (!request.quiet) std::fprintf(stderr, "marrow: note: %s\n", printable(text).c_str());
+    if (!request.quiet) say_note(text);
   };
   for (const std::string& text : pipeline.notes) note(text);
   const std::string fault = store ? store->prepare() : "";

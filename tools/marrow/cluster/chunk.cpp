@@ -178,8 +178,7 @@ int run_chunk(const ChunkRequest& asked) {
     leave_fault_of_chunk(plan.folder, chunk->name, error.what());
     throw;
   }
-  std::fprintf(stderr, "marrow: %s; the same command goes on from here\n", stopped_text().c_str());
-  return 130;
+  return stopped();
 }
 
 }  // namespace

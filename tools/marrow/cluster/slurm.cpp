@@ -16,6 +16,7 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "process.hpp"
 #include "report/report.hpp"
 #include "watch/child.hpp"
@@ -31,7 +32,7 @@ constexpr std::size_t kMostSaidBytes = 300;
 
 std::string without_end_of_line(const std::string& text) { return text.substr(0, text.find_last_not_of("\n") + 1); }
 
-/// What a program of Slurm prints. Throws Error if it fails.
+/// The output of a Slurm program. Throws Error if it fails.
 std::string said_by(const std::vector<std::string>& command) {
   const ChildEnd end = run_child(
       command, [] { return false; }, Said::kept);
@@ -40,7 +41,7 @@ std::string said_by(const std::vector<std::string>& command) {
   return end.said;
 }
 
-/// Runs a program of Slurm that only asks. It is ended if it takes too long, and after Ctrl-C.
+/// Runs a Slurm program that only asks. Ends it if it takes too long, and after Ctrl-C.
 ChildEnd ask(const std::vector<std::string>& command) {
   const auto asked_at = std::chrono::steady_clock::now();
   const std::atomic<bool>& stop = stop_on_signals();
@@ -48,18 +49,17 @@ ChildEnd ask(const std::vector<std::string>& command) {
       command, [&] { return stop || std::chrono::steady_clock::now() - asked_at > kLongestAnswer; }, Said::kept);
 }
 
-std::string jobs_of(const Submission& submission) {
-  std::string jobs = submission.gather;
-  for (const Submission::Array& array : submission.arrays) jobs += (jobs.empty() ? "" : ",") + array.job;
+std::vector<std::string> arrays_of(const Submission& submission) {
+  std::vector<std::string> jobs;
+  for (const Submission::Array& array : submission.arrays) jobs.push_back(array.job);
   return jobs;
 }
 
-// Names of a plan's jobs. They tell them from jobs that got the same numbers, after the cluster forgot them.
+// Names of a plan's jobs. A cluster may forget jobs and use their numbers again; the names tell them apart.
 std::string name_of_arrays(const std::string& plan) { return "marrow-" + plan; }
 std::string name_of_gather(const std::string& plan) { return "marrow-gather-" + plan; }
 
-/// The place of a job's log, in which Slurm replaces %j, %A and %a. Of a path with a backslash it would replace
-/// nothing.
+/// The path of a job's log. Slurm replaces %j, %A and %a in it, but not in a path with a backslash.
 std::string place_of_log(const ClusterPlan& plan, const std::string& name) {
   std::string place;
   for (const char c : plan.folder.string()) place += c == '%' ? "%%" : std::string(1, c);
@@ -138,7 +138,7 @@ class Submitter {
     if (!profile_file.empty()) more.insert(more.end(), {"--profile", fs::absolute(profile_file).string()});
     const fs::path file = write_gather_script(plan_, more);
     std::vector<std::string> command = sbatch(plan_, profile_, false);
-    add_dependency(command, jobs());
+    add_dependency(command, arrays_of(done_));
     command.push_back(file.string());
     done_.gather = first_word(said_by(command));
   }
@@ -147,23 +147,16 @@ class Submitter {
   void take_back() const {
     std::vector<std::string> command{"scancel"};
     if (!done_.gather.empty()) command.push_back(done_.gather);
-    for (const std::string& job : jobs()) command.push_back(job);
+    for (const std::string& job : arrays_of(done_)) command.push_back(job);
     if (command.size() > 1) ask(command);
   }
 
-  std::vector<std::string> jobs() const {
-    std::vector<std::string> ids;
-    for (const Submission::Array& array : done_.arrays) ids.push_back(array.job);
-    return ids;
-  }
   Submission& done() { return done_; }
 
  private:
   static void add_dependency(std::vector<std::string>& command, const std::vector<std::string>& after) {
     if (after.empty()) return;
-    std::string text = "--dependency=afterany";
-    for (const std::string& job : after) text += ":" + job;
-    command.push_back(text);
+    command.push_back("--dependency=afterany:" + joined(after, ":"));
   }
 
   const ClusterPlan& plan_;
@@ -197,12 +190,12 @@ std::string in_words(const std::string& state) {
   return "its end is not known";
 }
 
-/// Whether the task may have said why it ended: nobody else ended it.
+/// Whether nobody else ended the task, so it may have said itself why it ended.
 bool ended_by_itself(const std::string& state) {
   return state == "FAILED" || state == "COMPLETED" || state == "UNKNOWN";
 }
 
-/// Why the task could not go on: what marrow left, else the last line that the task printed.
+/// Why the task could not continue: the fault that marrow left, else the last line that the task printed.
 std::string what_task_said(const fs::path& folder, const std::string& chunk, const fs::path& log) {
   std::string last = fault_of_chunk(folder, chunk);
   std::ifstream lines(last.empty() ? log : fs::path());
@@ -244,7 +237,7 @@ Submission submit(const ClusterPlan& plan, const ClusterProfile& profile, const 
   submitter.done().tries = tries_before + 1;
   try {
     submitter.add_arrays(without_rows(plan.cases, files), "cases", {});
-    submitter.add_arrays(without_rows(plan.cells, files), "cells", submitter.jobs());
+    submitter.add_arrays(without_rows(plan.cells, files), "cells", arrays_of(submitter.done()));
     submitter.add_gather(profile_file);
     write_submission(plan.folder, submitter.done());
   } catch (const Error&) {
@@ -255,8 +248,7 @@ Submission submit(const ClusterPlan& plan, const ClusterProfile& profile, const 
 }
 
 std::map<std::string, std::string> states_of(const Submission& submission) {
-  std::string jobs;
-  for (const Submission::Array& array : submission.arrays) jobs += (jobs.empty() ? "" : ",") + array.job;
+  const std::string jobs = joined(arrays_of(submission), ",");
   std::map<std::string, std::string> states;
   if (jobs.empty()) return states;
   add_states({"squeue", "--noheader", "--array", "--states=all", "--jobs=" + jobs, "--format=%F_%K %T"}, states);
@@ -282,11 +274,13 @@ std::map<std::string, std::string> reasons_of(const ClusterPlan& plan, const Sub
 }
 
 Queue queue_of(const Submission& submission) {
+  std::vector<std::string> jobs = arrays_of(submission);
+  jobs.insert(jobs.begin(), submission.gather);
   const ChildEnd end =
-      ask({"squeue", "--noheader", "--jobs=" + jobs_of(submission),
+      ask({"squeue", "--noheader", "--jobs=" + joined(jobs, ","),
            "--name=" + name_of_arrays(submission.plan) + "," + name_of_gather(submission.plan), "--format=%i %T %r"});
   Queue queue;
-  // This is said if only one job is asked for, and it is no longer known.
+  // squeue says this if it is asked for one job only and no longer knows it.
   queue.is_known = end.code == 0 || end.said.find("Invalid job id") != std::string::npos;
   if (end.code != 0) queue.fault = end.stopped ? "squeue did not end" : without_end_of_line(end.said);
   std::istringstream lines(end.code == 0 ? end.said : "");

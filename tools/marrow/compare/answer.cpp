@@ -28,6 +28,29 @@ bool has_all_figures(const CellRow& row) {
   return std::find(row.values.begin(), row.values.end(), std::nullopt) == row.values.end();
 }
 
+/// Counts silent failures and false alarms.
+VerdictCounts verdict_counts(const Experiment& experiment, const Rows& rows) {
+  VerdictCounts counts;
+  compare::CaseRate silent, false_alarms;
+  for (const CellRow* row : rows) {
+    if (!row->verdict) continue;
+    ++counts.cells;
+    if (!experiment.defines_success()) continue;
+    const bool is_trusted = *row->verdict == Judgement::trusted;
+    if (row->is_success(experiment))
+      false_alarms.add(row->case_name, !is_trusted);
+    else
+      silent.add(row->case_name, is_trusted);
+  }
+  counts.misses = silent.runs();
+  counts.successes = false_alarms.runs();
+  counts.silent = silent.successes();
+  counts.false_alarms = false_alarms.successes();
+  if (silent.runs()) counts.silent_rate = silent.interval();
+  if (false_alarms.runs()) counts.false_alarm_rate = false_alarms.interval();
+  return counts;
+}
+
 VariantSummary summary_of(const Experiment& experiment, const Rows& rows,
                           const std::set<std::pair<std::string, std::string>>& done_by_all) {
   VariantSummary summary;
@@ -88,6 +111,37 @@ bool is_of_same_runs(const std::vector<Rows>& of_variant, std::size_t metric) {
     different.insert(std::move(places));
   }
   return different.size() < 2;
+}
+
+std::optional<compare::Interval> rate_of(const Experiment& experiment, const RowsOfVariant& rows, double confidence) {
+  compare::CaseRate rate;
+  for (const compare::CellRow* row : rows) rate.add(row->case_name, row->is_success(experiment));
+  return rate.runs() ? std::optional(rate.exact_interval(confidence)) : std::nullopt;
+}
+
+/// Applies the rule 'stop' of the experiment, if it has one, to its cases so far. The units are known.
+void add_look(const Experiment& experiment, const std::vector<RowsOfVariant>& rows, Answer& answer) {
+  if (!experiment.stop) return;
+  const compare::StopRule& rule = *experiment.stop;
+  const compare::StopPlan plan(rule);
+  const std::size_t cases = experiment.cases.size();
+  if (rule.goal == compare::StopRule::Goal::difference) {
+    answer.look = compare::look_at_difference(plan, cases,
+                                              cell_pairs(rows[experiment.baseline], rows[rule.variant], *rule.metric),
+                                              experiment.metrics[*rule.metric].higher_is_better());
+  } else {
+    std::vector<std::optional<compare::Interval>> intervals;
+    const double confidence = 1 - plan.level_at(cases);
+    for (const RowsOfVariant& own : rows)
+      intervals.push_back(rule.metric ? figure_of_cases(own, *rule.metric).median_interval(confidence)
+                                      : rate_of(experiment, own, confidence));
+    answer.look = compare::look_at_widths(plan, cases, intervals);
+  }
+  answer.look_sentence =
+      compare::sentence(rule, *answer.look,
+                        {rule.metric ? experiment.metrics[*rule.metric].label : "the success rate",
+                         rule.metric ? answer.units[*rule.metric] : "", experiment.variants[answer.look->variant].name,
+                         experiment.variants[experiment.baseline].name});
 }
 
 }  // namespace

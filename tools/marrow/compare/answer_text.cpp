@@ -86,6 +86,25 @@ std::string figure_table(const Experiment& experiment, const Answer& answer, std
                                 "cases and starts.\n");
 }
 
+/// What the verdicts of each variant are worth; empty if no cell has a verdict.
+std::string verdict_table(const Experiment& experiment, const Answer& answer) {
+  std::size_t cells = 0;
+  for (const VariantSummary& summary : answer.variants) cells += summary.verdicts.cells;
+  if (!cells) return "";
+  using enum Side;
+  TextTable table({left, right, left, right, left});
+  table.add({"", "cells", "silent failures", "caught", "false alarms"});
+  for (std::size_t v = 0; v < answer.variants.size(); ++v) {
+    const VerdictCounts& counts = answer.variants[v].verdicts;
+    table.add({experiment.variants[v].name, formatted("{}", counts.cells),
+               rate_text(counts.silent, counts.misses, counts.silent_rate, 1),
+               experiment.defines_success() ? formatted("{}", counts.caught()) : kNone,
+               rate_text(counts.false_alarms, counts.successes, counts.false_alarm_rate, 1)});
+  }
+  return "\nVerdicts: misses that are trusted, of all misses; successes that are not, of all successes\n" +
+         table.text();
+}
+
 std::vector<compare::CaptureRange::Bin> longest_bins(const Answer& answer) {
   std::vector<compare::CaptureRange::Bin> longest;
   for (const VariantSummary& summary : answer.variants)

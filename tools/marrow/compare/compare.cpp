@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
 #include <cstdio>
 
 #include "cluster/on_cluster.hpp"
@@ -7,13 +6,13 @@
 #include "commands.hpp"
 #include "compare/comparison.hpp"
 #include "compare/comparison_folder.hpp"
-#include "compare/item_check.hpp"
 #include "given_path.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/no_process.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
 #include "marrow/compare/experiment_notes.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/run/place_of_results.hpp"
 #include "marrow/runtime/store/shared_store.hpp"
 #include "process.hpp"
@@ -65,9 +64,8 @@ void expect_outside_cases(const Experiment& experiment, const fs::path& folder, 
 /// A message if a part of a cell's name is unknown to the experiment, with the nearest known name. Otherwise empty.
 template <class Named>
 std::string fault_of_part(const std::string& what, const std::string& part, const std::vector<Named>& all) {
-  std::vector<std::string> names;
-  for (const Named& one : all) names.push_back(one.name);
-  if (std::find(names.begin(), names.end(), part) != names.end()) return "";
+  const std::vector<std::string> names = names_of(all);
+  if (contains(names, part)) return "";
   return "no " + what + " '" + part + "'; " + suggestion(part, names);
 }
 
@@ -82,7 +80,7 @@ std::string fault_of_id(const Experiment& experiment, const std::string& id) {
 }
 
 void say(const std::vector<std::string>& notes) {
-  for (const std::string& note : notes) std::fprintf(stderr, "marrow: note: %s\n", printable(note).c_str());
+  for (const std::string& note : notes) say_note(note);
 }
 
 /// Returns 0 if the comparison can run, else the exit code. Looks at the cases of the file.

@@ -22,7 +22,7 @@ class App;
 
 namespace marrow::cli {
 
-/// Calls of nodes by cells that a command ran, not by those that were there already.
+/// Calls of nodes in the cells that a command ran, without cells that were done before.
 struct CallCounts {
   long made = 0, cached = 0;
   void add(const compare::CellRow& row);
@@ -40,12 +40,12 @@ struct CompareRequest {
   double page_mb = 20;    ///< bytes of report.html; pictures that do not fit lie beside it
   bool dry_run = false, no_cache = false, quiet = false;
   bool gather = false;           ///< run no cell: those without a row have failed
-  std::size_t more_cases = 0;    ///< further seeds; for `compare` at most so many, for other commands exactly
+  std::size_t more_cases = 0;    ///< further seeds: the largest number for `compare`, the exact one for other commands
   std::size_t made_before = 0;   ///< rows that the same command made at earlier looks
   CallCounts calls_before;       ///< for these rows
   std::string tuned;             ///< name of the tuned variant that the experiment has; empty without one
   std::optional<Tuning> tuning;  ///< how it was found
-  std::map<std::string, compare::CellRow> failed_before;  ///< of these the failed ones, by their names; not tried again
+  std::map<std::string, compare::CellRow> failed_before;  ///< the failed ones of these rows, by name; not tried again
   FileLimits file_limits;
 };
 
@@ -60,20 +60,28 @@ int run_comparison(const CompareRequest& request, const Catalogue& catalogue, co
 using LostCells = std::map<std::size_t, std::string>;
 struct Gathered {
   int code = 0;      ///< 1 if cells are lost, 130 if it was interrupted
-  std::string lost;  ///< how many cells no task left a row of, and the first ones with their reasons; empty if none
+  std::string lost;  ///< how many cells have no row from any task, and the first ones with reasons; empty if none
 };
-/// Does the same from the rows that are there; no cell is run. With request.gather. Cells without a row are lost: they
-/// have failed, for the reason in `reasons`.
+/// Does the same from the existing rows and runs no cell; for request.gather. Cells without a row are lost: they count
+/// as failed, for the reason in `reasons`.
 Gathered gather_comparison(const CompareRequest& request, const Catalogue& catalogue,
                            const compare::Experiment& experiment, const std::filesystem::path& folder,
                            const LostCells& reasons);
 
-/// Says why a comparison was stopped, and how it goes on. Returns the exit code, 130.
+/// Says why a comparison was stopped, and how to continue it. Returns the exit code, 130.
 int stopped();
+
+/// Checks before any cell runs that the cases have the items that the experiment's figures name. A worker runs the
+/// nodes that name the items, for the first case and, if an item is missing there, for the last case. If both cases
+/// lack an item, prints the faults and returns 2. Returns 0 if the comparison can run: also if the check was not
+/// possible (a note says so), or if the first cells were done before. Returns 130 if it was interrupted. Makes
+/// simulated cases only with `makes_cases`.
+int check_items(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment,
+                const std::filesystem::path& folder, const Store* store, bool makes_cases);
 
 struct CellRows {
   std::vector<compare::CellRow> rows;
-  std::size_t made = 0;  ///< those that were not there already
+  std::size_t made = 0;  ///< rows that this call made
   CallCounts calls;      ///< for these
   compare::Dependencies dependencies;
 };
@@ -90,14 +98,14 @@ int run_more_cases(const CompareRequest& request, const Catalogue& catalogue, co
 int run_tuning(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment,
                const std::filesystem::path& folder);
 
-/// The experiment with the most cases that run_more_cases() may take. Throws Error as that does.
+/// The experiment with the largest number of cases that run_more_cases() may use. Throws the same Errors.
 compare::Experiment largest_experiment(const CompareRequest& request, const Catalogue& catalogue,
                                        const compare::Experiment& experiment);
 
 /// Cells whose pictures go into the report: all variants of at most `most` pairs of case and start, the most important
-/// pair first. In turn come one where a variant was worst in the first metric, one where it was nearest to its median,
-/// one where it has no value, and one where it was best; of those without, first one for each reason. Then the others,
-/// in their order.
+/// pair first. These take turns: a pair where a variant was worst in the first metric, one where it was nearest to its
+/// median, one where it has no value (first one for each reason), and one where it was best. The other pairs follow in
+/// their order.
 std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experiment,
                                               const std::vector<compare::CellRow>& rows, std::size_t most);
 
@@ -105,9 +113,9 @@ std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experim
 void print_plan(const compare::Experiment& experiment, const Catalogue& catalogue, const Store* store,
                 const std::filesystem::path& folder);
 
-/// What is left to do, in evaluations of nodes, and the seconds that these took in earlier runs.
+/// The work that is left, in evaluations of nodes, and the seconds that these took in earlier runs.
 struct WorkEstimate {
-  double to_make = 0, unknown = 0;  ///< `unknown`: of nodes that never ran, which the seconds leave out
+  double to_make = 0, unknown = 0;  ///< `unknown`: of nodes that never ran; the seconds do not include them
   double seconds = 0;
 };
 WorkEstimate estimate_of(const compare::Experiment& experiment, const Catalogue& catalogue, const Store* store,
@@ -116,7 +124,7 @@ WorkEstimate estimate_of(const compare::Experiment& experiment, const Catalogue&
 /// A figure of merit of one variant, over those of its runs that have it.
 struct VariantFigure {
   std::size_t count = 0, of = 0;            ///< runs that have it, and all
-  compare::Summary summary;                 ///< of no meaning if no run has it
+  compare::Summary summary;                 ///< meaningless if no run has it
   std::optional<compare::Interval> median;  ///< of metrics only: FigureOfCases::median_interval
 };
 /// What the verdicts of a variant are worth, over its completed cells that have one. Without limits under 'success', no
@@ -141,15 +149,15 @@ struct VariantSummary {
   VariantFigure seconds, evaluations;
   VerdictCounts verdicts;
 };
-/// Comparison of a variant with the baseline in one figure. There is one for each variant and metric, also where no
-/// case can be compared: how many Holm's correction counts does not depend on what came out.
+/// Comparison of a variant with the baseline in one figure. There is one for each variant and metric, also if no case
+/// can be compared: the number for Holm's correction must not depend on the results.
 struct Finding {
   std::size_t variant = 0, metric = 0;
   compare::Comparison comparison;
   double p_holm = 1;
   std::string sentence;
 };
-/// A figure at one value of a swept option, or at those in one bin.
+/// A figure at one value of a swept option, or at the values in one bin.
 struct CurvePoint {
   double value = 0;                           ///< mean of the values
   std::size_t runs = 0, of = 0;               ///< those that have the figure, and all
@@ -158,7 +166,7 @@ struct CurvePoint {
 };
 /// A figure over a swept option. All variants with the same value count, whatever their other options.
 struct Curve {
-  std::string variant;  ///< whose option is swept; empty for the pipeline as it is
+  std::string variant;  ///< whose option is swept; empty for the unchanged pipeline
   std::size_t option = 0;
   std::optional<std::size_t> metric;  ///< nothing for the success rate
   std::vector<CurvePoint> points;     ///< by rising value
@@ -191,22 +199,16 @@ struct FigureOfCases {
 FigureOfCases figure_of_cases(const RowsOfVariant& rows, std::size_t metric);
 /// A pair of values for each case and start; empty for a run without the figure.
 std::vector<compare::Pair> cell_pairs(const RowsOfVariant& baseline, const RowsOfVariant& variant, std::size_t metric);
-/// Applies the rule 'stop' of the experiment, if it has one, to its cases. The units are known.
-void add_look(const compare::Experiment& experiment, const std::vector<RowsOfVariant>& rows, Answer& answer);
 
 /// `rows` are those of all cells; failed ones have no figures. Throws Error as FigureUnits::add() does.
 Answer answer_of(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
 /// The response curves of all swept options: on a grid a point for each value, else in eight bins of the range.
 std::vector<Curve> curves_of(const compare::Experiment& experiment, const std::vector<RowsOfVariant>& rows);
 nlohmann::json curves_json(const compare::Experiment& experiment, const std::vector<Curve>& curves);
-/// Counts silent failures and false alarms.
-VerdictCounts verdict_counts(const compare::Experiment& experiment, const std::vector<const compare::CellRow*>& rows);
-/// The counts of all variants as a table for the terminal; empty if no cell has a verdict.
-std::string verdict_table(const compare::Experiment& experiment, const Answer& answer);
 
 /// The answer as a table for the terminal.
 std::string table_text(const compare::Experiment& experiment, const Answer& answer);
-/// The complete answer; docs/comparing.md lists its keys.
+/// The complete answer; docs/comparing.md lists the keys.
 nlohmann::json answer_json(const compare::Experiment& experiment, const Answer& answer);
 /// Writes cells.csv, cells.jsonl and comparison.json.
 void write_tables(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows,

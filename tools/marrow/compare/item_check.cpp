@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "compare/item_check.hpp"
-
 #include <algorithm>
 #include <cstdio>
 #include <set>
@@ -31,9 +29,7 @@ class ItemCheck {
       if (open.empty() || contains(cases_, experiment_.cases[one].name)) break;
       if (!learn(one, open)) return stopped();
       if (!why_not_.empty()) {
-        if (!request_.quiet)
-          std::fprintf(stderr, "marrow: note: whether there are the items that figures name is not checked: %s\n",
-                       printable(why_not_).c_str());
+        if (!request_.quiet) say_note("whether there are the items that figures name is not checked: " + why_not_);
         return 0;
       }
       cases_.push_back(experiment_.cases[one].name);

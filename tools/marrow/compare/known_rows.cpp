@@ -3,6 +3,8 @@
 
 #include <cstdio>
 
+#include "commands.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/remove_tree.hpp"
 
@@ -47,17 +49,15 @@ std::optional<CellRow> KnownRows::failed(const compare::CellIndex& cell) const {
 
 void KnownRows::say_doubts() const {
   if (changed_.cells)
-    std::fprintf(stderr, "marrow: note: %zu %s, so %s not count: %s%s\n", changed_.cells,
-                 changed_.cells > 1 ? "rows are not as marrow wrote them" : "row is not as marrow wrote it",
-                 changed_.cells > 1 ? "they do" : "it does", printable(changed_.first).c_str(),
-                 changed_.cells > 1 ? ", and others" : "");
+    say_note(changed_.cells == 1
+                 ? "1 row is not as marrow wrote it, so it does not count: " + changed_.first
+                 : formatted("{} rows are not as marrow wrote them, so they do not count: {}, and others",
+                             changed_.cells, changed_.first));
   if (contradicting_.cells)
-    std::fprintf(
-        stderr,
-        "marrow: note: of %zu cells there are rows whose results differ, made on several hosts or at several times, "
-        "such as %s; one that was made on a machine like this one is taken, else the first in the order of "
-        "their texts\n",
-        contradicting_.cells, printable(contradicting_.first).c_str());
+    say_note(formatted(
+        "of {} cells there are rows whose results differ, made on several hosts or at several times, such as {}; one "
+        "that was made on a machine like this one is taken, else the first in the order of their texts",
+        contradicting_.cells, contradicting_.first));
 }
 
 }  // namespace marrow::cli

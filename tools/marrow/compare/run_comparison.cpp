@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs a comparison, or continues an interrupted one, up to its report.
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
 #include <numeric>
+#include <set>
 #include <thread>
 
 #include "cluster/plan.hpp"
+#include "commands.hpp"
 #include "compare/cell_jobs.hpp"
-#include "compare/doubled_cases.hpp"
-#include "compare/first_cells.hpp"
 #include "compare/known_rows.hpp"
 #include "compare/progress.hpp"
 #include "compare/times.hpp"
@@ -31,6 +32,56 @@ using compare::CellRunner;
 using compare::Experiment;
 
 constexpr std::size_t kMostNamed = 20;  // cells with a reason
+
+/// Ends a comparison early if it names figures that do not exist. The declarations of nodes do not name all figures and
+/// items, so only the first cells show it. add() must get each row, made now or before.
+class FirstCells {
+ public:
+  explicit FirstCells(const Experiment& experiment) : experiment_(experiment) {}
+  /// Throws Error if no cell is done, and all variants lack a figure in all cases so far. There must be two such cases
+  /// if the experiment has two: a single case may be the cause.
+  void add(const CellIndex& cell, const CellRow& row) {
+    any_done_ |= row.failed.empty();
+    if (any_done_ || !row.lacks_figure) return;
+    variants_.insert(cell.variant);
+    cases_.insert(cell.case_index);
+    if (variants_.size() < experiment_.variants.size() ||
+        cases_.size() < std::min<std::size_t>(2, experiment_.cases.size()))
+      return;
+    throw Error(row.failed +
+                "; this is so in the first cells of all variants, so the others were not run; name another figure in " +
+                experiment_.file.string());
+  }
+
+ private:
+  const Experiment& experiment_;
+  bool any_done_ = false;
+  std::set<std::size_t> variants_, cases_;  ///< with a cell that lacks a figure
+};
+
+/// A sentence about cases whose folders have the same content: copies, or simulations that do not use the seed. Each
+/// counts as a separate case, so one observation would count several times. Empty if there are none. The runner must
+/// keep its dependencies and have the keys of the cells.
+std::string doubled_cases_text(const Experiment& experiment, const CellRunner& runner) {
+  std::map<std::string, std::string> first;  // case, by the digest of its content
+  std::size_t doubled = 0;
+  std::string example;
+  for (std::size_t i = 0; i < experiment.cases.size(); ++i) {
+    const fs::path place = runner.case_place(i);
+    if (place.empty()) continue;
+    const auto content = runner.dependencies().contents.find(fs::absolute(place).string());
+    if (content == runner.dependencies().contents.end()) continue;
+    const auto [known, is_new] = first.emplace(content->second, experiment.cases[i].name);
+    if (is_new) continue;
+    if (!doubled++) example = "'" + known->second + "' and '" + experiment.cases[i].name + "'";
+  }
+  if (!doubled) return "";
+  return formatted(
+      "{}{} the same content as another one, such as {}; each counts as a case of its own, so intervals are too narrow "
+      "and p too small: leave the copies out{}",
+      doubled, doubled > 1 ? " cases have" : " case has", example,
+      experiment.simulation.pipeline.empty() ? "" : ", or let the simulation take the seed (seed_input)");
+}
 
 class Comparison {
  public:
@@ -71,7 +122,7 @@ class Comparison {
     const std::vector<CellIndex> shown = cells_to_show(experiment_, rows, request_.shown);
     if (!draw(shown)) return stopped();
     if (const std::string untidy = tidy(); !untidy.empty())
-      std::fprintf(stderr, "marrow: note: the store of results is not tidied up: %s\n", untidy.c_str());
+      say_note("the store of results is not tidied up: " + untidy);
     write_report(experiment_, rows, answer, runner_, shown, request_, folder_);
     print_counts(rows);
     std::printf("\n%s", table_text(experiment_, answer).c_str());
@@ -112,8 +163,7 @@ class Comparison {
       if (!rows_[i]) jobs.push_back(cells_.job_of("cell", i, experiment_.cases[cells_.cell(i).case_index].name));
     }
     known.say_doubts();
-    if (const std::string text = doubled_cases_text(experiment_, runner_); !text.empty())
-      std::fprintf(stderr, "marrow: note: %s\n", printable(text).c_str());
+    if (const std::string text = doubled_cases_text(experiment_, runner_); !text.empty()) say_note(text);
     Progress progress(jobs.size(), request_.quiet);
     std::size_t done = 0;
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
@@ -128,7 +178,7 @@ class Comparison {
     });
   }
 
-  /// A row that was made before, here or by a task of a cluster, or one that says why there will be none.
+  /// A row that was made before, here or by a task of a cluster, or one that says why the cell cannot run.
   std::optional<CellRow> row_there_is(std::size_t number, KnownRows& known) {
     const CellIndex& cell = cells_.cell(number);
     if (const auto fault = case_faults_.find(cell.case_index); fault != case_faults_.end())

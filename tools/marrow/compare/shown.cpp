@@ -9,29 +9,29 @@ namespace marrow::cli {
 namespace {
 
 /// A case and a start.
-using Place = std::pair<std::size_t, std::size_t>;
+using CellPlace = std::pair<std::size_t, std::size_t>;
 
 /// Chooses places, each once, until there are enough.
 class Chooser {
  public:
   explicit Chooser(std::size_t most) : most_(most) {}
-  void add(const Place& place) {
+  void add(const CellPlace& place) {
     if (places_.size() < most_ && taken_.insert(place).second) places_.push_back(place);
   }
   /// The first place of each list, then the second ones, and so on.
-  void add_in_turn(const std::vector<std::vector<Place>>& lists) {
+  void add_in_turn(const std::vector<std::vector<CellPlace>>& lists) {
     std::size_t longest = 0;
     for (const auto& list : lists) longest = std::max(longest, list.size());
     for (std::size_t i = 0; i < longest; ++i)
       for (const auto& list : lists)
         if (i < list.size()) add(list[i]);
   }
-  const std::vector<Place>& places() const { return places_; }
+  const std::vector<CellPlace>& places() const { return places_; }
 
  private:
   std::size_t most_;
-  std::vector<Place> places_;
-  std::set<Place> taken_;
+  std::vector<CellPlace> places_;
+  std::set<CellPlace> taken_;
 };
 
 /// The rows without the first figure, the first one with each reason before all others.
@@ -49,7 +49,7 @@ std::vector<std::size_t> failed_rows(const std::vector<compare::CellRow>& rows) 
 std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experiment,
                                               const std::vector<compare::CellRow>& rows, std::size_t most) {
   const std::size_t variants = experiment.variants.size(), starts = experiment.starts.size();
-  const auto place_of = [&](std::size_t row) { return Place{row / variants / starts, row / variants % starts}; };
+  const auto place_of = [&](std::size_t row) { return CellPlace{row / variants / starts, row / variants % starts}; };
   std::vector<std::vector<std::size_t>> by_value(variants);  // for each variant, its rows with a value, the best first
   for (std::size_t i = 0; i < rows.size(); ++i)
     if (rows[i].values.at(0)) by_value[i % variants].push_back(i);
@@ -60,12 +60,12 @@ std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experim
     });
 
   const auto at_rank = [&](double rank) {
-    std::vector<Place> places;
+    std::vector<CellPlace> places;
     for (const auto& order : by_value)
       if (!order.empty()) places.push_back(place_of(order[std::size_t(std::lround(rank * double(order.size() - 1)))]));
     return places;
   };
-  std::vector<Place> failed;
+  std::vector<CellPlace> failed;
   for (const std::size_t row : failed_rows(rows)) failed.push_back(place_of(row));
   Chooser chooser(most);
   chooser.add_in_turn({at_rank(1), at_rank(0.5), failed, at_rank(0)});  // worst, median, failed, best

@@ -17,6 +17,7 @@
 #include "marrow/base/reason_of_exception.hpp"
 #include "marrow/base/temporary_folder.hpp"
 #include "marrow/plugin.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/process/worker.hpp"
 #include "process.hpp"
 
@@ -28,10 +29,6 @@ using nlohmann::json;
 using OptionValues = std::map<std::string, OptionValue>;
 
 constexpr double kMemory_mb = 8192;
-
-bool is_in(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
 
 /// Time limit of one check in seconds.
 int time_limit_s() {
@@ -182,9 +179,9 @@ void expect_known(const std::vector<std::string>& wanted, const Catalogue& catal
   std::vector<std::string> known;
   for (const std::string& node : nodes)
     for (const CheckInfo& check : checks_for(node, catalogue))
-      if (!is_in(known, check.name)) known.push_back(check.name);
+      if (!contains(known, check.name)) known.push_back(check.name);
   for (const std::string& name : wanted)
-    if (!is_in(known, name)) throw Error("there is no check '" + name + "'; " + suggestion(name, known));
+    if (!contains(known, name)) throw Error("there is no check '" + name + "'; " + suggestion(name, known));
 }
 
 /// Runs the wanted checks of a node, or all if none are named, and counts their verdicts.
@@ -192,7 +189,7 @@ void check_node(const std::string& node, const std::vector<CheckInfo>& all, cons
                 Checks& checks, std::map<char, int>& count) {
   std::printf("%s\n", node.c_str());
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if (!wanted.empty() && !is_in(wanted, all[i].name)) continue;
+    if (!wanted.empty() && !contains(wanted, all[i].name)) continue;
     const Outcome outcome = checks.run(i);
     ++count[outcome.verdict];
     std::printf("  %s %-26s %s\n",

@@ -7,15 +7,12 @@
 #include "difference/findings.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow::cli {
 namespace {
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return printable(text);
-}
+std::string listed(const std::vector<std::string>& names) { return printable(joined(names, ", ")); }
 
 void print_fate(const char* which, const RecordedNode& node) {
   if (node.went_well())
@@ -58,7 +55,7 @@ void print_consequences(const Findings& findings) {
       group->second.push_back(id);
   }
   for (const auto& [fate, names] : groups)
-    if (!names.empty()) std::printf("In consequence %s: %s\n", fate.c_str(), joined(names).c_str());
+    if (!names.empty()) std::printf("In consequence %s: %s\n", fate.c_str(), listed(names).c_str());
 }
 
 /// Whether all items of an output are missing in one of the runs. The nodes of that run say why.
@@ -113,8 +110,8 @@ void print_only(const std::vector<std::string>& names, const char* which, const 
                 const char* other_one) {
   std::vector<std::string> missing, not_needed;
   for (const std::string& name : names) (other.not_needed.contains(name) ? not_needed : missing).push_back(name);
-  if (!missing.empty()) std::printf("Only in the %s run: %s\n", which, joined(missing).c_str());
-  if (!not_needed.empty()) std::printf("Not needed in the %s run: %s\n", other_one, joined(not_needed).c_str());
+  if (!missing.empty()) std::printf("Only in the %s run: %s\n", which, listed(missing).c_str());
+  if (!not_needed.empty()) std::printf("Not needed in the %s run: %s\n", other_one, listed(not_needed).c_str());
 }
 
 void print_other_changes(const Findings& findings) {
@@ -134,7 +131,7 @@ void print_other_changes(const Findings& findings) {
   std::vector<std::string> texts;
   for (const Change& change : difference.rebuilt) texts.push_back(is_all ? change.name : change.text);
   std::printf("Of another build: %s%s\n", is_all ? "marrow's own library, and with it the build ids of " : "",
-              joined(texts).c_str());
+              listed(texts).c_str());
 }
 
 void print_differing_results(const Findings& findings, std::set<std::pair<std::string, std::string>>& shown) {
@@ -152,10 +149,10 @@ void print_differing_results(const Findings& findings, std::set<std::pair<std::s
   std::printf("\n");
   if (!differing.empty()) std::printf("Outputs that differ\n");
   print_outputs(differing, shown);
-  if (!only_before.empty()) std::printf("Outputs that only the first run has: %s\n", joined(only_before).c_str());
-  if (!only_now.empty()) std::printf("Outputs that only the second run has: %s\n", joined(only_now).c_str());
-  if (!neither.empty()) std::printf("Outputs that neither run has: %s\n", joined(neither).c_str());
-  if (!same.empty()) std::printf("Outputs that are the same: %s\n", joined(same).c_str());
+  if (!only_before.empty()) std::printf("Outputs that only the first run has: %s\n", listed(only_before).c_str());
+  if (!only_now.empty()) std::printf("Outputs that only the second run has: %s\n", listed(only_now).c_str());
+  if (!neither.empty()) std::printf("Outputs that neither run has: %s\n", listed(neither).c_str());
+  if (!same.empty()) std::printf("Outputs that are the same: %s\n", listed(same).c_str());
 }
 
 bool has_unknown_amount(const std::vector<OutputDifference>& outputs) {

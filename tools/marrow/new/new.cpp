@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
+// `marrow new`: nodes and kinds are made by node_project.cpp, pipelines, experiments and cases here.
+#include <algorithm>
 #include <cstdio>
 
 #include "command_options.hpp"
 #include "commands.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/names.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/base/text_file.hpp"
 #include "projects.hpp"
 #include "report/report.hpp"
+#include "templates.hpp"
 
 namespace fs = std::filesystem;
 
@@ -18,7 +24,7 @@ struct NewRequest {
   bool in_python = false;
 };
 
-/// What was made, and what to do next. {} stands for its place, as a word of a shell.
+/// What was made, and the next step. {} is replaced by its place, as a word of a shell.
 struct Made {
   fs::path place;
   std::string next;
@@ -52,6 +58,37 @@ NewCommand add_what(CLI::App* command, const std::string& what, const std::strin
   return made;
 }
 
+/// A file that is there, or one of marrow's own in `folder`, with or without .yaml.
+fs::path file_named(const std::string& from, const fs::path& folder) {
+  if (fs::is_regular_file(from)) return from;
+  std::vector<std::string> known;
+  for (const fs::directory_entry& entry : fs::directory_iterator(shared_files(folder))) {
+    const fs::path& path = entry.path();
+    if (path.extension() != ".yaml") continue;
+    if (path.filename() == from || path.stem() == from) return path;
+    known.push_back(path.stem().string());
+  }
+  std::sort(known.begin(), known.end());
+  throw Error("--from '" + printable(from) + "': neither a file here nor one of marrow's own; " +
+              suggestion(from, known));
+}
+
+fs::path copy(const std::string& name, const fs::path& from, const fs::path& file) {
+  expect_name(name, "the name");
+  const fs::path target = file.empty() ? fs::path(name + ".yaml") : file;
+  expect_free(target);
+  const fs::path folder = fs::absolute(target).parent_path();
+  if (!fs::is_directory(folder)) throw Error(printable(folder.string()) + ": there is no such folder; make it first");
+  write_text_file(target, moved_text(from, folder));
+  return target;
+}
+
+fs::path new_case(const std::string& name, const fs::path& folder) {
+  if (name.empty() || name.find('/') != std::string::npos)
+    throw Error("new case '" + printable(name) + "': expected the name of a folder; its place is given with --out");
+  return write_project(folder, name, filled_templates(shared_files("templates/case"), {}));
+}
+
 Made make_node(const NewRequest& r) {
   if (r.in_python) return {new_python_node(r.name, r.out), "{}/ci tests it, and compares it with marrow's own"};
   return {new_node(r.name, r.out), "{}/ci builds it, tests it, and compares it with marrow's own"};
@@ -59,9 +96,11 @@ Made make_node(const NewRequest& r) {
 Made make_kind(const NewRequest& r) {
   return {new_kind(r.name, r.out), "{}/ci builds it, tests it, and compares variants"};
 }
-Made make_pipeline(const NewRequest& r) { return {new_pipeline(r.name, r.from, r.out), "marrow check {}"}; }
+Made make_pipeline(const NewRequest& r) {
+  return {copy(r.name, file_named(r.from, "pipelines"), r.out), "marrow check {}"};
+}
 Made make_experiment(const NewRequest& r) {
-  return {new_experiment(r.name, r.from, r.out), "marrow compare {} --dry-run"};
+  return {copy(r.name, file_named(r.from, "pipelines/experiments"), r.out), "marrow compare {} --dry-run"};
 }
 Made make_case(const NewRequest& r) {
   return {new_case(r.name, r.out), "put the CT and the images there, and correct {}/case.yaml"};

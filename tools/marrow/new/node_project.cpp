@@ -6,6 +6,7 @@
 #include "marrow/base/names.hpp"
 #include "marrow/base/text_file.hpp"
 #include "marrow/base/yaml.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/plugins/catalogue.hpp"
 #include "projects.hpp"
 #include "templates.hpp"
@@ -36,14 +37,12 @@ std::vector<std::string> kinds_with_templates() {
 
 void expect_template(const std::string& kind, const Catalogue& catalogue) {
   const std::vector<std::string> kinds = kinds_with_templates();
-  if (std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) return;
-  std::string list;
-  for (const std::string& one : kinds) list += (list.empty() ? "" : ", ") + one;
+  if (contains(kinds, kind)) return;
   const std::vector<std::string> known = catalogue.kind_names();
-  if (std::find(known.begin(), known.end(), kind) == known.end())
+  if (!contains(known, kind))
     throw Error("no library brings the kind '" + kind + "'; make it by: marrow new kind " + kind + "; or " +
                 suggestion(kind, known));
-  throw Error("the kind '" + kind + "' has no template; there are templates of " + list +
+  throw Error("the kind '" + kind + "' has no template; there are templates of " + joined(kinds, ", ") +
               ". Copy a node of this kind, or the example-plugin of the documentation");
 }
 
@@ -65,7 +64,7 @@ std::string node_at(const std::string& pipeline, const std::string& place) {
   return pipeline.substr(begin, pipeline.find_first_of(",}\n", begin) - begin);
 }
 
-/// A node that is to be made: its names, and what it replaces in the pipeline.
+/// A node to be made: its names, and the node that it replaces in the pipeline.
 struct NewNode {
   std::string name, kind, own, file, origin, place, before, link;
   fs::path from;  ///< the templates of its kind
@@ -128,8 +127,7 @@ fs::path new_python_node(const std::string& name, const fs::path& folder) {
 
 fs::path new_kind(const std::string& name, const fs::path& folder) {
   expect_name(name, "new kind:");
-  const std::vector<std::string> known = Catalogue().kind_names();
-  if (std::find(known.begin(), known.end(), name) != known.end())
+  if (contains(Catalogue().kind_names(), name))
     throw Error("a kind '" + name + "' exists already; a node of it: marrow new node " + name + ".mine");
   Files files = filled_templates(shared_files("templates/kind"),
                                  {{"@kind@", name}, {"new_kind", name}, {"NewKind", capitalised(name)}});

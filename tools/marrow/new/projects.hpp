@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What `marrow new` makes. Each function throws Error if the request cannot be met; then nothing is written.
+// New nodes and kinds. Each function throws Error if the request cannot be met; then nothing is written.
 #include <filesystem>
 #include <string>
 
@@ -12,11 +12,5 @@ std::filesystem::path new_node(const std::string& name, const std::filesystem::p
 std::filesystem::path new_python_node(const std::string& name, const std::filesystem::path& folder);
 /// Makes a folder with a kind, its checks and two nodes, as docs/example-kind has them.
 std::filesystem::path new_kind(const std::string& name, const std::filesystem::path& folder);
-/// Makes a copy of a pipeline or an experiment, of marrow's own by its name or of any file, that works where it is put.
-std::filesystem::path new_pipeline(const std::string& name, const std::string& from, const std::filesystem::path& file);
-std::filesystem::path new_experiment(const std::string& name, const std::string& from,
-                                     const std::filesystem::path& file);
-/// Makes the folder of a case, to which CT and images must be added.
-std::filesystem::path new_case(const std::string& name, const std::filesystem::path& folder);
 
 }  // namespace marrow::cli
