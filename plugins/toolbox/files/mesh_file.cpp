@@ -8,7 +8,7 @@
 namespace marrow::files {
 namespace {
 
-constexpr std::uint64_t kLargestFile = std::uint64_t(4) << 30;
+constexpr std::uint64_t kLargestMeshFile = std::uint64_t(4) << 30;
 
 }  // namespace
 
@@ -28,7 +28,7 @@ MarkedMesh read_marked_mesh(const std::filesystem::path& path) {
   const std::string extension = extension_of(path);
   if (extension != ".stl" && extension != ".ply")
     throw Error(what + ": not a surface that can be read; known are .stl and .ply");
-  std::string bytes = read_bytes(path, kLargestFile);
+  std::string bytes = read_bytes(path, kLargestMeshFile);
   return extension == ".stl" ? read_stl(std::move(bytes), what) : read_ply(std::move(bytes), what);
 }
 

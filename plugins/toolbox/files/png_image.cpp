@@ -14,7 +14,7 @@
 namespace marrow::files {
 namespace {
 
-constexpr std::uint64_t kLargestFile = 1 << 30;
+constexpr std::uint64_t kLargestPng = 1 << 30;
 
 struct Source {
   std::string bytes;
@@ -90,7 +90,7 @@ void check_orientation(const std::string& what, std::string_view bytes) {
 Samples read_png(const std::filesystem::path& path) {
   const std::string what = path.string();
   Source source;
-  source.bytes = read_bytes(path, kLargestFile);
+  source.bytes = read_bytes(path, kLargestPng);
   if (source.bytes.size() < 8 || png_sig_cmp(reinterpret_cast<png_const_bytep>(source.bytes.data()), 0, 8))
     throw Error(what + ": is not a PNG file, or is damaged at its start");
   check_orientation(what, source.bytes);
