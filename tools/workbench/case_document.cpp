@@ -30,15 +30,15 @@ json json_of_scalar(const YAML::Node& node) {
   return node.Scalar();
 }
 
-json json_of(const YAML::Node& node) {
+json json_of_yaml(const YAML::Node& node) {
   if (node.IsSequence()) {
     json list = json::array();
-    for (const YAML::Node& item : node) list.push_back(json_of(item));
+    for (const YAML::Node& item : node) list.push_back(json_of_yaml(item));
     return list;
   }
   if (node.IsMap()) {
     json map = json::object();
-    for (const auto& entry : node) map[entry.first.Scalar()] = json_of(entry.second);
+    for (const auto& entry : node) map[entry.first.Scalar()] = json_of_yaml(entry.second);
     return map;
   }
   return node.IsScalar() ? json_of_scalar(node) : json();
@@ -82,7 +82,7 @@ json document_of_case(const OpenedFolder& folder, const std::string& case_path) 
   json document{{"ct", nullptr}, {"views", json::array()}, {"fragments", json::object()}};
   if (fs::exists(file)) {
     try {
-      document = json_of(YAML::Load(plain_text(read_text_file(file, kMostSourceBytes))));
+      document = json_of_yaml(YAML::Load(plain_text(read_text_file(file, kMostSourceBytes))));
       adapt(document, case_path.empty() ? "" : case_path + "/");
     } catch (const std::exception& error) {
       throw Error(printable(file.string()) + ": this case cannot be read here: " + printable(error.what()) +

@@ -66,7 +66,7 @@ json deviations_of(const Pose& pose) {
   return deviations;
 }
 
-json json_of(const Verdict& verdict) {
+json json_of_verdict(const Verdict& verdict) {
   return {
       {"judgement", name_of(verdict.judgement)},
       {"failure_probability", std::isfinite(verdict.failure_probability) ? json(verdict.failure_probability) : json()},
@@ -186,13 +186,12 @@ json run_from_starts(const Workbench& workbench, const fs::path& pipeline, const
     for (std::size_t i = 0; i < value.items.size(); ++i) {
       if (!value.items[i].data) continue;  // a node may fail for one of the bones
       if (value.type == TypeInfo::of<Verdict>()) {
-        result["verdicts"][value.names[i]] = json_of(value.items[i].as<Verdict>());
+        result["verdicts"][value.names[i]] = json_of_verdict(value.items[i].as<Verdict>());
         continue;
       }
       const Pose& pose = value.items[i].as<Pose>();
-      result["poses"][value.names[i]] = {{"matrix", workbench::json_of(pose.world_from_model)},
-                                         {"deviations", deviations_of(pose)},
-                                         {"warnings", pose.warnings}};
+      result["poses"][value.names[i]] = {
+          {"matrix", json_of(pose.world_from_model)}, {"deviations", deviations_of(pose)}, {"warnings", pose.warnings}};
     }
   return result;
 }
