@@ -49,10 +49,7 @@ def calls(s):
         }
     )
     made.update(
-        {
-            "similarity.%s" % name: lambda: (views_and(projector=s.drr, **others(False)), {})
-            for name in GREY_VALUES
-        }
+        {"similarity.%s" % name: lambda: (views_and(projector=s.drr, **others(False)), {}) for name in GREY_VALUES}
     )
 
     def segment(**more):

@@ -180,8 +180,7 @@ TEST_F(ExperimentLimits, TheFileItself) {
   };
   EXPECT_NE(fault(scratch.path).find("error: the experiment file is a folder, not a regular file"), std::string::npos)
       << diagnostics.text();
-  EXPECT_NE(fault("/dev/zero").find("error: the experiment file is a device, not a regular file"),
-            std::string::npos)
+  EXPECT_NE(fault("/dev/zero").find("error: the experiment file is a device, not a regular file"), std::string::npos)
       << diagnostics.text();
   const std::string named = scratch.write("...yaml", kGood).string();
   EXPECT_NE(fault(named).find("the experiment is named after its file, which becomes a folder's name: '..' cannot be "
