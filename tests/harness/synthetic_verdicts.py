@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Verdicts for the made-up runs and comparisons of synthetic.py."""
-from harness.synthetic import wilson
+from harness.synthetic_figures import wilson
 
 VERDICTS = {
     "trusted": (0.003, ["the grey values and the contour lead to the same pose"], []),

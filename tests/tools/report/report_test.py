@@ -13,6 +13,7 @@ import time
 
 from harness import browser
 from harness import synthetic
+from harness import synthetic_figures
 from harness import synthetic_verdicts
 from harness.modules import modules
 from harness.page import SECTIONS, PageTest, page_of, run_tests
@@ -61,7 +62,7 @@ class ReportTest(PageTest):
                 float(value.removeprefix("at least ").removesuffix("\u00a0mm")), item["capture"]["range"], delta=0.05
             )
         ours = self.browser.js(scripts + "return Data.wilson(7, 20)")
-        for key, value in synthetic.wilson(7, 20).items():
+        for key, value in synthetic_figures.wilson(7, 20).items():
             self.assertAlmostEqual(ours[key], value, 9)
 
     def test_wipe_moves_with_mouse_and_keys(self):

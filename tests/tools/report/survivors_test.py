@@ -8,7 +8,7 @@ of how many runs each number is, in which unit, and no number for what is not kn
 import copy
 import sys
 
-from harness import synthetic
+from harness import synthetic_figures
 from harness.modules import modules
 from harness.page import PageTest, run_tests
 
@@ -108,10 +108,10 @@ class SurvivorsTest(PageTest):
 
     def test_one_of_many_is_not_0_percent(self):
         def change(data):
-            data["summary"][0]["success"] = synthetic.wilson(1, 301)
-            data["summary"][1]["success"] = synthetic.wilson(2999, 3000)
-            data["summary"][2]["success"] = synthetic.wilson(0, 301)
-            data["summary"][3]["success"] = synthetic.wilson(60, 60)
+            data["summary"][0]["success"] = synthetic_figures.wilson(1, 301)
+            data["summary"][1]["success"] = synthetic_figures.wilson(2999, 3000)
+            data["summary"][2]["success"] = synthetic_figures.wilson(0, 301)
+            data["summary"][3]["success"] = synthetic_figures.wilson(60, 60)
 
         self.page(change)
         for number, text in enumerate(("0.3 % 1/301", "99.97 % 2999/3000", " 0 % 0/301", "100 % 60/60")):
