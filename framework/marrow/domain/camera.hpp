@@ -47,13 +47,13 @@ Plane back_project_line(const Camera& camera, const Eigen::Vector3d& line);
 /// inverse of the projection's derivative. It holds for pixels of any shape.
 Eigen::Vector2d offset_at_mm(const Camera& camera, const Eigen::Vector3d& world_mm, const Eigen::Vector2d& offset_px);
 
-/// Size of a pixel at a world point, in mm: the square root of its area there, parallel to the detector. Only for what
-/// is the same in all directions, such as a blur; a distance in the image is turned into mm by offset_at_mm().
+/// Size of a pixel at a world point, in mm: the square root of its area there, parallel to the detector. Use it only
+/// for lengths without a direction, such as a blur. offset_at_mm() converts an offset in the image.
 double pixel_size_at_mm(const Camera& camera, const Eigen::Vector3d& world_mm);
 
-/// Throws Error if the image size is not positive or a side has more than 65536 pixels, if the camera matrix does not
-/// have the form given at Camera or its focal lengths are not positive, and as check_rigid() does. `what` names the
-/// camera in the message.
+/// Throws Error if the image size is not positive, if a side has more than 65536 pixels, if the camera matrix does not
+/// have the form given at Camera, or if a focal length is not positive. Throws as check_rigid() does, too. `what` names
+/// the camera in the message.
 void check_camera(const Camera& camera, const std::string& what);
 
 /// One X-ray view: an image and its camera. `mask` is CV_8U and non-zero where the image may be used; empty means
@@ -66,8 +66,8 @@ struct View {
   using fields = Fields<&View::name, &View::image, &View::camera, &View::mask>;
 };
 
-/// Throws Error if the image is empty, if the sizes of image, camera and mask differ, and as check_camera() does. The
-/// message names the view and both sizes.
+/// Throws Error if the image is empty or if the sizes of image, camera and mask differ. The message names the view and
+/// both sizes. Throws as check_camera() does, too.
 void check_view(const View& view);
 
 }  // namespace marrow

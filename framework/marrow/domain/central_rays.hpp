@@ -8,9 +8,10 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// The point nearest to the central rays of all views, at which they are aimed. A central ray is its camera's z axis;
-/// cutting an image does not change it. Nothing for a single view, for rays within about 2.6 degrees of each other, and
-/// if the point does not lie in front of every source: then the cameras do not tell how far away the bone is.
+/// The point at which all views are aimed: it has the least sum of squared distances to their central rays. A central
+/// ray is a camera's z axis, so cropping an image does not change it. Returns nothing for a single view, for rays
+/// within about 2.6 degrees of each other, and if the point is not in front of every source. In these cases the cameras
+/// do not tell how far away the bone is.
 std::optional<Eigen::Vector3d> meeting_point_mm(const List<View>& views);
 
 }  // namespace marrow

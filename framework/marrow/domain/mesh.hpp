@@ -44,8 +44,8 @@ std::vector<Eigen::Vector3d> sample_surface(const Mesh& mesh, std::size_t count)
 struct FragmentFrame {
   Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
-  /// Whether it is as described above. If not, it is any other origin and axes, such as those of the CT, about which
-  /// nobody may say "the long axis" or "shortening".
+  /// Whether origin and axes are the ones described above. Otherwise they are others, such as those of the CT, and no
+  /// text may call one of them "the long axis" or a shift "shortening".
   bool is_anatomical = false;
   using fields = Fields<&FragmentFrame::origin_mm, &FragmentFrame::axes, &FragmentFrame::is_anatomical>;
 };

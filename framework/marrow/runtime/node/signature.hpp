@@ -101,7 +101,7 @@ struct Returned {
   }
   using Item = typename decltype(item())::type;
 
-  /// The value of a member of type M of what a node returned. The value keeps that alive.
+  /// The value of a member of type M in the object that a node returned. The value keeps the object alive.
   static Value value(const TypeInfo& type, const std::shared_ptr<const void>& member, std::string_view axis) {
     const M& returned = *static_cast<const M*>(member.get());
     if constexpr (kList) {
