@@ -27,6 +27,13 @@ void check_mesh(const Mesh& mesh, const std::string& what);
 /// True if each edge is shared by exactly two triangles that run along it in opposite directions.
 bool is_closed(const Mesh& mesh);
 
+/// True if a mesh is closed and the triangles around each vertex form a single fan. Then no two parts of the surface
+/// touch in a single point.
+bool is_manifold(const Mesh& mesh);
+
+/// Throws Error unless check_mesh() accepts the mesh, it is closed and its normals point outward.
+void check_closed_surface(const Mesh& mesh, const std::string& what);
+
 /// Volume enclosed by a closed surface (divergence theorem). It is positive if normals point outward.
 double enclosed_volume_mm3(const Mesh& mesh);
 double surface_area_mm2(const Mesh& mesh);
