@@ -54,6 +54,13 @@ def another_run_makes_all(store):
 
 
 class Case(unittest.TestCase):
+    @classmethod
+    def shared_folder(cls):
+        """A folder that all tests of this class share; it is deleted after them."""
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="marrow-shared-"))
+        cls.addClassCleanup(shutil.rmtree, folder, ignore_errors=True)
+        return folder
+
     def setUp(self):
         self.scratch = pathlib.Path(tempfile.mkdtemp(prefix="marrow-cli-"))
 

@@ -53,7 +53,7 @@ class Page(Case):
         noise = random.Random(7)
         for case in "abcd":
             (self.scratch / "cases" / case).mkdir(parents=True)
-            url = shapes.png(200, 200, bytes(noise.randrange(256) for _ in range(40000)), 1)
+            url = shapes.picture(200, 200, bytes(noise.randrange(256) for _ in range(40000)), 1)
             (self.scratch / "cases" / case / "picture.png").write_bytes(base64.b64decode(url.split(",")[1]))
         self.write("p.yaml", PICTURES)
         self.write("e.yaml", EXPERIMENT % ("{folders: [cases/*], input: case}", "picture", "{x: {}, y: {m.value: 2}}"))

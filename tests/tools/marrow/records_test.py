@@ -6,8 +6,8 @@ import os
 import shutil
 import subprocess
 
-from harness.cases import png
 from harness import MARROW
+from harness.formats import grey_png
 from harness.program import main
 from number_cases import NUMBER, Commands
 
@@ -147,11 +147,11 @@ class Records(Commands):
 
     def test_a_page_shows_nothing_from_outside_the_run(self):
         secret = json.dumps({"metrics": [{"name": "secret figure", "value": 1, "unit": ""}]})
-        (self.scratch / "a" / "outputs" / "inside.png").write_bytes(png(4, 4, lambda u, v: 0))
+        (self.scratch / "a" / "outputs" / "inside.png").write_bytes(grey_png(4, 4, lambda u, v: 0))
         self.expect(0, "show", "a")
         self.assertEqual(self.shown()["pictures"], {})
         self.write("secret.json", secret)
-        (self.scratch / "secret.png").write_bytes(png(4, 4, lambda u, v: 1000 * u))
+        (self.scratch / "secret.png").write_bytes(grey_png(4, 4, lambda u, v: 1000 * u))
         (self.scratch / "a" / "outputs" / "link.png").symlink_to(self.scratch / "secret.png")
         (self.scratch / "a" / "outputs" / "link").symlink_to(self.scratch)
         outside = [
