@@ -25,7 +25,7 @@ bool is_blank_but_no_space(char32_t code) {
   return is_in_one_of(kBlanks, code);
 }
 
-/// The marks into which the form NFD takes letters apart: of alphabets, of kana, and the parts of Hangul.
+/// Marks that the form NFD writes apart from their letters: of alphabets, kana and Hangul.
 bool is_mark_of_a_letter(char32_t code) {
   static constexpr CodeRange kMarks[] = {{0x0300, 0x036F}, {0x0483, 0x0489}, {0x1161, 0x11FF}, {0x1AB0, 0x1AFF},
                                          {0x1DC0, 0x1DFF}, {0x20D0, 0x20FF}, {0x3099, 0x309A}, {0xFE20, 0xFE2F}};

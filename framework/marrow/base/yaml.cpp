@@ -21,9 +21,9 @@ constexpr std::size_t kMostRepeated = 100'000;  // values that aliases may repea
 
 [[noreturn]] void refuse(const YAML::Mark& mark, const std::string& why) { throw YAML::Exception(mark, why); }
 
-/// Counts values and levels of nesting as if every alias were written out. It runs before a tree is built.
-/// It also refuses what YAML would take away from a text without a word: a tag ("! b", "!!str 5"), and the name of an
-/// anchor ("&a b") that no alias names.
+/// Counts values and levels of nesting as if every alias were written out. It runs before a tree is built. It also
+/// refuses what YAML would silently remove from a text: a tag ("! b", "!!str 5"), and an anchor ("&a b") that no alias
+/// names.
 class Survey : public YAML::EventHandler {
  public:
   Survey(const std::string& text, const YamlLimits& limits) : text_(text), limits_(limits) {}

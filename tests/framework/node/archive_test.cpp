@@ -59,7 +59,7 @@ TEST(Archive, ATruthValueIsZeroOrOne) {
 }
 
 TEST(Archive, AChoiceIsOneThatThereIs) {
-  EXPECT_EQ(fault_of<Side>(std::string(1, '\2')), "the packed value holds a choice that there is not");
+  EXPECT_EQ(fault_of<Side>(std::string(1, '\2')), "the packed value holds an unknown choice");
   EXPECT_EQ(fault_of<Side>(std::string(1, '\1')), "");
 }
 

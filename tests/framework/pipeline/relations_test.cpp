@@ -220,12 +220,13 @@ TEST(RelationDeclaration, UnknownName) {
             "relation not_above: there is no option 'lo'; did you mean 'low'?\n");
 }
 TEST(RelationDeclaration, TextsAreInNoOrder) {
-  EXPECT_EQ(faults_of(marrow::not_above("name", "high")), "relation not_above: option 'name' is no number\n");
-  EXPECT_EQ(faults_of(marrow::below("low", "name")), "relation below: option 'name' is no number\n");
+  EXPECT_EQ(faults_of(marrow::not_above("name", "high")), "relation not_above: option 'name' is not a number\n");
+  EXPECT_EQ(faults_of(marrow::below("low", "name")), "relation below: option 'name' is not a number\n");
 }
 TEST(RelationDeclaration, NumbersHaveNoLength) {
-  EXPECT_EQ(faults_of(marrow::same_length({"low", "list"})), "relation same_length: option 'low' is no list\n");
-  EXPECT_EQ(faults_of(marrow::as_many_or_none("list", "high")), "relation as_many_or_none: option 'high' is no list\n");
+  EXPECT_EQ(faults_of(marrow::same_length({"low", "list"})), "relation same_length: option 'low' is not a list\n");
+  EXPECT_EQ(faults_of(marrow::as_many_or_none("list", "high")),
+            "relation as_many_or_none: option 'high' is not a list\n");
 }
 TEST(RelationDeclaration, OneNameAlone) {
   EXPECT_EQ(faults_of(marrow::exactly_one({"name"})), "relation exactly_one: it needs two names or more\n");
@@ -234,7 +235,7 @@ TEST(RelationDeclaration, OneNameAlone) {
 TEST(RelationDeclaration, TooFewOrTooManyNames) {
   EXPECT_EQ(faults_of(marrow::at_least_one({})), "relation at_least_one: it needs a name\n");
   EXPECT_EQ(faults_of({marrow::RelationType::distinct, {"list", "list"}}), "relation distinct: it needs one name\n");
-  EXPECT_EQ(faults_of(marrow::distinct("name")), "relation distinct: option 'name' is no list\n");
+  EXPECT_EQ(faults_of(marrow::distinct("name")), "relation distinct: option 'name' is not a list\n");
   EXPECT_EQ(faults_of(marrow::at_least_one({"low"})),
             "relation at_least_one: option 'low' is never empty, so it is always given\n");
 }

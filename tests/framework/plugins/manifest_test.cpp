@@ -218,7 +218,7 @@ TEST(Manifest, RelationsAreThoseOfADeclaration) {
   expect_refused(names({"integer", "nothing"}), "relation not_above: there is no option 'nothing'");
   expect_refused(names({"integer"}), "relation not_above: it needs two names");
   expect_refused(names({"integer", "number", "number"}), "relation not_above: it needs two names");
-  expect_refused(names({"integer", "text"}), "relation not_above: option 'text' is no number");
+  expect_refused(names({"integer", "text"}), "relation not_above: option 'text' is not a number");
   expect_refused([](json& j) { j["nodes"][0]["relations"][0]["type"] = "like"; }, "there is no relation 'like'");
 }
 TEST(Manifest, HasAllFieldsAndNoOthers) {
@@ -253,7 +253,7 @@ TEST(Manifest, DifferencesAreNamed) {
   expect([](auto& i) { i.kinds[0].checks[0].limit = 9; },
          "kinds/test/checks/bias/limit: the library has 0.25, its description has 9.0");
   expect([](auto& i) { i.writers.push_back(i.writers[0]); },
-         "the order or number of its kinds, nodes and writers is another in its description");
+         "its description has another order or number of kinds, nodes and writers");
 }
 
 /// All values of a document.

@@ -10,7 +10,6 @@
 
 #include "marrow/base/diagnostics.hpp"
 #include "marrow/plugin.hpp"
-#include "marrow/runtime/node/declaration.hpp"
 #include "marrow/runtime/node/node_json.hpp"
 
 namespace marrow::detail {
@@ -126,9 +125,9 @@ std::string fault_in_relation(const NodeInfo& node, RelationType type, const std
   const bool is_number = is == OptionType::number || is == OptionType::integer;
   const bool is_list = is == OptionType::numbers || is == OptionType::texts || is == OptionType::paths;
   if ((type == RelationType::not_above || type == RelationType::below) && !is_number)
-    return "option '" + name + "' is no number";
+    return "option '" + name + "' is not a number";
   if (!is_about_given && type != RelationType::not_above && type != RelationType::below && !is_list)
-    return "option '" + name + "' is no list";
+    return "option '" + name + "' is not a list";
   if (is_about_given && (is_number || is == OptionType::boolean))
     return "option '" + name + "' is never empty, so it is always given";
   return "";

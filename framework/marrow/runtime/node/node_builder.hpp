@@ -29,6 +29,10 @@ struct ReturnedPart {
   std::string axis = {};
 };
 
+/// Checks the declaration itself: names are well formed, texts are given, defaults are within their range, relations
+/// fit. Adds what is wrong to `faults`. It does not check the contract of the kind.
+void check_declaration(NodeDefinition& node);
+
 /// The part of a NodeBuilder that does not depend on the function's type.
 class NodeDeclaration {
  public:
@@ -40,8 +44,7 @@ class NodeDeclaration {
   NodeDeclaration(NodeDefinition& node, Function function, Call call, std::shared_ptr<void> (*make_options)());
   NodeDeclaration(const NodeDeclaration&) = delete;
   NodeDeclaration& operator=(const NodeDeclaration&) = delete;
-  /// Checks the declaration itself (names are well formed, texts are given, defaults are within their range, relations
-  /// fit) and fills `faults`. It does not check the contract of the kind.
+  /// Checks the declaration.
   ~NodeDeclaration();
 
   NodeInfo& info() { return node_.info; }

@@ -18,13 +18,10 @@
 #include "marrow/base/regular_file.hpp"
 #include "marrow/base/thread_state.hpp"
 #include "marrow/plugin.hpp"
-#include "marrow/runtime/plugins/describe.hpp"
 #include "marrow/runtime/plugins/descriptions.hpp"
-#include "marrow/runtime/plugins/libraries_to_load.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
 #include "marrow/runtime/plugins/manifest.hpp"
 #include "marrow/runtime/plugins/python_file.hpp"
-#include "marrow/runtime/plugins/run_paths.hpp"
 #include "marrow/runtime/plugins/trust.hpp"
 #include "marrow/runtime/process/worker.hpp"
 

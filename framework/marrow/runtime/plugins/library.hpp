@@ -2,6 +2,7 @@
 #pragma once
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -13,20 +14,23 @@
 namespace MARROW_EXPORT marrow {
 
 class Plugin;
+class WorkerReports;
 
 /// A library that a plugin links, as it was when the plugin was described.
 struct LinkedLibrary {
   std::string path;
   std::uint64_t size = 0;
+  using fields = Fields<&LinkedLibrary::path, &LinkedLibrary::size>;
 };
 
 /// A folder in which a plugin's libraries or modules were looked for before they were found elsewhere, or not at all. A
 /// file that appears there may be loaded instead.
 struct SearchedFolder {
   std::string path;
-  /// Of what was looked for: the whole name of a file, or its name up to the first point. "*.pth" stands for all files
+  /// The names that were looked for: a file's full name, or its name up to the first dot. "*.pth" stands for all files
   /// with this ending.
   std::vector<std::string> names;
+  using fields = Fields<&SearchedFolder::path, &SearchedFolder::names>;
 };
 
 /// What is known about a plugin library without loading it: the content of its manifest, or why it is refused.
@@ -41,6 +45,9 @@ struct LibraryInfo {
   std::vector<KindInfo> kinds;
   std::vector<NodeInfo> nodes;
   std::vector<WriterInfo> writers;
+  using fields = Fields<&LibraryInfo::file, &LibraryInfo::refused, &LibraryInfo::note, &LibraryInfo::digest,
+                        &LibraryInfo::build_id, &LibraryInfo::linked, &LibraryInfo::searched, &LibraryInfo::kinds,
+                        &LibraryInfo::nodes, &LibraryInfo::writers>;
 };
 
 /// Loads a plugin library into this process and registers its kinds and nodes. It is never unloaded. Throws Error with
@@ -52,6 +59,8 @@ std::unique_ptr<Plugin> load_library(const LibraryInfo& described);
 /// or hangs does no harm. A library is refused without being loaded if somebody other than the user, root and the owner
 /// of marrow could have put it there, unless MARROW_TRUST_ALL_PLUGINS is 1.
 LibraryInfo describe_library(const std::filesystem::path& file);
+/// The child process's side: the answer to {"do": "describe", "library": ...}.
+nlohmann::json answer_describe(const nlohmann::json& request, WorkerReports& reports);
 
 /// The description of a library. It comes from the manifest next to the library, if that is whole, trusted and belongs
 /// to this very file; else from the user's cache of descriptions; else from describe_library(). `framework` is the

@@ -10,7 +10,7 @@
 #include "marrow/base/file_state.hpp"
 #include "marrow/base/framework_file.hpp"
 #include "marrow/runtime/plugins/descriptions.hpp"
-#include "marrow/runtime/plugins/library_archive.hpp"
+#include "marrow/runtime/plugins/library_fields.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
 #include "marrow/runtime/plugins/own_cache.hpp"
 #include "marrow/runtime/plugins/python_file.hpp"
