@@ -28,7 +28,7 @@ class Survey : public YAML::EventHandler {
  public:
   Survey(const std::string& text, const YamlLimits& limits) : text_(text), limits_(limits) {}
   void OnDocumentStart(const YAML::Mark& mark) override {
-    if (documents_++) refuse(mark, "the file goes on after the end of its first document; keep one document a file");
+    if (documents_++) refuse(mark, "the file goes on after the end of its first document; keep one document per file");
   }
   void OnDocumentEnd() override {
     if (!unnamed_.empty())
@@ -60,7 +60,7 @@ class Survey : public YAML::EventHandler {
     expect_no_anchor(mark, anchor);
     unnamed_.erase(anchor);
     const auto found = anchored_.find(anchor);
-    if (found == anchored_.end()) refuse(mark, "an alias names a list or map that it is in itself");
+    if (found == anchored_.end()) refuse(mark, "an alias names the list or map that contains it");
     repeated_ += found->second.values;
     if (repeated_ > kMostRepeated)
       refuse(mark,

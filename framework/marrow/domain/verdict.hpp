@@ -51,4 +51,12 @@ struct Verdict {
                         &Verdict::figures>;
 };
 
+/// Whether a repetition ends after this pass.
+struct Stop {
+  bool stops = false;
+  std::string reason;  ///< in words, also of a pass that does not stop; may be empty
+
+  using fields = Fields<&Stop::stops, &Stop::reason>;
+};
+
 }  // namespace marrow

@@ -35,7 +35,7 @@ TEST(FileNames, BadOnesAndWhy) {
        {std::string("a\nb"), std::string("a\tb"), std::string("\x1b[2J"), std::string("a\0b", 3), std::string("a\x7f"),
         std::string("\u202e"), std::string("\u009b")})
     EXPECT_EQ(fault_of_name(name), "it holds a control character") << name;
-  EXPECT_EQ(fault_of_name("\xff"), "it holds bytes that are no UTF-8");
+  EXPECT_EQ(fault_of_name("\xff"), "it holds bytes that are not UTF-8");
 }
 
 /// Names that look like "ab" or "é". The code points are those of the Unicode standard.
@@ -51,7 +51,7 @@ TEST(FileNames, ThatLookLikeOthersAndWhy) {
     EXPECT_EQ(fault_of_name(name), "it holds " + code + ", which cannot be seen");
   for (const auto& [name, code] : std::vector<std::pair<std::string, std::string>>{
            {"a\u00a0b", "U+00A0"}, {"a\u2009b", "U+2009"}, {"a\u3000b", "U+3000"}, {"a\u202fb", "U+202F"}})
-    EXPECT_EQ(fault_of_name(name), "it holds " + code + ", a blank that is no space");
+    EXPECT_EQ(fault_of_name(name), "it holds " + code + ", a blank that is not a space");
   EXPECT_EQ(fault_of_name("e\u0301"),
             "it holds U+0301, a mark of the letter before it; type the letter with its mark as one character");
   EXPECT_EQ(fault_of_name("\u1112\u1161").substr(0, 16), "it holds U+1161,") << "Hangul, taken apart";

@@ -97,7 +97,7 @@ TEST(Yaml, KeysThatLookTheSameAreRefused) {
   marrow::yaml_keys(parse_yaml("\"a\\u200b\": 1\n\"a\\u00a0b\": 1\n\"e\\u0301\": 1\né: 1\n"), "it", faults);
   ASSERT_EQ(faults.size(), 3u);
   EXPECT_EQ(faults[0].text, "the key 'a\u200b' in it holds U+200B, which cannot be seen");
-  EXPECT_EQ(faults[1].text, "the key 'a\u00a0b' in it holds U+00A0, a blank that is no space");
+  EXPECT_EQ(faults[1].text, "the key 'a\u00a0b' in it holds U+00A0, a blank that is not a space");
   EXPECT_EQ(
       faults[2].text,
       "the key 'e\u0301' in it holds U+0301, a mark of the letter before it; type the letter with its mark as one "
@@ -120,7 +120,7 @@ TEST(Yaml, Limits) {
   EXPECT_EQ(refusal(sixty + nested(39, "*sixty")), "");
   EXPECT_EQ(refusal(sixty + nested(40, "*sixty")), "2: lists and maps are nested more than 100 deep");
   EXPECT_EQ(refusal("a: 1\n---\nb: 2\n"),
-            "2: the file goes on after the end of its first document; keep one document a file");
+            "2: the file goes on after the end of its first document; keep one document per file");
   EXPECT_EQ(refusal("a: \"\\0\"\n"), "1: a text holds the character NUL (\\0); take it out");
 }
 

@@ -89,7 +89,7 @@ TEST_F(PipelineTest, AliasesThatMultiplyAreSaid) {
   EXPECT_NE(diagnostics.text().find("aliases repeat more than 100000 values"), std::string::npos) << diagnostics.text();
   read("marrow: 1\nnodes: &a {b: *a}\n");
   EXPECT_NE(diagnostics.text().find(
-                "p.yaml:2:15: error: cannot be read as YAML: an alias names a list or map that it is in itself"),
+                "p.yaml:2:15: error: cannot be read as YAML: an alias names the list or map that contains it"),
             std::string::npos)
       << diagnostics.text();
   const Pipeline p = read(

@@ -78,7 +78,7 @@ TEST_F(LibraryTest, FastMath) {
 TEST_F(LibraryTest, Crash) { expect_refused(kBad / "crashes.so", "crashed while being loaded (Segmentation fault)"); }
 TEST_F(LibraryTest, Throws) { expect_refused(kBad / "throws.so", "crashed while being loaded (Aborted)"); }
 TEST_F(LibraryTest, NoEntry) {
-  expect_refused(kBad / "no_entry.so", "is no marrow plugin: it has no function marrow_plugin_entry");
+  expect_refused(kBad / "no_entry.so", "is not a marrow plugin: it has no function marrow_plugin_entry");
 }
 TEST_F(LibraryTest, WrongDeclaration) {
   expect_refused(kBad / "wrong_declaration.so",

@@ -38,7 +38,7 @@ TEST(PackedValues, AFileThatCannotBeReadIsSaidToBeOne) {
   Scratch scratch;
   const int descriptor = open(scratch.write("values", "bytes").c_str(), O_WRONLY | O_CLOEXEC);
   ASSERT_GE(descriptor, 0);
-  EXPECT_EQ(refusal(descriptor), "another process handed nothing over");
+  EXPECT_EQ(refusal(descriptor), "another process handed over nothing");
   close(descriptor);
 }
 

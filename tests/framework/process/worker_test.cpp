@@ -72,7 +72,7 @@ TEST(Worker, LinesThatAreNoPartOfTheJobEndIt) {
        {"end {}\n", "{\"job\": 2, \"end\": 1}\n", "{\"end\": 1}\n", "[1]\n", "{\"job\": \"1\", \"end\": 1}\n", "\n"}) {
     const WorkerEnd end = ask({{"do", "forge"}, {"line", line}});
     EXPECT_TRUE(end.died) << line;
-    EXPECT_EQ(end.failed, "its process sent something that is no part of its job") << line;
+    EXPECT_EQ(end.failed, "its process sent something that is not part of its job") << line;
   }
 }
 

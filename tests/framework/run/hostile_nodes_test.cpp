@@ -75,8 +75,8 @@ class HostileNodes : public testing::Test {
 };
 
 TEST_F(HostileNodes, TheyMayThrowAnything) {
-  expect_failure("throw number", "threw something that is no std::exception (int); throw marrow::Error");
-  expect_failure("throw text", "threw something that is no std::exception (char const*); throw marrow::Error");
+  expect_failure("throw number", "threw something that is not a std::exception (int); throw marrow::Error");
+  expect_failure("throw text", "threw something that is not a std::exception (char const*); throw marrow::Error");
 }
 
 TEST_F(HostileNodes, ArithmeticIsPutBack) {

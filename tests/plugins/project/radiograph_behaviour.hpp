@@ -190,7 +190,7 @@ inline void a_field_leaves_the_rest_out(const Make& make) {
   const auto refusal = [&] { return marrow::test::message_of([&] { make(two, &field); }); };
   field.grid.origin_mm.x() += 500;
   EXPECT_EQ(refusal(),
-            "the field does not lie where the volume lies: voxels of the same index are up to 500 mm apart; wire the "
+            "the field is not where the volume is: voxels of the same index are up to 500 mm apart; wire the "
             "field that was segmented from this volume");
   field.grid = two.grid;
   field.values_mm.pop_back();

@@ -134,7 +134,7 @@ std::string fault_in_relation(const NodeInfo& node, RelationType type, const std
 }
 
 void check_relation(const NodeInfo& node, const RelationInfo& relation, std::vector<std::string>& faults) {
-  const std::string what = std::string("relation ") + relation_type_name(relation.type) + ": ";
+  const std::string what = std::string("relation ") + kRelationTypes[std::size_t(relation.type)] + ": ";
   const RelationType type = relation.type;
   const std::size_t count = relation.names.size();
   if (type == RelationType::distinct) {

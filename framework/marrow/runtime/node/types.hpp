@@ -8,7 +8,6 @@
 #include "marrow/domain/functions.hpp"
 #include "marrow/domain/landmarks.hpp"
 #include "marrow/domain/scene.hpp"
-#include "marrow/domain/stop.hpp"
 #include "marrow/domain/verdict.hpp"
 #include "marrow/runtime/node/value.hpp"
 

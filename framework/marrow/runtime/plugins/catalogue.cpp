@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/plugins/catalogue.hpp"
-#include "marrow/base/framework_file.hpp"
-#include "marrow/base/regular_file.hpp"
 
 #include <algorithm>
 #include <cstdlib>
 #include <set>
 #include <sstream>
 
+#include "marrow/base/framework_file.hpp"
+#include "marrow/base/regular_file.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/plugins/contract.hpp"
 #include "marrow/runtime/plugins/library_index.hpp"

@@ -175,7 +175,7 @@ void write_manifest(const LibraryInfo& info) {
                 "; rename it");
   std::error_code error;
   if (fs::exists(fs::symlink_status(manifest, error)) && !is_manifest(manifest))
-    throw Error(manifest.string() + " is there already and is no manifest that marrow wrote; move it away, or rename " +
+    throw Error(manifest.string() + " exists and is not a manifest that marrow wrote; move it away, or rename " +
                 info.file.string());
   write_text_file(manifest, manifest_text(info), Kinds::files, 0644);
 }

@@ -68,10 +68,10 @@ std::string stamp_mismatch(const AbiStamp& theirs) {
 const PluginEntry& checked_entry(void* handle) {
   const auto function = reinterpret_cast<const PluginEntry* (*)()>(dlsym(handle, "marrow_plugin_entry"));
   if (!function)
-    throw Error("is no marrow plugin: it has no function marrow_plugin_entry (open it with MARROW_PLUGIN)");
+    throw Error("is not a marrow plugin: it has no function marrow_plugin_entry (open it with MARROW_PLUGIN)");
   const PluginEntry* entry = function();
   if (!entry || std::memcmp(entry->magic, "marrow!", 8) != 0)
-    throw Error("is no marrow plugin: its entry has another magic");
+    throw Error("is not a marrow plugin: its entry has another magic");
   if (entry->api_major != MARROW_API_MAJOR || entry->api_minor > MARROW_API_MINOR)
     throw Error(
         formatted("was built for plugin interface {}.{}, this marrow has {}.{}; rebuild it with this marrow's headers",

@@ -227,7 +227,7 @@ class PackedReader {
 std::string contents_of(int descriptor) {
   std::string bytes(std::size_t(bytes_in(descriptor)), '\0');
   if (read_at(descriptor, bytes.data(), bytes.size(), 0) != std::int64_t(bytes.size()))
-    throw Error("another process handed nothing over");
+    throw Error("another process handed over nothing");
   return bytes;
 }
 

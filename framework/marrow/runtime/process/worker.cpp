@@ -176,7 +176,7 @@ std::optional<WorkerEnd> Worker::understand(const std::string& line, const Said&
   } catch (const Error&) {
   }
   if (!message.is_object() || !is_busy_ || message.value("job", json()) != json(job_))
-    return ended("sent something that is no part of its job");
+    return ended("sent something that is not part of its job");
   if (message.contains("say")) {
     const json what = message["say"];
     if (what == "at" && message.value("place", json()).is_string()) at_ = message["place"];
