@@ -30,21 +30,12 @@ namespace fs = std::filesystem;
 /// The file of a description in the cache. Its name depends on the framework too, because a newer framework may accept
 /// what an older one refused.
 std::string file_in_cache(const Digest& name, const Digest& framework) {
-  Hasher hasher;
-  hasher.add(name);
-  hasher.add(framework);
-  hasher.add(search_digest());
-  return hasher.digest().hex() + ".json";
+  return hash_of(name, framework, search_digest()).hex() + ".json";
 }
 
 /// The name of a library's description in the cache. The same library in another folder may link other libraries: those
 /// beside it.
-Digest name_in_cache(const fs::path& real, const Digest& content) {
-  Hasher name;
-  name.add(real.string());
-  name.add(content);
-  return name.digest();
-}
+Digest name_in_cache(const fs::path& real, const Digest& content) { return hash_of(real.string(), content); }
 
 /// Why a description does not belong to this very library and to the linked libraries that are here now; empty if it
 /// does.
