@@ -11,7 +11,6 @@
 #include <thread>
 
 #include <marrow/plugin.hpp>
-#include <marrow/runtime/node/reading.hpp>
 
 namespace {
 using marrow::Metrics;

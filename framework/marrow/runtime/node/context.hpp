@@ -2,6 +2,7 @@
 #pragma once
 #include <atomic>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -53,5 +54,9 @@ class Context {
  private:
   Hooks hooks_;
 };
+
+/// A parser must call this before it reads a file. If the process then crashes or is killed, the message names that
+/// file. Has an effect only in a process that was started to read files. Safe to use from several threads.
+void now_reading(const std::filesystem::path& file);
 
 }  // namespace marrow

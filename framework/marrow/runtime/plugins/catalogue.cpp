@@ -70,12 +70,11 @@ void Catalogue::enter_names() {
   nodes_.clear();
   writers_.clear();
   for (std::size_t l = 0; l < libraries_.size(); ++l) {
-    for (std::size_t i = 0; i < libraries_[l].kinds.size(); ++i)
-      kinds_.try_emplace(libraries_[l].kinds[i].name, Entry{l, i});
-    for (std::size_t i = 0; i < libraries_[l].nodes.size(); ++i)
-      nodes_.try_emplace(libraries_[l].nodes[i].name, Entry{l, i});
-    for (std::size_t i = 0; i < libraries_[l].writers.size(); ++i)
-      writers_.try_emplace(libraries_[l].writers[i].type.id, Entry{l, i});
+    const LibraryInfo& library = libraries_[l];
+    for (std::size_t i = 0; i < library.kinds.size(); ++i) kinds_.try_emplace(library.kinds[i].name, Entry{l, i});
+    for (std::size_t i = 0; i < library.nodes.size(); ++i) nodes_.try_emplace(library.nodes[i].name, Entry{l, i});
+    for (std::size_t i = 0; i < library.writers.size(); ++i)
+      writers_.try_emplace(library.writers[i].type.id, Entry{l, i});
   }
 }
 
