@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "marrow/base/export.hpp"
 #include "marrow/base/fields.hpp"
 #include "marrow/domain/image.hpp"
+#include "marrow/domain/list.hpp"
 #include "marrow/domain/transform.hpp"
 
 namespace MARROW_EXPORT marrow {
@@ -69,5 +71,11 @@ struct View {
 /// Throws Error if the image is empty or if the sizes of image, camera and mask differ. The message names the view and
 /// both sizes. Throws as check_camera() does, too.
 void check_view(const View& view);
+
+/// The point at which all views are aimed: it has the least sum of squared distances to their central rays. A central
+/// ray is a camera's z axis, so cropping an image does not change it. Returns nothing for a single view, for rays
+/// within about 2.6 degrees of each other, and if the point is not in front of every source. In these cases the cameras
+/// do not tell how far away the bone is.
+std::optional<Eigen::Vector3d> meeting_point_mm(const List<View>& views);
 
 }  // namespace marrow
