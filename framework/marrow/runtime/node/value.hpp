@@ -89,7 +89,7 @@ class Source {
 struct Value {
   TypeInfo type;
   std::shared_ptr<const void> data;  ///< data of one item
-  std::shared_ptr<Source> source;    ///< source of one item whose data are not here yet
+  std::shared_ptr<Source> source;    ///< source of one item whose data were not needed yet
 
   std::string axis;  ///< axis of a list; empty for one item
   std::vector<std::string> names;

@@ -37,8 +37,7 @@ std::string file_in_cache(const Digest& name, const Digest& framework) {
 /// beside it.
 Digest name_in_cache(const fs::path& real, const Digest& content) { return hash_of(real.string(), content); }
 
-/// Why a description does not belong to this very library and to the linked libraries that are here now; empty if it
-/// does.
+/// Why a description does not fit this library and the linked libraries that exist now; empty if it fits.
 std::string stale(const LibraryInfo& info, const Digest& digest) {
   if (info.digest != digest) return "it belongs to another build of the library";
   for (const LinkedLibrary& library : info.linked) {

@@ -123,7 +123,7 @@ void add_registered(const Plugin& plugin, LibraryInfo& info) {
   for (const WriterDefinition& writer : plugin.writers) info.writers.push_back(writer.info);
 }
 
-/// Throws Error, before anything of it runs, if others could change what a library links.
+/// Throws Error if others could change what a library links. To be called before any of that runs.
 void expect_trusted(const std::vector<fs::path>& linked) {
   if (const std::string fault = untrusted_among(linked); !fault.empty()) throw Error(fault);
 }

@@ -25,7 +25,7 @@ const std::vector<LinkedLibrary>& framework_libraries();
 
 std::vector<std::filesystem::path> paths_of(const std::vector<LinkedLibrary>& libraries);
 
-/// Whether a file, given with its full path, is where the system's packages put theirs.
+/// Whether a file, given with its full path, is in a folder of the system's packages.
 bool is_of_the_system(const std::string& file);
 
 /// The identity of a library. It includes the name of the file. For a library of the system, it also includes the size
