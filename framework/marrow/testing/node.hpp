@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <marrow/base/error.hpp>
+#include <marrow/conformance.hpp>
 #include <marrow/runtime/node/attributes.hpp>
 #include <marrow/runtime/node/types.hpp>
 #include <marrow/runtime/plugins/catalogue.hpp>
@@ -21,10 +22,7 @@ using Options = std::map<std::string, marrow::OptionValue>;
 using Outputs = std::map<std::string, marrow::Value>;
 
 /// One item, and a list along an axis, as inputs.
-template <class T>
-marrow::Value item(T value) {
-  return marrow::Value::of<T>(std::make_shared<const T>(std::move(value)));
-}
+using marrow::conformance::item;
 template <class T>
 marrow::Value list(const marrow::List<T>& items, const std::string& axis) {
   return marrow::Value::of<T>(items, axis);

@@ -2,7 +2,6 @@
 #pragma once
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -14,7 +13,6 @@
 namespace MARROW_EXPORT marrow {
 
 class Plugin;
-class WorkerReports;
 
 /// A library that a plugin links, as it was when the plugin was described.
 struct LinkedLibrary {
@@ -59,8 +57,6 @@ std::unique_ptr<Plugin> load_library(const LibraryInfo& described);
 /// or hangs does no harm. A library is refused without being loaded if somebody other than the user, root and the owner
 /// of marrow could have put it there, unless MARROW_TRUST_ALL_PLUGINS is 1.
 LibraryInfo describe_library(const std::filesystem::path& file);
-/// The child process's side: the answer to {"do": "describe", "library": ...}.
-nlohmann::json answer_describe(const nlohmann::json& request, WorkerReports& reports);
 
 /// The description of a library. It comes from the manifest next to the library, if that is whole, trusted and belongs
 /// to this very file; else from the user's cache of descriptions; else from describe_library(). `framework` is the
