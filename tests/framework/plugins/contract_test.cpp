@@ -53,8 +53,9 @@ TEST(Contract, OtherTypes) {
 TEST(Contract, AnotherVersionOfAType) {
   NodeInfo old = node<marrow::View, marrow::EdgeMap>("view", "edges");
   ++old.inputs[0].type.version;
-  EXPECT_EQ(faults(old),
-            Faults{"input 'view': the kind 'edges' has it as view, not another version of that type; build both again"});
+  EXPECT_EQ(
+      faults(old),
+      Faults{"input 'view': the kind 'edges' has it as view, not another version of that type; build both again"});
 }
 
 TEST(Contract, AMissingOutput) {
