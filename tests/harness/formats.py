@@ -84,7 +84,7 @@ def element(group, number, kind, value):
 
 
 def dicom(width, height, values, elements, meta=()):
-    """A grey DICOM image of 16 bits, of these bytes. Further elements and meta elements: {(group, number): (kind, value)}."""
+    """A grey DICOM image of 16 bits from its bytes. Further elements, also of the meta header: {tag: (kind, value)}."""
     elements = {
         (0x28, 2): ("US", 1),
         (0x28, 4): ("CS", "MONOCHROME2"),
