@@ -10,6 +10,7 @@
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
 #include "marrow/runtime/node/types.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 #include "new/templates.hpp"
@@ -66,7 +67,7 @@ json deviations_of(const Pose& pose) {
   return deviations;
 }
 
-json json_of(const Verdict& verdict) {
+json verdict_json(const Verdict& verdict) {
   return {
       {"judgement", name_of(verdict.judgement)},
       {"failure_probability", std::isfinite(verdict.failure_probability) ? json(verdict.failure_probability) : json()},
@@ -129,11 +130,6 @@ std::string write_placement(const OpenedFolder& folder, const std::string& into,
   throw Error("there are too many folders in " + printable(folder.inside(all).string()) + "; remove some");
 }
 
-std::string write_starts(const OpenedFolder& folder, const std::string& into, const PlacedCase& placed,
-                         const std::map<std::string, RigidTransform>& poses) {
-  return write_placement(folder, into, placed, start_files(placed, poses));
-}
-
 json pipelines_from_starts(const Workbench& workbench) {
   std::vector<fs::path> files{workbench_pipeline("register")};
   std::vector<fs::path> shipped;
@@ -178,21 +174,19 @@ json run_from_starts(const Workbench& workbench, const fs::path& pipeline, const
   call.arguments.inputs = {{"case", folder}};
   call.arguments.overrides = {{node_with_starts(read) + "." + kStarts, workbench.folder.inside(starts).string()}};
   // An output of the name 'pose' is the result; otherwise the first one is.
-  const bool has_pose = std::find(poses.begin(), poses.end(), "pose") != poses.end();
-  if (!poses.empty()) call.only.push_back(has_pose ? "pose" : poses.front());
+  if (!poses.empty()) call.only.push_back(contains(poses, "pose") ? "pose" : poses.front());
   if (!verdicts.empty()) call.only.push_back(verdicts.front());
   json result = {{"poses", json::object()}, {"verdicts", json::object()}};
   for (const auto& [name, value] : outputs_of(call, workbench, job))
     for (std::size_t i = 0; i < value.items.size(); ++i) {
       if (!value.items[i].data) continue;  // a node may fail for one of the bones
       if (value.type == TypeInfo::of<Verdict>()) {
-        result["verdicts"][value.names[i]] = json_of(value.items[i].as<Verdict>());
+        result["verdicts"][value.names[i]] = verdict_json(value.items[i].as<Verdict>());
         continue;
       }
       const Pose& pose = value.items[i].as<Pose>();
-      result["poses"][value.names[i]] = {{"matrix", workbench::json_of(pose.world_from_model)},
-                                         {"deviations", deviations_of(pose)},
-                                         {"warnings", pose.warnings}};
+      result["poses"][value.names[i]] = {
+          {"matrix", json_of(pose.world_from_model)}, {"deviations", deviations_of(pose)}, {"warnings", pose.warnings}};
     }
   return result;
 }
