@@ -19,8 +19,8 @@
 namespace MARROW_EXPORT marrow {
 namespace conformance {
 
-/// Input values by the name of the port. A node takes the values of those ports that it has. One port may be here
-/// several times, with different types: a node takes the value of its own port's type.
+/// Input values by the names of ports. A node takes the values of the ports that it has. A name may occur several times
+/// with different types. A node then takes the value of its port's type.
 class Inputs {
  public:
   Inputs() = default;

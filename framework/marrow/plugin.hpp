@@ -21,7 +21,7 @@
 // A node returns a value, a std::optional of one, a List<T>, a std::shared_ptr<const Interface> for a function, a
 // std::tuple of these, or a struct whose members are named with .out("port", &Struct::member, "help").
 //
-// A kind is the part of a node's name before the dot. A library may declare its own kinds (runtime/kind_builder.hpp).
+// A kind is the part of a node's name before the dot. A library may declare its own kinds (KindBuilder).
 #include <deque>
 #include <string>
 #include <utility>

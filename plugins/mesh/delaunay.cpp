@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // This file is under the GPL because it is linked to the surface mesher of CGAL (delaunay_refinement.cpp).
-#include <marrow/domain/manifold.hpp>
+#include <marrow/domain/mesh.hpp>
 #include <marrow/plugin.hpp>
 
 #include "delaunay_refinement.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <marrow/domain/manifold.hpp>
+#include <marrow/domain/mesh.hpp>
 #include <marrow/plugin.hpp>
 
 #include "marrow/mesh/poisson.hpp"

@@ -11,7 +11,7 @@
 #include <set>
 
 #include "marrow/base/number_text.hpp"
-#include "marrow/domain/manifold.hpp"
+#include "marrow/domain/mesh.hpp"
 #include "marrow/domain/quantile.hpp"
 #include "marrow/runtime/node/types.hpp"
 

@@ -36,13 +36,6 @@ struct Result {
   Verdict verdict;
 };
 
-/// [v] with [v] w = v x w.
-Matrix3d cross(const Vector3d& v) {
-  Matrix3d matrix;
-  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return matrix;
-}
-
 /// A small motion (r, t) of the pose in its frame turns the axis by r x axis and moves the centre by r x arm + t. Only
 /// what lies across the axis counts.
 void predict(const Pose& pose, const Hole& hole, LockingPlan::Drill& drill) {
@@ -53,8 +46,8 @@ void predict(const Pose& pose, const Hole& hole, LockingPlan::Drill& drill) {
                  arm = pose.frame.axes.transpose() * (hole.centre_mm - pose.frame.origin_mm);
   const Matrix3d across = Matrix3d::Identity() - axis * axis.transpose();
   Eigen::Matrix<double, 3, 6> turn, shift;
-  turn << -cross(axis), Matrix3d::Zero();
-  shift << -across * cross(arm), across;
+  turn << -cross_matrix(axis), Matrix3d::Zero();
+  shift << -across * cross_matrix(arm), across;
   const Matrix3d of_turn = turn * *pose.covariance * turn.transpose(),
                  of_shift = shift * *pose.covariance * shift.transpose();
   drill.deviation_deg = degrees(std::sqrt(std::max(0.0, of_turn.trace())));

@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "marrow/base/number_text.hpp"
-#include "marrow/domain/central_rays.hpp"
+#include "marrow/domain/camera.hpp"
 #include "marrow/similarity/block_expansions.hpp"
 #include "marrow/toolbox/match/views_cost.hpp"
 #include "surface_distance.hpp"

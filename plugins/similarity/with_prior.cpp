@@ -21,12 +21,6 @@ struct Options {
   double noise_times = 2;
 };
 
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d matrix;
-  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return matrix;
-}
-
 /// How a rotation vector r changes if a small rotation comes before it: the inverse of the right Jacobian of SO(3)
 /// (Sola, Deray and Atchuthan, arXiv 1812.01537, Eq 144).
 Eigen::Matrix3d vector_by_rotation(const Eigen::Vector3d& r) {

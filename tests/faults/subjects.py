@@ -6,9 +6,9 @@ import json
 import os
 import re
 import shutil
-import struct
 import subprocess
-import zlib
+
+from harness import formats
 
 SENTENCE = re.compile(r"^(marrow: (error: |stopped)|\S+: error: ).{8}", re.MULTILINE)
 # A folder of libraries with the few plugins that are used: the manifests of all of them are most of a small run's work.
@@ -58,24 +58,6 @@ timed_cells: 1
 """
 
 
-def png(width, height):
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    rows = b"".join(b"\0" + bytes((7 * u + 13 * v) % 256 for u in range(width)) for v in range(height))
-    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
-
-
-def mha(side):
-    header = (
-        "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"
-        "TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 0 0 0\nElementSpacing = 1 1 1\nDimSize = %d %d %d\n"
-        "ElementType = MET_FLOAT\nElementDataFile = LOCAL\n" % (side, side, side)
-    )
-    return header.encode() + struct.pack("<%df" % side**3, *range(side**3))
-
-
 def stl(facets):
     facet = "facet normal 0 0 1\nouter loop\nvertex %d 0 0\nvertex %d 10 0\nvertex %d 10 9\nendloop\nendfacet\n"
     return "solid a\n" + "".join(facet % (i, i, i + 1) for i in range(facets)) + "endsolid a\n"
@@ -84,8 +66,10 @@ def stl(facets):
 def write_data(folder):
     (folder / "other").mkdir(parents=True)  # an experiment of the same name with other values
     (folder / "text").write_text("a file that counts by its content")
-    (folder / "picture.png").write_bytes(png(16, 12))
-    (folder / "ct.mha").write_bytes(mha(4))
+    (folder / "picture.png").write_bytes(
+        formats.png(16, 12, [(7 * u + 13 * v) % 256 for v in range(12) for u in range(16)])
+    )
+    (folder / "ct.mha").write_bytes(formats.mha(formats.straight((4, 4, 4)), range(64), "MET_FLOAT"))
     (folder / "mesh.stl").write_text(stl(5))
     small = PIPELINE % {"data": folder}
     (folder / "small.yaml").write_text(small)

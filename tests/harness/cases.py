@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cases that the tests of whole commands run on: simulated ones, and files in the formats of scanners, made without any
-library."""
+"""Simulated cases that the tests of whole commands run on, and small matrices."""
 import json
 import math
 import os
 import shutil
-import struct
-import zlib
 
 import yaml
 
@@ -48,103 +45,6 @@ def contents(folder):
 
 def metrics(path):
     return {metric["name"]: metric["value"] for metric in json.loads(path.read_text())["metrics"]}
-
-
-def png(width, height, grey):
-    """A 16 bit grey PNG; grey(u, v) gives its values."""
-    rows = b"".join(b"\0" + struct.pack(">%dH" % width, *(grey(u, v) for u in range(width))) for v in range(height))
-
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    header = struct.pack(">IIBBBBB", width, height, 16, 0, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
-
-
-def tiff(width, height, pages):
-    """A TIFF of 16 bit grey pages, each a list of values in one strip; every page's directory stands before its
-    values."""
-    data = struct.pack("<2sHI", b"II", 42, 8)
-    for number, page in enumerate(pages):
-        values = struct.pack("<%dH" % len(page), *page)
-        tags = [
-            (256, 3, width),
-            (257, 3, height),
-            (258, 3, 16),
-            (259, 3, 1),
-            (262, 3, 1),
-            (273, 4, 0),
-            (277, 3, 1),
-            (278, 3, height),
-            (279, 4, len(values)),
-        ]
-        begin = len(data) + 2 + 12 * len(tags) + 4
-        data += struct.pack("<H", len(tags))
-        for tag, kind, value in tags:
-            data += struct.pack("<HHII", tag, kind, 1, begin if tag == 273 else value)
-        data += struct.pack("<I", begin + len(values) if number + 1 < len(pages) else 0) + values
-    return data
-
-
-def dicom_slice(width, height, number, values):
-    """A CT slice in explicit little endian, 1 mm wide voxels, slices 1 mm apart."""
-
-    def element(group, tag, kind, value):
-        if isinstance(value, str):
-            value = value.encode()
-        if len(value) % 2:
-            value += b"\0" if kind == b"UI" else b" "
-        length = struct.pack("<2xI", len(value)) if kind in (b"OB", b"OW") else struct.pack("<H", len(value))
-        return struct.pack("<HH2s", group, tag, kind) + length + value
-
-    def short(group, tag, value):
-        return element(group, tag, b"US", struct.pack("<H", value))
-
-    ct_storage, series = "1.2.840.10008.5.1.4.1.1.2", "1.2.826.0.1.3680043.2.1143.1"
-    meta = (
-        element(2, 1, b"OB", b"\0\1")
-        + element(2, 2, b"UI", ct_storage)
-        + element(2, 3, b"UI", "%s.%d" % (series, number))
-        + element(2, 16, b"UI", "1.2.840.10008.1.2.1")
-        + element(2, 18, b"UI", series)
-    )
-    return (
-        b"\0" * 128
-        + b"DICM"
-        + element(2, 0, b"UL", struct.pack("<I", len(meta)))
-        + meta
-        + element(0x8, 0x16, b"UI", ct_storage)
-        + element(0x8, 0x18, b"UI", "%s.%d" % (series, number))
-        + element(0x8, 0x60, b"CS", "CT")
-        + element(0x18, 0x50, b"DS", "1")
-        + element(0x20, 0xD, b"UI", series + ".1")
-        + element(0x20, 0xE, b"UI", series + ".2")
-        + element(0x20, 0x13, b"IS", str(number))
-        + element(0x20, 0x32, b"DS", "0\\0\\%d" % number)
-        + element(0x20, 0x37, b"DS", "1\\0\\0\\0\\1\\0")
-        + short(0x28, 2, 1)
-        + element(0x28, 4, b"CS", "MONOCHROME2")
-        + short(0x28, 0x10, height)
-        + short(0x28, 0x11, width)
-        + element(0x28, 0x30, b"DS", "1\\1")
-        + short(0x28, 0x100, 16)
-        + short(0x28, 0x101, 16)
-        + short(0x28, 0x102, 15)
-        + short(0x28, 0x103, 1)
-        + element(0x28, 0x1052, b"DS", "0")
-        + element(0x28, 0x1053, b"DS", "1")
-        + element(0x7FE0, 0x10, b"OW", struct.pack("<%dh" % len(values), *values))
-    )
-
-
-def mha(size, values):
-    """A MetaImage of floats with 1 mm voxels."""
-    header = (
-        "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData ="
-        " False\nTransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 0 0 0\nElementSpacing = 1 1 1\nDimSize = %d %d"
-        " %d\nElementType = MET_FLOAT\nElementDataFile = LOCAL\n" % size
-    )
-    return header.encode() + struct.pack("<%df" % len(values), *values)
 
 
 def times(matrix, vector):

@@ -1,10 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Comparisons of figures that a test plugin reads from tables, so that their values are known."""
-import json
-import re
-
 from harness import BUILD
-from harness.program import Case, marrow
+from harness.program import Case
 
 GIVEN_PLUGINS = BUILD / "tests" / "given_plugins"
 PIPELINE = """marrow: 1
@@ -39,14 +36,6 @@ class GivenCase(Case):
         text += "variants:\n" + "".join("  %s: {n.column: %s}\n" % (name, name) for name in variants)
         return self.write("e.yaml", text + ("" if "timed_cells" in more else "timed_cells: 0\n") + more)
 
-    def marrow(self, *arguments):
-        return marrow(
-            *arguments,
-            plugins=self.plugins,
-            extra_environment={"MARROW_CACHE": str(self.scratch / "cache")},
-            cwd=self.scratch
-        )
-
     def compare(self, values, more="", code=0, **others):
         """What the terminal shows."""
         self.write_cases(values)
@@ -54,10 +43,3 @@ class GivenCase(Case):
         self.result = self.marrow("compare", file, "--out", "out", "--quiet")
         self.assertEqual(self.result.returncode, code, self.result.stdout + self.result.stderr)
         return self.result.stdout
-
-    def answer(self):
-        return json.loads((self.scratch / "out" / "comparison.json").read_text())
-
-    def page_data(self):
-        page = (self.scratch / "out" / "report.html").read_text()
-        return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.S).group(1))

@@ -4,7 +4,8 @@ import base64
 import math
 import random
 import struct
-import zlib
+
+from harness import formats
 
 
 def bone(around=28, along=36):
@@ -113,12 +114,9 @@ def thickness(mesh, world_from_model, view):
     return [abs(value) for value in sums]
 
 
-def png(width, height, pixels, channels):
-    rows = b"".join(b"\0" + bytes(pixels[channels * width * v : channels * width * (v + 1)]) for v in range(height))
-    chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-    head = struct.pack(">IIBBBBB", width, height, 8, {1: 0, 3: 2}[channels], 0, 0, 0)
-    data = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows, 6)) + chunk(b"IEND", b"")
-    return "data:image/png;base64," + base64.b64encode(data).decode()
+def picture(width, height, pixels, channels):
+    """A PNG as a page holds it."""
+    return "data:image/png;base64," + base64.b64encode(formats.png(width, height, pixels, channels=channels)).decode()
 
 
 def xray(depths, view, seed):

@@ -97,7 +97,7 @@ def add_material(data, chance, pairs):
         greys = []
         for view in views:
             greys.append(shapes.xray(shapes.thickness(mesh, truth, view), view, "%d %d" % (case, start)))
-            data["pictures"]["xray %d %d %s" % (case, start, view["name"])] = shapes.png(256, 256, greys[-1], 1)
+            data["pictures"]["xray %d %d %s" % (case, start, view["name"])] = shapes.picture(256, 256, greys[-1], 1)
         for variant in range(len(data["variants"])):
             cell = by_key[variant, case, start]
             if cell["status"] == "failed":
@@ -105,10 +105,10 @@ def add_material(data, chance, pairs):
             result = shapes.multiply(truth, shapes.pose(*small_motion(chance, 0.45 * min(8, cell["values"][0]))))
             for view, grey in zip(views, greys):
                 name = "%s %s" % (cell["id"], view["name"])
-                data["pictures"][name] = shapes.png(
+                data["pictures"][name] = shapes.picture(
                     256, 256, shapes.overlay(grey, shapes.thickness(mesh, result, view), view, (255, 190, 40)), 3
                 )
-                data["pictures"][name + " edges"] = shapes.png(
+                data["pictures"][name + " edges"] = shapes.picture(
                     256, 256, bytearray(255 if value > 150 else value // 3 for value in grey), 1
                 )
                 cell["pictures"] += [
@@ -256,7 +256,7 @@ def run(with_cube=True):
             u, v, _ = shapes.project(view, shapes.apply(matrix, vertex))
             pixels[round(v) * view["width_px"] + round(u)] = 255
         view["image"] = "cube " + view["name"]
-        data["pictures"][view["image"]] = shapes.png(view["width_px"], view["height_px"], pixels, 1)
+        data["pictures"][view["image"]] = shapes.picture(view["width_px"], view["height_px"], pixels, 1)
     data["scenes"][cell["scene"]] = {
         "meshes": [shapes.mesh_entry("cube", mesh)],
         "views": views,

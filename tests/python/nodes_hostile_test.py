@@ -140,7 +140,7 @@ class Hostile(Written):
             "        except OSError: pass\n"
         )
         self.assertIn("mine.py: its process", said := self.failure(code))
-        self.assertIn("sent something that is no part of its job and was ended", said)
+        self.assertIn("sent something that is not part of its job and was ended", said)
 
     def test_a_process_that_was_killed_is_no_fault_of_the_node(self):
         self.assertIn(

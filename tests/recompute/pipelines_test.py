@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every figure of several shipped pipelines that can be recomputed is what numpy and scipy find."""
-import pathlib
-import shutil
-import tempfile
 
 from recomputing import counts, recompute_all, run  # it finds the modules below
 from harness.cases import SMALL, simulate
@@ -37,12 +34,8 @@ def sets(texts):
 class Pipelines(Case):
     @classmethod
     def setUpClass(cls):
-        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-recompute-"))
+        cls.shared = cls.shared_folder()
         cls.case = simulate(cls.shared / "made", *SMALL)
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.shared, ignore_errors=True)
 
     def check(self, folder, least, unknown=()):
         """All recomputed figures agree, there are so many of them, and the others are those that are named."""

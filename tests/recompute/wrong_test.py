@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A figure of a run that is changed is found and named, and figures that cannot be recomputed are listed."""
-import pathlib
 import shutil
-import tempfile
 
 from recomputing import counts, different, recompute, recompute_all, run  # it finds the modules below
 from harness.program import Case, main
@@ -27,12 +25,8 @@ def with_other_number(path, key, factor):
 class Wrong(Case):
     @classmethod
     def setUpClass(cls):
-        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-recompute-"))
+        cls.shared = cls.shared_folder()
         cls.made = run(cls.shared / "run", "landmarks.yaml")
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.shared, ignore_errors=True)
 
     def setUp(self):
         super().setUp()

@@ -1,11 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A figure of a comparison that is changed is found, wherever it stands."""
 import json
-import pathlib
 import random
 import re
-import shutil
-import tempfile
 
 from harness import BUILD, need_scipy
 from harness.program import Case, main
@@ -55,7 +52,7 @@ def changed(tree, path):
 class Wrong(Case):
     @classmethod
     def setUpClass(cls):
-        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-wrong-"))
+        cls.shared = cls.shared_folder()
         cls.made = {}
         for seed in SEEDS:
             experiment, folder = generate(seed), cls.shared / str(seed)
@@ -63,10 +60,6 @@ class Wrong(Case):
             ended = files.run(experiment, folder, BUILD)
             assert ended.returncode == 0, ended.stderr
             cls.made[seed] = ended.stdout
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.shared, ignore_errors=True)
 
     def setUp(self):
         super().setUp()

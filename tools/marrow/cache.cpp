@@ -49,33 +49,6 @@ std::string several(const std::string& key, const std::set<std::string>& keys) {
   return keys.size() > kMostShown ? text + "\n..." : text;
 }
 
-}  // namespace
-
-bool can_keep_results(const std::string& fault_of_store, bool quiet) {
-  if (!fault_of_store.empty() && !quiet)
-    std::fprintf(stderr, "marrow: note: results are not kept: %s\n", printable_lines(fault_of_store).c_str());
-  return fault_of_store.empty();
-}
-
-namespace {
-
-void note_not_shared(const std::string& text) {
-  if (!text.empty()) std::fprintf(stderr, "marrow: note: %s\n", printable_lines(text).c_str());
-}
-
-}  // namespace
-
-void say_if_not_shared(const Store& store, bool quiet) {
-  const std::string fault = store.shared() && !quiet ? store.shared()->fault() : "";
-  if (!fault.empty()) note_not_shared("the shared store is not used: " + fault);
-}
-
-void say_complaint(const Store& store) {
-  if (store.shared()) note_not_shared(store.shared()->complaint());
-}
-
-namespace {
-
 void print_shares(const std::string& folder, const std::vector<Store::Entry>& entries) {
   std::map<std::string, Share> shares;
   Share all;
@@ -133,7 +106,7 @@ int cache_why(const std::string& key) {
       print(entry);
     else
       code = code_after("the result " + entry.key.hex() +
-                        " is damaged or of another version; it is made anew when it is needed");
+                        " is damaged or of another version; the next run that needs it makes it again");
   }
   return code;
 }

@@ -51,7 +51,7 @@ void print_kind(const NodeInfo& node, const KindInfo* kind) {
   if (!kind) return;
   std::printf("\nKind\n  %s: %s\n", printable(kind->name).c_str(), printable(kind->summary).c_str());
   for (const TraitInfo& trait : kind->traits)
-    if (std::find(node.traits.begin(), node.traits.end(), trait.name) != node.traits.end())
+    if (contains(node.traits, trait.name))
       std::printf("  %s: %s\n", printable(trait.name).c_str(), printable(trait.help).c_str());
 }
 
@@ -194,8 +194,7 @@ void add_doctor(CLI::App& app, int& code) {
 void add_describe(CLI::App& app, int& code) {
   const auto library = std::make_shared<std::filesystem::path>();
   const auto write = std::make_shared<bool>(false);
-  CLI::App* command =
-      app.add_subcommand("describe", "load one plugin library in a process of its own and print its manifest");
+  CLI::App* command = app.add_subcommand("describe", "load one plugin library and print its manifest");
   command->add_option("library", *library, "the .so file, or a .py file with @marrow.node")->required();
   command->add_flag("--write", *write, "write the manifest beside the library instead");
   command->callback([library, write, &code] { code = describe(*library, *write); });

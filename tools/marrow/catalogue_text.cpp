@@ -109,6 +109,11 @@ json kind_json(const KindInfo& kind) {
   return j;
 }
 
+json fit_json(const Fit& fit) {
+  const char* verdict = !fit.faults.empty() ? "no" : fit.missing.empty() ? "yes" : "with more";
+  return {{"node", fit.node}, {"fits", verdict}, {"missing", fit.missing}, {"faults", fit.faults}};
+}
+
 std::string port_text(const PortInfo& port) { return types_text({port.type}, port.axis); }
 std::string port_text(const KindPort& port) { return types_text(port.types, port.axis); }
 

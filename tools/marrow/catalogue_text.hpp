@@ -6,12 +6,15 @@
 
 #include "marrow/runtime/node/kind.hpp"
 #include "marrow/runtime/node/node.hpp"
+#include "marrow/runtime/pipeline/fits.hpp"
 
 namespace marrow::cli {
 
 nlohmann::json node_json(const NodeInfo& node);
 /// The contract of a kind, with the limits of its checks.
 nlohmann::json kind_json(const KindInfo& kind);
+/// {node, fits: "yes", "with more" or "no", missing, faults}
+nlohmann::json fit_json(const Fit& fit);
 /// "edge_map", "list of view over view".
 std::string port_text(const PortInfo& port);
 std::string port_text(const KindPort& port);

@@ -3,6 +3,7 @@
 // The commands of the program, and what they share. Exit codes: 0 success, 1 a node or a library failed, 2 fault in the
 // request or in a file, 3 from `run` if nothing failed but a verdict is `wrong`, 130 stopped by Ctrl-C.
 #include <filesystem>
+#include <initializer_list>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
@@ -71,6 +72,23 @@ void add_conformance(CLI::App& app, int& code);
 void add_check_worker(CLI::App& app, int& code);
 void add_describe(CLI::App& app, int& code);
 
+/// Runs the command that the words of the command line name, and returns the exit code. Each of `commands` adds one,
+/// see commands.hpp. What a command throws is printed as an error.
+int run_program(int argc, char** argv, std::initializer_list<void (*)(CLI::App& app, int& code)> commands);
+
+/// What a command wants to be given.
+enum class Wanted { pipeline, experiment, run };
+
+/// Throws Error if the path names something of marrow that is not the wanted thing. The error says what it is and what
+/// to do with it. All other paths pass: their reader says what is wrong.
+void expect_given(const std::filesystem::path& given, Wanted wanted);
+
+/// "edges (frontal)": the node of an event, and the item if there is one.
+std::string place_of(const RunEvent& event);
+/// An event of a run as `marrow run --json` prints it, and as the pages of `marrow open` get it: {event, node}, and of
+/// {item, text, level, fraction, seconds} those that it has.
+nlohmann::json json_of(const RunEvent& event);
+
 /// Prints a note on the standard error, on one line.
 void say_note(const std::string& text);
 /// Prints a JSON document, or with `indent` -1 a line of JSON.
@@ -84,6 +102,8 @@ void say_complaint(const Store& store);
 /// Splits texts of the form name=value. Throws Error for one without '=' or without a name; `form` says what is
 /// expected.
 std::vector<std::pair<std::string, std::string>> pairs_of(const std::vector<std::string>& texts, const char* form);
+/// [{file, line, column, message, hint}]
+nlohmann::json faults_json(const Diagnostics& diagnostics);
 /// Prints all faults and their number to the standard error stream.
 void print_faults(const Diagnostics& diagnostics);
 /// Splits texts of the form name=value. Throws Error for a text without '='.

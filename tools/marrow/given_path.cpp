@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "given_path.hpp"
-
 #include <optional>
 #include <regex>
 #include <string>
 
+#include "commands.hpp"
 #include "compare/comparison_folder.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/printable.hpp"

@@ -7,9 +7,7 @@
 #include "catalogue_text.hpp"
 #include "command_options.hpp"
 #include "commands.hpp"
-#include "given_path.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/runtime/pipeline/fits.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -112,10 +110,7 @@ int list_fits(const ListRequest& request) {
   }
   if (request.as_json) {
     json all = json::array();
-    for (const Fit& fit : fits) {
-      const char* verdict = !fit.faults.empty() ? "no" : fit.missing.empty() ? "yes" : "with more";
-      all.push_back({{"node", fit.node}, {"fits", verdict}, {"missing", fit.missing}, {"faults", fit.faults}});
-    }
+    for (const Fit& fit : fits) all.push_back(fit_json(fit));
     print_as_json(all);
     return 0;
   }
@@ -133,7 +128,7 @@ void add_list(CLI::App& app, int& code) {
   command->add_option("kind", request->kind, "only this kind");
   command
       ->add_option("--fits", request->fits,
-                   "FILE NODE: the nodes that could stand in place of this one of a pipeline, and what they need")
+                   "FILE NODE: the nodes that could replace this node of a pipeline, and what they need")
       ->type_name("FILE NODE")
       ->expected(2);
   command

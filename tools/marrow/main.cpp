@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "commands.hpp"
-#include "program.hpp"
 
 int main(int argc, char** argv) {
   using namespace marrow::cli;

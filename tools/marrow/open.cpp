@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `marrow open`: starts the workbench, which is a program and a package of its own.
+// `marrow open`: starts the workbench, a separate program and package.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>

@@ -6,27 +6,13 @@
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "drawn_graph.hpp"
-#include "given_path.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/run/run_folder.hpp"
 
 namespace marrow::cli {
-namespace {
-
-void print_json(const Diagnostics& diagnostics) {
-  nlohmann::json list = nlohmann::json::array();
-  for (const Diagnostic& item : diagnostics.sorted())
-    list.push_back({{"file", item.place.file},
-                    {"line", item.place.line},
-                    {"column", item.place.column},
-                    {"message", item.message},
-                    {"hint", item.hint}});
-  print_as_json(list);
-}
-
-}  // namespace
 
 std::vector<std::pair<std::string, std::string>> pairs_of(const std::vector<std::string>& texts, const char* form) {
   std::vector<std::pair<std::string, std::string>> result;
@@ -52,9 +38,19 @@ PipelineArguments arguments_of(const PipelineRequest& request) {
   return arguments;
 }
 
+nlohmann::json faults_json(const Diagnostics& diagnostics) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const Diagnostic& item : diagnostics.sorted())
+    list.push_back({{"file", item.place.file},
+                    {"line", item.place.line},
+                    {"column", item.place.column},
+                    {"message", item.message},
+                    {"hint", item.hint}});
+  return list;
+}
+
 void print_faults(const Diagnostics& diagnostics) {
-  std::fprintf(stderr, "%s%zu error%s\n", diagnostics.text().c_str(), diagnostics.size(),
-               diagnostics.size() == 1 ? "" : "s");
+  std::fprintf(stderr, "%s%s\n", diagnostics.text().c_str(), counted(diagnostics.size(), "error").c_str());
 }
 
 namespace {
@@ -83,7 +79,7 @@ bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& 
   pipeline = read_pipeline(request.file, arguments, catalogue, diagnostics, inputs_required);
   for (std::string& note : notes_on_repeated(arguments.overrides)) pipeline.notes.push_back(std::move(note));
   check_writers(pipeline, catalogue, diagnostics);
-  if (json) print_json(diagnostics);
+  if (json) print_as_json(faults_json(diagnostics));
   if (diagnostics.empty()) return true;
   if (!json) print_faults(diagnostics);
   return false;

@@ -8,6 +8,7 @@
 #include <array>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <new>
@@ -32,7 +33,7 @@ void say(const char* text) {
   say("marrow: error: ");
   try {
     if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
-    say("ended without a reason that it knows");
+    say("it ended for an unknown reason");
   } catch (const std::bad_alloc&) {
     say("out of memory");
   } catch (const std::exception& error) {
@@ -107,3 +108,12 @@ std::string stopped_text() {
 }
 
 }  // namespace marrow::cli
+
+// Functions of the C library that end the process without another word. Those of the program are found before those of
+// the library, also by plugins. exit() and quick_exit() call what they were told to (runtime/process/plugin_code.cpp).
+extern "C" {
+
+void _exit(int code) { marrow::end_process(marrow::code_of_end(code)); }
+
+void _Exit(int code) noexcept { marrow::end_process(marrow::code_of_end(code)); }
+}

@@ -63,7 +63,7 @@ void add_diff(CLI::App& app, int& code) {
     bool as_json = false;
   };
   const auto given = std::make_shared<Given>();
-  CLI::App* command = app.add_subcommand("diff", "say where two runs part, by how much and why");
+  CLI::App* command = app.add_subcommand("diff", "say where two runs begin to differ, by how much, and why");
   command->add_option("first", given->first, "folder of a run, or of a cell of a comparison")->required();
   command->add_option("second", given->second, "folder of the run to compare it with")->required();
   command->add_flag("--json", given->as_json, "as JSON");
@@ -73,11 +73,11 @@ void add_diff(CLI::App& app, int& code) {
 void add_rerun(CLI::App& app, int& code) {
   const auto request = std::make_shared<RerunRequest>();
   CLI::App* command = app.add_subcommand(
-      "rerun", "repeat a run from its folder, computing everything anew, and say whether the results are the same");
+      "rerun", "repeat a run from its folder without stored results, and say whether its results are the same");
   command->add_option("run", request->run, "folder of the run, or of a cell of a comparison")->required();
   command->add_option(
       "--out", request->folder,
-      "folder to write; new or empty (default: runs/NAME-rerun, or runs/NAME-rerun-2 ... where that is there)");
+      "folder to write; new or empty (default: runs/NAME-rerun, or runs/NAME-rerun-2 ... if that exists)");
   add_log_level(command, request->log_level);
   command->add_flag("--quiet", request->quiet, "no progress");
   command->add_flag("--json", request->json, "print the differences as JSON");

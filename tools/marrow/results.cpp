@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// What commands print: events, notes, verdicts and the most important results.
 #include <unistd.h>
 
 #include <algorithm>
@@ -7,8 +8,11 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
+#include "marrow/base/json_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/types.hpp"
+#include "marrow/runtime/run/run_log.hpp"
+#include "marrow/runtime/store/shared_store.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -70,13 +74,48 @@ void print_value(const std::string& name, const Value& value) {
   if (value.type == TypeInfo::of<Metrics>()) print_metrics(name, {""}, {&value.as<Metrics>()});
 }
 
+void say_note_in_lines(const std::string& text) {
+  if (!text.empty()) std::fprintf(stderr, "marrow: note: %s\n", printable_lines(text).c_str());
+}
+
 }  // namespace
+
+std::string place_of(const RunEvent& event) {
+  return event.item.empty() ? event.node : event.node + " (" + event.item + ")";
+}
+
+nlohmann::json json_of(const RunEvent& event) {
+  using Kind = RunEvent::Kind;
+  static constexpr const char* kNames[] = {"started", "progress", "finished", "failed",  "skipped",
+                                           "message", "warning",  "cached",   "waiting", "waited"};
+  nlohmann::json j = {{"event", kNames[int(event.kind)]}, {"node", event.node}};
+  if (!event.item.empty()) j["item"] = event.item;
+  if (!event.text.empty()) j["text"] = event.text;
+  if (event.kind == Kind::message || event.kind == Kind::warning || event.kind == Kind::failed)
+    j["level"] = level_name(event.level);
+  if (event.kind == Kind::progress) j["fraction"] = event.fraction;
+  if (event.kind == Kind::finished || event.kind == Kind::cached) j["seconds"] = event.seconds;
+  return j;
+}
+
+bool can_keep_results(const std::string& fault_of_store, bool quiet) {
+  if (!fault_of_store.empty() && !quiet)
+    std::fprintf(stderr, "marrow: note: results are not kept: %s\n", printable_lines(fault_of_store).c_str());
+  return fault_of_store.empty();
+}
+
+void say_if_not_shared(const Store& store, bool quiet) {
+  const std::string fault = store.shared() && !quiet ? store.shared()->fault() : "";
+  if (!fault.empty()) say_note_in_lines("the shared store is not used: " + fault);
+}
+
+void say_complaint(const Store& store) {
+  if (store.shared()) say_note_in_lines(store.shared()->complaint());
+}
 
 void say_note(const std::string& text) { std::fprintf(stderr, "marrow: note: %s\n", printable(text).c_str()); }
 
-void print_as_json(const nlohmann::json& value, int indent) {
-  std::printf("%s\n", value.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
-}
+void print_as_json(const nlohmann::json& value, int indent) { std::printf("%s\n", json_text(value, indent).c_str()); }
 
 void print_verdicts(const std::vector<NamedVerdict>& verdicts) {
   static constexpr const char* kColours[] = {"\033[32m", "\033[33m", "\033[31m"};  // green, yellow, red

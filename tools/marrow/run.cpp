@@ -21,7 +21,6 @@
 #include "marrow/runtime/run/verdict_json.hpp"
 #include "marrow/runtime/store/shared_store.hpp"
 #include "process.hpp"
-#include "run_event.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -38,7 +37,7 @@ class RunProgress {
   }
 
   void operator()(const RunEvent& event) {
-    const std::string where = printable(event.item.empty() ? event.node : event.node + " (" + event.item + ")");
+    const std::string where = printable(place_of(event));
     if (request_.json) print_json(event);
     switch (event.kind) {
       case Kind::finished:
@@ -122,7 +121,7 @@ class StopNotice {
 
   /// To be told of all events of the run. Safe to use from several threads.
   void operator()(const RunEvent& event) {
-    const std::string where = event.item.empty() ? event.node : event.node + " (" + event.item + ")";
+    const std::string where = place_of(event);
     const bool has_ended = event.kind == RunEvent::Kind::finished || event.kind == RunEvent::Kind::failed;
     if (event.kind != RunEvent::Kind::started && !has_ended) return;
     const std::scoped_lock lock(mutex_);
@@ -341,7 +340,7 @@ void add_run(CLI::App& app, int& code) {
   CLI::App* command = app.add_subcommand("run", "run a pipeline and write a folder with its results");
   add_pipeline_arguments(command, request->pipeline);
   command->add_option("--out", request->folder,
-                      "folder to write; new or empty (default: runs/NAME, or runs/NAME-2 ... where that is there)");
+                      "folder to write; new or empty (default: runs/NAME, or runs/NAME-2 ... if that exists)");
   command
       ->add_option("--only", request->only,
                    "compute and write only this output, and the verdicts on its poses; may be given several times")

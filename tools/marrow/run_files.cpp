@@ -68,7 +68,7 @@ bool leads_outside(const fs::path& folder, const std::string& name) {
 void refuse_outside(const fs::path& folder, const std::string& name) {
   if (leads_outside(folder, name))
     throw Error((folder / name).string() +
-                " is a link to a file outside of the folder, of which nothing is shown; copy it there");
+                " is a link to a file outside of the folder, and such files are not shown; copy it into the folder");
 }
 
 RgbPixels read_png(const fs::path& file) {

@@ -220,8 +220,8 @@ int schema(const std::filesystem::path& file) {
 void add_schema(CLI::App& app, int& code) {
   const auto file = std::make_shared<std::filesystem::path>();
   CLI::App* command =
-      app.add_subcommand("schema", "print the JSON Schema of pipelines, by which editors complete and check");
-  command->add_option("--out", *file, "write it to this file; one that is there is replaced");
+      app.add_subcommand("schema", "print the JSON Schema of pipelines, with which editors complete and check them");
+  command->add_option("--out", *file, "write it to this file; an existing one is replaced");
   command->callback([file, &code] { code = schema(*file); });
   say_that_libraries_are_described(command);
 }

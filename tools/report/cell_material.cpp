@@ -5,6 +5,7 @@
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/hash.hpp"
+#include "marrow/base/json_text.hpp"
 #include "marrow/base/text_file.hpp"
 
 namespace marrow::cli {
@@ -15,8 +16,6 @@ using compare::CellIndex;
 using nlohmann::json;
 
 constexpr const char* kFolder = "report";
-
-std::string text_of(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
 
 /// What is known of the cells of one case and start, and the pictures, meshes and scenes that they name.
 struct Place {
@@ -32,10 +31,10 @@ std::array<std::pair<const char*, json*>, 3> groups_of(ReportMaterial& material)
 
 /// The bytes by which `data` grows if a place is added. What another place has already added does not count.
 std::size_t growth(const json& data, Place& place) {
-  std::size_t bytes = text_of(place.cells).size();
+  std::size_t bytes = json_text(place.cells).size();
   for (const auto& [name, group] : groups_of(place.material))
     for (const auto& [id, thing] : group->items())
-      if (!data.at(name).contains(id)) bytes += id.size() + 5 + text_of(thing).size();
+      if (!data.at(name).contains(id)) bytes += id.size() + 5 + json_text(thing).size();
   return bytes;
 }
 
@@ -58,7 +57,7 @@ json written_beside(Place place, const fs::path& folder) {
   const std::vector<std::string> kinds = kinds_in(place.cells);
   json content = {{"materials", std::move(place.cells)}};
   for (const auto& [name, group] : groups_of(place.material)) content[name] = std::move(*group);
-  const std::string text = text_of(content), name = hash_of(text).hex().substr(0, 16) + ".js";
+  const std::string text = json_text(content), name = hash_of(text).hex().substr(0, 16) + ".js";
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw Error("cannot make the folder " + folder.string() + ": " + error.message());
@@ -94,7 +93,7 @@ void add_cell_materials(json& data, const compare::CellRunner& runner, const std
       enter(data, std::move(place));
     } else {
       data["parts"].push_back(written_beside(std::move(place), folder / kFolder));
-      bytes += text_of(data["parts"].back()).size() + 1;
+      bytes += json_text(data["parts"].back()).size() + 1;
     }
   }
 }

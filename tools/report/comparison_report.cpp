@@ -14,14 +14,6 @@ using compare::CellRow;
 using compare::Experiment;
 using nlohmann::json;
 
-std::string text_of_file(const fs::path& file) {
-  try {
-    return read_text_file(file, kMostSourceBytes);
-  } catch (const Error&) {
-    return "";  // the page is written without it
-  }
-}
-
 std::string starts_sentence(const Experiment& experiment) {
   if (!experiment.protocol) return "Each run starts where its pipeline starts.";
   const compare::StartProtocol& protocol = *experiment.protocol;
@@ -76,7 +68,7 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
                         {"help", experiment.help},
                         {"file", experiment.file.string()},
                         {"text", experiment.text},
-                        {"pipeline_text", text_of_file(experiment.pipeline)},
+                        {"pipeline_text", text_if_readable(experiment.pipeline)},
                         {"seed", 1},
                         {"command", command_of(experiment, request)},
                         {"folder", folder.string()},
@@ -107,10 +99,7 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
   data["marrow"] = record.value("marrow", "");
   data["experiment"]["machine"] = machine_of(record);
   data["experiment"]["finished"] = record.value("finished", "");
-  data["experiment"]["plugins"] = json::array();
-  for (const json& plugin : record.value("plugins", json::array()))
-    data["experiment"]["plugins"].push_back(
-        {{"file", plugin.value("file", "")}, {"build_id", plugin.value("build_id", "")}});
+  data["experiment"]["plugins"] = plugins_of(record);
   add_cell_materials(data, runner, shown, folder, std::size_t(1e6 * request.page_mb));
   write_page(data, folder / "report.html");
   remove_other_parts(data, folder);

@@ -25,11 +25,7 @@ using nlohmann::json;
 
 constexpr int kPictureSize = 1000;
 
-std::string id_of(const std::string& content) {
-  Hasher hasher;
-  hasher.add(content);
-  return hasher.digest().hex().substr(0, 16);
-}
+std::string id_of(const std::string& content) { return hash_of(content).hex().substr(0, 16); }
 
 /// A file's name below outputs/, without its extension.
 std::string place_of(const std::string& name) {
@@ -209,7 +205,7 @@ void ReportMaterial::prepare(const fs::path& run_folder) {
                     {"geometries", material.geometries},
                     {"scenes", material.scenes},
                     {"left_out", material.left_out}};
-  write_text_file(run_folder / "report.json", all.dump(-1, ' ', false, json::error_handler_t::replace));
+  write_text_file(run_folder / "report.json", json_text(all));
 }
 
 void ReportMaterial::add_prepared(const fs::path& run_folder, json& cell) {
@@ -237,6 +233,21 @@ json machine_of(const json& run_record) {
     if (line.starts_with("model name")) cpu = line.substr(line.find(':') + 2);
   return {
       {"cpu", cpu}, {"cores", std::thread::hardware_concurrency()}, {"cpu_level", run_record.value("cpu_level", "")}};
+}
+
+json plugins_of(const json& run_record) {
+  json plugins = json::array();
+  for (const json& plugin : run_record.value("plugins", json::array()))
+    plugins.push_back({{"file", plugin.value("file", "")}, {"build_id", plugin.value("build_id", "")}});
+  return plugins;
+}
+
+std::string text_if_readable(const fs::path& file) {
+  try {
+    return read_text_file(file, kMostSourceBytes);
+  } catch (const Error&) {
+    return "";
+  }
 }
 
 }  // namespace marrow::cli

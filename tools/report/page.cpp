@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "marrow/base/json_text.hpp"
 #include "marrow/base/text_file.hpp"
 #include "report/cell_material.hpp"
 #include "report/report.hpp"
@@ -27,7 +28,7 @@ std::string_view page_without_data() {
 
 /// No text in the data may end the script, so "<" is written as a JSON escape.
 std::string safe_text(const nlohmann::json& data) {
-  const std::string text = data.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  const std::string text = json_text(data);
   std::string safe;
   safe.reserve(text.size() + text.size() / 16);
   for (const char c : text) c == '<' ? safe += "\\u003c" : safe += c;

@@ -53,6 +53,10 @@ nlohmann::json graph_of(const Pipeline& pipeline, const std::vector<std::pair<st
 
 /// Processor and number of cores of this machine, and the processor level from the record of a run.
 nlohmann::json machine_of(const nlohmann::json& run_record);
+/// [{file, build_id}] of the plugins that a run used.
+nlohmann::json plugins_of(const nlohmann::json& run_record);
+/// The text of a file that people write; empty if it cannot be read, for a page without it.
+std::string text_if_readable(const std::filesystem::path& file);
 
 /// Any text as one word of a command that a person copies into a shell. It holds only characters that terminals and
 /// pages show as they are: a text with others is written as $'...', which bash, zsh, ksh and POSIX of 2024 read.

@@ -3,7 +3,6 @@
 #include <optional>
 
 #include "command_options.hpp"
-#include "given_path.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/plain_path.hpp"
@@ -109,14 +108,6 @@ std::string absent_of(const json& record) {
   return text;
 }
 
-std::string pipeline_text_of(const fs::path& file) {
-  try {
-    return read_text_file(file, kMostSourceBytes);
-  } catch (const Error&) {
-    return "";  // the page is written without it
-  }
-}
-
 json page_of(const fs::path& folder, const json& record, ReportMaterial& material) {
   const std::string name = fs::absolute(folder / ".").parent_path().filename().string();
   json cell = {{"id", name},
@@ -149,17 +140,14 @@ json page_of(const fs::path& folder, const json& record, ReportMaterial& materia
   if (!pipeline) material.note_if_outside(folder, "pipeline.yaml");
   const json graph = pipeline ? graph_of_run(*pipeline) : json();
   if (graph.is_object()) data["graph"] = graph;
-  json plugins = json::array();
-  for (const json& plugin : record.value("plugins", json::array()))
-    plugins.push_back({{"file", plugin.value("file", "")}, {"build_id", plugin.value("build_id", "")}});
   data["experiment"] = {{"name", record.value("pipeline", name)},
-                        {"pipeline_text", pipeline ? pipeline_text_of(*pipeline) : ""},
+                        {"pipeline_text", pipeline ? text_if_readable(*pipeline) : ""},
                         {"seed", record.contains("seed") ? record["seed"] : json(1)},
                         {"finished", record.value("finished", "")},
                         {"command", "marrow rerun " + shell_path(folder)},
                         {"folder", cell["folder"]},
                         {"machine", machine_of(record)},
-                        {"plugins", plugins}};
+                        {"plugins", plugins_of(record)}};
   return data;
 }
 
@@ -190,7 +178,7 @@ void add_show(CLI::App& app, int& code) {
   const auto run = std::make_shared<fs::path>(), file = std::make_shared<fs::path>();
   CLI::App* command = app.add_subcommand("show", "write a page that shows a run: figures, pictures, 3D view");
   command->add_option("run", *run, "folder of the run")->required();
-  command->add_option("--out", *file, "HTML file to write; one that is there is replaced (default: RUN/report.html)");
+  command->add_option("--out", *file, "HTML file to write; an existing one is replaced (default: RUN/report.html)");
   command->callback([run, file, &code] {
     std::printf("%s\n", printable(plain_path(fs::absolute(write_run_page(*run, *file))).string()).c_str());
     code = 0;

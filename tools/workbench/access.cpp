@@ -62,7 +62,7 @@ std::string Access::fault(const Asked& asked, bool hands_in_token) const {
     return "a page of another site may not ask this server";
   if (asked.fetch_site == "cross-site" && !hands_in_token) return "a page of another site may not ask this server";
   if (!hands_in_token && !is_same(value_of_cookie(asked.cookie, cookie_name()), session_))
-    return "this browser is not known here; open the address that 'marrow open' printed, or start it anew";
+    return "this browser is not known here; open the address that 'marrow open' printed, or start it again";
   if (!asked.changes) return "";
   if (asked.own_header.empty()) return "the header X-Marrow is missing";
   if (asked.content_type != "application/json") return "only JSON may be sent here";

@@ -8,6 +8,7 @@
 
 #include "marrow/base/number_text.hpp"
 #include "workbench/server.hpp"
+#include "workbench/value_json.hpp"
 
 namespace marrow::workbench {
 namespace {
@@ -25,8 +26,6 @@ double obliquity_deg(const Grid& grid) {
   }
   return largest_deg;
 }
-
-json list_of(const Eigen::Vector3d& vector) { return {vector.x(), vector.y(), vector.z()}; }
 
 std::int16_t as_int16(float value) { return std::int16_t(std::lround(std::clamp(value, -32768.0f, 32767.0f))); }
 
@@ -98,11 +97,11 @@ std::shared_ptr<const OpenCt> CtMemory::add(const std::string& content, Value va
 json about_ct(const OpenCt& ct) {
   const Grid& grid = ct.volume().grid;
   json direction = json::array();
-  for (int row = 0; row < 3; ++row) direction.push_back(list_of(grid.direction.row(row)));
+  for (int row = 0; row < 3; ++row) direction.push_back(json_of(Eigen::Vector3d(grid.direction.row(row))));
   return {{"name", ct.name},
           {"size", grid.size},
-          {"spacing_mm", list_of(grid.spacing_mm)},
-          {"origin_mm", list_of(grid.origin_mm)},
+          {"spacing_mm", json_of(grid.spacing_mm)},
+          {"origin_mm", json_of(grid.origin_mm)},
           {"direction", direction},
           {"lowest_hu", ct.lowest_hu},
           {"highest_hu", ct.highest_hu},

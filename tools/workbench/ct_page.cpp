@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The requests of the page "Case" about its CT: reading it, and its slices.
+#include "marrow/base/json_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "workbench/ct_memory.hpp"
 #include "workbench/ct_requests.hpp"
@@ -18,9 +19,7 @@ PipelineCall call_of(const fs::path& place, const json& ct) {
   PipelineCall call{.file = workbench_pipeline("volume"), .keep = false};  // storing it takes longer than reading it
   call.arguments.inputs.push_back({"ct", place.string()});
   for (const char* option : kOptions)
-    if (ct.contains(option))
-      call.arguments.overrides.push_back(
-          {std::string("ct.") + option, ct[option].dump(-1, ' ', false, json::error_handler_t::replace)});
+    if (ct.contains(option)) call.arguments.overrides.push_back({std::string("ct.") + option, json_text(ct[option])});
   return call;
 }
 

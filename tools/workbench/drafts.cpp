@@ -10,6 +10,7 @@
 
 #include "marrow/base/descriptor.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/json_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "workbench/server.hpp"
 
@@ -60,10 +61,9 @@ void Drafts::apply(Draft& draft, const json& line) {
 }
 
 void Drafts::append(Draft& draft, const json& line) {
-  const auto text = [](const json& one) { return one.dump(-1, ' ', false, json::error_handler_t::replace) + "\n"; };
-  std::string lines = text(line);
+  std::string lines = json_text(line) + "\n";
   if (draft.bytes == 0)  // the beginning belongs to the history, too
-    lines = text({{"what", draft.steps[0].what}, {"document", draft.steps[0].document}}) + lines;
+    lines = json_text({{"what", draft.steps[0].what}, {"document", draft.steps[0].document}}) + "\n" + lines;
   append_line(draft.file, lines);
   draft.bytes += lines.size();
   apply(draft, line);

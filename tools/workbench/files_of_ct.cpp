@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which files a CT is read from.
 #include "marrow/base/error.hpp"
+#include "marrow/base/json_text.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "workbench/ct_requests.hpp"
@@ -39,8 +40,7 @@ void FilesOfCt::add(const fs::path& file) {
 
 std::string content_of_ct(const fs::path& place, nlohmann::json ct, const FilesOfCt& files) {
   ct.erase("file");
-  return place.string() + '\n' + ct.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + '\n' +
-         files.description;
+  return place.string() + '\n' + json_text(ct) + '\n' + files.description;
 }
 
 }  // namespace marrow::workbench

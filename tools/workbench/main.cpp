@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // marrow-workbench: the program behind `marrow open`.
-#include "program.hpp"
+#include "commands.hpp"
 #include "workbench/open.hpp"
 
 int main(int argc, char** argv) { return marrow::cli::run_program(argc, argv, {marrow::workbench::add_open}); }

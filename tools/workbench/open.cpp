@@ -12,7 +12,6 @@
 #include <cstdio>
 
 #include "command_options.hpp"
-#include "given_path.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"

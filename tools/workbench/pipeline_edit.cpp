@@ -5,9 +5,11 @@
 #include <nlohmann/json.hpp>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/json_text.hpp"
 #include "marrow/base/names.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/yaml.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "workbench/yaml_text.hpp"
 
 namespace marrow::workbench {
@@ -104,7 +106,7 @@ YAML::Node node_of(const YAML::Node& root, const std::string& id) {
   std::vector<std::string> ids;
   for (const auto& pair : nodes)
     if (pair.first.IsScalar()) ids.push_back(pair.first.Scalar());
-  if (std::find(ids.begin(), ids.end(), id) == ids.end())
+  if (!contains(ids, id))
     throw Error("the pipeline has no node " + in_quotes(printable(id)) + "; " + suggestion(id, ids));
   const YAML::Node node = nodes[id];
   if (!node.IsMap() || node.size() == 0)
@@ -241,10 +243,9 @@ std::string yaml_scalar(const std::string& text) {
     static const std::vector<std::string> kWords{"true", "false", "yes", "no", "on", "off", "null", "~",
                                                  "True", "False", "Yes", "No", "On", "Off", "Null", "NULL",
                                                  "TRUE", "FALSE", "YES", "NO", "ON", "OFF", "y",    "n"};
-    const bool is_word = std::find(kWords.begin(), kWords.end(), text) != kWords.end();
-    if (plain.IsScalar() && plain.Scalar() == text && !is_word && !yaml_number(plain)) return text;
+    if (plain.IsScalar() && plain.Scalar() == text && !contains(kWords, text) && !yaml_number(plain)) return text;
   }
-  return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return json_text(nlohmann::json(text));
 }
 
 }  // namespace marrow::workbench

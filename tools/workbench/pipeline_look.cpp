@@ -13,6 +13,7 @@
 #include "marrow/toolbox/files/mesh_file.hpp"
 #include "report/report.hpp"
 #include "workbench/pipeline_run.hpp"
+#include "workbench/value_json.hpp"
 
 namespace fs = std::filesystem;
 
@@ -29,7 +30,7 @@ constexpr std::size_t kMostText = 100'000;
 
 template <class Item>
 std::string bytes_text(const std::vector<Item>& items) {
-  return base64({reinterpret_cast<const char*>(items.data()), items.size() * sizeof(Item)});
+  return base64(bytes_of_items(items));
 }
 
 json mesh_json(const Mesh& mesh) {
@@ -37,15 +38,9 @@ json mesh_json(const Mesh& mesh) {
   if (count > kMostTriangles)
     return {{"kind", "text"},
             {"text", formatted("a surface of {} triangles; at most {} are drawn here", count, kMostTriangles)}};
-  std::vector<float> vertices;
-  std::vector<std::uint32_t> triangles;
-  for (const auto& vertex : mesh.vertices_mm)
-    for (int k = 0; k < 3; ++k) vertices.push_back(float(vertex[k]));
-  for (const auto& triangle : mesh.triangles)
-    for (int k = 0; k < 3; ++k) triangles.push_back(std::uint32_t(triangle[k]));
   return {{"kind", "mesh"},
-          {"vertices", bytes_text(vertices)},
-          {"triangles", bytes_text(triangles)},
+          {"vertices", bytes_text(floats_of(mesh.vertices_mm))},
+          {"triangles", bytes_text(mesh.triangles)},
           {"text", formatted("{} vertices, {} triangles", mesh.vertices_mm.size(), count)}};
 }
 

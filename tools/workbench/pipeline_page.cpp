@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The requests of the page "Pipeline".
+#include "catalogue_text.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/runtime/pipeline/fits.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "workbench/pipeline_edit.hpp"
 #include "workbench/pipeline_files.hpp"
 #include "workbench/pipeline_run.hpp"
@@ -66,7 +67,7 @@ void expect_no_new_fault(const std::string& file, const PipelineEdit& edit, cons
   const std::vector<std::string> before = faults_of(file, {}, workbench);
   std::string added;
   for (const std::string& fault : faults_of(file, {{edit.key(), *edit.value, place}}, workbench))
-    if (std::find(before.begin(), before.end(), fault) == before.end()) added += (added.empty() ? "" : "\n") + fault;
+    if (!contains(before, fault)) added += (added.empty() ? "" : "\n") + fault;
   if (!added.empty()) throw Error(edit.in_words() + " is not written: " + added);
 }
 
@@ -105,14 +106,10 @@ void add_file_requests(Server& server, const Page& page) {
                           page->workbench.catalogue, diagnostics);
     if (!diagnostics.empty()) throw Error(diagnostics.text());
     json all = json::array();
-    for (const Fit& fit : fits)
-      all.push_back({{"node", fit.node},
-                     {"summary", page->workbench.catalogue.find(fit.node)->summary},
-                     {"fits", !fit.faults.empty()   ? "no"
-                              : fit.missing.empty() ? "yes"
-                                                    : "with more"},
-                     {"missing", fit.missing},
-                     {"faults", fit.faults}});
+    for (const Fit& fit : fits) {
+      all.push_back(cli::fit_json(fit));
+      all.back()["summary"] = page->workbench.catalogue.find(fit.node)->summary;
+    }
     return json_answer(all);
   });
 }

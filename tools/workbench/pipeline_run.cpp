@@ -7,7 +7,6 @@
 #include "marrow/runtime/run/place_of_results.hpp"
 #include "marrow/runtime/run/run_folder.hpp"
 #include "marrow/runtime/run/verdict_json.hpp"
-#include "run_event.hpp"
 
 namespace marrow::workbench {
 namespace {
@@ -17,7 +16,7 @@ using Kind = RunEvent::Kind;
 
 /// The lines that `marrow run` writes to the log of a run.
 void log_event(RunLog& log, const RunEvent& event) {
-  const std::string where = event.item.empty() ? event.node : event.node + " (" + event.item + ")";
+  const std::string where = cli::place_of(event);
   if (event.kind == Kind::finished) {
     const std::string text = formatted("{:.3f} s", event.seconds);
     log.keep(LogLevel::info, where, text);
@@ -41,10 +40,6 @@ json nodes_of(const Pipeline& pipeline, const RunResult& result) {
   return nodes;
 }
 
-const Store* usable_store(const Workbench& workbench) {
-  return workbench.store.fault().empty() && workbench.store.prepare().empty() ? &workbench.store : nullptr;
-}
-
 }  // namespace
 
 void LastRuns::keep(const std::string& file, std::shared_ptr<const LastRun> run) {
@@ -62,7 +57,7 @@ std::shared_ptr<const LastRun> LastRuns::find(const std::string& file, const std
 json plan_of(const Pipeline& pipeline, const Workbench& workbench) {
   static constexpr const char* kStates[] = {"not_needed", "cached", "function", "runs", "depends"};
   RunSettings settings;
-  settings.store = usable_store(workbench);
+  settings.store = workbench.usable_store();
   if (!settings.store)
     throw Error("results cannot be kept, so it is not known what is stale: " + workbench.store.fault());
   settings.remember = false;
@@ -86,7 +81,7 @@ json run_into_folder(std::shared_ptr<LastRun> run, const PipelineArguments& argu
   const std::filesystem::path runs = workbench.folder.inside("runs");
   expect_nothing_reads(run->pipeline, runs, "the folder of the runs", "open a folder above it");
   RunSettings settings;
-  settings.store = usable_store(workbench);
+  settings.store = workbench.usable_store();
   if (settings.store)
     expect_nothing_reads(run->pipeline, settings.store->folder(), "the store of results",
                          "set MARROW_CACHE to another folder");

@@ -2,6 +2,7 @@
 #include "workbench/pipeline_state.hpp"
 
 #include "catalogue_text.hpp"
+#include "commands.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/yaml.hpp"
 #include "marrow/runtime/run/run_folder.hpp"
@@ -72,17 +73,6 @@ void add_manifest(json& node, const PipelineNode& known) {
   }
 }
 
-json faults_json(const Diagnostics& diagnostics) {
-  json faults = json::array();
-  for (const Diagnostic& one : diagnostics.sorted())
-    faults.push_back({{"file", one.place.file},
-                      {"line", one.place.line},
-                      {"column", one.place.column},
-                      {"message", one.message},
-                      {"hint", one.hint}});
-  return faults;
-}
-
 }  // namespace
 
 void describe_pipeline(json& state, const Workbench& workbench) {
@@ -90,7 +80,7 @@ void describe_pipeline(json& state, const Workbench& workbench) {
   Diagnostics diagnostics;
   const Pipeline pipeline = read_pipeline(workbench.folder.inside(file), {}, workbench.catalogue, diagnostics, false);
   check_writers(pipeline, workbench.catalogue, diagnostics);
-  state["faults"] = faults_json(diagnostics);
+  state["faults"] = cli::faults_json(diagnostics);
   state["faults_text"] = diagnostics.text();
   state["graph"] = nullptr;
   state["nodes"] = json::object();
@@ -137,8 +127,7 @@ Pipeline pipeline_of_form(const std::string& file, const json& inputs, const Wor
 
 std::string command_of_form(const std::string& command, const std::string& file, const json& inputs,
                             const Workbench& workbench) {
-  std::string text = "cd " + cli::shell_path(workbench.folder.path()) + " && marrow " + command + " " +
-                     cli::shell_path(std::filesystem::path(file));
+  std::string text = command_in_folder(workbench, command + " " + cli::shell_path(file));
   if (inputs.is_object())
     for (const auto& [name, value] : inputs.items())
       if (value.is_string() && !value.get<std::string>().empty())

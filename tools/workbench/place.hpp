@@ -88,10 +88,6 @@ std::map<std::string, std::string> start_files(const PlacedCase& placed,
 /// already holds the same files, uses that.
 std::string write_placement(const OpenedFolder& folder, const std::string& into, const PlacedCase& placed,
                             const std::map<std::string, std::string>& texts);
-/// Writes a pose file for each bone in this way.
-std::string write_starts(const OpenedFolder& folder, const std::string& into, const PlacedCase& placed,
-                         const std::map<std::string, RigidTransform>& poses);
-
 /// Pipelines that register a case from its starts: [{file, name, help}], those of marrow first. `file` is relative to
 /// the opened folder, or absolute.
 nlohmann::json pipelines_from_starts(const Workbench& workbench);

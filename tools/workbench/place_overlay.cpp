@@ -15,13 +15,6 @@ namespace {
 
 using nlohmann::json;
 
-std::string bytes_of(const cv::Mat& grey) {  // CV_8U
-  std::string bytes;
-  bytes.reserve(grey.total());
-  for (int row = 0; row < grey.rows; ++row) bytes.append(grey.ptr<char>(row), std::size_t(grey.cols));
-  return bytes;
-}
-
 /// The mean of each square of `step` pixels, as CV_32F; a rest at the right and below is left out.
 cv::Mat means_of_squares(const cv::Mat& pixels, int step) {
   cv::Mat grey;
@@ -63,15 +56,10 @@ std::string edges_of(const std::vector<float>& values, const PixelGrid& grid, do
 
 std::string outline_bytes(const OverlayWish& wish, json& about) {
   const auto points = wish.bone->outline->outline(wish.view->camera, wish.world_from_model, wish.step_px);
-  std::string bytes(points.size() * 2 * sizeof(float), '\0');
-  char* at = bytes.data();
-  for (const OutlinePoint& point : points)
-    for (const float value : {point.u_px, point.v_px}) {
-      std::memcpy(at, &value, sizeof value);
-      at += sizeof value;
-    }
+  std::vector<float> places;
+  for (const OutlinePoint& point : points) places.insert(places.end(), {point.u_px, point.v_px});
   about = {{"points", points.size()}};
-  return bytes;
+  return bytes_of_items(places);
 }
 
 }  // namespace
@@ -85,7 +73,7 @@ std::string grey_bytes(const View& view, int step_px) {
                bright = std::max(quantile_in_place(values, 0.995), dark + 1e-9);
   cv::Mat bytes;
   small.convertTo(bytes, CV_8U, 255 / (bright - dark), -255 * dark / (bright - dark));
-  return bytes_of(bytes);
+  return bytes_of_pixels(bytes);
 }
 
 std::string overlay_bytes(const OverlayWish& wish, json& about) {

@@ -17,26 +17,14 @@ constexpr const char* kHidden = ".marrow/placed";
 /// What the page needs of an opened case.
 json about_case(const PlacedCase& placed) {
   json views = json::array(), bones = json::array();
-  for (std::size_t i = 0; i < placed.views.size(); ++i) {
-    const Camera& camera = placed.views[i].camera;
-    json intrinsics = json::array();
-    for (int row = 0; row < 3; ++row)
-      intrinsics.push_back({camera.intrinsics(row, 0), camera.intrinsics(row, 1), camera.intrinsics(row, 2)});
-    views.push_back({{"name", placed.views.name(i)},
-                     {"camera",
-                      {{"width_px", camera.width_px},
-                       {"height_px", camera.height_px},
-                       {"intrinsics", intrinsics},
-                       {"camera_from_world", json_of(camera.camera_from_world)}}}});
-  }
-  for (const PlacedBone& bone : placed.bones) {
-    const Eigen::Vector3d &middle = bone.frame.origin_mm, along = bone.frame.axes.col(2);
+  for (std::size_t i = 0; i < placed.views.size(); ++i)
+    views.push_back({{"name", placed.views.name(i)}, {"camera", json_of(placed.views[i].camera)}});
+  for (const PlacedBone& bone : placed.bones)
     bones.push_back({{"name", bone.name},
-                     {"middle_mm", {middle.x(), middle.y(), middle.z()}},
-                     {"long_axis", {along.x(), along.y(), along.z()}},
+                     {"middle_mm", json_of(bone.frame.origin_mm)},
+                     {"long_axis", json_of(Eigen::Vector3d(bone.frame.axes.col(2)))},
                      {"start", json_of(bone.start)},
                      {"start_is", bone.start_is}});
-  }
   return {{"case", placed.path}, {"views", views}, {"bones", bones}};
 }
 
@@ -78,7 +66,7 @@ Answer overlay(const PlacedCase& placed, const Request& request) {
 /// Begins a job that runs a pipeline from the poses of the request.
 json start_from(const Request& request, const PlacedCase& placed, Workbench& workbench, const std::string& title,
                 const std::string& into, const std::filesystem::path& pipeline, const std::string& shown) {
-  const std::string starts = write_starts(workbench.folder, into, placed, poses_in(request));
+  const std::string starts = write_placement(workbench.folder, into, placed, start_files(placed, poses_in(request)));
   const std::string command = command_from_starts(workbench, shown, placed.path, starts);
   const std::string job =
       workbench.jobs.start(title, command, [&workbench, pipeline, path = placed.path, starts](Job& j) {

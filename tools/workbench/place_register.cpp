@@ -10,6 +10,7 @@
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
 #include "marrow/runtime/node/types.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 #include "new/templates.hpp"
@@ -129,11 +130,6 @@ std::string write_placement(const OpenedFolder& folder, const std::string& into,
   throw Error("there are too many folders in " + printable(folder.inside(all).string()) + "; remove some");
 }
 
-std::string write_starts(const OpenedFolder& folder, const std::string& into, const PlacedCase& placed,
-                         const std::map<std::string, RigidTransform>& poses) {
-  return write_placement(folder, into, placed, start_files(placed, poses));
-}
-
 json pipelines_from_starts(const Workbench& workbench) {
   std::vector<fs::path> files{workbench_pipeline("register")};
   std::vector<fs::path> shipped;
@@ -178,8 +174,7 @@ json run_from_starts(const Workbench& workbench, const fs::path& pipeline, const
   call.arguments.inputs = {{"case", folder}};
   call.arguments.overrides = {{node_with_starts(read) + "." + kStarts, workbench.folder.inside(starts).string()}};
   // An output of the name 'pose' is the result; otherwise the first one is.
-  const bool has_pose = std::find(poses.begin(), poses.end(), "pose") != poses.end();
-  if (!poses.empty()) call.only.push_back(has_pose ? "pose" : poses.front());
+  if (!poses.empty()) call.only.push_back(contains(poses, "pose") ? "pose" : poses.front());
   if (!verdicts.empty()) call.only.push_back(verdicts.front());
   json result = {{"poses", json::object()}, {"verdicts", json::object()}};
   for (const auto& [name, value] : outputs_of(call, workbench, job))

@@ -36,7 +36,7 @@ struct TrackWish {
 };
 
 /// Writes the poses in the first frame as BONE.yaml, and the keyframes {BONE: {FRAME from 1: matrix}} as BONE.tra, into
-/// a folder as write_starts() does. So that other sequences have other folders, `sequence` is written beside them.
+/// a folder as write_placement() does. So that other sequences have other folders, `sequence` is written beside them.
 /// Returns the folder's path relative to the opened folder.
 std::string write_keyframes(const OpenedFolder& folder, const PlacedCase& placed,
                             const std::map<std::string, RigidTransform>& starts, const nlohmann::json& keyframes,

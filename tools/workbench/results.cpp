@@ -8,6 +8,7 @@
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/run/verdict_json.hpp"
 #include "report/report.hpp"
 #include "run_files.hpp"
@@ -135,7 +136,7 @@ json compare_results(const OpenedFolder& opened, const std::string& first, const
   const std::vector<std::string> others = pictures_of(now, now_record);
   json pictures = json::array();
   for (const std::string& picture : pictures_of(before, before_record))
-    if (std::find(others.begin(), others.end(), picture) != others.end()) pictures.push_back(picture);
+    if (contains(others, picture)) pictures.push_back(picture);
   return {{"findings", cli::json_of(findings)},
           {"figures", figures_side_by_side(cli::figures_of(before, before_record), cli::figures_of(now, now_record))},
           {"pictures", pictures}};

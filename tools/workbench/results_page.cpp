@@ -20,10 +20,6 @@ constexpr const char* kReportPolicy =
     "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
 
-std::string in_folder(const Workbench& workbench, const std::string& command) {
-  return "cd " + cli::shell_path(workbench.folder.path()) + " && marrow " + command;
-}
-
 /// The name of a downloaded file, reduced to characters that a header may hold.
 std::string download_name(const std::string& result) {
   std::string name;
@@ -67,14 +63,14 @@ void add_results_page(Server& server, Workbench& workbench) {
   server.get("/api/results/diff", [&](const Request& request) {
     const std::string &first = request.parameter("first"), &second = request.parameter("second");
     json answer = compare_results(workbench.folder, first, second);
-    answer["command"] = in_folder(workbench, "diff " + cli::shell_path(first) + " " + cli::shell_path(second));
+    answer["command"] = command_in_folder(workbench, "diff " + cli::shell_path(first) + " " + cli::shell_path(second));
     return json_answer(answer);
   });
   server.post("/api/results/report", [&](const Request& request) {
     const std::string result = request.text("folder");
     report_of(workbench.folder, result);
     const bool is_run = fs::exists(workbench.folder.inside(result) / "run.json");  // a comparison wrote its own report
-    return json_answer({{"command", is_run ? in_folder(workbench, "show " + cli::shell_path(result)) : ""}});
+    return json_answer({{"command", is_run ? command_in_folder(workbench, "show " + cli::shell_path(result)) : ""}});
   });
   server.get("/results/report.html", [&](const Request& request) { return report_answer(workbench, request); });
   server.get("/results/part.txt", [&](const Request& request) { return part_answer(workbench, request); });

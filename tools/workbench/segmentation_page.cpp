@@ -9,6 +9,7 @@
 #include "marrow/domain/mesh.hpp"
 #include "workbench/ct_requests.hpp"
 #include "workbench/segmentation.hpp"
+#include "workbench/value_json.hpp"
 
 namespace marrow::workbench {
 namespace {
@@ -153,18 +154,13 @@ Answer outlines(const Segmentation& segmentation, int axis, int index) {
   for (std::size_t f = 0; f < segmentation.fields.size(); ++f) {
     const auto ends = outline_in_slice(segmentation.fields[f], segmentation.ct->volume().grid, axis, index);
     fragments.push_back({{"name", segmentation.fields.name(f)}, {"numbers", ends.size()}});
-    bytes.append(reinterpret_cast<const char*>(ends.data()), ends.size() * sizeof(float));
+    bytes += bytes_of_items(ends);
   }
   return bytes_answer(std::move(bytes), fragments);
 }
 
 Answer surface(const Mesh& mesh) {
-  std::vector<float> vertices;
-  vertices.reserve(3 * mesh.vertices_mm.size());
-  for (const Eigen::Vector3d& vertex : mesh.vertices_mm)
-    for (int k = 0; k < 3; ++k) vertices.push_back(float(vertex[k]));
-  std::string bytes(reinterpret_cast<const char*>(vertices.data()), vertices.size() * sizeof(float));
-  bytes.append(reinterpret_cast<const char*>(mesh.triangles.data()), mesh.triangles.size() * sizeof(mesh.triangles[0]));
+  std::string bytes = bytes_of_items(floats_of(mesh.vertices_mm)) + bytes_of_items(mesh.triangles);
   return bytes_answer(std::move(bytes), {{"vertices", mesh.vertices_mm.size()}, {"triangles", mesh.triangles.size()}});
 }
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <thread>
 
+#include "marrow/base/json_text.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/reason_of_exception.hpp"
@@ -40,8 +41,7 @@ Asked asked_by(const httplib::Request& request) {
 
 void refuse(httplib::Response& response, int status, const std::string& text) {
   response.status = status;
-  response.set_content(json{{"error", printable_lines(text)}}.dump(-1, ' ', false, json::error_handler_t::replace),
-                       "application/json");
+  response.set_content(json_text(json{{"error", printable_lines(text)}}), "application/json");
 }
 
 /// As it is: httplib compresses what set_content() is given, and that takes a second for the scripts of a page.
@@ -86,7 +86,7 @@ std::string Request::text(const std::string& name) const {
   return found->get<std::string>();
 }
 
-Answer json_answer(const json& value) { return {value.dump(-1, ' ', false, json::error_handler_t::replace)}; }
+Answer json_answer(const json& value) { return {json_text(value)}; }
 
 Answer bytes_answer(std::string bytes, const json& about) {
   Answer answer{std::move(bytes), "application/octet-stream"};
@@ -137,7 +137,7 @@ struct Server::Parts {
     if (access.take_token(request.get_param_value("token"))) {
       response.set_header("Set-Cookie", access.cookie());
     } else if (!access.fault(asked_by(request), false).empty()) {
-      refuse(response, 403, "this address was used before; start 'marrow open' anew for a new one");
+      refuse(response, 403, "this address was used before; start 'marrow open' again for a new one");
       return httplib::Server::HandlerResponse::Handled;
     }
     response.set_redirect("/");  // so that the token does not stay in the address; the browser keeps what is behind '#'

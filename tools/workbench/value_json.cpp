@@ -5,6 +5,8 @@ namespace marrow::workbench {
 
 using nlohmann::json;
 
+json json_of(const Eigen::Vector3d& vector) { return {vector.x(), vector.y(), vector.z()}; }
+
 json json_of(const RigidTransform& target_from_source) {
   json rows = json::array();
   for (int i = 0; i < 3; ++i) {
@@ -25,6 +27,22 @@ json json_of(const Camera& camera) {
           {"camera_from_world", json_of(camera.camera_from_world)},
           {"width_px", camera.width_px},
           {"height_px", camera.height_px}};
+}
+
+std::vector<float> floats_of(const std::vector<Eigen::Vector3d>& points) {
+  std::vector<float> numbers;
+  numbers.reserve(3 * points.size());
+  for (const Eigen::Vector3d& point : points)
+    for (int k = 0; k < 3; ++k) numbers.push_back(float(point[k]));
+  return numbers;
+}
+
+std::string bytes_of_pixels(const cv::Mat& pixels) {
+  std::string bytes;
+  bytes.reserve(pixels.total() * pixels.elemSize());
+  for (int row = 0; row < pixels.rows; ++row)
+    bytes.append(pixels.ptr<char>(row), std::size_t(pixels.cols) * pixels.elemSize());
+  return bytes;
 }
 
 }  // namespace marrow::workbench

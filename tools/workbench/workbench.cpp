@@ -3,10 +3,11 @@
 
 #include <algorithm>
 
+#include "commands.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "new/templates.hpp"
 #include "report/report.hpp"
-#include "run_event.hpp"
 
 namespace marrow::workbench {
 
@@ -25,21 +26,22 @@ std::string command_of(const PipelineCall& call) {
   return command;
 }
 
+std::string command_in_folder(const Workbench& workbench, const std::string& command) {
+  return "cd " + cli::shell_path(workbench.folder.path()) + " && marrow " + command;
+}
+
 std::map<std::string, Value> outputs_of(const PipelineCall& call, const Workbench& workbench, Job& job) {
   Diagnostics diagnostics;
   Pipeline pipeline = read_pipeline(call.file, call.arguments, workbench.catalogue, diagnostics);
   if (!diagnostics.empty()) throw Error(diagnostics.text());
   if (!call.only.empty())
-    std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) {
-      return std::find(call.only.begin(), call.only.end(), output.name) == call.only.end();
-    });
+    std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) { return !contains(call.only, output.name); });
   RunSettings settings;
   settings.cancelled = &job.stopped();
   settings.observer = [&](const RunEvent& event) { job.tell(cli::json_of(event)); };
   settings.given = call.given;
   settings.remember = false;
-  if (call.keep && workbench.store.fault().empty() && workbench.store.prepare().empty())
-    settings.store = &workbench.store;
+  if (call.keep) settings.store = workbench.usable_store();
   const RunResult result = run_pipeline(pipeline, workbench.catalogue, settings);
   for (std::size_t i = 0; i < result.nodes.size(); ++i)
     if (result.nodes[i].status == NodeRecord::Status::failed)

@@ -15,6 +15,8 @@ namespace marrow::workbench {
 
 struct Workbench {
   explicit Workbench(const std::filesystem::path& opened) : folder(opened) {}
+  /// The store; nullptr if no results can be kept in it.
+  const Store* usable_store() const { return store.fault().empty() && store.prepare().empty() ? &store : nullptr; }
 
   OpenedFolder folder;
   Catalogue catalogue;
@@ -42,6 +44,8 @@ std::map<std::string, Value> outputs_of(const PipelineCall& call, const Workbenc
 
 /// The command that runs it in a shell.
 std::string command_of(const PipelineCall& call);
+/// "cd FOLDER && marrow COMMAND", with the opened folder.
+std::string command_in_folder(const Workbench& workbench, const std::string& command);
 
 /// Each adds the requests of one page to the server.
 void add_shell(Server& server, Workbench& workbench);

@@ -10,6 +10,7 @@
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/hash.hpp"
+#include "marrow/base/text_file.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 
 namespace fs = std::filesystem;
@@ -20,19 +21,11 @@ namespace {
 constexpr const char* kFolder = ".marrow/drafts";
 constexpr std::chrono::hours kFresh{1}, kUnused{24};
 
-/// Throws Error if the file cannot be read to its end.
-std::string text_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream.is_open() || stream.bad()) throw Error(file.string() + " cannot be read");
-  return text;
-}
-
 /// The texts that may name working files: all drafts with all their steps. A case names its own copies.
 std::string texts_of_drafts(const fs::path& drafts) {
   std::string texts;
   for (const fs::directory_entry& entry : fs::directory_iterator(drafts))
-    if (entry.path().extension() == ".jsonl") texts += text_of(entry.path());
+    if (entry.path().extension() == ".jsonl") texts += read_text_file(entry.path(), entry.file_size());
   return texts;
 }
 

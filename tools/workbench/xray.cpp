@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "workbench/xray.hpp"
 
+#include "marrow/base/json_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
 
@@ -17,8 +18,7 @@ void add_xray_page(Server& server, Workbench& workbench) {
 
 std::string set_text(const json& value) {
   std::string text;
-  for (const char c : value.dump(-1, ' ', false, json::error_handler_t::replace))
-    text += c == '$' ? "$$" : std::string(1, c);
+  for (const char c : json_text(value)) text += c == '$' ? "$$" : std::string(1, c);
   return text;
 }
 

@@ -10,14 +10,12 @@ namespace {
 
 using nlohmann::json;
 
-json json_of_place(const Eigen::Vector3d& place) { return {place.x(), place.y(), place.z()}; }
-
 /// By fragment: [[x, y, z], ...].
 json json_of_seeds(const List<Seeds>& seeds) {
   json fragments = json::object();
   for (std::size_t i = 0; i < seeds.size(); ++i) {
     json points = json::array();
-    for (const Eigen::Vector3d& point : seeds[i].points_mm) points.push_back(json_of_place(point));
+    for (const Eigen::Vector3d& point : seeds[i].points_mm) points.push_back(json_of(point));
     fragments[seeds.name(i)] = {{"seeds", points}, {"register", seeds[i].wanted}};
   }
   return fragments;
@@ -28,8 +26,7 @@ json json_of_landmarks(const List<Landmarks>& fragments) {
   json list = json::array();
   for (std::size_t i = 0; i < fragments.size(); ++i)
     for (const Landmarks::Point& point : fragments[i].points) {
-      json landmark = {
-          {"name", point.name}, {"fragment", fragments.name(i)}, {"model_mm", json_of_place(point.model_mm)}};
+      json landmark = {{"name", point.name}, {"fragment", fragments.name(i)}, {"model_mm", json_of(point.model_mm)}};
       for (const Landmarks::Seen& seen : fragments[i].seen)
         if (seen.name == point.name) landmark["pixels"][seen.view] = {seen.pixel.x(), seen.pixel.y()};
       list.push_back(landmark);

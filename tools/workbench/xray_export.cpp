@@ -54,7 +54,7 @@ Format format_of(const std::string& what, const std::string& path) {
   throw Error(in_quotes(printable(path)) + ": the name must end in one of " + known);
 }
 
-/// A place below a folder that is there. A file that is there already is only replaced if `replace` says so.
+/// The place of a file in an existing folder. An existing file is replaced only with `replace`.
 fs::path place_for(const Workbench& workbench, const std::string& path, bool replace) {
   const fs::path file = workbench.folder.inside(path);
   if (fs::is_directory(file)) throw Error(in_quotes(printable(path)) + " is a folder; give another name");

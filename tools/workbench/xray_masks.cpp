@@ -50,10 +50,7 @@ Answer shown_mask(const Workbench& workbench, const Request& request) {
   const Camera& camera = shown.camera.camera;
   if (!shown.camera.distortion.is_none() && mask.cols == camera.width_px && mask.rows == camera.height_px)
     mask = straightened_mask(mask, camera.intrinsics, shown.camera.distortion);
-  std::string bytes;
-  for (int row = 0; row < mask.rows; ++row)
-    bytes.append(reinterpret_cast<const char*>(mask.ptr(row)), std::size_t(mask.cols));
-  return bytes_answer(std::move(bytes), {{"width_px", mask.cols}, {"height_px", mask.rows}});
+  return bytes_answer(bytes_of_pixels(mask), {{"width_px", mask.cols}, {"height_px", mask.rows}});
 }
 
 /// The image whose pixels, row after row, are first used, then not used, and so on, each for as many pixels as `runs`

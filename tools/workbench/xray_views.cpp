@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/toolbox/files/image_sides.hpp"
 #include "workbench/xray.hpp"
 
@@ -30,11 +31,7 @@ std::string pixels_of(const Image& image, json& about) {
   about["height_px"] = stored.rows;
   about["offset"] = offset;
   about["scale"] = scale;
-  std::string bytes(stored.total() * 2, '\0');
-  for (int row = 0; row < stored.rows; ++row)
-    std::memcpy(bytes.data() + std::size_t(row) * std::size_t(stored.cols) * 2, stored.ptr(row),
-                std::size_t(stored.cols) * 2);
-  return bytes;
+  return bytes_of_pixels(stored);
 }
 
 /// The warnings of a run that read a view, and doubts from its header. A camera of angles has the patient's axes, so
@@ -43,8 +40,7 @@ std::vector<std::string> with_sides(std::vector<std::string> warnings, const std
                                     const json& written, const Camera& camera) {
   if (!written.contains("c_arm")) return warnings;
   const std::vector<std::string> known = files::doubts_about_sides(image);
-  std::erase_if(warnings,
-                [&](const std::string& one) { return std::find(known.begin(), known.end(), one) != known.end(); });
+  std::erase_if(warnings, [&](const std::string& one) { return contains(known, one); });
   for (const std::string& doubt : files::doubts_about_sides(image, 0, camera)) warnings.push_back(doubt);
   return warnings;
 }

@@ -38,7 +38,7 @@ concept Plain = std::is_arithmetic_v<T> || CheckedEnum<T>;
 
 }  // namespace detail
 
-/// How a type of another library or of the field is archived. A specialisation has two functions:
+/// How a type that has no `fields` is archived. A specialisation has two functions:
 ///   static void add(Archive& archive, const T& value);
 ///   static void read(Unpacker& unpacker, T& value);
 /// domain/archived.hpp has those of matrices, images and lists.
@@ -131,7 +131,7 @@ class Unpacker {
       value = truth(get<std::uint8_t>());
     } else if constexpr (std::is_enum_v<T>) {
       value = T(get<std::underlying_type_t<T>>());
-      if (!is_valid(value)) throw Error("the packed value holds a choice that there is not");
+      if (!is_valid(value)) throw Error("the packed value holds an unknown choice");
     } else if constexpr (detail::Plain<T>) {
       bytes(&value, sizeof value);
     } else if constexpr (detail::HasFields<T>) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How marrow writes files that are whole or not there: under a temporary name, and then renamed.
+// How marrow writes files so that they are either complete or absent: under a temporary name, and then renamed.
 #include <filesystem>
 #include <functional>
 
@@ -10,9 +10,9 @@
 namespace MARROW_EXPORT marrow {
 
 /// A temporary name for a file or folder that is renamed to `final` when it is complete: FINAL.tmp-PROCESS-NUMBER. It
-/// tells a clean-up what the file was to become and who writes it. Each call returns a new name.
+/// shows a clean-up the final name and the writer. Each call returns a new name.
 std::filesystem::path temporary_beside(const std::filesystem::path& final);
-/// The same for a folder that people look into: .tmp-PROCESS-NUMBER, hidden, and short however long the final name is.
+/// The same for a folder that people look into: .tmp-PROCESS-NUMBER, hidden, and short even if the final name is long.
 std::filesystem::path hidden_beside(const std::filesystem::path& final);
 /// Whether a name may be one of hidden_beside().
 bool is_hidden_temporary(const std::filesystem::path& file);
@@ -22,7 +22,7 @@ bool is_hidden_temporary(const std::filesystem::path& file);
 class AtomicFile {
  public:
   using NameBeside = std::filesystem::path (*)(const std::filesystem::path& final);
-  /// Opens a file that must not be there yet. Returns -1 with errno if it cannot.
+  /// Opens a file that must not exist yet. Returns -1 with errno if it cannot.
   using OpenNew = std::function<int(const std::filesystem::path&)>;
 
   AtomicFile(std::filesystem::path final, NameBeside name_beside, const OpenNew& open_new);
@@ -30,10 +30,10 @@ class AtomicFile {
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// Its errno is set if the file is not open.
+  /// If it is not open, errno says why.
   const Descriptor& descriptor() const { return descriptor_; }
-  /// Puts the file in its place. If `is_durable`, waits until it is on the disk. Returns false, with errno, if that is
-  /// not possible.
+  /// Renames the file to its final name. If `is_durable`, first waits until it is on the disk. Returns false, with
+  /// errno, if that fails.
   bool finish(bool is_durable = false);
 
  private:

@@ -19,13 +19,13 @@ bool is_in_one_of(const CodeRange (&ranges)[count], char32_t code) {
                      [&](const CodeRange& range) { return code >= range.first && code <= range.last; });
 }
 
-bool is_blank_but_no_space(char32_t code) {
+bool is_blank_but_not_a_space(char32_t code) {
   static constexpr CodeRange kBlanks[] = {{0x00A0, 0x00A0}, {0x1680, 0x1680}, {0x2000, 0x200A}, {0x202F, 0x202F},
                                           {0x205F, 0x205F}, {0x2800, 0x2800}, {0x3000, 0x3000}};
   return is_in_one_of(kBlanks, code);
 }
 
-/// The marks into which the form NFD takes letters apart: of alphabets, of kana, and the parts of Hangul.
+/// Marks that the form NFD writes apart from their letters: of alphabets, kana and Hangul.
 bool is_mark_of_a_letter(char32_t code) {
   static constexpr CodeRange kMarks[] = {{0x0300, 0x036F}, {0x0483, 0x0489}, {0x1161, 0x11FF}, {0x1AB0, 0x1AFF},
                                          {0x1DC0, 0x1DFF}, {0x20D0, 0x20FF}, {0x3099, 0x309A}, {0xFE20, 0xFE2F}};
@@ -67,10 +67,10 @@ std::string odd_character_in(std::string_view name) {
   while (!name.empty()) {
     const Character character = first_character(name);
     const std::string code = formatted("U+{:04X}", std::uint32_t(character.code));
-    if (!character.is_valid) return "bytes that are no UTF-8";
+    if (!character.is_valid) return "bytes that are not UTF-8";
     if (is_control(character.code)) return "a control character";
     if (is_unseen(character.code)) return code + ", which cannot be seen";
-    if (is_blank_but_no_space(character.code)) return code + ", a blank that is no space";
+    if (is_blank_but_not_a_space(character.code)) return code + ", a blank that is not a space";
     if (is_mark_of_a_letter(character.code))
       return code + ", a mark of the letter before it; type the letter with its mark as one character";
     name.remove_prefix(character.size);

@@ -17,7 +17,7 @@ struct Character {
 /// The first character of a text that is not empty. A byte that is not UTF-8 counts as a character.
 Character first_character(std::string_view text);
 
-/// Whether a byte of UTF-8 goes on with a character that an earlier byte began.
+/// Whether a byte of UTF-8 continues a character.
 constexpr bool goes_on(char byte) { return (static_cast<unsigned char>(byte) & 0xC0) == 0x80; }
 
 /// C0, DEL, C1, line separators, and characters that change the direction of writing.

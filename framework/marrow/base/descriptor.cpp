@@ -11,11 +11,11 @@ namespace marrow {
 Descriptor::~Descriptor() {
   const int number = errno;
   close();
-  errno = number;  // that of what went wrong before
+  errno = number;  // the reason of an earlier failure
 }
 
 bool Descriptor::close() {
-  // After EINTR the file is closed nevertheless.
+  // Even after EINTR, the file is closed.
   return number_ < 0 || ::close(release()) == 0 || errno == EINTR;
 }
 

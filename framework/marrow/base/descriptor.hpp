@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The one owner of an open file's number, and the loops that read and write all of it.
+// The one owner of an open file, and the loops that read and write whole pieces of it.
 #include <cstdint>
 #include <string_view>
 #include <utility>
@@ -37,11 +37,11 @@ struct Pipe {
 };
 Pipe open_pipe();
 
-/// Writes all of the bytes, also in parts. Returns false, with errno, if that is not possible.
+/// Writes all bytes, in several parts if necessary. Returns false, with errno, if that fails.
 bool write_all(int descriptor, std::string_view bytes);
 
-/// Reads from an offset, also in parts. Returns how many bytes were read: fewer than wanted only at the end of the
-/// file; -1, with errno, if it cannot be read.
+/// Reads from an offset, in several parts if necessary. Returns how many bytes were read: fewer than wanted only at the
+/// end of the file; -1, with errno, if it cannot be read.
 std::int64_t read_at(int descriptor, void* to, std::size_t wanted, std::uint64_t offset);
 
 }  // namespace marrow

@@ -27,70 +27,28 @@ concept HasFields = requires {
 template <std::size_t Count, class T>
 void has_as_many_members([[maybe_unused]] const T& value) {
   static_assert(Count >= 1 && Count <= 16, "fields lists 1 to 16 members; make a struct of some that belong together");
-  if constexpr (Count == 1) {
-    const auto& [a] = value;
-    static_cast<void>(a);
+#define MARROW_BINDS(count, ...)       \
+  if constexpr (Count == count) {      \
+    const auto& [__VA_ARGS__] = value; \
+    static_cast<void>(a);              \
   }
-  if constexpr (Count == 2) {
-    const auto& [a, b] = value;
-    static_cast<void>(a);
-  }
-  if constexpr (Count == 3) {
-    const auto& [a, b, c] = value;
-    static_cast<void>(a);
-  }
-  if constexpr (Count == 4) {
-    const auto& [a, b, c, d] = value;
-    static_cast<void>(a);
-  }
-  if constexpr (Count == 5) {
-    const auto& [a, b, c, d, e] = value;
-    static_cast<void>(a);
-  }
-  if constexpr (Count == 6) {
-    const auto& [a, b, c, d, e, f] = value;
-    static_cast<void>(a);
-  }
-  if constexpr (Count == 7) {
-    const auto& [a, b, c, d, e, f, g] = value;
-    static_cast<void>(a);
-  }
-  if constexpr (Count == 8) {
-    const auto& [a, b, c, d, e, f, g, h] = value;
-    static_cast<void>(a);
-  }
-  if constexpr (Count == 9) {
-    const auto& [a, b, c, d, e, f, g, h, i] = value;
-    static_cast<void>(a);
-  }
-  if constexpr (Count == 10) {
-    const auto& [a, b, c, d, e, f, g, h, i, j] = value;
-    static_cast<void>(a);
-  }
-  if constexpr (Count == 11) {
-    const auto& [a, b, c, d, e, f, g, h, i, j, k] = value;
-    static_cast<void>(a);
-  }
-  if constexpr (Count == 12) {
-    const auto& [a, b, c, d, e, f, g, h, i, j, k, l] = value;
-    static_cast<void>(a);
-  }
-  if constexpr (Count == 13) {
-    const auto& [a, b, c, d, e, f, g, h, i, j, k, l, m] = value;
-    static_cast<void>(a);
-  }
-  if constexpr (Count == 14) {
-    const auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n] = value;
-    static_cast<void>(a);
-  }
-  if constexpr (Count == 15) {
-    const auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o] = value;
-    static_cast<void>(a);
-  }
-  if constexpr (Count == 16) {
-    const auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = value;
-    static_cast<void>(a);
-  }
+  MARROW_BINDS(1, a)
+  MARROW_BINDS(2, a, b)
+  MARROW_BINDS(3, a, b, c)
+  MARROW_BINDS(4, a, b, c, d)
+  MARROW_BINDS(5, a, b, c, d, e)
+  MARROW_BINDS(6, a, b, c, d, e, f)
+  MARROW_BINDS(7, a, b, c, d, e, f, g)
+  MARROW_BINDS(8, a, b, c, d, e, f, g, h)
+  MARROW_BINDS(9, a, b, c, d, e, f, g, h, i)
+  MARROW_BINDS(10, a, b, c, d, e, f, g, h, i, j)
+  MARROW_BINDS(11, a, b, c, d, e, f, g, h, i, j, k)
+  MARROW_BINDS(12, a, b, c, d, e, f, g, h, i, j, k, l)
+  MARROW_BINDS(13, a, b, c, d, e, f, g, h, i, j, k, l, m)
+  MARROW_BINDS(14, a, b, c, d, e, f, g, h, i, j, k, l, m, n)
+  MARROW_BINDS(15, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o)
+  MARROW_BINDS(16, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p)
+#undef MARROW_BINDS
 }
 
 template <class T, class Function, auto... Members>

@@ -55,9 +55,7 @@ std::string file_name_of(const std::string& text) {
     result += is_special ? percent_encoded(character) : character;
   }
   if (result.size() <= kMostInFileName) return result;
-  Hasher hasher;
-  hasher.add(text);
-  const std::string hash = "~" + hasher.digest().hex();
+  const std::string hash = "~" + hash_of(text).hex();
   std::size_t end = kMostInFileName - hash.size();
   while (goes_on(result[end])) --end;
   return result.substr(0, end) + hash;

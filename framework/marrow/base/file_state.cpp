@@ -17,14 +17,14 @@ namespace {
 
 constexpr time_t kResolution_s = 2, kOtherClocks_s = 600;
 
-/// The file systems of disks of this host: this host's clock gives their times.
+/// Whether a file system is on a disk of this host. Its times then come from this host's clock.
 bool is_local(long kind) {
   constexpr std::array<long, 6> kLocal{EXT4_SUPER_MAGIC, XFS_SUPER_MAGIC,       BTRFS_SUPER_MAGIC,
                                        F2FS_SUPER_MAGIC, OVERLAYFS_SUPER_MAGIC, 0x2fc12fc1 /* ZFS */};
   return std::find(kLocal.begin(), kLocal.end(), kind) != kLocal.end();
 }
 
-/// Whether this process saw the file in this state more than the resolution of its time ago, by its own clock.
+/// Whether this process has seen the file in this state for longer than the resolution of its time, by its own clock.
 bool was_seen(const std::filesystem::path& file, const FileState& state) {
   struct Seen {
     FileState state;

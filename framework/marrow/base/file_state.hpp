@@ -25,10 +25,10 @@ struct FileState {
 /// Nothing if the file is not there.
 std::optional<FileState> state_of(const std::filesystem::path& file);
 
-/// Whether each later change of the file will show in its state. Ask before the file is read. A file that was changed
-/// just now may change again within the resolution of its time: that takes 2 s at most. The clock of a network file
-/// system may differ from this host's by minutes: there the file must have been in this state for 10 minutes, or for 2
-/// s since this process first asked. A file that is in memory only may change without a new time.
+/// Whether every later change of the file will show in its state. Ask before reading the file. A file that was changed
+/// just now may change again within the resolution of its time, which is at most 2 s. The clock of a network file
+/// system may differ from this host's by minutes. There the file must have been in this state for 10 minutes, or for
+/// 2 s since this process first asked. A file that exists only in memory may change without a new time.
 bool is_settled(const std::filesystem::path& file, const FileState& state);
 
 }  // namespace marrow

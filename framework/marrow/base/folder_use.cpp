@@ -43,7 +43,8 @@ void rename_unused(const fs::path& folder, const fs::path& to, std::error_code& 
     error = std::make_error_code(std::errc::device_or_resource_busy);
     return;
   }
-  // If it was missing, or another process renamed it before it was locked, a new folder may be there, without a lock.
+  // If it was missing, or another process renamed it before it was locked, a new folder without a lock may have its
+  // name.
   if (is_gone || (held.is_open() && !is_still(held, folder))) {
     error = std::make_error_code(std::errc::no_such_file_or_directory);
     return;

@@ -45,10 +45,11 @@ std::optional<Digest> digest_of_hex(const std::string& text);
 /// Hash of one contiguous block of bytes.
 Digest hash_of_bytes(const void* data, std::size_t size);
 
-template <class T>
-Digest hash_of(const T& value) {
+/// Hash of some values, one after the other.
+template <class... T>
+Digest hash_of(const T&... values) {
   Hasher hasher;
-  hasher.add(value);
+  (hasher.add(values), ...);
   return hasher.digest();
 }
 

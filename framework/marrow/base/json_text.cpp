@@ -68,4 +68,8 @@ std::int64_t integer_of(const nlohmann::json& value, std::int64_t least, std::in
   return number;
 }
 
+std::string json_text(const nlohmann::json& value, int indent) {
+  return value.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 }  // namespace marrow

@@ -8,8 +8,8 @@
 namespace MARROW_EXPORT marrow {
 
 /// Has the kernel provide the pages of memory that is about to be filled, by several threads at once. For 800 MB this
-/// takes a third of the time that the first writes to the memory would take. Does nothing for less than 4 MB, and where
-/// the kernel cannot do it. The content does not change.
+/// takes a third of the time that the first writes to the memory would take. Does nothing for less than 4 MB, or if the
+/// kernel does not support it. The content does not change.
 void provide_pages(void* data, std::size_t size);
 
 /// values.resize(count), with the pages provided first.

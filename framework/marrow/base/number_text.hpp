@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Numbers as texts, and texts as numbers: the one place that knows how. All of it is the same in every locale.
-// std::snprintf, std::to_string and std::strtod use the decimal sign of the locale that the process has set, as a
-// script with `locale.setlocale` does: "0,5" in Germany. Such a text is another number, or several cells, to whoever
-// reads it.
+// The one place that converts numbers to texts and texts to numbers. The results are the same in every locale.
+// std::snprintf, std::to_string and std::strtod use the decimal sign of the process's locale, which a script may have
+// set with `locale.setlocale`: "0,5" in Germany. A reader would take this for another number, or for several cells.
 #include <fmt/core.h>
 
 #include <cstddef>
@@ -26,10 +25,10 @@ std::string formatted(fmt::format_string<Values...> format, Values&&... values) 
   return detail::formatted(format, fmt::make_format_args(values...));
 }
 
-/// With so many significant digits at most, and no trailing zeros: 0.125, 1.5e-07, 95.
+/// With at most so many significant digits and without trailing zeros: 0.125, 1.5e-07, 95.
 std::string short_number(double value, int digits = 3);
 
-/// With so many decimals. Zero has no minus sign, and neither has what is rounded to zero.
+/// With so many decimals. Zero has no minus sign, even if it results from rounding.
 std::string fixed_number(double value, int decimals);
 
 /// The shortest text from which the same number is read again. Whole numbers below 1e15 have all their digits, so that
@@ -39,8 +38,8 @@ std::string exact_number(double value);
 /// The shortest text from which the same number is read again: 1e+05 for 100000. Files of poses hold such texts.
 std::string shortest_number(double value);
 
-/// A share, from 0 to 1, as a number of percent, with at least so many decimals. More are shown where the share would
-/// else read as 0 or 100 and is neither: 1 of 3000 is 0.03, with one decimal.
+/// A share, from 0 to 1, in percent, with at least so many decimals. A share that is neither 0 nor 1 gets as many more
+/// as it needs not to read as 0 or 100: with one decimal, 1 of 3000 is 0.03.
 std::string percent_text(double share, int decimals);
 
 /// "1 case", "2 cases". The plural of `what` is formed with an s.

@@ -45,9 +45,9 @@ std::string utf8_of_utf16(const std::string& bytes) {
   return text;
 }
 
-/// In place, because a text may be a surface of gigabytes. Several \r before a \n, as some converters leave them, are
-/// one line end with it. Beside \n, a \r elsewhere is no line end: 3D Slicer on Windows writes some inside of its
-/// lines.
+/// In place, because a text may be a surface of gigabytes. Several \r before a \n, as some converters leave them,
+/// belong to one line end. In a text that has \n, any other \r is not a line end: 3D Slicer on Windows writes some
+/// inside of lines.
 void unify_line_ends(std::string& text) {
   std::size_t to = text.find('\r');
   if (to == std::string::npos) return;

@@ -6,10 +6,9 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// A text that another program wrote, as marrow's readers expect it: UTF-8 without a byte order mark, in lines that end
-/// with \n. Lines that end with \r\n, or all with \r alone, are turned into such. A text that begins with UTF-16's byte
-/// order mark is converted; half a character in it becomes U+FFFD. To be used for texts only, because a binary file may
-/// hold \r anywhere.
+/// Converts a text of another program to the form that marrow's readers expect: UTF-8 without a byte order mark, in
+/// lines that end with \n. Line ends \r\n become \n. So does \r if the text has no \n. A text with UTF-16's byte order
+/// mark is converted; half a character in it becomes U+FFFD. Use it only for texts: a binary file may hold \r anywhere.
 std::string plain_text(std::string bytes);
 
 /// Whether the bytes begin with the byte order mark of UTF-16, in either order.

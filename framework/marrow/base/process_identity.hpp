@@ -18,7 +18,7 @@ bool is_identity(std::string_view text);
 
 enum class Life { lives, ended, unknown };
 /// Whether the process of an identity lives. The system is asked only about processes of this host, boot and namespace:
-/// elsewhere the same number means another process. Everything else is unknown, also a text that is no identity.
+/// elsewhere the same number means another process. All others are unknown, and so is a text that is not an identity.
 Life life_of(std::string_view identity);
 
 }  // namespace marrow

@@ -26,7 +26,7 @@
 
 namespace marrow {
 
-/// Not an unnamed namespace, because ProcessState::Parts, which the header declares, has members of these types.
+/// This namespace has a name because ProcessState::Parts, which the header declares, has members of these types.
 namespace process_parts {
 
 /// The folder at which all relative paths start. If a plugin's library changed it, inputs would be read and results
@@ -291,7 +291,7 @@ void ProcessState::keep_during(const std::function<void()>& code) {
 }
 
 void ProcessState::keep_for_process(const std::function<void()>& start) {
-  constexpr int kMostTimes = 10;  // code that keeps changing the state fails by itself
+  constexpr int kMostTimes = 10;  // code that keeps changing the state fails in keep_during()
   for (int time = 0; time < kMostTimes; ++time) {
     const long before = changes_;
     start();

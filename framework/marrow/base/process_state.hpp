@@ -2,7 +2,7 @@
 #pragma once
 // What all nodes of a process share besides their inputs: the working folder, the locale, the environment, the handlers
 // of signals, the standard streams, limits, the mask of new files' permissions, and OpenCV's settings. A node that
-// changed it would change the results of others, whose keys do not know of it.
+// changed it would change the results of other nodes, and their keys would not show it.
 #include <atomic>
 #include <functional>
 #include <memory>

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/base/process_tree.hpp"
 
+#include <fcntl.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <string>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/base/number_text.hpp"
 
 namespace marrow {
@@ -34,7 +38,7 @@ double resident_mb(pid_t process) {
   return resident * double(sysconf(_SC_PAGESIZE)) / 1e6;
 }
 
-/// Of a page that several processes share, each counts its part. The resident memory if the system does not tell this.
+/// Each process counts its part of a page that several share. Returns the resident memory if the system does not tell.
 double proportional_mb(pid_t process) {
   std::ifstream stream(proc_folder(process) + "/smaps_rollup");
   for (std::string word; stream >> word;)
@@ -68,6 +72,16 @@ double memory_of_tree_mb(pid_t process, double enough_mb) {
   sum_mb = proportional_mb(process);
   for (const pid_t one : descendants) sum_mb += proportional_mb(one);
   return sum_mb;
+}
+
+double resident_memory_mb() {
+  const Descriptor file(open("/proc/self/statm", O_RDONLY | O_CLOEXEC));
+  if (!file.is_open()) return 0;
+  char text[100];
+  const ssize_t size = read(file, text, sizeof text - 1);
+  text[std::max<ssize_t>(size, 0)] = '\0';
+  unsigned long resident = 0;
+  return std::sscanf(text, "%*u %lu", &resident) == 1 ? double(resident) * double(sysconf(_SC_PAGESIZE)) / 1e6 : 0;
 }
 
 }  // namespace marrow

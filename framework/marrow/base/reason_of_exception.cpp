@@ -17,10 +17,10 @@ std::string reason_of_exception() {
     return error.what();
   } catch (...) {
     const std::type_info* type = abi::__cxa_current_exception_type();
-    if (!type) return "threw something that is no std::exception; throw marrow::Error";
+    if (!type) return "threw something that is not a std::exception; throw marrow::Error";
     const std::unique_ptr<char, void (*)(void*)> name(abi::__cxa_demangle(type->name(), nullptr, nullptr, nullptr),
                                                       std::free);
-    return std::string("threw something that is no std::exception (") + (name ? name.get() : type->name()) +
+    return std::string("threw something that is not a std::exception (") + (name ? name.get() : type->name()) +
            "); throw marrow::Error";
   }
 }

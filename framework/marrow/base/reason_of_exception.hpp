@@ -6,8 +6,8 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// What the exception that is being handled says. Plugins may throw anything: if it is no std::exception, its type is
-/// named.
+/// The message of the exception that is being handled. Plugins may throw anything: the type is named if it is not a
+/// std::exception.
 std::string reason_of_exception();
 
 }  // namespace marrow

@@ -7,7 +7,7 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// Whether another file system, or a folder from elsewhere, is mounted at a path itself. False if the kernel does not
+/// Whether another file system, or a folder from elsewhere, is mounted exactly at a path. False if the kernel does not
 /// tell.
 bool is_mount(const std::filesystem::path& path);
 

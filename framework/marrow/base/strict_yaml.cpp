@@ -19,7 +19,7 @@ YAML::Node StrictYaml::parse(const std::string& written) {
     return parse_yaml(text);
   } catch (const YAML::ParserException& error) {
     fault({file_, error.mark.line + 1, error.mark.column + 1}, "not valid YAML: " + error.msg);
-    // The parser reports where the text ends or becomes strange. The typing error is where something was left open.
+    // The parser reports where the text ends or makes no sense. The mistake is where a bracket or quote was left open.
     if (const auto opened = last_unclosed(text))
       fault({file_, opened->line, opened->column}, std::string("this ") + opened->mark + " is not closed");
   } catch (const YAML::Exception& error) {

@@ -24,7 +24,7 @@ struct YamlEntry {
 class StrictYaml {
  public:
   StrictYaml(std::string file, Diagnostics& diagnostics) : file_(std::move(file)), diagnostics_(diagnostics) {}
-  /// For a text that was taken out of a file. All of it counts as written at one place.
+  /// For a text that was taken out of a file. All faults are reported at one place.
   StrictYaml(const Place& only, Diagnostics& diagnostics) : file_(only.file), diagnostics_(diagnostics), only_(only) {}
 
   /// Parses a text, however its writer stored it (plain_text()). A syntax error becomes a diagnostic and gives a null

@@ -20,8 +20,8 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-/// Makes a folder among the system's temporary files: marrow-PURPOSE-XXXXXX. Its name cannot be foreseen, so nobody can
-/// have put files there before, and only this user can access it. Throws Error if it cannot be made.
+/// Makes a folder among the system's temporary files: marrow-PURPOSE-XXXXXX. Nobody can predict its name and put files
+/// there before, and only this user can access it. Throws Error if it cannot be made.
 std::filesystem::path new_temporary_folder(const std::string& purpose);
 
 }  // namespace marrow

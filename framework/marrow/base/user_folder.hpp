@@ -10,7 +10,7 @@ namespace marrow {
 
 /// The folder for files that a program can make again: XDG_CACHE_HOME, or .cache in HOME, or .cache in the home folder
 /// that the system knows for the user. A variable that is empty or not an absolute path counts as not set. Empty if
-/// there is none of these. It is never a folder that all users share.
+/// none of these exists. It is never a folder that all users share.
 std::filesystem::path user_cache_folder();
 
 struct User {

@@ -21,14 +21,14 @@ constexpr std::size_t kMostRepeated = 100'000;  // values that aliases may repea
 
 [[noreturn]] void refuse(const YAML::Mark& mark, const std::string& why) { throw YAML::Exception(mark, why); }
 
-/// Counts values and levels of nesting as if every alias were written out. It runs before a tree is built.
-/// It also refuses what YAML would take away from a text without a word: a tag ("! b", "!!str 5"), and the name of an
-/// anchor ("&a b") that no alias names.
+/// Counts values and levels of nesting as if every alias were written out. It runs before a tree is built. It also
+/// refuses what YAML would silently remove from a text: a tag ("! b", "!!str 5"), and an anchor ("&a b") that no alias
+/// names.
 class Survey : public YAML::EventHandler {
  public:
   Survey(const std::string& text, const YamlLimits& limits) : text_(text), limits_(limits) {}
   void OnDocumentStart(const YAML::Mark& mark) override {
-    if (documents_++) refuse(mark, "the file goes on after the end of its first document; keep one document a file");
+    if (documents_++) refuse(mark, "the file goes on after the end of its first document; keep one document per file");
   }
   void OnDocumentEnd() override {
     if (!unnamed_.empty())
@@ -60,7 +60,7 @@ class Survey : public YAML::EventHandler {
     expect_no_anchor(mark, anchor);
     unnamed_.erase(anchor);
     const auto found = anchored_.find(anchor);
-    if (found == anchored_.end()) refuse(mark, "an alias names a list or map that it is in itself");
+    if (found == anchored_.end()) refuse(mark, "an alias names the list or map that contains it");
     repeated_ += found->second.values;
     if (repeated_ > kMostRepeated)
       refuse(mark,

@@ -23,8 +23,8 @@ struct YamlLimits {
 };
 
 /// Parses a text with one document. An empty text gives a null node. Throws YAML::Exception with the place if the text
-/// is not YAML, has more than one document or exceeds the limits. So it does for tags, and for anchors that no alias
-/// names: `&a b` and `! b` would be read as b.
+/// is not YAML, has more than one document, exceeds the limits, or has a tag or an anchor that no alias names: `&a b`
+/// and `! b` would be read as b.
 YAML::Node parse_yaml(const std::string& text, const YamlLimits& limits = {});
 
 /// Describes a node for a message that says what was found: "a map", "a list of 3", "nothing", "'text'", "the quoted

@@ -137,7 +137,7 @@ cv::Mat1b original_mask(const cv::Mat1b& straight, const Eigen::Matrix3d& intrin
   check_distortion(intrinsics, distortion, straight.cols, straight.rows, "the mask");
   const double radius = std::sqrt(largest_squared_radius(intrinsics.inverse(), straight.cols, straight.rows));
   cv::Mat1b original(straight.size(), std::uint8_t(255)), is_known(straight.size(), std::uint8_t(0));
-  // Where several pixels become one, it is zero if any of them is.
+  // An original pixel is zero if any of the pixels that fall on it is zero.
   for (int v = 0; v < straight.rows; ++v)
     for (int u = 0; u < straight.cols; ++u) {
       const Eigen::Vector2d seen = distorted_pixel(intrinsics, distortion, {u, v});
@@ -145,7 +145,7 @@ cv::Mat1b original_mask(const cv::Mat1b& straight, const Eigen::Matrix3d& intrin
       nearest(is_known, seen) = 255;
       if (straight(v, u) == 0) nearest(original, seen) = 0;
     }
-  // Where one becomes several, they are all alike.
+  // The original pixels on which none falls get the value of a neighbour.
   tbb::parallel_for(0, straight.rows, [&](int v) {
     for (int u = 0; u < straight.cols; ++u) {
       if (is_known(v, u)) continue;

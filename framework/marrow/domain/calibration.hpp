@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a calibration knows about an imaging device. Nodes only get views of an ideal pinhole: the distortion is removed
-// once, when a view is read. So no projector, cost or edge detector has to handle distortion, and none can forget it.
+// The calibration of an imaging device. Distortion is removed once, when a view is read, so nodes only get views of an
+// ideal pinhole. No projector, cost or edge detector has to handle distortion.
 #include <Eigen/Core>
 #include <array>
 #include <string>
@@ -60,14 +60,14 @@ void check_distortion(const Eigen::Matrix3d& intrinsics, const RadialDistortion&
 /// original image are masked out. Throws Error as check_view() and check_distortion() do.
 void remove_distortion(View& view, const RadialDistortion& distortion);
 
-/// The mask of the straightened image: each pixel is as that pixel of `original` which lies nearest to where it was
-/// seen, and zero outside.
+/// The mask of the undistorted image. Each pixel gets the value of the pixel of `original` that is nearest to its place
+/// there, or zero if that place is outside.
 cv::Mat1b straightened_mask(const cv::Mat1b& original, const Eigen::Matrix3d& intrinsics,
                             const RadialDistortion& distortion);
 
-/// The mask of the original image for one that was drawn on the straightened image. Straightened again, it is zero
-/// wherever `straight` is zero; elsewhere it is as `straight`, except where several pixels were seen as one of which
-/// some are zero. Throws Error as check_distortion() does.
+/// Converts a mask that was drawn on the undistorted image to the original image. straightened_mask() of the result is
+/// zero wherever `straight` is zero. Elsewhere it equals `straight`, unless several pixels of `straight` fall on one
+/// original pixel and some of them are zero. Throws Error as check_distortion() does.
 cv::Mat1b original_mask(const cv::Mat1b& straight, const Eigen::Matrix3d& intrinsics,
                         const RadialDistortion& distortion);
 

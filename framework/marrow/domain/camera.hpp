@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "marrow/base/export.hpp"
 #include "marrow/base/fields.hpp"
 #include "marrow/domain/image.hpp"
+#include "marrow/domain/list.hpp"
 #include "marrow/domain/transform.hpp"
 
 namespace MARROW_EXPORT marrow {
@@ -47,13 +49,13 @@ Plane back_project_line(const Camera& camera, const Eigen::Vector3d& line);
 /// inverse of the projection's derivative. It holds for pixels of any shape.
 Eigen::Vector2d offset_at_mm(const Camera& camera, const Eigen::Vector3d& world_mm, const Eigen::Vector2d& offset_px);
 
-/// Size of a pixel at a world point, in mm: the square root of its area there, parallel to the detector. Only for what
-/// is the same in all directions, such as a blur; a distance in the image is turned into mm by offset_at_mm().
+/// Size of a pixel at a world point, in mm: the square root of its area there, parallel to the detector. Use it only
+/// for lengths without a direction, such as a blur. offset_at_mm() converts an offset in the image.
 double pixel_size_at_mm(const Camera& camera, const Eigen::Vector3d& world_mm);
 
-/// Throws Error if the image size is not positive or a side has more than 65536 pixels, if the camera matrix does not
-/// have the form given at Camera or its focal lengths are not positive, and as check_rigid() does. `what` names the
-/// camera in the message.
+/// Throws Error if the image size is not positive, if a side has more than 65536 pixels, if the camera matrix does not
+/// have the form given at Camera, or if a focal length is not positive. Throws as check_rigid() does, too. `what` names
+/// the camera in the message.
 void check_camera(const Camera& camera, const std::string& what);
 
 /// One X-ray view: an image and its camera. `mask` is CV_8U and non-zero where the image may be used; empty means
@@ -66,8 +68,14 @@ struct View {
   using fields = Fields<&View::name, &View::image, &View::camera, &View::mask>;
 };
 
-/// Throws Error if the image is empty, if the sizes of image, camera and mask differ, and as check_camera() does. The
-/// message names the view and both sizes.
+/// Throws Error if the image is empty or if the sizes of image, camera and mask differ. The message names the view and
+/// both sizes. Throws as check_camera() does, too.
 void check_view(const View& view);
+
+/// The point at which all views are aimed: it has the least sum of squared distances to their central rays. A central
+/// ray is a camera's z axis, so cropping an image does not change it. Returns nothing for a single view, for rays
+/// within about 2.6 degrees of each other, and if the point is not in front of every source. In these cases the cameras
+/// do not tell how far away the bone is.
+std::optional<Eigen::Vector3d> meeting_point_mm(const List<View>& views);
 
 }  // namespace marrow

@@ -10,8 +10,8 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// One patient: a CT with seeds for each fragment, the views with their cameras and, if known, start poses and exact
-/// poses. On disk it is a folder with case.yaml (docs/case.md).
+/// One patient: a CT, seeds for each fragment, and the views with their cameras. Start poses and exact poses are
+/// included if they are known. On disk, a case is a folder with case.yaml (docs/case.md).
 struct Case {
   Volume ct;
   List<Seeds> seeds;  ///< axis fragment

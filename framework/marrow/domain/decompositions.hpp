@@ -15,12 +15,12 @@ struct SymmetricEigen {
   Eigen::Matrix<double, Size, Size> vectors;
 };
 
-/// Of a symmetric matrix, of which only the lower half is read. Sizes: 2, 3, 6, 8 and Eigen::Dynamic.
+/// Decomposes a symmetric matrix. Only its lower triangle is read. Sizes: 2, 3, 6, 8 and Eigen::Dynamic.
 template <int Size>
 SymmetricEigen<Size> eigen_of_symmetric(const Eigen::Matrix<double, Size, Size>& matrix);
 
-/// Solves matrix * x = right by the LDL^T decomposition. The matrix is symmetric and not indefinite; only its lower
-/// half is read. Sizes: 3, 6 and Eigen::Dynamic.
+/// Solves matrix * x = right by the LDL^T decomposition. The matrix must be symmetric and semidefinite. Only its lower
+/// triangle is read. Sizes: 3, 6 and Eigen::Dynamic.
 template <int Size>
 Eigen::Matrix<double, Size, 1> solve_symmetric(const Eigen::Matrix<double, Size, Size>& matrix,
                                                const Eigen::Matrix<double, Size, 1>& right);

@@ -34,17 +34,15 @@ struct LineSegment {
   using fields = Fields<&LineSegment::from_px, &LineSegment::to_px>;
 };
 
-/// The two outer borders of the shaft in one view. Both run in the same direction. `left` is on the left when looking
-/// from `from` to `to` in the image (v down).
+/// The two outer borders of the shaft in one view. Both have the same direction. Seen from from_px towards to_px in the
+/// image (v down), `left` is on the left.
 struct ShaftLines {
   LineSegment left;
   LineSegment right;
-  /// The outer diameter of the shaft, if it lies at the depth of the isocentre (world origin). Then its standard
-  /// deviation, which includes the error of the fit and the unknown depth of the shaft. Then the score of the pair.
-  double width_mm = 0;
-  double width_deviation_mm = 0;
-  double log_likelihood = 0;
-  /// A rejected pair of borders, with the reason in words. `rejected` has the best ones first.
+  double width_mm = 0;            ///< outer diameter, assuming the depth of the isocentre (world origin)
+  double width_deviation_mm = 0;  ///< standard deviation, from the error of the fit and the unknown depth
+  double log_likelihood = 0;      ///< score of the pair
+  /// A rejected pair of borders, with the reason in words. `rejected` begins with the best pair.
   struct Rejected {
     LineSegment left, right;
     std::string reason;

@@ -38,8 +38,8 @@ struct PixelGrid {
 class OutlineProjector {
  public:
   virtual ~OutlineProjector();
-  /// The outline of the model in the camera's image: about one point every `spacing_px`, in a fixed order, inside the
-  /// image only. Leaves out parts that come from the end of the CT volume and not from the bone. May be empty.
+  /// The outline of the model in the camera's image: about one point every `spacing_px`, in a fixed order, only inside
+  /// the image. Leaves out edges that the end of the CT volume makes, because they are not bone. May be empty.
   virtual std::vector<OutlinePoint> outline(const Camera& camera, const RigidTransform& world_from_model,
                                             double spacing_px) const = 0;
 };
@@ -94,13 +94,13 @@ class Cost {
   /// which is the default.
   virtual std::optional<Expansion> expansion(const RigidTransform& world_from_model, const FragmentFrame& frame) const;
   /// The cost at a pose with each block of the images left out in turn. Blocks are squares of the views' images. They
-  /// are the same at every pose and always in the same order; a block that does not matter gives value(). How the
-  /// minimum moves without each block shows how uncertain it is (delete-a-group jackknife: Shao and Tu, The Jackknife
-  /// and Bootstrap, 1995). Empty if the cost cannot tell, which is the default.
+  /// are the same at every pose, in the same order. A block without effect gives value(). The shifts of the minimum
+  /// without single blocks show its uncertainty (delete-a-group jackknife: Shao and Tu, The Jackknife and Bootstrap,
+  /// 1995). Empty, the default, if the cost does not support this.
   virtual std::vector<double> without_each_block(const RigidTransform& world_from_model) const;
   /// The quadratic model of the cost at a pose with each block left out in turn, all in one call. Blocks may be larger
-  /// here than in without_each_block(). The curvature is that of the cost itself with its matches kept, so it may
-  /// differ from that of expansion(), which is made for a search. Empty if the cost cannot tell, which is the default.
+  /// here than in without_each_block(). The curvature is that of the cost itself with fixed matches. It may differ from
+  /// that of expansion(), which serves a search. Empty, the default, if the cost does not support this.
   virtual std::vector<Expansion> expansion_without_each_block(const RigidTransform& world_from_model,
                                                               const FragmentFrame& frame) const;
   /// The number of views that the cost compares; 0, the default, if it cannot be split into views.
@@ -108,11 +108,11 @@ class Cost {
   /// The cost of a pose in one view alone, with view < view_count(). It has the range of value().
   virtual double value_in_view(std::size_t view, const RigidTransform& world_from_model) const;
   /// Why the images say nothing about this pose, such as "the outline is empty in all views"; empty if something was
-  /// compared. A pose about which the images say nothing is not a result. Empty is the default, so callers also check
-  /// that the cost changes about the pose.
+  /// compared. A pose about which the images say nothing is not a result. The default is empty, so callers also check
+  /// that the cost varies around the pose.
   virtual std::string nothing_compared(const RigidTransform& world_from_model) const;
   /// A sentence for each view that says nothing about this pose, such as "view 'lateral': the mask hides the whole
-  /// outline". None, the default, if each says something or the cost cannot tell.
+  /// outline". Empty, the default, if each view says something or the cost does not support this.
   virtual std::vector<std::string> silent_views(const RigidTransform& world_from_model) const;
 };
 
@@ -146,8 +146,8 @@ class Optimizer {
  public:
   virtual ~Optimizer();
   /// Returns the best point found. A function value that is not finite counts as the worst. Throws Error if the problem
-  /// has no coordinates, no positive and finite steps and tolerance, or bounds that exclude the start; and if no value
-  /// is finite. Exceptions of the function pass through.
+  /// has no coordinates, if a step or the tolerance is not positive and finite, if the bounds exclude the start, or if
+  /// no value is finite. Exceptions of the function pass through.
   virtual MinimisationResult minimise(const MinimisationProblem& problem) const = 0;
 };
 

@@ -9,8 +9,8 @@
 namespace MARROW_EXPORT marrow {
 
 /// A fluoroscopic image with one channel of type CV_8U, CV_16U or CV_32F. Air is bright unless a node says otherwise.
-/// Pixel (0, 0) is at the top left, and integer coordinates are pixel centres (OpenCV's convention). Copies of a
-/// cv::Mat share their pixels, so whoever receives an Image must not write to it.
+/// Pixel (0, 0) is at the top left, and integer coordinates are pixel centres (OpenCV's convention). Never write to the
+/// pixels of an Image that you were given: copies of a cv::Mat share them.
 struct Image {
   cv::Mat pixels;
 

@@ -27,6 +27,13 @@ void check_mesh(const Mesh& mesh, const std::string& what);
 /// True if each edge is shared by exactly two triangles that run along it in opposite directions.
 bool is_closed(const Mesh& mesh);
 
+/// True if a mesh is closed and the triangles around each vertex form a single fan. Then no two parts of the surface
+/// touch in a single point.
+bool is_manifold(const Mesh& mesh);
+
+/// Throws Error unless check_mesh() accepts the mesh, it is closed and its normals point outward.
+void check_closed_surface(const Mesh& mesh, const std::string& what);
+
 /// Volume enclosed by a closed surface (divergence theorem). It is positive if normals point outward.
 double enclosed_volume_mm3(const Mesh& mesh);
 double surface_area_mm2(const Mesh& mesh);
@@ -44,8 +51,8 @@ std::vector<Eigen::Vector3d> sample_surface(const Mesh& mesh, std::size_t count)
 struct FragmentFrame {
   Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
-  /// Whether it is as described above. If not, it is any other origin and axes, such as those of the CT, about which
-  /// nobody may say "the long axis" or "shortening".
+  /// Whether origin and axes are the ones described above. Otherwise they are others, such as those of the CT, and no
+  /// text may call one of them "the long axis" or a shift "shortening".
   bool is_anatomical = false;
   using fields = Fields<&FragmentFrame::origin_mm, &FragmentFrame::axes, &FragmentFrame::is_anatomical>;
 };

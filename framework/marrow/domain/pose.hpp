@@ -20,7 +20,7 @@ struct Pose {
   FragmentFrame frame;
   /// Predicted covariance of (r, t) in rad and mm; absent if it was not predicted.
   std::optional<Matrix6d> covariance;
-  /// Warnings in words: a direction that the images do not determine, a limit that was reached.
+  /// In words: a direction that the images do not determine, a limit that was reached.
   std::vector<std::string> warnings;
   double cost = 0;
   int evaluations = 0;
@@ -37,10 +37,10 @@ struct Pose {
 };
 
 /// Throws Error unless the covariance is symmetric and positive semidefinite, to 1e-9 of its deviations. Infinite and
-/// NaN variances are allowed: they say that the direction is not known. `what` names the pose in the message.
+/// NaN variances are allowed: they mean that a direction is unknown. `what` names the pose in the message.
 void check_covariance(const Matrix6d& covariance, const std::string& what);
-/// Throws Error as check_rigid() does, as check_covariance() does if there is a covariance, and if the frame's axes are
-/// not a rotation. `what` names the pose in the message.
+/// Throws Error if the transform is not rigid (check_rigid()), if the frame's axes are not a rotation, or if there is
+/// a covariance that check_covariance() refuses. `what` names the pose in the message.
 void check_pose(const Pose& pose, const std::string& what);
 
 /// The pose after a small motion (r [rad], t [mm]) as defined at Pose.
@@ -56,8 +56,8 @@ Matrix6d change_of_frame(const FragmentFrame& from, const FragmentFrame& to);
 /// The same pose, with its covariance in another frame.
 Pose in_frame(Pose pose, const FragmentFrame& frame);
 
-/// The exact pose of a fragment, known for simulated data. It has its own type so that a pipeline can give it only to
-/// nodes of kinds that may see the truth, such as `evaluate` and `render`.
+/// The exact pose of a fragment, known for simulated data. It has its own type because only nodes of some kinds may get
+/// it, such as `evaluate` and `render`.
 struct Truth {
   RigidTransform world_from_model{"world", "ct"};
   using fields = Fields<&Truth::world_from_model>;

@@ -11,7 +11,7 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// Where a quantile lies among values in rising order: `part` of the way from the one at `below` to the one at `above`.
+/// The place of a quantile in ascending values: `part` of the way from the value at `below` to the value at `above`.
 struct QuantilePlace {
   std::size_t below = 0, above = 0;
   double part = 0;
@@ -25,14 +25,14 @@ inline QuantilePlace quantile_place(std::size_t count, double fraction) {
   return {below, part > 0 ? below + 1 : below, part};
 }
 
-/// The quantile of values in rising order, of which there is at least one and none is NaN.
+/// The quantile of values in ascending order. There must be at least one value, and none may be NaN.
 template <class Number>
 double quantile_of_sorted(const std::vector<Number>& sorted, double fraction) {
   const QuantilePlace place = quantile_place(sorted.size(), fraction);
   return std::lerp(double(sorted[place.below]), double(sorted[place.above]), place.part);
 }
 
-/// The same of values in any order, in a time in proportion to their number. Changes their order.
+/// The same for values in any order, in linear time. Changes their order.
 template <class Number>
 double quantile_in_place(std::vector<Number>& values, double fraction) {
   const QuantilePlace place = quantile_place(values.size(), fraction);
@@ -42,7 +42,7 @@ double quantile_in_place(std::vector<Number>& values, double fraction) {
   return std::lerp(double(*below), double(*std::min_element(below + 1, values.end())), place.part);
 }
 
-/// The same, of a copy.
+/// The same, but the caller's values keep their order.
 template <class Number>
 double quantile(std::vector<Number> values, double fraction) {
   return quantile_in_place(values, fraction);

@@ -35,9 +35,8 @@ void check_same_grid(const Grid& field, const Grid& volume) {
                 " voxels" + kRemedy);
   const double apart_mm = farthest_apart_mm(field, volume);
   if (!(apart_mm <= kMost_voxels * volume.spacing_mm.minCoeff()))
-    throw Error(
-        formatted("the field does not lie where the volume lies: voxels of the same index are up to {:.3g} mm apart{}",
-                  apart_mm, kRemedy));
+    throw Error(formatted("the field is not where the volume is: voxels of the same index are up to {:.3g} mm apart{}",
+                          apart_mm, kRemedy));
 }
 
 void check_lies_in(const Mesh& mesh, const Grid& grid, const std::string& what, const std::string& of) {

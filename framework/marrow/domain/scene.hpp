@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What reports show interactively: models in their poses together with the X-ray views, and the cost around a pose.
+// The interactive parts of reports: models in their poses together with the X-ray views, and the cost around a pose.
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,7 +25,7 @@ struct Scene {
     RigidTransform world_from_model{"world", "ct"};
     using fields = Fields<&Placement::model, &Placement::name, &Placement::world_from_model>;
   };
-  /// A view's camera and its image as it is shown: 8 bit, grey, with the size that the camera gives.
+  /// A view's camera, and its image for display: 8 bit, grey, of the camera's size.
   struct Backdrop {
     std::string name;
     Camera camera;

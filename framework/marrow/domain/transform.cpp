@@ -42,6 +42,12 @@ Eigen::Vector3d vector_from_rotation(const Eigen::Matrix3d& rotation) {
   return angle_axis.angle() * angle_axis.axis();
 }
 
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d matrix;
+  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return matrix;
+}
+
 double geodesic_angle_rad(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
   // |a - b| = 2 sqrt(2) sin(angle / 2) is exact for small angles; the arc cosine of the trace is not.
   const double half_sine = (a - b).norm() / std::sqrt(8.0);

@@ -51,6 +51,9 @@ Eigen::Matrix3d rotation_from_vector(const Eigen::Vector3d& rotation_rad);
 /// Logarithm of a rotation: axis times angle, with the angle in [0, pi].
 Eigen::Vector3d vector_from_rotation(const Eigen::Matrix3d& rotation);
 
+/// The matrix [v] with [v] w = v x w for every w.
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v);
+
 /// Geodesic angle between two rotations, in [0, pi].
 double geodesic_angle_rad(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b);
 

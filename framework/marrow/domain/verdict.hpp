@@ -16,7 +16,7 @@ namespace MARROW_EXPORT marrow {
 /// Whether a pose can be relied on. A larger value is worse.
 enum class Judgement : std::uint8_t {
   trusted,
-  doubtful,  ///< something else must settle it, such as a further view
+  doubtful,  ///< more information must decide, such as another view
   wrong,
 };
 constexpr bool is_valid(Judgement judgement) { return judgement <= Judgement::wrong; }
@@ -38,17 +38,25 @@ inline std::optional<Judgement> judgement_named(std::string_view name) {
 inline constexpr double kMostError_mm = 2;
 inline constexpr double kMostAxialError_deg = 5;
 
-/// What is to be thought of a pose, without knowledge of the true one.
+/// How far a pose can be relied on. It is made without knowing the true pose.
 struct Verdict {
   Judgement judgement = Judgement::doubtful;
   /// Probability (0 to 1) that the pose is off, as defined at kMostError_mm. NaN if it is not known.
   double failure_probability = std::numeric_limits<double>::quiet_NaN();
-  std::vector<std::string> reasons;   ///< in words, the weightiest first
-  std::vector<std::string> remedies;  ///< in words: what would settle it; empty for a trusted pose
-  std::vector<Metric> figures;        ///< what the reasons rest on
+  std::vector<std::string> reasons;   ///< in words, the most important first
+  std::vector<std::string> remedies;  ///< in words: what would decide it; empty for a trusted pose
+  std::vector<Metric> figures;        ///< the numbers behind the reasons
 
   using fields = Fields<&Verdict::judgement, &Verdict::failure_probability, &Verdict::reasons, &Verdict::remedies,
                         &Verdict::figures>;
+};
+
+/// Whether a repetition ends after this pass.
+struct Stop {
+  bool stops = false;
+  std::string reason;  ///< in words, also of a pass that does not stop; may be empty
+
+  using fields = Fields<&Stop::stops, &Stop::reason>;
 };
 
 }  // namespace marrow

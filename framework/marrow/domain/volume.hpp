@@ -11,9 +11,9 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// Where the samples of a volume lie: point = origin_mm + direction * (index .* spacing_mm), in the frame named
-/// `frame`. Index (0, 0, 0) is the centre of the first voxel (ITK's convention). The columns of `direction` are the
-/// orthonormal axes of the grid in that frame.
+/// The places of a volume's samples: point = origin_mm + direction * (index .* spacing_mm), in the frame named `frame`.
+/// Index (0, 0, 0) is the centre of the first voxel (ITK's convention). The columns of `direction` are the orthonormal
+/// axes of the grid in that frame.
 struct Grid {
   std::array<int, 3> size{0, 0, 0};
   Eigen::Vector3d spacing_mm = Eigen::Vector3d::Ones();
@@ -68,7 +68,7 @@ void check_volume(const Volume& volume, const std::string& what);
 struct Seeds {
   std::string fragment;
   std::vector<Eigen::Vector3d> points_mm;
-  /// False for a fragment that is segmented only to separate it from the others. It is not passed on.
+  /// False for a fragment that is segmented only to separate it from the others. It is not part of the result.
   bool wanted = true;
   using fields = Fields<&Seeds::fragment, &Seeds::points_mm, &Seeds::wanted>;
 };

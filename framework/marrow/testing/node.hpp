@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// For tests of nodes, marrow's own and others. A node is called by its name, out of its library, as a pipeline does.
-// Libraries are found as by the program: in the folders of MARROW_PLUGIN_PATH, then beside marrow's library. All
-// functions throw marrow::Error for a node, an input or an option that does not exist.
+// For tests of nodes, marrow's own and others. Nodes are called by their names, from their libraries, as in a pipeline.
+// Libraries are searched where the program searches them: in the folders of MARROW_PLUGIN_PATH, then beside marrow's
+// library. All functions throw marrow::Error for a node, an input or an option that does not exist.
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <marrow/base/error.hpp>
+#include <marrow/conformance.hpp>
 #include <marrow/runtime/node/attributes.hpp>
 #include <marrow/runtime/node/types.hpp>
 #include <marrow/runtime/plugins/catalogue.hpp>
@@ -21,10 +22,7 @@ using Options = std::map<std::string, marrow::OptionValue>;
 using Outputs = std::map<std::string, marrow::Value>;
 
 /// One item, and a list along an axis, as inputs.
-template <class T>
-marrow::Value item(T value) {
-  return marrow::Value::of<T>(std::make_shared<const T>(std::move(value)));
-}
+using marrow::conformance::item;
 template <class T>
 marrow::Value list(const marrow::List<T>& items, const std::string& axis) {
   return marrow::Value::of<T>(items, axis);
@@ -37,8 +35,8 @@ inline const marrow::NodeDefinition& definition_of(const std::string& node) {
   return catalogue.load(node);
 }
 
-/// Whether a node declares that its options are so to each other. What then happens to a pipeline that breaks it, the
-/// tests of the runtime say.
+/// Whether a node declares this relation between its options. The runtime's tests cover what happens if a pipeline
+/// breaks it.
 inline bool declares(const std::string& node, const marrow::RelationInfo& relation) {
   const std::vector<marrow::RelationInfo>& all = definition_of(node).info.relations;
   return std::any_of(all.begin(), all.end(), [&](const marrow::RelationInfo& declared) {
@@ -46,8 +44,8 @@ inline bool declares(const std::string& node, const marrow::RelationInfo& relati
   });
 }
 
-/// The outputs of a node by port, with the options given and its defaults for the others. Exceptions of the node pass
-/// through; ports and options that it has not are an Error.
+/// The outputs of a node by port. Options that are not given have their defaults. Exceptions of the node pass through.
+/// Throws Error if the node does not have one of the inputs or options.
 inline Outputs call(const std::string& node, const Inputs& inputs, const Options& options = {},
                     marrow::Context context = marrow::Context()) {
   const marrow::NodeDefinition& definition = definition_of(node);
@@ -58,7 +56,7 @@ inline Outputs call(const std::string& node, const Inputs& inputs, const Options
       definition.set_option[i](settings.get(), given->second);
       ++known;
     }
-  if (known != options.size()) throw marrow::Error("the test gives '" + node + "' an option that it has not");
+  if (known != options.size()) throw marrow::Error("the test gives '" + node + "' an option that it does not have");
   std::vector<marrow::Value> values;
   known = 0;
   for (const marrow::PortInfo& port : definition.info.inputs) {
@@ -68,14 +66,14 @@ inline Outputs call(const std::string& node, const Inputs& inputs, const Options
     values.push_back(given == inputs.end() ? marrow::Value() : given->second);
     known += given != inputs.end();
   }
-  if (known != inputs.size()) throw marrow::Error("the test gives '" + node + "' an input that it has not");
+  if (known != inputs.size()) throw marrow::Error("the test gives '" + node + "' an input that it does not have");
   Outputs outputs;
   const std::vector<marrow::Value> results = definition.call(values, settings.get(), context);
   for (std::size_t i = 0; i < results.size(); ++i) outputs[definition.info.outputs[i].name] = results[i];
   return outputs;
 }
 
-/// The text that a node refuses its inputs with; empty where it does not.
+/// The message with which a node refuses its inputs; empty if it accepts them.
 inline std::string refusal(const std::string& node, const Inputs& inputs, const Options& options = {}) {
   try {
     call(node, inputs, options);
@@ -85,7 +83,7 @@ inline std::string refusal(const std::string& node, const Inputs& inputs, const 
   return "";
 }
 
-/// A figure of merit by its name; NaN where there is none.
+/// A figure of merit by its name; NaN if there is none.
 inline double figure(const marrow::Value& metrics, const std::string& name) {
   if (metrics.is_absent()) return std::nan("");
   for (const marrow::Metric& metric : metrics.as<marrow::Metrics>().items)

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <marrow/base/error.hpp>
-#include <marrow/domain/central_rays.hpp>
+#include <marrow/domain/camera.hpp>
 #include <tuple>
 
 #include "marrow/base/number_text.hpp"

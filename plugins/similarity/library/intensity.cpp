@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/base/error.hpp"
-#include "marrow/domain/central_rays.hpp"
+#include "marrow/domain/camera.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
 #include "moments.hpp"
 #include "smoothed_at_bone.hpp"

@@ -12,7 +12,7 @@
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/plain_text.hpp"
-#include "marrow/runtime/node/reading.hpp"
+#include "marrow/runtime/node/context.hpp"
 
 namespace marrow::files {
 namespace {

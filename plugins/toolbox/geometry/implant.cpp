@@ -20,14 +20,7 @@ Eigen::Vector3d unit_axis(const Eigen::Vector3d& axis, const std::string& what, 
 }
 
 void check_implant(const Implant& implant, const std::string& what) {
-  check_mesh(implant.surface, what);
-  if (!is_closed(implant.surface))
-    throw Error(what +
-                ": the surface is open or not consistently oriented, so it has no inside; close its holes (each "
-                "edge must be shared by exactly two triangles)");
-  if (!(enclosed_volume_mm3(implant.surface) > 0))
-    throw Error(formatted("{}: the triangles face inward (enclosed volume {:f} mm3); reverse their order", what,
-                          enclosed_volume_mm3(implant.surface)));
+  check_closed_surface(implant.surface, what);
   if (implant.holes.empty())
     throw Error(what + ": the implant has no holes, so there is nothing to lock; give each hole's centre and axis");
   std::set<std::string> names;

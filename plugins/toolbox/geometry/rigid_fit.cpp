@@ -81,10 +81,8 @@ RigidTransform fit_rigid(const std::vector<Eigen::Vector3d>& from_mm, const std:
 
 Eigen::Matrix<double, 3, 6> point_by_motion(const FragmentFrame& frame, const Eigen::Vector3d& model_mm) {
   const Eigen::Vector3d arm = model_mm - frame.origin_mm;
-  Eigen::Matrix3d cross;  // cross * r = r x arm
-  cross << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
   Eigen::Matrix<double, 3, 6> derivatives;
-  derivatives << cross * frame.axes, frame.axes;
+  derivatives << cross_matrix(-arm) * frame.axes, frame.axes;  // r x arm = -arm x r
   return derivatives;
 }
 

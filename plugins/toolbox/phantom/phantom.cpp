@@ -11,17 +11,6 @@
 namespace marrow::phantom {
 namespace {
 
-void check_surface(const Mesh& mesh, const std::string& what) {
-  check_mesh(mesh, what);
-  if (!is_closed(mesh))
-    throw Error(what +
-                ": the surface is open or not consistently oriented, so it has no inside; close its holes (each edge "
-                "must be shared by exactly two triangles)");
-  if (!(enclosed_volume_mm3(mesh) > 0))
-    throw Error(formatted("{}: the triangles face inward (enclosed volume {:f} mm3); reverse their order", what,
-                          enclosed_volume_mm3(mesh)));
-}
-
 void shift(Mesh& mesh, const Eigen::Vector3d& by_mm) {
   for (auto& vertex : mesh.vertices_mm) vertex += by_mm;
 }
@@ -29,8 +18,8 @@ void shift(Mesh& mesh, const Eigen::Vector3d& by_mm) {
 }  // namespace
 
 void check_bone(const Bone& bone, const std::string& what) {
-  check_surface(bone.outer, what + ", outer surface");
-  if (!bone.inner.triangles.empty()) check_surface(bone.inner, what + ", inner surface");
+  check_closed_surface(bone.outer, what + ", outer surface");
+  if (!bone.inner.triangles.empty()) check_closed_surface(bone.inner, what + ", inner surface");
   if (bone.fill_z_mm.empty() || bone.fill_z_mm.size() != bone.fill_fraction.size())
     throw Error(formatted("{}: the bone share needs as many positions as values, got {} and {}", what,
                           bone.fill_z_mm.size(), bone.fill_fraction.size()));
@@ -45,7 +34,7 @@ void check_bone(const Bone& bone, const std::string& what) {
 void check_phantom(const Phantom& phantom, const std::string& what) {
   check_bone(phantom.bone, what);
   if (phantom.fragments.empty()) throw Error(what + ": the phantom has no fragments; break the bone first");
-  if (!phantom.fracture.triangles.empty()) check_surface(phantom.fracture, what + ", fracture surface");
+  if (!phantom.fracture.triangles.empty()) check_closed_surface(phantom.fracture, what + ", fracture surface");
   for (const Fragment& fragment : phantom.fragments) {
     check_rigid(fragment.ct_from_bone, what + ", fragment '" + fragment.name + "' in the CT");
     check_rigid(fragment.world_from_ct, what + ", fragment '" + fragment.name + "' in the images");
@@ -60,7 +49,7 @@ void check_phantom(const ClutteredPhantom& cluttered, const std::string& what) {
   for (const auto* bodies : {&cluttered.tissues, &cluttered.bodies})
     for (const Body& body : *bodies) {
       const std::string name = what + ", '" + body.name + "'";
-      check_surface(body.surface, name);
+      check_closed_surface(body.surface, name);
       check_rigid(body.ct_from_world, name + " in the CT");
       try {
         material(body.material);

@@ -72,12 +72,6 @@ Eigen::MatrixXd with_a_little(const Eigen::MatrixXd& information, double most) {
   return information + 1e-14 * most * Eigen::MatrixXd::Identity(information.rows(), information.cols());
 }
 
-Eigen::Matrix3d skew_of(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d skew;
-  skew << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return skew;
-}
-
 /// Turns about one axis say nothing about how the robot is turned about it, and noise in them is no second axis. Both
 /// show in the covariance: a turn counts by its size against the noise.
 void check_turned(const Eigen::Matrix3d& covariance_of_turn, const std::string& what) {
@@ -157,7 +151,7 @@ HandEye solve_ax_xb(const std::vector<Move>& moves) {
             .squaredNorm();
     matrix.middleRows<3>(row) = minus_identity(moves[i].told.rotation);
     right.segment<3>(row) = x.rotation * moves[i].seen.translation_mm - moves[i].told.translation_mm;
-    by_turn.middleRows<3>(row) = -skew_of(x.rotation * moves[i].seen.translation_mm);
+    by_turn.middleRows<3>(row) = -cross_matrix(x.rotation * moves[i].seen.translation_mm);
   }
   const Eigen::Matrix3d of_turn = variance_of(squares, double(rows - 3), kLeastNoise_rad) *
                                   with_a_little(information, information.trace()).inverse();
@@ -267,9 +261,9 @@ Matrix6d left_by(const RigidTransform& motion, const Matrix6d& covariance, const
   Matrix6d by = Matrix6d::Identity();
   by.topLeftCorner<3, 3>() -= motion.rotation;
   by.bottomRightCorner<3, 3>() -= motion.rotation;
-  by.bottomLeftCorner<3, 3>() -= skew_of(motion.translation_mm) * motion.rotation;
+  by.bottomLeftCorner<3, 3>() -= cross_matrix(motion.translation_mm) * motion.rotation;
   Matrix6d about_place = Matrix6d::Identity();
-  about_place.bottomLeftCorner<3, 3>() = -skew_of(place_mm);
+  about_place.bottomLeftCorner<3, 3>() = -cross_matrix(place_mm);
   return about_place * by * covariance * by.transpose() * about_place.transpose();
 }
 

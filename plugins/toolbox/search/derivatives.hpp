@@ -12,8 +12,7 @@ namespace marrow::search {
 /// Right Jacobian J of a rotation vector: R(r + dr) = R(r) R(J dr) for small dr.
 inline Eigen::Matrix3d rotation_derivative(const Eigen::Vector3d& r_rad) {
   const double angle = r_rad.norm();
-  Eigen::Matrix3d cross;
-  cross << 0, -r_rad.z(), r_rad.y(), r_rad.z(), 0, -r_rad.x(), -r_rad.y(), r_rad.x(), 0;
+  const Eigen::Matrix3d cross = cross_matrix(r_rad);
   if (angle < 1e-6) return Eigen::Matrix3d::Identity() - 0.5 * cross;
   return Eigen::Matrix3d::Identity() - (1 - std::cos(angle)) / (angle * angle) * cross +
          (angle - std::sin(angle)) / (angle * angle * angle) * cross * cross;

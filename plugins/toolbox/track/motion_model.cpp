@@ -12,12 +12,6 @@
 namespace marrow::track {
 namespace {
 
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d matrix;
-  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return matrix;
-}
-
 /// Turns a small change of a motion's numbers into the small motion that follows the motion: by the right Jacobian of
 /// SO(3) for rotations (Sola, eq. 183), and by the inverse rotation for translations.
 Matrix6d of_addition(const Vector6d& motion) {

@@ -2,7 +2,7 @@
 // Figures that no output can have are faults of the experiment's file. The nodes' declarations say what can be.
 #include "marrow/compare/cell.hpp"
 #include "marrow/compare/experiment_notes.hpp"
-#include "tests/framework/runtime/fixture.hpp"
+#include "tests/framework/fixture.hpp"
 
 namespace experiment_figures_test {
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "marrow/compare/experiment.hpp"
-#include "tests/framework/runtime/fixture.hpp"
+#include "tests/framework/fixture.hpp"
 
 namespace experiment_files {
 

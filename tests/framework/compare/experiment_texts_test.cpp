@@ -68,7 +68,7 @@ TEST_F(ExperimentTexts, NamesThatLookTheSameAreFaults) {
            {"one\u200b", "U+200B, which cannot be seen"},
            {"o\u00adne", "U+00AD, which cannot be seen"},
            {"\ufeffone", "U+FEFF, which cannot be seen"},
-           {"one\u00a0a", "U+00A0, a blank that is no space"},
+           {"one\u00a0a", "U+00A0, a blank that is not a space"},
            {"e\u0301", "U+0301, a mark of the letter before it; type the letter with its mark as one character"},
            {"\u202eone", "a control character"}}) {
     expect_fault(kGood + "variants:\n  one: {}\n  \"" + name + "\": {}\n", 7,

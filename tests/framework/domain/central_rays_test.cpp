@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <marrow/domain/central_rays.hpp>
+#include <marrow/domain/camera.hpp>
 
 namespace central_rays_test {
 

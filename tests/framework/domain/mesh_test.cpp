@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
-#include <marrow/domain/manifold.hpp>
 #include <marrow/domain/mesh.hpp>
 
 #include "tests/framework/domain/shapes.hpp"

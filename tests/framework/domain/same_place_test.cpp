@@ -32,7 +32,7 @@ TEST(SamePlace, OfTwoGrids) {
             "the field is in frame 'mr', but the volume in frame 'ct'" + remedy);
   EXPECT_EQ(fault([](Grid& field) { field.size[2] = 30; }),
             "the field has another size than the volume: 11 x 21 x 30, not 11 x 21 x 31 voxels" + remedy);
-  const std::string apart = "the field does not lie where the volume lies: voxels of the same index are up to ";
+  const std::string apart = "the field is not where the volume is: voxels of the same index are up to ";
   EXPECT_EQ(fault([](Grid& field) { field.origin_mm.z() += 500; }), apart + "500 mm apart" + remedy);
   // The last voxel is 30 steps of 0.1 mm off; turned by half a turn about z, 10 and 20 steps of 1 mm lie across: twice
   // sqrt(100 + 400).

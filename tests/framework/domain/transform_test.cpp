@@ -81,6 +81,11 @@ TEST(Rotation, VectorAndMatrixAgree) {
   EXPECT_LT(marrow::vector_from_rotation(Matrix3d::Identity()).norm(), 1e-15);
 }
 
+TEST(Rotation, CrossMatrixMultipliesAsTheCrossProduct) {
+  const Vector3d v(1, -2, 3), w(-4, 5, 7);
+  EXPECT_EQ(Vector3d(marrow::cross_matrix(v) * w), v.cross(w));
+}
+
 TEST(Rotation, GeodesicAngleIsExactForSmallAndLargeAngles) {
   const Matrix3d base = AngleAxisd(0.8, Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
   for (double angle : {1e-8, 1e-4, 0.01, 1.0, 3.0, 3.14}) {

@@ -5,6 +5,7 @@
 #include "marrow/simulate/photograph.hpp"
 #include "marrow/toolbox/calibration/chessboard.hpp"
 #include "shipped.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace chessboard_test {
 
@@ -180,12 +181,9 @@ TEST(CameraPhotographs, TheLogarithmGivesTheLightWithoutDistortion) {
 TEST(CameraPhotographs, RefusesAPhotographWithoutACamera) {
   List<Picture> photographs;
   photographs.add("lateral", plain());
-  try {
-    viewed(photographs, phantom::camera_at(taken().arm, 0), taken().arm.device);
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_STREQ(error.what(), "there is no camera for photograph 'lateral'; calibrate it with the same names");
-  }
+  EXPECT_EQ(
+      marrow::test::message_of([&] { viewed(photographs, phantom::camera_at(taken().arm, 0), taken().arm.device); }),
+      "there is no camera for photograph 'lateral'; calibrate it with the same names");
 }
 
 }  // namespace chessboard_test

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "tests/harness/message_of.hpp"
 #include "tests/plugins/plan/implants.hpp"
 
 namespace evaluate_locking_test {
@@ -57,14 +58,9 @@ TEST(EvaluateLocking, SilentIsOffAndNotDoubted) {
 TEST(EvaluateLocking, RefusesAPlanForAnotherImplant) {
   LockingPlan other = plan(0, {0, 0, 0});
   other.drills[0].hole = "proximal";
-  try {
-    errors(other);
-    FAIL();
-  } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(),
-                 "evaluate.locking: the plan has a drill for hole 'proximal', but the implant has no such hole; give "
-                 "the implant of the plan");
-  }
+  EXPECT_EQ(marrow::test::message_of([&] { errors(other); }),
+            "evaluate.locking: the plan has a drill for hole 'proximal', but the implant has no such hole; give "
+            "the implant of the plan");
 }
 
 }  // namespace evaluate_locking_test

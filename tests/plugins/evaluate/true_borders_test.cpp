@@ -12,7 +12,7 @@
 
 namespace true_borders_test {
 
-using marrow::LineSegment, marrow::Mesh, marrow::RigidTransform, marrow::ShaftLines;
+using marrow::LineSegment, marrow::Mesh, marrow::RigidTransform, marrow::ShaftLines, tube::posed;
 
 constexpr double kRadius_mm = 14, kPixel_mm = 0.6 * 300 / 512;  // at the isocentre
 constexpr double kLimit_mm = 0.01;
@@ -20,13 +20,6 @@ constexpr double kLimit_mm = 0.01;
 Mesh cylinder(double half_mm = 150) {
   return tube::mesh(
       half_mm, [](double, double) { return kRadius_mm; }, [](double) { return Eigen::Vector3d(0, 0, 0); }, 360, 60);
-}
-
-RigidTransform posed(const Eigen::Vector3d& rotation_deg, const Eigen::Vector3d& translation_mm) {
-  RigidTransform world_from_model{"world", "ct"};
-  world_from_model.rotation = marrow::rotation_from_vector(rotation_deg * (marrow::kPi / 180));
-  world_from_model.translation_mm = translation_mm;
-  return world_from_model;
 }
 
 /// The farthest that an end of one segment is from the line through the other, in mm at the isocentre.

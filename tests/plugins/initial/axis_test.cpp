@@ -7,6 +7,7 @@
 #include <marrow/base/error.hpp>
 #include <random>
 
+#include "tests/harness/message_of.hpp"
 #include "tests/plugins/edges/radiograph.hpp"
 #include "tests/plugins/initial/tube.hpp"
 
@@ -116,14 +117,9 @@ TEST(Axis, IsRefusedFromViewsOfTheSameSide) {
     const auto lines = tube::borders(camera, {0, 0, 0}, {0, 0, 1}, 14, 50, 400);
     planes.push_back(bisecting_plane(camera, lines.left, lines.right));
   }
-  try {
-    axis_of_planes(planes);
-    FAIL();
-  } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(),
-                 "the 2 views see the shaft from nearly the same side: the planes of its axis meet at 4.0 degrees, but "
-                 "10 are needed; use views farther apart, or a single one");
-  }
+  EXPECT_EQ(marrow::test::message_of([&] { axis_of_planes(planes); }),
+            "the 2 views see the shaft from nearly the same side: the planes of its axis meet at 4.0 degrees, but "
+            "10 are needed; use views farther apart, or a single one");
 }
 
 }  // namespace axis_test

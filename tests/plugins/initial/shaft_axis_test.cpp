@@ -10,7 +10,7 @@
 
 namespace shaft_axis_test {
 
-using marrow::List, marrow::Mesh, marrow::Pose, marrow::RigidTransform, marrow::ShaftLines, marrow::View;
+using marrow::List, marrow::Mesh, marrow::Pose, marrow::RigidTransform, marrow::ShaftLines, marrow::View, tube::posed;
 
 shipped::Inputs inputs_of(const Mesh& model, const List<ShaftLines>& lines, const List<View>& views,
                           const Pose* start) {
@@ -26,13 +26,6 @@ Pose shaft_axis(const Mesh& model, const List<ShaftLines>& lines, const List<Vie
 }
 std::string refusal(const Mesh& model, const List<ShaftLines>& lines, const List<View>& views, const Pose* start) {
   return shipped::refusal("initial.shaft_axis", inputs_of(model, lines, views, start));
-}
-
-RigidTransform posed(const Eigen::Vector3d& rotation_deg, const Eigen::Vector3d& translation_mm) {
-  RigidTransform world_from_model{"world", "ct"};
-  world_from_model.rotation = marrow::rotation_from_vector(rotation_deg * (marrow::kPi / 180));
-  world_from_model.translation_mm = translation_mm;
-  return world_from_model;
 }
 
 /// Views from the angles, with the borders that the model at its true pose shows between two heights of the image.

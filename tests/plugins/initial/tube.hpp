@@ -42,6 +42,10 @@ inline marrow::Mesh cylinder(double radius_mm, double half_mm) {
       half_mm, [=](double, double) { return radius_mm; }, [](double) { return Eigen::Vector3d(0, 0, 0); });
 }
 
+inline marrow::RigidTransform posed(const Eigen::Vector3d& rotation_deg, const Eigen::Vector3d& translation_mm) {
+  return {"world", "ct", marrow::rotation_from_vector(rotation_deg * (marrow::kPi / 180)), translation_mm};
+}
+
 /// The two image lines in which planes through the source touch a circular cylinder, between the images of two of its
 /// points.
 inline std::array<Eigen::Vector3d, 2> tangents(const marrow::Camera& camera, const Eigen::Vector3d& point,

@@ -9,7 +9,6 @@
 #include <random>
 #include <string>
 
-#include "marrow/domain/manifold.hpp"
 #include "marrow/domain/mesh.hpp"
 #include "marrow/domain/volume.hpp"
 #include "shipped.hpp"

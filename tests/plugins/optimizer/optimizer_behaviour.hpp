@@ -4,12 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <marrow/base/error.hpp>
 #include <marrow/domain/functions.hpp>
 #include <memory>
 #include <string>
 
 #include "shipped.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace optimizer_behaviour {
 
@@ -33,12 +33,7 @@ inline marrow::MinimisationProblem valley() {
 
 /// Why an optimizer refuses a problem; empty if it does not.
 inline std::string refusal_of(const marrow::Optimizer& optimizer, const marrow::MinimisationProblem& problem) {
-  try {
-    optimizer.minimise(problem);
-  } catch (const marrow::Error& error) {
-    return error.what();
-  }
-  return "";
+  return marrow::test::message_of([&] { optimizer.minimise(problem); });
 }
 
 }  // namespace optimizer_behaviour

@@ -8,6 +8,7 @@
 #include <marrow/domain/volume.hpp>
 #include <memory>
 
+#include "tests/harness/message_of.hpp"
 #include "tests/plugins/project/made.hpp"
 #include "tests/plugins/project/shapes.hpp"
 
@@ -98,14 +99,7 @@ TEST_P(Outlines, EndsOfTheVolumeAreLeftOut) {
   for (const auto& p : make(mesh, nullptr)->outline(camera, pose, 1)) level += std::abs(p.normal_v) > 0.9;
   EXPECT_GT(level, 60u);
 
-  const auto refusal = [&] {
-    try {
-      make(mesh, &volume);
-    } catch (const marrow::Error& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
+  const auto refusal = [&] { return marrow::test::message_of([&] { make(mesh, &volume); }); };
   volume.grid.origin_mm.x() += 500;
   EXPECT_EQ(refusal(), "only 0 % of the mesh lies in the volume; give those that belong together");
   volume.grid.frame = "mr";
@@ -126,12 +120,8 @@ TEST_P(Outlines, KeepsInsideTheImage) {
 }
 
 TEST_P(Outlines, RefusesNonsense) {
-  try {
-    make(marrow::Mesh{}, nullptr);
-    FAIL();
-  } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(), "the mesh to project: the surface has no triangles");
-  }
+  EXPECT_EQ(marrow::test::message_of([&] { make(marrow::Mesh{}, nullptr); }),
+            "the mesh to project: the surface has no triangles");
   const marrow::Mesh mesh = shapes::sphere(10);
   EXPECT_THROW(make(mesh, nullptr)->outline(shapes::c_arm(0), shapes::centred_at({0, 0, 10}), 0), marrow::Error);
 }

@@ -9,6 +9,7 @@
 #include <map>
 
 #include "marrow/plugin.hpp"
+#include "tests/harness/message_of.hpp"
 #include "tests/plugins/project/shapes.hpp"
 
 namespace radiograph_behaviour {
@@ -186,17 +187,10 @@ inline void a_field_leaves_the_rest_out(const Make& make) {
   };
   EXPECT_GT(projector->radiograph(camera(0), shapes::centred_at({0, 0, 0}), pixels(-20)).at(0), 50);
   EXPECT_EQ(projector->radiograph(camera(0), shapes::centred_at({0, 0, 0}), pixels(20)).at(0), 0);
-  const auto refusal = [&] {
-    try {
-      make(two, &field);
-    } catch (const marrow::Error& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
+  const auto refusal = [&] { return marrow::test::message_of([&] { make(two, &field); }); };
   field.grid.origin_mm.x() += 500;
   EXPECT_EQ(refusal(),
-            "the field does not lie where the volume lies: voxels of the same index are up to 500 mm apart; wire the "
+            "the field is not where the volume is: voxels of the same index are up to 500 mm apart; wire the "
             "field that was segmented from this volume");
   field.grid = two.grid;
   field.values_mm.pop_back();

@@ -10,6 +10,7 @@
 #include <regex>
 
 #include "tests/plugins/read/damage.hpp"
+#include "tests/plugins/read/dicom_text.hpp"
 #include "tests/plugins/read/itk_files.hpp"
 
 namespace damaged {
@@ -42,12 +43,6 @@ inline void expect_handled(const TemporaryFolder& folder, const Sample& sample,
   put(path, sample.bytes);
   std::printf("%-24s %3d refused, %3d read\n", sample.name.c_str(), counts[Outcome::refused],
               counts[Outcome::accepted]);
-}
-
-inline std::string little_bytes(std::uint64_t value, int width) {
-  std::string bytes;
-  for (int i = 0; i < width; ++i) bytes += char(value >> (8 * i));
-  return bytes;
 }
 
 inline ItkGrid<std::uint16_t> picture() {

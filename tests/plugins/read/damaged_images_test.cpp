@@ -45,17 +45,16 @@ TEST(Damaged, DicomImage) {
   const TemporaryFolder folder;
   Sample sample{"a.dcm", fluoroscopy_file(48, 32), 0, {}, false};
   sample.header_bytes = sample.bytes.size() - 48 * 32 * 2;
-  const std::string rows = dicom_element(0x00280010, "US", little_bytes(32, 2));
-  const std::string pixels = little_bytes(48 * 32 * 2, 4);
-  sample.lies = {
-      {rows, dicom_element(0x00280010, "US", little_bytes(60000, 2))},
-      {pixels, little_bytes(0xFFFFFFF0u, 4)},
-      {pixels, little_bytes(48 * 32 * 2 + 2, 4)},
-      {dicom_element(0x00280100, "US", little_bytes(16, 2)), dicom_element(0x00280100, "US", little_bytes(64, 2))},
-      {dicom_element(0x00280002, "US", little_bytes(1, 2)), dicom_element(0x00280002, "US", little_bytes(30000, 2))},
-      {dicom_element(0x00280010, "US", little_bytes(32, 2)), dicom_element(0x00280008, "IS", "999999999 ") + rows},
-      {rows, dicom_element(0x00280010, "US", little_bytes(0, 2))},
-      {"CS" + little_bytes(2, 2) + "XA", "CS" + little_bytes(0xFFFE, 2) + "XA"}};
+  const std::string rows = dicom_element(0x00280010, "US", little(32, 2));
+  const std::string pixels = little(48 * 32 * 2, 4);
+  sample.lies = {{rows, dicom_element(0x00280010, "US", little(60000, 2))},
+                 {pixels, little(0xFFFFFFF0u, 4)},
+                 {pixels, little(48 * 32 * 2 + 2, 4)},
+                 {dicom_element(0x00280100, "US", little(16, 2)), dicom_element(0x00280100, "US", little(64, 2))},
+                 {dicom_element(0x00280002, "US", little(1, 2)), dicom_element(0x00280002, "US", little(30000, 2))},
+                 {dicom_element(0x00280010, "US", little(32, 2)), dicom_element(0x00280008, "IS", "999999999 ") + rows},
+                 {rows, dicom_element(0x00280010, "US", little(0, 2))},
+                 {"CS" + little(2, 2) + "XA", "CS" + little(0xFFFE, 2) + "XA"}};
   expect_handled(folder, sample, image_at);
   // The camera needs only the header, so a file with damaged pixels may be accepted.
   expect_handled(folder, sample, [](const Path& path) { marrow::files::read_xray_geometry(path, 1, {}); });

@@ -13,11 +13,11 @@ using Path = std::filesystem::path;
 
 std::string stl_binary(std::uint32_t triangles) {
   std::string bytes(80, ' ');
-  bytes += little_bytes(triangles, 4);
+  bytes += little(triangles, 4);
   for (std::uint32_t i = 0; i < triangles; ++i) {
     float numbers[12] = {0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, float(i)};
     bytes.append(reinterpret_cast<const char*>(numbers), sizeof numbers);
-    bytes += little_bytes(0, 2);
+    bytes += little(0, 2);
   }
   return bytes;
 }
@@ -29,7 +29,7 @@ TEST(Damaged, Meshes) {
                  {"a.stl",
                   stl_binary(100),
                   84,
-                  {{little_bytes(100, 4), little_bytes(0xFFFFFFFFu, 4)}, {little_bytes(100, 4), little_bytes(101, 4)}},
+                  {{little(100, 4), little(0xFFFFFFFFu, 4)}, {little(100, 4), little(101, 4)}},
                   false},
                  read);
   std::string text =
@@ -53,13 +53,12 @@ TEST(Damaged, Meshes) {
       "property list uint uint vertex_indices\nend_header\n";
   for (float value : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f})
     binary.append(reinterpret_cast<const char*>(&value), 4);
-  binary += little_bytes(3, 4) + little_bytes(0, 4) + little_bytes(1, 4) + little_bytes(2, 4);
+  binary += little(3, 4) + little(0, 4) + little(1, 4) + little(2, 4);
   expect_handled(folder,
                  {"b.ply",
                   binary,
                   190,
-                  {{little_bytes(3, 4) + little_bytes(0, 4) + little_bytes(1, 4),
-                    little_bytes(0xFFFFFFFFu, 4) + little_bytes(0, 4) + little_bytes(1, 4)}},
+                  {{little(3, 4) + little(0, 4) + little(1, 4), little(0xFFFFFFFFu, 4) + little(0, 4) + little(1, 4)}},
                   false},
                  read);
 }

@@ -27,17 +27,17 @@ TEST(Damaged, TiffStack) {
 }
 
 std::string tiff_pages(const std::vector<std::pair<int, int>>& sizes) {
-  std::string bytes = "II" + little_bytes(42, 2) + little_bytes(8, 4);
+  std::string bytes = "II" + little(42, 2) + little(8, 4);
   for (std::size_t i = 0; i < sizes.size(); ++i) {
     const auto [width, height] = sizes[i];
     const std::uint64_t values = std::uint64_t(width) * std::uint64_t(height) * 2,
                         begin = bytes.size() + 2 + 12 * 9 + 4;
     const std::pair<int, std::uint64_t> tags[] = {{256, width}, {257, height}, {258, 16},     {259, 1},     {262, 1},
                                                   {273, begin}, {277, 1},      {278, height}, {279, values}};
-    bytes += little_bytes(9, 2);
+    bytes += little(9, 2);
     for (const auto& [tag, value] : tags)
-      bytes += little_bytes(std::uint64_t(tag), 2) + little_bytes(4, 2) + little_bytes(1, 4) + little_bytes(value, 4);
-    bytes += little_bytes(i + 1 < sizes.size() ? begin + values : 0, 4) + std::string(values, 'x');
+      bytes += little(std::uint64_t(tag), 2) + little(4, 2) + little(1, 4) + little(value, 4);
+    bytes += little(i + 1 < sizes.size() ? begin + values : 0, 4) + std::string(values, 'x');
   }
   return bytes;
 }
@@ -122,8 +122,7 @@ TEST(Damaged, Nrrd) {
 TEST(Damaged, Nifti) {
   const TemporaryFolder folder;
   const auto dimensions = [](int x, int y, int z) {
-    return little_bytes(3, 2) + little_bytes(std::uint64_t(x), 2) + little_bytes(std::uint64_t(y), 2) +
-           little_bytes(std::uint64_t(z), 2);
+    return little(3, 2) + little(std::uint64_t(x), 2) + little(std::uint64_t(y), 2) + little(std::uint64_t(z), 2);
   };
   expect_handled(folder,
                  written(folder, "a.nii", stack(), false, 352,
@@ -131,8 +130,8 @@ TEST(Damaged, Nifti) {
                           {dimensions(20, 16, 12), dimensions(32767, 32767, 32767)},
                           {dimensions(20, 16, 12), dimensions(-20, 16, 12)},
                           {dimensions(20, 16, 12), dimensions(0, 16, 12)},
-                          {dimensions(20, 16, 12), little_bytes(9, 2) + dimensions(20, 16, 12).substr(2)},
-                          {dimensions(20, 16, 12), little_bytes(0, 2) + dimensions(20, 16, 12).substr(2)}}),
+                          {dimensions(20, 16, 12), little(9, 2) + dimensions(20, 16, 12).substr(2)},
+                          {dimensions(20, 16, 12), little(0, 2) + dimensions(20, 16, 12).substr(2)}}),
                  volume_at);
   Sample packed = written(folder, "a.nii.gz", stack(), true, 352);
   packed.header_bytes = 200;

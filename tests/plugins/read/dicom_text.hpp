@@ -12,7 +12,7 @@ namespace marrow::test {
 /// Elements of explicit little endian DICOM by tag. A value's kind stands before it: "DS:1000".
 using Elements = std::map<std::uint32_t, std::string>;
 
-inline std::string little(std::uint32_t value, int width) {
+inline std::string little(std::uint64_t value, int width) {
   std::string bytes;
   for (int i = 0; i < width; ++i) bytes += char(value >> (8 * i));
   return bytes;

@@ -43,6 +43,22 @@ inline void put(const std::filesystem::path& path, const std::string& bytes) {
   std::ofstream(path, std::ios::binary) << bytes;
 }
 
+/// The bytes of a number, the lowest first.
+template <class T>
+std::string number(T value) {
+  return {reinterpret_cast<const char*>(&value), sizeof value};
+}
+
+/// A field of a TIFF's directory.
+inline std::string tiff_entry(int tag, int type, std::uint32_t count, std::uint32_t value) {
+  return number(std::uint16_t(tag)) + number(std::uint16_t(type)) + number(count) + number(value);
+}
+
+/// Other bytes from a place on.
+inline std::string replaced(std::string bytes, std::size_t at, const std::string& by) {
+  return bytes.replace(at, by.size(), by);
+}
+
 /// `text` without a folder's name, which may hold any letters.
 inline std::string without_folder(std::string text, const std::filesystem::path& folder) {
   for (std::size_t at; (at = text.find(folder.string())) != std::string::npos;) text.erase(at, folder.string().size());

@@ -7,10 +7,6 @@ namespace hostile_tiff_test {
 using namespace hostile_volumes;
 using namespace marrow::test;
 
-std::string tiff_entry(int tag, int type, std::uint32_t count, std::uint32_t value) {
-  return number(std::uint16_t(tag)) + number(std::uint16_t(type)) + number(count) + number(value);
-}
-
 std::string tiff_directory(std::uint32_t next) {
   return number<std::uint16_t>(8) + tiff_entry(256, 4, 1, 2) + tiff_entry(257, 4, 1, 2) + tiff_entry(258, 4, 1, 8) +
          tiff_entry(259, 4, 1, 1) + tiff_entry(262, 4, 1, 1) + tiff_entry(273, 4, 1, 4) + tiff_entry(278, 4, 1, 2) +

@@ -24,15 +24,6 @@ inline ItkGrid<std::int16_t> stack() {
   return grid;
 }
 
-template <class T>
-std::string number(T value) {
-  return {reinterpret_cast<const char*>(&value), sizeof value};
-}
-
-inline std::string replaced(std::string bytes, std::size_t at, const std::string& by) {
-  return bytes.replace(at, by.size(), by);
-}
-
 /// Gives the bytes of good files, and expects that other files are refused for a given reason.
 class Hostile : public testing::Test {
  protected:

@@ -15,15 +15,6 @@ namespace nifti_test {
 
 using namespace marrow::test;
 
-template <class T>
-std::string number(T value) {
-  return {reinterpret_cast<const char*>(&value), sizeof value};
-}
-
-std::string replaced(std::string bytes, std::size_t at, const std::string& by) {
-  return bytes.replace(at, by.size(), by);
-}
-
 class TwoPlaces : public testing::Test {
  protected:
   TwoPlaces() {

@@ -11,15 +11,6 @@ namespace tiff_test {
 
 using namespace marrow::test;
 
-template <class T>
-std::string number(T value) {
-  return {reinterpret_cast<const char*>(&value), sizeof value};
-}
-
-std::string entry(int tag, int type, std::uint32_t count, std::uint32_t value) {
-  return number(std::uint16_t(tag)) + number(std::uint16_t(type)) + number(count) + number(value);
-}
-
 struct Page {
   std::string description;  ///< none where empty
   int format = 1, photometric = 1;
@@ -32,11 +23,12 @@ std::string tiff(const std::vector<Page>& pages) {
     const std::uint32_t entries = pages[k].description.empty() ? 9 : 10,
                         data = std::uint32_t(bytes.size()) + 2 + 12 * entries + 4;
     const std::string samples = number(std::uint16_t(1000 * (k + 1))) + number(std::uint16_t(1001 * (k + 1)));
-    bytes += number(std::uint16_t(entries)) + entry(256, 4, 1, 2) + entry(257, 4, 1, 1) + entry(258, 4, 1, 16) +
-             entry(259, 4, 1, 1) + entry(262, 4, 1, std::uint32_t(pages[k].photometric));
-    if (entries == 10) bytes += entry(270, 2, std::uint32_t(pages[k].description.size()), data + 4);
-    bytes += entry(273, 4, 1, data) + entry(278, 4, 1, 1) + entry(279, 4, 1, 4) +
-             entry(339, 3, 1, std::uint32_t(pages[k].format));
+    bytes += number(std::uint16_t(entries)) + tiff_entry(256, 4, 1, 2) + tiff_entry(257, 4, 1, 1) +
+             tiff_entry(258, 4, 1, 16) + tiff_entry(259, 4, 1, 1) +
+             tiff_entry(262, 4, 1, std::uint32_t(pages[k].photometric));
+    if (entries == 10) bytes += tiff_entry(270, 2, std::uint32_t(pages[k].description.size()), data + 4);
+    bytes += tiff_entry(273, 4, 1, data) + tiff_entry(278, 4, 1, 1) + tiff_entry(279, 4, 1, 4) +
+             tiff_entry(339, 3, 1, std::uint32_t(pages[k].format));
     const std::uint32_t next = data + 4 + std::uint32_t(pages[k].description.size());
     bytes += number(k + 1 == pages.size() ? 0u : next) + samples + pages[k].description;
   }

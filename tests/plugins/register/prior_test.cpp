@@ -9,13 +9,6 @@ namespace prior_test {
 
 using marrow::Cost, marrow::Matrix6d, marrow::Pose, marrow::Vector6d;
 
-Pose truth() {
-  Pose pose;
-  pose.frame = {Eigen::Vector3d(5, -3, 80), marrow::rotation_from_vector({0.1, -0.2, 0.3}), true};
-  pose.world_from_model = {"world", "ct", marrow::rotation_from_vector({0.2, 0.1, -0.4}), Eigen::Vector3d(12, -7, 30)};
-  return pose;
-}
-
 /// Squared deviations, from degrees and mm to radians and mm.
 Matrix6d squares(const Vector6d& deg_and_mm) {
   Vector6d deviations = deg_and_mm;
@@ -27,7 +20,7 @@ Matrix6d squares(const Vector6d& deg_and_mm) {
 // prior says 2, with a variance of 4. Two normal densities multiply to one with the sum of their weights 1 / variance,
 // and with the mean of their means by these weights.
 TEST(Prior, ThePoseLiesBetweenImagesAndPriorWithTheDeviationOfBoth) {
-  const Pose at = truth();
+  const Pose at = well::truth();
   Vector6d found, known;
   found << 0.1, 0.1, 1, 0.1, 0.1, 0.1;
   known << 20, 20, 2, 50, 50, 50;

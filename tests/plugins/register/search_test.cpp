@@ -10,6 +10,7 @@
 #include "marrow/toolbox/search/derivatives.hpp"
 #include "marrow/toolbox/search/predicted_covariance.hpp"
 #include "marrow/toolbox/search/scan.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace search_test {
 
@@ -24,18 +25,12 @@ using marrow::search::SearchOptions;
 using well::Bowl;
 using well::Listener;
 using well::pose_at;
+using well::truth;
 
 Vector6d motion(double rx, double ry, double rz, double tx, double ty, double tz) {
   Vector6d deg_and_mm;
   deg_and_mm << rx, ry, rz, tx, ty, tz;
   return deg_and_mm;
-}
-
-Pose truth() {
-  Pose pose;
-  pose.frame = {Eigen::Vector3d(5, -3, 80), marrow::rotation_from_vector({0.1, -0.2, 0.3}), true};
-  pose.world_from_model = {"world", "ct", marrow::rotation_from_vector({0.2, 0.1, -0.4}), Eigen::Vector3d(12, -7, 30)};
-  return pose;
 }
 
 Bowl bowl(double information = 1) {
@@ -162,13 +157,8 @@ TEST(Search, FollowsTheBestOfItsScanThroughAllLevels) {
 }
 
 TEST(Search, RefusesLevelsWithoutPositiveNumbers) {
-  const auto said = [](const SearchOptions& options) -> std::string {
-    try {
-      marrow::search::check_options(options);
-    } catch (const marrow::Error& error) {
-      return error.what();
-    }
-    return "";
+  const auto said = [](const SearchOptions& options) {
+    return marrow::test::message_of([&] { marrow::search::check_options(options); });
   };
   SearchOptions options;
   EXPECT_EQ(said(options), "");
@@ -308,12 +298,7 @@ std::string refused(const marrow::Cost& cost) {
   const Pose start = truth();
   const SearchOptions options;
   Search search(listener, start, options, context);
-  try {
-    final_pose_of(search, start, cost, {1, 1, 1, 0.1}, options, context);
-  } catch (const marrow::Error& error) {
-    return error.what();
-  }
-  return "";
+  return marrow::test::message_of([&] { final_pose_of(search, start, cost, {1, 1, 1, 0.1}, options, context); });
 }
 
 TEST(Search, APoseAboutWhichTheImagesSayNothingIsNoResult) {

@@ -9,14 +9,8 @@ namespace sequence_test {
 using marrow::Cost;
 using marrow::Pose;
 using well::pose_at;
+using well::truth;
 using well::Well;
-
-Pose truth() {
-  Pose pose;
-  pose.frame = {Eigen::Vector3d(5, -3, 80), marrow::rotation_from_vector({0.1, -0.2, 0.3}), true};
-  pose.world_from_model = {"world", "ct", marrow::rotation_from_vector({0.2, 0.1, -0.4}), Eigen::Vector3d(12, -7, 30)};
-  return pose;
-}
 
 /// The first cost is least at `first`, the second at `second`.
 struct Trial {

@@ -11,13 +11,7 @@ using marrow::Cost;
 using marrow::Matrix6d;
 using marrow::Pose;
 using marrow::Vector6d;
-
-Pose truth() {
-  Pose pose;
-  pose.frame = {Eigen::Vector3d(5, -3, 80), marrow::rotation_from_vector({0.1, -0.2, 0.3}), true};
-  pose.world_from_model = {"world", "ct", marrow::rotation_from_vector({0.2, 0.1, -0.4}), Eigen::Vector3d(12, -7, 30)};
-  return pose;
-}
+using well::truth;
 
 /// A prediction off by this much, with these deviations of all angles and translations.
 Pose predicted(const Vector6d& off_deg_mm, double deg, double mm) {

@@ -49,6 +49,14 @@ class Well : public marrow::Cost {
   double height_, length_;
 };
 
+/// A pose that is no round number in any coordinate.
+inline marrow::Pose truth() {
+  marrow::Pose pose;
+  pose.frame = {Eigen::Vector3d(5, -3, 80), marrow::rotation_from_vector({0.1, -0.2, 0.3}), true};
+  pose.world_from_model = {"world", "ct", marrow::rotation_from_vector({0.2, 0.1, -0.4}), Eigen::Vector3d(12, -7, 30)};
+  return pose;
+}
+
 /// A pose moved about its frame, in degrees and mm.
 inline marrow::Pose pose_at(const marrow::Pose& from, double rx, double ry, double rz, double tx, double ty,
                             double tz) {

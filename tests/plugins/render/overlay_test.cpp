@@ -3,6 +3,7 @@
 
 #include "marrow/toolbox/draw/canvas.hpp"
 #include "shipped.hpp"
+#include "tests/harness/message_of.hpp"
 #include "tests/plugins/render/pictures.hpp"
 
 namespace overlay_test {
@@ -167,13 +168,8 @@ TEST(Overlay, ContrastIgnoresNotANumberAndWhatTheMaskHides) {
 }
 
 TEST(Overlay, SaysWhatIsWrong) {
-  const auto message = [](const marrow::View& view, const marrow::Pose& pose) -> std::string {
-    try {
-      overlay(pose, {}, {}, view);
-    } catch (const marrow::Error& error) {
-      return error.what();
-    }
-    return "no error";
+  const auto message = [](const marrow::View& view, const marrow::Pose& pose) {
+    return marrow::test::message_of([&] { overlay(pose, {}, {}, view); });
   };
   marrow::View empty = view();
   empty.image.pixels = cv::Mat();

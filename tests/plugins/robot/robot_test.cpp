@@ -5,6 +5,7 @@
 #include "marrow/guide/relative_pose.hpp"
 #include "marrow/robot/contact.hpp"
 #include "marrow/toolbox/robotics/robot_state.hpp"
+#include "tests/harness/message_of.hpp"
 #include "tests/plugins/simulate/nodes.hpp"
 
 namespace robot_test {
@@ -56,12 +57,8 @@ TEST(Contact, WholeBoneIsApartAndPressedBoneIsNot) {
 }
 
 TEST(Contact, NeedsAFracture) {
-  try {
-    robot::Contact(Phantom{}, "test");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_STREQ(error.what(), "test: the phantom is of a whole bone; a broken one is needed");
-  }
+  EXPECT_EQ(marrow::test::message_of([&] { robot::Contact(Phantom{}, "test"); }),
+            "test: the phantom is of a whole bone; a broken one is needed");
 }
 
 TEST(SoftTissue, PullsAsMuchAsItShould) {

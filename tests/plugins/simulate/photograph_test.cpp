@@ -4,6 +4,7 @@
 
 #include "marrow/simulate/photograph.hpp"
 #include "nodes.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace photograph_test {
 
@@ -107,12 +108,10 @@ TEST(Photograph, TheSensorHasGammaAndNoise) {
 }
 
 TEST(Photograph, ABodyBehindTheCameraIsRefused) {
-  try {
-    taken({block({-5, -700, -5}, {5, 5, 5}, {1, 1, 1})}, even());
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_STREQ(error.what(), "a photographed body reaches behind the camera or closer than 10 mm to it");
-  }
+  EXPECT_EQ(marrow::test::message_of([&] {
+              taken({block({-5, -700, -5}, {5, 5, 5}, {1, 1, 1})}, even());
+            }),
+            "a photographed body reaches behind the camera or closer than 10 mm to it");
 }
 
 TEST(SimulatePhotograph, ShowsBoneClampAndPlatform) {

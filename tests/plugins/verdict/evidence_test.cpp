@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "shipped.hpp"
+#include "tests/harness/message_of.hpp"
 #include "wells.hpp"
 
 namespace evidence_test {
@@ -245,13 +246,7 @@ TEST(VerdictEvidence, WithoutAModelAPoseIsDoubtful) {
 }
 
 std::string refusal(const std::string& text) {
-  Trial trial;
-  try {
-    trial.verdict(ModelFile(text).options());
-  } catch (const marrow::Error& error) {
-    return error.what();
-  }
-  return "";
+  return marrow::test::message_of([&] { Trial().verdict(ModelFile(text).options()); });
 }
 
 TEST(VerdictEvidence, SaysWhatIsWrongWithAModel) {

@@ -6,11 +6,11 @@
 
 #include <cmath>
 
-#include "shipped.hpp"
+#include "tests/plugins/verdict/wells.hpp"
 
 namespace long_axis_test {
 
-using marrow::Matrix6d, marrow::Pose, marrow::Vector6d, marrow::Verdict;
+using marrow::Matrix6d, marrow::Pose, marrow::Vector6d, marrow::Verdict, wells::figure;
 
 /// Turns z into an oblique direction.
 Eigen::Matrix3d turn() { return marrow::rotation_from_vector({0.5, -0.6, 0.2}); }
@@ -38,12 +38,6 @@ Pose known_to(double axial_deg) {
   pose.world_from_model.translation_mm = {5, -3, 700};
   pose.covariance = q * variance.asDiagonal() * q.transpose();
   return pose;
-}
-
-double figure(const Verdict& verdict, const std::string& name) {
-  for (const marrow::Metric& one : verdict.figures)
-    if (one.name == name) return one.value;
-  return std::nan("");
 }
 
 Verdict verdict_on(const Pose& pose, const Pose* prior = nullptr) {

@@ -3,13 +3,12 @@
 
 #include <cmath>
 
-#include "shipped.hpp"
-#include "tests/framework/domain/shapes.hpp"
 #include "tests/plugins/evaluate/listener.hpp"
+#include "tests/plugins/verdict/wells.hpp"
 
 namespace predicted_test {
 
-using marrow::Judgement, marrow::Verdict;
+using marrow::Judgement, marrow::Verdict, wells::figure;
 using Texts = std::vector<std::string>;
 
 /// A box of 20 x 20 x 100 mm about the origin.
@@ -30,12 +29,6 @@ Verdict verdict_of(const marrow::Pose& pose, const shipped::Options& options = {
   const auto outputs =
       shipped::call("verdict.predicted", {{"pose", shipped::item(pose)}, {"model", shipped::item(box())}}, options);
   return outputs.at("verdict").as<Verdict>();
-}
-
-double figure(const Verdict& verdict, const std::string& name) {
-  for (const marrow::Metric& one : verdict.figures)
-    if (one.name == name) return one.value;
-  return std::nan("");
 }
 
 TEST(VerdictPredicted, APoseThatIsKnownWellIsTrusted) {

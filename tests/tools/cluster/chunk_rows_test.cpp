@@ -4,8 +4,8 @@
 
 #include <fstream>
 
-#include "tests/framework/runtime/fixture.hpp"
-#include "tools/marrow/cluster/chunk_rows.cpp"
+#include "cluster/chunk_rows.hpp"
+#include "tests/framework/fixture.hpp"
 
 namespace chunk_rows_test {
 

@@ -4,7 +4,7 @@
 
 #include <numeric>
 
-#include "tools/marrow/cluster/chunks.cpp"
+#include "cluster/plan.hpp"
 
 namespace cut_test {
 

@@ -5,11 +5,9 @@ import math
 import os
 import pathlib
 import shutil
-import tempfile
 
-import yaml
-
-from harness.cases import FEMUR, SMALL, contents, copy_case, dicom_slice, mha, png, replace, simulate, tiff
+from harness.cases import FEMUR, SMALL, contents, copy_case, replace, simulate
+from harness.formats import dicom_series, grey_png, mha, straight, tiff
 from harness.program import Case, main, marrow
 
 READ_VOLUME = "marrow: 1\nnodes:\n  ct: {uses: read.volume, with: {path: %s}}\noutputs: {ct: ct}\n"
@@ -19,12 +17,8 @@ SIZE = 512
 class BadData(Case):
     @classmethod
     def setUpClass(cls):
-        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-bad-data-"))
+        cls.shared = cls.shared_folder()
         cls.simulated = simulate(cls.shared / "simulated", *SMALL)
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.shared, ignore_errors=True)
 
     def failed(self, pipeline, *arguments, code=1):
         """Runs beside the results of an earlier run; gives the text of the error and the folder."""
@@ -52,14 +46,12 @@ class BadData(Case):
         self.assertEqual([path for path in (out / "outputs").rglob("*")], [])
 
     def write_dicom(self, folder):
-        folder.mkdir()
-        for number in range(6):
-            (folder / ("%d.dcm" % number)).write_bytes(dicom_slice(16, 12, number, [number * 100] * 192))
+        dicom_series(folder, (16, 12, 6), [number * 100 for number in range(6) for _ in range(192)])
 
     def test_whole_files_are_read(self):
         self.write_dicom(self.scratch / "series")
         (self.scratch / "ct.tif").write_bytes(tiff(16, 12, [[number * 100] * 192 for number in range(6)]))
-        (self.scratch / "ct.mha").write_bytes(mha((4, 4, 4), [1.5] * 64))
+        (self.scratch / "ct.mha").write_bytes(mha(straight((4, 4, 4)), [1.5] * 64, "MET_FLOAT"))
         for name in ("series", "ct.tif, voxel_size_mm: [1, 1, 1]", "ct.mha"):
             result = marrow(
                 "run",
@@ -72,31 +64,35 @@ class BadData(Case):
 
     def test_dicom_slice_cut_off(self):
         self.write_dicom(self.scratch / "series")
-        slice_3 = self.scratch / "series" / "3.dcm"
+        slice_3 = self.scratch / "series" / "slice7-003.dcm"
         slice_3.write_bytes(slice_3.read_bytes()[:-100])
         error, out = self.failed(self.write("p.yaml", READ_VOLUME % "series"))
         self.assertIn("node 'ct' (read.volume) failed: ", error)
-        self.assertIn("series/3.dcm: is cut off: 384 bytes of pixels expected, got 284; copy or export it again", error)
+        self.assertIn(
+            "series/slice7-003.dcm: is cut off: 384 bytes of pixels expected, got 284; copy or export it again", error
+        )
         self.assert_nothing_made(out)
 
     def test_dicom_slice_missing(self):
         self.write_dicom(self.scratch / "series")
-        (self.scratch / "series" / "3.dcm").unlink()
+        (self.scratch / "series" / "slice7-003.dcm").unlink()
         error, _ = self.failed(self.write("p.yaml", READ_VOLUME % "series"))
-        self.assertIn("2 mm between 2.dcm and 4.dcm, 1 mm between most slices; a slice is missing", error)
+        self.assertIn(
+            "2 mm between slice7-002.dcm and slice7-004.dcm, 1 mm between most slices; a slice is missing", error
+        )
 
     def test_dicom_series_of_a_case_cut_off(self):
         def damage(case):
             self.write_dicom(case / "series")
-            first = (case / "series" / "0.dcm").read_bytes()
-            replace(case / "series" / "0.dcm", first[:-384])
+            first = (case / "series" / "slice7-000.dcm").read_bytes()
+            replace(case / "series" / "slice7-000.dcm", first[:-384])
 
         error, out = self.failed_case(lambda description: description.update(ct="series"), damage)
         self.assertIn("node 'case' (read.case) failed: ", error)
         self.assertRegex(
             error,
-            r"case.yaml:2:5: case: ct: .*series/0.dcm: is cut off: 384 bytes of pixels expected, got 0; copy or "
-            r"export it again",
+            r"case.yaml:2:5: case: ct: .*series/slice7-000.dcm: is cut off: 384 bytes of pixels expected, got 0; "
+            r"copy or export it again",
         )
         self.assert_nothing_made(out)
 
@@ -126,7 +122,7 @@ class BadData(Case):
 
     def test_image_and_camera_of_different_size(self):
         error, out = self.failed_case(
-            damage=lambda case: replace(case / "lateral.png", png(256, 300, lambda u, v: 1000))
+            damage=lambda case: replace(case / "lateral.png", grey_png(256, 300, lambda u, v: 1000))
         )
         self.assertRegex(
             error,
@@ -137,7 +133,7 @@ class BadData(Case):
 
     def test_image_without_contrast(self):
         error, out = self.failed_case(
-            damage=lambda case: replace(case / "lateral.png", png(SIZE, SIZE, lambda u, v: 20000))
+            damage=lambda case: replace(case / "lateral.png", grey_png(SIZE, SIZE, lambda u, v: 20000))
         )
         self.assertIn(
             (
@@ -151,7 +147,7 @@ class BadData(Case):
     def test_empty_edge_map(self):
         error, out = self.failed_case(
             settings=["--set", "edges.uses=edges.canny"],
-            damage=lambda case: replace(case / "lateral.png", png(SIZE, SIZE, lambda u, v: 20000 + 10 * u)),
+            damage=lambda case: replace(case / "lateral.png", grey_png(SIZE, SIZE, lambda u, v: 20000 + 10 * u)),
         )
         self.assertIn(
             (
@@ -167,7 +163,7 @@ class BadData(Case):
         def disc(u, v):
             return 10000 if math.hypot(u - 256, v - 256) < 150 else 40000
 
-        error, out = self.failed_case(damage=lambda case: replace(case / "lateral.png", png(SIZE, SIZE, disc)))
+        error, out = self.failed_case(damage=lambda case: replace(case / "lateral.png", grey_png(SIZE, SIZE, disc)))
         self.assertIn(
             "node 'shaft' (shaft.hough_pairs) for lateral failed: view 'lateral': no shaft pair found: ", error
         )
@@ -220,7 +216,7 @@ class BadData(Case):
     def test_nan_in_a_volume(self):
         values = [50.0] * 64
         values[1 + 4 * (2 + 4 * 3)] = math.nan
-        (self.scratch / "ct.mha").write_bytes(mha((4, 4, 4), values))
+        (self.scratch / "ct.mha").write_bytes(mha(straight((4, 4, 4)), values, "MET_FLOAT"))
         error, out = self.failed(self.write("p.yaml", READ_VOLUME % "ct.mha"))
         self.assertIn("node 'ct' (read.volume) failed: ", error)
         self.assertIn(
@@ -230,7 +226,7 @@ class BadData(Case):
 
     def test_unwritable_output_folder(self):
         self.write("file", "mine")
-        (self.scratch / "ct.mha").write_bytes(mha((4, 4, 4), [1.5] * 64))
+        (self.scratch / "ct.mha").write_bytes(mha(straight((4, 4, 4)), [1.5] * 64, "MET_FLOAT"))
         pipeline = self.write("p.yaml", READ_VOLUME % "ct.mha")
         places = [self.scratch / "file" / "out", pathlib.Path("/proc/out")]
         if os.geteuid() != 0:  # root may write everywhere

@@ -1,9 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """pipelines/femur-best.yaml on a small simulated femur with an old plate: with right cameras and with wrong ones."""
 import json
-import pathlib
-import shutil
-import tempfile
 
 from harness.cases import metrics, simulate
 from harness import SOURCE
@@ -21,7 +18,7 @@ def sets(texts):
 class Best(Case):
     @classmethod
     def setUpClass(cls):
-        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-best-"))
+        cls.shared = cls.shared_folder()
         cls.cases = {}
         for level in ("off", "usual"):
             cls.cases[level] = simulate(
@@ -31,10 +28,6 @@ class Best(Case):
                 *sets(SMALL),
                 pipeline="simulate-clutter.yaml",
             )
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.shared, ignore_errors=True)
 
     def registered(self, level, *arguments, codes=(0,)):
         result = marrow(

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """pipelines/bone.yaml on a small simulated vertebra: each way to a start alone, none, and one to four views."""
-import pathlib
 import shutil
-import tempfile
 
 import yaml
 
@@ -24,13 +22,9 @@ def sets(texts):
 class Bone(Case):
     @classmethod
     def setUpClass(cls):
-        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-bone-"))
+        cls.shared = cls.shared_folder()
         cls.case = simulate(cls.shared / "made", *sets(SMALL + VIEWS), pipeline="simulate-vertebra.yaml")
         cls.landmarks = cls.shared / "made" / "outputs" / "landmarks" / "bone.yaml"
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.shared, ignore_errors=True)
 
     def copy(self, views=("frontal", "lateral"), start=None, landmarks=False):
         def change(case):

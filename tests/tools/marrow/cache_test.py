@@ -94,7 +94,7 @@ class Cache(Case):
         self.assertEqual((told.returncode, told.stdout), (2, ""))
         self.assertEqual(
             told.stderr,
-            "marrow: error: the result %s is damaged or of another version; it is made anew when it is needed\n"
+            "marrow: error: the result %s is damaged or of another version; the next run that needs it makes it again\n"
             % entries[0],
         )
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tools/marrow/catalogue_text.cpp"
+#include "catalogue_text.hpp"
 
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "marrow/base/yaml.hpp"
 #include "marrow/runtime/node/attributes.hpp"

@@ -19,6 +19,8 @@ outputs: {each: each, free: free, staged: staged, errors: errors}
 
 
 class Before(Case):
+    plugins = [TEST_PLUGINS, TEST_PLUGINS.parent / "figure_plugins"]
+
     def setUp(self):
         super().setUp()
         self.write("p.yaml", PIPELINE)
@@ -32,16 +34,7 @@ class Before(Case):
     def compare(self, code, figure, *arguments, variants="{a: {}, b: {}}", cases="{folders: [cases/*]}"):
         text = "experiment: 1\npipeline: p.yaml\ncases: %s\nvariants: %s\nmetrics:\n  - %s\ntimed_cells: 0\n"
         file = self.write("e.yaml", text % (cases, variants, figure))
-        result = marrow(
-            "compare",
-            file,
-            "--out",
-            self.scratch / "out",
-            *arguments,
-            plugins=[TEST_PLUGINS, TEST_PLUGINS.parent / "figure_plugins"],
-            extra_environment={"MARROW_CACHE": str(self.scratch / "cache")},
-            cwd=self.scratch
-        )
+        result = self.marrow("compare", file, "--out", self.scratch / "out", *arguments)
         self.assertEqual(result.returncode, code, result.stdout + result.stderr)
         return result
 

@@ -4,7 +4,7 @@ import os
 import subprocess
 
 from harness import MARROW, TEST_PLUGINS
-from harness.program import Case, marrow, wait_until
+from harness.program import Case, wait_until
 
 PIPELINE = """marrow: 1
 inputs: {case: {type: path}}
@@ -33,13 +33,7 @@ class Comparison(Case):
         return self.write(name + ".yaml", HEAD + "variants: " + variants + "\n")
 
     def marrow(self, code, *arguments, **more):
-        result = marrow(
-            *arguments,
-            plugins=[TEST_PLUGINS],
-            extra_environment={"MARROW_CACHE": str(self.scratch / "cache")},
-            cwd=self.scratch,
-            **more
-        )
+        result = super().marrow(*arguments, **more)
         self.assertEqual(result.returncode, code, result.stdout + result.stderr)
         return result
 

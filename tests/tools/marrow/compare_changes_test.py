@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a kept cell, or a kept case, depends on: where any of it changes, nothing old passes for new."""
 import contextlib
-import csv
 import os
 import shutil
 import subprocess
 
 from compare_cases import DRAWN
 from harness import MARROW, TEST_PLUGINS
-from harness.program import Case, another_run_makes_all, main, marrow, wait_until
+from harness.program import Case, another_run_makes_all, main, wait_until
 
 PIPELINE = """marrow: 1
 inputs: {case: {type: path}}
@@ -41,22 +40,12 @@ class Changes(Case):
         self.write("cases/%s/data" % name, "case " + name)
 
     def compare(self, out, *arguments, code=0):
-        result = marrow(
-            "compare",
-            self.file,
-            "--out",
-            out,
-            *arguments,
-            plugins=[TEST_PLUGINS],
-            cwd=self.scratch,
-            extra_environment={"MARROW_CACHE": str(self.scratch / "cache")}
-        )
+        result = self.marrow("compare", self.file, "--out", out, *arguments)
         self.assertEqual(result.returncode, code, result.stdout + result.stderr)
         return result
 
     def figures(self, out, column="number.value"):
-        with open(self.scratch / out / "cells.csv", newline="") as stream:
-            return {row["cell"]: row[column] for row in csv.DictReader(stream)}
+        return {cell: row[column] for cell, row in self.rows(out).items()}
 
     def expect_fresh(self, out):
         """Every figure is the present one of its own cell."""

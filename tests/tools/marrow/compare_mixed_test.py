@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nothing is mixed in a comparison: rows that were changed, experiments of one name, figures in another order, cases
 that are copies."""
-import csv
 import json
 import shutil
 
@@ -19,13 +18,9 @@ SIMULATION = "marrow: 1\nnodes:\n  s: {uses: test.sides}\noutputs: {case: s.both
 
 
 class Rows(Comparison):
-    def table(self, out="out"):
-        with open(self.scratch / out / "cells.csv", newline="") as stream:
-            return {row["cell"]: row for row in csv.DictReader(stream)}
-
     def test_a_row_that_was_changed_by_hand_is_not_believed(self):
         self.marrow(0, "compare", self.file, "--out", "out")
-        before = self.table()
+        before = self.rows()
         file = self.scratch / "out" / "cells" / "b" / "1" / "0" / "cell.json"
         good = file.read_text()
         values = '"values":%s' % json.dumps(json.loads(good)["values"])
@@ -43,14 +38,14 @@ class Rows(Comparison):
                     done.stderr,
                 )
                 self.assertIn("3 were there already", done.stdout)
-                self.assertEqual(self.table()["b/1/0"]["number.value"], before["b/1/0"]["number.value"])
+                self.assertEqual(self.rows()["b/1/0"]["number.value"], before["b/1/0"]["number.value"])
         self.assertEqual(self.marrow(0, "compare", self.file, "--out", "out", "--quiet").stderr, "")
 
     def test_each_row_says_what_it_was_made_from(self):
         self.marrow(0, "compare", self.file, "--out", "out")
         lines = (self.scratch / "out" / "cells.jsonl").read_text().splitlines()
         keys = {row["id"]: row["key"] for row in map(json.loads, lines)}
-        for cell, row in self.table().items():
+        for cell, row in self.rows().items():
             kept = json.loads((self.scratch / "out" / "cells" / cell / "cell.json").read_text())
             self.assertEqual((row["key"], keys[cell]), (kept["key"], kept["key"]))
             self.assertIn('"%s"' % kept["key"][:12], (self.scratch / "out" / "report.html").read_text())
@@ -73,7 +68,7 @@ class Rows(Comparison):
                 file = self.write("e.yaml", head + "metrics: " + metrics + "\n")
                 done = self.marrow(0, "compare", file, "--out", "out")
                 self.assertIn("%d were there already" % there, done.stdout)
-                for row in self.table().values():
+                for row in self.rows().values():
                     self.assertEqual(float(row["two.value"]), 7)
                     self.assertEqual(float(row.get("one.value", 3)), 3)
                     if success:

@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of a comparison: which pictures it holds, and that the others are beside it."""
 import base64
-import csv
 import json
 import random
-import re
 
-from harness import TEST_PLUGINS
-from harness.program import Case, main, marrow
+from harness.program import Case, main
 
 from harness import shapes
 
@@ -37,23 +34,19 @@ variants: %s
 
 class Page(Case):
     def marrow(self, *arguments):
-        cache = {"MARROW_CACHE": str(self.scratch / "cache")}
-        result = marrow(*arguments, plugins=[TEST_PLUGINS], extra_environment=cache, cwd=self.scratch)
+        result = super().marrow(*arguments)
         self.assertEqual(result.returncode, 0, result.stderr)
-
-    def data_of(self, page):
-        return json.loads(re.search(r'id="data">(.*?)</script>', page.read_text(), re.S).group(1))
 
     def compare(self, *arguments):
         self.marrow("compare", "e.yaml", "--out", "out", "--quiet", *arguments)
         self.page = self.scratch / "out" / "report.html"
-        return self.data_of(self.page)
+        return self.page_data(self.page)
 
     def with_pictures(self):
         noise = random.Random(7)
         for case in "abcd":
             (self.scratch / "cases" / case).mkdir(parents=True)
-            url = shapes.png(200, 200, bytes(noise.randrange(256) for _ in range(40000)), 1)
+            url = shapes.picture(200, 200, bytes(noise.randrange(256) for _ in range(40000)), 1)
             (self.scratch / "cases" / case / "picture.png").write_bytes(base64.b64decode(url.split(",")[1]))
         self.write("p.yaml", PICTURES)
         self.write("e.yaml", EXPERIMENT % ("{folders: [cases/*], input: case}", "picture", "{x: {}, y: {m.value: 2}}"))
@@ -106,15 +99,14 @@ class Page(Case):
         # The commands that the page gives for such a cell.
         self.marrow("cell", data["experiment"]["file"], "--out", data["experiment"]["out"], "y/b/0")
         self.marrow("show", data["experiment"]["folder"] + "/pictures/y/b/0")
-        shown = self.data_of(self.scratch / "out" / "pictures" / "y" / "b" / "0" / "report.html")
+        shown = self.page_data(self.scratch / "out" / "pictures" / "y" / "b" / "0" / "report.html")
         self.assertEqual(len(shown["pictures"]), 1)
 
     def test_worst_median_failed_and_best_are_shown(self):
         self.write("p.yaml", NUMBERS)
         self.write("e.yaml", EXPERIMENT % ("{seeds: 1..9}", "", "{x: {m.value: 1000003}}"))
         self.compare()
-        rows = csv.DictReader((self.scratch / "out" / "cells.csv").read_text().splitlines())
-        values = sorted((float(row["number.value"]), number) for number, row in enumerate(rows))
+        values = sorted((float(row["number.value"]), number) for number, row in enumerate(self.rows().values()))
         limit = (values[6][0] + values[7][0]) / 2
         self.write(
             "e.yaml",

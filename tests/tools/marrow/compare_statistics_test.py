@@ -3,8 +3,7 @@
 import json
 import re
 
-from harness import TEST_PLUGINS
-from harness.program import Case, main, marrow
+from harness.program import Case, main
 
 PIPELINE = """marrow: 1
 nodes:
@@ -23,19 +22,11 @@ timed_cells: 0
 
 
 class ComparisonCase(Case):
-    def marrow(self, *arguments):
-        return marrow(
-            *arguments,
-            plugins=[TEST_PLUGINS],
-            extra_environment={"MARROW_CACHE": str(self.scratch / "cache")},
-            cwd=self.scratch
-        )
-
     def answer(self, text, *arguments):
         self.write("p.yaml", PIPELINE)
         self.result = self.marrow("compare", self.write("e.yaml", HEAD + text), "--out", "out", "--quiet", *arguments)
         self.assertEqual(self.result.returncode, 0, self.result.stderr)
-        return json.loads((self.scratch / "out" / "comparison.json").read_text())
+        return super().answer()
 
 
 class Statistics(ComparisonCase):
@@ -86,7 +77,7 @@ class StoppedCase(ComparisonCase):
 
 class MoreCases(StoppedCase):
     def stop(self):
-        return json.loads((self.scratch / "out" / "comparison.json").read_text())["stop"]
+        return Case.answer(self)["stop"]
 
     def test_a_difference_is_shown_early(self):
         first = self.compare("difference: number.value")
@@ -192,7 +183,7 @@ class Sweep(StoppedCase):
         variants = "starts: {node: start, count: 2, translation_mm: 0.1}\nsweep: {options: {%s}, %s}\n%s"
         result = self.compare("", variants=variants % (*sweep, more))
         self.assertEqual(result.returncode, 0, result.stderr)
-        answer = json.loads((self.scratch / "out" / "comparison.json").read_text())
+        answer = Case.answer(self)
         page = (self.scratch / "out" / "report.html").read_text()
         self.assertIn('"curves":', page)
         return answer["curves"]

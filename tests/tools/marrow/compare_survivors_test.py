@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs without a figure, because a node failed that may fail, are not left out of a comparison in silence: every table
 says of how many runs its numbers are, and lost runs count in the answer."""
-import csv
 import math
 import statistics
 from fractions import Fraction
@@ -99,7 +98,7 @@ class Survivors(GivenCase):
         self.assertEqual(page["summary"], answer["variants"])
         for part in ("metrics", "comparisons"):
             self.assertEqual(page[part], answer[part])
-        rows = list(csv.DictReader((self.scratch / "out" / "cells.csv").read_text().splitlines()))
+        rows = self.rows().values()
         self.assertEqual(sum(row["figures.err"] == "" for row in rows), 20)
         self.assertEqual({row["success"] for row in rows}, {""}, "there are no limits")
 

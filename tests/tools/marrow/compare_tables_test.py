@@ -3,14 +3,12 @@
 not misread; and how much there is to do, said of large experiments too."""
 import csv
 import json
-import re
 import resource
 import shlex
 import shutil
 import subprocess
 
-from harness import TEST_PLUGINS
-from harness.program import IS_SANITIZED, Case, main, marrow
+from harness.program import IS_SANITIZED, Case, main
 
 from harness.modules import modules
 
@@ -24,15 +22,6 @@ outputs: {number: k}
 
 
 class Tables(Case):
-    def marrow(self, *arguments, **more):
-        return marrow(
-            *arguments,
-            plugins=[TEST_PLUGINS],
-            extra_environment={"MARROW_CACHE": str(self.scratch / "cache")},
-            cwd=self.scratch,
-            **more
-        )
-
     def experiment(self, name, cases, rest):
         self.write("p.yaml", PIPELINE)
         for case in cases:
@@ -65,7 +54,7 @@ class Tables(Case):
         file = self.experiment("e.yaml", ["a"], "variants: {a: {}}\n")
         file.write_text(file.read_text().replace("metrics: [number.value]", "metrics: [number.twice, number.value]"))
         self.assertEqual(self.marrow("compare", file, "--out", "out").returncode, 0)
-        row = next(csv.DictReader((self.scratch / "out" / "cells.csv").read_text().splitlines()))
+        (row,) = self.rows().values()
         self.assertEqual((row["number.twice"], row["number.value"]), ("4", "2"))
 
     def test_no_terminal_obeys_a_field(self):
@@ -77,16 +66,11 @@ class Tables(Case):
         self.assertNotIn("\x1b", text)
         self.assertIn("\\x1b[31mred\nnext line", text)
 
-    def report_data(self, page):
-        return json.loads(
-            re.search(r'<script type="application/json" id="data">(.*?)</script>', page.read_text(), re.S).group(1)
-        )
-
     def test_the_commands_of_a_report_are_quoted(self):
         file = self.experiment("it's $(touch hurt) ; x.yaml", ["a"], "variants: {one: {}}\n")
         out = self.scratch / "out `touch hurt` & y"
         self.assertEqual(self.marrow("compare", file.name, "--out", out).returncode, 0)
-        command = self.report_data(out / "report.html")["experiment"]["command"]
+        command = self.page_data(out / "report.html")["experiment"]["command"]
         self.assertEqual(shlex.split(command), ["marrow", "compare", file.name, "--out", str(out)])
         said = subprocess.run(
             ["/bin/sh", "-c", command.replace("marrow compare", "printf '%s\\n'", 1)],
@@ -99,7 +83,7 @@ class Tables(Case):
         self.assertEqual(self.marrow("run", "p.yaml", "case=cases/a", "--out", run).returncode, 0)
         self.assertEqual(self.marrow("show", "--", run.name).returncode, 0)
         self.assertEqual(
-            shlex.split(self.report_data(run / "report.html")["experiment"]["command"]),
+            shlex.split(self.page_data(run / "report.html")["experiment"]["command"]),
             ["marrow", "rerun", "./-run $x"],
         )
         self.assertFalse((self.scratch / "hurt").exists())

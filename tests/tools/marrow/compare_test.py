@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """Comparisons as a person runs them: a fault in one cell stays there, and an interrupted comparison can continue."""
-import csv
 import json
 import os
 import random
@@ -36,17 +35,8 @@ class Compare(Case):
         return self.write("e.yaml", HEAD + "variants:\n" + "".join("  %s: %s\n" % item for item in variants.items()))
 
     def compare(self, *arguments, cache="cache", **more):
-        return marrow(
-            "compare",
-            *arguments,
-            plugins=[TEST_PLUGINS],
-            extra_environment={"MARROW_CACHE": str(self.scratch / cache)},
-            **more
-        )
-
-    def rows(self, out):
-        with open(self.scratch / out / "cells.csv", newline="") as stream:
-            return {row["cell"]: row for row in csv.DictReader(stream)}
+        environment = {"MARROW_CACHE": str(self.scratch / cache)}
+        return self.marrow("compare", *arguments, extra_environment=environment, cwd=None, **more)
 
     def results(self, out):
         """Of each cell all but times and how often it was tried."""
@@ -85,10 +75,7 @@ class Compare(Case):
                 "95 % or more to at least 1.5 0".split(),
             ],
         )
-        near, far = (
-            variant["capture"]
-            for variant in json.loads((self.scratch / "out" / "comparison.json").read_text())["variants"]
-        )
+        near, far = (variant["capture"] for variant in self.answer()["variants"])
         self.assertEqual((near["range"], near["is_open"], far["range"], far["is_open"]), (1.5, True, 0, False))
         self.assertEqual([bin["of"] for bin in far["bins"]], [0, 0, 3])
 

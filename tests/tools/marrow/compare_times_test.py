@@ -5,7 +5,7 @@ import json
 import os
 
 from harness import TEST_PLUGINS
-from harness.program import Case, main, marrow
+from harness.program import Case, main
 
 PIPELINE = """marrow: 1
 inputs: {case: {type: path}}
@@ -25,6 +25,8 @@ VARIANTS = "a: {log.name: a}, b: {log.name: b}, c: {log.name: c}"
 
 
 class Times(Case):
+    plugins = [TEST_PLUGINS, TEST_PLUGINS.parent / "timed_plugins"]
+
     def setUp(self):
         super().setUp()
         self.write("p.yaml", PIPELINE)
@@ -38,7 +40,6 @@ class Times(Case):
         """Runs the cells. Then, as a second command, times them. Returns what that said and the calls it made."""
         calls = self.scratch / "calls"
         environment = {
-            "MARROW_CACHE": str(self.scratch / "cache"),
             "MARROW_TEST_CALLS": str(calls),
             "MARROW_TEST_FAILS": str(self.scratch / "fails"),
         }
@@ -49,16 +50,7 @@ class Times(Case):
             if count:
                 fails.write_text(getattr(self, "fails_when_timed", ""))
             file = self.write("e.yaml", HEAD + "timed_cells: %d\nvariants: {%s}\n" % (count, variants))
-            result = marrow(
-                "compare",
-                file,
-                "--out",
-                "out",
-                *arguments,
-                plugins=[TEST_PLUGINS, TEST_PLUGINS.parent / "timed_plugins"],
-                extra_environment=environment,
-                cwd=self.scratch
-            )
+            result = self.marrow("compare", file, "--out", "out", *arguments, extra_environment=environment)
             self.assertEqual(result.returncode, 0, result.stderr + result.stdout)
             said.append(result.stdout)
             if fails.exists():
@@ -69,9 +61,6 @@ class Times(Case):
     def timed(self):
         rows = [json.loads(line) for line in (self.scratch / "out/cells.jsonl").read_text().splitlines()]
         return sorted(row["variant"] + row["case"] for row in rows if row["seconds"] is not None)
-
-    def answer(self):
-        return json.loads((self.scratch / "out/comparison.json").read_text())
 
     def of_variants(self, key):
         return {one["name"]: one[key] for one in self.answer()["variants"]}
@@ -168,15 +157,7 @@ class Times(Case):
         self.cases("10")
         head = HEAD.replace("{folders: [cases/*]}", "{seeds: 1..2}")
         file = self.write("e.yaml", head + "timed_cells: 2\nvariants: {a: {c.number: 1}, b: {c.number: 2}}\n")
-        result = marrow(
-            "compare",
-            file,
-            "--out",
-            "out",
-            plugins=[TEST_PLUGINS, TEST_PLUGINS.parent / "timed_plugins"],
-            extra_environment={"MARROW_CACHE": str(self.scratch / "cache")},
-            cwd=self.scratch,
-        )
+        result = self.marrow("compare", file, "--out", "out")
         self.assertEqual(result.returncode, 0, result.stderr)
         rows = [json.loads(line) for line in (self.scratch / "out/cells.jsonl").read_text().splitlines()]
         self.assertEqual(len(rows), 4)

@@ -4,10 +4,9 @@ import json
 import os
 import signal
 import subprocess
-import time
 
 from harness import MARROW, TEST_PLUGINS
-from harness.program import Case, main, marrow
+from harness.program import Case, main
 
 # number.value is x - 3 + a draw of the case's seed, and best is nearest to zero.
 PIPELINE = """marrow: 1
@@ -59,26 +58,17 @@ tune: {options: {x.value: [0, 8]}, optimizer: {uses: optimizer.%s}, points: 30, 
 
 
 class Tuning(Case):
+    plugins = [TEST_PLUGINS, TEST_PLUGINS.parent / "relation_plugins", TEST_PLUGINS.parent / "timed_plugins"]
+
     def setUp(self):
         super().setUp()
         self.write("p.yaml", PIPELINE)
         self.file = self.write("e.yaml", EXPERIMENT % "nelder_mead")
 
-    def marrow(self, *arguments):
-        return marrow(
-            *arguments,
-            plugins=[TEST_PLUGINS, TEST_PLUGINS.parent / "relation_plugins", TEST_PLUGINS.parent / "timed_plugins"],
-            extra_environment={"MARROW_CACHE": str(self.scratch / "cache")},
-            cwd=self.scratch
-        )
-
     def compare(self, *arguments, code=0):
         result = self.marrow("compare", self.file, "--out", "out", *arguments)
         self.assertEqual(result.returncode, code, result.stderr + result.stdout)
         return result
-
-    def answer(self):
-        return json.loads((self.scratch / "out" / "comparison.json").read_text())
 
     def draws(self, first, last):
         """What the cases draw: number.value of the pipeline as it is is the magnitude of this, minus 2."""

@@ -2,8 +2,9 @@
 """By how much two runs differ, in the terms of the field."""
 import json
 
-from harness.cases import FEMUR, SMALL, matrix_product, mha, png, rotation_vector_deg, simulate, transposed
+from harness.cases import FEMUR, SMALL, matrix_product, rotation_vector_deg, simulate, transposed
 from diff_cases import Runs
+from harness.formats import grey_png, mha, straight
 from harness.program import main
 
 POSE = """marrow-pose: 1
@@ -39,8 +40,8 @@ class Amounts(Runs):
         self.pipeline += "outputs: {volume: volume, image: image, pose: pose}\n"
 
     def run_on(self, name, hu, grey, pose, *arguments):
-        (self.scratch / "ct.mha").write_bytes(mha((4, 5, 6), [0.0] * 119 + [hu]))
-        (self.scratch / "view.png").write_bytes(png(8, 9, lambda u, v: grey if (u, v) == (3, 4) else 100))
+        (self.scratch / "ct.mha").write_bytes(mha(straight((4, 5, 6)), [0.0] * 119 + [hu], "MET_FLOAT"))
+        (self.scratch / "view.png").write_bytes(grey_png(8, 9, lambda u, v: grey if (u, v) == (3, 4) else 100))
         self.write("pose.yaml", pose)
         self.run_into(name, self.pipeline, *arguments)
 

@@ -54,7 +54,7 @@ class Folders(Runs):
             told.startswith(
                 "first run (was): a\nsecond run (is): b\n\n"
                 + "\n".join(damaged)
-                + "\nAll else is by what the runs came to, not by these files\n\n"
+                + "\nEverything else compares what the runs computed, not these files\n\n"
                 "What took part in both runs came out the same: 6 nodes\n"
             ),
             told,
@@ -110,8 +110,8 @@ class Folders(Runs):
             (
                 "linked",
                 (
-                    "linked/pipeline.yaml is a link to a file outside of the folder, of which nothing is shown; copy it"
-                    " there\n"
+                    "linked/pipeline.yaml is a link to a file outside of the folder, and such files are not shown; "
+                    "copy it into the folder\n"
                 ),
             ),
             (

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // How the tables of a comparison write numbers, shares and columns. The texts follow from the values by hand.
-#include "tools/marrow/compare/figure_text.cpp"
-#include "tools/marrow/compare/text_table.cpp"
+#include "compare/text_table.hpp"
 
 #include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "marrow/base/number_text.hpp"
 
 namespace {
 

@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A kind, nodes and a decorator that libraries outside the tree bring: docs/example-kind, used in every way."""
 import json
-import pathlib
 import shutil
 import subprocess
-import tempfile
 import unittest
 
 from harness.cases import FEMUR, SMALL, simulate
@@ -51,7 +49,7 @@ def without_ends(text):
 class Kinds(Case):
     @classmethod
     def setUpClass(cls):
-        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-kinds-"))
+        cls.shared = cls.shared_folder()
         folder = cls.shared / "mine"
         shutil.copytree(SOURCE / "docs" / "example-kind", folder)
         cls.lines = sum(len(path.read_text().splitlines()) for path in folder.iterdir())
@@ -65,10 +63,6 @@ class Kinds(Case):
         configure = ["cmake", "-S", folder, "-B", cls.build, "-G", "Ninja", "-Dmarrow_DIR=%s" % BUILD]
         subprocess.run(configure, check=True, stdout=subprocess.DEVNULL)
         subprocess.run(["cmake", "--build", cls.build], check=True, stdout=subprocess.DEVNULL)
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.shared, ignore_errors=True)
 
     def marrow(self, *arguments, more=(), **options):
         return marrow(*arguments, plugins=[self.build, *(self.build / name for name in more)], **options)

@@ -1,9 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Poses from landmarks, markers and surfaces: the pipelines as they are shipped, and files as a person writes them."""
 import json
-import pathlib
-import shutil
-import tempfile
 
 import yaml
 
@@ -17,14 +14,10 @@ PIPELINES = SOURCE / "pipelines"
 class Landmarks(Case):
     @classmethod
     def setUpClass(cls):
-        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-landmarks-"))
+        cls.shared = cls.shared_folder()
         cls.result = marrow(
             "run", PIPELINES / "landmarks.yaml", "--out", cls.shared / "run", "--quiet", "--set", "bone.resolution_mm=2"
         )
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.shared, ignore_errors=True)
 
     def figures(self, *path):
         return metrics(self.shared.joinpath("run", "outputs", *path).with_suffix(".json"))

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """A node that may fail: what a person is told, and what a run, a plan, a page and a comparison make of it."""
-import csv
 import json
 
 from diff_cases import Runs
@@ -106,8 +105,7 @@ class MayFail(Runs):
     def test_the_page_says_it(self):
         self.run_it("--out", "out")
         self.assertEqual(self.marrow("show", "out").returncode, 0)
-        page = (self.scratch / "out" / "report.html").read_text()
-        data = json.loads(page.split('id="data">')[1].split("</script>")[0])
+        data = self.page_data()
         self.assertEqual(data["cells"][0]["status"], "done")
         self.assertEqual(data["cells"][0]["absent"], FAILED)
 
@@ -153,14 +151,12 @@ class MayFail(Runs):
         self.assertIn(
             "\ncells in which a node failed that may fail\n  b/0/0: %s\n  b/1/0: %s\n" % (why, why), result.stdout
         )
-        with open(self.scratch / "out" / "cells.csv", newline="") as stream:
-            rows = {row["cell"]: row for row in csv.DictReader(stream)}
+        rows = self.rows()
         shown = [rows["b/0/0"][name] for name in ("status", "reason", "success", "m.value", "d.value")]
         self.assertEqual(shown, ["done", why, "0", "", "0"])
         self.assertEqual(rows["a/0/0"]["d.value"], "1")
         self.assertEqual(rows["strict/0/0"]["status"], "failed")
-        page = (self.scratch / "out" / "report.html").read_text()
-        table = json.loads(page.split('id="data">')[1].split("</script>")[0])["cell_table"]
+        table = self.page_data()["cell_table"]
         row = dict(zip(table["fields"], table["rows"][4]))  # of case 1, variant b
         self.assertEqual((row["variant"], row["case"], row["start"], table["texts"][row["absent"]]), (1, 1, 0, why))
         again = self.marrow("compare", experiment, "--out", "out")

@@ -117,10 +117,10 @@ class Names(Commands):
         )
 
     def test_what_is_replaced_and_what_not(self):
-        self.assertIn("one that is there is replaced", " ".join(self.expect(0, "show", "--help").stdout.split()))
-        self.assertIn("one that is there is replaced", " ".join(self.expect(0, "schema", "--help").stdout.split()))
+        self.assertIn("an existing one is replaced", " ".join(self.expect(0, "show", "--help").stdout.split()))
+        self.assertIn("an existing one is replaced", " ".join(self.expect(0, "schema", "--help").stdout.split()))
         self.assertIn(
-            "new or empty (default: runs/NAME, or runs/NAME-2 ... where that is there)",
+            "new or empty (default: runs/NAME, or runs/NAME-2 ... if that exists)",
             " ".join(self.expect(0, "run", "--help").stdout.split()),
         )
         self.expect(0, "schema", "--out", self.write("s.json", "old"))

@@ -182,7 +182,9 @@ class Plugins(Case):
             self.assertNotIn(program.pid, loads, command)
             told = " ".join(marrow(command[0], "--help").stdout.split())
             self.assertIn(
-                "A plugin library that is not known yet is loaded once, in a process of its own, to be described", told
+                "A plugin library that marrow does not know yet is loaded once in a separate process, which describes "
+                "it. ",
+                told,
             )
 
     def test_a_folder_that_others_may_write_is_refused(self):
@@ -245,7 +247,7 @@ class Plugins(Case):
             self.assertEqual(result.returncode, 2, foreign)
             self.assertEqual(
                 result.stderr,
-                "marrow: error: %s is there already and is no manifest that marrow wrote; move it away, or rename %s\n"
+                "marrow: error: %s exists and is not a manifest that marrow wrote; move it away, or rename %s\n"
                 % (manifest, library),
             )
             self.assertEqual(manifest.read_text(), foreign)

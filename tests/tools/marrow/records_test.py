@@ -6,8 +6,8 @@ import os
 import shutil
 import subprocess
 
-from harness.cases import png
 from harness import MARROW
+from harness.formats import grey_png
 from harness.program import main
 from number_cases import NUMBER, Commands
 
@@ -75,7 +75,7 @@ class Records(Commands):
 
     def test_wrong_pipelines_are_refused(self):
         for text, why in (
-            ("nodes: &a {c: *a}\n", "an alias names a list or map that it is in itself"),
+            ("nodes: &a {c: *a}\n", "an alias names the list or map that contains it"),
             ("a: " + "[" * 50000, "nested more than 100 deep"),
             ("{", "not valid YAML"),
             ("x" * 4000001, "longer than 4 MB"),
@@ -142,16 +142,15 @@ class Records(Commands):
 
     def shown(self):
         """What the page of the run holds."""
-        page = (self.scratch / "a" / "report.html").read_text()
-        return json.loads(page.split('<script type="application/json" id="data">')[1].split("</script>")[0])
+        return self.page_data("a/report.html")
 
     def test_a_page_shows_nothing_from_outside_the_run(self):
         secret = json.dumps({"metrics": [{"name": "secret figure", "value": 1, "unit": ""}]})
-        (self.scratch / "a" / "outputs" / "inside.png").write_bytes(png(4, 4, lambda u, v: 0))
+        (self.scratch / "a" / "outputs" / "inside.png").write_bytes(grey_png(4, 4, lambda u, v: 0))
         self.expect(0, "show", "a")
         self.assertEqual(self.shown()["pictures"], {})
         self.write("secret.json", secret)
-        (self.scratch / "secret.png").write_bytes(png(4, 4, lambda u, v: 1000 * u))
+        (self.scratch / "secret.png").write_bytes(grey_png(4, 4, lambda u, v: 1000 * u))
         (self.scratch / "a" / "outputs" / "link.png").symlink_to(self.scratch / "secret.png")
         (self.scratch / "a" / "outputs" / "link").symlink_to(self.scratch)
         outside = [
@@ -193,7 +192,8 @@ class Records(Commands):
         shutil.move(self.scratch / "a" / "run.json", self.scratch / "run.json")
         (self.scratch / "a" / "run.json").symlink_to(self.scratch / "run.json")
         self.assertIn(
-            "a/run.json is a link to a file outside of the folder, of which nothing is shown; copy it there",
+            "a/run.json is a link to a file outside of the folder, and such files are not shown; copy it into the "
+            "folder",
             self.expect(2, "show", "a").stderr,
         )
 

@@ -177,8 +177,7 @@ class Repetition(Runs):
     def test_the_page_shows_passes_and_body(self):
         self.run_into("a", OVER)
         self.told(0, "show", "a")
-        page = (self.scratch / "a/report.html").read_text()
-        data = json.loads(page.split('id="data">')[1].split("</script>")[0])
+        data = self.page_data("a/report.html")
         self.assertEqual([one["node"] for one in data["passes"]], ["r"])
         self.assertEqual([one["name"] for one in data["passes"][0]["passes"]], ["x", "y", "z"])
         nodes = {node["id"]: node for node in data["graph"]["nodes"]}

@@ -1,9 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One pipeline file for one view, three views and two fragments, with every node replaced by its siblings."""
 import json
-import pathlib
-import shutil
-import tempfile
 
 import yaml
 
@@ -43,12 +40,8 @@ NOT_AS_EXACT = {
 class Siblings(Case):
     @classmethod
     def setUpClass(cls):
-        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-siblings-"))
+        cls.shared = cls.shared_folder()
         cls.case = simulate(cls.shared / "simulated", *SMALL, *COARSE_IMAGES)
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.shared, ignore_errors=True)
 
     def run_femur(self, case, *arguments, out="out", outputs=("pose", "errors")):
         """Makes these outputs only: the pictures take longer than the pose."""

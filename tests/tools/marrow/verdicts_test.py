@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What becomes of verdicts: in a run and its exit code, in its record, on its page, in a comparison."""
-import csv
 import json
 import os
 import pty
-import re
 import subprocess
 
 from diff_cases import Runs
@@ -173,13 +171,10 @@ class Verdicts(Runs):
         self.assertIn("a reason now: the number is 4", told)
         self.assertIn("a reason before: the number is 3", told)
 
-    def page_data(self, page):
-        return json.loads(re.search(r'id="data">(.*?)</script>', page.read_text(), re.S).group(1))
-
     def test_the_page_has_it(self):
         self.run_it(BOTH, "--quiet")
         self.assertEqual(self.marrow("show", "out").returncode, 0)
-        shown = self.page_data(self.scratch / "out" / "report.html")["cells"][0]["verdicts"]
+        shown = self.page_data()["cells"][0]["verdicts"]
         self.assertEqual(shown, self.record()["verdicts"])
         # What somebody else may have written there is not believed.
         record = self.record()
@@ -191,7 +186,7 @@ class Verdicts(Runs):
         ]
         (self.scratch / "out" / "run.json").write_text(json.dumps(record))
         self.assertEqual(self.marrow("show", "out").returncode, 0)
-        shown = self.page_data(self.scratch / "out" / "report.html")["cells"][0]["verdicts"]
+        shown = self.page_data()["cells"][0]["verdicts"]
         self.assertEqual([one["item"] for one in shown], ["b"])
 
     def test_a_comparison_counts_silent_failures_and_false_alarms(self):
@@ -209,7 +204,7 @@ class Verdicts(Runs):
             "false_alarm      2  -                           0  2/2 (34.2 to 100.0 %)\n",
             result.stdout,
         )
-        rows = list(csv.DictReader((self.scratch / "c" / "cells.csv").read_text().splitlines()))
+        rows = self.rows("c").values()
         self.assertEqual(
             {row["variant"]: (row["verdict"], row["failure_probability"]) for row in rows},
             {
@@ -219,14 +214,14 @@ class Verdicts(Runs):
                 "false_alarm": ("doubtful", "0.06"),
             },
         )
-        variants = json.loads((self.scratch / "c" / "comparison.json").read_text())["variants"]
+        variants = self.answer("c")["variants"]
         silent = variants[1]["verdicts"]
         self.assertEqual((silent["cells"], silent["caught"]), (2, 0))
         self.assertEqual({key: silent["silent_failures"][key] for key in ("count", "of")}, {"count": 2, "of": 2})
         self.assertAlmostEqual(silent["silent_failures"]["low"], 0.3424, 4)
         self.assertEqual(silent["false_alarms"], {"count": 0, "of": 0, "rate": None, "low": None, "high": None})
         self.assertEqual(variants[3]["verdicts"]["false_alarms"]["count"], 2)
-        data = self.page_data(self.scratch / "c" / "report.html")
+        data = self.page_data("c/report.html")
         self.assertEqual(data["summary"][1]["verdicts"], silent)
         table = data["cell_table"]
         judged = {table["texts"][row[table["fields"].index("verdict")]] for row in table["rows"]}
@@ -269,9 +264,9 @@ class Verdicts(Runs):
         result = self.marrow("compare", self.write("e.yaml", EXPERIMENT), "--out", "c", "--quiet")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertNotIn("Verdicts", result.stdout)
-        self.assertNotIn("verdicts", json.loads((self.scratch / "c" / "comparison.json").read_text())["variants"][0])
-        rows = list(csv.DictReader((self.scratch / "c" / "cells.csv").read_text().splitlines()))
-        self.assertEqual((rows[0]["verdict"], rows[0]["failure_probability"]), ("", ""))
+        self.assertNotIn("verdicts", self.answer("c")["variants"][0])
+        row = next(iter(self.rows("c").values()))
+        self.assertEqual((row["verdict"], row["failure_probability"]), ("", ""))
 
 
 if __name__ == "__main__":

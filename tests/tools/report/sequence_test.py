@@ -22,7 +22,7 @@ def sequence(frames=6, lost=3):
             if view == "lateral" and i == lost:
                 continue
             key = "film %s %s" % (view, name)
-            data["pictures"][key] = shapes.png(8, 8, bytes([20 * i + 9 * (view == "lateral")] * 64), 1)
+            data["pictures"][key] = shapes.picture(8, 8, bytes([20 * i + 9 * (view == "lateral")] * 64), 1)
             cell["pictures"].append({"name": "overlay/%s/cube/%s" % (name, view), "picture": key})
     cell["trajectories"] = [
         {

@@ -12,6 +12,7 @@ import yaml
 import bench
 import ct_cases
 from bench import MARROW, SOURCE, PageTest
+from harness import formats
 
 SIZE = (40, 36, 44)
 LOWER, UPPER = (20, 18, 11), (20, 18, 32)
@@ -30,8 +31,8 @@ class CasePageTest(PageTest):
     def setUp(self):
         super().setUp()
         self.values = ct_cases.two_balls(SIZE, LOWER, UPPER, 8)
-        ct_cases.dicom_series(self.folder / "scan", SIZE, self.values, patient="DOE^JANE")
-        (self.folder / "front.png").write_bytes(ct_cases.png(64, 64))
+        formats.dicom_series(self.folder / "scan", SIZE, self.values, patient="DOE^JANE")
+        (self.folder / "front.png").write_bytes(formats.png(64, 64, [128] * 4096))
 
     def begin(self, **document):
         """A server whose draft of the case 'mine' has one view."""
@@ -241,14 +242,14 @@ class CasePageTest(PageTest):
         self.assertEqual(document["landmarks"], [{"name": "tip", "pixels": pixels}])
 
     def test_a_ct_that_cannot_be_read_is_said_on_the_page(self):
-        (self.folder / "scan" / "slice7-007.dcm").write_bytes(b"damaged")
+        (self.folder / "scan" / "slice7-107.dcm").write_bytes(b"damaged")
         self.begin(ct={"file": "scan"})
         self.wait("!!document.querySelector('.ct-panel .fault')")
-        self.assertIn("slice7-007.dcm", self.css(".ct-panel .fault").text)
+        self.assertIn("slice7-107.dcm", self.css(".ct-panel .fault").text)
         self.assertEqual(self.browser.js("return document.querySelector('.ct-options').open"), True)
 
     def test_of_several_series_one_is_chosen(self):
-        ct_cases.dicom_series(self.folder / "scan", (20, 20, 20), 8000 * [-1000], series="8")
+        formats.dicom_series(self.folder / "scan", (20, 20, 20), 8000 * [-1000], series="8")
         self.begin(ct={"file": "scan"})
         self.wait("document.querySelectorAll('[data-series]').length === 2")
         self.click('[data-series="1.2.826.0.1.3680043.2.1143.8.2"]')
@@ -266,7 +267,7 @@ class CasePageTest(PageTest):
         )
 
     def test_comments_that_would_go_are_shown_before(self):
-        ct = ct_cases.mha(ct_cases.straight(SIZE), self.values)
+        ct = formats.mha(formats.straight(SIZE), self.values)
         (self.folder / "scan.mha").write_bytes(ct)
         self.begin(ct={"file": "scan.mha"}, fragments={"distal": {"seeds": [list(LOWER)], "register": True}})
         self.click('[data-do="save"]')

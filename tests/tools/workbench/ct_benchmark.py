@@ -11,8 +11,8 @@ import statistics
 import time
 
 import bench
-import ct_cases
 from bench import PageTest
+from harness import formats
 
 SIZE = (512, 512, 400)
 
@@ -124,7 +124,7 @@ class Benchmark(PageTest):
 
     def write_mha(self, path):
         with open(path, "wb") as file:
-            header = ct_cases.mha(ct_cases.straight(SIZE, (0.7, 0.7, 1.0)), [])
+            header = formats.mha(formats.straight(SIZE, (0.7, 0.7, 1.0)), [])
             file.write(header)
             for values in self.slices():
                 file.write(values.tobytes())
@@ -133,7 +133,7 @@ class Benchmark(PageTest):
         values = array.array("h")
         for one in self.slices():
             values.extend(one)
-        ct_cases.dicom_series(folder, SIZE, values)
+        formats.dicom_series(folder, SIZE, values)
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ import yaml
 import bench
 import ct_cases
 from bench import BenchTest, PageTest
+from harness import formats
 from harness.modules import modules
 
 SIZE = (40, 36, 32)
@@ -26,9 +27,9 @@ class CtServerTest(BenchTest):
         return server.finish(server.json("POST", "/api/ct/open", {"ct": ct})["job"])
 
     def write(self, name, grid=None, values=None):
-        grid = grid or ct_cases.straight(SIZE)
+        grid = grid or formats.straight(SIZE)
         count = grid["size"][0] * grid["size"][1] * grid["size"][2]
-        (self.folder / name).write_bytes(ct_cases.mha(grid, values or [-1000, 1000] * (count // 2)))
+        (self.folder / name).write_bytes(formats.mha(grid, values or [-1000, 1000] * (count // 2)))
 
     def enter(self):
         server = self.open()
@@ -75,9 +76,9 @@ class CtServerTest(BenchTest):
     def test_what_looks_wrong_is_said(self):
         count = SIZE[0] * SIZE[1] * SIZE[2]
         self.write("offset.mha", values=[0, 2000] * (count // 2))
-        self.write("oblique.mha", {**ct_cases.straight(SIZE), "direction": ct_cases.turned((0, 0, 30))})
-        self.write("thin.mha", ct_cases.straight((40, 36, 4)))
-        self.write("thick.mha", ct_cases.straight(SIZE, (0.5, 0.5, 5.0)))
+        self.write("oblique.mha", {**formats.straight(SIZE), "direction": ct_cases.turned((0, 0, 30))})
+        self.write("thin.mha", formats.straight((40, 36, 4)))
+        self.write("thick.mha", formats.straight(SIZE, (0.5, 0.5, 5.0)))
         server = self.enter()
         for file, doubt in (
             (
@@ -102,8 +103,8 @@ class CtServerTest(BenchTest):
 
     def test_what_cannot_be_read_is_said_in_words(self):
         (self.folder / "notes.txt").write_text("")
-        (self.folder / "cut.mha").write_bytes(ct_cases.mha(ct_cases.straight((4, 4, 4)), [0] * 64)[:-9])
-        whole = ct_cases.mha(ct_cases.straight((4, 4, 4)), [0] * 64)
+        (self.folder / "cut.mha").write_bytes(formats.mha(formats.straight((4, 4, 4)), [0] * 64)[:-9])
+        whole = formats.mha(formats.straight((4, 4, 4)), [0] * 64)
         (self.folder / "sizeless.mha").write_bytes(whole.replace(b"ElementSpacing = 1.0 1.0 1.0\n", b""))
         server = self.enter()
         for file, fault in (
@@ -126,7 +127,7 @@ class CtServerTest(BenchTest):
 
     def test_a_volume_of_2_gb_is_refused_before_it_is_read(self):
         with open(self.folder / "huge.mha", "wb") as file:
-            file.write(ct_cases.mha(ct_cases.straight((1000, 1000, 1000)), []))
+            file.write(formats.mha(formats.straight((1000, 1000, 1000)), []))
             file.truncate(2_000_000_300)  # takes no room on the disk
         state = self.opened(self.enter(), file="huge.mha")
         self.assertRegex(
@@ -183,7 +184,7 @@ def random_geometry(chance):
 
 class CtPageTest(PageTest):
     def open_case(self, grid, values, width_px=1440, theme="light", name="ct.mha"):
-        (self.folder / name).write_bytes(ct_cases.mha(grid, values))
+        (self.folder / name).write_bytes(formats.mha(grid, values))
         server = self.open()
         self.show(server, "case=mine", width_px=width_px, theme=theme)
         self.choose(name)
@@ -284,7 +285,7 @@ class CtPageTest(PageTest):
     def test_dragging_with_the_right_button_changes_the_window(self):
         from selenium.webdriver.common.actions.action_builder import ActionBuilder
 
-        self.open_case(ct_cases.straight((20, 20, 20)), 8000 * [-1000])
+        self.open_case(formats.straight((20, 20, 20)), 8000 * [-1000])
         canvas = self.browser.driver.find_element("css selector", '[data-slice="axial"]')
         self.browser.js("arguments[0].scrollIntoView({block: 'center'})", canvas)
         for dx, dy, changed in ((60, 0, ("400", "2580")), (0, 40, ("480", "2580"))):

@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // Saving a case while others do the same.
-#include "tools/workbench/files_of_case.cpp"
-
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <thread>
 
-#include "tests/framework/runtime/fixture.hpp"
-#include "tests/framework/runtime/identities.hpp"
+#include "tests/framework/fixture.hpp"
+#include "tests/framework/identities.hpp"
+#include "workbench/case_text.hpp"
+#include "workbench/files_of_case.hpp"
 
 namespace {
+
+namespace fs = std::filesystem;
 
 using marrow::workbench::PlannedCase;
 using marrow::workbench::write_case_files;

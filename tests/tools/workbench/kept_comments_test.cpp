@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A case that is saved again: comments stay with what did not change, and what is lost is told.
-#include "tools/workbench/kept_comments.cpp"
+#include "workbench/kept_comments.hpp"
 
 #include <gtest/gtest.h>
-
-#include "tools/workbench/yaml_text.cpp"
 
 namespace {
 

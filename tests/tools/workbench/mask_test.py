@@ -7,6 +7,7 @@ import numpy
 
 import ct_cases
 from bench import MARROW, main
+from harness import formats
 from xray_bench import HEIGHT, WIDTH, XrayTest, camera_matrices, read_png, write_png
 
 SIZE = (40, 30, 40)
@@ -46,7 +47,7 @@ class DistortedMaskTest(XrayTest):
         }
         self.views[0]["camera"] = camera
         values = ct_cases.two_balls(SIZE, (20, 15, 10), (20, 15, 30), 7)
-        (self.folder / "scan.mha").write_bytes(ct_cases.mha(ct_cases.straight(SIZE), values))
+        (self.folder / "scan.mha").write_bytes(formats.mha(formats.straight(SIZE), values))
         self.draft = {
             "ct": {"file": "scan.mha"},
             "views": self.views[:1],

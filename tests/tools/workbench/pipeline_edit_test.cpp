@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // The editor of pipeline files: it makes each wanted change, and all other text stays.
-#include "tools/workbench/pipeline_edit.cpp"
+#include "workbench/pipeline_edit.hpp"
 
 #include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
 
 #include <set>
 #include <sstream>
 
-#include "tests/framework/runtime/fixture.hpp"
-#include "tools/workbench/yaml_text.cpp"
+#include "marrow/base/diagnostics.hpp"
+#include "marrow/base/error.hpp"
+#include "marrow/base/yaml.hpp"
+#include "tests/framework/fixture.hpp"
 
 namespace {
 

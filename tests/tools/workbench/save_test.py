@@ -12,6 +12,7 @@ import yaml
 
 import ct_cases
 from bench import MARROW, SOURCE, BenchTest
+from harness import formats
 
 SIZE = (40, 30, 40)
 NASTY = "<img src=x onerror=alert(1)> & 'one': {2}"
@@ -21,9 +22,9 @@ class SaveTest(BenchTest):
     def setUp(self):
         super().setUp()
         values = ct_cases.two_balls(SIZE, (20, 15, 10), (20, 15, 30), 7)
-        (self.folder / "scan.mha").write_bytes(ct_cases.mha(ct_cases.straight(SIZE), values))
-        (self.folder / "front.png").write_bytes(ct_cases.png(64, 64))
-        (self.folder / "side.png").write_bytes(ct_cases.png(64, 64, 90))
+        (self.folder / "scan.mha").write_bytes(formats.mha(formats.straight(SIZE), values))
+        (self.folder / "front.png").write_bytes(formats.png(64, 64, [128] * 4096))
+        (self.folder / "side.png").write_bytes(formats.png(64, 64, [90] * 4096))
         side = {**ct_cases.CAMERA, "c_arm": {**ct_cases.CAMERA["c_arm"], "beta_deg": 90}, "marrow-camera": 1}
         (self.folder / "side.yaml").write_text(yaml.safe_dump(side))
 
@@ -284,6 +285,4 @@ class SaveTest(BenchTest):
 
 
 if __name__ == "__main__":
-    import sys
-
     unittest.main(verbosity=2)

@@ -9,6 +9,7 @@ import urllib.parse
 
 import ct_cases
 from bench import BenchTest
+from harness import formats
 
 SMALL, LARGE = (40, 36, 44), (120, 116, 124)  # the large one has more voxels than a coarse grid
 
@@ -17,7 +18,7 @@ class SegmentTest(BenchTest):
     def begin(self, size, centres, radius, grid=None):
         """A server with an open CT of two balls; the name of the CT."""
         values = ct_cases.two_balls(size, *centres, radius)
-        (self.folder / "ct.mha").write_bytes(ct_cases.mha(grid or ct_cases.straight(size), values))
+        (self.folder / "ct.mha").write_bytes(formats.mha(grid or formats.straight(size), values))
         server = self.open()
         server.enter()
         state = server.finish(server.json("POST", "/api/ct/open", {"ct": {"file": "ct.mha"}})["job"])
@@ -39,7 +40,7 @@ class SegmentTest(BenchTest):
 
     def test_outlines_lie_on_the_surface_in_a_flipped_grid_of_long_voxels(self):
         grid = {
-            **ct_cases.straight(SMALL, (0.8, 0.8, 1.6), (5.0, -7.0, 90.0)),
+            **formats.straight(SMALL, (0.8, 0.8, 1.6), (5.0, -7.0, 90.0)),
             "direction": [[-1, 0, 0], [0, 1, 0], [0, 0, -1]],
         }
         centres, radius = ((20, 18, 11), (20, 18, 32)), 8
@@ -131,7 +132,7 @@ class SegmentTest(BenchTest):
     def test_too_many_fragments_for_the_memory(self):
         size, bone = (512, 512, 400), b"\x84\x03" * (512 * 512)  # 900 HU
         with open(self.folder / "ct.mha", "wb") as file:
-            file.write(ct_cases.mha(ct_cases.straight(size), []))
+            file.write(formats.mha(formats.straight(size), []))
             begin = file.tell()
             for z in range(100, 130):
                 file.seek(begin + 2 * 512 * 512 * z)
@@ -151,6 +152,4 @@ class SegmentTest(BenchTest):
 
 
 if __name__ == "__main__":
-    import sys
-
     unittest.main(verbosity=2)

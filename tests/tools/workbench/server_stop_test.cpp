@@ -4,8 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "tools/workbench/access.cpp"
-#include "tools/workbench/server.cpp"
+#include "workbench/server.hpp"
 
 namespace {
 

@@ -35,7 +35,7 @@ class ServerTest(BenchTest):
             self.assertIn("; " + part, headers["Set-Cookie"])
         again = server.ask("GET", "/?token=" + server.token)
         self.assertEqual(again[0], 403)
-        self.assertEqual(self.error(again), "this address was used before; start 'marrow open' anew for a new one")
+        self.assertEqual(self.error(again), "this address was used before; start 'marrow open' again for a new one")
         server.cookie = headers["Set-Cookie"].split(";")[0]
         self.assertEqual(server.ask("GET", "/")[0], 200)
         self.assertEqual(server.ask("GET", "/?token=" + server.token)[0], 302, "its own browser may come again")
@@ -48,7 +48,7 @@ class ServerTest(BenchTest):
                 self.assertEqual(answer[0], 403, path)
                 self.assertEqual(
                     self.error(answer),
-                    "this browser is not known here; open the address that 'marrow open' printed, or start it anew",
+                    "this browser is not known here; open the address that 'marrow open' printed, or start it again",
                 )
         self.assertEqual(server.ask("GET", "/?token=" + "0" * 64)[0], 403)
 

@@ -6,37 +6,22 @@ import struct
 import unittest
 
 from bench import BenchTest
+from harness import formats
 
 ARM = {"alpha_deg": 0, "beta_deg": 0, "source_to_detector_mm": 1000, "source_to_isocentre_mm": 600, "pixel_mm": 1}
 CAMERA = {"width_px": 6, "height_px": 4, "c_arm": ARM}
 
 
-def element(group, number, kind, value):
-    if isinstance(value, str):
-        value = value.encode()
-    value += (b"\0" if kind == b"UI" else b" ") * (len(value) % 2)
-    length = struct.pack("<HI", 0, len(value)) if kind in (b"OW", b"OB") else struct.pack("<H", len(value))
-    return struct.pack("<HH", group, number) + kind + length + value
-
-
-def us(number, value):
-    return element(0x0028, number, b"US", struct.pack("<H", value))
-
-
 def dicom(orientation=None, flip=None, angles=None):
-    """An X-ray image of 6 x 4 pixels in explicit little endian."""
-    meta = element(2, 1, b"OB", b"\0\1") + element(2, 0x10, b"UI", "1.2.840.10008.1.2.1")
-    data = b"\0" * 128 + b"DICM" + element(2, 0, b"UL", struct.pack("<I", len(meta))) + meta
-    data += element(8, 0x16, b"UI", "1.2.840.10008.5.1.4.1.1.12.1") + element(8, 0x60, b"CS", "XA")
+    """An X-ray image of 6 x 4 pixels."""
+    elements = {(8, 0x16): ("UI", "1.2.840.10008.5.1.4.1.1.12.1"), (8, 0x60): ("CS", "XA")}
     if angles:
-        data += element(0x18, 0x1510, b"DS", str(angles[0])) + element(0x18, 0x1511, b"DS", str(angles[1]))
+        elements.update({(0x18, 0x1510): ("DS", str(angles[0])), (0x18, 0x1511): ("DS", str(angles[1]))})
     if flip:
-        data += element(0x18, 0x7034, b"CS", flip)
+        elements[0x18, 0x7034] = ("CS", flip)
     if orientation:
-        data += element(0x20, 0x20, b"CS", orientation)
-    data += us(2, 1) + element(0x28, 4, b"CS", "MONOCHROME2") + us(0x10, 4) + us(0x11, 6)
-    data += us(0x100, 16) + us(0x101, 16) + us(0x102, 15) + us(0x103, 0)
-    return data + element(0x7FE0, 0x10, b"OW", struct.pack("<24H", *range(1000, 1024)))
+        elements[0x20, 0x20] = ("CS", orientation)
+    return formats.dicom(6, 4, struct.pack("<24H", *range(1000, 1024)), elements)
 
 
 class SidesTest(BenchTest):
@@ -72,6 +57,4 @@ class SidesTest(BenchTest):
 
 
 if __name__ == "__main__":
-    import sys
-
     unittest.main(verbosity=2)

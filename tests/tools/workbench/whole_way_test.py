@@ -15,8 +15,8 @@ import yaml
 from selenium.webdriver.common.keys import Keys
 
 import bench
-import ct_cases
 from bench import MARROW, SMALL, PageTest, simulate
+from harness import formats
 
 MOST_CLICKS = 25
 
@@ -42,7 +42,7 @@ class WholeWayTest(PageTest):
         size, spacing, origin, values = read_mha(case / self.given["ct"])
         self.grid = {"size": size, "spacing_mm": spacing, "origin_mm": origin}
         values = numpy.clip(numpy.round(values), -1024, 32767).astype("<i2")
-        ct_cases.dicom_series(self.folder / "scan", size, values, spacing_mm=spacing, origin_mm=origin)
+        formats.dicom_series(self.folder / "scan", size, values, spacing_mm=spacing, origin_mm=origin)
         for view in self.given["views"]:
             shutil.copy(case / view["image"], self.folder)
         self.clicks = 0

@@ -6,8 +6,8 @@ import os
 import time
 import unittest
 
-import ct_cases
 from bench import BenchTest
+from harness import formats
 
 DAY_s = 24 * 3600
 
@@ -46,7 +46,7 @@ class WorkingFilesTest(BenchTest):
     def test_what_is_asked_for_again_is_young_again(self):
         server = self.open()
         server.enter()
-        (self.folder / "a.png").write_bytes(ct_cases.png(2, 1))
+        (self.folder / "a.png").write_bytes(formats.png(2, 1, [128] * 2))
         body = {"image": "a.png", "camera": None, "width_px": 2, "height_px": 1, "runs": [1, 1]}
         first = self.folder / server.json("POST", "/api/xray/mask", body)["mask"]
         os.utime(first, (time.time() - 2 * DAY_s,) * 2)
@@ -63,6 +63,4 @@ class WorkingFilesTest(BenchTest):
 
 
 if __name__ == "__main__":
-    import sys
-
     unittest.main(verbosity=2)

@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <set>
 
-#include "cluster/chunk_fault.hpp"
 #include "cluster/chunk_rows.hpp"
 #include "cluster/plan.hpp"
 #include "command_options.hpp"
@@ -60,10 +59,9 @@ bool make_cases(const Task& task, const CellJobs& cells, const std::vector<std::
                 const fs::path& scratch, std::map<std::size_t, std::string>& faults) {
   const std::vector<Job> jobs = cells.cases_of(numbers);
   Progress progress(jobs.size(), task.request.quiet);
-  std::size_t done = 0;
   return run_jobs(jobs, pool_of(task.request, scratch, task.request.threads), [&](const Job& job, const JobEnd& end) {
     if (std::string fault = cells.fault_of_case(job, end); !fault.empty()) faults[job.number] = std::move(fault);
-    progress.done(++done, "case " + task.experiment.cases[job.number].name);
+    progress.add("case " + task.experiment.cases[job.number].name);
   });
 }
 
@@ -108,7 +106,6 @@ bool make_rows(const Task& task, const Chunk& chunk) {
       jobs.push_back(cells.job_of("cell", number, task.experiment.cases[cell.case_index].name));
   }
   Progress progress(jobs.size(), task.request.quiet);
-  std::size_t done = 0;
   if (!run_jobs(jobs, pool_of(task.request, scratch.path(), task.request.threads),
                 [&](const Job& job, const JobEnd& end) {
                   const CellRow row = cells.row_of(job, end);
@@ -116,7 +113,7 @@ bool make_rows(const Task& task, const Chunk& chunk) {
                   std::error_code ignored;
                   fs::remove_all(runner.folder_of(cells.cell(job.number)), ignored);
                   if (!task.request.no_cache) store.tidy(&stop_on_signals());
-                  progress.done(++done, row.id + (row.failed.empty() ? "" : " failed: " + row.failed));
+                  progress.add(row.id + (row.failed.empty() ? "" : " failed: " + row.failed));
                 }))
     return false;
   file.finish();
@@ -189,7 +186,7 @@ void add_chunk(CLI::App& app, int& code) {
   command->add_option("plan", request->plan, "file of the plan, which --on or --emit of 'marrow compare' wrote")
       ->required();
   command->add_option("name", request->name, "the chunk")->required();
-  add_whole_number(command, "--jobs", request->jobs, "cells at once (default: as many as there are cores)", 1, 1024);
+  add_whole_number(command, "--jobs", request->jobs, "cells at once (default: the number of cores)", 1, 1024);
   command->add_flag("--quiet", request->quiet, "no progress");
   command->callback([request, &code] { code = run_chunk(*request); });
 }

@@ -12,7 +12,9 @@
 #include <string_view>
 
 #include "marrow/base/error.hpp"
+#include "marrow/base/printable.hpp"
 #include "marrow/base/process_identity.hpp"
+#include "marrow/base/text_file.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -20,7 +22,13 @@ namespace {
 namespace fs = std::filesystem;
 using compare::CellRow;
 
+constexpr std::size_t kMostFaultBytes = 2000;
+
 fs::path rows_folder(const fs::path& folder) { return folder / "rows"; }
+
+fs::path fault_file(const fs::path& folder, const std::string& chunk) {
+  return rows_folder(folder) / (chunk + ".fault");
+}
 
 /// The result in a row, without what differs each time the cell runs.
 std::string result_of(CellRow row) {
@@ -63,6 +71,29 @@ std::map<std::string, bool> chunk_files(const fs::path& folder) {
     if (name.extension() == ".part") chunks.emplace(name.native().substr(0, name.native().find('.')), false);
   }
   return chunks;
+}
+
+void leave_fault_of_chunk(const fs::path& folder, const std::string& chunk, const std::string& fault) {
+  const fs::path file = fault_file(folder, chunk);
+  std::error_code ignored;
+  fs::create_directories(file.parent_path(), ignored);
+  try {
+    write_text_file(file, cut(printable(fault), kMostFaultBytes));
+  } catch (const Error&) {
+  }
+}
+
+void remove_fault_of_chunk(const fs::path& folder, const std::string& chunk) {
+  std::error_code ignored;
+  fs::remove(fault_file(folder, chunk), ignored);
+}
+
+std::string fault_of_chunk(const fs::path& folder, const std::string& chunk) {
+  try {
+    return printable(read_text_file(fault_file(folder, chunk), kMostFaultBytes));
+  } catch (const Error&) {
+    return "";
+  }
 }
 
 RowsOfChunks::RowsOfChunks(const fs::path& folder, const compare::Experiment& experiment, const std::string& plan,

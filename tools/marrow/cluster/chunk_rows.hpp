@@ -37,6 +37,14 @@ class ChunkFile {
 /// that was absent before may seem to be absent still.
 std::map<std::string, bool> chunk_files(const std::filesystem::path& folder);
 
+/// Writes FOLDER/rows/CHUNK.fault: why a task could not do its chunk, in one sentence. The task's output may be on
+/// another host. If the file cannot be written, that is ignored: the task prints the sentence, too.
+void leave_fault_of_chunk(const std::filesystem::path& folder, const std::string& chunk, const std::string& fault);
+/// Call this when the chunk is done.
+void remove_fault_of_chunk(const std::filesystem::path& folder, const std::string& chunk);
+/// The sentence, without control characters; empty if there is none.
+std::string fault_of_chunk(const std::filesystem::path& folder, const std::string& chunk);
+
 /// What tasks left in a folder.
 class RowsOfChunks {
  public:

@@ -31,7 +31,7 @@ void add_pieces(const Numbers& numbers, std::size_t least, std::vector<Numbers>&
                         numbers.begin() + std::ptrdiff_t((i + 1) * numbers.size() / pieces));
 }
 
-std::vector<Numbers> cut(const std::vector<Numbers>& cases, std::size_t least) {
+std::vector<Numbers> cut_cases(const std::vector<Numbers>& cases, std::size_t least) {
   std::vector<Numbers> chunks;
   Numbers open;
   for (const Numbers& one : cases) {
@@ -54,8 +54,8 @@ std::vector<Numbers> cut_into_chunks(const Numbers& numbers, std::size_t cells_o
   std::size_t least = std::size_t(std::clamp(wanted, 1., double(std::max<std::size_t>(1, numbers.size()))));
   if (!(seconds_of_a_cell > 0)) least = std::max<std::size_t>(1, cells_of_a_case);
   const std::vector<Numbers> cases = by_case(numbers, cells_of_a_case);
-  std::vector<Numbers> chunks = cut(cases, least);
-  while (chunks.size() > rule.most_tasks) chunks = cut(cases, least = least + least / 4 + 1);
+  std::vector<Numbers> chunks = cut_cases(cases, least);
+  while (chunks.size() > rule.most_tasks) chunks = cut_cases(cases, least = least + least / 4 + 1);
   return chunks;
 }
 

@@ -3,7 +3,6 @@
 
 #include <cstdio>
 
-#include "cluster/chunk_fault.hpp"
 #include "cluster/chunk_rows.hpp"
 #include "cluster/follow.hpp"
 #include "cluster/scripts.hpp"
@@ -145,14 +144,14 @@ void add_cluster_options(CLI::App* command, CompareRequest& request, ClusterRequ
   command->add_option("--emit", cluster.emit, "write what is left for another program: snakemake, parallel")
       ->check(CLI::IsMember({"snakemake", "parallel"}))
       ->excludes("--on");
-  command->add_option("--profile", cluster.profile, "what the cluster wants to be told (YAML)");
+  command->add_option("--profile", cluster.profile, "settings for the cluster (YAML)");
   show_default(add_amount(command, "--chunk-minutes", cluster.rule.least_minutes, "minutes",
                           "minutes that a task takes at least, as estimated from earlier runs"),
                cluster.rule.least_minutes);
   command->add_flag("--wait", cluster.wait, "follow what was submitted; Ctrl-C ends it on the cluster, too");
-  command->add_flag("--status", cluster.status, "say how far the tasks are");
+  command->add_flag("--status", cluster.status, "say how many tasks are done");
   command->add_flag("--cancel", cluster.cancel, "end what was submitted");
-  command->add_flag("--gather", request.gather, "run no cell: make tables and report from the rows that are there");
+  command->add_flag("--gather", request.gather, "run no cell: make tables and report from the existing rows");
 }
 
 int compare_on_cluster(const CompareRequest& asked, const ClusterRequest& cluster, const Catalogue& catalogue,

@@ -57,7 +57,7 @@ json of(const std::map<std::string, std::string>& digests) {
 }
 
 /// Everything but the id, which is the digest of this.
-json content_of(const ClusterPlan& plan) {
+json plan_content(const ClusterPlan& plan) {
   return {{"marrow-plan", kVersion},
           {"experiment", json_of_bytes(plan.file.string())},
           {"folder", json_of_bytes(plan.folder.string())},
@@ -160,7 +160,7 @@ ClusterPlan make_plan(const CompareRequest& request, const Catalogue& catalogue,
     plan.cases = chunks_of(cut_into_chunks(left.cases, 1, 0, {0, std::min(rule.most_tasks, kMostCaseTasks)}));
   }
   if (plan.cells.empty()) return plan;
-  const json content = content_of(plan);
+  const json content = plan_content(plan);
   name_all(plan, content);
   std::error_code error;
   fs::create_directories(plan.place().parent_path(), error);
@@ -187,7 +187,7 @@ ClusterPlan read_plan(const fs::path& file) {
     plan.no_cache = j.at("no_cache");
     for (const json& ranges : j.at("cases")) plan.cases.push_back({"", numbers_of(ranges)});
     for (const json& ranges : j.at("cells")) plan.cells.push_back({"", numbers_of(ranges)});
-    name_all(plan, content_of(plan));
+    name_all(plan, plan_content(plan));
     if (plan.id != file.stem()) throw Error("it was changed, or renamed");
     return plan;
   } catch (const std::exception& error) {

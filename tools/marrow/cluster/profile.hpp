@@ -9,7 +9,7 @@
 
 namespace marrow::cli {
 
-/// What a cluster wants to be told with each task.
+/// Settings for a cluster, which it gets with each task.
 struct ClusterProfile {
   std::string partition, account;    ///< empty = the cluster's default
   std::int64_t processors = 0;       ///< of one task; 0 = the cluster's default

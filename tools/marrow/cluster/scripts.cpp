@@ -102,7 +102,7 @@ fs::path write_chunk_script(const ClusterPlan& plan, const ClusterProfile& profi
 }
 
 fs::path write_gather_script(const ClusterPlan& plan, const std::vector<std::string>& more) {
-  std::string text = "#!/bin/sh\n# Makes tables and report of a comparison from the rows that are there.\nset -e\n" +
+  std::string text = "#!/bin/sh\n# Makes tables and report of a comparison from the existing rows.\nset -e\n" +
                      settings_of_marrow() + "exec " + script_word(this_program().string()) + " compare " +
                      script_word(plan.file.string()) + " --out " + script_word(plan.folder.string()) + " --gather";
   for (const std::string& word : more) text += " " + script_word(word);

@@ -18,7 +18,7 @@ void write_list(const std::filesystem::path& file, const std::vector<Chunk>& chu
 /// Writes plans/ID-chunk.sh, which runs the chunk that is its argument with the settings of this process, and returns
 /// its path.
 std::filesystem::path write_chunk_script(const ClusterPlan& plan, const ClusterProfile& profile);
-/// Writes plans/ID-gather.sh, which makes tables and report from the rows that are there, and returns its path. `more`:
+/// Writes plans/ID-gather.sh, which makes tables and report from the existing rows, and returns its path. `more`:
 /// further words of the command.
 std::filesystem::path write_gather_script(const ClusterPlan& plan, const std::vector<std::string>& more = {});
 

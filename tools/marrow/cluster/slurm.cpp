@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "cluster/chunk_fault.hpp"
 #include "cluster/chunk_rows.hpp"
 #include "cluster/scripts.hpp"
 #include "marrow/base/error.hpp"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The answer of a comparison as tables for the terminal.
 #include "compare/comparison.hpp"
-#include "compare/figure_text.hpp"
 #include "compare/text_table.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"

@@ -6,7 +6,6 @@
 #include "commands.hpp"
 #include "compare/comparison.hpp"
 #include "compare/comparison_folder.hpp"
-#include "given_path.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/no_process.hpp"
 #include "marrow/base/printable.hpp"
@@ -192,8 +191,8 @@ void add_experiment_arguments(CLI::App* command, CompareRequest& request) {
   command->add_flag("--no-cache", request.no_cache, "neither read nor keep results of nodes");
   add_whole_number(command, "--more-cases", request.more_cases,
                    command->get_name() == "compare"
-                       ? "add up to so many cases with further seeds, until the rule under 'stop' ends it"
-                       : "so many further seeds belong to the experiment, as in a comparison that added them",
+                       ? "add at most this number of cases, with further seeds, until the rule under 'stop' is met"
+                       : "number of further seeds of the experiment, as in the comparison that added them",
                    1, 100000);
   add_shared_cache(command);
   add_file_limits(command, request.file_limits);
@@ -204,7 +203,7 @@ void add_compare(CLI::App& app, int& code) {
   CLI::App* command =
       app.add_subcommand("compare", "run an experiment: variants of a pipeline on the same cases, and which is better");
   add_experiment_arguments(command, *request);
-  add_whole_number(command, "--jobs", request->jobs, "cells at once (default: as many as there are cores)", 1, 1024);
+  add_whole_number(command, "--jobs", request->jobs, "cells at once (default: the number of cores)", 1, 1024);
   show_default(add_amount(command, "--time-limit", request->time_limit_s, "seconds", "seconds that one cell may take"),
                request->time_limit_s);
   show_default(
@@ -216,7 +215,7 @@ void add_compare(CLI::App& app, int& code) {
   show_default(add_amount(command, "--page-mb", request->page_mb, "megabytes",
                           "megabytes that report.html may have; pictures that do not fit go to the folder report/"),
                request->page_mb);
-  command->add_flag("--dry-run", request->dry_run, "say what there is to do, and how long that took before");
+  command->add_flag("--dry-run", request->dry_run, "say what is left to do, and how long it took in earlier runs");
   command->add_flag("--quiet", request->quiet, "no progress");
   const auto cluster = std::make_shared<ClusterRequest>();
   add_cluster_options(command, *request, *cluster);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "compare/comparison.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -53,7 +54,7 @@ CurvePoint point_of(const Experiment& experiment, const Group& group, std::optio
 std::vector<Curve> curves_of(const Experiment& experiment, const std::vector<RowsOfVariant>& rows) {
   std::vector<std::string> bases;
   for (const compare::Variant& variant : experiment.variants)
-    if (std::find(bases.begin(), bases.end(), variant.swept_from) == bases.end()) bases.push_back(variant.swept_from);
+    if (!contains(bases, variant.swept_from)) bases.push_back(variant.swept_from);
   std::vector<std::optional<std::size_t>> figures;
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) figures.emplace_back(m);
   if (experiment.defines_success()) figures.emplace_back();

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "compare/comparison.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/compare/experiment_notes.hpp"
 
 namespace marrow::cli {
@@ -144,8 +145,8 @@ void Plan::print() const {
   std::printf("%zu cells: %zu variants, %zu cases, %zu starts\n", experiment_.cell_count(), experiment_.variants.size(),
               cases.all, starts.all);
   if (const auto counts = compare::comparison_counts(experiment_); counts.comparisons)
-    std::printf("%zu comparison%s with the baseline, for which a difference takes at least %zu cases\n",
-                counts.comparisons, counts.comparisons == 1 ? "" : "s", counts.fewest_cases);
+    std::printf("%s with the baseline, for which a difference takes at least %zu cases\n",
+                counted(counts.comparisons, "comparison").c_str(), counts.fewest_cases);
   if (is_sample)
     std::printf("looked at: %zu cases and %zu starts, evenly spread; by them there are about\n", cases.taken,
                 starts.taken);

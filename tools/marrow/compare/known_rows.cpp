@@ -54,10 +54,10 @@ void KnownRows::say_doubts() const {
                  : formatted("{} rows are not as marrow wrote them, so they do not count: {}, and others",
                              changed_.cells, changed_.first));
   if (contradicting_.cells)
-    say_note(formatted(
-        "of {} cells there are rows whose results differ, made on several hosts or at several times, such as {}; one "
-        "that was made on a machine like this one is taken, else the first in the order of their texts",
-        contradicting_.cells, contradicting_.first));
+    say_note(
+        formatted("{} rows with different results, from several hosts or times, such as {}. A row from a machine like "
+                  "this one is taken, or else the first in the order of their texts",
+                  counted(contradicting_.cells, "cell has", "cells have"), contradicting_.first));
 }
 
 }  // namespace marrow::cli

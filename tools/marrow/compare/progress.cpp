@@ -12,6 +12,7 @@ namespace marrow::cli {
 Progress::Progress(std::size_t all, bool quiet) : all_(all), quiet_(quiet), is_terminal_(isatty(STDERR_FILENO)) {}
 
 void Progress::done(std::size_t number, const std::string& what) {
+  number_ = number;
   const auto now = std::chrono::steady_clock::now();
   if (quiet_ || (number < all_ &&
                  now - last_ < (is_terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(5000))))

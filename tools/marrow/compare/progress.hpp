@@ -11,11 +11,13 @@ namespace marrow::cli {
 class Progress {
  public:
   Progress(std::size_t all, bool quiet);
+  /// One more part is done, `what`.
+  void add(const std::string& what) { done(number_ + 1, what); }
   /// `number` parts are done; `what` is the last of them.
   void done(std::size_t number, const std::string& what);
 
  private:
-  std::size_t all_;
+  std::size_t all_, number_ = 0;
   bool quiet_, is_terminal_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_ = start_;
 };

@@ -145,11 +145,10 @@ class Comparison {
     std::iota(all.begin(), all.end(), std::size_t(0));
     const std::vector<Job> jobs = cells_.cases_of(all);
     Progress progress(jobs.size(), request_.quiet);
-    std::size_t done = 0;
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
       if (std::string fault = cells_.fault_of_case(job, end); !fault.empty())
         case_faults_[job.number] = std::move(fault);
-      progress.done(++done, "case " + experiment_.cases[job.number].name);
+      progress.add("case " + experiment_.cases[job.number].name);
     });
   }
 
@@ -165,15 +164,14 @@ class Comparison {
     known.say_doubts();
     if (const std::string text = doubled_cases_text(experiment_, runner_); !text.empty()) say_note(text);
     Progress progress(jobs.size(), request_.quiet);
-    std::size_t done = 0;
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
       CellRow row = cells_.row_of(job, end);
       calls_.add(row);
       runner_.write(cells_.cell(job.number), row);
       first.add(cells_.cell(job.number), row);
       tidy();  // thousands of cells would fill the disk before the end; a fault is said there
-      progress.done(++done, row.id + (row.failed.empty() ? "" : " failed: " + row.failed) +
-                                (row.absent.empty() ? "" : ": " + row.absent));
+      progress.add(row.id + (row.failed.empty() ? "" : " failed: " + row.failed) +
+                   (row.absent.empty() ? "" : ": " + row.absent));
       rows_[job.number] = std::move(row);
     });
   }
@@ -205,11 +203,10 @@ class Comparison {
     alone.workers = 1;
     alone.time_limit_s *= 2;  // the cell runs twice
     Progress progress(jobs.size(), request_.quiet);
-    std::size_t done = 0;
     const bool is_whole = run_jobs(jobs, alone, [&](const Job& job, const JobEnd& end) {
       CellRow& row = rows[job.number];
       if (end.answer.is_number()) row.seconds = end.answer.get<double>();
-      progress.done(++done, "time of " + row.id + (end.failed.empty() ? "" : " failed: " + end.failed));
+      progress.add("time of " + row.id + (end.failed.empty() ? "" : " failed: " + end.failed));
     });
     timed.keep_complete(rows);
     return is_whole;
@@ -220,13 +217,12 @@ class Comparison {
     for (const CellIndex& cell : cells)
       jobs.push_back(cells_.job_of("draw", cells_.number_of(cell), experiment_.cases[cell.case_index].name));
     Progress progress(jobs.size(), request_.quiet);
-    std::size_t done = 0;
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
       const std::string id = compare::cell_id(experiment_, cells_.cell(job.number));
       if (!end.failed.empty())
         std::fprintf(stderr, "marrow: no pictures of %s: %s\n", printable(id).c_str(), printable(end.failed).c_str());
       if (!end.failed.empty()) remove_old_pictures(cells_.cell(job.number));
-      progress.done(++done, "pictures of " + id);
+      progress.add("pictures of " + id);
     });
   }
 

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "compare/comparison.hpp"
+#include "marrow/base/json_text.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
@@ -17,13 +18,6 @@ using compare::CellRow;
 using compare::Experiment;
 using nlohmann::json;
 
-bool is_number(const std::string& text) {
-  double value = 0;
-  const char* const begin = text.data() + (text[0] == '+');
-  const auto [end, error] = std::from_chars(begin, text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size();
-}
-
 /// A field of a CSV file (RFC 4180), quoted if necessary. A text that a spreadsheet would take for a formula, such as a
 /// reason that begins with "=", is marked as text. Control characters are written out, because a terminal would execute
 /// them. Line breaks stay.
@@ -33,7 +27,7 @@ std::string field(const std::string& raw) {
     end = std::min(raw.find('\n', begin), raw.size());
     text += (begin ? "\n" : "") + printable(raw.substr(begin, end - begin));
   }
-  if (!text.empty() && std::string("=+-@\t\r\n").find(text[0]) != std::string::npos && !is_number(text))
+  if (!text.empty() && std::string("=+-@\t\r\n").find(text[0]) != std::string::npos && !parsed_number(text))
     text = "'" + text;
   if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
   std::string quoted = "\"";
@@ -101,7 +95,7 @@ std::string jsonl(const Experiment& experiment, const std::vector<CellRow>& rows
     for (std::size_t i = 0; i < options.size(); ++i) j["options"][options[i]] = values_of.at(row.variant)[i];
     for (std::size_t i = 0; i < experiment.metrics.size(); ++i)
       j[experiment.metrics[i].path] = row.values[i] ? json(*row.values[i]) : json();
-    text += j.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
+    text += json_text(j) + "\n";
   }
   return text;
 }
@@ -267,8 +261,7 @@ void write_tables(const Experiment& experiment, const std::vector<CellRow>& rows
                   const std::filesystem::path& folder) {
   write_text_file(folder / "cells.csv", csv(experiment, rows));
   write_text_file(folder / "cells.jsonl", jsonl(experiment, rows));
-  write_text_file(folder / "comparison.json",
-                  answer_json(experiment, answer).dump(1, ' ', false, json::error_handler_t::replace) + "\n");
+  write_text_file(folder / "comparison.json", json_text(answer_json(experiment, answer), 1) + "\n");
 }
 
 }  // namespace marrow::cli

@@ -15,10 +15,6 @@ using CaseAndStart = std::pair<std::string, std::string>;
 
 bool is_done_without_a_failure(const CellRow& row) { return row.failed.empty() && row.absent.empty(); }
 
-std::string count_of_times(std::size_t count, const std::string& one, const std::string& more) {
-  return formatted("{} {}", count, count == 1 ? one : more);
-}
-
 }  // namespace
 
 std::set<CaseAndStart> places_done_by_all(const std::vector<RowsOfVariant>& rows) {
@@ -77,16 +73,16 @@ std::string TimedCells::sentence(bool has_store) const {
   std::string text = "Times were not measured";
   text += places_ ? "." : ": there is no case and start in which every variant was done without a failure.";
   if (places_ > lost_)
-    text = "Times: " + count_of_times(places_ - lost_, "run", "runs") +
+    text = "Times: " + counted(places_ - lost_, "run") +
            " of each variant, the same cases and starts for all, in turns, one at a time on " +
-           count_of_times(std::thread::hardware_concurrency(), "thread", "threads") +
+           counted(std::thread::hardware_concurrency(), "thread") +
            " with nothing else running. Each cell runs once before, which does not count. " +
            (has_store ? "What all variants share is read back, everything else is made anew."
                       : "Everything is made anew, also what all variants share.");
   if (has_fewer_ && places_) text += " In no other case and start was every variant done without a failure.";
   if (!without_any_.empty()) text += " Without times: " + without_any_ + ", which was done nowhere without a failure.";
   if (lost_)
-    text += " Left out: " + count_of_times(lost_, "case and start", "cases and starts") +
+    text += " Left out: " + counted(lost_, "case and start", "cases and starts") +
             " in which a run failed while it was timed.";
   return text;
 }

@@ -9,6 +9,7 @@
 #include "difference/numbers.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/runtime/node/types.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/run/verdicts.hpp"
 
 namespace marrow::cli {
@@ -81,13 +82,10 @@ void compare_placement(const RigidTransform& a, const RigidTransform& b, const F
 /// Adds the texts that only one of two lists has: `new_one` and `old_one` say so.
 void compare_texts(const std::vector<std::string>& a, const std::vector<std::string>& b, const std::string& new_one,
                    const std::string& old_one, Amount& amount) {
-  const auto has = [](const std::vector<std::string>& texts, const std::string& text) {
-    return std::find(texts.begin(), texts.end(), text) != texts.end();
-  };
   for (const std::string& one : b)
-    if (!has(a, one)) amount.lines.push_back(new_one + one);
+    if (!contains(a, one)) amount.lines.push_back(new_one + one);
   for (const std::string& one : a)
-    if (!has(b, one)) amount.lines.push_back(old_one + one);
+    if (!contains(b, one)) amount.lines.push_back(old_one + one);
 }
 
 void compare_poses(const Pose& a, const Pose& b, Amount& amount) {

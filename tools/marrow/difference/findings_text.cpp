@@ -105,7 +105,7 @@ void print_roots(const Findings& findings, std::set<std::pair<std::string, std::
   }
 }
 
-/// The nodes that ran in one of the runs only. The other one may have had them, too, without need for them.
+/// The nodes that ran in one of the runs only. The other pipeline may have them too, without an output that needs them.
 void print_only(const std::vector<std::string>& names, const char* which, const RunRecord& other,
                 const char* other_one) {
   std::vector<std::string> missing, not_needed;
@@ -120,8 +120,7 @@ void print_other_changes(const Findings& findings) {
   print_only(difference.only_now, "second", findings.before, "first");
   for (const Change& change : difference.others) {
     const RecordedNode* node = findings.now.find(change.node);
-    const bool differs = std::find(difference.in_consequence.begin(), difference.in_consequence.end(), change.node) !=
-                         difference.in_consequence.end();
+    const bool differs = contains(difference.in_consequence, change.node);
     std::printf("Also changed: %s%s%s\n", node ? printable("node '" + change.node + "': ").c_str() : "",
                 printable_lines(change.text).c_str(),
                 node && node->makes_data() && !differs ? " (with the same result)" : "");
@@ -179,7 +178,7 @@ void print(const Findings& findings) {
     return;
   }
   for (const std::string& file : findings.damaged) std::printf("%s\n", printable(file).c_str());
-  if (!findings.damaged.empty()) std::printf("All else is by what the runs came to, not by these files\n\n");
+  if (!findings.damaged.empty()) std::printf("Everything else compares what the runs computed, not these files\n\n");
   std::set<std::pair<std::string, std::string>> shown;
   if (difference.roots.empty()) std::printf("What took part in both runs came out the same: %s\n", nodes.c_str());
   print_roots(findings, shown);

@@ -6,8 +6,7 @@
 #include <algorithm>
 #include <set>
 
-#include "amount_bounds.hpp"
-#include "given_path.hpp"
+#include "command_options.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/printable.hpp"

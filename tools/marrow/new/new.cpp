@@ -9,7 +9,6 @@
 #include "marrow/base/names.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
-#include "projects.hpp"
 #include "report/report.hpp"
 #include "templates.hpp"
 
@@ -47,7 +46,7 @@ NewCommand add_what(CLI::App* command, const std::string& what, const std::strin
                     Make make, int& code) {
   const NewCommand made{command->add_subcommand(what, help), std::make_shared<NewRequest>()};
   made.app->add_option("name", made.request->name, name_help)->required();
-  made.app->add_option("--out", made.request->out, "where it is put; by default here, under its name");
+  made.app->add_option("--out", made.request->out, "where to put it (default: here, under its name)");
   made.app->callback([request = made.request, make, &code] {
     const Made done = make(*request);
     std::string next = done.next;
@@ -58,7 +57,7 @@ NewCommand add_what(CLI::App* command, const std::string& what, const std::strin
   return made;
 }
 
-/// A file that is there, or one of marrow's own in `folder`, with or without .yaml.
+/// An existing file, or one of marrow's own in `folder`, with or without .yaml.
 fs::path file_named(const std::string& from, const fs::path& folder) {
   if (fs::is_regular_file(from)) return from;
   std::vector<std::string> known;

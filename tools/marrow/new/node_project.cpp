@@ -8,7 +8,6 @@
 #include "marrow/base/yaml.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/plugins/catalogue.hpp"
-#include "projects.hpp"
 #include "templates.hpp"
 
 namespace fs = std::filesystem;

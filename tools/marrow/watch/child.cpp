@@ -48,7 +48,7 @@ pid_t started(const std::vector<std::string>& command, int output) {
   return process;
 }
 
-/// Reads what is there. False at the end.
+/// Reads the next part of the output. False at the end.
 bool take(int from, Said said, std::string& kept) {
   char text[4096];
   const ssize_t count = read(from, text, sizeof text);

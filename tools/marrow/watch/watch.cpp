@@ -8,7 +8,6 @@
 
 #include "command_options.hpp"
 #include "commands.hpp"
-#include "given_path.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"

@@ -37,9 +37,9 @@ inline Attribute one_of(std::initializer_list<std::string_view> names) {
 }
 /// A pipeline must give this option.
 inline Attribute required() { return {}; }
-/// This option replaces the options of these names of the nodes whose functions reach this node: what such a node says
-/// has no effect here. "input.option" is only meant for nodes behind this input. An empty list or a 0 replaces nothing.
-/// `marrow check` notes it where a pipeline gives both.
+/// This option replaces options of the nodes whose functions reach this node: those with these names. Their own values
+/// then have no effect here. "input.option" means only nodes behind that input. An empty list or a 0 replaces nothing.
+/// If a pipeline gives both, `marrow check` prints a note.
 inline Attribute replaces(std::initializer_list<std::string_view> names) {
   return {.type = Attribute::Type::replaces, .names = names};
 }
@@ -65,7 +65,8 @@ inline RelationInfo as_many_or_none(std::string list, std::string like) {
 inline RelationInfo exactly_one(std::vector<std::string> names) {
   return {RelationType::exactly_one, std::move(names)};
 }
-/// At least one of these must be given. The names are as those of exactly_one. With one name, it must not be empty.
+/// At least one of these must be given. Names are written as for exactly_one(). A single name is an option that must
+/// not be empty.
 inline RelationInfo at_least_one(std::vector<std::string> names) {
   return {RelationType::at_least_one, std::move(names)};
 }

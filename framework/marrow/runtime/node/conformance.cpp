@@ -11,7 +11,6 @@
 
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/process_state.hpp"
-#include "marrow/runtime/node/declaration.hpp"
 #include "marrow/runtime/node/node_json.hpp"
 
 namespace marrow::conformance {

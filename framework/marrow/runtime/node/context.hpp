@@ -2,6 +2,7 @@
 #pragma once
 #include <atomic>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -28,14 +29,14 @@ class Context {
   explicit Context(std::uint64_t seed) { hooks_.seed = seed; }
   explicit Context(Hooks hooks) : hooks_(std::move(hooks)) {}
 
-  /// The only source of randomness. It is made from the run's seed and everything that the node was given, so two nodes
-  /// with the same recipe draw the same numbers. A node that uses it is declared with .random().
+  /// The only source of randomness. It is made from the run's seed and all inputs and options of the node. So two nodes
+  /// with the same recipe draw the same numbers. A node that uses it must be declared with .random().
   std::uint64_t seed() const { return hooks_.seed; }
   /// Throws Cancelled after Ctrl-C. Call it inside long loops.
   void check_cancelled() const {
     if (hooks_.cancelled && hooks_.cancelled->load(std::memory_order_relaxed)) throw Cancelled();
   }
-  /// Reports how far a long call is, from 0 to 1.
+  /// Reports the progress of a long call, from 0 to 1.
   void progress(double fraction, std::string_view what = {}) const {
     if (hooks_.progress) hooks_.progress(fraction, what);
   }
@@ -53,5 +54,9 @@ class Context {
  private:
   Hooks hooks_;
 };
+
+/// A parser must call this before it reads a file. If the process then crashes or is killed, the message names that
+/// file. Has an effect only in a process that was started to read files. Safe to use from several threads.
+void now_reading(const std::filesystem::path& file);
 
 }  // namespace marrow

@@ -10,7 +10,6 @@
 
 #include "marrow/base/diagnostics.hpp"
 #include "marrow/plugin.hpp"
-#include "marrow/runtime/node/declaration.hpp"
 #include "marrow/runtime/node/node_json.hpp"
 
 namespace marrow::detail {
@@ -65,7 +64,6 @@ void check_numbers(const OptionInfo& option, const std::string& name, std::vecto
 
 void check_option(const OptionInfo& option, std::vector<std::string>& faults) {
   const std::string name = "option '" + option.name + "'";
-  if (!is_name(option.name)) faults.push_back(name + ": names are lower_case");
   if (option.help.empty()) faults.push_back(name + ": has no line of help");
   check_texts(name, {option.help, option.unit}, faults);
   check_texts(name, option.choices, faults);
@@ -90,20 +88,35 @@ void check_replaces(const NodeInfo& node, const OptionInfo& option, std::vector<
   }
 }
 
+const std::string& name_of(const std::string& name) { return name; }
+template <class Item>
+const std::string& name_of(const Item& item) {
+  return item.name;
+}
+
+/// Checks that names are well formed and that none occurs twice.
+template <class Item>
+void check_names(const std::vector<Item>& items, const std::string& what, std::vector<std::string>& faults) {
+  std::set<std::string> seen;
+  for (const Item& item : items) {
+    const std::string& name = name_of(item);
+    if (!is_name(name)) faults.push_back(what + " '" + name + "': names are lower_case");
+    if (!seen.insert(name).second) faults.push_back(what + " '" + name + "' is named twice");
+  }
+}
+
 std::vector<TypeInfo> types_of(const PortInfo& port) { return {port.type}; }
 const std::vector<TypeInfo>& types_of(const KindPort& port) { return port.types; }
 
 template <class Port>
-void check_ports(const std::vector<Port>& ports, const char* what, std::vector<std::string>& faults) {
-  for (std::size_t i = 0; i < ports.size(); ++i) {
-    const std::string port = std::string(what) + " '" + ports[i].name + "'";
-    if (!is_name(ports[i].name)) faults.push_back(port + ": names are lower_case");
-    std::vector<std::string> texts{ports[i].help, ports[i].axis};
-    for (const TypeInfo& type : types_of(ports[i])) texts.push_back(type.id);
-    if (texts.size() == 2) faults.push_back(port + ": has no type");
-    check_texts(port, texts, faults);
-    for (std::size_t j = 0; j < i; ++j)
-      if (ports[j].name == ports[i].name) faults.push_back(port + " is named twice");
+void check_ports(const std::vector<Port>& ports, const std::string& what, std::vector<std::string>& faults) {
+  check_names(ports, what, faults);
+  for (const Port& port : ports) {
+    const std::string name = what + " '" + port.name + "'";
+    std::vector<std::string> texts{port.help, port.axis};
+    for (const TypeInfo& type : types_of(port)) texts.push_back(type.id);
+    if (texts.size() == 2) faults.push_back(name + ": has no type");
+    check_texts(name, texts, faults);
   }
 }
 
@@ -126,16 +139,16 @@ std::string fault_in_relation(const NodeInfo& node, RelationType type, const std
   const bool is_number = is == OptionType::number || is == OptionType::integer;
   const bool is_list = is == OptionType::numbers || is == OptionType::texts || is == OptionType::paths;
   if ((type == RelationType::not_above || type == RelationType::below) && !is_number)
-    return "option '" + name + "' is no number";
+    return "option '" + name + "' is not a number";
   if (!is_about_given && type != RelationType::not_above && type != RelationType::below && !is_list)
-    return "option '" + name + "' is no list";
+    return "option '" + name + "' is not a list";
   if (is_about_given && (is_number || is == OptionType::boolean))
     return "option '" + name + "' is never empty, so it is always given";
   return "";
 }
 
 void check_relation(const NodeInfo& node, const RelationInfo& relation, std::vector<std::string>& faults) {
-  const std::string what = std::string("relation ") + relation_type_name(relation.type) + ": ";
+  const std::string what = std::string("relation ") + kRelationTypes[std::size_t(relation.type)] + ": ";
   const RelationType type = relation.type;
   const std::size_t count = relation.names.size();
   if (type == RelationType::distinct) {
@@ -152,15 +165,6 @@ void check_relation(const NodeInfo& node, const RelationInfo& relation, std::vec
       faults.push_back(what + fault);
 }
 
-/// Checks names of traits or checks: none may occur twice.
-void check_names(const std::vector<std::string>& names, const std::string& what, std::vector<std::string>& faults) {
-  std::set<std::string> seen;
-  for (const std::string& name : names) {
-    if (!is_name(name)) faults.push_back(what + " '" + name + "': names are lower_case");
-    if (!seen.insert(name).second) faults.push_back(what + " '" + name + "' is named twice");
-  }
-}
-
 }  // namespace
 
 void check_declaration(NodeDefinition& node) {
@@ -174,13 +178,11 @@ void check_declaration(NodeDefinition& node) {
   check_ports(info.inputs, "input", faults);
   check_ports(info.outputs, "output", faults);
   check_texts("summary", {info.summary}, faults);
-  std::set<std::string> names;
+  check_names(info.options, "option", faults);
   for (const OptionInfo& option : info.options) {
     check_option(option, faults);
     check_replaces(info, option, faults);
-    if (!names.insert(option.name).second) faults.push_back("option '" + option.name + "' is named twice");
   }
-
   for (const RelationInfo& relation : info.relations) check_relation(info, relation, faults);
   check_names(info.traits, "trait", faults);
 }
@@ -193,18 +195,13 @@ void check_declaration(KindDefinition& kind) {
   check_texts("summary", {info.summary}, faults);
   check_ports(info.inputs, "input", faults);
   check_ports(info.outputs, "output", faults);
-  std::vector<std::string> traits, checks;
-  for (const TraitInfo& trait : info.traits) {
-    traits.push_back(trait.name);
-    check_texts("trait '" + trait.name + "'", {trait.help}, faults);
-  }
+  for (const TraitInfo& trait : info.traits) check_texts("trait '" + trait.name + "'", {trait.help}, faults);
   for (const CheckInfo& check : info.checks) {
-    checks.push_back(check.name);
     check_texts("check '" + check.name + "'", {check.what, check.unit}, faults);
     if (!std::isfinite(check.limit)) faults.push_back("check '" + check.name + "': its limit is not a finite number");
   }
-  check_names(traits, "trait", faults);
-  check_names(checks, "check", faults);
+  check_names(info.traits, "trait", faults);
+  check_names(info.checks, "check", faults);
 }
 
 }  // namespace marrow::detail

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A kind as plain data. A kind is the part of a node's name before the dot, together with a contract. Because of the
-// contract, a pipeline can replace a node by another of its kind by changing one line. Libraries declare kinds as they
-// declare nodes.
+// contract, one changed line of a pipeline replaces a node by another of its kind. Libraries declare kinds and nodes.
 #include <string>
 #include <vector>
 

@@ -26,7 +26,7 @@ struct KindDefinition {
 };
 
 namespace detail {
-/// Checks the declaration itself and fills `faults`.
+/// Checks the declaration itself. Adds what is wrong to `faults`.
 void check_declaration(KindDefinition& kind);
 }  // namespace detail
 

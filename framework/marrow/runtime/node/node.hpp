@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What is known about a node, as plain data. It is all that is needed to list, check and inspect nodes, and to make the
-// JSON Schema and the cache key.
+// Nodes as plain data. This suffices to list, check and inspect nodes, and to make the JSON Schema and cache keys.
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -22,8 +21,8 @@ struct PortInfo {
   TypeInfo type;
   bool optional = false;  ///< an input that may be left unwired, or an output that may be absent
   std::string axis;       ///< the axis that a list port takes or makes; empty for one item
-  /// Of an output of figures (Metrics): the names that its figures can have, in which * stands for any text; empty if
-  /// they are not known before the node is called.
+  /// For an output of figures (Metrics): the names that its figures can have. * stands for any text. Empty if the names
+  /// are not known before the node is called.
   std::vector<std::string> figures = {};
 };
 

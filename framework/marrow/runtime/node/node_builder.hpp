@@ -29,6 +29,10 @@ struct ReturnedPart {
   std::string axis = {};
 };
 
+/// Checks the declaration itself: names are well formed, texts are given, defaults are within their range, relations
+/// fit. Adds what is wrong to `faults`. It does not check the contract of the kind.
+void check_declaration(NodeDefinition& node);
+
 /// The part of a NodeBuilder that does not depend on the function's type.
 class NodeDeclaration {
  public:
@@ -40,8 +44,7 @@ class NodeDeclaration {
   NodeDeclaration(NodeDefinition& node, Function function, Call call, std::shared_ptr<void> (*make_options)());
   NodeDeclaration(const NodeDeclaration&) = delete;
   NodeDeclaration& operator=(const NodeDeclaration&) = delete;
-  /// Checks the declaration itself (names are well formed, texts are given, defaults are within their range, relations
-  /// fit) and fills `faults`. It does not check the contract of the kind.
+  /// Checks the declaration.
   ~NodeDeclaration();
 
   NodeInfo& info() { return node_.info; }
@@ -132,15 +135,14 @@ class NodeBuilder {
   }
 
   /// The names that the figures of the last output can have; * stands for any text, as in "*.median_px". A node that
-  /// makes another figure fails. With it, a figure that cannot be is refused before anything runs.
+  /// makes another figure fails. A pipeline that uses any other name is refused before anything runs.
   NodeBuilder& figures(std::initializer_list<std::string_view> names) {
     declaration_.name_figures(names);
     return *this;
   }
 
   /// An option, bound to a member of the options struct. Its default is the value of the member in a
-  /// default-constructed struct. Attributes: at_least, at_most, one_of, unit, required,
-  /// replaces.
+  /// default-constructed struct. Attributes: at_least, at_most, one_of, unit, required, replaces.
   template <class M, class O, class... Attributes>
   NodeBuilder& option(std::string_view name, M O::*member, std::string_view help, const Attributes&... attributes) {
     static_assert(std::is_base_of_v<O, Options>, "the option is not a member of the node's options struct");
@@ -151,7 +153,7 @@ class NodeBuilder {
   }
 
  private:
-  /// Where an R could be. It only serves to find where the members of an R are; there is none.
+  /// A place for an R at which none is constructed. It only serves to compute the offsets of members.
   static const R& place() {
     alignas(R) static const std::byte bytes[sizeof(R)]{};
     return *reinterpret_cast<const R*>(bytes);

@@ -3,7 +3,6 @@
 #include <cstddef>
 
 #include "marrow/base/number_text.hpp"
-#include "marrow/runtime/node/declaration.hpp"
 #include "marrow/runtime/node/node_builder.hpp"
 #include "marrow/runtime/node/node_json.hpp"
 #include "marrow/runtime/node/types.hpp"

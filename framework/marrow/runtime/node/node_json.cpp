@@ -9,6 +9,4 @@ nlohmann::json json_of(const OptionValue& value) {
   return std::visit([](const auto& v) { return nlohmann::json(v); }, value);
 }
 
-const char* relation_type_name(RelationType type) { return kRelationTypes[std::size_t(type)]; }
-
 }  // namespace marrow

@@ -12,7 +12,5 @@ nlohmann::json json_of(const OptionValue& value);
 /// The names of the types of relations, in the order of RelationType.
 inline constexpr const char* kRelationTypes[] = {"not_above",   "below",        "same_length", "as_many_or_none",
                                                  "exactly_one", "at_least_one", "distinct"};
-/// "not_above".
-const char* relation_type_name(RelationType type);
 
 }  // namespace marrow

@@ -27,73 +27,57 @@ constexpr bool is_list_of_numbers() {
     return false;
 }
 
+/// The type of an option, and the type of its value in an OptionValue.
+template <OptionType type, class T>
+struct StoredAs {
+  static constexpr OptionType kType = type;
+  static constexpr bool kList = type >= OptionType::numbers;
+  using ValueType = T;
+};
+
 template <class M>
-OptionValue to_option_value(const M& member) {
-  if constexpr (std::is_same_v<M, bool>)
-    return member;
-  else if constexpr (std::is_integral_v<M>)
-    return std::int64_t(member);
-  else if constexpr (std::is_floating_point_v<M>)
-    return double(member);
-  else if constexpr (std::is_same_v<M, std::string>)
-    return member;
-  else if constexpr (std::is_same_v<M, std::filesystem::path>)
-    return member.string();
-  else if constexpr (std::is_same_v<M, std::vector<std::string>>)
-    return member;
-  else if constexpr (std::is_same_v<M, std::vector<std::filesystem::path>>) {
-    std::vector<std::string> texts;
-    for (const auto& path : member) texts.push_back(path.string());
-    return texts;
+constexpr auto stored_as() {
+  if constexpr (std::is_same_v<M, bool>) {
+    return StoredAs<OptionType::boolean, bool>();
+  } else if constexpr (std::is_integral_v<M>) {
+    return StoredAs<OptionType::integer, std::int64_t>();
+  } else if constexpr (std::is_floating_point_v<M>) {
+    return StoredAs<OptionType::number, double>();
+  } else if constexpr (std::is_same_v<M, std::string>) {
+    return StoredAs<OptionType::text, std::string>();
+  } else if constexpr (std::is_same_v<M, std::filesystem::path>) {
+    return StoredAs<OptionType::path, std::string>();
+  } else if constexpr (std::is_same_v<M, std::vector<std::string>>) {
+    return StoredAs<OptionType::texts, std::vector<std::string>>();
+  } else if constexpr (std::is_same_v<M, std::vector<std::filesystem::path>>) {
+    return StoredAs<OptionType::paths, std::vector<std::string>>();
   } else {
     static_assert(is_list_of_numbers<M>(),
                   "an option of this type is not known; for numbers, use std::vector<double> or std::array<double, N>");
-    return std::vector<double>(member.begin(), member.end());
+    return StoredAs<OptionType::numbers, std::vector<double>>();
   }
+}
+template <class M>
+using Stored = decltype(stored_as<M>());
+
+template <class M>
+OptionValue to_option_value(const M& member) {
+  using Kept = typename Stored<M>::ValueType;
+  if constexpr (Stored<M>::kList)
+    return Kept(member.begin(), member.end());
+  else
+    return Kept(member);
 }
 
 template <class M>
 void from_option_value(M& member, const OptionValue& value) {
-  if constexpr (std::is_same_v<M, bool>)
-    member = std::get<bool>(value);
-  else if constexpr (std::is_integral_v<M>)
-    member = M(std::get<std::int64_t>(value));
-  else if constexpr (std::is_floating_point_v<M>)
-    member = M(std::get<double>(value));
-  else if constexpr (std::is_same_v<M, std::string> || std::is_same_v<M, std::filesystem::path>)
-    member = std::get<std::string>(value);
-  else if constexpr (std::is_same_v<M, std::vector<std::string>>)
-    member = std::get<std::vector<std::string>>(value);
-  else if constexpr (std::is_same_v<M, std::vector<std::filesystem::path>>) {
-    member.clear();
-    for (const auto& text : std::get<std::vector<std::string>>(value)) member.emplace_back(text);
-  } else {
-    const auto& numbers = std::get<std::vector<double>>(value);
-    if constexpr (std::is_same_v<M, std::vector<double>>)
-      member = numbers;
-    else
-      for (std::size_t i = 0; i < numbers.size(); ++i) member[i] = numbers[i];
-  }
-}
-
-template <class M>
-constexpr OptionType option_type() {
-  if constexpr (std::is_same_v<M, bool>)
-    return OptionType::boolean;
-  else if constexpr (std::is_integral_v<M>)
-    return OptionType::integer;
-  else if constexpr (std::is_floating_point_v<M>)
-    return OptionType::number;
-  else if constexpr (std::is_same_v<M, std::string>)
-    return OptionType::text;
-  else if constexpr (std::is_same_v<M, std::filesystem::path>)
-    return OptionType::path;
-  else if constexpr (std::is_same_v<M, std::vector<std::string>>)
-    return OptionType::texts;
-  else if constexpr (std::is_same_v<M, std::vector<std::filesystem::path>>)
-    return OptionType::paths;
+  const auto& stored = std::get<typename Stored<M>::ValueType>(value);
+  if constexpr (!Stored<M>::kList)
+    member = M(stored);
+  else if constexpr (requires { member.assign(stored.begin(), stored.end()); })
+    member.assign(stored.begin(), stored.end());
   else
-    return OptionType::numbers;
+    for (std::size_t i = 0; i < stored.size(); ++i) member[i] = stored[i];
 }
 
 /// How many numbers a list option of fixed size takes; 0 for std::vector.
@@ -131,7 +115,7 @@ struct MemberType {
 template <class M>
 __attribute__((visibility("default"))) const MemberType* member_type() {
   static constexpr MemberType kType{
-      option_type<M>(), option_length<M>(),
+      Stored<M>::kType, option_length<M>(),
       [](const void* member) { return to_option_value<M>(*static_cast<const M*>(member)); },
       [](void* member, const OptionValue& value) { from_option_value<M>(*static_cast<M*>(member), value); },
       narrow_range<M>};

@@ -26,22 +26,6 @@ template <class T>
 struct IsTuple : std::false_type {};
 template <class... T>
 struct IsTuple<std::tuple<T...>> : std::true_type {};
-template <class T>
-struct OptionalItem {
-  using type = void;
-};
-template <class T>
-struct OptionalItem<std::optional<T>> {
-  using type = T;
-};
-template <class T>
-struct SharedItem {
-  using type = void;
-};
-template <class T>
-struct SharedItem<std::shared_ptr<const T>> {
-  using type = T;
-};
 
 enum class Role { input, optional_input, list, optional_list, context, options };
 
@@ -83,25 +67,23 @@ Value value_of_list(const TypeInfo& type, const std::vector<std::string>& names,
 
 /// The item type of a returned type: the item of a list, of an optional or of a shared pointer, else the type itself.
 template <class M>
-struct Returned {
-  using Optional = typename OptionalItem<M>::type;
-  using Shared = typename SharedItem<M>::type;
-  static constexpr bool kOptional = !std::is_void_v<Optional>;
-  static constexpr bool kShared = !std::is_void_v<Shared>;
-  static constexpr bool kList = IsList<M>::value;
-  static auto item() {
-    if constexpr (kOptional)
-      return std::type_identity<Optional>{};
-    else if constexpr (kShared)
-      return std::type_identity<Shared>{};
-    else if constexpr (kList)
-      return std::type_identity<typename M::value_type>{};
-    else
-      return std::type_identity<M>{};
-  }
-  using Item = typename decltype(item())::type;
+struct ItemOf : std::type_identity<M> {};
+template <class T>
+struct ItemOf<List<T>> : std::type_identity<T> {};
+template <class T>
+struct ItemOf<std::optional<T>> : std::type_identity<T> {};
+template <class T>
+struct ItemOf<std::shared_ptr<const T>> : std::type_identity<T> {};
 
-  /// The value of a member of type M of what a node returned. The value keeps that alive.
+/// What a node's function returns, or a member of it.
+template <class M>
+struct Returned {
+  using Item = typename ItemOf<M>::type;
+  static constexpr bool kList = IsList<M>::value;
+  static constexpr bool kOptional = std::is_same_v<M, std::optional<Item>>;
+  static constexpr bool kShared = std::is_same_v<M, std::shared_ptr<const Item>>;
+
+  /// The value of a member of type M in the object that a node returned. The value keeps the object alive.
   static Value value(const TypeInfo& type, const std::shared_ptr<const void>& member, std::string_view axis) {
     const M& returned = *static_cast<const M*>(member.get());
     if constexpr (kList) {

@@ -8,54 +8,42 @@
 #include "marrow/domain/functions.hpp"
 #include "marrow/domain/landmarks.hpp"
 #include "marrow/domain/scene.hpp"
-#include "marrow/domain/stop.hpp"
 #include "marrow/domain/verdict.hpp"
 #include "marrow/runtime/node/value.hpp"
 
-MARROW_VALUE_TYPE(marrow::Image, "image", 1)
-MARROW_VALUE_TYPE(marrow::Picture, "picture", 1)
-MARROW_VALUE_TYPE(marrow::Volume, "volume", 1)
-MARROW_VALUE_TYPE(marrow::SignedField, "signed_field", 1)
-MARROW_VALUE_TYPE(marrow::Seeds, "seeds", 1)
-MARROW_VALUE_TYPE(marrow::Mesh, "mesh", 1)
-MARROW_VALUE_TYPE(marrow::Camera, "camera", 1)
-MARROW_VALUE_TYPE(marrow::View, "view", 1)
-MARROW_VALUE_TYPE(marrow::EdgeMap, "edge_map", 1)
-MARROW_VALUE_TYPE(marrow::ShaftLines, "shaft_lines", 2)
-MARROW_VALUE_TYPE(marrow::Landmarks, "landmarks", 1)
-MARROW_VALUE_TYPE(marrow::Pose, "pose", 3)
-MARROW_VALUE_TYPE(marrow::Truth, "truth", 1)
-MARROW_VALUE_TYPE(marrow::Metrics, "metrics", 1)
-MARROW_VALUE_TYPE(marrow::Verdict, "verdict", 1)
-MARROW_VALUE_TYPE(marrow::Stop, "stop", 1)
-MARROW_VALUE_TYPE(marrow::Scene, "scene", 1)
-MARROW_VALUE_TYPE(marrow::Landscape, "landscape", 1)
-MARROW_VALUE_TYPE(marrow::Case, "case", 1)
-MARROW_VALUE_TYPE(marrow::Calibration, "calibration", 1)
+// The types of data that all plugins share, each with its id and version, for a macro of three arguments.
+#define MARROW_OWN_TYPES(OF)         \
+  OF(Image, "image", 1)              \
+  OF(Picture, "picture", 1)          \
+  OF(Volume, "volume", 1)            \
+  OF(SignedField, "signed_field", 1) \
+  OF(Seeds, "seeds", 1)              \
+  OF(Mesh, "mesh", 1)                \
+  OF(Camera, "camera", 1)            \
+  OF(View, "view", 1)                \
+  OF(EdgeMap, "edge_map", 1)         \
+  OF(ShaftLines, "shaft_lines", 2)   \
+  OF(Landmarks, "landmarks", 1)      \
+  OF(Pose, "pose", 3)                \
+  OF(Truth, "truth", 1)              \
+  OF(Metrics, "metrics", 1)          \
+  OF(Verdict, "verdict", 1)          \
+  OF(Stop, "stop", 1)                \
+  OF(Scene, "scene", 1)              \
+  OF(Landscape, "landscape", 1)      \
+  OF(Case, "case", 1)                \
+  OF(Calibration, "calibration", 1)
+
+#define MARROW_REGISTER(Type, id, version) MARROW_VALUE_TYPE(marrow::Type, id, version)
+MARROW_OWN_TYPES(MARROW_REGISTER)
+#undef MARROW_REGISTER
 MARROW_FUNCTION_TYPE(marrow::OutlineProjector, "outline_projector", 1)
 MARROW_FUNCTION_TYPE(marrow::RadiographProjector, "radiograph_projector", 1)
 MARROW_FUNCTION_TYPE(marrow::Cost, "cost", 1)
 MARROW_FUNCTION_TYPE(marrow::Optimizer, "optimizer", 1)
 
 namespace MARROW_EXPORT marrow {
-extern template const Content* content_of<Image>();
-extern template const Content* content_of<Picture>();
-extern template const Content* content_of<Volume>();
-extern template const Content* content_of<SignedField>();
-extern template const Content* content_of<Seeds>();
-extern template const Content* content_of<Mesh>();
-extern template const Content* content_of<Camera>();
-extern template const Content* content_of<View>();
-extern template const Content* content_of<EdgeMap>();
-extern template const Content* content_of<ShaftLines>();
-extern template const Content* content_of<Landmarks>();
-extern template const Content* content_of<Pose>();
-extern template const Content* content_of<Truth>();
-extern template const Content* content_of<Metrics>();
-extern template const Content* content_of<Verdict>();
-extern template const Content* content_of<Stop>();
-extern template const Content* content_of<Scene>();
-extern template const Content* content_of<Landscape>();
-extern template const Content* content_of<Case>();
-extern template const Content* content_of<Calibration>();
+#define MARROW_COMPILED_ONCE(Type, id, version) extern template const Content* content_of<Type>();
+MARROW_OWN_TYPES(MARROW_COMPILED_ONCE)
+#undef MARROW_COMPILED_ONCE
 }  // namespace marrow

@@ -55,8 +55,8 @@ __attribute__((visibility("default"))) const Content* content_of() {
   return &kContent;
 }
 
-/// A type as the graph compares it: by id, version, size and whether it is a function. typeid is not used, because it
-/// would be equal for two structs of the same name but different layout in two plugins.
+/// A type as the graph compares it: by id, version, size and whether it is a function. typeid would be equal for two
+/// structs in two plugins that have the same name but different layouts.
 struct TypeInfo {
   std::string id;
   int version = 0;
@@ -89,7 +89,7 @@ class Source {
 struct Value {
   TypeInfo type;
   std::shared_ptr<const void> data;  ///< data of one item
-  std::shared_ptr<Source> source;    ///< source of one item whose data are not here yet
+  std::shared_ptr<Source> source;    ///< source of one item whose data were not needed yet
 
   std::string axis;  ///< axis of a list; empty for one item
   std::vector<std::string> names;
@@ -97,7 +97,8 @@ struct Value {
 
   /// Why an absent item could not be made ("node 'edges' failed"). Empty if the item simply does not exist.
   std::string missing;
-  /// The item is missing because a node failed that may fail: who can do without it goes on as if nothing were wired.
+  /// The item is missing because a node failed that may fail. A node that can do without the item runs as if nothing
+  /// were wired.
   bool may_be_missing = false;
   /// Identifies the value: the content hash of data, or the recipe key of a function. Set by the executor.
   Digest key;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/plugins/catalogue.hpp"
-#include "marrow/base/framework_file.hpp"
-#include "marrow/base/regular_file.hpp"
 
 #include <algorithm>
 #include <cstdlib>
 #include <set>
 #include <sstream>
 
+#include "marrow/base/framework_file.hpp"
+#include "marrow/base/regular_file.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/plugins/contract.hpp"
 #include "marrow/runtime/plugins/library_index.hpp"
@@ -70,12 +70,11 @@ void Catalogue::enter_names() {
   nodes_.clear();
   writers_.clear();
   for (std::size_t l = 0; l < libraries_.size(); ++l) {
-    for (std::size_t i = 0; i < libraries_[l].kinds.size(); ++i)
-      kinds_.try_emplace(libraries_[l].kinds[i].name, Entry{l, i});
-    for (std::size_t i = 0; i < libraries_[l].nodes.size(); ++i)
-      nodes_.try_emplace(libraries_[l].nodes[i].name, Entry{l, i});
-    for (std::size_t i = 0; i < libraries_[l].writers.size(); ++i)
-      writers_.try_emplace(libraries_[l].writers[i].type.id, Entry{l, i});
+    const LibraryInfo& library = libraries_[l];
+    for (std::size_t i = 0; i < library.kinds.size(); ++i) kinds_.try_emplace(library.kinds[i].name, Entry{l, i});
+    for (std::size_t i = 0; i < library.nodes.size(); ++i) nodes_.try_emplace(library.nodes[i].name, Entry{l, i});
+    for (std::size_t i = 0; i < library.writers.size(); ++i)
+      writers_.try_emplace(library.writers[i].type.id, Entry{l, i});
   }
 }
 

@@ -30,24 +30,14 @@ namespace fs = std::filesystem;
 /// The file of a description in the cache. Its name depends on the framework too, because a newer framework may accept
 /// what an older one refused.
 std::string file_in_cache(const Digest& name, const Digest& framework) {
-  Hasher hasher;
-  hasher.add(name);
-  hasher.add(framework);
-  hasher.add(search_digest());
-  return hasher.digest().hex() + ".json";
+  return hash_of(name, framework, search_digest()).hex() + ".json";
 }
 
 /// The name of a library's description in the cache. The same library in another folder may link other libraries: those
 /// beside it.
-Digest name_in_cache(const fs::path& real, const Digest& content) {
-  Hasher name;
-  name.add(real.string());
-  name.add(content);
-  return name.digest();
-}
+Digest name_in_cache(const fs::path& real, const Digest& content) { return hash_of(real.string(), content); }
 
-/// Why a description does not belong to this very library and to the linked libraries that are here now; empty if it
-/// does.
+/// Why a description does not fit this library and the linked libraries that exist now; empty if it fits.
 std::string stale(const LibraryInfo& info, const Digest& digest) {
   if (info.digest != digest) return "it belongs to another build of the library";
   for (const LinkedLibrary& library : info.linked) {
@@ -175,7 +165,7 @@ void write_manifest(const LibraryInfo& info) {
                 "; rename it");
   std::error_code error;
   if (fs::exists(fs::symlink_status(manifest, error)) && !is_manifest(manifest))
-    throw Error(manifest.string() + " is there already and is no manifest that marrow wrote; move it away, or rename " +
+    throw Error(manifest.string() + " exists and is not a manifest that marrow wrote; move it away, or rename " +
                 info.file.string());
   write_text_file(manifest, manifest_text(info), Kinds::files, 0644);
 }

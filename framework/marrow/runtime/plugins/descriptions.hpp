@@ -2,8 +2,14 @@
 #pragma once
 #include <optional>
 
+#include "marrow/base/export.hpp"
 #include "marrow/runtime/plugins/library.hpp"
 #include "marrow/runtime/process/worker.hpp"
+
+namespace MARROW_EXPORT marrow {
+/// The worker's side of describe_library(): the answer to {"do": "describe", "library": ...} is the library_json().
+nlohmann::json answer_describe(const nlohmann::json& request, WorkerReports& reports);
+}  // namespace marrow
 
 namespace marrow {
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/runtime/plugins/libraries_to_load.hpp"
-
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <spawn.h>
@@ -14,6 +12,7 @@
 #include <string>
 
 #include "marrow/base/descriptor.hpp"
+#include "marrow/runtime/plugins/linked_libraries.hpp"
 
 namespace marrow {
 namespace {

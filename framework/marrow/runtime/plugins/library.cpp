@@ -18,13 +18,10 @@
 #include "marrow/base/regular_file.hpp"
 #include "marrow/base/thread_state.hpp"
 #include "marrow/plugin.hpp"
-#include "marrow/runtime/plugins/describe.hpp"
 #include "marrow/runtime/plugins/descriptions.hpp"
-#include "marrow/runtime/plugins/libraries_to_load.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
 #include "marrow/runtime/plugins/manifest.hpp"
 #include "marrow/runtime/plugins/python_file.hpp"
-#include "marrow/runtime/plugins/run_paths.hpp"
 #include "marrow/runtime/plugins/trust.hpp"
 #include "marrow/runtime/process/worker.hpp"
 
@@ -36,34 +33,32 @@ namespace fs = std::filesystem;
 /// What differs between the plugin's stamp and ours, in words, with both values and what to do; empty if they agree.
 std::string stamp_mismatch(const AbiStamp& theirs) {
   constexpr AbiStamp ours = abi_stamp();
-  const auto differs = [](const std::string& what, const std::string& got, const std::string& expected,
-                          const std::string& cure) {
-    return "was built with " + what + " " + got + ", this marrow with " + expected + "; " + cure;
+  const auto differs = [](const char* what, const auto& got, const auto& expected, const char* cure) {
+    return formatted("was built with {} {}, this marrow with {}; {}", what, got, expected, cure);
   };
-  const std::string rebuild = "build both with the same compiler and flags";
+  const auto on_or_off = [](int flag) { return flag ? "on" : "off"; };
+  const auto versions = [](const AbiStamp& stamp) {
+    return formatted("{} and {}", stamp.eigen_version, stamp.opencv_version);
+  };
+  constexpr const char* kRebuild = "build both with the same compiler and flags";
   if (std::strncmp(theirs.compiler, ours.compiler, sizeof ours.compiler) != 0)
-    return differs("compiler", theirs.compiler, ours.compiler, rebuild);
+    return differs("compiler", std::string(theirs.compiler), std::string(ours.compiler), kRebuild);
   if (theirs.eigen_max_align != ours.eigen_max_align)
-    return differs("EIGEN_MAX_ALIGN_BYTES", formatted("{}", theirs.eigen_max_align),
-                   formatted("{}", ours.eigen_max_align),
+    return differs("EIGEN_MAX_ALIGN_BYTES", theirs.eigen_max_align, ours.eigen_max_align,
                    "leave out -march=native, -mavx and the like, which change how Eigen aligns memory");
   if (theirs.glibcxx_debug != ours.glibcxx_debug)
-    return differs("_GLIBCXX_DEBUG (debug mode)", theirs.glibcxx_debug ? "on" : "off",
-                   ours.glibcxx_debug ? "on" : "off", "debug mode changes the layout of every container");
-  if (theirs.sanitizers != ours.sanitizers)
-    return differs("sanitizers", formatted("{}", theirs.sanitizers), formatted("{}", ours.sanitizers), rebuild);
+    return differs("_GLIBCXX_DEBUG (debug mode)", on_or_off(theirs.glibcxx_debug), on_or_off(ours.glibcxx_debug),
+                   "debug mode changes the layout of every container");
+  if (theirs.sanitizers != ours.sanitizers) return differs("sanitizers", theirs.sanitizers, ours.sanitizers, kRebuild);
   if (theirs.fast_math != ours.fast_math)
-    return differs("-ffast-math", theirs.fast_math ? "on" : "off", ours.fast_math ? "on" : "off",
+    return differs("-ffast-math", on_or_off(theirs.fast_math), on_or_off(ours.fast_math),
                    "leave out -ffast-math and -Ofast: they change the results of other nodes, and NaN is not seen");
   if (theirs.cxx_standard / 100 != ours.cxx_standard / 100)
-    return differs("C++ standard", formatted("{}", theirs.cxx_standard), formatted("{}", ours.cxx_standard),
-                   "use -std=c++20");
+    return differs("C++ standard", theirs.cxx_standard, ours.cxx_standard, "use -std=c++20");
   if (theirs.cxx11_abi != ours.cxx11_abi)
-    return differs("_GLIBCXX_USE_CXX11_ABI", formatted("{}", theirs.cxx11_abi), formatted("{}", ours.cxx11_abi),
-                   rebuild);
+    return differs("_GLIBCXX_USE_CXX11_ABI", theirs.cxx11_abi, ours.cxx11_abi, kRebuild);
   if (theirs.eigen_version != ours.eigen_version || theirs.opencv_version != ours.opencv_version)
-    return differs("Eigen and OpenCV", formatted("{} and {}", theirs.eigen_version, theirs.opencv_version),
-                   formatted("{} and {}", ours.eigen_version, ours.opencv_version), "use the same versions");
+    return differs("Eigen and OpenCV", versions(theirs), versions(ours), "use the same versions");
   if (theirs.headers != ours.headers) return "was built against other headers; rebuild it with this marrow's headers";
   return "";
 }
@@ -71,10 +66,10 @@ std::string stamp_mismatch(const AbiStamp& theirs) {
 const PluginEntry& checked_entry(void* handle) {
   const auto function = reinterpret_cast<const PluginEntry* (*)()>(dlsym(handle, "marrow_plugin_entry"));
   if (!function)
-    throw Error("is no marrow plugin: it has no function marrow_plugin_entry (open it with MARROW_PLUGIN)");
+    throw Error("is not a marrow plugin: it has no function marrow_plugin_entry (open it with MARROW_PLUGIN)");
   const PluginEntry* entry = function();
   if (!entry || std::memcmp(entry->magic, "marrow!", 8) != 0)
-    throw Error("is no marrow plugin: its entry has another magic");
+    throw Error("is not a marrow plugin: its entry has another magic");
   if (entry->api_major != MARROW_API_MAJOR || entry->api_minor > MARROW_API_MINOR)
     throw Error(
         formatted("was built for plugin interface {}.{}, this marrow has {}.{}; rebuild it with this marrow's headers",
@@ -128,7 +123,7 @@ void add_registered(const Plugin& plugin, LibraryInfo& info) {
   for (const WriterDefinition& writer : plugin.writers) info.writers.push_back(writer.info);
 }
 
-/// Throws Error, before anything of it runs, if others could change what a library links.
+/// Throws Error if others could change what a library links. To be called before any of that runs.
 void expect_trusted(const std::vector<fs::path>& linked) {
   if (const std::string fault = untrusted_among(linked); !fault.empty()) throw Error(fault);
 }

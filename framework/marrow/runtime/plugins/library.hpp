@@ -18,15 +18,17 @@ class Plugin;
 struct LinkedLibrary {
   std::string path;
   std::uint64_t size = 0;
+  using fields = Fields<&LinkedLibrary::path, &LinkedLibrary::size>;
 };
 
 /// A folder in which a plugin's libraries or modules were looked for before they were found elsewhere, or not at all. A
 /// file that appears there may be loaded instead.
 struct SearchedFolder {
   std::string path;
-  /// Of what was looked for: the whole name of a file, or its name up to the first point. "*.pth" stands for all files
+  /// The names that were looked for: a file's full name, or its name up to the first dot. "*.pth" stands for all files
   /// with this ending.
   std::vector<std::string> names;
+  using fields = Fields<&SearchedFolder::path, &SearchedFolder::names>;
 };
 
 /// What is known about a plugin library without loading it: the content of its manifest, or why it is refused.
@@ -41,6 +43,9 @@ struct LibraryInfo {
   std::vector<KindInfo> kinds;
   std::vector<NodeInfo> nodes;
   std::vector<WriterInfo> writers;
+  using fields = Fields<&LibraryInfo::file, &LibraryInfo::refused, &LibraryInfo::note, &LibraryInfo::digest,
+                        &LibraryInfo::build_id, &LibraryInfo::linked, &LibraryInfo::searched, &LibraryInfo::kinds,
+                        &LibraryInfo::nodes, &LibraryInfo::writers>;
 };
 
 /// Loads a plugin library into this process and registers its kinds and nodes. It is never unloaded. Throws Error with

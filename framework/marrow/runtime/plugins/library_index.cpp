@@ -10,7 +10,7 @@
 #include "marrow/base/file_state.hpp"
 #include "marrow/base/framework_file.hpp"
 #include "marrow/runtime/plugins/descriptions.hpp"
-#include "marrow/runtime/plugins/library_archive.hpp"
+#include "marrow/runtime/plugins/library_fields.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
 #include "marrow/runtime/plugins/own_cache.hpp"
 #include "marrow/runtime/plugins/python_file.hpp"
@@ -48,19 +48,12 @@ Digest surroundings() {
     for (const std::string& file : files_of_framework()) hasher.add(file), hasher.add(digest_of_state(state_of(file)));
     return hasher.digest();
   }();
-  Hasher hasher;
-  hasher.add(framework);
-  hasher.add(search_digest());
-  hasher.add(std::uint64_t(geteuid()));
-  hasher.add(all_are_trusted());
-  return hasher.digest();
+  return hash_of(framework, search_digest(), std::uint64_t(geteuid()), all_are_trusted());
 }
 
 std::string name_of_index(const fs::path& folder) {
-  Hasher name;
-  name.add(fs::absolute(folder / "library").parent_path().string());  // without a slash at its end
-  name.add(framework_file().string());
-  return name.digest().hex() + ".index";
+  const fs::path without_slash = fs::absolute(folder / "library").parent_path();
+  return hash_of(without_slash.string(), framework_file().string()).hex() + ".index";
 }
 
 struct Sealed {

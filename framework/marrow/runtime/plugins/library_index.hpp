@@ -13,7 +13,7 @@ namespace MARROW_EXPORT_TO_TESTS marrow {
 /// A file or folder that a description depends on.
 struct IndexedFile {
   std::string path;
-  Digest state;  ///< of its FileState; 0 if it is not there
+  Digest state;  ///< of its FileState; 0 if it does not exist
   using fields = Fields<&IndexedFile::path, &IndexedFile::state>;
 };
 
@@ -27,7 +27,7 @@ struct IndexedLibrary {
 };
 
 /// The descriptions of the libraries of one folder, in one file of the user's cache: what library_info() returned at an
-/// earlier start. A later start only asks whether anything has changed that a description was made from. It compares
+/// earlier start. A later start only checks whether the sources of a description have changed. It compares
 /// size, inode and times of the library, its manifest, the libraries that it links and the folders that were searched,
 /// and the owners and modes of the folders above. If anything has changed, the library is not found here. A file of the
 /// cache that is damaged, or that another build wrote, is ignored.

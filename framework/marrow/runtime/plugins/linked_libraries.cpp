@@ -1,57 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/plugins/linked_libraries.hpp"
 
-#include <dlfcn.h>
-
 #include <algorithm>
 #include <cstring>
 #include <map>
 #include <mutex>
-#include <set>
 #include <sstream>
 
+#include "marrow/base/elf_file.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/file_state.hpp"
-#include "marrow/base/framework_file.hpp"
 #include "marrow/base/regular_file.hpp"
-#include "marrow/runtime/plugins/build_note.hpp"
-#include "marrow/runtime/plugins/loaded_libraries.hpp"
 
 namespace marrow {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::set<const link_map*> needed_by(const link_map* library, const LoadedLibraries& loaded) {
-  std::set<const link_map*> needed;
-  for (const std::string& name : entries_of(library).needed)
-    if (const link_map* found = loaded.find(name)) needed.insert(found);
-  return needed;
-}
-
-/// Adds all libraries that a library needs, directly or indirectly. Does not go into libraries that are in `known`
-/// already.
-void add_all(const link_map* library, const LoadedLibraries& loaded, std::set<const link_map*>& known) {
-  for (const link_map* one : needed_by(library, loaded))
-    if (known.insert(one).second) add_all(one, loaded, known);
-}
-
-std::vector<LinkedLibrary> files_of_loaded(const std::set<const link_map*>& wanted, const LoadedLibraries& loaded) {
-  std::vector<LinkedLibrary> files;
-  for (const link_map* library : loaded.in_order()) {
-    std::error_code error;
-    const fs::path real = wanted.contains(library) ? fs::canonical(library->l_name, error) : fs::path();
-    if (!real.empty() && !error) files.push_back({real.string(), fs::file_size(real)});
-  }
-  return files;
-}
-
-const link_map* map_of_framework() {
-  Dl_info info{};
-  link_map* map = nullptr;
-  dladdr1(reinterpret_cast<const void*>(&framework_file), &info, reinterpret_cast<void**>(&map), RTLD_DL_LINKMAP);
-  return map;
-}
 
 Digest identity_of_package(const std::string& path, const FileState& state) try {
   Hasher hasher;
@@ -97,33 +61,6 @@ std::vector<fs::path> paths_of(const std::vector<LinkedLibrary>& libraries) {
 
 bool is_of_the_system(const std::string& file) {
   return (file.starts_with("/usr/") && !file.starts_with("/usr/local/")) || file.starts_with("/lib");
-}
-
-const std::vector<LinkedLibrary>& framework_libraries() {
-  static const std::vector<LinkedLibrary> libraries = [] {
-    const link_map* framework = map_of_framework();
-    if (!framework) return std::vector<LinkedLibrary>();
-    const LoadedLibraries loaded(framework);
-    std::set<const link_map*> needed;
-    add_all(framework, loaded, needed);
-    return files_of_loaded(needed, loaded);
-  }();
-  return libraries;
-}
-
-std::vector<LinkedLibrary> linked_libraries(void* handle) {
-  link_map* self = nullptr;
-  if (dlinfo(handle, RTLD_DI_LINKMAP, &self) != 0) return {};
-  const LoadedLibraries loaded(self);
-  const link_map* framework = map_of_framework();
-  std::set<const link_map*> all, of_framework, wanted = needed_by(self, loaded);
-  if (framework) all.insert(framework), of_framework.insert(framework), add_all(framework, loaded, of_framework);
-  add_all(self, loaded, all);
-  for (const link_map* library : all)
-    if (!of_framework.contains(library)) wanted.insert(library);
-  wanted.erase(framework);
-  wanted.erase(self);
-  return files_of_loaded(wanted, loaded);
 }
 
 Digest identity_of(const LinkedLibrary& library) {

@@ -11,12 +11,21 @@ namespace MARROW_EXPORT marrow {
 /// left out too, unless the library links them itself.
 std::vector<LinkedLibrary> linked_libraries(void* handle);
 
+/// The libraries that would be loaded with a library, as the system's loader lists them: with full paths, and without
+/// running their code. Empty if it lists none, for example because one of them is missing.
+std::vector<std::filesystem::path> libraries_to_load(const std::filesystem::path& library);
+
+/// The folders of run paths (DT_RUNPATH, DT_RPATH) in which the loader looked in vain for what a loaded library needs,
+/// directly or indirectly, each with the names of these libraries. Leaves out folders in LD_LIBRARY_PATH, and libraries
+/// that the framework needs: they were loaded before.
+std::vector<SearchedFolder> run_path_folders(void* handle);
+
 /// The libraries that the framework needs in this process, directly or indirectly.
 const std::vector<LinkedLibrary>& framework_libraries();
 
 std::vector<std::filesystem::path> paths_of(const std::vector<LinkedLibrary>& libraries);
 
-/// Whether a file, given with its full path, is where the system's packages put theirs.
+/// Whether a file, given with its full path, is in a folder of the system's packages.
 bool is_of_the_system(const std::string& file);
 
 /// The identity of a library. It includes the name of the file. For a library of the system, it also includes the size

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/plugins/manifest.hpp"
-#include "marrow/base/number_text.hpp"
-#include "marrow/runtime/node/declaration.hpp"
 
 #include <algorithm>
 #include <cctype>
@@ -11,7 +9,9 @@
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/json_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/plugin.hpp"
+#include "marrow/runtime/plugins/library_fields.hpp"
 #include "marrow/runtime/process/worker.hpp"
 
 namespace marrow {
@@ -21,53 +21,37 @@ using nlohmann::json;
 constexpr int kManifestVersion = 6;  // 6: the checksum is of the text that follows it
 constexpr std::string_view kChecksum = "{\"checksum\": \"";
 constexpr std::size_t kDigits = 32;  // of a checksum
-constexpr const char* kOptionTypes[] = {"boolean", "integer", "number", "text", "path", "numbers", "texts", "paths"};
-constexpr const char* kApart[] = {"no", "parses", "computes"};
 constexpr std::int64_t kMostBytes_of_value = 1 << 30;
 constexpr std::size_t kMostLinked = 20'000;  // some Python packages load thousands of files
 
-json json_of(const TypeInfo& type) {
-  return {{"id", type.id}, {"version", type.version}, {"size", type.size}, {"function", type.is_function}};
+template <class T>
+json document_of(const std::vector<T>& items);
+
+template <class T>
+json document_of(const T& value) {
+  if constexpr (HasNamedFields<T>) {
+    json object;
+    visit_fields(value, [&](const char* key, const auto& member) {
+      json one = document_of(member);
+      if (!one.is_null()) object[key] = std::move(one);  // a range that is not given
+    });
+    return object;
+  } else if constexpr (std::is_enum_v<T>) {
+    return ValueNames<T>::kNames[std::size_t(value)];
+  } else if constexpr (std::is_same_v<T, OptionValue>) {
+    return json_of(value);
+  } else if constexpr (std::is_same_v<T, std::optional<double>>) {
+    return value ? json(*value) : json();
+  } else {
+    return value;
+  }
 }
 
-json json_of(const PortInfo& port) {
-  return {{"name", port.name},         {"help", port.help}, {"type", json_of(port.type)},
-          {"optional", port.optional}, {"axis", port.axis}, {"figures", port.figures}};
-}
-
-json json_of(const OptionInfo& option) {
-  json j = {{"name", option.name},         {"help", option.help},
-            {"unit", option.unit},         {"type", kOptionTypes[int(option.type)]},
-            {"required", option.required}, {"default", marrow::json_of(option.default_value)},
-            {"choices", option.choices},   {"length", option.length},
-            {"replaces", option.replaces}};
-  if (option.minimum) j["minimum"] = *option.minimum;
-  if (option.maximum) j["maximum"] = *option.maximum;
-  return j;
-}
-
-json json_of(const KindPort& port) {
-  json j = {{"name", port.name}, {"help", port.help}, {"axis", port.axis}, {"types", json::array()}};
-  for (const TypeInfo& type : port.types) j["types"].push_back(json_of(type));
-  return j;
-}
-
-json json_of(const KindInfo& kind) {
-  json j = {{"name", kind.name},
-            {"summary", kind.summary},
-            {"sees_truth", kind.sees_truth},
-            {"apart", kApart[int(kind.apart)]}};
-  j["inputs"] = j["outputs"] = j["traits"] = j["checks"] = json::array();
-  for (const KindPort& port : kind.inputs) j["inputs"].push_back(json_of(port));
-  for (const KindPort& port : kind.outputs) j["outputs"].push_back(json_of(port));
-  for (const TraitInfo& trait : kind.traits) j["traits"].push_back({{"name", trait.name}, {"help", trait.help}});
-  for (const CheckInfo& check : kind.checks)
-    j["checks"].push_back({{"name", check.name}, {"what", check.what}, {"limit", check.limit}, {"unit", check.unit}});
-  return j;
-}
-
-json json_of(const WriterInfo& writer) {
-  return {{"type", json_of(writer.type)}, {"extension", writer.extension}, {"help", writer.help}};
+template <class T>
+json document_of(const std::vector<T>& items) {
+  json list = json::array();
+  for (const T& item : items) list.push_back(document_of(item));
+  return list;
 }
 
 [[noreturn]] void damaged(const std::string& what) { throw Error("it is damaged: " + what); }
@@ -80,6 +64,7 @@ class JsonObject {
     if (!object.is_object()) damaged(name_ + " is not an object");
     if (object.size() != count) damaged(formatted("{} has {} fields, expected {}", name_, object.size(), count));
   }
+  bool has(const char* key) const { return object_.contains(key); }
   const json& at(const char* key) const {
     const auto found = object_.find(key);
     if (found == object_.end()) damaged(name_ + " has no '" + key + "'");
@@ -128,17 +113,12 @@ class JsonObject {
   std::string name_;
 };
 
-TypeInfo type_from(const json& j) {
-  const JsonObject fields(j, "a type", 4);
-  const auto version = int(fields.integer("version", 0, std::numeric_limits<int>::max()));
-  return {fields.text("id"), version, std::size_t(fields.integer("size", 1, kMostBytes_of_value)),
-          fields.boolean("function")};
-}
-
-PortInfo port_from(const json& j) {
-  const JsonObject fields(j, "a port", 6);
-  return {fields.text("name"),        fields.text("help"), type_from(fields.at("type")),
-          fields.boolean("optional"), fields.text("axis"), fields.texts("figures")};
+/// The index of a text in a list of names.
+template <class Names>
+int one_of(const Names& names, const std::string& text, const std::string& what) {
+  const auto found = std::find(std::begin(names), std::end(names), text);
+  if (found == std::end(names)) damaged("there is no " + what + " '" + text + "'");
+  return int(found - std::begin(names));
 }
 
 OptionValue default_from(const JsonObject& fields, OptionType type) {
@@ -159,96 +139,76 @@ OptionValue default_from(const JsonObject& fields, OptionType type) {
   }
 }
 
-/// The index of a text in a list of names.
-template <std::size_t Count>
-int one_of(const char* const (&names)[Count], const std::string& text, const std::string& what) {
-  const auto found = std::find(std::begin(names), std::end(names), text);
-  if (found == std::end(names)) damaged("there is no " + what + " '" + text + "'");
-  return int(found - std::begin(names));
+/// Throws Error unless a library could register this.
+template <class Definition, class Info>
+void check_as_registered(Info& info, const std::string& what) {
+  Definition definition;
+  definition.info = std::move(info);
+  detail::check_declaration(definition);
+  if (!definition.faults.empty()) damaged(what + definition.info.name + ": " + definition.faults.front());
+  info = std::move(definition.info);
 }
 
-OptionInfo option_from(const json& j) {
-  const JsonObject fields(j, "an option", 9 + j.contains("minimum") + j.contains("maximum"));
-  OptionInfo option;
-  option.name = fields.text("name");
-  option.help = fields.text("help");
-  option.unit = fields.text("unit");
-  option.type = OptionType(one_of(kOptionTypes, fields.text("type"), "type of options"));
-  option.required = fields.boolean("required");
+/// Checks what the types of its fields do not guarantee.
+template <class T>
+void complete(const JsonObject&, T&) {}
+void complete(const JsonObject& fields, TypeInfo&) { fields.integer("size", 1, kMostBytes_of_value); }
+void complete(const JsonObject& fields, OptionInfo& option) {
   option.default_value = default_from(fields, option.type);
-  option.choices = fields.texts("choices");
-  option.length = std::size_t(fields.integer("length", 0, kMostBytes_of_value));
-  option.replaces = fields.texts("replaces");
   const auto* numbers = std::get_if<std::vector<double>>(&option.default_value);
   if (option.length && (!numbers || numbers->size() != option.length))
     damaged(formatted("the default of '{}' does not have {} numbers", option.name, option.length));
-  if (j.contains("minimum")) option.minimum = fields.number("minimum");
-  if (j.contains("maximum")) option.maximum = fields.number("maximum");
-  return option;
 }
-
-RelationInfo relation_from(const json& j) {
-  const JsonObject fields(j, "a relation", 2);
-  return {RelationType(one_of(kRelationTypes, fields.text("type"), "relation")), fields.texts("names")};
-}
-
-/// The node must obey the same rules as when a library registers it.
-NodeInfo node_from(const json& j) {
-  const JsonObject fields(j, "a node", 8);
-  NodeDefinition node;
-  node.info.name = fields.text("name");
-  node.info.summary = fields.text("summary");
-  node.info.random = fields.boolean("random");
-  for (const json& port : fields.list("inputs")) node.info.inputs.push_back(port_from(port));
-  for (const json& port : fields.list("outputs")) node.info.outputs.push_back(port_from(port));
-  for (const json& option : fields.list("options")) node.info.options.push_back(option_from(option));
-  for (const json& relation : fields.list("relations")) node.info.relations.push_back(relation_from(relation));
-  node.info.traits = fields.texts("traits");
-  detail::check_declaration(node);
-  if (!node.faults.empty()) damaged(node.info.name + ": " + node.faults.front());
-  return std::move(node.info);
-}
-
-KindPort kind_port_from(const json& j) {
-  const JsonObject fields(j, "a port of a kind", 4);
-  KindPort port{fields.text("name"), fields.text("help"), {}, fields.text("axis")};
-  for (const json& type : fields.list("types")) port.types.push_back(type_from(type));
-  return port;
-}
-
-/// The kind must obey the same rules as when a library registers it.
-KindInfo kind_from(const json& j) {
-  const JsonObject fields(j, "a kind", 8);
-  KindDefinition kind;
-  kind.info.name = fields.text("name");
-  kind.info.summary = fields.text("summary");
-  kind.info.sees_truth = fields.boolean("sees_truth");
-  kind.info.apart = Apart(one_of(kApart, fields.text("apart"), "way to run apart"));
-  for (const json& port : fields.list("inputs")) kind.info.inputs.push_back(kind_port_from(port));
-  for (const json& port : fields.list("outputs")) kind.info.outputs.push_back(kind_port_from(port));
-  for (const json& trait : fields.list("traits")) {
-    const JsonObject of_trait(trait, "a trait", 2);
-    kind.info.traits.push_back({of_trait.text("name"), of_trait.text("help")});
-  }
-  for (const json& check : fields.list("checks")) {
-    const JsonObject of_check(check, "a check", 4);
-    kind.info.checks.push_back(
-        {of_check.text("name"), of_check.text("what"), of_check.number("limit"), of_check.text("unit")});
-  }
-  detail::check_declaration(kind);
-  if (!kind.faults.empty()) damaged("kind " + kind.info.name + ": " + kind.faults.front());
-  return std::move(kind.info);
-}
-
-WriterInfo writer_from(const json& j) {
-  const JsonObject fields(j, "a writer", 3);
-  WriterInfo writer{type_from(fields.at("type")), fields.text("extension"), fields.text("help")};
+void complete(const JsonObject&, NodeInfo& node) { check_as_registered<NodeDefinition>(node, ""); }
+void complete(const JsonObject&, KindInfo& kind) { check_as_registered<KindDefinition>(kind, "kind "); }
+void complete(const JsonObject&, WriterInfo& writer) {
   // The extension becomes the end of a file's path.
   const bool plain = std::all_of(writer.extension.begin(), writer.extension.end(),
                                  [](unsigned char c) { return std::isalnum(c) || c == '.' || c == '_' || c == '-'; });
   if (!plain || (!writer.extension.empty() && writer.extension[0] != '.'))
     damaged("'" + writer.extension + "' is not an extension of files");
-  return writer;
+}
+
+template <class T>
+T read_from(const json& j);
+
+/// Reads one field. An option's default is left to complete(), because its type is another field.
+template <class M>
+void read_field(const JsonObject& fields, const char* key, M& value) {
+  if constexpr (std::is_same_v<M, bool>) {
+    value = fields.boolean(key);
+  } else if constexpr (std::is_enum_v<M>) {
+    value = M(one_of(ValueNames<M>::kNames, fields.text(key), ValueNames<M>::kWhat));
+  } else if constexpr (std::is_integral_v<M>) {
+    constexpr std::int64_t kMost = std::is_same_v<M, int> ? std::numeric_limits<int>::max() : kMostBytes_of_value;
+    value = M(fields.integer(key, 0, kMost));
+  } else if constexpr (std::is_same_v<M, double>) {
+    value = fields.number(key);
+  } else if constexpr (std::is_same_v<M, std::optional<double>>) {
+    if (fields.has(key)) value = fields.number(key);
+  } else if constexpr (std::is_same_v<M, std::string>) {
+    value = fields.text(key);
+  } else if constexpr (std::is_same_v<M, std::vector<std::string>>) {
+    value = fields.texts(key);
+  } else if constexpr (HasNamedFields<M>) {
+    value = read_from<M>(fields.at(key));
+  } else if constexpr (!std::is_same_v<M, OptionValue>) {
+    for (const json& item : fields.list(key)) value.push_back(read_from<typename M::value_type>(item));
+  }
+}
+
+template <class T>
+T read_from(const json& j) {
+  T value{};
+  std::size_t count = 0;
+  const char* what = visit_fields(value, [&](const char* key, const auto& member) {
+    constexpr bool kMayBeAbsent = std::is_same_v<std::remove_cvref_t<decltype(member)>, std::optional<double>>;
+    count += !kMayBeAbsent || j.contains(key);
+  });
+  const JsonObject fields(j, what, count);
+  visit_fields(value, [&](const char* key, auto& member) { read_field(fields, key, member); });
+  complete(fields, value);
+  return value;
 }
 
 std::string full_path_from(const json& j, const char* of_what) {
@@ -296,28 +256,18 @@ void check(const std::string& text, const json& j) {
 
 }  // namespace
 
-json json_of(const NodeInfo& node) {
-  json j = {{"name", node.name}, {"summary", node.summary}, {"random", node.random}};
-  j["inputs"] = j["outputs"] = j["options"] = j["relations"] = json::array();
-  for (const PortInfo& port : node.inputs) j["inputs"].push_back(json_of(port));
-  for (const PortInfo& port : node.outputs) j["outputs"].push_back(json_of(port));
-  for (const OptionInfo& option : node.options) j["options"].push_back(json_of(option));
-  for (const RelationInfo& relation : node.relations)
-    j["relations"].push_back({{"type", relation_type_name(relation.type)}, {"names", relation.names}});
-  j["traits"] = node.traits;
-  return j;
-}
+json json_of(const NodeInfo& node) { return document_of(node); }
 
 json library_json(const LibraryInfo& info) {
   json j = {{"marrow_manifest", kManifestVersion}, {"library", info.digest.hex()}, {"refused", info.refused}};
-  j["linked"] = j["searched"] = j["kinds"] = j["nodes"] = j["writers"] = json::array();
+  j["linked"] = j["searched"] = json::array();
   for (const LinkedLibrary& library : info.linked)
     j["linked"].push_back({{"path", json_of_bytes(library.path)}, {"size", library.size}});
   for (const SearchedFolder& folder : info.searched)
     j["searched"].push_back({{"path", json_of_bytes(folder.path)}, {"names", folder.names}});
-  for (const KindInfo& kind : info.kinds) j["kinds"].push_back(json_of(kind));
-  for (const NodeInfo& node : info.nodes) j["nodes"].push_back(json_of(node));
-  for (const WriterInfo& writer : info.writers) j["writers"].push_back(json_of(writer));
+  j["kinds"] = document_of(info.kinds);
+  j["nodes"] = document_of(info.nodes);
+  j["writers"] = document_of(info.writers);
   return j;
 }
 
@@ -348,14 +298,14 @@ LibraryInfo library_from_json(const json& j) {
   for (const json& folder : fields.list("searched")) info.searched.push_back(searched_from(folder));
   std::set<std::string> kinds, names;
   for (const json& kind : fields.list("kinds")) {
-    info.kinds.push_back(kind_from(kind));
+    info.kinds.push_back(read_from<KindInfo>(kind));
     if (!kinds.insert(info.kinds.back().name).second) damaged("it has the kind '" + info.kinds.back().name + "' twice");
   }
   for (const json& node : fields.list("nodes")) {
-    info.nodes.push_back(node_from(node));
+    info.nodes.push_back(read_from<NodeInfo>(node));
     if (!names.insert(info.nodes.back().name).second) damaged("it has the node '" + info.nodes.back().name + "' twice");
   }
-  for (const json& writer : fields.list("writers")) info.writers.push_back(writer_from(writer));
+  for (const json& writer : fields.list("writers")) info.writers.push_back(read_from<WriterInfo>(writer));
   if (!info.refused.empty() && !(info.kinds.empty() && info.nodes.empty() && info.writers.empty()))
     damaged("it has nodes of a library that it refuses");
   return info;

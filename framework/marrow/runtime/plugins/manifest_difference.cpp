@@ -51,7 +51,7 @@ std::string difference(const LibraryInfo& described, const LibraryInfo& register
   const json before = by_name(described, names_described), now = by_name(registered, names_registered);
   const std::string found = difference(before, now, "");
   return found.empty() && names_described != names_registered
-             ? "the order or number of its kinds, nodes and writers is another in its description"
+             ? "its description has another order or number of kinds, nodes and writers"
              : found;
 }
 

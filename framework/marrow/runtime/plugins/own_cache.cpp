@@ -35,14 +35,15 @@ bool make_own(const fs::path& folder) {
   return (mkdir(folder.c_str(), 0700) == 0 || errno == EEXIST) && is_own(folder);
 }
 
-}  // namespace
-
+/// Empty if there is no such folder that belongs to the user alone. `make`: makes it.
 fs::path own_cache_folder(bool make) {
   const fs::path cache = user_cache_folder();
   if (cache.empty()) return {};
   const fs::path folder = cache / "marrow" / "libraries";
   return (make ? make_own(folder) : is_own(folder)) ? folder : fs::path();
 }
+
+}  // namespace
 
 std::optional<std::string> own_cached_text(const std::string& name, std::size_t most_bytes) try {
   const fs::path folder = own_cache_folder(false);

@@ -75,14 +75,9 @@ LibraryInfo described_by_process(const fs::path& real, std::vector<std::string>&
 
 /// The name of a file's description in the cache. It does not depend on what the file imports, which is not known yet.
 Digest name_in_cache(const fs::path& real) {
-  Hasher name;
-  name.add(std::string("python"));
-  name.add(real.string());
-  name.add(digest_of(RegularFile(real)));
-  name.add(python_settings());
+  const Digest content = digest_of(RegularFile(real));
   const char* home = std::getenv("HOME");  // it has a folder of modules of the user's own
-  name.add(std::string(home ? home : ""));
-  return name.digest();
+  return hash_of(std::string("python"), real.string(), content, python_settings(), std::string(home ? home : ""));
 }
 
 /// Throws Error if others could change what the file imports, as far as it is known.

@@ -41,7 +41,7 @@ struct LoadedByPython {
   bool add_new(const nlohmann::json& answer, const LibraryInfo& described);
 };
 
-/// Adds to the kept description what a process has loaded besides. From now on is_fully_described() is false for
+/// Adds to the kept description what a process has loaded in addition. From now on is_fully_described() is false for
 /// `described`, because its build id does not cover what was added.
 void add_to_description(const LibraryInfo& described, const LoadedByPython& more_loaded);
 bool is_fully_described(const LibraryInfo& described);

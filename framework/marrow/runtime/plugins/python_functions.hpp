@@ -29,8 +29,6 @@ class PythonFunction {
 /// A transform as 12 numbers: the first three rows of its matrix.
 nlohmann::json json_of_transform(const RigidTransform& transform);
 
-std::shared_ptr<const Cost> python_cost(PythonFunction function, Context& context);
-std::shared_ptr<const Optimizer> python_optimizer(PythonFunction function);
 std::shared_ptr<const RadiographProjector> python_projector(PythonFunction function, Context& context);
 
 /// Whether the node makes a function and not data.

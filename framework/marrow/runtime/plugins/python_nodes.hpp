@@ -25,8 +25,8 @@ struct PythonArguments {
   PythonArguments(const std::vector<Value>& inputs, const std::vector<OptionValue>& options);
 };
 
-/// A process does one request at a time, and waits for the next one when it has done so. Safe to use from several
-/// threads: each uses a process of its own.
+/// Each process does one request at a time and then waits for the next. Safe to use from several threads: each thread
+/// uses its own process.
 class PythonNodes {
  public:
   /// Answers what a process asks back during a request: {"say": "ask", ...}. What it throws ends the request.

@@ -88,7 +88,7 @@ uid_t owner_of_interpreter() {
 }
 
 WorkerSettings python_process(const fs::path& file, int made, int replies) {
-  // A file of a certain name there would run before anything could be looked at.
+  // Python runs a sitecustomize.py in these folders before anything can be checked.
   std::vector<fs::path> folders;
   std::istringstream path(search_path());
   for (std::string folder; std::getline(path, folder, ':');) folders.emplace_back(folder);

@@ -20,8 +20,8 @@ uid_t owner_of_interpreter();
 /// The folder that holds marrow's Python package. Throws Error, with a text that begins with a verb, if there is none.
 std::filesystem::path python_package_folder();
 
-/// What decides, besides files, which modules a process of python_process() finds and how it runs them, as texts: the
-/// interpreter, the search path, and each variable of the interpreter's own (PYTHONOPTIMIZE, for example).
+/// The settings that decide which modules a process of python_process() finds and how it runs them: the interpreter,
+/// the search path, and the interpreter's own variables, such as PYTHONOPTIMIZE.
 std::vector<std::string> python_settings();
 
 /// A process that holds the nodes of `file` (python/marrow/node_process.py). Its descriptor 3 is the open file `made`,
@@ -38,7 +38,7 @@ class ReplyPipe {
   ReplyPipe();
 
   int read_end() const { return pipe_.read_end; }
-  /// To be called when the process has been started: only it reads.
+  /// Call it when the process has been started: only the process reads.
   void close_read_end() { pipe_.read_end.close(); }
   /// Does nothing if the process has ended.
   void send(const nlohmann::json& reply);

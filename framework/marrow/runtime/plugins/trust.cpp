@@ -56,8 +56,8 @@ uid_t owner_of_framework() {
 
 std::string mode_text(mode_t mode) { return formatted("{:04o}", mode & 07777); }
 
-/// Whether a file has an access list. The list lets other users write as far as the mode lets the group write, and the
-/// group itself may have nothing to do with it.
+/// Whether a file has an access list. If so, the group's bits of the mode say what the users of the list may do at
+/// most. They say nothing about the group itself.
 bool has_access_list(const fs::path& path) { return getxattr(path.c_str(), "system.posix_acl_access", nullptr, 0) > 0; }
 
 /// What lets others change a file or the entries of a folder; empty if nothing does. In a folder above, a sticky bit

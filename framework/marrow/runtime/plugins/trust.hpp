@@ -33,7 +33,7 @@ std::string untrusted_among(const std::vector<std::filesystem::path>& files, uid
 /// Whether MARROW_TRUST_ALL_PLUGINS is 1.
 bool all_are_trusted();
 
-/// What the trust in some files rests on, besides their own owners and modes.
+/// What the trust in some files depends on, besides their own owners and modes.
 struct TrustedFiles {
   std::set<std::string> folders;                  ///< the folders of both ends of each path, without links
   std::set<std::array<std::uint32_t, 2>> groups;  ///< groups that may write, each with its owner

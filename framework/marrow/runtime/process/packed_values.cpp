@@ -227,7 +227,7 @@ class PackedReader {
 std::string contents_of(int descriptor) {
   std::string bytes(std::size_t(bytes_in(descriptor)), '\0');
   if (read_at(descriptor, bytes.data(), bytes.size(), 0) != std::int64_t(bytes.size()))
-    throw Error("another process handed nothing over");
+    throw Error("another process handed over nothing");
   return bytes;
 }
 
@@ -268,12 +268,9 @@ std::vector<Value> read_values(int descriptor, pid_t process, const ContentOf& c
 }
 
 const Content* content_of_own(const TypeInfo& type) {
-  static const std::vector<TypeInfo> kOwn{
-      TypeInfo::of<Image>(),     TypeInfo::of<Picture>(),    TypeInfo::of<Volume>(),     TypeInfo::of<SignedField>(),
-      TypeInfo::of<Seeds>(),     TypeInfo::of<Mesh>(),       TypeInfo::of<Camera>(),     TypeInfo::of<View>(),
-      TypeInfo::of<EdgeMap>(),   TypeInfo::of<ShaftLines>(), TypeInfo::of<Landmarks>(),  TypeInfo::of<Pose>(),
-      TypeInfo::of<Truth>(),     TypeInfo::of<Metrics>(),    TypeInfo::of<Verdict>(),    TypeInfo::of<Scene>(),
-      TypeInfo::of<Landscape>(), TypeInfo::of<Case>(),       TypeInfo::of<Calibration>()};
+#define MARROW_INFO(Type, id, version) TypeInfo::of<Type>(),
+  static const std::vector<TypeInfo> kOwn{MARROW_OWN_TYPES(MARROW_INFO)};
+#undef MARROW_INFO
   const auto found = std::find(kOwn.begin(), kOwn.end(), type);
   return found == kOwn.end() ? nullptr : found->content;
 }

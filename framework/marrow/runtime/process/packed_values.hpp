@@ -21,7 +21,7 @@ class SharedMemory {
  public:
   SharedMemory();
   int descriptor() const { return descriptor_; }
-  /// From now on nobody can write to it, also no other process that opens it through /proc. Throws Error if the system
+  /// From now on nobody can write to it, not even a process that opens it through /proc. Throws Error if the system
   /// does not allow this.
   void seal() const;
 

@@ -41,7 +41,7 @@ class RunningCode {
     const auto own = std::find_if(running_.begin(), running_.end(),
                                   [](const PluginCode* code) { return code->thread_ == std::this_thread::get_id(); });
     if (running_.empty()) return false;
-    // The main thread ends the program where that belongs. Any other thread does what a plugin told it.
+    // The main thread may end the program. On another thread, only a plugin can be the cause.
     if (own == running_.end() && gettid() == getpid()) return false;
     const PluginCode* code = own != running_.end() ? *own : running_.size() == 1 ? running_[0] : nullptr;
     lock.unlock();

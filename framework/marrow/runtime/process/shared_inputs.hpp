@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Inputs of Python nodes in memory that all of their processes map. A value is packed once, however often and by
-// however many processes it is used.
+// Inputs of Python nodes in memory that all of their processes map. Each value is packed only once, even if several
+// processes use it.
 #include <cstdint>
 #include <list>
 #include <memory>
@@ -31,7 +31,7 @@ class SharedInputs {
   /// The numbers of all that is kept. A process may unmap everything else.
   std::vector<std::uint64_t> numbers() const;
 
-  /// Those of this process.
+  /// The inputs of this process.
   static SharedInputs& all();
 
  private:

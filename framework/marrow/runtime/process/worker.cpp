@@ -176,7 +176,7 @@ std::optional<WorkerEnd> Worker::understand(const std::string& line, const Said&
   } catch (const Error&) {
   }
   if (!message.is_object() || !is_busy_ || message.value("job", json()) != json(job_))
-    return ended("sent something that is no part of its job");
+    return ended("sent something that is not part of its job");
   if (message.contains("say")) {
     const json what = message["say"];
     if (what == "at" && message.value("place", json()).is_string()) at_ = message["place"];
@@ -231,13 +231,13 @@ WorkerEnd Worker::ended(const std::string& why) {
 
 std::optional<WorkerEnd> Worker::check(const WorkerLimits& limits) {
   if (is_dead() || !is_busy_) return std::nullopt;
-  if (seconds() > limits.seconds) {
-    WorkerEnd end = ended(formatted("took longer than {:g} s", limits.seconds));
-    end.is_late = true;
-    return end;
-  }
-  if (limits.seconds < WorkerLimits().seconds && suspended_seconds_ > limits.suspended_seconds) {
-    WorkerEnd end = ended(formatted("was suspended for more than {:g} s", limits.suspended_seconds));
+  std::string late;
+  if (seconds() > limits.seconds)
+    late = formatted("took longer than {:g} s", limits.seconds);
+  else if (limits.seconds < WorkerLimits().seconds && suspended_seconds_ > limits.suspended_seconds)
+    late = formatted("was suspended for more than {:g} s", limits.suspended_seconds);
+  if (!late.empty()) {
+    WorkerEnd end = ended(late);
     end.is_late = true;
     return end;
   }

@@ -78,8 +78,8 @@ class Worker {
   /// Kills the process and returns when it is gone. Call it when the job has ended.
   void close();
   bool is_dead() const { return process_ < 0; }
-  /// Whether the process cannot answer any more although take() has not reported its end: its main thread has ended,
-  /// and other threads of it, which still end, hold its output open.
+  /// Whether the process can no longer answer although take() has not reported its end: its main thread has ended, but
+  /// other threads, which are still ending, hold its output open.
   bool is_ending() const;
   pid_t process() const { return process_; }
   /// Time that the job has taken so far. Time in which it waits for another process's result, or in which the worker or

@@ -6,8 +6,8 @@
 #include <opencv2/core.hpp>
 
 #include "marrow/base/no_process.hpp"
+#include "marrow/base/process_tree.hpp"
 #include "marrow/base/reason_of_exception.hpp"
-#include "marrow/base/resident_memory.hpp"
 #include "marrow/base/stopwatch.hpp"
 #include "marrow/runtime/pipeline/named_files.hpp"
 #include "marrow/runtime/plugins/python_file.hpp"

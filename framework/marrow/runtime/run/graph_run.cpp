@@ -6,7 +6,7 @@
 #include <chrono>
 
 #include "marrow/base/no_process.hpp"
-#include "marrow/base/resident_memory.hpp"
+#include "marrow/base/process_tree.hpp"
 #include "marrow/runtime/run/passes.hpp"
 #include "marrow/runtime/run/stopped_nodes.hpp"
 #include "marrow/runtime/store/known_keys.hpp"

@@ -11,7 +11,6 @@
 
 #include "marrow/base/error.hpp"
 #include "marrow/plugin.hpp"
-#include "marrow/runtime/node/reading.hpp"
 #include "marrow/runtime/plugins/manifest.hpp"
 #include "marrow/runtime/process/packed_values.hpp"
 #include "marrow/runtime/process/worker.hpp"

@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <exception>
 
-#include "marrow/runtime/plugins/describe.hpp"
+#include "marrow/runtime/plugins/descriptions.hpp"
 #include "marrow/runtime/process/worker.hpp"
 #include "marrow/runtime/run/apart.hpp"
 

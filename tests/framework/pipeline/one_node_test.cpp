@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// The call of one node with values that a program has.
+#include "marrow/runtime/pipeline/one_node.hpp"
+
+#include "tests/framework/fixture.hpp"
+
+namespace one_node_test {
+
+using marrow::Diagnostic;
+using marrow::Diagnostics;
+using marrow::Metrics;
+using marrow::OneNode;
+using marrow::Value;
+
+using Inputs = std::vector<std::pair<std::string, Value>>;
+using Options = std::vector<std::pair<std::string, std::string>>;
+
+Value number(double value) {
+  return Value::of<Metrics>(std::make_shared<const Metrics>(Metrics{{{"value", value, ""}}}));
+}
+
+Value list_of(const std::vector<double>& values, const std::string& axis) {
+  Value list = number(0);
+  list.data.reset();
+  list.axis = axis;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    list.names.push_back(std::string(1, char('a' + i)));
+    list.items.push_back(number(values[i]));
+  }
+  return list;
+}
+
+double number_in(const Value& value) { return value.as<Metrics>().items.at(0).value; }
+
+/// Calls the node, which must succeed, and returns its output.
+Value called(const std::string& name, const Inputs& inputs, const Options& options = {}) {
+  Diagnostics diagnostics;
+  const marrow::Catalogue& catalogue = runtime_fixture::test_catalogue();
+  const OneNode one = marrow::pipeline_of_node(name, inputs, options, catalogue, diagnostics);
+  EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+  marrow::RunSettings settings;
+  settings.given = one.given;
+  const marrow::RunResult result = marrow::run_pipeline(one.pipeline, catalogue, settings);
+  EXPECT_FALSE(result.failed());
+  return marrow::value_of(result, one.pipeline.outputs.at(0).source);
+}
+
+std::vector<Diagnostic> faults(const std::string& name, const Inputs& inputs, const Options& options = {}) {
+  Diagnostics diagnostics;
+  marrow::pipeline_of_node(name, inputs, options, runtime_fixture::test_catalogue(), diagnostics);
+  return diagnostics.sorted();
+}
+
+TEST(OneNodeTest, TakesInputsAndOptions) {
+  EXPECT_EQ(number_in(called("test.add", {{"a", number(2)}, {"b", number(5)}})), 7);
+  EXPECT_EQ(number_in(called("test.constant", {}, {{"value", "3.5"}})), 3.5);
+}
+
+TEST(OneNodeTest, IsCalledForEachItemOfAListThatThePortDoesNotTakeWhole) {
+  const Value sums = called("test.add", {{"a", list_of({1, 2}, "letter")}, {"b", number(10)}});
+  EXPECT_EQ(sums.axis, "letter");
+  EXPECT_EQ(sums.names, (std::vector<std::string>{"a", "b"}));
+  EXPECT_EQ(number_in(sums.items.at(1)), 12);
+  EXPECT_EQ(number_in(called("test.sum", {{"items", list_of({1, 2, 4}, "side")}})), 7) << "taken whole";
+}
+
+TEST(OneNodeTest, NestsListsOverDifferentAxes) {
+  const Value sums = called("test.add", {{"a", list_of({1, 2}, "row")}, {"b", list_of({10, 20, 30}, "column")}});
+  EXPECT_EQ(sums.axis, "row");
+  EXPECT_EQ(sums.items.at(1).axis, "column");
+  EXPECT_EQ(number_in(sums.items.at(1).items.at(2)), 32);
+}
+
+TEST(OneNodeTest, AllFaultsComeAtOnceWithTheirPlaces) {
+  const Value other = Value::of<marrow::Stop>(std::make_shared<const marrow::Stop>());
+  const std::vector<Diagnostic> found = faults("test.add", {{"a", other}, {"c", number(1)}}, {{"valu", "1"}});
+  ASSERT_EQ(found.size(), 3u);
+  EXPECT_EQ(found[0].place.file, "test.add(a)");
+  EXPECT_EQ(found[0].message, "input 'a' of test.add expects metrics, got stop");
+  EXPECT_EQ(found[0].hint, "first");
+  EXPECT_EQ(found[1].place.file, "test.add(c)");
+  EXPECT_EQ(found[1].message, "'test.add' has no input 'c'");
+  EXPECT_EQ(found[2].place.file, "test.add(valu)");
+  EXPECT_EQ(found[2].message, "'test.add' has no option 'valu'");
+}
+
+TEST(OneNodeTest, AMissingInputIsAFaultUnlessItIsOptional) {
+  const std::vector<Diagnostic> found = faults("test.add", {});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].place.file, "test.add(a)");
+  EXPECT_EQ(found[0].message, "test.add needs the input 'a', of type metrics");
+  EXPECT_EQ(found[0].hint, "first");
+  EXPECT_EQ(number_in(called("test.add", {{"a", number(2)}})), 2);
+}
+
+TEST(OneNodeTest, WrongOptionsAndNamesAreFaults) {
+  const std::vector<Diagnostic> found = faults("test.constant", {}, {{"count", "-1"}, {"value", "much"}});
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].message, "option 'count' of test.constant: -1 is below the least allowed, 0");
+  EXPECT_NE(found[1].message.find("option 'value' of test.constant: expected a number"), std::string::npos);
+  const std::vector<Diagnostic> unknown = faults("test.ad", {});
+  ASSERT_EQ(unknown.size(), 1u);
+  EXPECT_EQ(unknown[0].message, "unknown node 'test.ad'");
+  EXPECT_EQ(unknown[0].hint, "did you mean 'test.add'?");
+}
+
+TEST(OneNodeTest, RelationsBetweenInputsAndOptionsAreChecked) {
+  const std::vector<Diagnostic> found = faults("test.any", {});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NE(found[0].message.find("'in.items'"), std::string::npos) << found[0].message;
+  EXPECT_NE(found[0].message.find("'in.adder'"), std::string::npos) << found[0].message;
+}
+
+}  // namespace one_node_test

@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every diagnostic of a pipeline file, at its place.
+#include "tests/framework/pipeline/pipeline_fixture.hpp"
+
+namespace pipeline_faults_test {
+
+using pipeline_fixture::PipelineTest;
+using runtime_fixture::test_catalogue;
+
+TEST_F(PipelineTest, RenamedNodeIsPointedAtWhereItIsDefined) {
+  read(
+      "marrow: 1\nnodes:\n  lefft: {uses: test.constant}\n  n: {uses: test.add, in: {a: left, b: left}}\noutputs: {o: "
+      "n}\n");
+  const std::vector<marrow::Diagnostic> faults = diagnostics.sorted();
+  ASSERT_EQ(faults.size(), 3u) << diagnostics.text();
+  EXPECT_EQ(faults[0].place.line, 3);
+  EXPECT_EQ(faults[0].message, "nothing uses node 'lefft'");
+  EXPECT_EQ(faults[0].hint, "'left' is used, but is not there: is this it?");
+  EXPECT_EQ(faults[1].message, "there is no node 'left'");
+}
+TEST_F(PipelineTest, RenamedInputIsPointedAtWhereItIsDeclared) {
+  read(
+      "marrow: 1\ninputs:\n  casse: {type: number, default: 1}\nnodes:\n  n: {uses: test.constant, with: {value: "
+      "$case}}\noutputs: {o: n}\n");
+  const std::vector<marrow::Diagnostic> faults = diagnostics.sorted();
+  ASSERT_EQ(faults.size(), 2u) << diagnostics.text();
+  EXPECT_EQ(faults[0].place.line, 3);
+  EXPECT_EQ(faults[0].message, "nothing uses input 'casse'");
+  EXPECT_EQ(faults[1].message, "the pipeline has no input 'case'");
+}
+
+TEST_F(PipelineTest, SyntaxErrorTellsWhatIsNotClosed) {
+  const auto places = [&](const std::string& text) {
+    read(text);
+    std::string result;
+    for (const marrow::Diagnostic& fault : diagnostics.sorted())
+      result +=
+          std::to_string(fault.place.line) + ":" + std::to_string(fault.place.column) + " " + fault.message + "\n";
+    return result;
+  };
+  EXPECT_EQ(places("marrow: 1\nnodes: {a: [\n"),
+            "2:12 this [ is not closed\n3:1 not valid YAML: end of sequence flow not found\n");
+  EXPECT_NE(places("marrow: 1\nnodes:\n  c: {uses: 'test.constant}\n  # all\n\n").find("3:13 this ' is not closed\n"),
+            std::string::npos);
+  EXPECT_NE(places("marrow: 1\nnodes:\n  c: {uses: [test.constant}\n  d: {}\n").find("3:13 this [ is not closed\n"),
+            std::string::npos);
+  EXPECT_EQ(places("marrow: 1\n\tnodes: {}\n").find("closed"), std::string::npos);
+}
+TEST_F(PipelineTest, UnreadableFile) {
+  marrow::read_pipeline(scratch.path / "none.yaml", {}, test_catalogue(), diagnostics);
+  EXPECT_NE(diagnostics.text().find("the pipeline file cannot be read"), std::string::npos);
+}
+TEST_F(PipelineTest, NoMap) { expect_fault("- a\n", 1, 1, "the pipeline must be a map, got a list"); }
+TEST_F(PipelineTest, MissingVersion) {
+  expect_fault("nodes: {c: {uses: test.constant}}\noutputs: {o: c}\n", 1, 1, "the key 'marrow' is missing");
+}
+TEST_F(PipelineTest, OtherVersion) {
+  expect_fault("marrow: 2\nnodes: {c: {uses: test.constant}}\noutputs: {o: c}\n", 1, 1,
+               "this file is of format 2, this program reads format 1");
+}
+TEST_F(PipelineTest, MissingOutputs) {
+  expect_fault("marrow: 1\nnodes: {c: {uses: test.constant}}\n", 1, 1, "the key 'outputs' is missing");
+}
+TEST_F(PipelineTest, UnknownKey) {
+  expect_fault("marrow: 1\nnode: {}\nnodes: {c: {uses: test.constant}}\noutputs: {o: c}\n", 2, 1, "unknown key 'node'",
+               "did you mean 'nodes'?");
+}
+TEST_F(PipelineTest, DuplicateKey) {
+  expect_fault("marrow: 1\nnodes:\n  c: {uses: test.constant}\n  c: {uses: test.sides}\noutputs: {o: c}\n", 4, 3,
+               "'c' is given twice", "line 3");
+}
+TEST_F(PipelineTest, MergeKey) {
+  expect_fault("marrow: 1\nnodes:\n  c: {uses: test.constant, <<: {with: {}}}\noutputs: {o: c}\n", 3, 28,
+               "merge keys (<<) are not supported");
+}
+TEST_F(PipelineTest, UnknownNode) {
+  expect_node_fault("{uses: test.constnat}", 13, "unknown node 'test.constnat'", "did you mean 'test.constant'?");
+}
+TEST_F(PipelineTest, NodeWithoutName) {
+  expect_fault("marrow: 1\nnodes:\n  \"\": {uses: test.constant}\noutputs: {o: \"\"}\n", 3, 3, "a node has no name",
+               "write it as  name: {uses: kind.name}");
+}
+TEST_F(PipelineTest, MissingUses) { expect_node_fault("{with: {value: 1}}", 3, "node 'n' does not say what it uses"); }
+TEST_F(PipelineTest, DotInName) {
+  expect_fault("marrow: 1\nnodes:\n  a.b: {uses: test.constant}\n  c: {uses: test.constant}\noutputs: {o: c}\n", 3, 3,
+               "has a dot");
+}
+TEST_F(PipelineTest, UnknownOption) {
+  expect_node_fault("{uses: test.constant, with: {vlaue: 1}}", 35, "has no option 'vlaue'", "did you mean 'value'?");
+}
+TEST_F(PipelineTest, NumberExpected) {
+  expect_node_fault("{uses: test.constant, with: {value: big}}", 35, "expected a number, got 'big'");
+}
+TEST_F(PipelineTest, QuotedNumberIsText) {
+  expect_node_fault("{uses: test.constant, with: {value: \"1\"}}", 35, "expected a number, got the quoted text \"1\"");
+}
+TEST_F(PipelineTest, NotANumber) {
+  expect_node_fault("{uses: test.constant, with: {value: nan}}", 35, "expected a number, got 'nan'");
+}
+TEST_F(PipelineTest, BelowRange) {
+  expect_node_fault("{uses: test.constant, with: {value: -2000}}", 35, "-2000 is below the least allowed, -1000");
+}
+TEST_F(PipelineTest, AboveRange) {
+  expect_node_fault("{uses: test.constant, with: {value: 2000}}", 35, "2000 is above the most allowed, 1000");
+}
+TEST_F(PipelineTest, WholeNumberThatTheOptionCannotHold) {
+  expect_node_fault("{uses: test.constant, with: {count: 5000000000}}", 35,
+                    "5000000000 is above the most allowed, 2147483647");
+}
+TEST_F(PipelineTest, OctalLookingInteger) {
+  expect_node_fault("{uses: test.constant, with: {count: 010}}", 35, "expected an integer, got '010'",
+                    "write it without leading zeros");
+}
+TEST_F(PipelineTest, FractionForInteger) {
+  expect_node_fault("{uses: test.constant, with: {count: 1.5}}", 35, "expected an integer, got '1.5'");
+}
+TEST_F(PipelineTest, YesIsNotTrue) {
+  expect_node_fault("{uses: test.constant, with: {flag: yes}}", 35, "expected true or false, got 'yes'");
+}
+TEST_F(PipelineTest, UnknownChoice) {
+  expect_node_fault("{uses: test.constant, with: {word: tow}}", 35, "'tow' is not one of its choices",
+                    "did you mean 'two'?");
+}
+TEST_F(PipelineTest, ListExpected) {
+  expect_node_fault("{uses: test.constant, with: {numbers: 3}}", 35, "expected a list, got '3'", "[a, b, c]");
+}
+TEST_F(PipelineTest, WrongLength) {
+  expect_node_fault("{uses: test.constant, with: {point: [1, 2]}}", 35, "expected 3 numbers, got 2");
+}
+TEST_F(PipelineTest, UnknownInputName) {
+  expect_node_fault("{uses: test.constant, with: {value: $v}}", 42, "the pipeline has no input 'v'");
+}
+TEST_F(PipelineTest, UnknownPort) {
+  expect_node_fault("{uses: test.add, in: {a: c, bb: c}}", 34, "has no input 'bb'", "did you mean 'b'?");
+}
+TEST_F(PipelineTest, UnwiredPort) {
+  expect_node_fault("{uses: test.add, in: {b: c}}", 3, "input 'a' of test.add is not wired");
+}
+TEST_F(PipelineTest, UnknownSource) {
+  expect_node_fault("{uses: test.add, in: {a: d}}", 28, "there is no node 'd'", "did you mean 'c'?");
+}
+TEST_F(PipelineTest, UnknownOutput) {
+  expect_node_fault("{uses: test.add, in: {a: s.lefft}}", 28, "node 's' has no output 'lefft'", "did you mean 'left'?");
+}
+TEST_F(PipelineTest, OutputOfAnotherNodeOfTheKindIsNoItem) {
+  const std::string before = "marrow: 1\nnodes:\n  l: {uses: test.letters}\n  n: {uses: test.add, in: {a: ";
+  expect_fault(before + "l.left}}\noutputs: {o: n}\n", 4, 28, "node 'l' has no output 'left'",
+               "other nodes of the kind test have one; an item of that name is l.letters.left");
+  for (const char* item : {"l.letters.left", "l.far_left"}) {
+    read(before + item + "}}\noutputs: {o: n}\n");
+    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+  }
+}
+TEST_F(PipelineTest, AmbiguousOutput) {
+  expect_node_fault("{uses: test.add, in: {a: s}}", 28, "node 's' has several outputs and not just one metrics");
+}
+TEST_F(PipelineTest, ListForSingle) {
+  expect_node_fault("{uses: test.add, in: {a: [c, c]}}", 28, "takes one metrics, not a list");
+}
+TEST_F(PipelineTest, TooManyPicks) {
+  expect_node_fault("{uses: test.add, in: {a: s.left.x}}", 28, "'s.left.x' picks 'x', but it is no list");
+}
+TEST_F(PipelineTest, WrongType) {
+  expect_fault(
+      "marrow: 1\nnodes:\n  t: {uses: test.truth}\n  a: {uses: test.apply, in: {adder: c, to: c}}\n  c: {uses: "
+      "test.constant}\noutputs: {o: c}\n",
+      4, 30, "input 'adder' of test.apply expects adder, but 'c' is metrics");
+}
+TEST_F(PipelineTest, TruthOnlyForEvaluation) {
+  expect_fault("marrow: 1\nnodes:\n  t: {uses: test.truth}\n  a: {uses: test.add, in: {a: t}}\noutputs: {o: a}\n", 4,
+               28, "the truth may be wired only to nodes of a kind that may see it, not to test.add");
+  read(
+      "marrow: 1\nnodes:\n  t: {uses: test.truth}\n  c: {uses: test.constant}\n  a: {uses: judge.test, in: {of: c, "
+      "truth: t}}\noutputs: {o: a}\n");
+  EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+}
+TEST_F(PipelineTest, Circle) {
+  expect_fault(
+      "marrow: 1\nnodes:\n  a: {uses: test.add, in: {a: b}}\n  b: {uses: test.add, in: {a: a}}\noutputs: {o: a}\n", 3,
+      3, "these nodes wait for each other in a circle: a, b");
+}
+TEST_F(PipelineTest, MissingInputValue) {
+  expect_fault(
+      "marrow: 1\ninputs:\n  v: {type: number}\nnodes: {c: {uses: test.constant, with: {value: $v}}}\noutputs: {o: "
+      "c}\n",
+      3, 3, "input 'v' has no value", "v=VALUE");
+}
+TEST_F(PipelineTest, UnknownInputType) {
+  expect_fault(
+      "marrow: 1\ninputs:\n  v: {type: nummber, default: 1}\nnodes: {c: {uses: test.constant}}\noutputs: {o: c}\n", 3,
+      7, "unknown type 'nummber'", "did you mean 'number'?");
+}
+TEST_F(PipelineTest, UnknownGivenInput) {
+  expect_fault(
+      "marrow: 1\ninputs: {value: {type: number, default: 1}}\nnodes: {c: {uses: test.constant}}\noutputs: {o: c}\n", 0,
+      0, "the pipeline has no input 'valu'", "did you mean 'value'?", {{{"valu", "2"}}, {}});
+}
+
+TEST_F(PipelineTest, TenMistakesGiveTenDiagnostics) {
+  read(
+      "marrow: 1\n"
+      "colour: red\n"  // 2 unknown key
+      "inputs:\n"
+      "  v: {type: nubmer, default: 1}\n"  // 4 unknown type
+      "nodes:\n"
+      "  c: {uses: test.constant, with: {value: abc}}\n"  // 6 no number
+      "  d: {uses: test.constant, with: {word: four}}\n"  // 7 no choice
+      "  e: {uses: test.nothing_known}\n"                 // 8 unknown node
+      "  f: {uses: test.add, in: {a: c, z: c}}\n"         // 9 unknown port
+      "  g: {uses: test.add, in: {b: c}}\n"               // 10 unwired
+      "  h: {uses: test.apply, in: {adder: c, to: c}}\n"  // 11 type
+      "  h: {uses: test.constant}\n"                      // 12 twice
+      "outputs: {o: missing}\n");                         // 13 no such node
+  std::vector<int> lines;
+  for (const marrow::Diagnostic& fault : diagnostics.sorted()) lines.push_back(fault.place.line);
+  EXPECT_EQ(lines, (std::vector<int>{2, 4, 6, 7, 8, 9, 10, 11, 12, 13})) << diagnostics.text();
+}
+
+TEST_F(PipelineTest, SourceLineIsShown) {
+  read("marrow: 1\nnodes:\n  c: {uses: test.constnat}\noutputs: {o: c}\n");
+  EXPECT_NE(diagnostics.text().find(
+                "p.yaml:3:13: error: unknown node 'test.constnat'\n    c: {uses: test.constnat}\n              ^\n"),
+            std::string::npos)
+      << diagnostics.text();
+}
+
+TEST_F(PipelineTest, NoNodes) {
+  expect_fault("marrow: 1\nnodes: {}\noutputs: {}\n", 1, 1, "the pipeline has no nodes", "name them under  nodes:");
+}
+
+}  // namespace pipeline_faults_test

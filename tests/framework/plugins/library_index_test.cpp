@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+// The descriptions that are kept from one start to the next: they are used as long as nothing has changed, and no
+// longer.
+#include "marrow/runtime/plugins/library_index.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+
+#include <chrono>
+#include <set>
+#include <thread>
+
+#include "marrow/runtime/plugins/manifest.hpp"
+#include "tests/framework/plugins/library_fixture.hpp"
+
+namespace library_index_test {
+
+namespace fs = std::filesystem;
+using library_fixture::kGood;
+
+/// Folders with the same library, all of which have been kept: the times of files that were just written tell nothing,
+/// so this takes some seconds.
+class LibraryIndexTest : public library_fixture::LibraryTest {
+ protected:
+  fs::path folder(const std::string& name) const { return scratch.path / name; }
+  fs::path library(const std::string& name) const { return folder(name) / "marrow_test_numbers.so"; }
+  fs::path manifest(const std::string& name) const { return folder(name) / "marrow_test_numbers.json"; }
+  void make(const std::string& name) {
+    fs::create_directories(folder(name));
+    fs::copy_file(kGood, library(name));
+    fs::copy_file(fs::path(kGood).replace_extension(".json"), manifest(name));
+  }
+  std::optional<marrow::LibraryInfo> found(const fs::path& file) {
+    return marrow::LibraryIndex(file.parent_path()).find(file);
+  }
+  bool are_kept(const std::vector<fs::path>& files) {
+    for (const fs::path& file : files) {
+      const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+      while (marrow::Catalogue({file.parent_path()}), !found(file)) {
+        if (std::chrono::steady_clock::now() > until) return false;
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      }
+    }
+    return true;
+  }
+};
+constexpr const char* kNotKept =
+    "the folder for scratch files is in memory only, so the times of its files tell nothing";
+
+TEST_F(LibraryIndexTest, IsUsedUntilSomethingChanges) {
+  const std::vector<std::string> names{"same",           "longer",  "replaced",    "no_manifest",
+                                       "other_manifest", "written", "open_folder", "removed"};
+  std::vector<fs::path> files;
+  for (const std::string& name : names) make(name), files.push_back(library(name));
+  if (!are_kept(files)) GTEST_SKIP() << kNotKept;
+
+  const marrow::LibraryInfo expected = marrow::library_info(library("same"), framework);
+  const std::optional<marrow::LibraryInfo> kept = found(library("same"));
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(marrow::manifest_text(*kept), marrow::manifest_text(expected));
+  EXPECT_EQ(kept->build_id, expected.build_id);
+  EXPECT_EQ(kept->file, expected.file);
+  EXPECT_EQ(marrow::Catalogue({folder("same")}).library_of("test.add")->build_id, expected.build_id);
+
+  std::ofstream(library("longer"), std::ios::app | std::ios::binary) << "another build";
+  struct stat before {};
+  ASSERT_EQ(stat(library("replaced").c_str(), &before), 0);
+  fs::copy_file(library("replaced"), folder("replaced") / "new");
+  fs::rename(folder("replaced") / "new", library("replaced"));
+  const timespec times[] = {before.st_atim, before.st_mtim};
+  ASSERT_EQ(utimensat(AT_FDCWD, library("replaced").c_str(), times, 0), 0);  // of the same size and time
+  fs::remove(manifest("no_manifest"));
+  std::ofstream(manifest("other_manifest")) << "{}";
+  fs::permissions(library("written"), fs::perms(0666));
+  fs::permissions(folder("open_folder"), fs::perms(0777));
+  fs::remove(library("removed"));
+  for (const std::string& name : names) EXPECT_EQ(found(library(name)).has_value(), name == "same") << name;
+  EXPECT_TRUE(marrow::Catalogue({folder("removed")}).libraries().empty());
+  for (const std::string name : {"written", "open_folder"})
+    EXPECT_TRUE(
+        marrow::Catalogue({folder(name)}).libraries().at(0).refused.starts_with("is not trusted, because others may"));
+
+  setenv("LD_LIBRARY_PATH", folder("same").c_str(), 1);
+  EXPECT_FALSE(found(library("same"))) << "the loader searches elsewhere";
+  unsetenv("LD_LIBRARY_PATH");
+  setenv("MARROW_TRUST_ALL_PLUGINS", "1", 1);
+  EXPECT_FALSE(found(library("same")));
+  unsetenv("MARROW_TRUST_ALL_PLUGINS");
+  EXPECT_TRUE(found(library("same")));
+  marrow::LibraryIndex::forget(folder("same"));
+  EXPECT_FALSE(found(library("same")));
+}
+
+TEST_F(LibraryIndexTest, LinkedLibrariesAndSearchedFoldersCount) {
+  const fs::path linked = fs::path(MARROW_BINARY_DIR) / "tests" / "linked_plugins";
+  std::vector<fs::path> files;
+  for (const std::string name : {"same", "other", "earlier"}) {
+    fs::create_directories(folder(name) / "libs");
+    for (const std::string one : {"libtest_base.so", "libtest_deep.so"})
+      fs::copy_file(linked / "libs1" / one, folder(name) / "libs" / one);
+    fs::copy_file(linked / "linked.so", folder(name) / "linked.so");
+    files.push_back(folder(name) / "linked.so");
+    marrow::write_manifest(marrow::describe_library(files.back()));
+  }
+  if (!are_kept(files)) GTEST_SKIP() << kNotKept;
+  fs::copy_file(linked / "libs2" / "libtest_deep.so", folder("other") / "libs" / "libtest_deep.so",
+                fs::copy_options::overwrite_existing);
+  fs::create_directories(folder("earlier") / "earlier");
+  fs::copy_file(linked / "libs2" / "libtest_base.so", folder("earlier") / "earlier" / "libtest_base.so");
+  EXPECT_TRUE(found(files[0]));
+  EXPECT_FALSE(found(files[1]));
+  EXPECT_FALSE(found(files[2]));
+}
+
+TEST_F(LibraryIndexTest, DamageCostsOnlyTime) {
+  make("plugins");
+  if (!are_kept({library("plugins")})) GTEST_SKIP() << kNotKept;
+  fs::path file;
+  for (const auto& one : fs::directory_iterator(scratch.path / "cache" / "marrow" / "libraries"))
+    if (one.path().extension() == ".index") file = one.path();
+  const std::string whole = text_of(file);
+  ASSERT_GT(whole.size(), 1000u);
+  std::vector<std::string> damaged{"", "x", whole.substr(0, whole.size() / 2), whole + "x"};
+  for (std::size_t at = 0; at < whole.size(); at += whole.size() / 50) {
+    damaged.push_back(whole);
+    damaged.back()[at] = char(damaged.back()[at] ^ 1);
+  }
+  for (const std::string& text : damaged) {
+    std::ofstream(file, std::ios::binary) << text;
+    EXPECT_FALSE(found(library("plugins")));
+  }
+  EXPECT_NE(marrow::Catalogue({folder("plugins")}).find("test.add"), nullptr);
+  EXPECT_EQ(text_of(file), whole) << "made anew";
+  setenv("XDG_CACHE_HOME", "/proc/self/none", 1);
+  EXPECT_NE(marrow::Catalogue({folder("plugins")}).find("test.add"), nullptr);
+}
+
+}  // namespace library_index_test

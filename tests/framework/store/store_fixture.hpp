@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What the tests of the store share: values to be kept, and runs with a store of their own.
+#include "marrow/runtime/store/store.hpp"
+#include "tests/framework/fixture.hpp"
+
+namespace store_fixture {
+
+using runtime_fixture::Scratch;
+using runtime_fixture::test_catalogue;
+
+inline marrow::Value number(double value) {
+  marrow::Value result = marrow::Value::of<marrow::Metrics>(
+      std::make_shared<const marrow::Metrics>(marrow::Metrics{{{"value", value, "mm"}}}));
+  result.key = result.type.content->hash(result.data.get());
+  return result;
+}
+
+inline marrow::Value many(std::size_t count) {
+  marrow::Volume volume;
+  volume.grid.size = {int(count), 1, 1};
+  for (std::size_t i = 0; i < count; ++i) volume.values.push_back(float(i % 1000));
+  marrow::Value result = marrow::Value::of<marrow::Volume>(std::make_shared<const marrow::Volume>(std::move(volume)));
+  result.key = result.type.content->hash(result.data.get());
+  return result;
+}
+
+inline std::filesystem::path only_file(const std::filesystem::path& folder) {
+  std::filesystem::path found;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
+    if (entry.is_regular_file() && entry.path().parent_path() != folder &&
+        entry.path().parent_path().filename() != "last")
+      found = entry.path();
+  return found;
+}
+
+class StoreTest : public testing::Test {
+ protected:
+  marrow::RunResult run(const std::string& nodes, const std::string& outputs, std::uint64_t seed = 1) {
+    read(nodes, outputs);
+    settings.seed = seed;
+    settings.threads = 2;
+    settings.store = &store;
+    settings.observer = [this](const marrow::RunEvent& event) {
+      if (event.kind == marrow::RunEvent::Kind::warning || event.kind == marrow::RunEvent::Kind::failed)
+        messages += event.text + "\n";
+    };
+    return marrow::run_pipeline(pipeline, test_catalogue(), settings);
+  }
+  std::vector<marrow::PlannedNode> plan(const std::string& nodes, const std::string& outputs, std::uint64_t seed = 1) {
+    read(nodes, outputs);
+    marrow::RunSettings planning;
+    planning.seed = seed;
+    planning.store = &store;
+    return marrow::plan_pipeline(pipeline, test_catalogue(), planning);
+  }
+  void read(const std::string& nodes, const std::string& outputs) {
+    marrow::Diagnostics diagnostics;
+    pipeline =
+        marrow::read_pipeline(scratch.write("p.yaml", "marrow: 1\nnodes:\n" + nodes + "outputs: {" + outputs + "}\n"),
+                              {}, test_catalogue(), diagnostics);
+    ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  }
+  double result_of(const marrow::RunResult& result, std::size_t index = 0) {
+    return marrow::value_of(result, pipeline.outputs[index].source).as<marrow::Metrics>().items[0].value;
+  }
+  static int calls(const marrow::RunResult& result) {
+    int sum = 0;
+    for (const auto& node : result.nodes) sum += node.calls;
+    return sum;
+  }
+  Scratch scratch;
+  marrow::Store store{scratch.path / "store"};
+  marrow::Pipeline pipeline;
+  marrow::RunSettings settings;
+  std::string messages;
+};
+
+}  // namespace store_fixture
