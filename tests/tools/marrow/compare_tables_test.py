@@ -83,8 +83,7 @@ class Tables(Case):
         self.assertEqual(self.marrow("run", "p.yaml", "case=cases/a", "--out", run).returncode, 0)
         self.assertEqual(self.marrow("show", "--", run.name).returncode, 0)
         self.assertEqual(
-            shlex.split(self.page_data(run / "report.html")["experiment"]["command"]),
-            ["marrow", "rerun", "./-run $x"],
+            shlex.split(self.page_data(run / "report.html")["experiment"]["command"]), ["marrow", "rerun", "./-run $x"]
         )
         self.assertFalse((self.scratch / "hurt").exists())
 

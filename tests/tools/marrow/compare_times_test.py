@@ -39,10 +39,7 @@ class Times(Case):
     def compare(self, timed_cells, variants=VARIANTS, *arguments):
         """Runs the cells. Then, as a second command, times them. Returns what that said and the calls it made."""
         calls = self.scratch / "calls"
-        environment = {
-            "MARROW_TEST_CALLS": str(calls),
-            "MARROW_TEST_FAILS": str(self.scratch / "fails"),
-        }
+        environment = {"MARROW_TEST_CALLS": str(calls), "MARROW_TEST_FAILS": str(self.scratch / "fails")}
         said = []
         fails = self.scratch / "fails"
         for count in (0, timed_cells):
