@@ -18,7 +18,7 @@ using nlohmann::json;
 constexpr const char* kFolder = "report";
 
 /// What is known of the cells of one case and start, and the pictures, meshes and scenes that they name.
-struct PlaceInList {
+struct CellsOfStart {
   std::size_t case_index = 0, start = 0;
   json cells = json::array();
   ReportMaterial material;
@@ -30,7 +30,7 @@ std::array<std::pair<const char*, json*>, 3> groups_of(ReportMaterial& material)
 }
 
 /// The bytes by which `data` grows if a place is added. What another place has already added does not count.
-std::size_t growth(const json& data, PlaceInList& place) {
+std::size_t growth(const json& data, CellsOfStart& place) {
   std::size_t bytes = json_text(place.cells).size();
   for (const auto& [name, group] : groups_of(place.material))
     for (const auto& [id, thing] : group->items())
@@ -38,7 +38,7 @@ std::size_t growth(const json& data, PlaceInList& place) {
   return bytes;
 }
 
-void enter(json& data, PlaceInList place) {
+void enter(json& data, CellsOfStart place) {
   for (json& cell : place.cells) data["materials"].push_back(std::move(cell));
   for (const auto& [name, group] : groups_of(place.material)) data[name].update(*group);
 }
@@ -53,7 +53,7 @@ std::vector<std::string> kinds_in(const json& cells) {
 }
 
 /// Writes a place as a file of `folder`, and returns how the page lists it.
-json written_beside(PlaceInList place, const fs::path& folder) {
+json written_beside(CellsOfStart place, const fs::path& folder) {
   const std::vector<std::string> kinds = kinds_in(place.cells);
   json content = {{"materials", std::move(place.cells)}};
   for (const auto& [name, group] : groups_of(place.material)) content[name] = std::move(*group);
@@ -66,8 +66,8 @@ json written_beside(PlaceInList place, const fs::path& folder) {
 }
 
 /// The next place among the shown cells from `at` on. Moves `at` behind it.
-PlaceInList next_place(const compare::CellRunner& runner, const std::vector<CellIndex>& shown, std::size_t& at) {
-  PlaceInList place{shown[at].case_index, shown[at].start, json::array(), {}};
+CellsOfStart next_place(const compare::CellRunner& runner, const std::vector<CellIndex>& shown, std::size_t& at) {
+  CellsOfStart place{shown[at].case_index, shown[at].start, json::array(), {}};
   for (; at < shown.size() && shown[at].case_index == place.case_index && shown[at].start == place.start; ++at) {
     json cell = json::object();
     place.material.add_prepared(runner.pictures_of(shown[at]), cell);
@@ -86,7 +86,7 @@ void add_cell_materials(json& data, const compare::CellRunner& runner, const std
   for (const char* name : {"pictures", "geometries", "scenes"}) data[name] = json::object();
   std::size_t bytes = page_bytes(data);
   for (std::size_t at = 0; at < shown.size();) {
-    PlaceInList place = next_place(runner, shown, at);
+    CellsOfStart place = next_place(runner, shown, at);
     const std::size_t more = growth(data, place);
     if (bytes + more <= most_bytes) {
       bytes += more;
