@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the studies share: they run marrow, read its figures of merit, and write a new folder with a table of all runs."""
+"""What the studies share: they run marrow, read its figures of merit, and write a new folder with a table of all
+runs."""
 import concurrent.futures
 import csv
 import json
