@@ -21,8 +21,8 @@ TEST_F(Circles, AWireToAPortOfAnotherNodeOfTheKindIsNotedAsUnused) {
   const marrow::Pipeline p =
       read("marrow: 1\nnodes:\n  c: {uses: test.constant}\n  n: {uses: test.constant, in: {a: c}}\noutputs: {o: n}\n");
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
-  EXPECT_EQ(p.notes, std::vector<std::string>{"node 'n': the wire to 'a' is not used: only other nodes of the kind "
-                                              "test have this input, test.constant has not"});
+  EXPECT_EQ(p.notes, std::vector<std::string>{"node 'n': the wire to 'a' is not used: test.constant does not have "
+                                              "this input, only other nodes of the kind test do"});
   EXPECT_TRUE(p.nodes[1].wires.empty());
 }
 

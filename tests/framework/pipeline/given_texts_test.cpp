@@ -90,7 +90,7 @@ TEST_F(GivenTexts, ThatBeginAsAListAndAreNoneAreFaults) {
                     tag = "tags (! or !!name) are not read; put quotes around a text that begins so";
   expect_one_fault(
       "s.names", "[a", list + no_end,
-      "a text in it with ' #', ': ', &, ! or * needs quotes; a text that begins so is given in double quotes, as "
+      "a text in it with ' #', ': ', &, ! or * needs quotes; to give it as a text, put it in double quotes: "
       "\"[a\"");
   for (const char* text : {"[a #b]", "[a, b] #c]", "[a] #b"}) expect_one_fault("s.names", text, list + no_end);
   for (const char* text : {"[a], ", "[a], [b]", "[a]: b", "[a] b"}) {
@@ -105,7 +105,7 @@ TEST_F(GivenTexts, ThatBeginAsAListAndAreNoneAreFaults) {
                        "this begins with an anchor (&name) that no alias (*name) names; put quotes around a text that "
                        "begins so");
   expect_one_fault("c.path", "\"a", quoted + "illegal EOF in scalar",
-                   "a text that begins so is given in double quotes, as \"\\\"a\"");
+                   "to give it as a text, put it in double quotes: \"\\\"a\"");
   expect_one_fault("c.path", "'a' b", quoted + no_end);
   expect_one_fault("c.path", "'a', 'b'", quoted + "it does not end as one");
 }

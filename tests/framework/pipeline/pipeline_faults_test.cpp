@@ -15,7 +15,7 @@ TEST_F(PipelineTest, RenamedNodeIsPointedAtWhereItIsDefined) {
   ASSERT_EQ(faults.size(), 3u) << diagnostics.text();
   EXPECT_EQ(faults[0].place.line, 3);
   EXPECT_EQ(faults[0].message, "nothing uses node 'lefft'");
-  EXPECT_EQ(faults[0].hint, "'left' is used, but is not there: is this it?");
+  EXPECT_EQ(faults[0].hint, "'left' is used but not defined; did you mean this name?");
   EXPECT_EQ(faults[1].message, "there is no node 'left'");
 }
 TEST_F(PipelineTest, RenamedInputIsPointedAtWhereItIsDeclared) {
@@ -158,7 +158,7 @@ TEST_F(PipelineTest, ListForSingle) {
   expect_node_fault("{uses: test.add, in: {a: [c, c]}}", 28, "takes one metrics, not a list");
 }
 TEST_F(PipelineTest, TooManyPicks) {
-  expect_node_fault("{uses: test.add, in: {a: s.left.x}}", 28, "'s.left.x' picks 'x', but it is no list");
+  expect_node_fault("{uses: test.add, in: {a: s.left.x}}", 28, "'s.left.x' picks 'x', but it is not a list");
 }
 TEST_F(PipelineTest, WrongType) {
   expect_fault(

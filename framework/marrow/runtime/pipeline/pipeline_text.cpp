@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/pipeline/pipeline_text.hpp"
-#include "marrow/base/number_text.hpp"
-#include "marrow/runtime/node/option_yaml.hpp"
 
 #include <algorithm>
-#include <set>
 
 #include "marrow/base/file_names.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/plain_path.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/runtime/node/option_yaml.hpp"
 #include "marrow/runtime/pipeline/given_value.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow {
 namespace {
@@ -31,23 +31,24 @@ class PipelineReader {
   WrittenPipeline read_body(const std::string& name, const YAML::Node& root) {
     is_body_ = true;
     pipeline_.name = name;
-    read_root(root);
-    for (const Override& one : arguments_.overrides) apply_override(one.key, one.value, one.place);
-    return pipeline_;
+    return read_root(root);
   }
 
   WrittenPipeline read() {
     const auto text = read_source(pipeline_.file, "the pipeline file", diagnostics_);
     if (!text) return pipeline_;
     const YAML::Node root = yaml_.parse(*text);
-    if (!diagnostics_.empty()) return pipeline_;
-    read_root(root);
+    return diagnostics_.empty() ? read_root(root) : pipeline_;
+  }
+
+ private:
+  WrittenPipeline read_root(const YAML::Node& root) {
+    read_keys(root);
     for (const Override& one : arguments_.overrides) apply_override(one.key, one.value, one.place);
     return pipeline_;
   }
 
- private:
-  void read_root(const YAML::Node& root) {
+  void read_keys(const YAML::Node& root) {
     static const std::vector<std::string> kKeys{"marrow", "name", "help", "only_inside", "inputs", "nodes", "outputs"};
     const Place start = is_body_ ? yaml_.place(root) : Place{pipeline_.file.string(), 1, 1};
     bool versioned = false, has_name = false, has_nodes = false, has_outputs = false;
@@ -74,7 +75,7 @@ class PipelineReader {
       if (entry.key == "outputs") {
         has_outputs = true;
         for (const YamlEntry& output : yaml_.map(entry.value, entry.place, "outputs"))
-          pipeline_.outputs.emplace_back(output.key, WrittenValue{output.place, output.value, folder_});
+          pipeline_.outputs.push_back({output.key, {output.place, output.value, folder_}});
       }
     }
     if (!root.IsMap()) return;
@@ -124,7 +125,7 @@ class PipelineReader {
         if (entry.key != "type") continue;
         const auto type = yaml_.text(entry.value, entry.place, "type");
         if (!type) continue;
-        if (std::find(kTypes.begin(), kTypes.end(), *type) == kTypes.end())
+        if (!contains(kTypes, *type))
           yaml_.fault(entry.place, "unknown type " + in_quotes(*type) + " of input " + in_quotes(input.key),
                       suggestion(*type, kTypes));
         if (*type == "path") info.type = OptionType::path;
@@ -138,7 +139,7 @@ class PipelineReader {
     }
   }
 
-  /// `may_be_empty`: its default is empty, so it is of use without a value.
+  /// `may_be_empty`: its default is an empty text, so an empty path is a good value.
   void set_input(const YamlEntry& input, const OptionInfo& info, const WrittenValue* value, bool may_be_empty) {
     if (!value) {
       pipeline_.missing_inputs.push_back(input.key);
@@ -159,7 +160,7 @@ class PipelineReader {
 
   void check_given_inputs() {
     for (const InputValue& one : arguments_.inputs)
-      if (std::find(declared_.begin(), declared_.end(), one.name) == declared_.end())
+      if (!contains(declared_, one.name))
         diagnostics_.add(place_of(one), "the pipeline has no input " + in_quotes(one.name),
                          suggestion(one.name, declared_));
   }
@@ -199,7 +200,7 @@ class PipelineReader {
         auto& target = part.key == "with" ? node.options : node.wires;
         for (const YamlEntry& item :
              yaml_.map(part.value, part.place, in_quotes(part.key) + " of node " + in_quotes(node.id)))
-          target.emplace_back(item.key, WrittenValue{item.place, item.value, folder_});
+          target.push_back({item.key, {item.place, item.value, folder_}});
       }
     }
     if (node.repetition) {
@@ -224,7 +225,7 @@ class PipelineReader {
       repetition.until = yaml_.text(part.value, part.place, what).value_or("");
     } else if (part.key == "carry") {
       for (const YamlEntry& item : yaml_.map(part.value, part.place, what))
-        repetition.carry.emplace_back(item.key, WrittenValue{item.place, item.value, folder_});
+        repetition.carry.push_back({item.key, {item.place, item.value, folder_}});
     } else if (part.key == "at_most") {
       repetition.at_most_place = part.place;
       set_at_most(repetition, yaml_.integer(part.value, part.place, what));
@@ -244,7 +245,7 @@ class PipelineReader {
 
   void set_if_pass_fails(WrittenRepetition& repetition, const Place& place, const std::optional<std::string>& what) {
     static const std::vector<std::string> kChoices{"end", "go_on"};
-    if (what && std::find(kChoices.begin(), kChoices.end(), *what) == kChoices.end())
+    if (what && !contains(kChoices, *what))
       diagnostics_.add(place, "'if_pass_fails' is " + in_quotes(*what) + ", but must be end or go_on",
                        suggestion(*what, kChoices));
     repetition.goes_on = what == "go_on";
@@ -259,7 +260,7 @@ class PipelineReader {
       yaml_.fault(node.place, who + " does not say what it repeats",
                   "add  repeat: FILE  with the body, a pipeline file");
     else if (repetition.over.empty() && repetition.at_most == 0 && !repetition.over_place.line)
-      yaml_.fault(node.place, who + " need not end: it goes over no axis and has no limit of passes",
+      yaml_.fault(node.place, who + " may never end: it goes over no axis and has no limit of passes",
                   "add  over: AXIS,  or  at_most: PASSES");
   }
 
@@ -272,7 +273,7 @@ class PipelineReader {
     std::vector<std::string> ids;
     for (const WrittenNode& node : pipeline_.nodes) ids.push_back(node.id);
     const auto node = std::find_if(pipeline_.nodes.begin(), pipeline_.nodes.end(),
-                                   [&](const WrittenNode& n) { return n.id == key.substr(0, dot); });
+                                   [&](const WrittenNode& one) { return one.id == key.substr(0, dot); });
     if (dot == std::string::npos || dot + 1 == key.size()) {
       diagnostics_.add(place,
                        "an override is node.option=value, node.uses=kind.name, node.may_fail=true or "
@@ -298,14 +299,15 @@ class PipelineReader {
       node->may_fail = yaml.boolean(*given, place, may_fail_of(node->id)).value_or(false);
       return;
     }
-    const WrittenValue value{place, *given, folder_of(written), true};
-    auto& target = what.starts_with("in.") ? node->wires : node->options;
-    const std::string name = what.starts_with("in.") ? what.substr(3) : what;
-    const auto old = std::find_if(target.begin(), target.end(), [&](const auto& item) { return item.first == name; });
+    const bool is_wire = what.starts_with("in.");
+    const WrittenEntry entry{is_wire ? what.substr(3) : what, {place, *given, folder_of(written), true}};
+    auto& target = is_wire ? node->wires : node->options;
+    const auto old =
+        std::find_if(target.begin(), target.end(), [&](const WrittenEntry& one) { return one.name == entry.name; });
     if (old != target.end())
-      old->second = value;
+      *old = entry;
     else
-      target.emplace_back(name, value);
+      target.push_back(entry);
   }
 
   void set_uses(WrittenNode& node, const std::string& key, const std::optional<std::string>& name, const Place& place) {
@@ -315,9 +317,9 @@ class PipelineReader {
                        "write it as  " + key + "=kind.name");
       return;
     }
-    // The options under `with` were written for the node that is replaced, so they mean nothing to another node.
-    // Overrides are meant for this run, so they are kept, in any order.
-    const auto of_file = [](const auto& option) { return !option.second.is_override; };
+    // The options under `with` were written for the replaced node, so another node must not get them. Overrides are
+    // meant for this run, so they stay, in whatever order they come.
+    const auto of_file = [](const WrittenEntry& option) { return !option.value.is_override; };
     if (*name != node.uses && std::erase_if(node.options, of_file) > 0)
       pipeline_.notes.push_back("node " + in_quotes(node.id) + ": the options written for " + node.uses +
                                 " are not used by " + *name);
@@ -325,7 +327,7 @@ class PipelineReader {
     node.uses_place = place;
   }
 
-  /// Whether the override is one of the repetition; then it is done.
+  /// Applies an override of the repetition. Returns false if it overrides something else.
   bool set_repetition(WrittenNode& node, const std::string& what, const std::string& text, const Place& place,
                       const Place& written) {
     WrittenRepetition& repetition = *node.repetition;

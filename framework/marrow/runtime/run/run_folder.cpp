@@ -25,7 +25,7 @@
 #include "marrow/base/regular_file.hpp"
 #include "marrow/base/text_file.hpp"
 #include "marrow/runtime/node/mapping.hpp"
-#include "marrow/runtime/pipeline/pipeline_writers.hpp"
+#include "marrow/runtime/pipeline/pipeline.hpp"
 #include "marrow/runtime/pipeline/written_content.hpp"
 #include "marrow/runtime/plugins/manifest.hpp"
 #include "marrow/runtime/process/plugin_code.hpp"
