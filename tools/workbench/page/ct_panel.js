@@ -17,13 +17,12 @@ const numberOf = (box) => (box.value.trim() === '' ? null : Number(box.value));
 
 // How the file is read where it does not say everything. changed(options) gets the keys of a case's `ct`.
 function optionsForm(changed) {
-  const number = (label) =>
-      el('label', {class: 'field'}, el('span', {}, label), el('input', {type: 'number', step: 'any', class: 'short'}));
+  const number = (label) => Dom.labelled(label, el('input', {type: 'number', step: 'any', class: 'short'}));
   const box = (field) => field.querySelector('input');
   const sizes = ['x', 'y', 'z'].map((axis) => number('voxel ' + axis + ', mm'));
   const offset = number('offset, HU');
   const flips = ['x', 'y', 'z'].map((axis) => Dom.checkbox('flip ' + axis, false, () => {}));
-  const series = el('label', {class: 'field'}, el('span', {}, 'series UID'), el('input', {type: 'text'}));
+  const series = Dom.labelled('series UID', el('input', {type: 'text'}));
   function read() {
     const size = sizes.map((field) => numberOf(box(field))), options = {};
     if (size.some((value) => value !== null)) {
@@ -85,12 +84,11 @@ function windowBar(state) {
   const level = el('input', {type: 'number', class: 'short', onchange: () => take()});
   const width = el('input', {type: 'number', class: 'short', min: 1, onchange: () => take()});
   const take = () => state.setWindow(Number(level.value), Number(width.value));
-  const field = (label, box) => el('label', {class: 'field'}, el('span', {}, label), box);
   return {
     element:
         el('div', {class: 'toolbar'},
            el('span', {class: 'field'}, el('span', {}, 'Window'), el('span', {class: 'choice'}, presets, all)),
-           field('level, HU', level), field('width, HU', width)),
+           Dom.labelled('level, HU', level), Dom.labelled('width, HU', width)),
     update() {
       if (document.activeElement !== level) level.value = state.window.level;
       if (document.activeElement !== width) width.value = state.window.width;

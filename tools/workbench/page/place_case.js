@@ -124,7 +124,7 @@ export class PlacedCase extends PlaceControls {
     this.keep(drag.kind === 'shift' ? 'move' : drag.kind === 'roll' ? 'turn about the long axis of' : 'turn');
   }
 
-  // A key, or a notch of the wheel. Further ones within a moment belong to the same step.
+  // A key, or a notch of the wheel. Further keys and notches within half a second belong to the same step.
   byKeys(view, what, motionOf) {
     if (!view || !this.bones().length) return;
     this.move(this.placed, motionOf({...this.hold(this.placed), camera: view.camera}), false);
@@ -132,7 +132,7 @@ export class PlacedCase extends PlaceControls {
     this.keyMoves = setTimeout(() => this.keep(what), 500);
   }
 
-  // Keeps the present poses of all bones as a step: a case has all starts or none.
+  // Keeps the present poses of all bones as a step, because a case has the starts of all bones or none.
   async keep(what) {
     clearTimeout(this.keyMoves);
     this.keyMoves = null;
@@ -155,9 +155,10 @@ export class PlacedCase extends PlaceControls {
     if (!more.verdicts) this.pause();
   }
 
-  async undo() {
+  // way: 'undo' or 'redo'
+  async change(way) {
     if (this.keyMoves) await this.keep('move');
-    this.draft.undo();
+    this.draft.step(way);
   }
 
   async goTo(step) {
@@ -214,7 +215,6 @@ export class PlacedCase extends PlaceControls {
     view.canvas.dataset.painted = Number(view.canvas.dataset.painted || 0) + 1;
   }
 
-  // A case that the server has forgotten is opened again.
   failed(error) {
     if (!this.isOpen || error.name === 'AbortError') return;
     Shell.notice(error.message, 'fault');
@@ -265,7 +265,7 @@ export class PlacedCase extends PlaceControls {
     try {
       const {job, command} = await Ask.post('api/place/verdict', {case: this.path, poses: step.poses});
       this.verdictJob = job;
-      this.steps.showVerdict(null, 'is being judged ...');
+      this.steps.showVerdict(null, 'being judged …');
       const result = await Ask.follow(job);
       if (this.verdictJob !== job) return;
       this.verdictJob = null;

@@ -67,7 +67,7 @@ export class PlaceTimeline {
         el('p', {class: 'note'},
            'For each view a folder with an image for each frame, or a file with several frames. All views show the ' +
                'same moments.'),
-        ...fields.map((one) => one.element), el('label', {class: 'field'}, el('span', {}, 'frames a second'), rate),
+        ...fields.map((one) => one.element), Dom.labelled('frames a second', rate),
         el('div', {class: 'toolbar'}, Dom.button('Show the sequence', apply, {class: 'primary', 'data-do': 'sequence'}),
            kept && Dom.button('Remove the sequence', remove, {'data-do': 'remove-sequence'}),
            Dom.button('Close', () => this.close())));
@@ -90,10 +90,9 @@ export class PlaceTimeline {
       name,
       value: () => ({images: images.value.trim(), pattern: pattern.value.trim()}),
       element:
-          el('fieldset', {}, el('legend', {}, name),
-             el('label', {class: 'field'}, el('span', {}, 'folder or file'), images),
+          el('fieldset', {}, el('legend', {}, name), Dom.labelled('folder or file', images),
              Dom.button('Choose', choose, {'aria-label': 'Choose the frames of ' + name}),
-             el('label', {class: 'field'}, el('span', {}, 'pattern of the file names'), pattern))
+             Dom.labelled('pattern of the file names', pattern))
     };
   }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Points of a CT as a list that keys alone can use, and fields for their names.
-import {button, el} from '../../report/page/dom.js';
+import {button, el, labelled} from '../../report/page/dom.js';
 
 import * as Shell from './shell.js';
 
@@ -34,7 +34,7 @@ export function nameField(label, text, taken, chosen) {
           chosen(name);
         }
       },
-         el('label', {class: 'field'}, el('span', {}, label), box), el('button', {type: 'submit'}, text));
+         labelled(label, box), el('button', {type: 'submit'}, text));
   form.box = box;
   return form;
 }

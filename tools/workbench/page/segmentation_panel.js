@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The panel "Segmentation": the fragments' bone grows from the seeds, and is shown in the slices and in 3D.
-import {button, command, el, number, select, shellPath, shellWord} from '../../report/page/dom.js';
+import {button, command, el, labelled, number, select, shellPath, shellWord} from '../../report/page/dom.js';
 
 import * as CasePage from './case.js';
 import {CtState} from './ct_state.js';
@@ -70,7 +70,7 @@ class Panel {
     this.solid = new SurfaceView('Surfaces of the fragments; arrow keys turn them');
     this.solid.element.hidden = true;
     this.threshold = el('input', {type: 'number', class: 'short', value: 250, step: 10});
-    const field = el('label', {class: 'field'}, el('span', {}, 'threshold, HU'), this.threshold);
+    const field = labelled('threshold, HU', this.threshold);
     const how = select('how', METHODS, this.method, (value) => {
       this.method = value;
       field.hidden = value !== 'bone';

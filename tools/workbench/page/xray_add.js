@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The dialogs that add a view to a case, or give another camera to one.
-import {button, el} from '../../report/page/dom.js';
+import {button, el, labelled} from '../../report/page/dom.js';
 
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
@@ -36,9 +36,7 @@ function armFields(known) {
                             value: known && known[key] !== undefined ? known[key] : value,
                             'data-arm': key
                           }));
-  const element =
-      el('div', {class: 'arm-fields'},
-         C_ARM.map(([, label], i) => el('label', {class: 'field'}, el('span', {}, label), boxes[i])));
+  const element = el('div', {class: 'arm-fields'}, C_ARM.map(([, label], i) => labelled(label, boxes[i])));
   const values = () => Object.fromEntries(C_ARM.map(([key], i) => [key, Number(boxes[i].value)]));
   return {element, values};
 }
@@ -70,8 +68,7 @@ function ask(title, image, name, taken, camera) {
         },
            arm.element, el('button', {type: 'submit', 'data-camera': 'c_arm'}, 'Use these angles and distances'));
     return el(
-        'div', {class: 'add-view'}, el('p', {class: 'note'}, image),
-        el('label', {class: 'field'}, el('span', {}, 'Name of the view'), box), fault,
+        'div', {class: 'add-view'}, el('p', {class: 'note'}, image), labelled('Name of the view', box), fault,
         el('h3', {}, 'How was it taken?'),
         el('p', {}, button('Choose a camera file', () => finish('file'), {'data-camera': 'file'}), ' ',
            el('span', {class: 'note'}, 'marrow’s YAML, or a file of XMALab, plastimatch, RTK or xReg')),

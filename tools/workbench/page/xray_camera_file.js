@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The dialog that asks what a camera file of another program leaves open (docs/formats.md).
-import {el, select} from '../../report/page/dom.js';
+import {el, labelled, select} from '../../report/page/dom.js';
 
 import * as Shell from './shell.js';
 
@@ -31,8 +31,8 @@ const ask = (file) => Shell.dialog('Camera file with projections', (close) => {
   };
   return el(
       'form', {class: 'arm-fields', onsubmit: submit}, el('p', {class: 'note'}, file),
-      el('label', {class: 'field'}, el('span', {}, 'Number of the projection, counted from 0'), projection), mirror,
-      is_rtk(file) && el('label', {class: 'field'}, el('span', {}, 'Size of a pixel on the detector, mm'), pixel),
+      labelled('Number of the projection, counted from 0', projection), mirror,
+      is_rtk(file) && labelled('Size of a pixel on the detector, mm', pixel),
       el('div', {class: 'toolbar'}, el('button', {type: 'submit', 'data-camera-file': 'ok'}, 'Use this camera')));
 });
 

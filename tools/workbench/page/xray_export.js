@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Seeds, landmarks, starts and cameras to files of marrow and of other programs (docs/formats.md).
-import {button, el, select} from '../../report/page/dom.js';
+import {button, el, labelled, select} from '../../report/page/dom.js';
 
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
@@ -99,9 +99,8 @@ const ask = (shared, what, names, beside) => Shell.dialog(`Export: ${TITLES[what
   };
   setTimeout(() => box.focus());
   return el(
-      'form', {class: 'arm-fields', onsubmit: submit}, format,
-      el('label', {class: 'field'}, el('span', {}, 'File in the folder that is open'), box), one,
-      is_camera && el('label', {class: 'field'}, el('span', {}, 'Width of a pixel on the detector, mm'), pixel),
+      'form', {class: 'arm-fields', onsubmit: submit}, format, labelled('File in the folder that is open', box), one,
+      is_camera && labelled('Width of a pixel on the detector, mm', pixel),
       el('div', {class: 'toolbar'}, el('button', {type: 'submit', 'data-do': 'ok'}, 'Export')));
 });
 

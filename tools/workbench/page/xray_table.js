@@ -20,7 +20,7 @@ export function askName(title, value, taken) {
     };
     setTimeout(() => box.select());
     return el(
-        'form', {onsubmit: submit}, el('label', {class: 'field'}, el('span', {}, 'Name'), box), fault,
+        'form', {onsubmit: submit}, Dom.labelled('Name', box), fault,
         el('div', {class: 'toolbar'}, el('button', {type: 'submit', 'data-do': 'ok'}, 'OK')));
   });
 }

@@ -81,8 +81,7 @@ function toolbar(shared, tools) {
     }
   });
   const number = el('span', {class: 'note'}, size.value + ' px');
-  const brush =
-      el('label', {class: 'field'}, el('span', {}, 'Brush'), el('span', {class: 'with-number'}, size, number));
+  const brush = Dom.labelled('Brush', el('span', {class: 'with-number'}, size, number));
   const all = Dom.button('Whole images', () => shared.frames.forEach((frame) => frame.fit()), {'data-do': 'fit'});
   const update = () => {
     brush.hidden = !['brush', 'eraser'].includes(shared.tool);
