@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/pipeline/written_content.hpp"
-#include "marrow/base/regular_file.hpp"
 
+#include "marrow/base/regular_file.hpp"
 #include "marrow/runtime/pipeline/named_files.hpp"
-#include "marrow/runtime/plugins/library.hpp"
 
 namespace marrow {
 
-Digest content_of(const std::filesystem::path& path) {
+Digest written_content(const std::filesystem::path& path) {
   Hasher hasher;
   for (const NamedFile& file : files_named_by(path)) {
     hasher.add(file.name);
