@@ -13,7 +13,7 @@
 namespace named_files_test {
 
 namespace fs = std::filesystem;
-using marrow::written_content;
+using marrow::content_of;
 using runtime_fixture::Scratch;
 
 class NamedFilesTest : public testing::Test {
@@ -90,10 +90,10 @@ TEST_F(NamedFilesTest, DigestOfASettledFileSeesAWriteThatKeepsSizeAndTime) {
 
 TEST(WrittenContent, OfAFileIsWhatItHolds) {
   const Scratch scratch;
-  const marrow::Digest before = written_content(scratch.write("a", "text"));
-  EXPECT_EQ(written_content(scratch.write("b", "text")), before) << "wherever it was moved to";
-  EXPECT_NE(written_content(scratch.write("a", "texT")), before);
-  EXPECT_NE(written_content(scratch.write("a", "")), before);
+  const marrow::Digest before = content_of(scratch.write("a", "text"));
+  EXPECT_EQ(content_of(scratch.write("b", "text")), before) << "wherever it was moved to";
+  EXPECT_NE(content_of(scratch.write("a", "texT")), before);
+  EXPECT_NE(content_of(scratch.write("a", "")), before);
 }
 
 TEST(WrittenContent, OfAFolderIsAllBelowIt) {
@@ -103,14 +103,14 @@ TEST(WrittenContent, OfAFolderIsAllBelowIt) {
     scratch.write(std::string(folder) + "/image.png", "pixels");
     scratch.write(std::string(folder) + "/inner/mask.png", "mask");
   }
-  const marrow::Digest whole = written_content(scratch.path / "one");
-  EXPECT_EQ(written_content(scratch.path / "two"), whole);
+  const marrow::Digest whole = content_of(scratch.path / "one");
+  EXPECT_EQ(content_of(scratch.path / "two"), whole);
   fs::rename(scratch.path / "two/image.png", scratch.path / "two/other.png");
-  EXPECT_NE(written_content(scratch.path / "two"), whole);
+  EXPECT_NE(content_of(scratch.path / "two"), whole);
   fs::rename(scratch.path / "two/other.png", scratch.path / "two/image.png");
-  EXPECT_EQ(written_content(scratch.path / "two"), whole);
+  EXPECT_EQ(content_of(scratch.path / "two"), whole);
   fs::remove(scratch.path / "two/inner/mask.png");
-  EXPECT_NE(written_content(scratch.path / "two"), whole);
+  EXPECT_NE(content_of(scratch.path / "two"), whole);
 }
 
 }  // namespace named_files_test

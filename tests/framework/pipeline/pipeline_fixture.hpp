@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the tests of pipeline files share: reading a text, and the one fault that is expected of it.
+// What the tests of pipeline files share: reading a text, and the one fault that it must have.
 #include <string>
 
 #include "tests/framework/fixture.hpp"
@@ -16,7 +16,7 @@ class PipelineTest : public testing::Test {
     diagnostics = marrow::Diagnostics();
     return marrow::read_pipeline(scratch.write("p.yaml", text), arguments, test_catalogue(), diagnostics);
   }
-  /// That there is one fault, at that place, whose message and hint hold the texts.
+  /// The pipeline must have one fault, at this place. Its message and hint contain these texts.
   void expect_fault(const std::string& text, int line, int column, const std::string& message,
                     const std::string& hint = "", const marrow::PipelineArguments& arguments = {}) {
     read(text, arguments);
@@ -27,6 +27,12 @@ class PipelineTest : public testing::Test {
     EXPECT_NE(fault.message.find(message), std::string::npos) << diagnostics.text();
     EXPECT_NE(fault.hint.find(hint), std::string::npos) << diagnostics.text();
   }
+  /// The last text that was read must have one fault. It is shown with this text.
+  void expect_one_fault(const std::string& shown) {
+    EXPECT_EQ(diagnostics.size(), 1u) << diagnostics.text();
+    EXPECT_NE(diagnostics.text().find(shown), std::string::npos) << diagnostics.text();
+  }
+  /// The node 'n', in line 5 of a pipeline with the nodes 'c' and 's', must have this fault.
   void expect_node_fault(const std::string& node, int column, const std::string& message,
                          const std::string& hint = "") {
     expect_fault(

@@ -225,7 +225,7 @@ void check_age(const fs::path& folder, const json& record) {
 
 bool holds(const fs::path& file, const std::string& content) {
   try {
-    return written_content(file).hex() == content;
+    return content_of(file).hex() == content;
   } catch (const Error&) {  // the file can no longer be read
     return false;
   }

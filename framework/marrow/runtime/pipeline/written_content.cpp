@@ -6,7 +6,7 @@
 
 namespace marrow {
 
-Digest written_content(const std::filesystem::path& path) {
+Digest content_of(const std::filesystem::path& path) {
   Hasher hasher;
   for (const NamedFile& file : files_named_by(path)) {
     hasher.add(file.name);

@@ -155,7 +155,7 @@ json files_of(const NodeRecord& record) {
 json digests_of(const fs::path& folder, const std::vector<std::string>& files) {
   json digests = json::array();
   for (const std::string& file : files) try {
-      digests.push_back(written_content(folder / file).hex());
+      digests.push_back(content_of(folder / file).hex());
     } catch (const Error&) {
       digests.push_back(json());
     }
