@@ -26,7 +26,7 @@ class Drawing {
       }
       for (const Wire& wire : node.wires)
         for (const Reference& source : wire.sources)
-          add_edges(pipeline, source, path, outer, around, id, node.info.inputs[std::size_t(wire.port)].name);
+          add_edges(pipeline, source, path, outer, around, id, node.input_of(wire).name);
     }
   }
 
@@ -47,8 +47,8 @@ class Drawing {
 
   void add_edges(const Pipeline& pipeline, const Reference& source, const std::string& path, const Pipeline* outer,
                  const PipelineNode* around, const std::string& to, const std::string& port) {
-    const PipelineNode& from = pipeline.nodes[std::size_t(source.node)];
-    const bool is_function = from.info.outputs[std::size_t(source.output)].type.is_function;
+    const PipelineNode& from = pipeline.node_of(source);
+    const bool is_function = pipeline.output_of(source).type.is_function;
     const auto add_edge = [&](const std::string& id, bool is_of_pass_before) {
       drawn_.edges.push_back({id, to, port, is_function, is_of_pass_before});
     };
@@ -60,12 +60,11 @@ class Drawing {
       for (const Wire& wire : around->wires)
         if (std::size_t(wire.port) == i) {
           is_made_in_body = false;
-          for (const Reference& one : wire.sources)
-            add_edge(outer_path + outer->nodes[std::size_t(one.node)].id, false);
+          for (const Reference& one : wire.sources) add_edge(outer_path + outer->node_of(one).id, false);
         }
       if (given.carried < 0) continue;
       const Reference& carried = pipeline.outputs[std::size_t(given.carried)].source;
-      add_edge(path + pipeline.nodes[std::size_t(carried.node)].id, true);
+      add_edge(path + pipeline.node_of(carried).id, true);
     }
     if (is_made_in_body) add_edge(path + from.id, false);
   }

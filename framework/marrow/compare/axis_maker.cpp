@@ -19,12 +19,12 @@ class MakerSearch {
   MakerSearch(const Pipeline& pipeline, const std::string& axis) : pipeline_(pipeline), axis_(axis) {}
 
   void look_at(const Reference& value) {
-    const PipelineNode& node = pipeline_.nodes[std::size_t(value.node)];
+    const PipelineNode& node = pipeline_.node_of(value);
     if (node.repetition) return;
-    if (node.info.outputs[std::size_t(value.output)].axis == axis_) return consider({value.node, value.output});
+    if (pipeline_.output_of(value).axis == axis_) return consider({value.node, value.output});
     if (!seen_.insert(value.node).second) return;
     for (const Wire& wire : node.wires) {
-      if (node.info.inputs[std::size_t(wire.port)].axis == axis_) continue;  // it takes the whole list
+      if (node.input_of(wire).axis == axis_) continue;  // it takes the whole list
       for (const Reference& source : wire.sources)
         if (contains(pipeline_.axes_of(source), axis_)) look_at(source);
     }

@@ -154,8 +154,7 @@ Pipeline CellRunner::pipeline_of(const CellIndex& cell, const fs::path& case_fol
   if (!experiment_.initial_error.empty())
     wanted.insert(experiment_.initial_error.substr(0, experiment_.initial_error.find('.')));
   std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) {
-    const PortInfo& port =
-        pipeline.nodes[std::size_t(output.source.node)].info.outputs[std::size_t(output.source.output)];
+    const PortInfo& port = pipeline.output_of(output.source);
     const bool is_shown =
         depth == Depth::pictures && (port.type == TypeInfo::of<Scene>() || port.type == TypeInfo::of<Landscape>());
     return !wanted.contains(output.name) && !is_shown && port.type != TypeInfo::of<Pose>() &&

@@ -74,7 +74,7 @@ class Checker {
       const PipelineOutput* output =
           find_output(pipeline, experiment_.pictures[i], written_.picture_places[i], diagnostics_);
       if (!output) continue;
-      const TypeInfo& type = port_of(pipeline, *output).type;
+      const TypeInfo& type = pipeline.output_of(output->source).type;
       const WriterInfo* writer = catalogue_.find_writer(type);
       if (!writer || writer->extension == ".png" || type == TypeInfo::of<Scene>() || type == TypeInfo::of<Landscape>())
         continue;

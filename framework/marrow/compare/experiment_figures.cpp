@@ -35,14 +35,6 @@ const PipelineOutput* find_output(const Pipeline& pipeline, const std::string& n
   return nullptr;
 }
 
-const PipelineNode& node_of(const Pipeline& pipeline, const PipelineOutput& output) {
-  return pipeline.nodes[std::size_t(output.source.node)];
-}
-
-const PortInfo& port_of(const Pipeline& pipeline, const PipelineOutput& output) {
-  return node_of(pipeline, output).info.outputs[std::size_t(output.source.output)];
-}
-
 void FigureChecker::check(std::size_t variant, const Pipeline& pipeline) {
   for (const MetricChoice& metric : experiment_.metrics) check(variant, pipeline, metric.path, metric.place);
   if (!experiment_.initial_error.empty())
@@ -65,7 +57,7 @@ void FigureChecker::look_at(std::size_t variant, const Pipeline& pipeline, const
   // A variant may use another node, whose output has another type, other lists or other figures.
   const Variant& own = experiment_.variants[variant];
   const std::string subject = (variant == 0 ? "" : "in variant '" + own.name + "' ") + "output '" + output->name + "'";
-  const PortInfo& port = port_of(pipeline, *output);
+  const PortInfo& port = pipeline.output_of(output->source);
   if (port.type.id != "metrics")
     return faults.add(variant == 0 ? place : own.place, subject + " is " + port.type.id + ", not figures of merit",
                       "name an output of an evaluate node");
@@ -79,7 +71,8 @@ void FigureChecker::look_at(std::size_t variant, const Pipeline& pipeline, const
                       "write it as  " + start + parts.back());
   const std::string figure = figure_from(parts, axes.size() + 1);
   if (!may_have_figure(port, figure))
-    return faults.add(place, subject + " (" + node_of(pipeline, *output).info.name + ") has no figure '" + figure + "'",
+    return faults.add(place,
+                      subject + " (" + pipeline.node_of(output->source).info.name + ") has no figure '" + figure + "'",
                       suggestion(figure, port.figures));
   add_items(variant, pipeline, *output, parts, {path, {}, {}, place, variant, {}, 0});
 }

@@ -11,9 +11,6 @@ namespace marrow::compare {
 /// The output of a pipeline with this name. Reports a fault if there is none.
 const PipelineOutput* find_output(const Pipeline& pipeline, const std::string& name, const Place& place,
                                   Diagnostics& diagnostics);
-/// What an output is, and the node that makes it.
-const PortInfo& port_of(const Pipeline& pipeline, const PipelineOutput& output);
-const PipelineNode& node_of(const Pipeline& pipeline, const PipelineOutput& output);
 
 /// Checks the figures that an experiment names against the pipelines of its variants: that there is such an output of
 /// figures, that the path names an item of each of its lists, and that its node can make such a figure. Which items

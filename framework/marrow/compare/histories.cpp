@@ -31,7 +31,7 @@ std::vector<Digest> histories(const Pipeline& pipeline, const std::string& case_
     if (depends_on_case(node)) hasher.add(case_name);
     for (const Wire& wire : node.wires)
       for (const Reference& source : wire.sources) {
-        hasher.add(node.info.inputs[std::size_t(wire.port)].name);
+        hasher.add(node.input_of(wire).name);
         hasher.add(result[std::size_t(source.node)]);
         hasher.add(std::int64_t(source.output));
         hasher.add(source.items);

@@ -143,8 +143,8 @@ TEST_F(PipelineTest, SourcesComeFirstInTheFilesOrderOtherwise) {
   EXPECT_EQ(order, "acbfde");
   for (std::size_t i = 0; i < p.nodes.size(); ++i)
     for (const marrow::Wire& wire : p.nodes[i].wires)
-      for (const marrow::Reference& source : wire.sources) EXPECT_EQ(p.nodes[std::size_t(source.node)].id, source.text);
-  EXPECT_EQ(p.nodes[std::size_t(p.outputs[0].source.node)].id, "e");
+      for (const marrow::Reference& source : wire.sources) EXPECT_EQ(p.node_of(source).id, source.text);
+  EXPECT_EQ(p.node_of(p.outputs[0].source).id, "e");
 }
 
 }  // namespace pipeline_test

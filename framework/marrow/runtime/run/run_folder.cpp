@@ -120,7 +120,7 @@ json inputs_of(const PipelineNode& node, const RunResult& result) {
       for (const Reference& source : wire.sources) hasher.add(key_of(value_of(result, source)));
     } catch (const Error&) {  // the list does not have this item: the node failed
     }
-    inputs[node.info.inputs[std::size_t(wire.port)].name] = hasher.digest().hex();
+    inputs[node.input_of(wire).name] = hasher.digest().hex();
   }
   return inputs;
 }
@@ -138,7 +138,7 @@ json inputs_in_body(const PipelineNode& node, const Repetition& repetition, cons
         if (target.node == source.node && target.output == source.output) hasher.add(key_of(passes.given[i]));
       }
     }
-    inputs[node.info.inputs[std::size_t(wire.port)].name] = hasher.digest().hex();
+    inputs[node.input_of(wire).name] = hasher.digest().hex();
   }
   return inputs;
 }
