@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an override's text is read as. The right answers follow from one rule: a text is itself, letter by letter,
-// unless it begins with [, {, " or '.
+// How the text of an override is read. The right answers follow from one rule: a text is taken letter by letter, unless
+// it begins with [, {, " or '.
 #include "tests/framework/pipeline/pipeline_fixture.hpp"
 
 namespace given_texts_test {
@@ -83,7 +83,7 @@ TEST_F(GivenTexts, OfNumbersBooleansAndLists) {
   expect_one_fault("s.names", "a", "option 'names' of test.sides: expected a list, got 'a'", "write it as [a, b, c]");
 }
 
-TEST_F(GivenTexts, ThatBeginAsAListAndAreNoneAreFaults) {
+TEST_F(GivenTexts, ThatBeginAsAListAndAreNotListsAreFaults) {
   const std::string list = "the value begins as a list, but cannot be read as one: ",
                     quoted = "the value begins as a quoted text, but cannot be read as one: ",
                     no_end = "end of sequence flow not found",
@@ -126,7 +126,7 @@ TEST_F(GivenTexts, PathsOfInputsAreNotEmpty) {
   EXPECT_TRUE(diagnostics.empty()) << "its default says that it may be: " << diagnostics.text();
 }
 
-/// A file with a comment says what it says. A tag or an anchor would be taken from the text without a word.
+/// In a file, YAML would remove a tag or an anchor from the text without a message, so these are faults.
 TEST_F(GivenTexts, TagsAndAnchorsInAFileAreFaults) {
   const auto text = [](const std::string& path) {
     return "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {path: " + path + "}}\noutputs: {o: c}\n";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a good pipeline file is resolved to, and what overrides make of it.
+// What is read from a good pipeline file, and how overrides change it.
 #include "marrow/base/file_names.hpp"
 #include "tests/framework/pipeline/pipeline_fixture.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What options must be to each other: a pipeline that breaks it is refused at its place, and a declaration that makes
-// no sense when its plugin registers.
+// Relations between options. A pipeline that breaks one has a fault at the option. A relation that makes no sense is a
+// fault of the plugin that declares it.
 #include "tests/framework/fixture.hpp"
 
 namespace relations_test {
@@ -27,7 +27,7 @@ class RelationsTest : public testing::Test {
     read(node, overrides);
     EXPECT_TRUE(diagnostics.empty()) << node << "\n" << diagnostics.text();
   }
-  /// That there is one fault, with this message and hint, where the line has `at`.
+  /// There must be one fault, with this message and hint, at the text `at` of the line.
   void expect_broken(const std::string& node, const std::string& at, const std::string& message,
                      const std::string& hint = "") {
     read(node);
@@ -39,7 +39,7 @@ class RelationsTest : public testing::Test {
     EXPECT_EQ(fault.place.line, 4);
     EXPECT_EQ(fault.place.column, int(line.find(at)) + 1) << diagnostics.text();
   }
-  /// The same where an override breaks it.
+  /// The same for a relation that an override breaks.
   void expect_broken_by(const std::string& node, const Override& override, const std::string& message) {
     read(node, {override});
     ASSERT_EQ(diagnostics.size(), 1u) << node << "\n" << diagnostics.text();
@@ -159,12 +159,12 @@ TEST_F(RelationsTest, OverridesBreakAndMend) {
   expect_kept("{uses: test.one_of_two, in: {number: one}, with: {file: a}}", {{"n.file", "''"}});
 }
 
-TEST_F(RelationsTest, EachThatIsBrokenIsTold) {
+TEST_F(RelationsTest, EachBrokenRelationIsReported) {
   read("{uses: test.limits, with: {low: 90, first: 20}}");
   EXPECT_EQ(diagnostics.size(), 2u) << diagnostics.text();
 }
 
-TEST_F(RelationsTest, AnOptionThatCannotBeReadIsToldOnce) {
+TEST_F(RelationsTest, AnOptionThatCannotBeReadIsReportedOnce) {
   read("{uses: test.limits, with: {low: ninety}}");
   ASSERT_EQ(diagnostics.size(), 1u) << diagnostics.text();
   EXPECT_NE(diagnostics.text().find("expected a number, got 'ninety'"), std::string::npos) << diagnostics.text();
@@ -188,7 +188,7 @@ struct Options {
 };
 marrow::Metrics node_function(const marrow::Metrics*, const Options&) { return {}; }
 
-/// What is said of a node with this relation.
+/// The faults of a plugin that declares this relation, one a line.
 std::string faults_of(const marrow::RelationInfo& relation) {
   Plugin plugin;
   plugin.node("test.node", node_function)

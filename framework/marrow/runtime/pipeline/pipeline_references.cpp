@@ -54,7 +54,7 @@ Reference resolve_reference(const std::string& text, const Place& place, const s
   }
   const std::size_t index = found->second;
   const std::vector<PortInfo>& outputs = nodes[index].info.outputs;
-  if (outputs.empty()) return source;  // the kind.name of the node is unknown, which was reported already
+  if (outputs.empty()) return source;  // what the node uses is unknown; this was reported already
   const PortInfo* named = parts.size() > 1 ? find_named(outputs, parts[1]) : nullptr;
   const int output = named ? int(named - outputs.data()) : default_output(outputs, types, parts.size() > 1);
   if (output < 0) {
