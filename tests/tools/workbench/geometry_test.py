@@ -4,7 +4,6 @@
 random ways to show an image. Expected values are computed with numpy by the formulas of docs/case.md, and by marrow."""
 import json
 import subprocess
-import unittest
 
 import numpy
 
