@@ -15,7 +15,7 @@ const PRESETS = [['bone', 'Bone', 400, 1800], ['soft', 'Soft tissue', 40, 400]];
 
 const numberOf = (box) => (box.value.trim() === '' ? null : Number(box.value));
 
-// How the file is read where it does not say everything. changed(options) gets the keys of a case's `ct`.
+// The options of reading, for files that do not say everything. changed(options) gets the keys of a case's `ct`.
 function optionsForm(changed) {
   const number = (label) => Dom.labelled(label, el('input', {type: 'number', step: 'any', class: 'short'}));
   const box = (field) => field.querySelector('input');
@@ -54,7 +54,7 @@ function optionsForm(changed) {
          sizes, flips, offset, series, el('button', {type: 'submit', 'data-do': 'read-ct'}, 'Read again'));
   const element =
       el('details', {class: 'ct-options'}, el('summary', {}, 'How it is read'),
-         el('p', {class: 'note'}, 'Only where its files do not say it, or say it wrongly.'), form);
+         el('p', {class: 'note'}, 'Needed only if its files do not say it, or are wrong.'), form);
   return {element, fill};
 }
 
@@ -64,7 +64,7 @@ async function choose(draft) {
       {folders: true, accepts: (name) => VOLUME.test(name), at: startOf(draft)});
   if (file !== undefined) draft.change('choose the CT ' + file, (document) => (document.ct = {file}));
 }
-// The chooser begins beside the present CT.
+// The chooser begins in the folder of the present CT.
 const startOf = ({document: {ct}}) => (ct ? ct.file.split('/').slice(0, -1).join('/') : '');
 
 // A button for each series of the folder, if the fault lists them.
@@ -98,7 +98,7 @@ function windowBar(state) {
   };
 }
 
-// What is at the crosshair, or under the pointer.
+// The place and the value at the crosshair and under the pointer.
 function readout(state, views) {
   const here = el('span', {'data-read': 'crosshair'}), pointer = el('span', {'data-read': 'pointer'});
   const words = (point_mm, value_hu) =>

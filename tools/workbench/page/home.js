@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The first page: what the folder holds.
+// The first page: the contents of the folder.
 import {el} from '../../report/page/dom.js';
 
 import * as Ask from './server.js';

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a node made: pictures, slices, surfaces, figures and texts.
+// The outputs of a node: pictures, slices, surfaces, figures and texts.
 import {el, number, withUnit} from '../../report/page/dom.js';
 import {decoded} from '../../report/page/meshes.js';
 import * as Verdict from '../../report/page/verdict.js';
@@ -67,7 +67,7 @@ export function clear() {
   open = [];
 }
 
-// Elements for what api/pipeline/look answers.
+// Elements for the answer of api/pipeline/look.
 export function show(node, outputs) {
   clear();
   return outputs.map(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page "Pipeline": the graph, the text beside it, the form of a node, what it made, and runs.
+// The page "Pipeline": the graph, the text beside it, the form of a node, its outputs, and runs.
 import * as Dom from '../../report/page/dom.js';
 import {el} from '../../report/page/dom.js';
 import * as Graph from '../../report/page/graph.js';
@@ -242,7 +242,7 @@ class Page {
            Dom.command(command)));
   }
 
-  // Shows what the chosen node made, if that is known.
+  // Shows the outputs of the chosen node, if they are known.
   async look() {
     const id = this.known(), count = ++this.lookCount;
     NodeOutput.clear();

@@ -56,7 +56,7 @@ function optionField(option, written, edit) {
               {'data-default': option.name, 'aria-label': 'Reset ' + option.name + ' to its default'}));
 }
 
-// What can be wired to a port: outputs of its type of the other nodes.
+// The possible sources of a port: outputs of other nodes with its type.
 function sources(nodes, id, port) {
   const names = [];
   for (const [other, {info}] of Object.entries(nodes)) {
@@ -139,6 +139,6 @@ export function form(state, id, edit, goTo) {
       checkbox(
           'may fail without ending the run', node.may_fail,
           (value) => own({what: 'may_fail', value: value ? 'true' : null})),
-      el('h3', {}, 'Wires'), inputs.length ? inputs : el('p', {class: 'note'}, 'It takes nothing from other nodes.'),
+      el('h3', {}, 'Wires'), inputs.length ? inputs : el('p', {class: 'note'}, 'It has no inputs.'),
       el('h3', {}, 'Another node in its place'), fitting(state.file, id, own));
 }

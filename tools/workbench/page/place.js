@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page "Place": bones are placed by hand over the X-rays, and registered from there. Poses are kept as `start` of
-// the case's draft.
+// The page "Place": bones are placed by hand over the X-rays, and registered from there. The case's draft keeps the
+// poses as `start`.
 import {el} from '../../report/page/dom.js';
 
 import * as Geometry from './geometry.js';
@@ -74,7 +74,7 @@ Shell.page('place', {
     ['r or R', 'tip the upper end away', tip(1)],
     ['f or F', 'tip it towards the source', tip(-1)],
     ['v', 'the next view', nextView],
-    ['m', 'show the bone in another way', nextMode],
+    ['m', 'show the bone in the next way', nextMode],
     ['z', 'zoom in to the bone, and out', nextZoom],
     ['[ or ,', 'the previous frame', () => inSequence((sequence) => sequence.step(-1))],
     ['] or .', 'the next frame', () => inSequence((sequence) => sequence.step(1))],

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A case on the page "Place": the poses of its bones, how they are moved, kept, judged and registered.
+// A case on the page "Place": moves its bones, keeps their poses, and has them judged and registered.
 import * as Dom from '../../report/page/dom.js';
 
 import {CaseDraft} from './draft.js';
@@ -85,12 +85,12 @@ export class PlacedCase extends PlaceControls {
     return this.about.bones.filter((bone) => this.moving.has(bone.name));
   }
 
-  // The bones to look at when all are locked.
+  // The moved bones; all bones if all are locked.
   watched() {
     return this.bones().length ? this.bones() : this.about.bones;
   }
 
-  // The place of the moved bones: the middle of all, and the long axis of the first.
+  // The common middle of the moved bones, and the long axis of the first.
   hold(poses) {
     const bones = this.watched(), middles = bones.map((bone) => Geometry.moved(poses[bone.name], bone.middle_mm));
     const middle = Geometry.times(middles.reduce(Geometry.plus, [0, 0, 0]), 1 / bones.length);
@@ -188,7 +188,7 @@ export class PlacedCase extends PlaceControls {
     this.pause();
   }
 
-  // A sequence was opened or left. Costs and verdicts are of the case's own images.
+  // A sequence was opened or left. Costs and verdicts exist only for the case's own images.
   sequenceChanged() {
     const {isOn} = this.sequence;
     this.pipelineField.hidden = isOn;
@@ -313,7 +313,7 @@ export class PlacedCase extends PlaceControls {
     if (this.isOpen) this.updateBar();
   }
 
-  // The same for a sequence.
+  // Tracks the bones through a sequence.
   async track() {
     this.isRegistering = true;
     this.updateBar();

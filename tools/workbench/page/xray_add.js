@@ -8,7 +8,7 @@ import * as XrayCameraFile from './xray_camera_file.js';
 
 const is_image = (name) => /\.(png|tiff?|dcm|dicom)$/i.test(name);
 const folderOf = (path) => path.split('/').slice(0, -1).join('/');
-// Of "a/frontal.0001.png" the name "frontal.0001".
+// "frontal.0001" of "a/frontal.0001.png".
 const stem = (path) => path.split('/').pop().replace(/\.[^.]*$/, '');
 
 // The keys of docs/case.md: [key, label, first value, least, most].
@@ -51,12 +51,12 @@ function ask(title, image, name, taken, camera) {
       const chosen = box.value.trim();
       if (!chosen) return void (fault.textContent = 'Give the view a name.');
       if (chosen !== name && taken.includes(chosen))
-        return void (fault.textContent = `There is a view “${chosen}” already; give another name.`);
+        return void (fault.textContent = `The name “${chosen}” is taken; give another one.`);
       const c_arm = arm.values();
       if (kind === 'c_arm' && !(c_arm.source_to_isocentre_mm < c_arm.source_to_detector_mm))
         return void (
             fault.textContent =
-                'The isocentre lies between source and detector, so its distance must be the smaller one.');
+                'The isocentre is between source and detector, so its distance must be the smaller one.');
       close({name: chosen, kind, c_arm});
     };
     const form =
@@ -80,7 +80,7 @@ function ask(title, image, name, taken, camera) {
   });
 }
 
-// What the document gets as the camera of an image, or undefined if the user leaves.
+// The camera of an image for the document, or undefined if the user leaves.
 async function cameraFor(answer, image) {
   if (answer.kind === 'file') {
     const file =
@@ -112,7 +112,7 @@ export async function add(draft) {
   });
 }
 
-// Everywhere in the document where the view is named.
+// Renames a view everywhere in the document.
 export function renameIn(document, name, next) {
   document.views.find((view) => view.name === name).name = next;
   for (const one of document.landmarks || [])

@@ -5,9 +5,9 @@ import {el, labelled, select} from '../../report/page/dom.js';
 import * as Shell from './shell.js';
 
 const MIRRORS = [
-  ['none', 'as it was: seen from the source, rows from above'],
-  ['left_right', 'left to right: it was seen from the detector'],
-  ['upside_down', 'upside down: its rows were from below']
+  ['none', 'not at all: it is seen from the source, with rows from the top'],
+  ['left_right', 'left to right: it is seen from the detector'],
+  ['upside_down', 'upside down: its rows begin at the bottom']
 ];
 const is_rtk = (file) => /\.xml$/i.test(file);
 const holdsProjections = (file) => /\.(xml|h5|hdf5)$/i.test(file);
@@ -36,7 +36,7 @@ const ask = (file) => Shell.dialog('Camera file with projections', (close) => {
       el('div', {class: 'toolbar'}, el('button', {type: 'submit', 'data-camera-file': 'ok'}, 'Use this camera')));
 });
 
-// The draft's camera for a file that was chosen; asks what the file does not say.
+// The draft's camera for a chosen file. Asks for what the file does not say.
 export const cameraOf = (file) => (holdsProjections(file) ? ask(file) : {file});
 
 export const inWords = ({file, projection, mirror}) => file +
