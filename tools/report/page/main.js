@@ -57,8 +57,8 @@ function metricFigure(data, kinds, extra, draw) {
 function distributions(data) {
   return section(
       'distributions', 'Distributions',
-      'Each mark is a run. The box spans the quartiles, its bar is the median, and the whiskers reach from the 5th to ' +
-          'the 95th percentile. ' +
+      'Each mark is a run. The box spans the quartiles, its bar is the median, and the whiskers reach from the ' +
+          '5th to the 95th percentile. ' +
           'Click a mark to open its run.',
       metricFigure(
           data, [['linear', 'linear'], ['log', 'log']], null,
@@ -92,8 +92,8 @@ function capture(data) {
                  el('li', {style: '--mark: ' + Plots.colour(i)}, variant.name + ': ' + Figures.captureRange(data, i))));
   return section(
       'capture', 'Capture range',
-      'How far from the truth a start may be: up to the given error, each bin of starts has a success rate of 95 % or ' +
-          'more. Bars are 95 % intervals; they take into account that the starts of a case are not independent. A ' +
+      'How far from the truth a start may be: up to the given error, each bin of starts has a success rate of 95 % ' +
+          'or more. Bars are 95 % intervals; they take into account that the starts of a case are not independent. A ' +
           'failed run is not a success.',
       ranges, Plots.legend(data.variants), Plots.responsive((width) => Figures.drawCapture(data, bins, width)),
       el('details', {}, el('summary', {}, 'The counts'), Figures.captureTable(data, bins)));
@@ -210,7 +210,8 @@ function closer(data) {
     kinds.has('scene') &&
         section(
             'scene', '3D view',
-            'The model in the found pose, in the true pose and at the start, among the X-rays or as one of them sees it.',
+            'The model in the found pose, in the true pose and at the start, among the X-rays or as one of them ' +
+                'sees it.',
             picker(), places.scene),
     kinds.has('convergence') &&
         section(

@@ -85,8 +85,8 @@ export function table(data) {
   return el(
       'div', {}, el('h3', {}, 'Verdicts'),
       el('p', {class: 'note'},
-         'A silent failure is a run that is no success, although its verdict is “trusted”. A false alarm is a success ' +
-             'with the verdict “doubtful” or “wrong”.'),
+         'A silent failure is a run that is no success, although its verdict is “trusted”. A false alarm is a ' +
+             'success with the verdict “doubtful” or “wrong”.'),
       Summary.sortable(
           data.variants.map((_, i) => i),
           [
