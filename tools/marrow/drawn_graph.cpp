@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drawn_graph.hpp"
 
-#include <algorithm>
-
 #include "marrow/base/number_text.hpp"
 
 namespace marrow::cli {
@@ -35,10 +33,8 @@ class Drawing {
  private:
   void add_body(const Pipeline& pipeline, const PipelineNode& node, const std::string& id) {
     const Repetition& repetition = *node.repetition;
-    const std::vector<bool> of_first = repetition.first.needed([&](const std::string& name) {
-      return std::any_of(repetition.given.begin(), repetition.given.end(),
-                         [&](const Repetition::Given& one) { return one.node == name; });
-    });
+    const std::vector<bool> of_first =
+        repetition.first.needed([&](const std::string& name) { return repetition.is_given(name); });
     const std::size_t count = repetition.alone.nodes.size();
     add(repetition.alone, {of_first.end() - std::ptrdiff_t(count), of_first.end()}, id + "/", &pipeline, &node);
     for (const PipelineOutput& output : repetition.alone.outputs)
@@ -56,7 +52,7 @@ class Drawing {
     const std::string outer_path = path.substr(0, path.empty() ? 0 : path.find_last_of('/', path.size() - 2) + 1);
     for (std::size_t i = 0; around && i < around->repetition->given.size(); ++i) {
       const Repetition::Given& given = around->repetition->given[i];
-      if (given.target.node != source.node || given.target.output != source.output) continue;
+      if (!given.target.has_same_output(source)) continue;
       for (const Wire& wire : around->wires)
         if (std::size_t(wire.port) == i) {
           is_made_in_body = false;

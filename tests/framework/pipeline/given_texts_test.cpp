@@ -27,8 +27,7 @@ class GivenTexts : public PipelineTest {
   void expect_one_fault(const std::string& key, const std::string& text, const std::string& message,
                         const std::string& hint = "") {
     with(key, text);
-    ASSERT_EQ(diagnostics.size(), 1u) << text << "\n" << diagnostics.text();
-    const marrow::Diagnostic fault = diagnostics.sorted()[0];
+    const marrow::Diagnostic fault = only_fault();
     EXPECT_EQ(fault.place.file, "--set " + key + "=" + text);
     EXPECT_EQ(fault.message, message);
     EXPECT_NE(fault.hint.find(hint), std::string::npos) << fault.hint;

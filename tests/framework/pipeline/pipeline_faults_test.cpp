@@ -141,7 +141,7 @@ INSTANTIATE_TEST_SUITE_P(
         {"UnknownOutput", "{uses: test.add, in: {a: s.lefft}}", 28, "node 's' has no output 'lefft'",
          "did you mean 'left'?"},
         {"AmbiguousOutput", "{uses: test.add, in: {a: s}}", 28,
-         "node 's' has several outputs and not just one metrics"},
+         "node 's' has several outputs, and not exactly one of them is metrics"},
         {"ListForSingle", "{uses: test.add, in: {a: [c, c]}}", 28, "takes one metrics, not a list"},
         {"TooManyPicks", "{uses: test.add, in: {a: s.left.x}}", 28, "'s.left.x' picks 'x', but it is not a list"},
     }),

@@ -21,6 +21,8 @@ struct Reference {
   int node = -1;                   ///< index into Pipeline::nodes
   int output = -1;                 ///< index into the node's outputs
   std::vector<std::string> items;  ///< the items that it picks along the axes, outermost first
+
+  bool has_same_output(const Reference& other) const { return node == other.node && output == other.output; }
 };
 
 /// What one input port is wired to.
@@ -98,6 +100,9 @@ struct Repetition {
   int at_most = 0;           ///< the most passes; 0: one for each item
   int until = -1;            ///< index of the body's output, of type stop, that ends the passes; -1: none
   bool goes_on = false;      ///< whether a failed pass is followed by the next; its missing outputs are then absent
+
+  /// Whether the node of `body` or `first` with this id holds a given value.
+  bool is_given(const std::string& id) const;
 };
 
 /// The nodes that a run may call: those that the outputs need. A node with a body is replaced by the nodes of its body.

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/may_fail.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
@@ -56,9 +55,8 @@ void check_picks(const Pipeline& pipeline, const Reference& source, Diagnostics&
   whole.items.clear();
   const std::size_t axes = pipeline.axes_of(whole).size();
   if (source.items.size() > axes)
-    diagnostics.add(source.place,
-                    in_quotes(source.text) + " picks " + in_quotes(source.items[axes]) + ", but " +
-                        (axes ? formatted("there are only {} axes to pick along", axes) : "it is not a list"));
+    diagnostics.add(source.place, in_quotes(source.text) + " picks " + in_quotes(source.items[axes]) + ", but " +
+                                      (axes ? "an item of each of its axes is picked already" : "it is not a list"));
 }
 
 void find_axes(Pipeline& pipeline, std::size_t index, Diagnostics& diagnostics) {

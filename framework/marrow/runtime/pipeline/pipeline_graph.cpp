@@ -29,6 +29,20 @@ std::vector<std::string> axes_of_passes(const Repetition& repetition, int output
   return axes;
 }
 
+/// `repetition`: the one whose body the pipeline is, or null.
+void add_called(const Pipeline& pipeline, const Repetition* repetition, std::vector<const PipelineNode*>& called) {
+  const std::vector<bool> needed =
+      pipeline.needed([&](const std::string& id) { return repetition && repetition->is_given(id); });
+  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
+    if (!needed[i]) continue;
+    const PipelineNode& node = pipeline.nodes[i];
+    if (node.repetition)
+      add_called(node.repetition->first, node.repetition.get(), called);
+    else
+      called.push_back(&node);
+  }
+}
+
 void write_options(YAML::Emitter& out, const PipelineNode& node) {
   out << YAML::Key << "with" << YAML::Value << YAML::BeginMap;
   for (std::size_t i = 0; i < node.options.size(); ++i) {
@@ -116,24 +130,14 @@ std::vector<bool> Pipeline::needed(const std::function<bool(const std::string&)>
   return result;
 }
 
+bool Repetition::is_given(const std::string& id) const {
+  return std::any_of(given.begin(), given.end(), [&](const Given& one) { return one.node == id; });
+}
+
 std::vector<const PipelineNode*> called_nodes(const Pipeline& pipeline) {
-  std::vector<const PipelineNode*> all;
-  const auto add = [&](const auto& self, const Pipeline& graph, const std::vector<Repetition::Given>& given) -> void {
-    const auto is_given = [&](const std::string& id) {
-      return std::any_of(given.begin(), given.end(), [&](const Repetition::Given& one) { return one.node == id; });
-    };
-    const std::vector<bool> needed = graph.needed(is_given);
-    for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
-      if (!needed[i]) continue;
-      const PipelineNode& node = graph.nodes[i];
-      if (node.repetition)
-        self(self, node.repetition->first, node.repetition->given);
-      else
-        all.push_back(&node);
-    }
-  };
-  add(add, pipeline, {});
-  return all;
+  std::vector<const PipelineNode*> called;
+  add_called(pipeline, nullptr, called);
+  return called;
 }
 
 std::string resolved_yaml(const Pipeline& pipeline) {

@@ -64,7 +64,7 @@ Reference resolve_reference(const std::string& text, const Place& place, const s
     else
       diagnostics.add(place,
                       "node " + in_quotes(id) + " has several outputs" +
-                          (types ? " and not just one " + types_text(*types, "") : ""),
+                          (types ? ", and not exactly one of them is " + types_text(*types, "") : ""),
                       "say which: " + id + "." + joined(names_of(outputs), ", "));
     return source;
   }

@@ -16,8 +16,6 @@ std::string axes_text(const std::vector<std::string>& axes) {
   return axes.empty() ? "one item" : "a list over " + joined(axes, " and ");
 }
 
-bool is_same_output(const Reference& a, const Reference& b) { return a.node == b.node && a.output == b.output; }
-
 /// The body in which given values replace outputs. For each value that `is_given`, a node that is never called is put
 /// in front, and the users of the output are wired to it.
 Pipeline with_given(const Pipeline& body, const std::vector<Repetition::Given>& given,
@@ -40,7 +38,7 @@ Pipeline with_given(const Pipeline& body, const std::vector<Repetition::Given>& 
   const int count = int(nodes.size());
   const auto rewire = [&](Reference& source) {
     for (std::size_t i = 0; i < given.size(); ++i)
-      if (is_given[i] && is_same_output(source, given[i].target)) {
+      if (is_given[i] && source.has_same_output(given[i].target)) {
         source.node = int(place[i]);
         source.output = 0;
         return;
@@ -113,10 +111,10 @@ class RepetitionResolver {
     const auto add = [&](const std::string& name, const Place& place) {
       const Reference target = resolve_reference(name, place, nullptr, body_->nodes, ids, diagnostics_);
       if (target.node >= 0 && !target.items.empty())
-        diagnostics_.add(place, in_quotes(name) + " names one item; the body can be given a whole output only");
+        diagnostics_.add(place, in_quotes(name) + " names one item; only a whole output can be given to the body");
       is_good = is_good && target.node >= 0 && target.items.empty();
       for (const Repetition::Given& other : made_->given)
-        if (target.node >= 0 && is_same_output(other.target, target)) {
+        if (target.node >= 0 && target.has_same_output(other.target)) {
           diagnostics_.add(place, in_quotes(name) + " is given twice, as " + in_quotes(other.name) + " too");
           is_good = false;
         }
@@ -184,10 +182,10 @@ class RepetitionResolver {
     if (!is_complete_) return true;
     bool is_good = true;
     for (const Pipeline* pipeline : {&made_->first, &made_->body}) {
-      const std::vector<bool> needed = pipeline->needed([&](const std::string& id) { return is_given_node(id); });
+      const std::vector<bool> needed = pipeline->needed([&](const std::string& id) { return made_->is_given(id); });
       for (std::size_t i = 0; i < needed.size() && is_good; ++i) {
         const std::string& id = pipeline->nodes[i].id;
-        if (!needed[i] || is_given_node(id) || !incomplete.contains(id)) continue;
+        if (!needed[i] || made_->is_given(id) || !incomplete.contains(id)) continue;
         diagnostics_.add(written_.place,
                          "node " + in_quotes(written_.id) + ": node " + in_quotes(id) +
                              " of the body needs an input of the body that has no value",
@@ -196,10 +194,6 @@ class RepetitionResolver {
       }
     }
     return is_good;
-  }
-
-  bool is_given_node(const std::string& id) const {
-    return std::any_of(made_->given.begin(), made_->given.end(), [&](const auto& one) { return one.node == id; });
   }
 
   void name_ports() {
@@ -215,7 +209,7 @@ class RepetitionResolver {
       if (type.is_function) {
         diagnostics_.add(written_.place,
                          "output " + in_quotes(output.name) + " of the body is a function (" + type.id + ")",
-                         "a body can give out data only; leave the output out");
+                         "the outputs of a body must be data; leave this one out");
         return;
       }
       if (contains(axes, made_->axis)) {

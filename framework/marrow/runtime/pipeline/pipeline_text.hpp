@@ -34,7 +34,6 @@ struct WrittenRepetition {
   std::string until;
   Place until_place;
   int at_most = 0;
-  Place at_most_place;
   bool goes_on = false;
   std::vector<Override> overrides;  ///< changes of the body
 };

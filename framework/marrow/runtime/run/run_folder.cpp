@@ -135,7 +135,7 @@ json inputs_in_body(const PipelineNode& node, const Repetition& repetition, cons
       if (std::size_t(source.output) < outputs.size()) hasher.add(key_of(outputs[std::size_t(source.output)]));
       for (std::size_t i = 0; i < passes.given.size(); ++i) {
         const Reference& target = repetition.given.at(i).target;
-        if (target.node == source.node && target.output == source.output) hasher.add(key_of(passes.given[i]));
+        if (target.has_same_output(source)) hasher.add(key_of(passes.given[i]));
       }
     }
     inputs[node.input_of(wire).name] = hasher.digest().hex();
