@@ -40,9 +40,8 @@ std::string node_with_starts(const Pipeline& pipeline) {
 std::vector<std::string> outputs_of_type(const Pipeline& pipeline, const TypeInfo& type) {
   std::vector<std::string> names;
   for (const PipelineOutput& output : pipeline.outputs) {
-    const PortInfo& port =
-        pipeline.nodes[std::size_t(output.source.node)].info.outputs[std::size_t(output.source.output)];
-    if (port.type == type && pipeline.axes_of(output.source) == std::vector<std::string>{"fragment"})
+    if (pipeline.output_of(output.source).type == type &&
+        pipeline.axes_of(output.source) == std::vector<std::string>{"fragment"})
       names.push_back(output.name);
   }
   return names;

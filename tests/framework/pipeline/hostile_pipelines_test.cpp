@@ -17,12 +17,12 @@ std::string with_key(const std::string& key) {
 }
 
 TEST_F(PipelineTest, NameIsNoPath) {
-  const std::string told = "a pipeline's name becomes a file name: ";
-  expect_fault(with_key("name: ../../x"), 2, 1, told + "'../../x' cannot be one, it holds '/'",
+  const std::string start = "a pipeline's name becomes a file name: ";
+  expect_fault(with_key("name: ../../x"), 2, 1, start + "'../../x' cannot be one, it holds '/'",
                "use at most 100 letters");
-  expect_fault(with_key("name: .."), 2, 1, told + "'..' cannot be one, it begins with a dot",
+  expect_fault(with_key("name: .."), 2, 1, start + "'..' cannot be one, it begins with a dot",
                "use at most 100 letters");
-  expect_fault(with_key("name: ''"), 2, 1, told + "'' cannot be one, it is empty");
+  expect_fault(with_key("name: ''"), 2, 1, start + "'' cannot be one, it is empty");
   expect_fault(with_key("name: \"a\\e[2J\""), 2, 1, "it holds a control character");
   expect_fault(with_key("name: " + std::string(101, 'x')), 2, 1, "it has 101 bytes");
   EXPECT_EQ(read(with_key("name: größer, links (2)")).name, "größer, links (2)");
