@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/compare/experiment.hpp"
 
-#include <algorithm>
-
 #include "draw.hpp"
 #include "experiment_check.hpp"
 #include "marrow/base/number_text.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -18,8 +17,8 @@ std::string list_text(const std::array<double, 3>& values) {
 
 template <class Named>
 std::optional<std::size_t> place_of_name(const std::vector<Named>& all, const std::string& name) {
-  const auto found = std::find_if(all.begin(), all.end(), [&](const Named& one) { return one.name == name; });
-  return found == all.end() ? std::nullopt : std::optional(std::size_t(found - all.begin()));
+  const Named* found = find_named(all, name);
+  return found ? std::optional(std::size_t(found - all.data())) : std::nullopt;
 }
 
 void add_seeded(const SeededInputs& seeded, std::uint64_t seed, std::vector<InputValue>& inputs) {

@@ -68,7 +68,7 @@ class Checker {
     }
   }
 
-  /// Scenes and landscapes belong to a report without being named, but may be.
+  /// A report shows scenes and landscapes even if they are not named; they may be named too.
   void check_pictures(const Pipeline& pipeline) {
     for (std::size_t i = 0; i < experiment_.pictures.size(); ++i) {
       const PipelineOutput* output =

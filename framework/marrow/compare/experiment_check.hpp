@@ -5,7 +5,7 @@
 namespace marrow::compare {
 
 struct CheckedPipelines {
-  std::vector<std::string> notes;  ///< that all variants have: what one alone does not use may be what another needs
+  std::vector<std::string> notes;  ///< of all variants: what one variant does not use, another may need
   std::vector<NamedItem> items;    ///< Experiment::named_items
 };
 

@@ -7,8 +7,8 @@
 
 namespace marrow::compare {
 
-/// Reads the section 'stop': when a comparison that takes more and more cases ends. What it names is known only after
-/// the whole file was read.
+/// Reads the section 'stop': when a comparison with more and more cases ends. Names in it can be checked only after the
+/// whole file was read.
 class StopReader {
  public:
   explicit StopReader(StrictYaml& yaml) : yaml_(yaml) {}

@@ -12,7 +12,7 @@ bool names_a_path(const NodeInfo& info) {
   return false;
 }
 
-/// Whether the node's result depends on the case by itself: by a path or by chance.
+/// Whether the node itself depends on the case, by a path or by chance, and not only through its inputs.
 bool depends_on_case(const PipelineNode& node) {
   if (!node.repetition) return names_a_path(node.info) || node.info.random;
   const std::vector<const PipelineNode*> called = called_nodes(node.repetition->first);
