@@ -13,7 +13,6 @@
 #include <thread>
 
 #include "marrow/runtime/store/store_entry.hpp"
-#include "marrow/runtime/store/store_folder.hpp"
 #include "tests/framework/environment.hpp"
 #include "tests/framework/identities.hpp"
 #include "tests/framework/store/store_fixture.hpp"
@@ -28,14 +27,9 @@ using marrow::SharedStore;
 using marrow::Store;
 using marrow::StoredResult;
 using store_fixture::many;
+using store_fixture::mode_of;
 using store_fixture::number;
 using store_fixture::StoreTest;
-
-mode_t mode_of(const fs::path& path) {
-  struct stat status {};
-  EXPECT_EQ(stat(path.c_str(), &status), 0) << path;
-  return status.st_mode & 07777;
-}
 
 void set_age(const fs::path& path, std::chrono::hours age) {
   fs::last_write_time(path, fs::file_time_type::clock::now() - age);
@@ -57,7 +51,7 @@ class SharedStoreTest : public StoreTest {
     chmod(folder.c_str(), 0700);
   }
   std::shared_ptr<SharedStore> open() const { return std::make_shared<SharedStore>(folder); }
-  fs::path file_of(const Digest& key) const { return folder / key.hex().substr(0, 2) / key.hex(); }
+  fs::path file_of(const Digest& one) const { return marrow::entry_file(folder, one); }
   std::size_t files_below(const fs::path& path) const {
     std::size_t count = 0;
     for (const auto& entry : fs::recursive_directory_iterator(path)) count += entry.is_regular_file();
@@ -136,7 +130,7 @@ TEST_F(SharedStoreTest, ADamagedResultIsNotUsedAndIsReplaced) {
   offer(*shared, key, 7);
   EXPECT_EQ(value_of(host.find(key)), 7);
   fs::resize_file(file_of(key), 10);
-  fs::remove_all(host.folder() / key.hex().substr(0, 2));
+  fs::remove(marrow::entry_file(host.folder(), key));
   EXPECT_FALSE(host.find(key));
   fs::rename(file_of(key), scratch.path / "cut");
   offer(*shared, hash_of(2), 8);
@@ -166,8 +160,7 @@ TEST_F(SharedStoreTest, ItIsUsedByRunsOfTwoHosts) {
 TEST_F(SharedStoreTest, AFaultIsSaidOnceAndTheRunGoesOn) {
   const auto shared = open();
   offer(*shared, hash_of(0), 7);
-  const std::string two = key.hex().substr(0, 2);
-  std::ofstream(folder / two) << "no folder";
+  std::ofstream(file_of(key).parent_path()) << "no folder";
   const Store host(scratch.path / "host", shared);
   EXPECT_FALSE(host.find(key));
   EXPECT_EQ(shared->complaint(),

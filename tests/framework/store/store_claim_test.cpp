@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A result that one process is making: others wait for it, until it is there or nobody makes it any more.
+// While one process makes a result, others wait until it is kept or nobody makes it any more.
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -60,7 +60,7 @@ TEST_F(StoreTest, NoFileStaysOpen) {
   };
   const Digest key = marrow::hash_of(1);
   ASSERT_EQ(store.prepare(), "");
-  std::filesystem::create_directories(store.folder() / key.hex().substr(0, 2) / key.hex());  // a folder is no entry
+  std::filesystem::create_directories(marrow::entry_file(store.folder(), key));  // a folder is no entry
   const auto before = open_files();
   {
     const Store::Claim claim = store.claim(marrow::hash_of(2), nullptr);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is damaged in the store is made again, and nothing is ever half there.
+// Damaged results are made again, and no result is ever half written.
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>

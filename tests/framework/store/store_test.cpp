@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What earlier runs left is read back, and a plan says so before.
+// Results of earlier runs are read back, and a plan says so beforehand.
 #include "tests/framework/store/store_fixture.hpp"
 
 namespace store_test {
