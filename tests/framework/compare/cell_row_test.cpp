@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The row of a cell as text: what was not written by marrow, or was damaged since, is no row.
+// The row of a cell as text: a text that marrow did not write, or that was damaged later, is refused.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>

@@ -11,7 +11,7 @@ namespace experiment_texts_test {
 using namespace experiment_files;
 using marrow::compare::Experiment;
 
-const std::string kGood = std::string(kHead) + kCases + kMetrics;  // lines 1 to 4
+const std::string kGood = kStart + kMetrics;  // lines 1 to 4
 
 class ExperimentTexts : public ExperimentFiles {
  protected:
@@ -25,14 +25,6 @@ class ExperimentTexts : public ExperimentFiles {
         marrow::read_pipeline(experiment.pipeline, arguments, test_catalogue(), diagnostics);
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
     return diagnostics.empty() ? std::get<std::string>(pipeline.nodes[0].options[6]) : "";
-  }
-  void expect_fault(const std::string& text, int line, const std::string& message, const std::string& hint) {
-    read(text);
-    ASSERT_EQ(diagnostics.size(), 1u) << text << diagnostics.text();
-    const marrow::Diagnostic fault = diagnostics.sorted()[0];
-    EXPECT_EQ(fault.place.line, line);
-    EXPECT_EQ(fault.message, message);
-    EXPECT_EQ(fault.hint, hint);
   }
 };
 

@@ -57,7 +57,7 @@ TEST(PlantedDifference, IsNotShownWhereThereIsNone) {
   expect_within(small_p, null_experiments, 0.05);
   expect_within(shown, null_experiments, 0.05);
   expect_within(null_experiments - covered, null_experiments, 0.05);
-  // What the means per case are for: the starts of a case are no evidence of their own.
+  // This is why a case counts by its mean: the starts of a case are not independent evidence.
   EXPECT_GT(starts_as_cases, 3 * small_p);
 }
 
