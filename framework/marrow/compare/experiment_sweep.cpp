@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "experiment_sweep.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <set>
 

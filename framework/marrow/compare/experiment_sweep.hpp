@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "experiment_yaml.hpp"
