@@ -40,7 +40,7 @@ CellRow good_row() {
   return row;
 }
 
-/// The row as a writer that knows the digest would give it: XXH3 of the line without it.
+/// The row as a forger who knows the digest would write it: XXH3 of the line without the digest.
 std::string written(json row) {
   row.erase("digest");
   const std::string line = row.dump();

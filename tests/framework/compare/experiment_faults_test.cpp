@@ -12,11 +12,11 @@ const std::string kAfterCases = std::string(kVariants) + kMetrics;
 
 class ExperimentFaults : public ExperimentFiles {
  protected:
-  /// Of a line after all that there has to be.
+  /// A fault of a line that follows all required lines.
   void expect_fault_of(const std::string& line, const std::string& message, const std::string& hint = "") {
     expect_fault(kGood + line + "\n", 8, message, hint);
   }
-  /// Of a line of a simulation.
+  /// A fault of a line of a simulation.
   void expect_simulation_fault(const std::string& line, const std::string& message, const std::string& hint = "") {
     const std::string pipeline = line.starts_with("pipeline") ? "" : "    pipeline: s.yaml\n",
                       seeds = line.starts_with("seeds") ? "" : "    seeds: 1..2\n";

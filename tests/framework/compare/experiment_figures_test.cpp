@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Figures that no output can have are faults of the experiment's file. The nodes' declarations say what can be.
+// A figure that no output can have is a fault of the experiment's file. The nodes declare the figures that they make.
 #include "experiment_files.hpp"
 #include "marrow/compare/cell.hpp"
 #include "marrow/compare/experiment_notes.hpp"
@@ -81,7 +81,7 @@ TEST_F(ExperimentFigures, EachVariantsOwnNode) {
 TEST_F(ExperimentFigures, ItemsThatTheCaseNames) {
   const Experiment experiment = with_metric("staged.dital.finl.mtre_mm");
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
-  // Stages are made by a search, so only the fragments can be asked for: test.fragments needs no other node.
+  // A search makes the stages, so only the fragments can be looked up: test.fragments needs no other node.
   ASSERT_EQ(experiment.named_items.size(), 1u);
   const NamedItem& item = experiment.named_items[0];
   EXPECT_EQ(item.item, "dital");

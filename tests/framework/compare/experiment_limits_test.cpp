@@ -16,7 +16,7 @@ const std::string kGood = kStart + kVariants + kMetrics;
 
 class ExperimentLimits : public ExperimentFiles {
  protected:
-  /// The only fault, quickly.
+  /// Exactly this fault, found quickly.
   void expect_fault(const std::string& text, const std::string& fault) {
     const std::clock_t start = std::clock();
     read(text);
@@ -96,7 +96,7 @@ TEST_F(ExperimentLimits, AHundredThousandCasesAreReadAtOnce) {
            kVariants + kMetrics);
   EXPECT_EQ(e.cases.size(), 100000u) << diagnostics.text();
   EXPECT_EQ(marrow::compare::cell_of(e, "two/seed-99999/0")->case_index, 99998u);
-  EXPECT_LT(double(std::clock() - start) / CLOCKS_PER_SEC, 20) << "quadratic, it was minutes";
+  EXPECT_LT(double(std::clock() - start) / CLOCKS_PER_SEC, 20) << "with quadratic work it takes minutes";
 }
 
 TEST_F(ExperimentLimits, NamesThatAreTooLongForAFolder) {
@@ -116,7 +116,7 @@ TEST_F(ExperimentLimits, NamesThatTheMatrixComposes) {
                "e.yaml:5:1: error: the matrix makes a variant's name of 102 bytes of its values; as a folder's name it "
                "may have 100\n");
   EXPECT_NE(diagnostics.text().find("hint: name the combinations under  variants:"), std::string::npos);
-  // Whatever the values are, each variant has a folder of its own.
+  // Each variant has its own folder, for any values.
   const auto e = read(kStart + kMetrics + "matrix:\n  c.path: [two, TWO, 'two', two-2, 'a b', a_b]\n");
   EXPECT_EQ(marrow::names_of(e.variants), (std::vector<std::string>{"two", "TWO-3", "two-4", "two-2", "a_b", "a_b-2"}))
       << diagnostics.text();

@@ -67,7 +67,7 @@ TEST_F(ExperimentFiles, WhatIsSetForAllComesBeforeWhatAVariantChanges) {
   };
   EXPECT_EQ(text(0), "c.uses=test.constant f.value=3 c.word=two ");
   EXPECT_EQ(text(1), "c.uses=test.constant f.value=3 c.word=two c.value=2 ");
-  EXPECT_EQ(e.variants[0].overrides.size(), 0u) << "what all have in common tells no variant from another";
+  EXPECT_EQ(e.variants[0].overrides.size(), 0u) << "changes of all variants belong to no single one";
 }
 
 TEST_F(ExperimentFiles, MatrixGivesEveryCombination) {
@@ -76,7 +76,7 @@ TEST_F(ExperimentFiles, MatrixGivesEveryCombination) {
   ASSERT_EQ(e.variants.size(), 6u);
   std::set<std::string> names;
   for (const auto& variant : e.variants) names.insert(variant.name);
-  EXPECT_EQ(names.size(), 6u) << "no two have one name";
+  EXPECT_EQ(names.size(), 6u) << "all names differ";
   EXPECT_TRUE(names.contains("2+add"));
 }
 
@@ -199,7 +199,8 @@ TEST_F(ExperimentFiles, PathsStartAtTheExperiment) {
                               test_catalogue(), diagnostics);
     return std::get<std::string>(p.nodes[0].options.back());
   };
-  EXPECT_EQ(path(0), (scratch.path / "data.txt").string()) << "wherever the program was started";
+  EXPECT_EQ(path(0), (scratch.path / "data.txt").string())
+      << "the folder where the program was started does not matter";
   EXPECT_EQ(path(1), (scratch.path / "cases/a").string());
 }
 

@@ -28,7 +28,7 @@ class ExperimentTexts : public ExperimentFiles {
   }
 };
 
-/// By YAML's rules for quoted texts, each value is what stands between the single quotes.
+/// By YAML's rules for quoted texts, each value is the text between the single quotes.
 TEST_F(ExperimentTexts, ArriveAsTheyAre) {
   const std::vector<std::string> texts{"a #b", "&a b", "! b", "*a",     "- a",     "a: b",   "~",   "null",
                                        "%a",   "| a",  "[a",  "{a: b}", "\"a\" b", "[a] #b", " a ", "größe 漢"};
@@ -72,7 +72,8 @@ TEST_F(ExperimentTexts, NamesThatLookTheSameAreFaults) {
   std::filesystem::create_directories(scratch.path / "cases" / "a\u200b");
   const Experiment experiment = read(kGood + kVariants);
   ASSERT_EQ(experiment.cases.size(), 3u) << diagnostics.text();
-  EXPECT_EQ(experiment.cases[1].name, "a%E2%80%8B") << "a folder that is there is escaped, so that all can see it";
+  EXPECT_EQ(experiment.cases[1].name, "a%E2%80%8B")
+      << "an existing folder gets an escaped name, in which the character can be seen";
 }
 
 /// A draw from [0, 1) is a multiple of 2^-53 (the generator's definition), which no text of six digits is.
@@ -90,7 +91,7 @@ TEST_F(ExperimentTexts, DrawnNumbersKeepAllDigits) {
   EXPECT_EQ(texts.size(), 40u);
 }
 
-/// An input of type integer takes no other number, however many digits it has.
+/// An input of type integer takes only whole numbers, with any number of digits.
 TEST_F(ExperimentTexts, WholeNumbersAreDrawnForIntegers) {
   const auto with = [](const std::string& range) {
     return kHead + ("cases: {simulate: {pipeline: s.yaml, seeds: 1..40, draw: {shape: " + range + "}}}\n") + kVariants +

@@ -30,7 +30,7 @@ double skewed(Random& random) { return -std::log(1 - random.uniform()) - std::lo
 /// On a grid of 0.1: many are 0, and many are equal.
 double tied(Random& random) { return 0.1 * std::round(2 * random.normal()); }
 
-/// Counts the experiments that go wrong, prints the rate, and holds it against 5 %.
+/// Counts the experiments that go wrong, prints the rate, and compares it with 5 %.
 void expect_within_level(const std::string& what, const std::function<bool(Random&)>& goes_wrong) {
   int wrong = 0;
   for (int i = 0; i < kExperiments; ++i) {
@@ -131,7 +131,7 @@ TEST(NullExperiments, StopRuleOfTheWidthOfAMedian) {
       }
 }
 
-/// The runs of a case: each takes its case's end with the probability sqrt(correlation), else its own.
+/// The runs of a case: each takes the outcome of its case with the probability sqrt(correlation), else its own.
 void add_case(CaseRate& rate, Random& random, const std::string& name, std::size_t runs, double truth,
               double correlation) {
   const bool of_case = random.uniform() < truth;

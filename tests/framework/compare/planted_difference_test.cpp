@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Simulated comparisons of two variants: a planted difference is found, and where there is none, none is shown.
+// Simulated comparisons of two variants. A planted difference is found; without one, none is shown.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -78,7 +78,7 @@ TEST(PlantedDifference, IsNotShownAmongSeveralVariantsAfterHolm) {
   EXPECT_GT(uncorrected, 2 * corrected);
 }
 
-/// In how many of 100 experiments the difference is shown, as one of three variants after Holm.
+/// The number of experiments, of 100, that show the difference of one of three variants after Holm.
 int found_of_100(double shift_mm) {
   std::mt19937_64 random(3);
   int found = 0, covered = 0;

@@ -35,7 +35,7 @@ void set_age(const fs::path& path, std::chrono::hours age) {
   fs::last_write_time(path, fs::file_time_type::clock::now() - age);
 }
 
-/// Of a result that took so long.
+/// The provenance of a result that took this many seconds.
 marrow::Provenance took(double seconds) {
   marrow::Provenance provenance;
   provenance.node = "test.work";
@@ -64,7 +64,7 @@ class SharedStoreTest : public StoreTest {
     if (!found) return std::nullopt;
     return found->outputs.at(0).as<marrow::Metrics>().items.at(0).value;
   }
-  /// What is said of the folder.
+  /// Why the folder cannot be used.
   std::string fault() const { return open()->fault(); }
 
   fs::path folder = scratch.path / "shared";
@@ -125,7 +125,7 @@ TEST_F(SharedStoreTest, ADamagedResultIsNotUsedAndIsReplaced) {
   std::fstream(file_of(key), std::ios::in | std::ios::out).seekp(-3, std::ios::end).put('x');
   const Store host(scratch.path / "host", shared);
   EXPECT_FALSE(host.find(key));
-  EXPECT_FALSE(host.find(key, Store::Where::here)) << "nor was it copied";
+  EXPECT_FALSE(host.find(key, Store::Where::here)) << "it was not copied either";
   EXPECT_EQ(shared->complaint(), "") << "another host may replace it";
   offer(*shared, key, 7);
   EXPECT_EQ(value_of(host.find(key)), 7);
@@ -152,7 +152,7 @@ TEST_F(SharedStoreTest, ItIsUsedByRunsOfTwoHosts) {
   EXPECT_EQ(first.nodes[0].calls, 1);
   EXPECT_EQ(second.nodes[0].calls, 0);
   EXPECT_EQ(second.nodes[0].cached, 1);
-  EXPECT_EQ(second.nodes[1].calls, 1) << "nobody else wants it, and it is quick";
+  EXPECT_EQ(second.nodes[1].calls, 1) << "no other cell needs it, and it is quick";
   EXPECT_EQ(result_of(first), result_of(second));
   EXPECT_EQ(files_below(folder), 2u) << "the result and the marker";
 }
@@ -175,7 +175,7 @@ TEST_F(SharedStoreTest, AFaultIsSaidOnceAndTheRunGoesOn) {
   offer(*writes, key, 7);
   EXPECT_EQ(writes->complaint(),
             "cannot write " + file_of(key).string() + ": Not a directory; nothing more is written to the shared store");
-  EXPECT_EQ(value_of(Store(scratch.path / "other", writes).find(hash_of(0))), 7) << "what is there is read";
+  EXPECT_EQ(value_of(Store(scratch.path / "other", writes).find(hash_of(0))), 7) << "existing results are still read";
 }
 
 TEST_F(SharedStoreTest, ItsUseIsNotedOnceADay) {
@@ -330,7 +330,7 @@ TEST_F(SharedStoreTest, WhatIsCollected) {
   }
   const std::uint64_t size = fs::file_size(file_of(hash_of(1)));
   EXPECT_EQ(shared->collect(2 * size).entries, 1u);
-  EXPECT_FALSE(fs::exists(file_of(hash_of(2)))) << "it was used longest ago";
+  EXPECT_FALSE(fs::exists(file_of(hash_of(2)))) << "it is the least recently used";
   EXPECT_TRUE(fs::exists(file_of(hash_of(1))));
   EXPECT_TRUE(fs::exists(temporary(elsewhere)));
   EXPECT_TRUE(fs::exists(folder / "claims" / hash_of(elsewhere).hex()));
@@ -364,7 +364,7 @@ TEST_F(SharedStoreTest, ManyThatMakeItAtTheSameTimeAllUseIt) {
 TEST_F(SharedStoreTest, TheTimeIsThatOfTheFileSystem) {
   const auto now = marrow::time_in(folder);
   ASSERT_TRUE(now);
-  EXPECT_NEAR(double(now->tv_sec), double(time(nullptr)), 60) << "here it is a disk of this host";
+  EXPECT_NEAR(double(now->tv_sec), double(time(nullptr)), 60) << "the folder is on a disk of this host";
   EXPECT_TRUE(fs::is_empty(folder));
   EXPECT_FALSE(marrow::time_in(folder / "absent"));
 }

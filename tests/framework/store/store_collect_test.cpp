@@ -46,7 +46,7 @@ TEST_F(StoreTest, RecordsOfLastResultsGoWithTheResults) {
   for (const Store::Entry& entry : store.entries())
     fs::last_write_time(marrow::entry_file(store.folder(), entry.key), now - std::chrono::hours(60));
   EXPECT_EQ(store.collect(one).entries, 1u);
-  EXPECT_EQ(remembered().size(), 2u) << "the call of the result that is kept may have begun then";
+  EXPECT_EQ(remembered().size(), 2u) << "the call that made the kept result may have begun then";
   fs::last_write_time(store.folder() / "last" / marrow::hash_of(std::string("old")).hex(),
                       now - std::chrono::hours(90));
   EXPECT_EQ(store.collect(2 * one).entries, 0u);
@@ -73,7 +73,7 @@ class TidyingTest : public StoreTest {
   std::size_t records() const {
     return std::size_t(std::distance(fs::directory_iterator(store.folder() / "last"), fs::directory_iterator()));
   }
-  /// The shortest of several times to look through that many records. A limit that nothing exceeds removes none.
+  /// The shortest of several times to look through that many records. The limit is so high that none is removed.
   double seconds_to_look_through(int count) {
     fill(count);
     const std::uint64_t all = std::uint64_t(1) << 40;
@@ -105,7 +105,7 @@ TEST_F(TidyingTest, StopsWhenItIsAskedTo) {
   fill(100);
   std::atomic<bool> cancelled{true};
   EXPECT_EQ(store.tidy(&cancelled), "");
-  EXPECT_EQ(records(), 100u) << "nothing is removed any more";
+  EXPECT_EQ(records(), 100u) << "it stopped before it removed anything";
   fs::remove(store.folder() / "tidied");
   cancelled = false;
   EXPECT_EQ(store.tidy(&cancelled), "");

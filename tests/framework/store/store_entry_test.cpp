@@ -47,7 +47,7 @@ TEST_F(StoreEntryTest, AnEntryUnderAnothersNameIsNotAccepted) {
   ASSERT_EQ(store.save(other, {number(2)}, {}), "");
   fs::copy_file(file_of(key), file_of(other), fs::copy_options::overwrite_existing);
   EXPECT_FALSE(store.find(other));
-  EXPECT_FALSE(fs::exists(file_of(other))) << "removed, as a damaged one is";
+  EXPECT_FALSE(fs::exists(file_of(other))) << "removed like a damaged entry";
   ASSERT_TRUE(store.find(key));
   EXPECT_EQ(store.find(key)->outputs[0].as<Metrics>().items[0].value, 1);
 }
@@ -99,7 +99,7 @@ TEST_F(StoreEntryTest, SizesThatWrapOrLieOutsideAreDamage) {
   }
   forge({{}, {}, {leaf(true, 0, 0)}, 0});
   ASSERT_TRUE(store.find(key));
-  EXPECT_THROW(store.find(key)->outputs[0].as<Metrics>(), marrow::DamagedEntry) << "no bytes are no metrics";
+  EXPECT_THROW(store.find(key)->outputs[0].as<Metrics>(), marrow::DamagedEntry) << "an empty value cannot be metrics";
 }
 
 TEST_F(StoreEntryTest, ListsThatAreNoneAreDamage) {

@@ -2,6 +2,7 @@
 #pragma once
 // What the tests of the store share: values to keep, and runs with their own store.
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "marrow/runtime/store/store.hpp"
 #include "marrow/runtime/store/store_folder.hpp"
@@ -41,6 +42,24 @@ inline std::filesystem::path only_file(const std::filesystem::path& folder) {
         entry.path().parent_path().filename() != "last")
       found = entry.path();
   return found;
+}
+
+/// Starts a process that holds what `claim` returns while it does `work`. Returns its number once it has claimed.
+template <class Claim, class Work>
+pid_t claimer(const Claim& claim, const Work& work) {
+  int pipe_ends[2];
+  EXPECT_EQ(pipe(pipe_ends), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    const auto held = claim();
+    if (write(pipe_ends[1], "c", 1) != 1) _exit(1);
+    work();
+    _exit(0);
+  }
+  char told = 0;
+  EXPECT_EQ(read(pipe_ends[0], &told, 1), 1);
+  for (const int end : pipe_ends) close(end);
+  return child;
 }
 
 class StoreTest : public testing::Test {

@@ -101,8 +101,8 @@ TEST_F(StoreFolderTest, ACaseInUseIsLeft) {
   std::shared_ptr<const void> first = marrow::use_folder(one), second = marrow::use_folder(one);
   ASSERT_TRUE(first && second);
   Store::Freed freed = store.collect(0);
-  EXPECT_EQ(freed.fault, "") << "what is in use is no fault";
-  EXPECT_EQ(freed.entries, 1u) << "the entry alone";
+  EXPECT_EQ(freed.fault, "") << "a case in use is not a fault";
+  EXPECT_EQ(freed.entries, 1u) << "only the entry";
   EXPECT_TRUE(fs::exists(one / "outputs" / "ct.mha"));
   first.reset();
   EXPECT_EQ(store.collect(0).entries, 0u);
@@ -214,7 +214,7 @@ TEST_F(StoreFolderTest, AFolderThatOthersMayWriteIsNotUsed) {
 }
 
 TEST_F(StoreFolderTest, AFolderOfAnotherUserIsNotUsed) {
-  if (geteuid() != 0) GTEST_SKIP() << "only root can make one";
+  if (geteuid() != 0) GTEST_SKIP() << "only root can make a folder of another user";
   ASSERT_EQ(save(store), "");
   const passwd* other = getpwuid(1);
   ASSERT_EQ(chown(folder.c_str(), 1, 1), 0);
@@ -265,7 +265,7 @@ TEST_F(StoreFolderTest, WhereTheStoreIs) {
   for (const auto& home : {std::optional<std::string>(), std::optional<std::string>("")}) {
     environment.set("HOME", home);
     EXPECT_EQ(Store::default_folder(), own ? fs::path(own->pw_dir) / ".cache/marrow/store" : fs::path())
-        << "never a folder that all share";
+        << "it is never a folder that all users share";
   }
 }
 
