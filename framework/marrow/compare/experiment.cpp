@@ -2,7 +2,6 @@
 #include "marrow/compare/experiment.hpp"
 
 #include "draw.hpp"
-#include "experiment_check.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 
@@ -78,17 +77,6 @@ PipelineArguments simulation_arguments_of(const Experiment& experiment, std::siz
   PipelineArguments arguments{simulation.inputs, simulation.changes};
   add_seeded(simulation.seeded, experiment.cases[case_index].seed, arguments.inputs);
   return arguments;
-}
-
-Experiment read_experiment(const fs::path& file, const Catalogue& catalogue, Diagnostics& diagnostics,
-                           std::size_t more_cases) {
-  WrittenExperiment written = read_written_experiment(file, diagnostics, more_cases);
-  if (!diagnostics.empty()) return std::move(written.experiment);
-  const CheckedPipelines checked = check_pipelines(written, catalogue, diagnostics);
-  Experiment& experiment = written.experiment;
-  experiment.named_items = checked.items;
-  experiment.notes = checked.notes;
-  return std::move(experiment);
 }
 
 }  // namespace marrow::compare
