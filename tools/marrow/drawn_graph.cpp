@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drawn_graph.hpp"
 
-#include <algorithm>
-
 #include "marrow/base/number_text.hpp"
 
 namespace marrow::cli {
@@ -26,7 +24,7 @@ class Drawing {
       }
       for (const Wire& wire : node.wires)
         for (const Reference& source : wire.sources)
-          add_edges(pipeline, source, path, outer, around, id, node.info.inputs[std::size_t(wire.port)].name);
+          add_edges(pipeline, source, path, outer, around, id, node.input_of(wire).name);
     }
   }
 
@@ -35,10 +33,8 @@ class Drawing {
  private:
   void add_body(const Pipeline& pipeline, const PipelineNode& node, const std::string& id) {
     const Repetition& repetition = *node.repetition;
-    const std::vector<bool> of_first = repetition.first.needed([&](const std::string& name) {
-      return std::any_of(repetition.given.begin(), repetition.given.end(),
-                         [&](const Repetition::Given& one) { return one.node == name; });
-    });
+    const std::vector<bool> of_first =
+        repetition.first.needed([&](const std::string& name) { return repetition.is_given(name); });
     const std::size_t count = repetition.alone.nodes.size();
     add(repetition.alone, {of_first.end() - std::ptrdiff_t(count), of_first.end()}, id + "/", &pipeline, &node);
     for (const PipelineOutput& output : repetition.alone.outputs)
@@ -47,8 +43,8 @@ class Drawing {
 
   void add_edges(const Pipeline& pipeline, const Reference& source, const std::string& path, const Pipeline* outer,
                  const PipelineNode* around, const std::string& to, const std::string& port) {
-    const PipelineNode& from = pipeline.nodes[std::size_t(source.node)];
-    const bool is_function = from.info.outputs[std::size_t(source.output)].type.is_function;
+    const PipelineNode& from = pipeline.node_of(source);
+    const bool is_function = pipeline.output_of(source).type.is_function;
     const auto add_edge = [&](const std::string& id, bool is_of_pass_before) {
       drawn_.edges.push_back({id, to, port, is_function, is_of_pass_before});
     };
@@ -56,16 +52,15 @@ class Drawing {
     const std::string outer_path = path.substr(0, path.empty() ? 0 : path.find_last_of('/', path.size() - 2) + 1);
     for (std::size_t i = 0; around && i < around->repetition->given.size(); ++i) {
       const Repetition::Given& given = around->repetition->given[i];
-      if (given.target.node != source.node || given.target.output != source.output) continue;
+      if (!given.target.has_same_output(source)) continue;
       for (const Wire& wire : around->wires)
         if (std::size_t(wire.port) == i) {
           is_made_in_body = false;
-          for (const Reference& one : wire.sources)
-            add_edge(outer_path + outer->nodes[std::size_t(one.node)].id, false);
+          for (const Reference& one : wire.sources) add_edge(outer_path + outer->node_of(one).id, false);
         }
       if (given.carried < 0) continue;
       const Reference& carried = pipeline.outputs[std::size_t(given.carried)].source;
-      add_edge(path + pipeline.nodes[std::size_t(carried.node)].id, true);
+      add_edge(path + pipeline.node_of(carried).id, true);
     }
     if (is_made_in_body) add_edge(path + from.id, false);
   }

@@ -33,8 +33,7 @@ void print_nodes(const Pipeline& pipeline, const std::string& margin) {
     for (const Wire& wire : node.wires) {
       std::string sources;
       for (const Reference& source : wire.sources) sources += (sources.empty() ? "" : " + ") + source.text;
-      std::printf("%s    %s <- %s\n", margin.c_str(), node.info.inputs[std::size_t(wire.port)].name.c_str(),
-                  printable(sources).c_str());
+      std::printf("%s    %s <- %s\n", margin.c_str(), node.input_of(wire).name.c_str(), printable(sources).c_str());
     }
     if (!node.repetition) continue;
     for (const Repetition::Given& given : node.repetition->given)
@@ -85,8 +84,8 @@ void print_dot(const Pipeline& pipeline) {
                 dot_text(edge.port).c_str(), edge.is_function ? ", style=dashed" : "",
                 edge.is_of_pass_before ? ", constraint=false, color=gray50" : "");
   for (const PipelineOutput& output : pipeline.outputs) {
-    const PipelineNode& from = pipeline.nodes[std::size_t(output.source.node)];
-    const bool is_function = from.info.outputs[std::size_t(output.source.output)].type.is_function;
+    const PipelineNode& from = pipeline.node_of(output.source);
+    const bool is_function = pipeline.output_of(output.source).type.is_function;
     std::printf("  \"output %s\" [label=\"%s\", shape=ellipse];\n", dot_text(output.name).c_str(),
                 dot_text(output.name).c_str());
     std::printf("  \"%s\" -> \"output %s\" [label=\"\"%s];\n", dot_text(from.id).c_str(), dot_text(output.name).c_str(),

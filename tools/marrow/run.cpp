@@ -263,8 +263,7 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
 
 void expect_files_can_hold(const Pipeline& pipeline, const Catalogue& catalogue) {
   for (const PipelineOutput& output : pipeline.outputs) {
-    const TypeInfo& type =
-        pipeline.nodes[std::size_t(output.source.node)].info.outputs[std::size_t(output.source.output)].type;
+    const TypeInfo& type = pipeline.output_of(output.source).type;
     if (!catalogue.find_writer(type))
       throw Error(printable(pipeline.file.string()) + ": output '" + output.name + "' is " +
                   (type.is_function ? "a function" : "of the type " + std::string(type.id)) +

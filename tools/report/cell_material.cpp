@@ -24,15 +24,10 @@ struct CellsOfStart {
   ReportMaterial material;
 };
 
-/// The groups of things that cells name.
-std::array<std::pair<const char*, json*>, 3> groups_of(ReportMaterial& material) {
-  return {{{"pictures", &material.pictures}, {"geometries", &material.geometries}, {"scenes", &material.scenes}}};
-}
-
-/// The bytes by which `data` grows if a place is added. What another place has already added does not count.
+/// The bytes by which `data` grows if a place is added. Things that another place has added do not count.
 std::size_t growth(const json& data, CellsOfStart& place) {
   std::size_t bytes = json_text(place.cells).size();
-  for (const auto& [name, group] : groups_of(place.material))
+  for (const auto& [name, group] : place.material.groups())
     for (const auto& [id, thing] : group->items())
       if (!data.at(name).contains(id)) bytes += id.size() + 5 + json_text(thing).size();
   return bytes;
@@ -40,7 +35,7 @@ std::size_t growth(const json& data, CellsOfStart& place) {
 
 void enter(json& data, CellsOfStart place) {
   for (json& cell : place.cells) data["materials"].push_back(std::move(cell));
-  for (const auto& [name, group] : groups_of(place.material)) data[name].update(*group);
+  for (const auto& [name, group] : place.material.groups()) data[name].update(*group);
 }
 
 std::vector<std::string> kinds_in(const json& cells) {
@@ -56,7 +51,7 @@ std::vector<std::string> kinds_in(const json& cells) {
 json written_beside(CellsOfStart place, const fs::path& folder) {
   const std::vector<std::string> kinds = kinds_in(place.cells);
   json content = {{"materials", std::move(place.cells)}};
-  for (const auto& [name, group] : groups_of(place.material)) content[name] = std::move(*group);
+  for (const auto& [name, group] : place.material.groups()) content[name] = std::move(*group);
   const std::string text = json_text(content), name = hash_of(text).hex().substr(0, 16) + ".js";
   std::error_code error;
   fs::create_directories(folder, error);

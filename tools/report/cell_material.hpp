@@ -14,10 +14,10 @@ namespace marrow::cli {
 /// All cells, as data.js describes a cell_table.
 nlohmann::json cell_table(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
 
-/// Enters the materials of the cells in `shown` into `data`, those of a case and start together, in this order, as long
-/// as the page has at most `most_bytes`. The others become files of FOLDER/report, which `data` lists as parts. A file
-/// is named after its content and holds a script, because a page from disk may load nothing else. Only one case and
-/// start at a time is in memory besides the page. Throws Error if a file cannot be written.
+/// Enters the materials of the cells in `shown` into `data`, in this order, as long as the page has at most
+/// `most_bytes`. Those of a case and start stay together. The others become files of FOLDER/report, which `data` lists
+/// as parts. A file is named after its content. It holds a script, because a page from disk may load nothing else.
+/// Besides the page, only one case and start is in memory at a time. Throws Error if a file cannot be written.
 void add_cell_materials(nlohmann::json& data, const compare::CellRunner& runner,
                         const std::vector<compare::CellIndex>& shown, const std::filesystem::path& folder,
                         std::size_t most_bytes);
@@ -25,7 +25,7 @@ void add_cell_materials(nlohmann::json& data, const compare::CellRunner& runner,
 /// Removes the files of FOLDER/report that `data` does not list: those of an earlier page. Other files stay.
 void remove_other_parts(const nlohmann::json& data, const std::filesystem::path& folder);
 
-/// Whether a file of FOLDER/report is a part of a page, by its name.
+/// Whether a file of this name in FOLDER/report is a part of a page.
 bool is_part_name(const std::string& name);
 
 /// Bytes of the page with these data.

@@ -12,7 +12,7 @@ namespace {
 using compare::CellRow;
 using nlohmann::json;
 
-/// Enough digits to tell cells apart; the tables have all.
+/// Enough digits to tell cells apart; the tables have all of them.
 constexpr std::size_t kKeyDigits = 12;
 
 /// With nine digits, like the tables for other programs: half as long as the exact number.
@@ -21,7 +21,7 @@ json rounded(const std::optional<double>& value) {
   return parsed_number(formatted("{:.9g}", *value)).value();
 }
 
-/// Texts that many cells share, each of them once.
+/// Texts that many cells share. Each is stored once.
 class Texts {
  public:
   json place_of(const std::string& text) {

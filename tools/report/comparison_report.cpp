@@ -37,7 +37,7 @@ std::string success_sentence(const Experiment& experiment, const std::vector<std
       limits += (limits.empty() ? "" : " and ") + metric.label + limit + (units[m].empty() ? "" : " " + units[m]);
     }
   return limits.empty() ? "The experiment sets no limits, so no run is a success or a miss."
-                        : "A run is a success with " + limits + "; a failed run is none.";
+                        : "A run is a success with " + limits + "; a failed run is not.";
 }
 
 json pipeline_graph(const Experiment& experiment, const compare::CellRunner& runner) {

@@ -39,7 +39,7 @@ json given_options(const PipelineNode& node) {
 std::string wires_of(const PipelineNode& node) {
   std::string text;
   for (const Wire& wire : node.wires) {
-    text += node.info.inputs[std::size_t(wire.port)].name + ":";
+    text += node.input_of(wire).name + ":";
     for (const Reference& source : wire.sources) text += " " + source.text;
     text += "\n";
   }

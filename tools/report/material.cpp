@@ -62,12 +62,6 @@ json convergence_of(const std::string& pose) {
   return steps;
 }
 
-json landscape_of(const json& file) {
-  json profiles = json::array();
-  for (json profile : file.at("profiles")) profiles.push_back(profile);
-  return profiles;
-}
-
 /// The cells of a line of CSV; a quoted one may hold commas and, doubled, quotes.
 std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> cells(1);
@@ -129,8 +123,12 @@ std::vector<std::string> files_in(const json& record) {
 
 }  // namespace
 
+std::array<std::pair<const char*, json*>, 3> ReportMaterial::groups() {
+  return {{{"pictures", &pictures}, {"geometries", &geometries}, {"scenes", &scenes}}};
+}
+
 void ReportMaterial::add_json(const json& file, json& cell) {
-  if (file.contains("marrow-landscape") && !cell.contains("landscape")) cell["landscape"] = landscape_of(file);
+  if (file.contains("marrow-landscape") && !cell.contains("landscape")) cell["landscape"] = file.at("profiles");
   if (!file.contains("marrow-scene")) return;
   json scene = file;
   for (json& mesh : scene["meshes"]) {
@@ -200,11 +198,8 @@ void ReportMaterial::prepare(const fs::path& run_folder) {
   ReportMaterial material;
   json cell = json::object();
   material.add_run(run_folder, cell);
-  const json all = {{"cell", cell},
-                    {"pictures", material.pictures},
-                    {"geometries", material.geometries},
-                    {"scenes", material.scenes},
-                    {"left_out", material.left_out}};
+  json all = {{"cell", std::move(cell)}, {"left_out", material.left_out}};
+  for (const auto& [name, group] : material.groups()) all[name] = std::move(*group);
   write_text_file(run_folder / "report.json", json_text(all));
 }
 
@@ -214,15 +209,14 @@ void ReportMaterial::add_prepared(const fs::path& run_folder, json& cell) {
     const auto file = file_of_run(run_folder, "report.json");
     if (!file) throw Error("not there");
     prepared = parse_json(read_text_file(*file, kMostRecordBytes), "report.json");
-    for (const char* part : {"cell", "pictures", "geometries", "scenes"})
-      if (!prepared.at(part).is_object()) throw Error("damaged");
+    bool is_good = prepared.at("cell").is_object();
+    for (const auto& [name, group] : groups()) is_good = prepared.at(name).is_object() && is_good;
+    if (!is_good) throw Error("damaged");
   } catch (const std::exception&) {  // not there, or damaged
     return add_run(run_folder, cell);
   }
   cell.update(prepared["cell"]);
-  pictures.update(prepared["pictures"]);
-  geometries.update(prepared["geometries"]);
-  scenes.update(prepared["scenes"]);
+  for (const auto& [name, group] : groups()) group->update(prepared[name]);
   for (const std::string line : prepared.value("left_out", json::array())) left_out.push_back(line);
 }
 

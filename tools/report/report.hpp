@@ -2,6 +2,7 @@
 #pragma once
 // Writes one HTML file that shows a run or a comparison and needs no other file. For a large comparison, further
 // pictures are beside it. data.js in tools/report/page describes the data.
+#include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -18,6 +19,8 @@ struct ReportMaterial {
   nlohmann::json geometries = nlohmann::json::object();
   nlohmann::json scenes = nlohmann::json::object();
   std::vector<std::string> left_out;  ///< sentences about files that a record names outside its run's folder
+  /// `pictures`, `geometries` and `scenes` with their names.
+  std::array<std::pair<const char*, nlohmann::json*>, 3> groups();
   /// Adds a sentence to `left_out` if the name of a file, or a link, leads out of the run's folder.
   void note_if_outside(const std::filesystem::path& run_folder, const std::string& name);
   void print_left_out() const;

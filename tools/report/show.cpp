@@ -88,12 +88,15 @@ json graph_of_run(const fs::path& file) {
   return diagnostics.empty() ? graph_of(pipeline, {}) : json();  // for example, a plugin no longer exists
 }
 
+std::string failure_of(const json& node) {
+  return "node '" + node.value("id", "") + "' (" + node.value("uses", "") + ") failed: " + node.value("reason", "");
+}
+
 std::string reason_of(const json& record) {
   for (const json& node : record.value("nodes", json::array()))
     if (node.value("status", "") == "failed") {
       const int stopped = node.value("not_run_because_of_it", 0);
-      return "node '" + node.value("id", "") + "' (" + node.value("uses", "") +
-             ") failed: " + node.value("reason", "") + (stopped > 0 ? "\n" + not_run_text(stopped) : "");
+      return failure_of(node) + (stopped > 0 ? "\n" + not_run_text(stopped) : "");
     }
   return "it was stopped before it was done";
 }
@@ -103,14 +106,13 @@ std::string absent_of(const json& record) {
   std::string text;
   for (const json& node : record.value("nodes", json::array()))
     if (node.value("status", "") == status_name(NodeRecord::Status::failed_alone))
-      text += (text.empty() ? "node '" : "\nnode '") + node.value("id", "") + "' (" + node.value("uses", "") +
-              ") failed: " + node.value("reason", "");
+      text += (text.empty() ? "" : "\n") + failure_of(node);
   return text;
 }
 
 json page_of(const fs::path& folder, const json& record, ReportMaterial& material) {
-  const std::string name = fs::absolute(folder / ".").parent_path().filename().string();
-  json cell = {{"id", name},
+  const std::string run_name = fs::absolute(folder / ".").parent_path().filename().string();
+  json cell = {{"id", run_name},
                {"variant", 0},
                {"case", 0},
                {"start", 0},
@@ -126,21 +128,19 @@ json page_of(const fs::path& folder, const json& record, ReportMaterial& materia
                {"format", 1},
                {"kind", "run"},
                {"metrics", json::array()},
-               {"cases", {name}},
+               {"cases", {run_name}},
                {"starts", {"0"}},
                {"variants", {{{"name", "result"}, {"is_baseline", false}, {"options", json::object()}}}}};
   data["figures"] = figures_of(folder, record);
   data["passes"] = passes_of(record);
   material.add_run(folder, cell);
   data["cells"] = {cell};
-  data["pictures"] = std::move(material.pictures);
-  data["geometries"] = std::move(material.geometries);
-  data["scenes"] = std::move(material.scenes);
+  for (const auto& [name, group] : material.groups()) data[name] = std::move(*group);
   const auto pipeline = file_of_run(folder, "pipeline.yaml");
   if (!pipeline) material.note_if_outside(folder, "pipeline.yaml");
   const json graph = pipeline ? graph_of_run(*pipeline) : json();
   if (graph.is_object()) data["graph"] = graph;
-  data["experiment"] = {{"name", record.value("pipeline", name)},
+  data["experiment"] = {{"name", record.value("pipeline", run_name)},
                         {"pipeline_text", pipeline ? text_if_readable(*pipeline) : ""},
                         {"seed", record.contains("seed") ? record["seed"] : json(1)},
                         {"finished", record.value("finished", "")},

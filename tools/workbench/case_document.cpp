@@ -20,7 +20,7 @@ using nlohmann::json;
 
 /// Numbers and truth values keep their type; everything else becomes a text.
 json json_of_scalar(const YAML::Node& node) {
-  if (node.Tag() == "!") return node.Scalar();  // it was quoted
+  if (node.Tag() == "!") return node.Scalar();  // a text in quotes
   bool truth = false;
   double number = 0;
   std::int64_t whole = 0;
@@ -57,18 +57,11 @@ json matrix_of(const json& placement) {
   return matrix;
 }
 
-void adapt(json& document, const std::string& base) {
-  const auto move = [&](json& path) { path = base + path.get<std::string>(); };
-  json& ct = document["ct"];
-  if (ct.is_string()) ct = {{"file", ct}};
-  move(ct.at("file"));
-  for (json& view : document.at("views")) {
-    move(view.at("image"));
-    if (view.contains("mask")) move(view["mask"]);
-    json& camera = view.at("camera");
-    if (camera.is_string()) camera = {{"file", camera}};
-    if (camera.contains("file")) move(camera["file"]);
-  }
+/// Replaces the short forms of a case.yaml by those of a document.
+void adapt(json& document) {
+  if (json& ct = document["ct"]; ct.is_string()) ct = {{"file", ct}};
+  for (json& view : document.at("views"))
+    if (json& camera = view.at("camera"); camera.is_string()) camera = {{"file", camera}};
   for (auto& [name, fragment] : document.at("fragments").items())
     for (const char* key : {"start", "truth"})
       if (fragment.contains(key)) fragment[key] = matrix_of(fragment[key]);
@@ -77,13 +70,26 @@ void adapt(json& document, const std::string& base) {
 
 }  // namespace
 
+void put_below(json& document, const std::string& case_path) {
+  const auto move = [&](json& path) {
+    if (!case_path.empty()) path = case_path + "/" + path.get<std::string>();
+  };
+  move(document.at("ct").at("file"));
+  for (json& view : document.at("views")) {
+    move(view.at("image"));
+    if (view.contains("mask") && !view["mask"].is_null()) move(view["mask"]);
+    if (view.at("camera").contains("file")) move(view["camera"]["file"]);
+  }
+}
+
 json document_of_case(const OpenedFolder& folder, const std::string& case_path) {
   const fs::path file = folder.inside(case_path) / "case.yaml";
   json document{{"ct", nullptr}, {"views", json::array()}, {"fragments", json::object()}};
   if (fs::exists(file)) {
     try {
       document = json_of_yaml(YAML::Load(plain_text(read_text_file(file, kMostSourceBytes))));
-      adapt(document, case_path.empty() ? "" : case_path + "/");
+      adapt(document);
+      put_below(document, case_path);
     } catch (const std::exception& error) {
       throw Error(printable(file.string()) + ": this case cannot be read here: " + printable(error.what()) +
                   "; 'marrow inspect' says what is wrong");

@@ -15,7 +15,7 @@ struct PlannedCase {
   struct File {
     std::filesystem::path from;  ///< a file, or the folder of a series
     std::string name;            ///< its path in the case's folder
-    bool is_new = false;         ///< it is elsewhere and will be copied
+    bool is_new = false;         ///< `from` is outside the case's folder and will be copied
   };
   nlohmann::json document;
   std::vector<File> files;
@@ -24,6 +24,9 @@ struct PlannedCase {
 /// Files outside the case's folder get a name that is free there; if the folder already has the same file, that one is
 /// used. Throws Error with everything that is missing.
 PlannedCase plan_case(const OpenedFolder& folder, const std::string& case_path, nlohmann::json document);
+
+/// Makes the paths of a document, which are relative to the case's folder, relative to the opened folder.
+void put_below(nlohmann::json& document, const std::string& case_path);
 
 /// The text of case.yaml.
 std::string case_yaml(const PlannedCase& plan);

@@ -21,7 +21,7 @@ namespace {
 
 using nlohmann::json;
 
-/// A file's name for the path of a case: "cases/7" is "cases%2F7.jsonl".
+/// The name of a draft's file for the path of a case: "cases/7" is "cases%2F7.jsonl".
 std::string file_name(const std::string& case_path) {
   std::string name;
   for (const char c : case_path) name += c == '/' ? "%2F" : c == '%' ? "%25" : std::string(1, c);
@@ -37,7 +37,7 @@ void append_line(const fs::path& file, const std::string& line) {
   const bool is_good = write_all(descriptor, line) && fsync(descriptor) == 0;
   const std::string why = std::strerror(errno);
   if (!is_good && ftruncate(descriptor, before) != 0) {
-    // the half line is left out when the draft is read
+    // whoever reads the draft skips the half line
   }
   if (!is_good) throw Error("the change is not kept in the draft: " + why + "; make room and try again");
 }
@@ -62,7 +62,7 @@ void Drafts::apply(Draft& draft, const json& line) {
 
 void Drafts::append(Draft& draft, const json& line) {
   std::string lines = json_text(line) + "\n";
-  if (draft.bytes == 0)  // the beginning belongs to the history, too
+  if (draft.bytes == 0)  // the history includes the beginning
     lines = json_text({{"what", draft.steps[0].what}, {"document", draft.steps[0].document}}) + "\n" + lines;
   append_line(draft.file, lines);
   draft.bytes += lines.size();
@@ -121,17 +121,11 @@ json Drafts::change(const std::string& case_path, int revision, const std::strin
   return shown(case_path, draft);
 }
 
-json Drafts::undo(const std::string& case_path, int revision) {
+json Drafts::step(const std::string& case_path, int revision, bool is_redo) {
   const std::lock_guard lock(mutex_);
   Draft& draft = find(case_path, revision);
-  if (draft.at > 0) append(draft, {{"undo", true}});
-  return shown(case_path, draft);
-}
-
-json Drafts::redo(const std::string& case_path, int revision) {
-  const std::lock_guard lock(mutex_);
-  Draft& draft = find(case_path, revision);
-  if (draft.at + 1 < draft.steps.size()) append(draft, {{"redo", true}});
+  const bool can_step = is_redo ? draft.at + 1 < draft.steps.size() : draft.at > 0;
+  if (can_step) append(draft, {{is_redo ? "redo" : "undo", true}});
   return shown(case_path, draft);
 }
 

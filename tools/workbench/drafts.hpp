@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Cases that are being made. Each change is written at once, so that a crash or a closed tab loses nothing. Each change
-// can be undone. The drafts are in .marrow/drafts of the opened folder: a case's own folder holds only the case.
+// Cases that are being made. Each change is written at once, so that a crash or a closed tab loses nothing, and can be
+// undone. The drafts are in .marrow/drafts of the opened folder: a case's own folder holds only the case.
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -22,12 +22,11 @@ class Drafts {
   /// {case, revision, document, undo, redo, is_saved}: `undo` and `redo` name the change that they would undo or redo,
   /// or are null. A case without a draft begins with its case.yaml, or empty. Throws Error if that cannot be read.
   nlohmann::json open(const std::string& case_path);
-  /// Each returns what open() does then. Throws Conflict unless `revision` is the newest, and Error if the change
-  /// cannot be written: then nothing has changed.
+  /// These change the draft, undo or redo a change, and return what open() now does. They throw Conflict unless
+  /// `revision` is the newest, and Error if the change cannot be written; then nothing has changed.
   nlohmann::json change(const std::string& case_path, int revision, const std::string& what, nlohmann::json document);
-  nlohmann::json undo(const std::string& case_path, int revision);
-  nlohmann::json redo(const std::string& case_path, int revision);
-  /// Call this when the document of this revision was written as a case.
+  nlohmann::json step(const std::string& case_path, int revision, bool is_redo);
+  /// Call this after the document of this revision was written as a case.
   nlohmann::json mark_saved(const std::string& case_path, int revision);
 
  private:
@@ -41,7 +40,7 @@ class Drafts {
     std::size_t at = 0;        ///< the step that is shown
     int revision = 0;          ///< the number of changes
     int saved = -1;            ///< the step that case.yaml holds; -1: none
-    std::uintmax_t bytes = 0;  ///< size of the file; if it differs, another program changed the file
+    std::uintmax_t bytes = 0;  ///< size of the file; another size means that another program changed it
   };
   Draft& find(const std::string& case_path);
   Draft& find(const std::string& case_path, int revision);

@@ -132,14 +132,14 @@ void remove_left_over(const fs::path& place) {
   }
 }
 
-/// Throws if something of that name has come there in the meantime.
+/// Throws if a file of that name has appeared in the meantime.
 void move_new(const fs::path& from, const fs::path& to) {
   if (renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return;
   if (errno != EINVAL || fs::exists(fs::symlink_status(to))) fail();
   fs::rename(from, to);  // a file system that does not know the flag
 }
 
-/// Moves what is new to its place. If it cannot continue, it takes back what it has moved.
+/// Moves new files to their places. On an exception, takes back what it has moved.
 void move_in(const fs::path& staging, const fs::path& place, const PlannedCase& plan, bool has_landmarks) {
   const fs::path old_landmarks = staging / "landmarks.before";
   std::error_code none;
@@ -156,12 +156,12 @@ void move_in(const fs::path& staging, const fs::path& place, const PlannedCase& 
     if (has_landmarks)
       fs::rename(staging / "landmarks.yaml", place / "landmarks.yaml");
     else
-      fs::remove(place / "landmarks.yaml");  // the last of them was removed
+      fs::remove(place / "landmarks.yaml");  // the last landmark was removed
     are_landmarks_changed = true;
     fs::rename(staging / "case.yaml", place / "case.yaml");
   } catch (...) {
     for (const fs::path& file : moved) fs::remove_all(file, none);
-    if (!are_landmarks_changed) throw;  // what is there may come from another process that is saving the case
+    if (!are_landmarks_changed) throw;  // landmarks.yaml may be from another process that is saving the case
     if (fs::exists(old_landmarks, none))
       fs::rename(old_landmarks, place / "landmarks.yaml", none);
     else
@@ -218,7 +218,7 @@ void write_case_files(const fs::path& place, const PlannedCase& plan, const std:
                  (error.code() == std::errc::no_space_on_device ? "; make room and try again" : ""));
   } catch (const std::exception& error) {
     clean();
-    std::string text = error.what();  // nobody knows the hidden folder
+    std::string text = error.what();  // the hidden folder would tell people nothing
     for (std::size_t at; !staging.empty() && (at = text.find(staging.string())) != std::string::npos;)
       text.replace(at, staging.string().size(), place.string());
     throw failed(text);

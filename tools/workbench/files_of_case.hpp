@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Writing a case's folder so that nothing is lost, whatever happens in the middle.
+// Writes a case's folder so that nothing is lost, even if an interruption comes in the middle.
 #include <filesystem>
 #include <functional>
 #include <string>

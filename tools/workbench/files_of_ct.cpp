@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which files a CT is read from.
+// The files of a CT.
 #include "marrow/base/error.hpp"
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/number_text.hpp"
@@ -32,7 +32,7 @@ FilesOfCt::FilesOfCt(const fs::path& place) {
 void FilesOfCt::add(const fs::path& file) {
   std::error_code error;
   const std::uintmax_t size = fs::file_size(file, error);
-  if (error) return;  // its reader says more
+  if (error) return;  // the reader of the CT reports it
   bytes += size;
   const auto time = fs::last_write_time(file, error).time_since_epoch().count();
   description += formatted("{} {} {}\n", file.filename().string(), size, time);

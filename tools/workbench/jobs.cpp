@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMostEvents = 5000;  // a job with more is a sequence; the page needs the last ones
+constexpr std::size_t kMostEvents = 5000;  // later ones are dropped; only long sequences have so many
 constexpr std::size_t kMostRunning = 8, kMostKept = 200;
 
 }  // namespace
@@ -53,7 +53,7 @@ Jobs::~Jobs() {
 std::string Jobs::start(const std::string& title, const std::string& command, std::function<json(Job&)> work) {
   const std::lock_guard lock(mutex_);
   const auto running = std::count_if(jobs_.begin(), jobs_.end(), [](const auto& one) { return !*one.second.is_over; });
-  if (std::size_t(running) >= kMostRunning) throw Error("too many things are being done; stop one, or wait");
+  if (std::size_t(running) >= kMostRunning) throw Error("too many jobs are running; stop one, or wait");
   for (auto one = jobs_.begin(); jobs_.size() >= kMostKept && one != jobs_.end();)
     if (*one->second.is_over) {
       one->second.thread.join();

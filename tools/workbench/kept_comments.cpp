@@ -62,7 +62,8 @@ bool says_same(const YAML::Node& a, const YAML::Node& b) {
   return true;
 }
 
-/// Whether '#' begins a comment here. In quotes it may be wrong, which only tells of one lost comment too many.
+/// Whether '#' begins a comment here. Inside quotes the answer may be wrong: at worst, a text in quotes is reported as
+/// a lost comment.
 bool is_comment(const std::string& text, std::size_t at) {
   return text[at] == '#' && (at == 0 || text[at - 1] == ' ' || text[at - 1] == '\t' || text[at - 1] == '\n');
 }
@@ -86,7 +87,7 @@ class Merge {
 
   std::string text() {
     merge_maps(older_.root(), newer_.root());
-    // From the end. Of two changes at the same place, the one that was found first comes first in the text.
+    // From the end to the beginning. Of two changes at the same place, the one found first comes first in the text.
     std::reverse(changes_.begin(), changes_.end());
     std::stable_sort(changes_.begin(), changes_.end(), [](const auto& a, const auto& b) { return a.begin > b.begin; });
     std::string text = older_.text();
@@ -100,11 +101,6 @@ class Merge {
     std::string by;
   };
 
-  static const YamlEntryText* find(const std::vector<YamlEntryText>& entries, const std::string& key) {
-    const auto found = std::find_if(entries.begin(), entries.end(), [&](const auto& one) { return one.key == key; });
-    return found == entries.end() ? nullptr : &*found;
-  }
-
   /// The text of a value in the newer text: with the space before it, or on separate lines that begin at this column.
   std::string value_text(const YamlEntryText& entry, std::size_t column) const {
     const std::string text = newer_.text().substr(entry.value_begin, entry.value_end - entry.value_begin);
@@ -114,7 +110,7 @@ class Merge {
     std::string moved = older_.newline() + std::string(column, ' ');
     for (std::size_t i = 0; i < text.size(); ++i) {
       moved += text[i] == '\n' ? older_.newline() + std::string(column, ' ') : std::string(1, text[i]);
-      if (text[i] == '\n') i += from;  // the emitter indents all lines of a value at least so much
+      if (text[i] == '\n') i += from;  // the emitter indents all lines of a value by at least this
     }
     return moved;
   }
@@ -132,14 +128,14 @@ class Merge {
 
   void merge_maps(const YAML::Node& before, const YAML::Node& after) {
     const auto olds = older_.entries(before), news = newer_.entries(after);
-    const YamlEntryText* last = nullptr;  // that stays
+    const YamlEntryText* last = nullptr;  // the last entry that stays
     for (const YamlEntryText& old : olds)
-      if (find(news, old.key)) last = &old;
-    if (!last) throw Error("there is no entry to put others behind");
+      if (find_entry(news, old.key)) last = &old;
+    if (!last) throw Error("no entry stays, so there is no place for new ones");
     std::string added;
     const std::size_t column = older_.column(olds.front().key_begin);
     for (const YamlEntryText& one : news) {
-      const YamlEntryText* old = find(olds, one.key);
+      const YamlEntryText* old = find_entry(olds, one.key);
       if (old)
         merge_values(*old, one);
       else
@@ -147,7 +143,7 @@ class Merge {
                  newer_.text().substr(one.key_begin, one.colon + 1 - one.key_begin) + value_text(one, column + 2);
     }
     for (const YamlEntryText& old : olds)
-      if (!find(news, old.key)) remove(old);
+      if (!find_entry(news, old.key)) remove(old);
     if (added.empty()) return;
     const std::size_t end = older_.line_end(last->value_end);
     changes_.push_back({end, end, added});
@@ -165,7 +161,7 @@ class Merge {
     if (now.size() > old.size()) append_items(before, after);
   }
 
-  /// Whether both are lists of maps in lines, and the older one's names come first in the newer one.
+  /// Whether both are lists of maps on lines of their own, and the newer list begins with the names of the older one.
   bool has_same_beginning(const YAML::Node& old, const YAML::Node& now) const {
     if (!old.IsSequence() || !now.IsSequence() || old.size() == 0 || now.size() < old.size()) return false;
     for (std::size_t i = 0; i < old.size(); ++i) {
@@ -176,7 +172,7 @@ class Merge {
     return true;
   }
 
-  /// The newer list's further items, behind the older list.
+  /// Adds the further items of the newer list behind the older list.
   void append_items(const YamlEntryText& before, const YamlEntryText& after) {
     const std::size_t dash_column = older_.column(before.value_begin);
     std::string added;

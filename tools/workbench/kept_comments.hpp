@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Writing a YAML file again without losing what people wrote beside its values.
+// Writes a YAML file again and keeps the comments of people.
 #include <string>
 #include <vector>
 
@@ -8,7 +8,7 @@ namespace marrow::workbench {
 
 struct KeptText {
   std::string text;
-  std::vector<std::string> lost;  ///< comments of the older text that are missing in it, each from its '#'
+  std::vector<std::string> lost;  ///< comments of the older text that are not in `text`, each from its '#'
 };
 
 /// A text with the content of `newer`. Parts with the same content in both are taken from `older`, with their comments,

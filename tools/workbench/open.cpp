@@ -33,7 +33,7 @@ struct OpenRequest {
   bool no_browser = false;
 };
 
-/// What is opened, and which page shows it, as the part of the address behind '#'.
+/// The opened folder, and the page that is shown first, as the part of the address behind '#'.
 struct Target {
   fs::path folder;
   std::string page;
@@ -49,8 +49,8 @@ std::string encoded(const std::string& text) {
   return result;
 }
 
-/// A case, a run or a comparison is shown at once; its folder is opened together with what is beside it, because a
-/// case may name files there.
+/// For a case, a run or a comparison, opens the folder around it, because a case may name files there. The page shows
+/// it at once.
 Target target_of(const fs::path& place) {
   std::error_code error;
   const fs::path full = fs::canonical(place, error);
@@ -75,7 +75,7 @@ void start_browser(const std::string& address) {
     if (child > 0) waitpid(child, nullptr, 0);
     return;
   }
-  if (fork() != 0) _exit(0);  // the browser belongs to nobody, and outlives marrow
+  if (fork() != 0) _exit(0);  // the browser loses its parent, and outlives marrow
   setsid();
   const int nothing = ::open("/dev/null", O_RDWR);
   for (const int stream : {0, 1, 2}) dup2(nothing, stream);
@@ -84,7 +84,8 @@ void start_browser(const std::string& address) {
 }
 
 /// Large blocks go back to the system when they are freed. Otherwise glibc keeps them in the heap of each thread that
-/// answers, where aligned blocks are seldom used again (glibc bug 14581): the server grew by megabytes with a request.
+/// answers, and seldom uses aligned blocks again (glibc bug 14581): the server would grow by megabytes with each
+/// request.
 void give_large_blocks_back() {
 #ifdef __GLIBC__
   constexpr int kLarge_bytes = 4 << 20;

@@ -22,7 +22,7 @@ class OpenedFolder {
   /// {path, folders: [name], files: [{name, bytes}]} of a folder, each sorted by name. Hidden ones are left out.
   nlohmann::json listing(const std::string& relative) const;
   /// What the folder offers, at most four folders deep: {cases, pipelines, experiments, runs, comparisons}, each a
-  /// sorted list of relative paths. `is_cut`: there are too many files to look at all.
+  /// sorted list of relative paths. `is_cut`: there are too many files to look at all of them.
   nlohmann::json contents() const;
 
  private:

@@ -20,11 +20,6 @@ using Entries = std::vector<YamlEntryText>;
 
 constexpr std::size_t kWidth = 120;  // a longer line is broken
 
-const YamlEntryText* find(const Entries& entries, const std::string& key) {
-  const auto found = std::find_if(entries.begin(), entries.end(), [&](const auto& one) { return one.key == key; });
-  return found == entries.end() ? nullptr : &*found;
-}
-
 std::string replaced(const std::string& text, std::size_t begin, std::size_t end, const std::string& by) {
   return text.substr(0, begin) + by + text.substr(end);
 }
@@ -90,7 +85,7 @@ std::string without_entry_in_braces(const YamlText& yaml, const Entries& entries
 /// A map without one of its entries. It must have several.
 std::string without_entry(const YamlText& yaml, const YAML::Node& map, const std::string& key) {
   const Entries entries = yaml.entries(map);
-  const YamlEntryText& entry = *find(entries, key);
+  const YamlEntryText& entry = *find_entry(entries, key);
   if (yaml.is_flow(map)) return without_entry_in_braces(yaml, entries, std::size_t(&entry - entries.data()));
   const std::string& text = yaml.text();
   const std::size_t begin = yaml.line_begin(entry.key_begin), end = yaml.line_end(entry.value_end);
@@ -119,12 +114,12 @@ std::string section_of(const PipelineEdit& edit) { return edit.what == What::opt
 std::string edit_section(const YamlText& yaml, const YAML::Node& node, const PipelineEdit& edit) {
   const std::string key = section_of(edit);
   const Entries parts = yaml.entries(node);
-  const YamlEntryText* section = find(parts, key);
+  const YamlEntryText* section = find_entry(parts, key);
   const bool is_map = section && section->value.IsMap();
   if (section && !is_map && !section->value.IsNull())
     throw Error(in_quotes(key) + " of node " + in_quotes(edit.node) + " is no map; change it in the text");
   const Entries entries = is_map ? yaml.entries(section->value) : Entries();
-  const YamlEntryText* entry = find(entries, edit.name);
+  const YamlEntryText* entry = find_entry(entries, edit.name);
   if (!edit.value) {
     if (!entry) return yaml.text();
     return entries.size() > 1 ? without_entry(yaml, section->value, edit.name) : without_entry(yaml, node, key);
@@ -139,7 +134,7 @@ std::string edit_section(const YamlText& yaml, const YAML::Node& node, const Pip
 std::string edit_part(const YamlText& yaml, const YAML::Node& node, const PipelineEdit& edit) {
   const std::string key = edit.what == What::uses ? "uses" : "may_fail";
   const Entries parts = yaml.entries(node);
-  const YamlEntryText* part = find(parts, key);
+  const YamlEntryText* part = find_entry(parts, key);
   if (!edit.value) return part && parts.size() > 1 ? without_entry(yaml, node, key) : yaml.text();
   return part ? with_value(yaml, *part, *edit.value) : with_entry(yaml, node, key, *edit.value);
 }
@@ -209,7 +204,7 @@ std::string PipelineEdit::key() const {
   return node + "." + name;
 }
 
-std::string PipelineEdit::in_words() const { return key() + (value ? " = " + *value : " taken out"); }
+std::string PipelineEdit::in_words() const { return key() + (value ? " = " + *value : " removed"); }
 
 std::string edited_text(const std::string& text, const PipelineEdit& edit) {
   if (edit.what == What::uses && !edit.value) throw Error("node " + in_quotes(edit.node) + " must use something");
@@ -225,7 +220,7 @@ std::string edited_text(const std::string& text, const PipelineEdit& edit) {
     YAML::Node wanted = parse_yaml(text, {.aliases = false});
     apply(wanted, edit);
     if (is_same(parse_yaml(result, {.aliases = false}), wanted)) return result;
-  } catch (const YAML::Exception&) {  // the text below
+  } catch (const YAML::Exception&) {  // ends in the Error below
   } catch (const Error&) {
     if (edit.value) value_of(edit);  // says what is wrong with it
   }

@@ -15,7 +15,7 @@ struct PipelineEdit {
 
   /// What --set calls it: "edges.low", "edges.in.view", "edges.uses".
   std::string key() const;
-  /// For people: "edges.low = 60", "edges.low taken out".
+  /// For people: "edges.low = 60", "edges.low removed".
   std::string in_words() const;
 };
 

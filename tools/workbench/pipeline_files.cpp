@@ -77,7 +77,7 @@ json PipelineFiles::step(const std::string& file, const std::string& revision, i
   const std::lock_guard lock(mutex_);
   History& history = find(file, revision);
   const std::size_t to = history.at + std::size_t(by);
-  if (to < history.steps.size()) {  // also if it is below zero
+  if (to < history.steps.size()) {  // a number below zero wraps around, and is too large
     write_text_file(folder_.inside(file), history.steps[to].text);
     history.at = to;
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Pipeline files that are being edited: their text, and the changes that can be undone. The file decides: a change by
-// another program counts like any other change.
+// Pipeline files that are being edited: their text, and the changes that can be undone. A change of the file by another
+// program is a change like any other.
 #include <functional>
 #include <map>
 #include <mutex>
@@ -21,8 +21,8 @@ class PipelineFiles {
   /// The revision is the digest of the text. Throws Error if the file cannot be read.
   nlohmann::json open(const std::string& file);
   std::string revision(const std::string& file) const;
-  /// Writes what `changed` makes of the text, and returns what open() does then. Throws Conflict unless the file is of
-  /// this revision, and Error if it cannot be written; then nothing has changed.
+  /// Writes the text that `changed` makes of the present one, and returns what open() now returns. Throws Conflict
+  /// unless the file is of this revision, and Error if it cannot be written; then nothing has changed.
   nlohmann::json change(const std::string& file, const std::string& revision, const std::string& what,
                         const std::function<std::string(const std::string&)>& changed);
   nlohmann::json undo(const std::string& file, const std::string& revision) { return step(file, revision, -1); }

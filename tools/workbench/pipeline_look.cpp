@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shows what a node made. Surfaces and volumes are shown as they are in memory. For other types their writers write
-// files into a temporary folder, and the files become pictures, surfaces and texts.
+// Shows the outputs of a node. Surfaces and volumes are shown directly. The writers of other types write files into a
+// temporary folder, and these become pictures, surfaces and texts.
 #include <cstdlib>
 
 #include "marrow/base/base64.hpp"
@@ -103,13 +103,13 @@ json shown_file(const fs::path& file, const std::string& name) {
   return item;
 }
 
-/// What the files show that the writer of the item's type makes.
+/// What the page shows of an item. For most types, their writer makes files, and the page shows these.
 json shown_item(const Value& value, const fs::path& folder, const Catalogue& catalogue) {
   if (value.is_absent())
     return json::array({{{"kind", "text"}, {"text", value.missing.empty() ? "nothing" : "nothing: " + value.missing}}});
   if (value.type.is_function)
     return json::array({{{"kind", "text"}, {"text", "a function that other nodes call; it has no picture"}}});
-  // A large value needs no way through a file.
+  // Large values are shown without files.
   if (value.type == TypeInfo::of<Mesh>()) return json::array({mesh_json(value.as<Mesh>())});
   if (value.type == TypeInfo::of<Volume>())
     return json::array({slices_json(value.as<Volume>().grid, value.as<Volume>().values)});

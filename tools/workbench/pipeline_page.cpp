@@ -33,10 +33,11 @@ OptionType type_of_option(const std::string& uses, const std::string& name, cons
   if (const NodeInfo* node = catalogue.find(uses))
     for (const OptionInfo& option : node->options)
       if (option.name == name) return option.type;
-  return OptionType::number;  // an unknown option is a fault, which is told
+  return OptionType::number;  // an unknown option is a fault that the check reports
 }
 
-/// The edit that a form asks for. Its texts are as people type them, so a text or a path is put into quotes if needed.
+/// The edit that a form requests. People type texts and paths without quotes, so quotes are added where YAML needs
+/// them.
 PipelineEdit edit_of(const Request& request, const Catalogue& catalogue) {
   static const std::map<std::string, PipelineEdit::What> kWhat{{"option", PipelineEdit::What::option},
                                                                {"wire", PipelineEdit::What::wire},
@@ -60,10 +61,11 @@ PipelineEdit edit_of(const Request& request, const Catalogue& catalogue) {
   return edit;
 }
 
-/// Throws Error if the edit would add faults to the file. An option that is taken out may leave one: it is shown then.
+/// Throws Error if the edit would add faults to the file. Removing an option may add some; the page then shows them.
 void expect_no_new_fault(const std::string& file, const PipelineEdit& edit, const Workbench& workbench) {
   if (!edit.value) return;
-  const Place place{workbench.folder.inside(file).string(), 1, 1};  // paths in the value start at the file's folder
+  const Place place{workbench.folder.inside(file).string(), 1,
+                    1};  // paths in the value are relative to the file's folder
   const std::vector<std::string> before = faults_of(file, {}, workbench);
   std::string added;
   for (const std::string& fault : faults_of(file, {{edit.key(), *edit.value, place}}, workbench))

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Plans and runs a pipeline of the opened folder, as `marrow plan` and `marrow run` do, and looks at what nodes made.
+// Plans and runs a pipeline of the opened folder, as `marrow plan` and `marrow run` do, and shows the outputs of nodes.
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -36,13 +36,13 @@ class LastRuns {
 /// or not_needed. Throws Error with the faults of the pipeline.
 nlohmann::json plan_of(const Pipeline& pipeline, const Workbench& workbench);
 
-/// Runs it into a new folder runs/NAME of the opened folder. Returns {folder, status, seconds, verdicts, nodes: {id:
-/// {status, reason, seconds}}, absent}. The job gets the run's events.
+/// Runs it into a new folder runs/NAME of the opened folder. Returns {folder, status, seconds, verdicts, faults, nodes:
+/// {id: {status, reason, seconds}}}. The job gets the run's events.
 nlohmann::json run_into_folder(std::shared_ptr<LastRun> run, const PipelineArguments& arguments,
                                const Workbench& workbench, Job& job);
 
-/// The outputs of a node, to be shown: [{name, type, help, items: [{place, kind, ...}]}]. Takes them from `last` if
-/// that is not null, otherwise from the store. Throws Error if they have not been computed yet.
+/// The outputs of a node for the page: [{name, type, help, left_out, items: [{place, parts: [{kind, ...}]}]}]. Takes
+/// them from `last` if it has them, otherwise from the store. Throws Error if they have not been computed yet.
 nlohmann::json outputs_of_node(const Pipeline& pipeline, const std::string& node, const LastRun* last,
                                const Workbench& workbench, Job& job);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the page "Pipeline" shows of a file, and the pipeline that the page's inputs make of it.
+// What the page "Pipeline" shows of a file, and the file's pipeline with the page's inputs.
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -23,7 +23,7 @@ Pipeline pipeline_of_form(const std::string& file, const nlohmann::json& inputs,
 std::string command_of_form(const std::string& command, const std::string& file, const nlohmann::json& inputs,
                             const Workbench& workbench);
 
-/// The faults that the file has with these overrides, each with what to do.
+/// The faults of the file with these overrides, each with its hint.
 std::vector<std::string> faults_of(const std::string& file, const std::vector<Override>& overrides,
                                    const Workbench& workbench);
 

@@ -22,7 +22,7 @@ struct PlacedBone {
   std::shared_ptr<const Cost> contour, grey_values;  ///< coarser and faster than in a registration
   FragmentFrame frame;
   RigidTransform start;     ///< world_from_model to begin with
-  std::string start_is;     ///< where it comes from, in words
+  std::string start_is;     ///< the source of `start`, in words
   double brightest_mm = 1;  ///< the line integral that is drawn brightest
 };
 
@@ -45,7 +45,7 @@ class PlacedCases {
  public:
   /// Keeps a case, and forgets all but the last two: each holds a CT.
   void keep(std::shared_ptr<const PlacedCase> one);
-  /// Throws Conflict if it is not there: the page then opens it again.
+  /// Throws Conflict if it is no longer kept; the page then opens it again.
   std::shared_ptr<const PlacedCase> find(const std::string& path) const;
 
  private:
@@ -81,7 +81,7 @@ nlohmann::json costs_of(const PlacedCase& placed, const PlacedBone& bone, const 
 /// The poses {BONE: matrix} of this name in a request. Throws Error unless each is a rigid motion.
 std::map<std::string, RigidTransform> poses_in(const Request& request, const char* name = "poses");
 
-/// A pose file BONE.yaml for each bone, as texts by name. Throws Error if the pose of a bone is missing.
+/// The texts of pose files by their names: BONE.yaml for each bone. Throws Error if the pose of a bone is missing.
 std::map<std::string, std::string> start_files(const PlacedCase& placed,
                                                const std::map<std::string, RigidTransform>& poses);
 /// Writes files into a new folder `INTO/CASE/NUMBER` of the opened folder, and returns its relative path. If a folder

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Opening a case for the page "Place": one run of pipelines/workbench/place.yaml, and where each bone begins.
+// Opens a case for the page "Place": one run of pipelines/workbench/place.yaml, and the start of each bone.
 #include <algorithm>
 #include <cmath>
 
@@ -35,8 +35,8 @@ List<Pose> poses_of(const Value& value) {
   return poses;
 }
 
-/// A cost for the figures that follow a drag. It keeps the fine one alive, whose images it may use. It is made once:
-/// for grey values the CT is smoothed, which takes longer than the comparison.
+/// A coarser cost, for the figures that are shown during a drag. It keeps the fine cost alive, because it may use the
+/// images of that. It is made once: smoothing the CT for grey values takes longer than a comparison.
 std::shared_ptr<const Cost> coarse(std::shared_ptr<const Cost> fine) {
   constexpr double kSpacing_px = 4, kReach_px = 24;
   constexpr int kPixelStep = 4;
@@ -64,7 +64,7 @@ void begin_at(PlacedBone& bone, const Pose* placed, const Pose* by_landmarks, co
   }
 }
 
-/// The line integral that only one pixel of two hundred exceeds, of the bone in the middle of the first view.
+/// The line integral that only one pixel in two hundred exceeds, with the bone in the middle of the first view.
 double brightest_mm(const PlacedBone& bone, const List<View>& views) {
   constexpr double kStep_px = 4;
   const Camera& camera = views[0].camera;

@@ -81,7 +81,7 @@ int count_frames(const Workbench& workbench, const PlacedCase& placed, const std
     const fs::path place = workbench.folder.inside(view.images);
     if (fs::is_directory(place)) {
       counts.push_back(files::frame_files(place, view.pattern).size());
-      read_frames(workbench, placed, view, 1, 1, job);  // says what is wrong with the images
+      read_frames(workbench, placed, view, 1, 1, job);  // throws if the images cannot be read
     } else {
       counts.push_back(read_frames(workbench, placed, view, 1, 0, job).size());
     }

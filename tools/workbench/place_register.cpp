@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// "From here" of the page "Place": a registration that starts from the present poses. These are written as pose files,
-// so that the same can be done on the command line.
+// "From here" of the page "Place": a registration that starts from the present poses. They are written as pose files,
+// so that the command line can do the same.
 #include <algorithm>
 #include <cmath>
 
@@ -11,6 +11,7 @@
 #include "marrow/base/text_file.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
+#include "marrow/runtime/run/verdict_json.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 #include "new/templates.hpp"
@@ -24,7 +25,7 @@ namespace {
 
 using nlohmann::json;
 
-/// The option by which a node that reads a case takes other starts.
+/// The option of a node that reads a case: it takes other starts.
 constexpr const char* kStarts = "starts";
 
 /// The node that reads the case and takes other starts; "" if there is none.
@@ -35,19 +36,18 @@ std::string node_with_starts(const Pipeline& pipeline) {
   return "";
 }
 
-/// The names of the outputs of a type that have an item for each fragment.
+/// The names of the outputs that have this type and an item for each fragment.
 std::vector<std::string> outputs_of_type(const Pipeline& pipeline, const TypeInfo& type) {
   std::vector<std::string> names;
   for (const PipelineOutput& output : pipeline.outputs) {
-    const PortInfo& port =
-        pipeline.nodes[std::size_t(output.source.node)].info.outputs[std::size_t(output.source.output)];
-    if (port.type == type && pipeline.axes_of(output.source) == std::vector<std::string>{"fragment"})
+    if (pipeline.output_of(output.source).type == type &&
+        pipeline.axes_of(output.source) == std::vector<std::string>{"fragment"})
       names.push_back(output.name);
   }
   return names;
 }
 
-/// Reads a pipeline for a case; an Error says what is wrong with it.
+/// Reads a pipeline for a case. Throws Error with the pipeline's faults.
 Pipeline read_for_case(const Workbench& workbench, const fs::path& file, const std::string& case_folder) {
   PipelineArguments arguments;
   arguments.inputs = {{"case", case_folder}};
@@ -67,21 +67,13 @@ json deviations_of(const Pose& pose) {
   return deviations;
 }
 
-json json_of_verdict(const Verdict& verdict) {
-  return {
-      {"judgement", name_of(verdict.judgement)},
-      {"failure_probability", std::isfinite(verdict.failure_probability) ? json(verdict.failure_probability) : json()},
-      {"reasons", verdict.reasons},
-      {"remedies", verdict.remedies}};
-}
-
-/// A path as written on a command line in the opened folder.
+/// A path for a command line in the opened folder.
 std::string shown_path(const OpenedFolder& folder, const fs::path& path) {
   const std::string relative = path.lexically_relative(folder.path()).generic_string();
   return relative.empty() || relative.starts_with("..") ? path.string() : relative;
 }
 
-/// Whether a folder holds exactly these files, apart from folders.
+/// Whether the files of a folder are exactly these. Folders in it do not count.
 bool holds_only(const fs::path& folder, const std::map<std::string, std::string>& texts) {
   std::size_t count = 0;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) count += entry.is_regular_file();
@@ -146,7 +138,7 @@ json pipelines_from_starts(const Workbench& workbench) {
       if (node_with_starts(pipeline).empty() || outputs_of_type(pipeline, TypeInfo::of<Pose>()).empty()) continue;
       found.push_back(
           {{"file", shown_path(workbench.folder, file)}, {"name", file.stem().string()}, {"help", pipeline.help}});
-    } catch (const std::exception&) {  // it takes no case, or has faults, so it is not offered
+    } catch (const std::exception&) {  // it takes no case or has faults, so it is not offered
     }
   }
   return found;
@@ -173,7 +165,7 @@ json run_from_starts(const Workbench& workbench, const fs::path& pipeline, const
   const auto verdicts = outputs_of_type(read, TypeInfo::of<Verdict>());
   call.arguments.inputs = {{"case", folder}};
   call.arguments.overrides = {{node_with_starts(read) + "." + kStarts, workbench.folder.inside(starts).string()}};
-  // An output of the name 'pose' is the result; otherwise the first one is.
+  // The output 'pose' is the result. Without one, the first output is.
   if (!poses.empty()) call.only.push_back(contains(poses, "pose") ? "pose" : poses.front());
   if (!verdicts.empty()) call.only.push_back(verdicts.front());
   json result = {{"poses", json::object()}, {"verdicts", json::object()}};
@@ -181,7 +173,7 @@ json run_from_starts(const Workbench& workbench, const fs::path& pipeline, const
     for (std::size_t i = 0; i < value.items.size(); ++i) {
       if (!value.items[i].data) continue;  // a node may fail for one of the bones
       if (value.type == TypeInfo::of<Verdict>()) {
-        result["verdicts"][value.names[i]] = json_of_verdict(value.items[i].as<Verdict>());
+        result["verdicts"][value.names[i]] = json_of(NamedVerdict{name, value.names[i], value.items[i].as<Verdict>()});
         continue;
       }
       const Pose& pose = value.items[i].as<Pose>();

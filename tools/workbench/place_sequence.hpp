@@ -24,7 +24,7 @@ std::vector<ViewFrames> frames_in(const nlohmann::json& views, const PlacedCase&
 std::filesystem::path camera_file_of(const Workbench& workbench, const PlacedCase& placed, const std::string& view);
 
 /// The number of frames, which is the same in all views. Images of folders are not opened, except the first. Throws
-/// Error if a view cannot be read, or if the views have unlike numbers of frames.
+/// Error if a view cannot be read, or if the views have different numbers of frames.
 int count_frames(const Workbench& workbench, const PlacedCase& placed, const std::vector<ViewFrames>& views, Job& job);
 
 /// A sequence, and the poses from which the bones are tracked through it.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Keyframes of the page "Place", and the tracking of bones through a sequence. Keyframes are written as files, so that
-// the same can be done on the command line.
+// the command line can do the same.
 #include <charconv>
 
 #include "marrow/base/error.hpp"
@@ -25,7 +25,7 @@ using track::Trajectory;
 
 constexpr int kMostFrames = 1'000'000;
 
-/// The poses {FRAME from 1: matrix} as a line for each frame.
+/// The poses {FRAME from 1: matrix} as a track with a line for each frame.
 AutoscoperTrack track_of(const std::string& bone, const json& poses, int frames) {
   AutoscoperTrack track;
   track.world_from_bone.resize(std::size_t(frames));
@@ -46,7 +46,7 @@ json poses_of(const AutoscoperTrack& track) {
   return poses;
 }
 
-/// `path` says how a path in the opened folder is given.
+/// `path` converts a path in the opened folder for this call.
 template <class Path>
 PipelineCall call_of(const Workbench& workbench, const PlacedCase& placed, const TrackWish& wish, const Path& path) {
   json names = json::array(), images = json::array(), patterns = json::array(), cameras = json::array();
@@ -77,7 +77,7 @@ TrackWish wish_of(const Request& request, const Workbench& workbench, const Plac
   return wish;
 }
 
-/// Writes the poses of a request, and says in `wish` where they are.
+/// Writes the poses of a request, and enters their folder into `wish`.
 void write_poses(const Request& request, const Workbench& workbench, const PlacedCase& placed, TrackWish& wish) {
   const json frames = request.body.value("frames", json());
   if (!frames.is_number_integer() || frames < 1 || frames > kMostFrames)
@@ -122,7 +122,7 @@ json track(const Workbench& workbench, const PlacedCase& placed, const TrackWish
     files::write_text(workbench.folder.inside(tracked) / (file_name_of(bone) + ".tra"), track::tra_text(tracks[i]));
     for (const Verdict& verdict : ways[i].verdicts) verdicts[bone].push_back(name_of(verdict.judgement));
   }
-  // As they are read again later, to the last digit.
+  // The poses are read back, so that they have the same digits as when they are read again later.
   return {{"tracked", tracked}, {"poses", tracked_poses(workbench.folder, placed, tracked)}, {"verdicts", verdicts}};
 }
 

@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// The requests of the page "Results".
+// The page "Results": lists the runs and comparisons of the opened folder, and compares two runs.
+#include <algorithm>
+
+#include "difference/findings.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/json_text.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/base/text_file.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
+#include "marrow/runtime/run/verdict_json.hpp"
 #include "report/cell_material.hpp"
 #include "report/report.hpp"
 #include "run_files.hpp"
-#include "workbench/results.hpp"
 #include "workbench/workbench.hpp"
 
 namespace marrow::workbench {
@@ -14,7 +20,142 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-/// A report may come from somebody else and contains scripts. So it is shown as a page without origin: it reaches
+constexpr std::size_t kMostRuns = 500;
+
+/// When the file was written, in UTC, for records without their own time.
+std::string time_of(const fs::path& file) {
+  std::error_code error;
+  const auto written = fs::last_write_time(file, error);
+  if (error) return "";
+  const auto clock = std::chrono::file_clock::to_sys(written);
+  const std::time_t seconds =
+      std::chrono::system_clock::to_time_t(std::chrono::time_point_cast<std::chrono::system_clock::duration>(clock));
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return text;
+}
+
+json run_row(const fs::path& folder) {
+  const json record = cli::read_record(folder);
+  json verdicts = json::array();
+  for (const NamedVerdict& one : verdicts_in(record)) verdicts.push_back(json_of(one));
+  const std::string finished = record.value("finished", "");
+  return {{"kind", "run"},
+          {"name", record.value("pipeline", "")},
+          {"when", finished.empty() ? time_of(folder / "run.json") : finished},
+          {"status", record.value("status", "")},
+          {"seconds", record.value("seconds", 0.0)},
+          {"verdicts", verdicts},
+          {"figures", cli::figures_of(folder, record)}};
+}
+
+json comparison_row(const fs::path& folder) {
+  if (cli::leads_outside(folder, "comparison.json")) throw Error("its comparison.json is a link that leads elsewhere");
+  const json record = parse_json(read_text_file(folder / "comparison.json", kMostRecordBytes), "comparison.json");
+  if (!record.is_object()) throw Error("its comparison.json holds no object");
+  json sentences = json::array();
+  for (const json& one : record.value("comparisons", json::array()))
+    if (one.is_object()) sentences.push_back(one.value("sentence", ""));
+  return {{"kind", "comparison"},
+          {"name", record.value("experiment", "")},
+          {"when", time_of(folder / "comparison.json")},
+          {"status", "done"},
+          {"verdicts", json::array()},
+          {"sentences", sentences},
+          {"figures", json::array()}};
+}
+
+void add_rows(json& rows, const OpenedFolder& opened, const json& paths, json (*row_of)(const fs::path&)) {
+  for (const json& path : paths) {
+    if (rows.size() >= kMostRuns) return;
+    json row;
+    const fs::path folder = opened.inside(path.get<std::string>());
+    try {
+      row = row_of(folder);
+    } catch (const std::exception& error) {
+      row = {{"kind", "run"}, {"name", ""}, {"when", time_of(folder)}, {"fault", printable_lines(error.what())}};
+    }
+    row["folder"] = path;
+    row["has_report"] = cli::file_of_run(folder, "report.html").has_value();
+    rows.push_back(std::move(row));
+  }
+}
+
+/// The figures of both runs side by side: [{table, column, name, unit, before, now}].
+json figures_side_by_side(const json& before, const json& now) {
+  json rows = json::array();
+  const auto add = [&](const json& tables, const char* side) {
+    for (const json& table : tables)
+      for (const json& row : table["rows"])
+        for (std::size_t i = 0; i < row["values"].size(); ++i) {
+          const json key = {{"table", table["name"]}, {"column", table["columns"][i]}, {"name", row["name"]}};
+          auto same = std::find_if(rows.begin(), rows.end(), [&](const json& one) {
+            return one["table"] == key["table"] && one["column"] == key["column"] && one["name"] == key["name"];
+          });
+          if (same == rows.end()) {
+            rows.push_back(key);
+            rows.back()["unit"] = row["unit"];
+            rows.back()["before"] = rows.back()["now"] = nullptr;
+            same = std::prev(rows.end());
+          }
+          (*same)[side] = row["values"][i];
+        }
+  };
+  add(before, "before");
+  add(now, "now");
+  return rows;
+}
+
+std::vector<std::string> pictures_of(const fs::path& folder, const json& record) {
+  std::vector<std::string> pictures;
+  for (const json& output : record.value("outputs", json::array()))
+    for (const json& file : output.value("files", json::array()))
+      if (file.is_string() && fs::path(file.get<std::string>()).extension() == ".png" && cli::file_of_run(folder, file))
+        pictures.push_back(file);
+  return pictures;
+}
+
+/// [{folder, kind, name, when, status, seconds, verdicts, figures, has_report, fault}], the newest first. `kind` is run
+/// or comparison. `fault` says why nothing else is known; otherwise it is missing.
+json list_results(const OpenedFolder& folder) {
+  const json contents = folder.contents();
+  json rows = json::array();
+  add_rows(rows, folder, contents["comparisons"], comparison_row);
+  add_rows(rows, folder, contents["runs"], run_row);
+  std::stable_sort(rows.begin(), rows.end(), [](const json& a, const json& b) { return a["when"] > b["when"]; });
+  return rows;
+}
+
+/// What `marrow diff` finds between two runs, and the pictures that both have: {findings, figures, pictures}. Throws
+/// Error if one of them is not a run.
+json compare_results(const OpenedFolder& opened, const std::string& first, const std::string& second) {
+  const fs::path before = opened.inside(first), now = opened.inside(second);
+  cli::KnownValues values;
+  const cli::Findings findings = cli::find_differences(cli::read_run(before), cli::read_run(now), values);
+  const json before_record = cli::read_record(before), now_record = cli::read_record(now);
+  const std::vector<std::string> others = pictures_of(now, now_record);
+  json pictures = json::array();
+  for (const std::string& picture : pictures_of(before, before_record))
+    if (contains(others, picture)) pictures.push_back(picture);
+  return {{"findings", cli::json_of(findings)},
+          {"figures", figures_side_by_side(cli::figures_of(before, before_record), cli::figures_of(now, now_record))},
+          {"pictures", pictures}};
+}
+
+/// The file report.html of a run or comparison. A run without one gets one. Throws Error for a comparison without one.
+fs::path report_of(const OpenedFolder& opened, const std::string& result) {
+  const fs::path folder = opened.inside(result);
+  if (const auto file = cli::file_of_run(folder, "report.html")) return *file;
+  std::error_code error;
+  if (fs::exists(folder / "comparison.json", error))
+    throw Error("this comparison has no report.html; continue it by: marrow compare");
+  cli::refuse_outside(folder, "report.html");
+  return cli::write_run_page(folder);
+}
+
+/// A report may come from somebody else, and it contains scripts. So it is shown as a page without origin: it reaches
 /// neither this server nor anything else, and can only draw.
 constexpr const char* kReportPolicy =
     "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
@@ -45,7 +186,8 @@ Answer picture_answer(const Workbench& workbench, const Request& request) {
   return {read_text_file(*file, kMostRecordBytes), "image/png"};
 }
 
-/// A file beside a comparison's page. The page in its frame may load nothing; the workbench's own page reads it for it.
+/// A file beside a comparison's page. The page in its frame may load nothing, so the workbench's own page reads the
+/// file.
 Answer part_answer(const Workbench& workbench, const Request& request) {
   const fs::path folder = workbench.folder.inside(request.parameter("folder"));
   const std::string& name = request.parameter("file");
@@ -69,7 +211,8 @@ void add_results_page(Server& server, Workbench& workbench) {
   server.post("/api/results/report", [&](const Request& request) {
     const std::string result = request.text("folder");
     report_of(workbench.folder, result);
-    const bool is_run = fs::exists(workbench.folder.inside(result) / "run.json");  // a comparison wrote its own report
+    const bool is_run =
+        fs::exists(workbench.folder.inside(result) / "run.json");  // a comparison has written its own report
     return json_answer({{"command", is_run ? command_in_folder(workbench, "show " + cli::shell_path(result)) : ""}});
   });
   server.get("/results/report.html", [&](const Request& request) { return report_answer(workbench, request); });

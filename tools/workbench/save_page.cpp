@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The request of the page "Case" that saves the draft as a case.
+// The requests of the page "Case" about its draft: changing it, undo and redo, and saving it as a case.
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
 #include "workbench/case_text.hpp"
@@ -34,20 +34,6 @@ void check_case(const fs::path& place, bool has_landmarks, const Workbench& work
   if (!faults.empty()) throw Error(faults);
 }
 
-/// The planned document with paths relative to the opened folder again, as drafts hold them.
-json document_after(const PlannedCase& plan, const std::string& case_path) {
-  const std::string base = case_path.empty() ? "" : case_path + "/";
-  const auto move = [&](json& path) { path = base + path.get<std::string>(); };
-  json document = plan.document;
-  move(document["ct"]["file"]);
-  for (json& view : document["views"]) {
-    move(view["image"]);
-    if (view.contains("mask") && view["mask"].is_string()) move(view["mask"]);
-    if (view["camera"].contains("file")) move(view["camera"]["file"]);
-  }
-  return document;
-}
-
 /// The texts of a case's files, with the comments of the existing ones.
 struct CaseTexts {
   std::string case_yaml, landmarks_yaml;
@@ -78,7 +64,7 @@ json lost_comments(const std::string& case_path, Workbench& workbench) {
 
 json save(const std::string& case_path, int revision, Workbench& workbench, CtMemory& memory, Job& job) {
   json draft = workbench.drafts.open(case_path);
-  if (draft["revision"] != revision) throw Conflict("this case was changed in another tab; look at it, and save again");
+  if (draft["revision"] != revision) throw Conflict("this case was changed in another tab; look at it and save again");
   const json& document = draft["document"];
   const PlannedCase plan = plan_case(workbench.folder, case_path, document);
   const fs::path place = workbench.folder.inside(case_path);
@@ -89,12 +75,13 @@ json save(const std::string& case_path, int revision, Workbench& workbench, CtMe
   const std::string content = content_of_ct(old_ct, ct, FilesOfCt(old_ct));
   write_case_files(place, plan, texts.case_yaml, texts.landmarks_yaml,
                    [&](const fs::path& staged) { check_case(staged, !texts.landmarks_yaml.empty(), workbench, job); });
-  memory.add_copy(content, content_of_ct(new_ct, ct, FilesOfCt(new_ct)));  // so that it need not be read again
+  memory.add_copy(content, content_of_ct(new_ct, ct, FilesOfCt(new_ct)));  // so that it is not read again
   json copied = json::array();
   for (const PlannedCase::File& file : plan.files)
     if (file.is_new) copied.push_back(file.name);
-  json after = document_after(plan, case_path);
-  if (after != document) {  // so that the next time nothing is copied again
+  json after = plan.document;
+  put_below(after, case_path);
+  if (after != document) {  // so that nothing is copied again the next time
     draft = workbench.drafts.change(case_path, revision, "use the files in the case's folder", std::move(after));
     revision = draft["revision"];
   }
@@ -105,6 +92,19 @@ json save(const std::string& case_path, int revision, Workbench& workbench, CtMe
 }
 
 }  // namespace
+
+void add_case_page(Server& server, Workbench& workbench) {
+  server.get("/api/draft",
+             [&](const Request& request) { return json_answer(workbench.drafts.open(request.parameter("case"))); });
+  server.post("/api/draft/change", [&](const Request& request) {
+    return json_answer(workbench.drafts.change(request.text("case"), request.body.value("revision", -1),
+                                               request.text("what"), request.body.value("document", json())));
+  });
+  for (const bool is_redo : {false, true})
+    server.post(is_redo ? "/api/draft/redo" : "/api/draft/undo", [&workbench, is_redo](const Request& request) {
+      return json_answer(workbench.drafts.step(request.text("case"), request.body.value("revision", -1), is_redo));
+    });
+}
 
 void add_saving(Server& server, Workbench& workbench, const std::shared_ptr<CtMemory>& memory) {
   server.get("/api/case/lost-comments", [&workbench](const Request& request) {

@@ -8,7 +8,8 @@
 
 namespace marrow::workbench {
 
-/// How many voxels along each axis become one, so that about `most_voxels` are left; 1, 1, 1 if there are not more.
+/// How many voxels along each axis become one, so that about `most_voxels` are left; 1, 1, 1 if there are no more than
+/// that.
 std::array<int, 3> coarse_steps(const Grid& grid, double most_voxels);
 
 /// Means of blocks of step[0] x step[1] x step[2] voxels.

@@ -22,7 +22,7 @@ constexpr std::size_t kMostBytes = 64'000'000;  // of one request: a painted mas
 constexpr int kMostAtOnce = 48;                 // requests that are being answered
 constexpr int kThreads = 32;
 
-/// Scripts, styles and pictures come from this server alone, and nothing of it is shown inside another page.
+/// Scripts, styles and pictures come from this server alone, and no other site may show the page inside its own.
 constexpr const char* kPolicy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
     "frame-src 'self'; worker-src 'self' blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
@@ -44,7 +44,7 @@ void refuse(httplib::Response& response, int status, const std::string& text) {
   response.set_content(json_text(json{{"error", printable_lines(text)}}), "application/json");
 }
 
-/// As it is: httplib compresses what set_content() is given, and that takes a second for the scripts of a page.
+/// Sends the content without compression. set_content() would compress it, which takes a second for a page's scripts.
 void send_whole(const std::shared_ptr<const std::string>& content, const std::string& type,
                 httplib::Response& response) {
   if (content->empty()) return response.set_content("", type);
@@ -140,7 +140,7 @@ struct Server::Parts {
       refuse(response, 403, "this address was used before; start 'marrow open' again for a new one");
       return httplib::Server::HandlerResponse::Handled;
     }
-    response.set_redirect("/");  // so that the token does not stay in the address; the browser keeps what is behind '#'
+    response.set_redirect("/");  // to an address without the token; the browser keeps the part behind '#'
     return httplib::Server::HandlerResponse::Handled;
   }
 
@@ -154,7 +154,7 @@ struct Server::Parts {
     try {
       Answer answer = handler(request_of(asked));
       for (const auto& [name, value] : answer.headers) {
-        response.headers.erase(name);  // the default one, which would count as well
+        response.headers.erase(name);  // the default header, which would apply as well
         response.set_header(name, value);
       }
       send_whole(std::make_shared<const std::string>(std::move(answer.body)), answer.type, response);
@@ -212,7 +212,7 @@ void Server::run(const std::atomic<bool>& stop) {
   const bool was_good = parts_->http.listen_after_bind();
   ended = true;
   watcher.join();
-  if (!was_good && !stop) throw Error("the server could not go on listening");
+  if (!was_good && !stop) throw Error("the server stopped listening because of an error");
 }
 
 }  // namespace marrow::workbench

@@ -29,13 +29,14 @@ struct Request {
 struct Answer {
   std::string body;
   std::string type = "application/json";
-  std::vector<std::pair<std::string, std::string>> headers = {};  ///< these replace the server's own of the same name
+  std::vector<std::pair<std::string, std::string>> headers =
+      {};  ///< these replace the server's own headers of the same name
 };
 Answer json_answer(const nlohmann::json& value);
 /// Bytes as they are, for pixels. `about` goes into the header X-Marrow-About as JSON.
 Answer bytes_answer(std::string bytes, const nlohmann::json& about = {});
 
-/// A request relies on a state that has changed, for example by another tab. The answer is 409.
+/// A request relies on a state that has changed, for example because of another tab. The answer is 409.
 class Conflict : public Error {
  public:
   using Error::Error;
@@ -52,7 +53,7 @@ class Server {
   /// `path` without parameters, such as "/api/slice". All paths are added before run().
   void get(const std::string& path, Handler handler);
   void post(const std::string& path, Handler handler);
-  /// A page, a script or a style of marrow's own.
+  /// One of marrow's own pages, scripts or styles.
   void page(const std::string& path, const std::string& type, std::string text);
 
   /// Takes the port; 0: any that is free. Throws Error if it is taken.

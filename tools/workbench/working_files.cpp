@@ -21,7 +21,7 @@ namespace {
 constexpr const char* kFolder = ".marrow/drafts";
 constexpr std::chrono::hours kFresh{1}, kUnused{24};
 
-/// The texts that may name working files: all drafts with all their steps. A case names its own copies.
+/// The texts that may name working files: all drafts with all their steps. Cases have copies of their own.
 std::string texts_of_drafts(const fs::path& drafts) {
   std::string texts;
   for (const fs::directory_entry& entry : fs::directory_iterator(drafts))
@@ -36,8 +36,8 @@ fs::path working_file(const OpenedFolder& folder, const std::string& name, const
   const fs::path drafts = folder.inside(kFolder);
   fs::create_directories(drafts);
   const fs::path file = drafts / (name + "-" + hash_of_bytes(text.data(), text.size()).hex() + ending);
-  // Its time says when it was last in use. It changes at most once an hour: a run that reads the file just now would
-  // take a change of it for a change of the content.
+  // Its time says when it was last in use. The time changes at most once an hour, because a run that is reading the
+  // file would mistake a change for new content.
   static std::mutex one_at_a_time;
   const std::lock_guard lock(one_at_a_time);
   std::error_code error;

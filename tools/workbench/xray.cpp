@@ -24,7 +24,7 @@ std::string set_text(const json& value) {
 
 namespace {
 
-/// The camera in a file of another program, with what the file leaves open, as one of marrow's own files.
+/// Converts the camera file of another program into one of marrow's own. `open`: what the file leaves open.
 fs::path converted_camera(const Workbench& workbench, const fs::path& file, const json& open,
                           const std::string& image) {
   PipelineCall call{workbench_pipeline("camera-file"),
@@ -72,7 +72,9 @@ std::vector<Override> overrides_of(const Workbench& workbench, const json& views
 }
 
 PipelineCall image_call(const Workbench& workbench, const std::string& image) {
-  return {workbench_pipeline("image"), {{{"image", workbench.folder.inside(image).string()}}, {}}, {}, {}, false};
+  return {.file = workbench_pipeline("image"),
+          .arguments = {{{"image", workbench.folder.inside(image).string()}}, {}},
+          .keep = false};
 }
 
 Ran run(const PipelineCall& call, const Workbench& workbench) {

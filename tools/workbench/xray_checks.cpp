@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What marrow says about the cameras of a draft's views, and the pose that its landmarks give.
-
+// The check of the cameras of a draft's views, and the pose that its landmarks give.
 #include "marrow/base/number_text.hpp"
 #include "marrow/domain/pose.hpp"
 #include "workbench/xray.hpp"
@@ -45,7 +44,7 @@ json checked(const Workbench& workbench, const Request& request) {
   return {{"warnings", ran.warnings}, {"metrics", metrics}, {"command", command_of(call)}};
 }
 
-/// The landmarks that have a place in the CT, in the format of read files.
+/// The landmarks that have a place in the CT, in the format of landmarks.yaml.
 json landmarks_file(const json& landmarks, const std::string& fragment) {
   json points = json::object(), seen = json::object();
   for (const json& landmark : landmarks) {
@@ -84,7 +83,7 @@ std::string surface_of(const json& points) {
          vertices + triangles;
 }
 
-/// The pose of landmarks, with the call that gave it.
+/// The pose from landmarks, and the call that computed it.
 struct Fit {
   Pose pose;
   PipelineCall call;
@@ -102,7 +101,7 @@ Fit fit(const Workbench& workbench, const json& views, const json& landmarks, co
   return fit;
 }
 
-/// The landmarks as an image shows them whose left and right are exchanged.
+/// The landmarks in the image of `view` with left and right exchanged.
 json mirrored(json landmarks, const std::string& view, double width_px) {
   for (json& landmark : landmarks)
     if (landmark.contains("pixels") && landmark["pixels"].contains(view)) {
@@ -127,7 +126,7 @@ std::vector<std::string> mirrored_view(const Workbench& workbench, const json& v
       least_px = other_px;
       best = name;
     } catch (const Error&) {
-      // mirrored, the landmarks have no pose: then this is not the mistake
+      // mirrored, the landmarks give no pose, so this image is not mirrored
     }
   }
   if (best.empty()) return {};

@@ -21,7 +21,7 @@ json json_of_seeds(const List<Seeds>& seeds) {
   return fragments;
 }
 
-/// A list as a draft's document has it, with the fragment of each.
+/// The list of a draft's document, with the fragment of each landmark.
 json json_of_landmarks(const List<Landmarks>& fragments) {
   json list = json::array();
   for (std::size_t i = 0; i < fragments.size(); ++i)
@@ -39,11 +39,9 @@ json imported(const Workbench& workbench, const Request& request) {
   const std::string what = request.parameter("what");
   if (what != "seeds" && what != "landmarks" && what != "pose")
     throw Error("seeds, landmarks or a pose can be imported, not '" + printable(what) + "'");
-  const PipelineCall call{workbench_pipeline("import-" + what),
-                          {{{"path", workbench.folder.inside(request.parameter("path")).string()}}, {}},
-                          {},
-                          {},
-                          false};
+  const std::string path = workbench.folder.inside(request.parameter("path")).string();
+  const PipelineCall call{
+      .file = workbench_pipeline("import-" + what), .arguments = {{{"path", path}}, {}}, .keep = false};
   const Ran ran = run(call, workbench);
   const Value& value = ran.outputs.at(what);
   json answer = {{"command", command_of(call)}, {"warnings", ran.warnings}};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Seeds, landmarks, poses and cameras to files: marrow's own, and those of other programs, which a pipeline makes.
+// Writes seeds, landmarks, poses and cameras to files: in marrow's own format, or by a pipeline for other programs.
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/toolbox/exchange/written_files.hpp"
@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::json;
 
-/// What a file's name must end in, and the output of the pipeline that makes it; empty for marrow's own format.
+/// The ending of a file's name, and the pipeline's output that makes the file. Marrow's own format needs no pipeline.
 struct Format {
   std::string ending, output;
   std::string (*bytes)(const Value&) = nullptr;
@@ -109,7 +109,7 @@ PipelineCall call_for(const Workbench& workbench, const std::string& what, const
   return call;
 }
 
-/// One file; where the pipeline makes one for each fragment or view, there must be only one.
+/// The only file. Throws Error if the pipeline made several, one for each fragment or view.
 const Value& only_item(const Value& value) {
   if (!value.is_list()) return value;
   if (value.items.size() == 1) return only_item(value.items.front());

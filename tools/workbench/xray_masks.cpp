@@ -53,8 +53,8 @@ Answer shown_mask(const Workbench& workbench, const Request& request) {
   return bytes_answer(bytes_of_pixels(mask), {{"width_px", mask.cols}, {"height_px", mask.rows}});
 }
 
-/// The image whose pixels, row after row, are first used, then not used, and so on, each for as many pixels as `runs`
-/// says. Throws Error unless they fill the image.
+/// The mask of an image from the lengths of its runs, row after row: used pixels, unused pixels, used pixels and so on.
+/// Throws Error unless the runs fill the image.
 std::string mask_of(int width_px, int height_px, const json& runs) {
   const std::size_t count = std::size_t(width_px) * std::size_t(height_px);
   std::string mask;

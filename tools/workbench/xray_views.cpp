@@ -34,8 +34,8 @@ std::string pixels_of(const Image& image, json& about) {
   return bytes_of_pixels(stored);
 }
 
-/// The warnings of a run that read a view, and doubts from its header. A camera of angles has the patient's axes, so
-/// the header can be compared with it; then this comparison is enough.
+/// The warnings of a run that read a view, and doubts from the image's header. A camera given by angles has the
+/// patient's axes, so the header is compared with it. Then the general doubts about sides are left out.
 std::vector<std::string> with_sides(std::vector<std::string> warnings, const std::filesystem::path& image,
                                     const json& written, const Camera& camera) {
   if (!written.contains("c_arm")) return warnings;
@@ -45,7 +45,7 @@ std::vector<std::string> with_sides(std::vector<std::string> warnings, const std
   return warnings;
 }
 
-/// The view if it can be read. If not, the image alone, and why not as `fault`. Throws Error if the image cannot be
+/// The view. If it cannot be read, the image alone, with the reason as `fault`. Throws Error if the image cannot be
 /// read.
 Answer view_answer(const Workbench& workbench, const Request& request) {
   const std::string image = request.text("image");
@@ -53,11 +53,10 @@ Answer view_answer(const Workbench& workbench, const Request& request) {
   std::string fault;
   try {
     const std::filesystem::path camera = camera_file(workbench, request.body.value("camera", json()), image);
-    const PipelineCall call{workbench_pipeline("view"),
-                            {{{"image", workbench.folder.inside(image).string()}, {"camera", camera.string()}}, {}},
-                            {},
-                            {},
-                            false};
+    const std::string file = workbench.folder.inside(image).string();
+    const PipelineCall call{.file = workbench_pipeline("view"),
+                            .arguments = {{{"image", file}, {"camera", camera.string()}}, {}},
+                            .keep = false};
     about["command"] = command_of(call);
     const Ran ran = run(call, workbench);
     const View& view = ran.outputs.at("view").as<View>();
@@ -87,11 +86,9 @@ void add_xray_views(Server& server, Workbench& workbench) {
     return bytes_answer(std::move(bytes), about);
   });
   server.get("/api/xray/header-camera", [&](const Request& request) {
-    const PipelineCall call{workbench_pipeline("header-camera"),
-                            {{{"image", workbench.folder.inside(request.parameter("image")).string()}}, {}},
-                            {},
-                            {},
-                            false};
+    const std::string image = workbench.folder.inside(request.parameter("image")).string();
+    const PipelineCall call{
+        .file = workbench_pipeline("header-camera"), .arguments = {{{"image", image}}, {}}, .keep = false};
     const Ran ran = run(call, workbench);
     return json_answer({{"camera", camera_json(ran.outputs.at("camera").as<Camera>())},
                         {"warnings", ran.warnings},

@@ -18,6 +18,11 @@ bool is_flow_indicator(char c) { return c == ',' || c == '[' || c == ']' || c ==
 
 }  // namespace
 
+const YamlEntryText* find_entry(const std::vector<YamlEntryText>& entries, const std::string& key) {
+  const auto found = std::find_if(entries.begin(), entries.end(), [&](const auto& one) { return one.key == key; });
+  return found == entries.end() ? nullptr : &*found;
+}
+
 YamlText::YamlText(std::string text) : text_(std::move(text)) {
   if (text_.starts_with("\xEF\xBB\xBF")) mark_offset_ = 3;
   const std::size_t first = text_.find('\n');
@@ -142,7 +147,7 @@ std::size_t YamlText::end_of_literal(std::size_t at, std::size_t parent_column) 
   return end;
 }
 
-/// The end of the part of a plain scalar that is on this line, without spaces behind it.
+/// The end of the part of a plain scalar on this line, without the spaces behind it.
 std::size_t YamlText::end_of_plain_line(std::size_t at, bool in_flow) const {
   std::size_t end = at;
   for (std::size_t i = at; i < text_.size() && !is_break(text_[i]); ++i) {

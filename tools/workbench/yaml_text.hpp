@@ -16,6 +16,9 @@ struct YamlEntryText {
   YAML::Node value;
 };
 
+/// nullptr if the map has no such key.
+const YamlEntryText* find_entry(const std::vector<YamlEntryText>& entries, const std::string& key);
+
 class YamlText {
  public:
   /// Throws Error if the text is not YAML, or uses anchors or aliases: a value then has several places.
@@ -36,7 +39,7 @@ class YamlText {
   std::size_t column(std::size_t at) const { return at - line_begin(at); }
   /// The spaces at the beginning of the line.
   std::size_t indent(std::size_t at) const;
-  /// "\r\n" if the text's first line ends so.
+  /// The line break of the first line: "\n" or "\r\n".
   const std::string& newline() const { return newline_; }
 
  private:

@@ -6,12 +6,11 @@
 #include <functional>
 #include <thread>
 
-#include "beta.hpp"
+#include "distributions.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/domain/quantile.hpp"
 #include "marrow/domain/random.hpp"
-#include "normal.hpp"
 #include "value_checks.hpp"
 
 namespace marrow::compare {
@@ -30,8 +29,8 @@ ValuesOfCases checked_and_sorted(ValuesOfCases cases, const BootstrapSettings& s
   return cases;
 }
 
-/// The values of all resamples, each from its own random numbers. `make` gives a function with memory of its own, one
-/// for each thread.
+/// The values of all resamples, each from its own random numbers. `make` is called once for each thread, and returns a
+/// function with its own memory.
 std::vector<double> of_resamples(const BootstrapSettings& settings,
                                  const std::function<std::function<double(Random&)>()>& make) {
   std::vector<double> results(settings.resamples);
@@ -57,8 +56,8 @@ double expanded_tail(double confidence, double cases) {
   return upper_tail(std::sqrt(cases / (cases - 1)) * student_quantile(1 - confidence, cases - 1));
 }
 
-/// Counts how often each value was drawn. The values are known by their ranks, so a median is found by counting up to
-/// the middle, without a sort. Blocks of ranks make this short.
+/// Counts how often each value was drawn. Values are stored by rank, so counting up to the middle finds the median
+/// without a sort. Blocks of ranks make this fast.
 class DrawnRanks {
  public:
   explicit DrawnRanks(std::size_t ranks) : counts_(ranks), blocks_(ranks / kBlock + 1) {}

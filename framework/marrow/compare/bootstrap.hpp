@@ -36,7 +36,7 @@ struct BootstrapSettings {
 std::size_t resamples_for(std::size_t runs);
 
 /// Interval of the median of all values. The same values (cases and runs in any order), seed and counts give the same
-/// bytes with any number of threads: resample k has random numbers of its own, Random(seed, k).
+/// bytes with any number of threads: resample k has its own random numbers, Random(seed, k).
 ///
 /// Throws Error for fewer than two cases, a case without values, a value that is not finite, a confidence that is not
 /// between 0 and 1, or fewer than 1000 resamples.

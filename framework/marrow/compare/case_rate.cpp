@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "beta.hpp"
+#include "distributions.hpp"
 #include "marrow/base/error.hpp"
-#include "normal.hpp"
+#include "value_checks.hpp"
 
 namespace marrow::compare {
 namespace {

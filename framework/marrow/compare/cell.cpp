@@ -5,14 +5,14 @@
 #include <cmath>
 #include <set>
 
-#include "cell_fault.hpp"
-#include "cell_key.hpp"
-#include "figure_path.hpp"
+#include "cell_parts.hpp"
+#include "experiment_figures.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/remove_tree.hpp"
 #include "marrow/base/text_file.hpp"
 #include "marrow/domain/pose.hpp"
 #include "marrow/runtime/node/types.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/run/run_folder.hpp"
 #include "marrow/runtime/run/verdicts.hpp"
 #include "marrow/runtime/store/digest_memory.hpp"
@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 /// a cell in all.
 constexpr long kSharedFilesOfCell = 1;
 
-/// A path names something that is not there. It may be the name of an item along an axis.
+/// A path names a figure, or an item along an axis, that does not exist.
 struct UnknownName : Error {
   UnknownName(const std::string& message, std::string along) : Error(message), axis(std::move(along)) {}
   std::string axis;  ///< empty if it is the name of a figure
@@ -40,23 +40,20 @@ Pipeline checked(const fs::path& file, const PipelineArguments& arguments, const
   return pipeline;
 }
 
-/// The figure that a path names. Nothing if a node failed that may fail; `absent` then gets a sentence about it. Throws
-/// Error if it is missing for another reason or is not a finite number.
+/// The figure that a path names. Nothing if a node that may fail has failed; a sentence about it is then added to
+/// `absent`. Throws Error if the figure is missing for another reason or is not finite.
 std::optional<marrow::Metric> figure(const Pipeline& pipeline, const RunResult& result, const std::string& path,
                                      std::string& absent) {
   const std::vector<std::string> parts = parts_of_path(path);
-  const auto output = std::find_if(pipeline.outputs.begin(), pipeline.outputs.end(),
-                                   [&](const PipelineOutput& one) { return one.name == parts[0]; });
-  Value value = value_of(result, output->source);
+  Value value = value_of(result, find_named(pipeline.outputs, parts[0])->source);
   std::size_t used = 1;
   for (; value.is_list(); ++used) {
     const auto item =
         used < parts.size() ? std::find(value.names.begin(), value.names.end(), parts[used]) : value.names.end();
     if (item == value.names.end()) {
-      std::string names;
-      for (const std::string& name : value.names) names += (names.empty() ? "" : ", ") + name;
-      throw UnknownName("'" + path + "': there are " + names + " along '" + value.axis + "', name one of them",
-                        value.axis);
+      throw UnknownName(
+          "'" + path + "': there are " + joined(value.names, ", ") + " along '" + value.axis + "', name one of them",
+          value.axis);
     }
     const Value picked = value.items[std::size_t(item - value.names.begin())];
     value = picked;
@@ -79,7 +76,7 @@ std::optional<marrow::Metric> figure(const Pipeline& pipeline, const RunResult& 
   throw UnknownName("'" + path + "': there is no figure '" + name + "'; " + suggestion(name, known), "");
 }
 
-/// As a metric's path begins: "verdict.distal".
+/// The beginning of a metric's path: "verdict.distal".
 std::string verdict_place(const NamedVerdict& one) {
   std::string item = one.item;
   std::replace(item.begin(), item.end(), '/', '.');
@@ -98,6 +95,14 @@ int evaluations_in(const Value& value) {
   for (const Value& item : value.items) sum += evaluations_in(item);
   if (!value.is_list() && !value.is_absent() && value.type == TypeInfo::of<Pose>()) sum += value.as<Pose>().evaluations;
   return sum;
+}
+
+/// The names along an axis, at any level of nested lists. These may have different items.
+void add_names_along(const Value& value, const std::string& axis, std::vector<std::string>& names) {
+  if (value.axis == axis)
+    for (const std::string& name : value.names)
+      if (!contains(names, name)) names.push_back(name);
+  for (const Value& item : value.items) add_names_along(item, axis, names);
 }
 
 /// Whether a file has exactly this text. False also if the file is missing or cannot be read.
@@ -154,8 +159,7 @@ Pipeline CellRunner::pipeline_of(const CellIndex& cell, const fs::path& case_fol
   if (!experiment_.initial_error.empty())
     wanted.insert(experiment_.initial_error.substr(0, experiment_.initial_error.find('.')));
   std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) {
-    const PortInfo& port =
-        pipeline.nodes[std::size_t(output.source.node)].info.outputs[std::size_t(output.source.output)];
+    const PortInfo& port = pipeline.output_of(output.source);
     const bool is_shown =
         depth == Depth::pictures && (port.type == TypeInfo::of<Scene>() || port.type == TypeInfo::of<Landscape>());
     return !wanted.contains(output.name) && !is_shown && port.type != TypeInfo::of<Pose>() &&
@@ -246,7 +250,7 @@ CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const Ru
   return row;
 }
 
-/// Throws Error if a figure is missing, unless a node failed that may fail.
+/// Throws Error if a figure is missing, unless a node that may fail has failed.
 void CellRunner::fill(CellRow& row, const Pipeline& pipeline, const Done& done) const {
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
     const NodeRecord& node = done.result.nodes[i];
@@ -304,6 +308,21 @@ const std::set<std::string>& CellRunner::wanted_by_others(const CellIndex& cell,
         (experiment_.cases.size() > 1 && !depends[i].on_case))
       wanted.insert(pipeline.nodes[i].id);
   return wanted;
+}
+
+std::vector<std::string> CellRunner::items_of(const CellIndex& cell, const NamedItem& asked) {
+  Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::figures);
+  const auto node = std::find_if(pipeline.nodes.begin(), pipeline.nodes.end(),
+                                 [&](const PipelineNode& one) { return one.id == asked.node; });
+  if (node == pipeline.nodes.end() || std::size_t(asked.output) >= node->info.outputs.size())
+    throw Error("the pipeline has no such node '" + asked.node + "' any more");
+  const Reference list{asked.node, {}, int(node - pipeline.nodes.begin()), asked.output, {}};
+  pipeline.outputs = {{"items", list}};
+  const RunResult result = run_pipeline(pipeline, catalogue_, settings_of(cell));
+  if (result.failed()) throw Error(reason_of(pipeline, result));
+  std::vector<std::string> names;
+  add_names_along(value_of(result, list), asked.axis, names);
+  return names;
 }
 
 void CellRunner::write(const CellIndex& cell, CellRow& row) const {

@@ -34,29 +34,29 @@ struct CellRow {
   std::string initial_error_unit;
   std::optional<double> seconds;  ///< measured with nothing else running, without what all variants share
   int evaluations = 0;            ///< number of cost evaluations, for all poses of the cell
-  /// The worst of the judgements that its pipeline's outputs have; nothing if there is no verdict among them.
+  /// The worst judgement of the verdicts among its pipeline's outputs; nothing if there is no verdict.
   std::optional<Judgement> verdict;
-  std::optional<double> failure_probability;                     ///< the largest of the verdicts' that is known
-  using Figures = std::map<std::string, std::optional<double>>;  ///< nothing for a figure that is no finite number
-  std::map<std::string, Figures> verdict_figures;  ///< what each verdict rests on, by its place: "verdict.distal"
+  std::optional<double> failure_probability;                     ///< the largest known one of the verdicts
+  using Figures = std::map<std::string, std::optional<double>>;  ///< nothing for a figure that is not finite
+  std::map<std::string, Figures> verdict_figures;  ///< the figures behind each verdict, by its place: "verdict.distal"
   struct Calls {
     int made = 0, cached = 0;
     double seconds = 0;
   };
   std::map<std::string, Calls> nodes;  ///< by the node's name in the pipeline
-  std::string key;  ///< key of everything that the row depends on; a row with another key is of no use
+  std::string key;  ///< key of everything that the row depends on; a row with another key cannot be used
 
   /// Whether it is done and within every limit of the experiment.
   bool is_success(const Experiment& experiment) const;
 };
 
-/// The row as one line of JSON. Its key "digest" is a digest of all the others, so that a row that was cut or changed
-/// since is not taken for a result.
+/// The row as one line of JSON. Its key "digest" is a digest of all other keys. So a row that was cut or changed later
+/// is not taken for a result.
 std::string to_json(const CellRow& row);
-/// Why a text is not a row as to_json() wrote it; empty if it is. It may be a row of any experiment.
+/// Why a text is not a row that to_json() wrote; empty if it is one. It may be a row of any experiment.
 std::string fault_of_written_row(const std::string& text);
-/// Parses a row of the experiment. Throws Error if the text is not a row as to_json() wrote it. The names of the cell
-/// in the text are not trusted: call name_row() with the cell that was asked for.
+/// Parses a row of the experiment. Throws Error if the text is not a row that to_json() wrote. Ignores the names of the
+/// cell in the text: call name_row() with the cell that was asked for.
 CellRow row_from_json(const std::string& text, const Experiment& experiment);
 /// Writes the names of the cell into its row.
 void name_row(CellRow& row, const Experiment& experiment, const CellIndex& cell);
@@ -73,7 +73,7 @@ struct Dependence {
 };
 std::vector<Dependence> dependences(const Pipeline& pipeline, const Experiment& experiment);
 
-/// What cells depend on besides the texts of the experiment and its pipelines, as it was when it was read.
+/// What cells depend on besides the texts of the experiment and its pipelines, in the state in which it was read.
 struct Dependencies {
   std::map<std::string, std::string> contents;  ///< digest of what each path names
   std::map<std::string, Digest> builds;         ///< build ids of the plugins, by node
@@ -94,8 +94,8 @@ class CellRunner {
   std::filesystem::path case_place(std::size_t case_index) const;
   /// The folder of a case. A simulated case is made if it is not in the store yet. Throws Error if that fails.
   std::filesystem::path case_folder(std::size_t case_index);
-  /// From now on, each path is read only once. This is for a process that has other processes run the cells and must
-  /// give all of them the same keys.
+  /// From now on, each path is read only once. Call this in a process whose cells are run by other processes, so that
+  /// all of them get the same keys.
   void keep_dependencies() { keeps_dependencies_ = true; }
   /// What was read since keep_dependencies().
   const Dependencies& dependencies() const { return dependencies_; }
@@ -104,7 +104,7 @@ class CellRunner {
   std::string key_of(const CellIndex& cell);
   /// The existing row of the cell, if it is whole, did not fail and has this key.
   std::optional<CellRow> finished(const CellIndex& cell, const std::string& key) const;
-  /// Why the cell's file is not a row as it was written; empty if it is one, or if there is none.
+  /// Why the cell's file is not a row that marrow wrote; empty if it is one, or if there is no file.
   std::string fault_of_row(const CellIndex& cell) const;
   /// Runs the cell. Does not throw if a node fails: the row then has the reason.
   CellRow run(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer = {});
@@ -113,15 +113,16 @@ class CellRunner {
   /// if the folder cannot be written.
   bool draw(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer = {});
   /// Seconds that a run of the cell takes if the results that all variants share are read back and all others are made
-  /// anew; without a store, everything is made anew. The cell runs once before, which does not count. It is measured
-  /// once: later calls with the same variants and number of threads find it in the store. Throws Error if a run fails.
+  /// again; without a store, everything is made again. The cell runs once before the measurement. The time is measured
+  /// only once: later calls with the same variants and number of threads find it in the store. Throws Error if a run
+  /// fails.
   double time(const CellIndex& cell);
   std::filesystem::path pictures_of(const CellIndex& cell) const;
-  /// The names of the items along an axis, in the case of a cell. Runs only the node from which they have their names,
-  /// and what this node needs. Empty if the case has no such list. Throws Error if a node fails.
+  /// The names of the items along an axis, in the case of a cell. Runs only the node that names the items, and what
+  /// this node needs. Empty if the case has no such list. Throws Error if a node fails.
   std::vector<std::string> items_of(const CellIndex& cell, const NamedItem& asked);
-  /// Writes the row to where finished() finds it. If it cannot be written, the row becomes a failed one, so that only
-  /// this cell is lost.
+  /// Writes the row where finished() finds it. If it cannot be written, the row becomes a failed one, so that only this
+  /// cell is lost.
   void write(const CellIndex& cell, CellRow& row) const;
   std::filesystem::path folder_of(const CellIndex& cell) const;
   const Experiment& experiment() const { return experiment_; }
@@ -154,7 +155,7 @@ class CellRunner {
                 const std::function<void(const RunEvent&)>& observer);
   void fill(CellRow& row, const Pipeline& pipeline, const Done& done) const;
   Pipeline simulation_of(std::size_t case_index) const;
-  /// What the variants are on one case from one start.
+  /// What is known of all variants on one case from one start.
   struct OfAllVariants {
     std::optional<std::pair<std::size_t, std::size_t>> place;  ///< case and start
     std::map<Digest, std::size_t> variants_with;               ///< how many have a node, by its history

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The simulated cases of an experiment: they are found in the store, copied from the shared store, or made.
-#include "cell_fault.hpp"
-#include "cell_key.hpp"
+#include "cell_parts.hpp"
 #include "marrow/base/folder_use.hpp"
 #include "marrow/base/temporary_folder.hpp"
 #include "marrow/base/text_file.hpp"
@@ -21,8 +20,8 @@ namespace fs = std::filesystem;
 /// The folder of a simulated case, from the path of its outputs.
 fs::path case_folder_of(const fs::path& outputs) { return outputs.parent_path().parent_path(); }
 
-/// The hash of a case's content. A simulated case has it in the file content.txt, which is written last. A case that
-/// does not match its hash is not whole and is made again.
+/// The hash of a case's content. The file content.txt of a simulated case holds it, and is written last. A case that
+/// does not match its hash is not whole, and is made again.
 std::string content_of_case(const fs::path& outputs) { return path_digest(outputs).hex(); }
 
 bool is_whole_case(const fs::path& folder, const fs::path& outputs) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The keys of cells and simulated cases. They cover everything that these depend on, so that kept ones can be reused.
-#include "cell_key.hpp"
+// The keys of cells and simulated cases. A key covers everything that a cell or case depends on, so that a kept one can
+// be reused.
+#include "cell_parts.hpp"
 
 #include <map>
 #include <set>
@@ -15,8 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The digest of what a path names. If it cannot be read, the error text is used instead, and the cell is not ended
-/// here: the node that needs the file fails and says why.
+/// The digest of what a path names. If it cannot be read, the text of the error is used instead: the node that needs
+/// the file fails later and says why.
 std::string content_now(const std::string& path) {
   try {
     return path_digest(path).hex();
@@ -63,8 +64,8 @@ std::string CellRunner::content_of(const std::string& path, Look look) const {
   return kept[path] = content_now(path);
 }
 
-/// The case counts as a whole, even if the nodes name only parts of it. Where a simulated case lies does not count: it
-/// is in a store, and hosts that share a comparison may have theirs at different places.
+/// The whole case counts, even if the nodes name only parts of it. The path of a simulated case does not count: it is
+/// in a store, and hosts that share a comparison may have their stores at different places.
 void CellRunner::add_pipeline(Hasher& hasher, const Pipeline& pipeline, const fs::path& case_folder, Look look) const {
   const std::string simulated = fs::absolute(store_ ? store_->cases() : folder_ / "cases").string() + "/";
   const std::string place = case_folder.empty() ? "" : fs::absolute(case_folder).string();
@@ -73,7 +74,7 @@ void CellRunner::add_pipeline(Hasher& hasher, const Pipeline& pipeline, const fs
   };
   hasher.add(neutral(resolved_yaml(pipeline)));
   std::set<Digest> build_ids;
-  std::map<std::string, std::string> paths;  // in an order that does not depend on where the case lies
+  std::map<std::string, std::string> paths;  // in an order that does not depend on the path of the case
   if (!place.empty()) paths.emplace(neutral(place), place);
   for (const PipelineNode* node : called_nodes(pipeline)) {
     const Digest build_id = catalogue_.library_of(node->info.name)->build_id;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measures the time of a cell.
-#include "cell_fault.hpp"
+#include "cell_parts.hpp"
 #include "marrow/compare/cell.hpp"
 #include "marrow/runtime/node/types.hpp"
 
@@ -70,8 +70,8 @@ double CellRunner::time(const CellIndex& cell) {
   hasher.add(kKindOfTime);
   hasher.add(before.key);
   hasher.add(std::int64_t(threads_));
-  // The variants say which nodes count. If one of them changes, all are measured again, so that no time of an earlier
-  // day stands beside one of today.
+  // The variants decide which nodes count. If one of them changes, all are measured again, so that times of different
+  // days are never compared.
   hasher.add(of_all_variants(cell).keys);
   const Digest key = hasher.digest();
   if (const auto known = store_ ? kept_seconds(*store_, key) : std::nullopt) return *known;
@@ -81,7 +81,7 @@ double CellRunner::time(const CellIndex& cell) {
     if (result.failed()) throw Error(reason_of(pipeline, result));
     return result.seconds;
   };
-  seconds_of_run();  // loads libraries, starts threads and fills caches, which must not count for whoever comes first
+  seconds_of_run();  // loads libraries, starts threads and fills caches: the first cell must not pay for this
   const double taken = seconds_of_run();
   if (watched(cell, pipeline) != before) throw Error(kChanged);
   Value seconds = Value::of(std::make_shared<const Metrics>(Metrics{{{"seconds", taken, "s"}}}));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The random draws of an experiment. They depend only on its seeds and are the same on every machine.
-#include <string>
 #include <vector>
 
 #include "marrow/base/export.hpp"

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/compare/experiment.hpp"
 
-#include <algorithm>
-
 #include "draw.hpp"
-#include "experiment_check.hpp"
 #include "marrow/base/number_text.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -18,8 +16,8 @@ std::string list_text(const std::array<double, 3>& values) {
 
 template <class Named>
 std::optional<std::size_t> place_of_name(const std::vector<Named>& all, const std::string& name) {
-  const auto found = std::find_if(all.begin(), all.end(), [&](const Named& one) { return one.name == name; });
-  return found == all.end() ? std::nullopt : std::optional(std::size_t(found - all.begin()));
+  const Named* found = find_named(all, name);
+  return found ? std::optional(std::size_t(found - all.data())) : std::nullopt;
 }
 
 void add_seeded(const SeededInputs& seeded, std::uint64_t seed, std::vector<InputValue>& inputs) {
@@ -79,17 +77,6 @@ PipelineArguments simulation_arguments_of(const Experiment& experiment, std::siz
   PipelineArguments arguments{simulation.inputs, simulation.changes};
   add_seeded(simulation.seeded, experiment.cases[case_index].seed, arguments.inputs);
   return arguments;
-}
-
-Experiment read_experiment(const fs::path& file, const Catalogue& catalogue, Diagnostics& diagnostics,
-                           std::size_t more_cases) {
-  WrittenExperiment written = read_written_experiment(file, diagnostics, more_cases);
-  if (!diagnostics.empty()) return std::move(written.experiment);
-  const CheckedPipelines checked = check_pipelines(written, catalogue, diagnostics);
-  Experiment& experiment = written.experiment;
-  experiment.named_items = checked.items;
-  experiment.notes = checked.notes;
-  return std::move(experiment);
 }
 
 }  // namespace marrow::compare

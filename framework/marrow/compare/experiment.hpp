@@ -10,7 +10,6 @@
 #include "marrow/base/export.hpp"
 #include "marrow/compare/stop_rule.hpp"
 #include "marrow/compare/swept_option.hpp"
-#include "marrow/compare/tune_rule.hpp"
 #include "marrow/runtime/pipeline/pipeline.hpp"
 
 namespace MARROW_EXPORT marrow {
@@ -89,8 +88,8 @@ struct MetricChoice {
   bool higher_is_better() const { return better == Better::higher; }
 };
 
-/// An item that the path of a figure names, and the node from which the items along its axis have their names. Which
-/// items there are is known from a case only (CellRunner::items_of).
+/// An item that the path of a figure names, and the node that names the items along its axis. Only a case shows which
+/// items exist (CellRunner::items_of).
 struct NamedItem {
   std::string path, item, axis;
   Place place;
@@ -99,8 +98,7 @@ struct NamedItem {
   int output = 0;           ///< of the node
 };
 
-/// Limits of an experiment: more is a fault of its file. Each variant's pipeline is read whenever the experiment is
-/// read.
+/// Limits of an experiment; more is a fault of its file. Reading an experiment reads the pipeline of each variant.
 inline constexpr std::size_t kMostVariants = 1000;
 inline constexpr std::size_t kMostCells = 1000000;
 inline constexpr std::size_t kMostMetrics = 1000;
@@ -117,7 +115,7 @@ struct Experiment {
   CaseSimulation simulation;
   SeededInputs seeded;  ///< of the pipeline itself, where it makes its data and the cases are seeds
   std::vector<ExperimentCase> cases;
-  std::size_t more_cases = 0;  ///< the last of the cases, which the file does not name
+  std::size_t more_cases = 0;  ///< number of cases at the end that the file does not name
   std::vector<Variant> variants;
   std::vector<SweptOption> swept;
   bool sweep_is_grid = false;  ///< else Sobol's points
@@ -127,7 +125,7 @@ struct Experiment {
   std::vector<MetricChoice> metrics;
   std::string initial_error;  ///< path of the figure over which the capture range is drawn; may be empty
   Place initial_error_place;
-  std::vector<NamedItem> named_items;  ///< of the metrics and the initial error; without those only a search can know
+  std::vector<NamedItem> named_items;  ///< of the metrics and the initial error, except items that only a search names
   std::vector<std::string> pictures;   ///< outputs to show side by side
   std::optional<StopRule> stop;        ///< when a comparison with more and more cases ends
   std::optional<TuneRule> tune;        ///< how a further variant is found
@@ -171,7 +169,7 @@ void keep_held_out_cases(Experiment& experiment);
 
 /// Reads and checks an experiment and the pipelines that it names, with each variant's changes. All faults go to
 /// `diagnostics`, at their lines; the result may be used only if there are none. `more_cases` further cases follow
-/// those of the file. Their seeds go on after the file's largest one.
+/// those of the file. Their seeds follow the file's largest seed.
 Experiment read_experiment(const std::filesystem::path& file, const Catalogue& catalogue, Diagnostics& diagnostics,
                            std::size_t more_cases = 0);
 

@@ -63,8 +63,7 @@ class CaseReader {
   }
 
  private:
-  /// Returns false and reports a fault if the case cannot be added. The other cases of the same list are then not
-  /// looked at.
+  /// Returns false and reports a fault if the case cannot be added. The rest of the same list is then ignored.
   bool add(ExperimentCase one, const Place& place) {
     if (!check_name(yaml_, one.name, place, "a case's name") || !is_new_folder(one, place)) return false;
     const auto [known, is_new] = known_.emplace(in_small_letters(one.name), experiment_.cases.size());
@@ -90,7 +89,7 @@ class CaseReader {
     if (one.folder.empty() || stat(one.folder.c_str(), &info) != 0) return true;
     const auto [known, is_new] = known_folders_.emplace(std::pair(info.st_dev, info.st_ino), one);
     const ExperimentCase& other = known->second;
-    if (is_new || other.name == one.name) return true;  // two cases of one name are refused anyway
+    if (is_new || other.name == one.name) return true;  // add() refuses two cases of one name
     yaml_.fault(place,
                 "the cases '" + other.name + "' and '" + one.name + "' are one folder, " +
                     printable(other.folder.string()) + ", to which " + printable(one.folder.string()) + " leads",

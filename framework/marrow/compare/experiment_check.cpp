@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "experiment_check.hpp"
-
 #include "experiment_figures.hpp"
+#include "experiment_text.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/pipeline/one_node.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
@@ -9,6 +8,13 @@
 namespace marrow::compare {
 namespace {
 
+struct CheckedPipelines {
+  std::vector<std::string> notes;  ///< of all variants: what one variant does not use, another may need
+  std::vector<NamedItem> items;    ///< Experiment::named_items
+};
+
+/// Reads the pipelines with the inputs of the cells and the changes of each variant. Checks that they have everything
+/// that the experiment names.
 class Checker {
  public:
   Checker(const WrittenExperiment& written, const Catalogue& catalogue, Diagnostics& diagnostics)
@@ -68,13 +74,13 @@ class Checker {
     }
   }
 
-  /// Scenes and landscapes belong to a report without being named, but may be.
+  /// A report shows scenes and landscapes even if they are not named; they may be named too.
   void check_pictures(const Pipeline& pipeline) {
     for (std::size_t i = 0; i < experiment_.pictures.size(); ++i) {
       const PipelineOutput* output =
           find_output(pipeline, experiment_.pictures[i], written_.picture_places[i], diagnostics_);
       if (!output) continue;
-      const TypeInfo& type = port_of(pipeline, *output).type;
+      const TypeInfo& type = pipeline.output_of(output->source).type;
       const WriterInfo* writer = catalogue_.find_writer(type);
       if (!writer || writer->extension == ".png" || type == TypeInfo::of<Scene>() || type == TypeInfo::of<Landscape>())
         continue;
@@ -92,9 +98,15 @@ class Checker {
 
 }  // namespace
 
-CheckedPipelines check_pipelines(const WrittenExperiment& written, const Catalogue& catalogue,
-                                 Diagnostics& diagnostics) {
-  return Checker(written, catalogue, diagnostics).check();
+Experiment read_experiment(const std::filesystem::path& file, const Catalogue& catalogue, Diagnostics& diagnostics,
+                           std::size_t more_cases) {
+  WrittenExperiment written = read_written_experiment(file, diagnostics, more_cases);
+  if (!diagnostics.empty()) return std::move(written.experiment);
+  const CheckedPipelines checked = Checker(written, catalogue, diagnostics).check();
+  Experiment& experiment = written.experiment;
+  experiment.named_items = checked.items;
+  experiment.notes = checked.notes;
+  return std::move(experiment);
 }
 
 }  // namespace marrow::compare

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "experiment_figures.hpp"
 
-#include "axis_maker.hpp"
-#include "figure_path.hpp"
+#include <algorithm>
+
 #include "marrow/base/number_text.hpp"
 #include "marrow/compare/cell.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
@@ -24,23 +24,91 @@ std::string start_of_path(const std::string& output, const std::vector<std::stri
   return text;
 }
 
+/// An output that is a list over an axis, of a node that is not called along this axis. So this node names the items.
+struct AxisMaker {
+  int node = -1, output = -1;
+};
+
+bool takes_long(const PipelineNode& node) {
+  return node.repetition || std::any_of(node.info.outputs.begin(), node.info.outputs.end(),
+                                        [](const PortInfo& output) { return output.type.is_function; });
+}
+
+class MakerSearch {
+ public:
+  MakerSearch(const Pipeline& pipeline, const std::string& axis) : pipeline_(pipeline), axis_(axis) {}
+
+  void look_at(const Reference& value) {
+    const PipelineNode& node = pipeline_.node_of(value);
+    if (node.repetition) return;
+    if (pipeline_.output_of(value).axis == axis_) return consider({value.node, value.output});
+    if (!seen_.insert(value.node).second) return;
+    for (const Wire& wire : node.wires) {
+      if (node.input_of(wire).axis == axis_) continue;  // it takes the whole list
+      for (const Reference& source : wire.sources)
+        if (contains(pipeline_.axes_of(source), axis_)) look_at(source);
+    }
+  }
+
+  const std::vector<AxisMaker>& best() const { return best_; }
+
+ private:
+  void consider(const AxisMaker& maker) {
+    std::set<int> needed{maker.node}, open = needed;
+    while (!open.empty()) {
+      const PipelineNode& node = pipeline_.nodes[std::size_t(*open.begin())];
+      open.erase(open.begin());
+      if (takes_long(node)) return;
+      for (const Wire& wire : node.wires)
+        for (const Reference& source : wire.sources)
+          if (needed.insert(source.node).second) open.insert(source.node);
+    }
+    if (!best_.empty() && needed.size() > fewest_) return;
+    if (!best_.empty() && needed.size() < fewest_) best_.clear();
+    best_.push_back(maker);
+    fewest_ = needed.size();
+  }
+
+  const Pipeline& pipeline_;
+  const std::string& axis_;
+  std::set<int> seen_;
+  std::vector<AxisMaker> best_;
+  std::size_t fewest_ = 0;
+};
+
+/// The outputs that name the items along one axis of a value. All inputs of a node have the same items along an axis,
+/// so there may be several such outputs. Returns those that need the fewest other nodes, because one of them may be
+/// absent in a case. Empty if each needs a cost, a projector, an optimizer or a repeated body: these take as long as a
+/// registration.
+std::vector<AxisMaker> quick_makers(const Pipeline& pipeline, const Reference& value, const std::string& axis) {
+  MakerSearch search(pipeline, axis);
+  search.look_at(value);
+  return search.best();
+}
+
 }  // namespace
+
+std::vector<std::string> parts_of_path(const std::string& path) {
+  std::vector<std::string> parts;
+  std::size_t begin = 0;
+  for (std::size_t dot; (dot = path.find('.', begin)) != std::string::npos; begin = dot + 1)
+    parts.push_back(path.substr(begin, dot - begin));
+  parts.push_back(path.substr(begin));
+  return parts;
+}
+
+std::string figure_from(const std::vector<std::string>& parts, std::size_t first) {
+  std::string name;
+  for (std::size_t i = first; i < parts.size(); ++i) name += (i == first ? "" : ".") + parts[i];
+  return name;
+}
 
 const PipelineOutput* find_output(const Pipeline& pipeline, const std::string& name, const Place& place,
                                   Diagnostics& diagnostics) {
-  for (const PipelineOutput& output : pipeline.outputs)
-    if (output.name == name) return &output;
+  if (const PipelineOutput* output = find_named(pipeline.outputs, name)) return output;
   diagnostics.add(place, "the pipeline " + pipeline.name + " has no output '" + name + "'",
                   suggestion(name, names_of(pipeline.outputs)));
   return nullptr;
-}
-
-const PipelineNode& node_of(const Pipeline& pipeline, const PipelineOutput& output) {
-  return pipeline.nodes[std::size_t(output.source.node)];
-}
-
-const PortInfo& port_of(const Pipeline& pipeline, const PipelineOutput& output) {
-  return node_of(pipeline, output).info.outputs[std::size_t(output.source.output)];
 }
 
 void FigureChecker::check(std::size_t variant, const Pipeline& pipeline) {
@@ -65,7 +133,7 @@ void FigureChecker::look_at(std::size_t variant, const Pipeline& pipeline, const
   // A variant may use another node, whose output has another type, other lists or other figures.
   const Variant& own = experiment_.variants[variant];
   const std::string subject = (variant == 0 ? "" : "in variant '" + own.name + "' ") + "output '" + output->name + "'";
-  const PortInfo& port = port_of(pipeline, *output);
+  const PortInfo& port = pipeline.output_of(output->source);
   if (port.type.id != "metrics")
     return faults.add(variant == 0 ? place : own.place, subject + " is " + port.type.id + ", not figures of merit",
                       "name an output of an evaluate node");
@@ -79,7 +147,8 @@ void FigureChecker::look_at(std::size_t variant, const Pipeline& pipeline, const
                       "write it as  " + start + parts.back());
   const std::string figure = figure_from(parts, axes.size() + 1);
   if (!may_have_figure(port, figure))
-    return faults.add(place, subject + " (" + node_of(pipeline, *output).info.name + ") has no figure '" + figure + "'",
+    return faults.add(place,
+                      subject + " (" + pipeline.node_of(output->source).info.name + ") has no figure '" + figure + "'",
                       suggestion(figure, port.figures));
   add_items(variant, pipeline, *output, parts, {path, {}, {}, place, variant, {}, 0});
 }

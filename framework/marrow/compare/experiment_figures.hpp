@@ -8,16 +8,19 @@
 
 namespace marrow::compare {
 
+/// The parts of a figure's path, errors.distal.mtre_mm: the output, an item of each of its lists, and the figure, whose
+/// name may have dots too.
+std::vector<std::string> parts_of_path(const std::string& path);
+/// The name of the figure, which begins with the part of this number.
+std::string figure_from(const std::vector<std::string>& parts, std::size_t first);
+
 /// The output of a pipeline with this name. Reports a fault if there is none.
 const PipelineOutput* find_output(const Pipeline& pipeline, const std::string& name, const Place& place,
                                   Diagnostics& diagnostics);
-/// What an output is, and the node that makes it.
-const PortInfo& port_of(const Pipeline& pipeline, const PipelineOutput& output);
-const PipelineNode& node_of(const Pipeline& pipeline, const PipelineOutput& output);
 
 /// Checks the figures that an experiment names against the pipelines of its variants: that there is such an output of
-/// figures, that the path names an item of each of its lists, and that its node can make such a figure. Which items
-/// there are is known from the data only: items() has what is to be asked.
+/// figures, that the path names an item of each of its lists, and that its node can make such a figure. Only the data
+/// show which items exist: items() returns what must be looked up there.
 class FigureChecker {
  public:
   FigureChecker(const Experiment& experiment, Diagnostics& diagnostics)

@@ -21,7 +21,7 @@ std::string note_of_comparisons(const Experiment& experiment) {
       comparisons == 1 ? "" : " after Holm's correction", fewest);
 }
 
-/// Why the rule cannot be met at its last look, whatever the cells give; else empty.
+/// Why no result of the cells can meet the rule at its last look; empty if one can.
 std::string fault_of_last_look(const StopRule& rule, std::size_t starts) {
   const double level = StopPlan(rule).level_at(rule.most_cases);
   const std::string fewest = formatted("{}", fewest_cases(level));

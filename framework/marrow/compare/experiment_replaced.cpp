@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Values that another section of the same file would replace without a word.
+// Values that another section of the same file would silently replace.
 #include "experiment_replaced.hpp"
 
 #include <algorithm>

@@ -16,10 +16,10 @@ struct SetBySection {
 SetBySection options_set_by(const std::string& section, const std::vector<Override>& changes);
 /// Reports each name of `first` that `later` sets too. Its value would have no effect in any cell.
 void refuse_replaced(StrictYaml& yaml, const std::string& what, const SetBySection& first, const SetBySection& later);
-/// Does so for all sections of an experiment whose variants are as they are written. They are applied in this order:
-/// 'set', the variants, `combined` ('matrix' and 'sweep'), `tuned`, 'starts'. A variant is there to change what 'set'
-/// says, and only one variant is tuned; so neither is reported here. An input for all cases must not be another one for
-/// each case.
+/// Calls refuse_replaced() for the sections of an experiment, before variants are combined. The sections are applied in
+/// this order: 'set', the variants, `combined` ('matrix' and 'sweep'), `tuned`, 'starts'. A variant may change what
+/// 'set' says, and only one variant is tuned; so neither is reported here. An input that is given for all cases must
+/// not also have a value for each case.
 void refuse_replaced_values(StrictYaml& yaml, const Experiment& experiment, std::vector<SetBySection> combined,
                             const SetBySection& tuned);
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "draw.hpp"
 #include "marrow/base/number_text.hpp"
 
 namespace marrow::compare {

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <optional>
-#include <string>
 
 #include "experiment_yaml.hpp"
 
 namespace marrow::compare {
 
-/// Reads the section 'stop': when a comparison that takes more and more cases ends. What it names is known only after
-/// the whole file was read.
+/// Reads the section 'stop': when a comparison with more and more cases ends. Names in it can be checked only after the
+/// whole file was read.
 class StopReader {
  public:
   explicit StopReader(StrictYaml& yaml) : yaml_(yaml) {}

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "experiment_sweep.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <set>
 
-#include "draw.hpp"
 #include "marrow/base/number_text.hpp"
 #include "sobol.hpp"
 
@@ -80,12 +78,6 @@ void SweepReader::read(const YamlEntry& section) {
         options_.push_back(swept_option_of(yaml_, option));
   }
   if (section.value.IsMap()) check(section);
-}
-
-std::vector<Named> SweepReader::names() const {
-  std::vector<Named> names;
-  for (const SweptOption& option : options_) names.push_back({option.key, option.place});
-  return names;
 }
 
 void SweepReader::check(const YamlEntry& section) {

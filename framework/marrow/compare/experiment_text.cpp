@@ -348,17 +348,13 @@ class Reader {
   }
 
   void set_success(const std::string& path, double value, const Place& place) {
-    std::vector<std::string> paths;
-    for (MetricChoice& metric : experiment_.metrics) {
-      paths.push_back(metric.path);
-      if (metric.path != path) continue;
-      metric.limit = value;
-      if (metric.better == MetricChoice::Better::nearest_zero && value <= 0)
-        yaml_.fault(place, formatted("the limit of '{}' is {:.6g}, but its magnitude counts, which is never below 0",
-                                     path, value));
-      return;
-    }
-    yaml_.fault(place, "'" + path + "' is not among the metrics", suggestion(path, paths));
+    const auto found = find_metric(yaml_, experiment_, {path, place});
+    if (!found) return;
+    MetricChoice& metric = experiment_.metrics[*found];
+    metric.limit = value;
+    if (metric.better == MetricChoice::Better::nearest_zero && value <= 0)
+      yaml_.fault(place, formatted("the limit of '{}' is {:.6g}, but its magnitude counts, which is never below 0",
+                                   path, value));
   }
 
   Diagnostics& diagnostics_;

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "experiment_tune.hpp"
 
-#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
 
-#include "draw.hpp"
 #include "experiment_replaced.hpp"
 #include "experiment_sweep.hpp"
 #include "marrow/base/number_text.hpp"
@@ -20,24 +18,7 @@ constexpr const char* kTuneExample =
 constexpr const char* kOptimizerHint = "add  optimizer: {uses: NAME};  marrow list optimizer  shows which there are";
 constexpr const char* kTuned = "tuned";
 
-/// Rounded to a power of ten that is at most a thousandth of `range`.
-double rounded(double value, double range) {
-  const double step = std::pow(10, std::floor(std::log10(range / 1000)));
-  return parsed_number(formatted("{:.15g}", std::round(value / step) * step)).value();
-}
-
 }  // namespace
-
-std::vector<double> TuneRule::values_at(const std::vector<double>& fractions) const {
-  std::vector<double> values;
-  for (std::size_t o = 0; o < options.size(); ++o) {
-    const SweptOption& option = options[o];
-    const double value = option.value_at(std::clamp(fractions[o], 0.0, 1.0));
-    const double near = option.is_log ? value : option.range[1] - option.range[0];
-    values.push_back(std::clamp(rounded(value, near), option.range[0], option.range[1]));
-  }
-  return values;
-}
 
 std::string add_tuned(Experiment& experiment, const std::vector<double>& values) {
   const TuneRule& rule = *experiment.tune;
@@ -135,12 +116,6 @@ void TuneReader::check_keys(const YamlEntry& section) {
   is_good_ = true;
 }
 
-std::vector<Named> TuneReader::names() const {
-  std::vector<Named> names;
-  for (const SweptOption& option : rule_.options) names.push_back({option.key, option.place});
-  return names;
-}
-
 /// The tuned variant is named after its values, and variants are told apart by their names.
 void TuneReader::check_names(const Experiment& experiment) {
   for (const Variant& variant : experiment.variants)
@@ -175,17 +150,11 @@ void TuneReader::apply(Experiment& experiment, std::size_t starts) {
 }
 
 void TuneReader::find_figure(const Experiment& experiment, TuneRule& rule) {
-  std::vector<std::string> names;
-  bool is_found = !figure_;
-  for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
-    names.push_back(experiment.metrics[m].path);
-    if (!figure_ || names.back() != figure_->name) continue;
-    rule.metric = m;
-    is_found = true;
+  if (figure_) {
+    const auto found = find_metric(yaml_, experiment, *figure_);
+    if (!found) return;
+    rule.metric = *found;
   }
-  if (!is_found)
-    return yaml_.fault(figure_->place, "'" + figure_->name + "' is not among the metrics",
-                       suggestion(figure_->name, names));
   find_failed_as(experiment.metrics[rule.metric], rule);
 }
 

@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <optional>
-#include <string>
 
 #include "experiment_yaml.hpp"
 
 namespace marrow::compare {
 
-/// Reads the section 'tune': options whose numbers an optimizer chooses on training cases. What it names is known only
-/// after the whole file was read.
+/// Reads the section 'tune': options whose numbers an optimizer chooses on training cases. Names in it can be checked
+/// only after the whole file was read.
 class TuneReader {
  public:
   explicit TuneReader(StrictYaml& yaml) : yaml_(yaml) {}
   void read(const YamlEntry& section);
-  std::vector<Named> names() const;  ///< of the tuned options
+  std::vector<Named> names() const { return names_of_options(rule_.options); }
   /// Adds the pipeline as it is, if the experiment has no variant.
   void add_variant(Experiment& experiment) const;
   /// Puts the rule into the experiment if there is one. Its metrics, variants and cases are read before, and `starts`

@@ -3,12 +3,12 @@
 
 #include <algorithm>
 
-#include "draw.hpp"
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/plain_path.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/given_value.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow::compare {
 
@@ -86,12 +86,26 @@ std::string in_small_letters(std::string name) {
 }
 
 void find_variant(StrictYaml& yaml, const Experiment& experiment, const Named& asked, std::size_t& number) {
-  std::vector<std::string> names;
-  for (const Variant& variant : experiment.variants) names.push_back(variant.name);
-  const auto found = std::find(names.begin(), names.end(), asked.name);
-  if (found == names.end())
-    return yaml.fault(asked.place, "there is no variant '" + asked.name + "'", suggestion(asked.name, names));
-  number = std::size_t(found - names.begin());
+  const Variant* found = find_named(experiment.variants, asked.name);
+  if (!found)
+    return yaml.fault(asked.place, "there is no variant '" + asked.name + "'",
+                      suggestion(asked.name, names_of(experiment.variants)));
+  number = std::size_t(found - experiment.variants.data());
+}
+
+std::optional<std::size_t> find_metric(StrictYaml& yaml, const Experiment& experiment, const Named& asked) {
+  std::vector<std::string> paths;
+  for (const MetricChoice& metric : experiment.metrics) paths.push_back(metric.path);
+  const auto found = std::find(paths.begin(), paths.end(), asked.name);
+  if (found != paths.end()) return std::size_t(found - paths.begin());
+  yaml.fault(asked.place, "'" + asked.name + "' is not among the metrics", suggestion(asked.name, paths));
+  return std::nullopt;
+}
+
+std::vector<Named> names_of_options(const std::vector<SweptOption>& options) {
+  std::vector<Named> names;
+  for (const SweptOption& option : options) names.push_back({option.key, option.place});
+  return names;
 }
 
 fs::path file_of(StrictYaml& yaml, const YamlEntry& entry, const fs::path& folder) {

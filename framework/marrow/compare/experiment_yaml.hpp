@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Readers for the parts of the sections of an experiment file.
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -42,6 +43,9 @@ bool check_name(StrictYaml& yaml, const std::string& name, const Place& place, c
 std::string in_small_letters(std::string name);
 /// Sets `number` to that of the variant with this name. Reports a fault if there is none.
 void find_variant(StrictYaml& yaml, const Experiment& experiment, const Named& asked, std::size_t& number);
+/// The number of the metric with this path. Reports a fault if there is none.
+std::optional<std::size_t> find_metric(StrictYaml& yaml, const Experiment& experiment, const Named& asked);
+std::vector<Named> names_of_options(const std::vector<SweptOption>& options);
 /// The file that a key names, relative to `folder`. If there is none, reports a fault and returns an empty path.
 std::filesystem::path file_of(StrictYaml& yaml, const YamlEntry& entry, const std::filesystem::path& folder);
 

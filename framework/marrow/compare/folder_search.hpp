@@ -11,10 +11,10 @@ namespace marrow::compare {
 /// even if links form a circle.
 class FolderSearch {
  public:
-  /// The existing paths that match `pattern`, sorted. It starts at `folder`, whose name is no pattern, whatever is in
-  /// it. A name that begins with a dot is matched only by a pattern that begins with a dot. Throws Error if a folder
-  /// cannot be read, if the path is longer than any may be, or if all calls together have looked at more than
-  /// kMostLookedAt files and folders.
+  /// The existing paths that match `pattern`, sorted. The search starts at `folder`, whose name is not a pattern even
+  /// if it holds a '*'. A name that begins with a dot is matched only by a pattern that begins with a dot. Throws Error
+  /// if a folder cannot be read, if the path is longer than any may be, or if all calls together have looked at more
+  /// than kMostLookedAt files and folders.
   std::vector<std::filesystem::path> matches(const std::filesystem::path& folder, const std::filesystem::path& pattern);
 
   static constexpr std::size_t kMostLookedAt = 300000;

@@ -12,7 +12,7 @@ bool names_a_path(const NodeInfo& info) {
   return false;
 }
 
-/// Whether the node's result depends on the case by itself: by a path or by chance.
+/// Whether the node itself depends on the case, by a path or by chance, and not only through its inputs.
 bool depends_on_case(const PipelineNode& node) {
   if (!node.repetition) return names_a_path(node.info) || node.info.random;
   const std::vector<const PipelineNode*> called = called_nodes(node.repetition->first);
@@ -31,7 +31,7 @@ std::vector<Digest> histories(const Pipeline& pipeline, const std::string& case_
     if (depends_on_case(node)) hasher.add(case_name);
     for (const Wire& wire : node.wires)
       for (const Reference& source : wire.sources) {
-        hasher.add(node.info.inputs[std::size_t(wire.port)].name);
+        hasher.add(node.input_of(wire).name);
         hasher.add(result[std::size_t(source.node)]);
         hasher.add(std::int64_t(source.output));
         hasher.add(source.items);

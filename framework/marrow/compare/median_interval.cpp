@@ -5,10 +5,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "infinite.hpp"
+#include "distributions.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
-#include "normal.hpp"
 #include "value_checks.hpp"
 
 namespace marrow::compare {
@@ -41,7 +40,7 @@ std::optional<Interval> median_interval_of(const ValuesOfCases& cases, double co
     first.push_back(values[0]);
     runs += values.size();
   }
-  // of one run each; if even its bounds are infinite, no interval of so few cases has this confidence
+  // The interval of one run of each case. If its bounds are infinite, so few cases give no interval of this confidence.
   Interval of_first = order_statistic_interval(std::move(first), 1 - confidence);
   if (!std::isfinite(of_first.lower)) return std::nullopt;
   of_first.confidence = confidence;

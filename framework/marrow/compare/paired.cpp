@@ -7,13 +7,12 @@
 #include <numeric>
 #include <set>
 
-#include "beta.hpp"
-#include "infinite.hpp"
+#include "distributions.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/compare/median_interval.hpp"
 #include "marrow/domain/quantile.hpp"
-#include "normal.hpp"
+#include "value_checks.hpp"
 
 namespace marrow::compare {
 namespace {

@@ -20,7 +20,7 @@ struct Pair {
   std::optional<double> reference, variant;
 };
 
-/// How many runs have a figure from whom; or how many cases are compared by what.
+/// Counts runs by who has a figure, or cases by what decides them.
 struct Tally {
   std::size_t both = 0;            ///< runs with both figures; cases compared by their values
   std::size_t variant_lost = 0;    ///< runs that only the variant lost; cases in which it lost more runs
@@ -131,17 +131,17 @@ struct CorrectedP {
 /// "canny, target error: no difference shown: 0.01 mm worse, 95 % interval -0.03 to 0.05, 20 cases, p = 0.62"
 /// The interval is given in the direction that the sentence names, so for "0.01 mm better" a negative bound is worse.
 /// It is the interval of this comparison alone; only p is corrected for the number of comparisons. With too few cases
-/// to reach alpha, the sentence says how many it takes. With too few for an interval, it has none. The last digit that
-/// is shown is worth at most a quarter of the interval's width.
+/// to reach alpha, the sentence says how many it takes. With too few for an interval, it gives none. The last digit
+/// shown is worth at most a quarter of the interval's width.
 ///
-/// If runs failed, it says so, of how many cases the comparison is, and what an infinite bound means:
+/// If runs failed, the sentence says so, how many cases are compared, and what an infinite bound means:
 /// "canny, target error: 0.12 mm worse, 95 % interval 0.08 mm to a failure of canny, 20 of 22 cases, p = 0.0031; of 22
 /// runs, only canny failed in 3, only the baseline in 0, both in 2"
 /// If the median itself is a failure, that comes first:
 /// "canny, target error: fails more often than the baseline, in 22 of 30 cases, p < 0.001; of 30 runs, only canny
 /// failed in 22, only the baseline in 0, both in 0; where both have a value, in 8 cases, the median is 0.20 mm better"
-/// If nothing is shown although p < alpha, it says why: the interval contains 0, or it lies on the other side than the
-/// ranks. Throws Error as difference_shown() does.
+/// If no difference is shown although p < alpha, it says why: the interval contains 0, or the ranks point to the other
+/// side. Throws Error as difference_shown() does.
 std::string sentence(const std::string& variant, const Metric& metric, const Comparison& comparison,
                      const CorrectedP& corrected, double alpha = 0.05);
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <optional>
 
-#include "infinite.hpp"
+#include "distributions.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/compare/paired.hpp"
@@ -30,8 +30,8 @@ std::string p_text(double p, double alpha) {
   return "p = " + fixed_number(p, decimals);
 }
 
-/// What decides how many decimals are shown: the interval's width; if one bound is infinite, twice the other side's;
-/// without any, nothing.
+/// The width that decides how many decimals are shown: that of the interval, or twice that of its finite side. Nothing
+/// if both sides are infinite.
 std::optional<double> width_of(double difference, const Interval& interval) {
   if (std::isinf(difference)) return std::nullopt;
   const double below = difference - interval.lower, above = interval.upper - difference;
@@ -41,8 +41,7 @@ std::optional<double> width_of(double difference, const Interval& interval) {
   return std::nullopt;
 }
 
-/// A bound near 0 must not be rounded to 0, because this would read as no difference. Up to two more decimals are used
-/// to avoid it.
+/// A bound near 0 gets up to two more decimals: rounded to 0, it would read as no difference.
 int decimals_of(double difference, const Interval& interval) {
   const std::optional<double> width = width_of(difference, interval);
   if (!width || *width <= 1e-9 * std::abs(difference)) {  // no wider than numbers are rounded
@@ -57,7 +56,7 @@ int decimals_of(double difference, const Interval& interval) {
   return std::max(decimals, std::min(decimals_for(nearest), decimals + 2));
 }
 
-/// A comparison in the direction that its sentence names: a positive difference is in that direction.
+/// A comparison in the direction that its sentence names: there, the difference is positive.
 struct Directed {
   const std::string& variant;
   const Metric& metric;
@@ -92,14 +91,14 @@ struct Directed {
   }
 };
 
-/// Whose runs failed; empty if none did.
+/// How many runs of whom failed; empty if none did.
 std::string failures_text(const std::string& variant, const Tally& runs) {
   if (runs.all() == runs.both) return "";
   return formatted("; of {}, only {} failed in {}, only the baseline in {}, both in {}", counted(runs.all(), "run"),
                    variant, runs.variant_lost, runs.reference_lost, runs.neither);
 }
 
-/// What a sentence says first if the median itself is a failure: who fails more, and in how many cases.
+/// The beginning of a sentence whose median is a failure: who fails more often, and in how many cases.
 std::string more_failures(const Comparison& comparison, bool variant_fails) {
   return formatted("{}{} of {}",
                    variant_fails ? "fails more often than the baseline, in " : "the baseline fails more often, in ",
@@ -115,7 +114,7 @@ std::string of_both(const std::string& variant, const Metric& metric, const Comp
          directed.amount(decimals);
 }
 
-/// Why nothing can be shown, or nothing is; empty if there is nothing to add.
+/// Why no difference can be shown, or is shown although p < alpha; else empty.
 std::string doubts(const Comparison& comparison, const CorrectedP& corrected, double alpha, bool has_interval,
                    bool is_shown) {
   const std::size_t fewest = fewest_cases(alpha, corrected.comparisons);

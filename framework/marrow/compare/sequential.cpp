@@ -5,19 +5,19 @@
 #include <cmath>
 #include <numbers>
 
+#include "distributions.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
-#include "normal.hpp"
 
 namespace marrow::compare {
 namespace {
 
-/// A standard Brownian motion that is watched at some times, as long as it stays between bounds. At a time t it is the
-/// test's sum with the variance t, so z is its place over sqrt(t).
+/// A standard Brownian motion that is watched at some times, as long as it stays between bounds. At the time t it
+/// stands for the test's sum, whose variance is t. So z is its place divided by sqrt(t).
 class WatchedMotion {
  public:
-  /// The z >= 0 that the motion has passed, to one of the two sides, for the first time at `time` with the probability
-  /// `chance`. From then on, only motions within it are watched.
+  /// The bound z >= 0 that the motion exceeds on either side at `time`, for the first time, with the probability
+  /// `chance`. From then on, only motions within this bound are watched.
   double bound_at(double time, double chance) {
     const double sd = std::sqrt(time - time_);
     double below = 0, above = kFarthest;
@@ -32,7 +32,7 @@ class WatchedMotion {
 
  private:
   static constexpr double kFarthest = 40;      // its tail is below the smallest double
-  static constexpr double kFarthestPlace = 8;  // of the places that are summed; beyond it lies 1e-15
+  static constexpr double kFarthestPlace = 8;  // the sums end here; the probability beyond is 1e-15
   static constexpr std::size_t kPlaces = 301;  // odd, for Simpson's rule
 
   double chance_beyond(double place, double sd) const {

@@ -5,8 +5,8 @@
 
 #include "marrow/base/export.hpp"
 
-// Tests that are made again and again while cases are added. Whoever looks twenty times at p < 0.05 finds a difference
-// in a quarter of the experiments in which there is none. Here all looks together find one in at most alpha of them.
+// Tests that are repeated while cases are added. With twenty looks at p < 0.05, a quarter of the experiments without a
+// difference would show one. Here all looks together show one in at most alpha of them.
 namespace MARROW_EXPORT marrow {
 namespace compare {
 
@@ -20,12 +20,12 @@ enum class Spending {
   even
 };
 
-/// For each look the two-sided p below which a difference is shown there. `information` is the share of the planned
+/// For each look, the two-sided p below which it shows a difference. `information` is the share of the planned
 /// cases that each look has seen, rising, up to 1 at most.
 ///
 /// The levels come from the joint distribution of the looks by numerical integration (Armitage, McPherson and Rowe
-/// 1969, J R Stat Soc A 132:235). It is that of sums of independent parts, which holds for Wilcoxon's signed-rank test
-/// with many cases. With few cases its exact p is discrete, and the test shows less than alpha.
+/// 1969, J R Stat Soc A 132:235). The looks are taken for sums of independent parts, which holds for Wilcoxon's
+/// signed-rank test with many cases. With few cases, its exact p is discrete, and the test shows less than alpha.
 ///
 /// Looks at other shares than planned are allowed, as long as their shares do not depend on what was seen. Throws Error
 /// for no looks, shares that do not rise from above 0 to at most 1, or an alpha not within 0.001 to 0.5.

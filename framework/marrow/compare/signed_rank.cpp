@@ -3,10 +3,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "distributions.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/compare/paired.hpp"
-#include "normal.hpp"
 #include "value_checks.hpp"
 
 namespace marrow::compare {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sobol.hpp"
 
-#include <bit>
 #include <cstdint>
 
 namespace marrow::compare {

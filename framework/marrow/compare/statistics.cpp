@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <numeric>
 
+#include "distributions.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/domain/quantile.hpp"
-#include "normal.hpp"
 #include "value_checks.hpp"
 
 namespace marrow::compare {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "infinite.hpp"
+#include "distributions.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/compare/sequential.hpp"
@@ -37,12 +37,11 @@ std::string holds(const StopRule& rule) {
   return formatted(", which holds with {:.3g} % confidence over all looks", 100 * (1 - rule.alpha));
 }
 
-/// What holds after any look.
+/// The interval, and its confidence over all looks.
 std::string meaning(const StopRule& rule, const Look& look, const std::string& unit) {
   const bool ends_in_failure = std::isinf(look.interval.upper);
-  return formatted("{}{} to {}{}, which holds with {:.3g} % confidence over all looks", value_text(look.interval.lower),
-                   ends_in_failure && std::isfinite(look.interval.lower) ? unit : "", value_text(look.interval.upper),
-                   ends_in_failure ? "" : unit, 100 * (1 - rule.alpha));
+  return value_text(look.interval.lower) + (ends_in_failure && std::isfinite(look.interval.lower) ? unit : "") +
+         " to " + value_text(look.interval.upper) + (ends_in_failure ? "" : unit) + holds(rule);
 }
 
 std::string text_of_width(const StopRule& rule, const Look& look, const LookNames& names, const std::string& unit) {
@@ -53,7 +52,7 @@ std::string text_of_width(const StopRule& rule, const Look& look, const LookName
                    meaning(rule, look, unit));
 }
 
-/// Why a difference is not shown although p is below the level; empty if it is not, or is shown.
+/// Why a difference is not shown although p is below the level; else empty.
 std::string doubt(const Look& look) {
   if (look.is_met || look.p >= look.level) return "";
   const bool contains_zero = look.interval.lower <= 0 && look.interval.upper >= 0;

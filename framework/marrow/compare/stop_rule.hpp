@@ -57,7 +57,7 @@ struct Look {
   bool is_met = false;      ///< the rule says stop
   std::size_t variant = 0;  ///< whose interval this is: the widest one, or that of the rule's variant
   /// With the confidence 1 - alpha, it and those of all other looks hold the true value (repeated intervals: Jennison
-  /// and Turnbull 1989, J R Stat Soc B 51:305). So it may be read after any look. Infinite if there is too little.
+  /// and Turnbull 1989, J R Stat Soc B 51:305). So it may be read after any look. Infinite if there are too few cases.
   Interval interval;
   double p = 1;           ///< goal difference: Wilcoxon's, two-sided
   double difference = 0;  ///< goal difference: median over cases; infinite if it is a failure
@@ -79,8 +79,8 @@ Look look_at_widths(const StopPlan& plan, std::size_t cases, const std::vector<s
 
 /// Looks at the differences of pairs, with the answer's own definition: difference_shown() at the level of the look, on
 /// compare_pairs() with the confidence 1 - level. So neither skewed differences with a median of 0 nor too few cases
-/// end a comparison. At a level that is 0 as a double, nothing is shown. Throws Error as level_at()
-/// and case_differences() do.
+/// end a comparison. If the level is 0 in double precision, no difference is shown. Throws Error as level_at() and
+/// case_differences() do.
 Look look_at_difference(const StopPlan& plan, std::size_t cases, const std::vector<Pair>& pairs, bool larger_is_better);
 
 /// What a look is about, in words.

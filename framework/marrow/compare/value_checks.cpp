@@ -24,6 +24,11 @@ void check_finite(const std::vector<double>& values, const std::string& what) { 
 
 void check_numbers(const std::vector<double>& values, const std::string& what) { check_each(values, what, true); }
 
+void check_confidence(double confidence) {
+  if (!(confidence > 0 && confidence < 1))
+    throw Error(formatted("the confidence is {:f}; give a fraction between 0 and 1, such as 0.95", confidence));
+}
+
 void check_resamples(std::size_t resamples) {
   if (resamples < 1000)
     throw Error(formatted("got {} resamples; the bounds need at least 1000 (10000 is the default)", resamples));

@@ -70,7 +70,7 @@ TEST(Bootstrap, IsTheSameWithAnyNumberOfThreadsAndInAnyOrder) {
 }
 
 TEST(Bootstrap, StartsAreNoCases) {
-  // All runs of a case are alike: 200 runs tell no more than the 20 cases.
+  // All runs of a case are equal: 200 runs say no more than the 20 cases.
   ValuesOfCases few = cases_of(20, 1, 1, 0, 6), many = few;
   for (std::vector<double>& own : many) own.resize(10, own[0]);
   const auto width = [](const Interval& interval) { return interval.upper - interval.lower; };

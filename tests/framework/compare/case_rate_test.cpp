@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <marrow/compare/case_rate.hpp>
 #include <marrow/domain/random.hpp>
 
@@ -13,7 +12,7 @@ namespace case_rate_test {
 using namespace marrow::compare;
 using marrow::test::message_of;
 
-/// `cases` cases, of which `failing` have no success and the others nothing else.
+/// In the first `failing` cases every run fails; in the others every run succeeds.
 CaseRate all_alike(std::size_t cases, std::size_t failing, std::size_t starts) {
   CaseRate rate;
   for (std::size_t c = 0; c < cases; ++c)
@@ -106,8 +105,9 @@ TEST(CaseRate, RefusesWhatIsNoRate) {
             "a success rate of no runs has no interval; give at least one run");
 }
 
-/// How often the intervals hold the true rate. Each case draws an end by the rate, and each of its runs takes that end
-/// with the probability sqrt(correlation), else draws its own. So two runs of a case correlate by `correlation`.
+/// How often the intervals hold the true rate. Each case draws a success or failure with the true rate. Each of its
+/// runs takes this outcome with the probability sqrt(correlation), and else draws its own. So two runs of a case
+/// correlate by `correlation`.
 struct Coverage {
   double of_cases = 0, of_runs = 0;
 };

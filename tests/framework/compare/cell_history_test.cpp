@@ -26,7 +26,7 @@ TEST(CellRow, IsASuccessWithinEveryLimit) {
     return row.is_success(experiment);
   };
   EXPECT_TRUE(success(1.9, 0.6, 100));
-  EXPECT_TRUE(success(-1, 0.6, std::nullopt)) << "what has no limit may be missing";
+  EXPECT_TRUE(success(-1, 0.6, std::nullopt)) << "a figure without a limit may be missing";
   EXPECT_FALSE(success(2, 0.6, 0)) << "at the limit";
   EXPECT_FALSE(success(1, 0.5, 0)) << "at the limit";
   EXPECT_FALSE(success(3, 0.6, 0));
@@ -58,7 +58,7 @@ TEST(Histories, EachPartThatMayChangeAResultCounts) {
   const std::vector<marrow::Digest> before = histories(pipeline, "case");
   EXPECT_EQ(before[0], before[1]) << "equal nodes of equal histories";
   EXPECT_NE(before[0], before[2]);
-  EXPECT_EQ(histories(pipeline, "other"), before) << "nothing names a path";
+  EXPECT_EQ(histories(pipeline, "other"), before) << "no node names a path";
   std::set<marrow::Digest> seen{before[2]};
   const auto is_new = [&](const char* what, auto change) {
     marrow::Pipeline changed = pipeline;
@@ -109,7 +109,7 @@ TEST(Dependences, StartsDifferOnlyWhereTheyAreDrawn) {
   }
 }
 
-/// SplitMix64 as scipy_test.py has it as well.
+/// SplitMix64; scipy_test.py has it too.
 struct SplitMix {
   std::uint64_t state;
   double uniform() {
@@ -143,7 +143,7 @@ TEST(Draw, StartsAreTheSameOnAnyMachine) {
   }
   protocol.count = 2;
   EXPECT_EQ(draw_starts(protocol)[1].rotation_deg, starts[1].rotation_deg)
-      << "the first ones do not depend on how many there are";
+      << "the first starts do not depend on the number of starts";
   protocol.distance_mm = 0;
   EXPECT_EQ(draw_starts(protocol)[1].distance_mm, 0);
 }

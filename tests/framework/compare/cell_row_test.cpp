@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The row of a cell as text: what was not written by marrow, or was damaged since, is no row.
+// The row of a cell as text: a text that marrow did not write, or that was damaged later, is refused.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -40,7 +40,7 @@ CellRow good_row() {
   return row;
 }
 
-/// The row as a writer that knows the digest would give it: XXH3 of the line without it.
+/// The row as a forger who knows the digest would write it: XXH3 of the line without the digest.
 std::string written(json row) {
   row.erase("digest");
   const std::string line = row.dump();

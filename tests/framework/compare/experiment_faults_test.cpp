@@ -6,29 +6,17 @@
 namespace experiment_faults_test {
 
 using namespace experiment_files;
-using runtime_fixture::test_catalogue;
 
-const std::string kStart = std::string(kHead) + kCases;   // lines 1 to 3
 const std::string kGood = kStart + kVariants + kMetrics;  // lines 1 to 7
 const std::string kAfterCases = std::string(kVariants) + kMetrics;
 
 class ExperimentFaults : public ExperimentFiles {
  protected:
-  /// Exactly this one.
-  void expect_fault(const std::string& text, int line, const std::string& message, const std::string& hint = "") {
-    read(text);
-    ASSERT_EQ(diagnostics.size(), 1u) << text << diagnostics.text();
-    const marrow::Diagnostic fault = diagnostics.sorted()[0];
-    EXPECT_EQ(fault.place.line, line) << diagnostics.text();
-    EXPECT_EQ(std::filesystem::path(fault.place.file).filename(), "e.yaml") << diagnostics.text();
-    EXPECT_EQ(fault.message, message);
-    EXPECT_EQ(fault.hint, hint);
-  }
-  /// Of a line after all that there has to be.
+  /// A fault of a line that follows all required lines.
   void expect_fault_of(const std::string& line, const std::string& message, const std::string& hint = "") {
     expect_fault(kGood + line + "\n", 8, message, hint);
   }
-  /// Of a line of a simulation.
+  /// A fault of a line of a simulation.
   void expect_simulation_fault(const std::string& line, const std::string& message, const std::string& hint = "") {
     const std::string pipeline = line.starts_with("pipeline") ? "" : "    pipeline: s.yaml\n",
                       seeds = line.starts_with("seeds") ? "" : "    seeds: 1..2\n";

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Figures that no output can have are faults of the experiment's file. The nodes' declarations say what can be.
+// A figure that no output can have is a fault of the experiment's file. The nodes declare the figures that they make.
+#include "experiment_files.hpp"
 #include "marrow/compare/cell.hpp"
 #include "marrow/compare/experiment_notes.hpp"
-#include "tests/framework/fixture.hpp"
 
 namespace experiment_figures_test {
 
+using experiment_files::ExperimentFiles;
 using marrow::compare::Experiment;
 using marrow::compare::NamedItem;
 
@@ -23,42 +24,29 @@ const char* const kPipeline =
     "  staged: {uses: test.declared, in: {of: search}}\n  free: {uses: test.undeclared, in: {of: f}}\n"
     "outputs: {one: one, each: each, staged: staged, free: free}\n";
 
-class ExperimentFigures : public testing::Test {
+class ExperimentFigures : public ExperimentFiles {
  protected:
-  ExperimentFigures() {
+  ExperimentFigures() : ExperimentFiles(catalogue()) {
     scratch.write("p.yaml", kPipeline);
     std::filesystem::create_directories(scratch.path / "case");
     scratch.write("case/fragments.txt", "distal\nproximal\n");
   }
   /// Lines 1 to 3; what is added begins in line 4.
   Experiment read(const std::string& text) {
-    diagnostics = marrow::Diagnostics();
-    return marrow::compare::read_experiment(
-        scratch.write("e.yaml", "experiment: 1\npipeline: p.yaml\ncases: {folders: [case]}\n" + text), catalogue(),
-        diagnostics);
+    return ExperimentFiles::read("experiment: 1\npipeline: p.yaml\ncases: {folders: [case]}\n" + text);
   }
   Experiment with_metric(const std::string& path, const std::string& more = "variants: {a: {}}\n") {
     return read("metrics:\n  - " + path + "\n" + more);
   }
-  /// Exactly one, at the line.
-  void expect_fault(int line, const std::string& message, const std::string& hint) {
-    ASSERT_EQ(diagnostics.size(), 1u) << diagnostics.text();
-    const marrow::Diagnostic fault = diagnostics.sorted()[0];
-    EXPECT_EQ(fault.place.line, line);
-    EXPECT_EQ(fault.message, message);
-    EXPECT_EQ(fault.hint, hint);
-  }
-  runtime_fixture::Scratch scratch;
-  marrow::Diagnostics diagnostics;
 };
 
 TEST_F(ExperimentFigures, AFigureThatTheNodeDoesNotDeclare) {
   with_metric("one.mtre_m");
-  expect_fault(5, "output 'one' (test.declared) has no figure 'mtre_m'", "did you mean 'mtre_mm'?");
+  expect_only_fault(5, "output 'one' (test.declared) has no figure 'mtre_m'", "did you mean 'mtre_mm'?");
   with_metric("each.distal.frontal.medianpx");
-  expect_fault(5, "output 'each' (test.declared) has no figure 'frontal.medianpx'", "known: mtre_mm, *.median_px");
+  expect_only_fault(5, "output 'each' (test.declared) has no figure 'frontal.medianpx'", "known: mtre_mm, *.median_px");
   read("metrics: [one.mtre_mm]\nvariants: {a: {}}\ninitial_error: one.start_mm\n");
-  expect_fault(6, "output 'one' (test.declared) has no figure 'start_mm'", "known: mtre_mm, *.median_px");
+  expect_only_fault(6, "output 'one' (test.declared) has no figure 'start_mm'", "known: mtre_mm, *.median_px");
 }
 
 TEST_F(ExperimentFigures, WhatIsDeclaredPasses) {
@@ -71,13 +59,13 @@ TEST_F(ExperimentFigures, WhatIsDeclaredPasses) {
 
 TEST_F(ExperimentFigures, APathWithTooFewParts) {
   with_metric("each.mtre_mm");
-  expect_fault(5, "'each.mtre_mm' has too few parts: output 'each' is a list over fragment",
-               "write it as  each.FRAGMENT.mtre_mm");
+  expect_only_fault(5, "'each.mtre_mm' has too few parts: output 'each' is a list over fragment",
+                    "write it as  each.FRAGMENT.mtre_mm");
   with_metric("staged.distal.mtre_mm");
-  expect_fault(5, "'staged.distal.mtre_mm' has too few parts: output 'staged' is a list over fragment and stage",
-               "write it as  staged.FRAGMENT.STAGE.mtre_mm");
+  expect_only_fault(5, "'staged.distal.mtre_mm' has too few parts: output 'staged' is a list over fragment and stage",
+                    "write it as  staged.FRAGMENT.STAGE.mtre_mm");
   with_metric("staged");
-  expect_fault(5, "'staged' does not say which figure", "write it as  staged.FRAGMENT.STAGE.FIGURE");
+  expect_only_fault(5, "'staged' does not say which figure", "write it as  staged.FRAGMENT.STAGE.FIGURE");
 }
 
 TEST_F(ExperimentFigures, EachVariantsOwnNode) {
@@ -87,13 +75,13 @@ TEST_F(ExperimentFigures, EachVariantsOwnNode) {
   EXPECT_EQ(diagnostics.sorted()[0].message, "in variant 'b' output 'one' (test.declared) has no figure 'value'");
   with_metric("one.value");  // of the first variant, it is said once
   with_metric("one.value", "variants: {a: {}, b: {}}\n");
-  expect_fault(5, "output 'one' (test.declared) has no figure 'value'", "known: mtre_mm, *.median_px");
+  expect_only_fault(5, "output 'one' (test.declared) has no figure 'value'", "known: mtre_mm, *.median_px");
 }
 
 TEST_F(ExperimentFigures, ItemsThatTheCaseNames) {
   const Experiment experiment = with_metric("staged.dital.finl.mtre_mm");
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
-  // Stages are made by a search, so only the fragments can be asked for: test.fragments needs no other node.
+  // A search makes the stages, so only the fragments can be looked up: test.fragments needs no other node.
   ASSERT_EQ(experiment.named_items.size(), 1u);
   const NamedItem& item = experiment.named_items[0];
   EXPECT_EQ(item.item, "dital");
@@ -113,22 +101,21 @@ TEST_F(ExperimentFigures, VariantsWithTheSameNodeAreAskedOnce) {
 
 TEST_F(ExperimentFigures, LimitsThatNoFigureKeeps) {
   read("metrics: [{figure: one.mtre_mm, better: nearest_zero}]\nsuccess:\n  one.mtre_mm: -1\nvariants: {a: {}}\n");
-  expect_fault(6, "the limit of 'one.mtre_mm' is -1, but its magnitude counts, which is never below 0", "");
+  expect_only_fault(6, "the limit of 'one.mtre_mm' is -1, but its magnitude counts, which is never below 0", "");
 }
 
 const std::string kSeeds = "experiment: 1\npipeline: s.yaml\n";
 
-class ExperimentNotes : public testing::Test {
+class ExperimentNotes : public ExperimentFiles {
  protected:
-  ExperimentNotes() { scratch.write("s.yaml", "marrow: 1\nnodes:\n  d: {uses: test.draw}\noutputs: {number: d}\n"); }
+  ExperimentNotes() : ExperimentFiles(catalogue()) {
+    scratch.write("s.yaml", "marrow: 1\nnodes:\n  d: {uses: test.draw}\noutputs: {number: d}\n");
+  }
   std::vector<std::string> notes(const std::string& text) {
-    marrow::Diagnostics diagnostics;
-    const Experiment experiment = marrow::compare::read_experiment(
-        scratch.write("e.yaml", kSeeds + "metrics: [number.value]\n" + text), catalogue(), diagnostics);
+    const Experiment experiment = read(kSeeds + "metrics: [number.value]\n" + text);
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
     return diagnostics.empty() ? marrow::compare::notes_of(experiment) : std::vector<std::string>();
   }
-  runtime_fixture::Scratch scratch;
 };
 
 using Notes = std::vector<std::string>;
@@ -189,11 +176,8 @@ TEST_F(ExperimentNotes, ACaptureRangeWithoutSuccess) {
 }
 
 TEST_F(ExperimentNotes, CountsOfComparisons) {
-  marrow::Diagnostics diagnostics;
-  const Experiment experiment = marrow::compare::read_experiment(
-      scratch.write("e.yaml",
-                    kSeeds + "metrics: [number.value]\ncases: {seeds: 1..8}\nvariants: {a: {}, b: {}, c: {}}\n"),
-      catalogue(), diagnostics);
+  const Experiment experiment =
+      read(kSeeds + "metrics: [number.value]\ncases: {seeds: 1..8}\nvariants: {a: {}, b: {}, c: {}}\n");
   const auto counts = marrow::compare::comparison_counts(experiment);
   EXPECT_EQ(counts.comparisons, 2u);
   EXPECT_EQ(counts.cases, 8u);

@@ -22,20 +22,42 @@ inline constexpr const char* kHead = "experiment: 1\npipeline: p.yaml\n";
 inline constexpr const char* kCases = "cases: {folders: [cases/*]}\n";
 inline constexpr const char* kVariants = "variants:\n  one: {}\n  two: {c.value: 2}\n";
 inline constexpr const char* kMetrics = "metrics: [number.value]\n";
+inline const std::string kStart = std::string(kHead) + kCases;  // lines 1 to 3
 
 /// The file p.yaml and the folders cases/a and cases/b; s.yaml makes cases.
 class ExperimentFiles : public testing::Test {
  protected:
-  ExperimentFiles() {
+  explicit ExperimentFiles(const marrow::Catalogue& catalogue = test_catalogue()) : nodes(catalogue) {
     scratch.write("p.yaml", kPipeline);
     scratch.write("s.yaml", kSimulation);
     for (const char* name : {"b", "a"}) std::filesystem::create_directories(scratch.path / "cases" / name);
   }
-  marrow::compare::Experiment read(const std::string& text) {
+  /// Adds the node s, whose start can be displaced.
+  void add_displaced_node() const {
+    std::string pipeline = kPipeline;
+    pipeline.insert(pipeline.find("  t:"), "  s: {uses: test.displaced}\n");
+    scratch.write("p.yaml", pipeline);
+  }
+  marrow::compare::Experiment read(const std::string& text, std::size_t more_cases = 0) {
     diagnostics = marrow::Diagnostics();
-    return marrow::compare::read_experiment(scratch.write("e.yaml", text), test_catalogue(), diagnostics);
+    return marrow::compare::read_experiment(scratch.write("e.yaml", text), nodes, diagnostics, more_cases);
+  }
+  /// The last reading gave exactly this fault.
+  void expect_only_fault(int line, const std::string& message, const std::string& hint = "") const {
+    ASSERT_EQ(diagnostics.size(), 1u) << diagnostics.text();
+    const marrow::Diagnostic fault = diagnostics.sorted()[0];
+    EXPECT_EQ(fault.place.line, line) << diagnostics.text();
+    EXPECT_EQ(std::filesystem::path(fault.place.file).filename(), "e.yaml") << diagnostics.text();
+    EXPECT_EQ(fault.message, message);
+    EXPECT_EQ(fault.hint, hint);
+  }
+  void expect_fault(const std::string& text, int line, const std::string& message, const std::string& hint = "") {
+    read(text);
+    SCOPED_TRACE(text);
+    expect_only_fault(line, message, hint);
   }
   Scratch scratch;
+  const marrow::Catalogue& nodes;
   marrow::Diagnostics diagnostics;
 };
 

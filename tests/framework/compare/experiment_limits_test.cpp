@@ -1,24 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// Experiments that are too large are a fault before anything of them is made; names that become folders fit every file
-// system.
+// Too large experiments are reported before any part of them is made. Names that become folders fit every file system.
 #include <ctime>
 #include <filesystem>
 
 #include "experiment_files.hpp"
 #include "marrow/compare/cell.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace experiment_limits_test {
 
 namespace fs = std::filesystem;
 using namespace experiment_files;
-using runtime_fixture::test_catalogue;
 
-const std::string kStart = std::string(kHead) + kCases;  // lines 1 to 3
 const std::string kGood = kStart + kVariants + kMetrics;
 
 class ExperimentLimits : public ExperimentFiles {
  protected:
-  /// The only fault, quickly.
+  /// Exactly this fault, found quickly.
   void expect_fault(const std::string& text, const std::string& fault) {
     const std::clock_t start = std::clock();
     read(text);
@@ -54,9 +52,7 @@ TEST_F(ExperimentLimits, VariantsByName) {
 }
 
 TEST_F(ExperimentLimits, Cells) {
-  std::string pipeline = kPipeline;
-  pipeline.insert(pipeline.find("  t:"), "  s: {uses: test.displaced}\n");
-  scratch.write("p.yaml", pipeline);
+  add_displaced_node();
   const std::string cases = std::string(kHead) + "cases: {seeds: 1..100000}\ninputs: {case: cases/a}\n" + kMetrics;
   expect_fault(
       cases + kVariants + "starts: {node: s, count: 6, rotation_deg: 1}\n",
@@ -100,7 +96,7 @@ TEST_F(ExperimentLimits, AHundredThousandCasesAreReadAtOnce) {
            kVariants + kMetrics);
   EXPECT_EQ(e.cases.size(), 100000u) << diagnostics.text();
   EXPECT_EQ(marrow::compare::cell_of(e, "two/seed-99999/0")->case_index, 99998u);
-  EXPECT_LT(double(std::clock() - start) / CLOCKS_PER_SEC, 20) << "quadratic, it was minutes";
+  EXPECT_LT(double(std::clock() - start) / CLOCKS_PER_SEC, 20) << "with quadratic work it takes minutes";
 }
 
 TEST_F(ExperimentLimits, NamesThatAreTooLongForAFolder) {
@@ -120,11 +116,10 @@ TEST_F(ExperimentLimits, NamesThatTheMatrixComposes) {
                "e.yaml:5:1: error: the matrix makes a variant's name of 102 bytes of its values; as a folder's name it "
                "may have 100\n");
   EXPECT_NE(diagnostics.text().find("hint: name the combinations under  variants:"), std::string::npos);
-  // Whatever the values are, each variant has a folder of its own.
+  // Each variant has its own folder, for any values.
   const auto e = read(kStart + kMetrics + "matrix:\n  c.path: [two, TWO, 'two', two-2, 'a b', a_b]\n");
-  std::vector<std::string> names;
-  for (const auto& variant : e.variants) names.push_back(variant.name);
-  EXPECT_EQ(names, (std::vector<std::string>{"two", "TWO-3", "two-4", "two-2", "a_b", "a_b-2"})) << diagnostics.text();
+  EXPECT_EQ(marrow::names_of(e.variants), (std::vector<std::string>{"two", "TWO-3", "two-4", "two-2", "a_b", "a_b-2"}))
+      << diagnostics.text();
 }
 
 TEST_F(ExperimentLimits, NamesThatAreOneFolderToSomeFileSystems) {
@@ -139,9 +134,8 @@ TEST_F(ExperimentLimits, FoldersWithOddNames) {
     fs::create_directories(scratch.path / "odd" / name);
   const auto e = read(std::string(kHead) + "cases: {folders: [odd/*, odd/.hidden]}\n" + kVariants + kMetrics);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
-  std::vector<std::string> names;
-  for (const auto& one : e.cases) names.push_back(one.name);
-  EXPECT_EQ(names, (std::vector<std::string>{"esc%1B[31m", "line%0Abreak", "not%FFutf8", "with space", "%2Ehidden"}));
+  EXPECT_EQ(marrow::names_of(e.cases),
+            (std::vector<std::string>{"esc%1B[31m", "line%0Abreak", "not%FFutf8", "with space", "%2Ehidden"}));
   EXPECT_EQ(e.cases[1].folder, scratch.path / "odd" / "line\nbreak");
 }
 

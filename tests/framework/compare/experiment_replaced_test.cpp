@@ -1,31 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// What would be mixed up or have no effect in an experiment: options and inputs that two sections set, one folder under
-// two names, and variants that are named as tuned points are.
+// Faults of experiments that would mix things up or have no effect: options and inputs that two sections set, one
+// folder under two names, and variants with the names of tuned points.
 #include "experiment_files.hpp"
 
 namespace experiment_replaced_test {
 
 using namespace experiment_files;
 
-const std::string kStart = std::string(kHead) + kCases;  // lines 1 to 3
-
 class ExperimentReplaced : public ExperimentFiles {
  protected:
-  /// Exactly this one, with the hint.
   void expect_fault(const std::string& text, int line, const std::string& message,
-                    const std::string& hint = kLeaveOut) {
-    read(text);
-    ASSERT_EQ(diagnostics.size(), 1u) << text << diagnostics.text();
-    const marrow::Diagnostic fault = diagnostics.sorted()[0];
-    EXPECT_EQ(fault.place.line, line) << diagnostics.text();
-    EXPECT_EQ(fault.message, message);
-    EXPECT_EQ(fault.hint, hint);
+                    const std::string& hint = "leave one of them out") {
+    ExperimentFiles::expect_fault(text, line, message, hint);
   }
   void expect_none(const std::string& text) {
     read(text);
     EXPECT_TRUE(diagnostics.empty()) << text << diagnostics.text();
   }
-  static constexpr const char* kLeaveOut = "leave one of them out";
 };
 
 std::string replaced(const std::string& what, const std::string& by, int line) {

@@ -1,31 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // The section 'stop' of an experiment, and cases that a command adds to those of the file.
 #include "experiment_files.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace experiment_stop_test {
 
 using namespace experiment_files;
 using marrow::compare::Experiment;
 using marrow::compare::StopRule;
-using runtime_fixture::test_catalogue;
 
 const std::string kSimulated = std::string(kHead) + "cases: {simulate: {pipeline: s.yaml, seeds: [1, 7, 3]}}\n";
 const std::string kGood = kSimulated + kVariants + kMetrics;  // lines 1 to 7
 
 class ExperimentStop : public ExperimentFiles {
  protected:
-  Experiment read_more(const std::string& text, std::size_t more_cases) {
-    diagnostics = marrow::Diagnostics();
-    return marrow::compare::read_experiment(scratch.write("e.yaml", text), test_catalogue(), diagnostics, more_cases);
-  }
-  /// Exactly this one, at line 8.
+  /// At line 8, the first after those of kGood.
   void expect_fault(const std::string& text, const std::string& message, const std::string& hint = "") {
-    read(text);
-    ASSERT_EQ(diagnostics.size(), 1u) << text << diagnostics.text();
-    const marrow::Diagnostic fault = diagnostics.sorted()[0];
-    EXPECT_EQ(fault.place.line, 8) << diagnostics.text();
-    EXPECT_EQ(fault.message, message);
-    EXPECT_EQ(fault.hint, hint);
+    ExperimentFiles::expect_fault(text, 8, message, hint);
   }
   void expect_stop_fault(const std::string& rule, const std::string& message, const std::string& hint = "") {
     expect_fault(kGood + "stop: {" + rule + "}\n", message, hint);
@@ -40,18 +31,17 @@ class ExperimentStop : public ExperimentFiles {
 const std::string kRest = ", most_cases: 40, look_every: 10";
 
 TEST_F(ExperimentStop, FurtherSeedsFollowTheLargest) {
-  const Experiment experiment = read_more(kGood, 2);
+  const Experiment experiment = read(kGood, 2);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
-  std::vector<std::string> names;
-  for (const auto& one : experiment.cases) names.push_back(one.name);
-  EXPECT_EQ(names, (std::vector<std::string>{"seed-1", "seed-7", "seed-3", "seed-8", "seed-9"}));
+  EXPECT_EQ(marrow::names_of(experiment.cases),
+            (std::vector<std::string>{"seed-1", "seed-7", "seed-3", "seed-8", "seed-9"}));
   EXPECT_EQ(experiment.cases[4].seed, 9u);
   EXPECT_TRUE(experiment.cases[4].is_simulated);
   EXPECT_EQ(experiment.more_cases, 2u);
 }
 
 TEST_F(ExperimentStop, FoldersDoNotBecomeMore) {
-  read_more(std::string(kHead) + kCases + kVariants + kMetrics, 2);
+  read(std::string(kHead) + kCases + kVariants + kMetrics, 2);
   ASSERT_EQ(diagnostics.size(), 1u) << diagnostics.text();
   EXPECT_EQ(diagnostics.sorted()[0].message, "further cases need seeds, which these cases do not have");
   EXPECT_EQ(diagnostics.sorted()[0].hint, "use  cases: {simulate: ...}  or  {seeds: 1..20}");
@@ -73,7 +63,7 @@ TEST_F(ExperimentStop, IsReadWithItsDefaults) {
 }
 
 TEST_F(ExperimentStop, LooksStayTheSameWithMoreCases) {
-  const Experiment experiment = read_more(kGood + "stop: {difference: number.value" + kRest + "}\n", 10);
+  const Experiment experiment = read(kGood + "stop: {difference: number.value" + kRest + "}\n", 10);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   EXPECT_EQ(experiment.cases.size(), 13u);
   EXPECT_EQ(experiment.stop->looks(), (std::vector<std::size_t>{3, 13, 23, 33, 40}));

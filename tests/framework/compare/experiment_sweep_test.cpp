@@ -2,6 +2,7 @@
 // The section 'sweep' of an experiment.
 #include "experiment_files.hpp"
 #include "marrow/compare/sobol.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 #include <set>
 
@@ -12,28 +13,17 @@ using marrow::compare::Experiment;
 using marrow::compare::sobol_point;
 using marrow::compare::Variant;
 
-const std::string kGood = std::string(kHead) + kCases + kMetrics;  // lines 1 to 4
+const std::string kGood = kStart + kMetrics;  // lines 1 to 4
 
 class ExperimentSweep : public ExperimentFiles {
  protected:
-  /// Exactly this one.
-  void expect_fault(const std::string& text, int line, const std::string& message, const std::string& hint = "") {
-    read(text);
-    ASSERT_EQ(diagnostics.size(), 1u) << text << diagnostics.text();
-    const marrow::Diagnostic fault = diagnostics.sorted()[0];
-    EXPECT_EQ(fault.place.line, line) << diagnostics.text();
-    EXPECT_EQ(fault.message, message);
-    EXPECT_EQ(fault.hint, hint);
-  }
   void expect_sweep_fault(const std::string& sweep, const std::string& message, const std::string& hint = "") {
     expect_fault(kGood + "sweep: {" + sweep + "}\n", 5, message, hint);
   }
   std::vector<std::string> names(const std::string& text) {
     experiment = read(text);
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
-    std::vector<std::string> result;
-    for (const Variant& variant : experiment.variants) result.push_back(variant.name);
-    return result;
+    return marrow::names_of(experiment.variants);
   }
   Experiment experiment;
 };

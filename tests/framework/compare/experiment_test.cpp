@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What experiment files come to.
+// What is read from experiment files.
 #include <set>
 
 #include "experiment_files.hpp"
@@ -9,11 +9,9 @@ namespace experiment_test {
 
 using namespace experiment_files;
 using marrow::compare::Experiment;
-using runtime_fixture::test_catalogue;
 
 TEST_F(ExperimentFiles, FoldersVariantsAndSuccess) {
-  const Experiment e =
-      read(std::string(kHead) + kCases + kVariants + kMetrics + "success: {number.value: 3}\nbaseline: two\n");
+  const Experiment e = read(kStart + kVariants + kMetrics + "success: {number.value: 3}\nbaseline: two\n");
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   ASSERT_EQ(e.cases.size(), 2u);
   EXPECT_EQ(e.cases[0].name, "a");
@@ -48,7 +46,7 @@ TEST_F(ExperimentFiles, APathThroughALinkIsWhatTheSystemFinds) {
 
 TEST_F(ExperimentFiles, MetricsHaveNamesForPeople) {
   const Experiment e =
-      read(std::string(kHead) + kCases + kVariants +
+      read(kStart + kVariants +
            "metrics:\n  - {figure: number.value, label: Sum}\n  - other.value\nsuccess: {number.value: 3}\n");
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   ASSERT_EQ(e.metrics.size(), 2u);
@@ -59,7 +57,7 @@ TEST_F(ExperimentFiles, MetricsHaveNamesForPeople) {
 
 TEST_F(ExperimentFiles, WhatIsSetForAllComesBeforeWhatAVariantChanges) {
   const std::string set = "set: {f.value: 3, c.word: two, c.uses: test.constant}\n";
-  const Experiment e = read(std::string(kHead) + kCases + set + kVariants + kMetrics);
+  const Experiment e = read(kStart + set + kVariants + kMetrics);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   const auto text = [&](std::size_t variant) {
     std::string all;
@@ -69,26 +67,23 @@ TEST_F(ExperimentFiles, WhatIsSetForAllComesBeforeWhatAVariantChanges) {
   };
   EXPECT_EQ(text(0), "c.uses=test.constant f.value=3 c.word=two ");
   EXPECT_EQ(text(1), "c.uses=test.constant f.value=3 c.word=two c.value=2 ");
-  EXPECT_EQ(e.variants[0].overrides.size(), 0u) << "what all have in common tells no variant from another";
+  EXPECT_EQ(e.variants[0].overrides.size(), 0u) << "changes of all variants belong to no single one";
 }
 
 TEST_F(ExperimentFiles, MatrixGivesEveryCombination) {
-  const Experiment e =
-      read(std::string(kHead) + kCases + "matrix:\n  c.value: [1, 2, 3]\n  n.uses: [test.add, test.add]\n" + kMetrics);
+  const Experiment e = read(kStart + "matrix:\n  c.value: [1, 2, 3]\n  n.uses: [test.add, test.add]\n" + kMetrics);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   ASSERT_EQ(e.variants.size(), 6u);
   std::set<std::string> names;
   for (const auto& variant : e.variants) names.insert(variant.name);
-  EXPECT_EQ(names.size(), 6u) << "no two have one name";
+  EXPECT_EQ(names.size(), 6u) << "all names differ";
   EXPECT_TRUE(names.contains("2+add"));
 }
 
 TEST_F(ExperimentFiles, StartsMayBeDrawnByTheirDistance) {
-  std::string pipeline = kPipeline;
-  pipeline.insert(pipeline.find("  t:"), "  s: {uses: test.displaced}\n");
-  scratch.write("p.yaml", pipeline);
-  const Experiment e = read(std::string(kHead) + kCases + kVariants + kMetrics +
-                            "starts: {node: s, count: 1000, rotation_deg: 3, distance_mm: 40}\n");
+  add_displaced_node();
+  const Experiment e =
+      read(kStart + kVariants + kMetrics + "starts: {node: s, count: 1000, rotation_deg: 3, distance_mm: 40}\n");
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   double mean = 0;
   int below_10 = 0;
@@ -102,12 +97,10 @@ TEST_F(ExperimentFiles, StartsMayBeDrawnByTheirDistance) {
 }
 
 TEST_F(ExperimentFiles, AShortestDistanceIsGivenToTheNodeToo) {
-  std::string pipeline = kPipeline;
-  pipeline.insert(pipeline.find("  t:"), "  s: {uses: test.displaced}\n");
-  scratch.write("p.yaml", pipeline);
+  add_displaced_node();
   const auto options = [&](const std::string& distance) {
-    const Experiment e = read(std::string(kHead) + kCases + kVariants + kMetrics +
-                              "starts: {node: s, count: 1, rotation_deg: 3" + distance + "}\n");
+    const Experiment e =
+        read(kStart + kVariants + kMetrics + "starts: {node: s, count: 1, rotation_deg: 3" + distance + "}\n");
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
     std::string keys;
     for (const auto& one : marrow::compare::arguments_of(e, {0, 0, 0}, e.cases[0].folder).overrides)
@@ -119,11 +112,9 @@ TEST_F(ExperimentFiles, AShortestDistanceIsGivenToTheNodeToo) {
 }
 
 TEST_F(ExperimentFiles, StartsAreDrawnByTheirProtocol) {
-  std::string pipeline = kPipeline;
-  pipeline.insert(pipeline.find("  t:"), "  s: {uses: test.displaced}\n");
-  scratch.write("p.yaml", pipeline);
-  const std::string text = std::string(kHead) + kCases + kVariants + kMetrics +
-                           "starts: {node: s, count: 2000, seed: 7, rotation_deg: 3, translation_mm: 5}\n";
+  add_displaced_node();
+  const std::string text =
+      kStart + kVariants + kMetrics + "starts: {node: s, count: 2000, seed: 7, rotation_deg: 3, translation_mm: 5}\n";
   const Experiment e = read(text);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   ASSERT_EQ(e.starts.size(), 2000u);
@@ -199,8 +190,8 @@ TEST_F(ExperimentFiles, PathsStartAtTheExperiment) {
   pipeline.insert(pipeline.find("{case:") + 1, "file: {type: path}, ");
   pipeline.replace(pipeline.find("path: $case"), 11, "path: $file");
   scratch.write("p.yaml", pipeline);
-  const Experiment e = read(std::string(kHead) + kCases +
-                            "inputs: {file: data.txt}\nvariants:\n  one: {}\n  two: {c.path: cases/a}\n" + kMetrics);
+  const Experiment e =
+      read(kStart + "inputs: {file: data.txt}\nvariants:\n  one: {}\n  two: {c.path: cases/a}\n" + kMetrics);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   const auto path = [&](std::size_t variant) {
     const auto p =
@@ -208,13 +199,14 @@ TEST_F(ExperimentFiles, PathsStartAtTheExperiment) {
                               test_catalogue(), diagnostics);
     return std::get<std::string>(p.nodes[0].options.back());
   };
-  EXPECT_EQ(path(0), (scratch.path / "data.txt").string()) << "wherever the program was started";
+  EXPECT_EQ(path(0), (scratch.path / "data.txt").string())
+      << "the folder where the program was started does not matter";
   EXPECT_EQ(path(1), (scratch.path / "cases/a").string());
 }
 
 TEST_F(ExperimentFiles, WhatIsNoFolderIsNoCase) {
   scratch.write("cases/notes.txt", "none");
-  EXPECT_EQ(read(std::string(kHead) + kCases + kVariants + kMetrics).cases.size(), 2u);
+  EXPECT_EQ(read(kStart + kVariants + kMetrics).cases.size(), 2u);
 }
 
 }  // namespace experiment_test

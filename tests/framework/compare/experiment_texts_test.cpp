@@ -11,7 +11,7 @@ namespace experiment_texts_test {
 using namespace experiment_files;
 using marrow::compare::Experiment;
 
-const std::string kGood = std::string(kHead) + kCases + kMetrics;  // lines 1 to 4
+const std::string kGood = kStart + kMetrics;  // lines 1 to 4
 
 class ExperimentTexts : public ExperimentFiles {
  protected:
@@ -26,17 +26,9 @@ class ExperimentTexts : public ExperimentFiles {
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
     return diagnostics.empty() ? std::get<std::string>(pipeline.nodes[0].options[6]) : "";
   }
-  void expect_fault(const std::string& text, int line, const std::string& message, const std::string& hint) {
-    read(text);
-    ASSERT_EQ(diagnostics.size(), 1u) << text << diagnostics.text();
-    const marrow::Diagnostic fault = diagnostics.sorted()[0];
-    EXPECT_EQ(fault.place.line, line);
-    EXPECT_EQ(fault.message, message);
-    EXPECT_EQ(fault.hint, hint);
-  }
 };
 
-/// By YAML's rules for quoted texts, each value is what stands between the single quotes.
+/// By YAML's rules for quoted texts, each value is the text between the single quotes.
 TEST_F(ExperimentTexts, ArriveAsTheyAre) {
   const std::vector<std::string> texts{"a #b", "&a b", "! b", "*a",     "- a",     "a: b",   "~",   "null",
                                        "%a",   "| a",  "[a",  "{a: b}", "\"a\" b", "[a] #b", " a ", "größe 漢"};
@@ -80,7 +72,8 @@ TEST_F(ExperimentTexts, NamesThatLookTheSameAreFaults) {
   std::filesystem::create_directories(scratch.path / "cases" / "a\u200b");
   const Experiment experiment = read(kGood + kVariants);
   ASSERT_EQ(experiment.cases.size(), 3u) << diagnostics.text();
-  EXPECT_EQ(experiment.cases[1].name, "a%E2%80%8B") << "a folder that is there is escaped, so that all can see it";
+  EXPECT_EQ(experiment.cases[1].name, "a%E2%80%8B")
+      << "an existing folder gets an escaped name, in which the character can be seen";
 }
 
 /// A draw from [0, 1) is a multiple of 2^-53 (the generator's definition), which no text of six digits is.
@@ -98,7 +91,7 @@ TEST_F(ExperimentTexts, DrawnNumbersKeepAllDigits) {
   EXPECT_EQ(texts.size(), 40u);
 }
 
-/// An input of type integer takes no other number, however many digits it has.
+/// An input of type integer takes only whole numbers, with any number of digits.
 TEST_F(ExperimentTexts, WholeNumbersAreDrawnForIntegers) {
   const auto with = [](const std::string& range) {
     return kHead + ("cases: {simulate: {pipeline: s.yaml, seeds: 1..40, draw: {shape: " + range + "}}}\n") + kVariants +

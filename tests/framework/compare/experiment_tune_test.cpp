@@ -8,7 +8,7 @@ using namespace experiment_files;
 using marrow::compare::Experiment;
 using marrow::compare::TuneRule;
 
-const std::string kGood = std::string(kHead) + kCases + kMetrics;  // lines 1 to 4
+const std::string kGood = kStart + kMetrics;  // lines 1 to 4
 const std::string kBy = "optimizer: {uses: optimizer.nelder_mead}, ";
 const std::string kRest = kBy + "points: 9, training_cases: 1, failed_as: 5";
 
@@ -21,24 +21,15 @@ const marrow::Catalogue& catalogue() {
 
 class ExperimentTune : public ExperimentFiles {
  protected:
-  Experiment read(const std::string& text) {
-    diagnostics = marrow::Diagnostics();
-    return marrow::compare::read_experiment(scratch.write("e.yaml", text), catalogue(), diagnostics);
-  }
+  ExperimentTune() : ExperimentFiles(catalogue()) {}
   Experiment good(const std::string& tune, const std::string& more = "") {
     Experiment experiment = read(kGood + more + "tune: {" + tune + "}\n");
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
     return experiment;
   }
-  /// Exactly this one.
   void expect_fault(const std::string& tune, const std::string& message, const std::string& hint = "",
                     const std::string& more = "") {
-    read(kGood + "tune: {" + tune + "}\n" + more);
-    ASSERT_EQ(diagnostics.size(), 1u) << tune << diagnostics.text();
-    const marrow::Diagnostic fault = diagnostics.sorted()[0];
-    EXPECT_EQ(fault.place.line, 5) << diagnostics.text();
-    EXPECT_EQ(fault.message, message);
-    EXPECT_EQ(fault.hint, hint);
+    ExperimentFiles::expect_fault(kGood + "tune: {" + tune + "}\n" + more, 5, message, hint);
   }
 };
 

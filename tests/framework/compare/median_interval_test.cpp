@@ -34,7 +34,7 @@ TEST(OrderStatisticInterval, RefusesWhatHasNoMedian) {
 }
 
 TEST(OrderStatisticInterval, MayEndInAFailure) {
-  // Of 6 values the interval goes from the smallest to the largest.
+  // With 6 values, the interval reaches from the smallest to the largest.
   const Interval interval = order_statistic_interval({1, 2, 3, 4, 5, infinite}, 0.05);
   EXPECT_EQ(interval.lower, 1);
   EXPECT_EQ(interval.upper, infinite);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the names of levels promise: in 500 simulated experiments each in which there is no difference, or whose true
-// value is known, tests find something and intervals miss the value no more often than their level says. A count
-// contradicts a level of 5 % if it is 44 or more of 500: a binomial count of that level is so with a probability of
-// 0.025 % (scipy.stats.binom.sf(43, 500, 0.05)). There are about 200 counts here.
+// Tests and intervals keep their level. Each is tried in 500 simulated experiments without a difference, or with a
+// known true value: tests find something, and intervals miss the value, no more often than the level says. 44 or more
+// of 500 contradict a level of 5 %: a binomial count of that level reaches 44 with a probability of 0.025 %
+// (scipy.stats.binom.sf(43, 500, 0.05)). There are about 200 counts here.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -27,10 +27,10 @@ using Draw = std::function<double(Random&)>;
 double symmetric(Random& random) { return (random.uniform() < 0.1 ? 10 : 1) * random.normal(); }
 /// Exponential, with a median of 0 and a mean of 1 - ln 2.
 double skewed(Random& random) { return -std::log(1 - random.uniform()) - std::log(2.0); }
-/// On a grid of 0.1, of which many are 0 and many tie.
+/// On a grid of 0.1: many are 0, and many are equal.
 double tied(Random& random) { return 0.1 * std::round(2 * random.normal()); }
 
-/// Counts the experiments that go wrong, prints the rate, and holds it against 5 %.
+/// Counts the experiments that go wrong, prints the rate, and compares it with 5 %.
 void expect_within_level(const std::string& what, const std::function<bool(Random&)>& goes_wrong) {
   int wrong = 0;
   for (int i = 0; i < kExperiments; ++i) {
@@ -103,7 +103,7 @@ TEST(NullExperiments, StopRuleOfADifference) {
     }
 }
 
-/// Looks until the rule says stop, and whether the interval then misses the true value.
+/// Looks until the rule says stop. Returns whether the interval then misses the true value.
 bool misses_at_the_end(const StopPlan& plan, double truth,
                        const std::function<std::optional<Interval>(std::size_t cases, double confidence)>& interval) {
   for (const std::size_t cases : plan.looks()) {
@@ -131,7 +131,7 @@ TEST(NullExperiments, StopRuleOfTheWidthOfAMedian) {
       }
 }
 
-/// The runs of a case: each takes its case's end with the probability sqrt(correlation), else its own.
+/// The runs of a case: each takes the outcome of its case with the probability sqrt(correlation), else its own.
 void add_case(CaseRate& rate, Random& random, const std::string& name, std::size_t runs, double truth,
               double correlation) {
   const bool of_case = random.uniform() < truth;

@@ -58,8 +58,8 @@ TEST(CaseDifferences, NameTheCaseThatIsNotFinite) {
 }
 
 TEST(CaseDifferences, FailuresDecideBeforeValues) {
-  // a: the variant lost a run more. b: the reference did. c: one each, so the run that both have decides. d: nobody has
-  // anything. e: one each, and none in common.
+  // a: the variant lost one run more. b: the reference lost one run more. c: each lost one, so the run that both have
+  // decides. d: both lost all runs. e: each lost one, and they have no run in common.
   const std::vector<Pair> pairs{{"a", 1, failed},      {"a", 5, 1},      {"b", failed, 1},
                                 {"c", 1, failed},      {"c", failed, 1}, {"c", 1, 3},
                                 {"d", failed, failed}, {"e", 1, failed}, {"e", failed, 9}};
@@ -153,7 +153,7 @@ TEST(MedianOfDifferences, LiesBetweenTheMiddleTwo) {
   EXPECT_EQ(median_of_differences({1, infinite}), infinite);
   EXPECT_EQ(median_of_differences({-infinite, 1}), -infinite);
   EXPECT_EQ(median_of_differences({infinite, infinite}), infinite);
-  EXPECT_EQ(median_of_differences({-infinite, infinite}), 0) << "as many failures of the one as of the other";
+  EXPECT_EQ(median_of_differences({-infinite, infinite}), 0) << "both failed equally often";
   EXPECT_EQ(message_of([] { median_of_differences({}); }), "there are no differences; give at least one");
 }
 
@@ -167,7 +167,7 @@ TEST(FewestCases, GrowWithTheComparisons) {
   EXPECT_EQ(message_of([] { fewest_cases(0.05, 0); }), "there are no comparisons; give at least one");
 }
 
-/// Values in tenths of a mm: what the numbers stand for, without any rounding.
+/// Values in tenths of a mm, exactly as they are meant, without rounding.
 struct Tenths {
   std::vector<long> reference, variant;
 };
@@ -233,7 +233,7 @@ TEST(RoundingNoise, DecidesNeitherTiesNorZeros) {
 }
 
 TEST(RoundingNoise, IsZeroInMedianAndInterval) {
-  // 0.3 - 0.1 - 0.2 is no 0 in doubles, nor is the mean of 0.1, 0.2 and -0.3.
+  // In doubles, neither 0.3 - 0.1 - 0.2 nor the mean of 0.1, 0.2 and -0.3 is exactly 0.
   std::vector<Pair> pairs;
   for (int c = 0; c < 8; ++c) pairs.push_back({std::to_string(c), 0.1 + 0.2, 0.3});
   for (const double difference : {0.1, 0.2, -0.3}) pairs.push_back({"mean", 1000.1, 1000.1 + difference});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Simulated comparisons of two variants: a planted difference is found, and where there is none, none is shown.
+// Simulated comparisons of two variants. A planted difference is found; without one, none is shown.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -57,7 +57,7 @@ TEST(PlantedDifference, IsNotShownWhereThereIsNone) {
   expect_within(small_p, null_experiments, 0.05);
   expect_within(shown, null_experiments, 0.05);
   expect_within(null_experiments - covered, null_experiments, 0.05);
-  // What the means per case are for: the starts of a case are no evidence of their own.
+  // This is why a case counts by its mean: the starts of a case are not independent evidence.
   EXPECT_GT(starts_as_cases, 3 * small_p);
 }
 
@@ -78,7 +78,7 @@ TEST(PlantedDifference, IsNotShownAmongSeveralVariantsAfterHolm) {
   EXPECT_GT(uncorrected, 2 * corrected);
 }
 
-/// In how many of 100 experiments the difference is shown, as one of three variants after Holm.
+/// The number of experiments, of 100, that show the difference of one of three variants after Holm.
 int found_of_100(double shift_mm) {
   std::mt19937_64 random(3);
   int found = 0, covered = 0;

@@ -79,8 +79,8 @@ TEST(SignedRank, FailuresShareTheHighestRank) {
 TEST(SignedRank, TiesAreThoseUpToTheLastDigits) {
   // 0.1 * 3 is 0.30000000000000004.
   EXPECT_EQ(signed_rank_test({0.1 * 3, -0.3, 1}).positive_ranks, 4.5);
-  EXPECT_EQ(signed_rank_test({0.3 * (1 + 1e-8), -0.3, 1}).positive_ranks, 5) << "a difference of its own";
-  EXPECT_EQ(signed_rank_test({1e-7, -2e-7, 1e6}).positive_ranks, 4) << "an outlier ties no others";
+  EXPECT_EQ(signed_rank_test({0.3 * (1 + 1e-8), -0.3, 1}).positive_ranks, 5) << "the two magnitudes are not tied";
+  EXPECT_EQ(signed_rank_test({1e-7, -2e-7, 1e6}).positive_ranks, 4) << "an outlier does not tie the others";
 }
 
 }  // namespace signed_rank_test_suite

@@ -38,7 +38,7 @@ TEST(Wilson, RefusesWhatIsNoRate) {
   EXPECT_NE(message_of([] { wilson_interval(1, 2, nan); }).find("confidence"), std::string::npos);
 }
 
-/// `successes` of `runs` from a start of that error.
+/// Adds `runs` runs from a start with this error; the first `successes` of them succeed.
 void add(std::vector<StartOutcome>& outcomes, double error, std::size_t successes, std::size_t runs) {
   for (std::size_t i = 0; i < runs; ++i) outcomes.push_back({error, i < successes});
 }
@@ -90,7 +90,7 @@ TEST(CaptureRange, PassesOverEmptyBinsButReachesNoFurtherByThem) {
   EXPECT_EQ(capture_range(outcomes).range, 4) << "4 to 10 mm were not tried";
   EXPECT_EQ(capture_range({{9, false}}).range, 0) << "0 to 8 mm were not tried";
   EXPECT_FALSE(capture_range({{9, false}}).is_open);
-  EXPECT_EQ(capture_range({{0.3, true}, {0.4, true}}, 0.1).range, 0.4) << "no farther than was tried";
+  EXPECT_EQ(capture_range({{0.3, true}, {0.4, true}}, 0.1).range, 0.4) << "the range ends at the farthest start";
   EXPECT_EQ(capture_range({}).range, 0);
   EXPECT_FALSE(capture_range({}).is_open);
 }

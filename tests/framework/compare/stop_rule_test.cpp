@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Simulated comparisons that stop by a rule: no cells are run, only their rows are made up.
+// Simulated comparisons that stop by a rule. No cells are run; only their rows are simulated.
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <iostream>
 #include <limits>
 #include <marrow/compare/median_interval.hpp>
@@ -28,7 +27,7 @@ StopRule difference_rule() {
   return rule;
 }
 
-/// What came of many experiments, each looked at until the rule said stop.
+/// The outcome of many experiments, each looked at until the rule says stop.
 struct Outcome {
   int shown = 0, shown_by_usual_p = 0, held = 0;
   double mean_cases = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Wires that the node does not use, and circles of wires whoever uses them. Which nodes are in a circle is seen by
-// following the wires of these few lines by eye.
+// Wires that their node does not use, and circles of used and unused wires. The pipelines are so short that a reader
+// can follow the wires and see which nodes are in a circle.
 #include "tests/framework/pipeline/pipeline_fixture.hpp"
 
 namespace circles_test {
@@ -21,8 +21,8 @@ TEST_F(Circles, AWireToAPortOfAnotherNodeOfTheKindIsNotedAsUnused) {
   const marrow::Pipeline p =
       read("marrow: 1\nnodes:\n  c: {uses: test.constant}\n  n: {uses: test.constant, in: {a: c}}\noutputs: {o: n}\n");
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
-  EXPECT_EQ(p.notes, std::vector<std::string>{"node 'n': the wire to 'a' is not used: only other nodes of the kind "
-                                              "test have this input, test.constant has not"});
+  EXPECT_EQ(p.notes, std::vector<std::string>{"node 'n': the wire to 'a' is not used: test.constant does not have "
+                                              "this input, only other nodes of the kind test do"});
   EXPECT_TRUE(p.nodes[1].wires.empty());
 }
 
@@ -58,8 +58,8 @@ TEST_F(Circles, OnlyItsOwnNodesAreNamed) {
             "4: these nodes wait for each other in a circle: a, b\n");
 }
 
-TEST_F(Circles, EachIsNamedByItself) {
-  // 'between' waits for the first circle, and the second one waits for it: it is in neither.
+TEST_F(Circles, EachIsNamedAlone) {
+  // 'between' waits for the first circle, and the second circle waits for 'between'. It is in neither.
   EXPECT_EQ(faults("  a: {uses: test.add, in: {a: b}}\n"
                    "  b: {uses: test.add, in: {a: a}}\n"
                    "  between: {uses: test.add, in: {a: a}}\n"
@@ -83,7 +83,7 @@ TEST_F(Circles, ItIsShownBesideOtherFaults) {
             "5: option 'value' of test.constant: expected a number, got 'many'\n");
 }
 
-TEST_F(Circles, ThatAnOverrideClosesAndOneInABody) {
+TEST_F(Circles, AnOverrideClosesOneAndABodyHoldsOne) {
   const std::string nodes = "  a: {uses: test.constant}\n  b: {uses: test.add, in: {a: a}}\noutputs: {o: b}\n";
   EXPECT_EQ(faults(nodes), "");
   EXPECT_EQ(faults(nodes, {{}, {{"a.in.after", "b"}}}), "3: these nodes wait for each other in a circle: a, b\n");

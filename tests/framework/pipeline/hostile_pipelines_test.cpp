@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pipeline files made to harm: names that lead elsewhere, and texts that are long, deep or slow to read.
+// Harmful pipeline files: names that lead to other folders, and texts that are long, deep or slow to read.
 #include <ctime>
 
 #include "tests/framework/pipeline/pipeline_fixture.hpp"
@@ -17,12 +17,12 @@ std::string with_key(const std::string& key) {
 }
 
 TEST_F(PipelineTest, NameIsNoPath) {
-  const std::string told = "a pipeline's name becomes a file name: ";
-  expect_fault(with_key("name: ../../x"), 2, 1, told + "'../../x' cannot be one, it holds '/'",
+  const std::string start = "a pipeline's name becomes a file name: ";
+  expect_fault(with_key("name: ../../x"), 2, 1, start + "'../../x' cannot be one, it holds '/'",
                "use at most 100 letters");
-  expect_fault(with_key("name: .."), 2, 1, told + "'..' cannot be one, it begins with a dot",
+  expect_fault(with_key("name: .."), 2, 1, start + "'..' cannot be one, it begins with a dot",
                "use at most 100 letters");
-  expect_fault(with_key("name: ''"), 2, 1, told + "'' cannot be one, it is empty");
+  expect_fault(with_key("name: ''"), 2, 1, start + "'' cannot be one, it is empty");
   expect_fault(with_key("name: \"a\\e[2J\""), 2, 1, "it holds a control character");
   expect_fault(with_key("name: " + std::string(101, 'x')), 2, 1, "it has 101 bytes");
   EXPECT_EQ(read(with_key("name: größer, links (2)")).name, "größer, links (2)");
@@ -34,10 +34,8 @@ TEST_F(PipelineTest, NameFromTheFileIsNoPathEither) {
        {std::string("...yaml"), std::string(".yaml"), std::string("a\nb.yaml"), std::string(120, 'x') + ".yaml"}) {
     diagnostics = Diagnostics();
     marrow::read_pipeline(scratch.write(file, with_key("help: x")), {}, test_catalogue(), diagnostics);
-    ASSERT_EQ(diagnostics.size(), 1u) << file << diagnostics.text();
-    EXPECT_NE(diagnostics.text().find("the pipeline takes its name from its file, and '"), std::string::npos)
-        << diagnostics.text();
-    EXPECT_NE(diagnostics.text().find("hint: add  name: ..."), std::string::npos);
+    expect_shown("the pipeline takes its name from its file, and '");
+    expect_shown("hint: add  name: ...");
     marrow::read_pipeline(scratch.write(file, with_key("name: x")), {}, test_catalogue(), diagnostics = Diagnostics());
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
   }
@@ -60,8 +58,7 @@ TEST_F(PipelineTest, NoControlCharactersInKeys) {
 
 TEST_F(PipelineTest, TooLongAFile) {
   read(with_key("#" + std::string(4000000, 'x')));
-  ASSERT_EQ(diagnostics.size(), 1u);
-  EXPECT_NE(diagnostics.text().find("the pipeline file is longer than 4 MB"), std::string::npos) << diagnostics.text();
+  expect_shown("the pipeline file is longer than 4 MB");
 }
 
 TEST_F(PipelineTest, DeepNestingIsSaid) {
@@ -69,9 +66,7 @@ TEST_F(PipelineTest, DeepNestingIsSaid) {
     std::string deep = "a:\n  ";
     for (int i = 0; i < 60000; ++i) deep += open;
     read(deep);
-    ASSERT_EQ(diagnostics.size(), 1u) << open;
-    EXPECT_NE(diagnostics.text().find("lists and maps are nested more than 100 deep"), std::string::npos)
-        << diagnostics.text();
+    expect_shown("lists and maps are nested more than 100 deep");
   }
   expect_fault(with_key("help: " + std::string(50, '[') + std::string(50, ']')), 2, 1,
                "help: expected a text, got a list");
@@ -85,8 +80,7 @@ TEST_F(PipelineTest, AliasesThatMultiplyAreSaid) {
     bomb += "]\n";
   }
   read(bomb);
-  ASSERT_EQ(diagnostics.size(), 1u);
-  EXPECT_NE(diagnostics.text().find("aliases repeat more than 100000 values"), std::string::npos) << diagnostics.text();
+  expect_shown("aliases repeat more than 100000 values");
   read("marrow: 1\nnodes: &a {b: *a}\n");
   EXPECT_NE(diagnostics.text().find(
                 "p.yaml:2:15: error: cannot be read as YAML: an alias names the list or map that contains it"),
@@ -111,60 +105,45 @@ TEST_F(PipelineTest, InputsThatMultiplyAreSaid) {
   for (int i = 0; i < 20; ++i) names += "$a";
   read("marrow: 1\ninputs: {a: {type: text, default: " + std::string(20000, 'x') +
        "}}\nnodes:\n  s: {uses: test.sides, with: {names: [" + names + "]}}\noutputs: {o: s.left}\n");
-  ASSERT_EQ(diagnostics.size(), 1u);
+  expect_shown("the values of inputs make the pipeline longer than 256 kB");
   EXPECT_LT(diagnostics.text().size(), 1000u);
-  EXPECT_NE(diagnostics.text().find("the values of inputs make the pipeline longer than 256 kB"), std::string::npos)
-      << diagnostics.text();
 }
 
 /// Files of 64 kB that are as slow to read as they can be.
 TEST_F(PipelineTest, SmallFilesTakeNoTime) {
-  const auto file_of = [](const std::string& begin, const std::function<std::string(int)>& line,
-                          const std::string& end) {
-    std::string text = begin;
-    for (int i = 0; text.size() < 63000; ++i) text += line(i);
-    return text + end;
+  const auto many = [](const std::function<std::string(const std::string& number)>& part) {
+    std::string text;
+    for (int i = 0; text.size() < 63000; ++i) text += part(std::to_string(i));
+    return text;
   };
-  const auto id = [](int i) { return "n" + std::to_string(i); };
-  const std::string head = "marrow: 1\nnodes:\n";
+  const auto repeated = [&](const std::string& part) { return many([&](const std::string&) { return part; }); };
+  const std::string head = "marrow: 1\nnodes:\n", constant = " c: {uses: test.constant}\n",
+                    numbers = head + " c: {uses: test.constant, with: {numbers: [";
   std::string reverse = head;
-  for (int i = 0; i < 1500; ++i) reverse += " " + id(i) + ": {uses: test.add, in: {a: " + id(i + 1) + "}}\n";
+  for (int i = 0; i < 1500; ++i)
+    reverse += " n" + std::to_string(i) + ": {uses: test.add, in: {a: n" + std::to_string(i + 1) + "}}\n";
   const std::map<std::string, std::string> files{
       {"in reverse order", reverse + " n1500: {uses: test.constant}\noutputs: {o: n0}\n"},
       {"unknown nodes",
-       file_of(
-           head, [&](int i) { return " " + id(i) + ": {uses: t" + std::to_string(i) + "}\n"; }, "outputs: {o: n0}\n")},
-      {"unknown sources", file_of(
-                              head + " c: {uses: test.sum, in: {items: [",
-                              [&](int i) { return "m" + std::to_string(i) + ", "; }, "c]}}\noutputs: {o: c}\n")},
-      {"unknown among many",
-       file_of(
-           head, [&](int i) { return " " + id(i) + ": {uses: test.add, in: {a: m" + std::to_string(i) + "}}\n"; },
-           "outputs: {o: n0}\n")},
-      {"many wires", file_of(
-                         head + " c: {uses: test.constant}\n s: {uses: test.sum, in: {items: [",
-                         [](int) { return "c,"; }, "c]}}\noutputs: {o: s}\n")},
-      {"unknown keys",
-       file_of(
-           head + " c: {uses: test.constant}\noutputs: {o: c}\n", [&](int i) { return id(i) + ":\n"; }, "")},
-      {"the same key", file_of(
-                           head, [](int) { return " c: {}\n"; }, "outputs: {o: c}\n")},
-      {"numbers",
-       file_of(
-           head + " c: {uses: test.constant, with: {numbers: [", [](int) { return "1,"; }, "1]}}\noutputs: {o: c}\n")},
-      {"no numbers",
-       file_of(
-           head + " c: {uses: test.constant, with: {numbers: [", [](int) { return "x,"; }, "1]}}\noutputs: {o: c}\n")},
-      {"outputs",
-       file_of(
-           head + " c: {uses: test.constant}\noutputs:\n", [&](int i) { return " " + id(i) + ": c\n"; }, "")},
-      {"inputs", file_of(
-                     "marrow: 1\ninputs:\n", [&](int i) { return " " + id(i) + ": {type: path}\n"; },
-                     "nodes: {c: {uses: test.constant}}\noutputs: {o: c}\n")},
-      {"unknown inputs", file_of(
-                             head + " c: {uses: test.constant, with: {path: ",
-                             [&](int i) { return "$i" + std::to_string(i); }, "}}\noutputs: {o: c}\n")},
-      {"dots", head + " c: {uses: test.constant}\noutputs: {o: c" + std::string(63000, '.') + "}\n"},
+       head + many([](const auto& i) { return " n" + i + ": {uses: t" + i + "}\n"; }) + "outputs: {o: n0}\n"},
+      {"unknown sources", head + " c: {uses: test.sum, in: {items: [" +
+                              many([](const auto& i) { return "m" + i + ", "; }) + "c]}}\noutputs: {o: c}\n"},
+      {"unknown among many", head + many([](const auto& i) {
+                               return " n" + i + ": {uses: test.add, in: {a: m" + i + "}}\n";
+                             }) + "outputs: {o: n0}\n"},
+      {"many wires",
+       head + constant + " s: {uses: test.sum, in: {items: [" + repeated("c,") + "c]}}\noutputs: {o: s}\n"},
+      {"unknown keys", head + constant + "outputs: {o: c}\n" + many([](const auto& i) { return "n" + i + ":\n"; })},
+      {"the same key", head + repeated(" c: {}\n") + "outputs: {o: c}\n"},
+      {"numbers", numbers + repeated("1,") + "1]}}\noutputs: {o: c}\n"},
+      {"no numbers", numbers + repeated("x,") + "1]}}\noutputs: {o: c}\n"},
+      {"outputs", head + constant + "outputs:\n" + many([](const auto& i) { return " n" + i + ": c\n"; })},
+      {"inputs", "marrow: 1\ninputs:\n" + many([](const auto& i) { return " n" + i + ": {type: path}\n"; }) +
+                     "nodes: {c: {uses: test.constant}}\noutputs: {o: c}\n"},
+      {"unknown inputs", head + " c: {uses: test.constant, with: {path: " + many([](const auto& i) {
+                           return "$i" + i;
+                         }) + "}}\noutputs: {o: c}\n"},
+      {"dots", head + constant + "outputs: {o: c" + std::string(63000, '.') + "}\n"},
       {"a long name", head + " c: {uses: " + std::string(63000, 'x') + "}\noutputs: {o: c}\n"}};
   for (const auto& [what, text] : files) {
     const std::clock_t start = std::clock();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every allocation fails once, the first, the second and so on: each time std::bad_alloc comes out, never a crash.
+// Each allocation fails once: first the first, then the second, and so on. Each time std::bad_alloc is thrown, and
+// nothing crashes.
 #include <cstdlib>
 #include <functional>
 #include <new>
@@ -8,7 +9,7 @@
 #include "tests/framework/fixture.hpp"
 
 namespace {
-long allocations_left = -1;  // before one fails; -1: none fails
+long allocations_left = -1;  // until an allocation fails; -1: none fails
 }
 
 [[gnu::noinline]] void* operator new(std::size_t size) {
@@ -22,7 +23,7 @@ long allocations_left = -1;  // before one fails; -1: none fails
 
 namespace {
 
-/// How many allocations failed until there were none left to fail.
+/// Repeats the work until no allocation fails in it any more. Returns how many repetitions had a failed allocation.
 long failures_of(const std::function<void()>& work) {
   for (long n = 0;; ++n) {
     allocations_left = n;

@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
+// Which files a path names, and the digests of their content.
 #include "marrow/runtime/pipeline/named_files.hpp"
 
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "marrow/runtime/pipeline/written_content.hpp"
 #include "marrow/runtime/run/keys.hpp"
 #include "tests/framework/fixture.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace named_files_test {
 
 namespace fs = std::filesystem;
+using marrow::content_of;
 using runtime_fixture::Scratch;
 
 class NamedFilesTest : public testing::Test {
@@ -26,12 +30,7 @@ class NamedFilesTest : public testing::Test {
     return names;
   }
   std::string fault() {
-    try {
-      marrow::files_named_by(folder);
-      return "";
-    } catch (const marrow::Error& error) {
-      return error.what();
-    }
+    return marrow::test::message_of([&] { marrow::files_named_by(folder); });
   }
   Scratch scratch;
   fs::path folder = fs::canonical(scratch.path) / "case";
@@ -43,7 +42,7 @@ TEST_F(NamedFilesTest, AreAllFilesBelowSorted) {
   EXPECT_EQ(marrow::files_named_by(folder / "b.txt").at(0).name, ".");
 }
 
-TEST_F(NamedFilesTest, LinkInsideCountsAndOneThatLeadsNowhereIsNoFault) {
+TEST_F(NamedFilesTest, ALinkInsideCountsAndALinkToNothingIsNoFault) {
   fs::create_symlink("b.txt", folder / "c.txt");
   fs::create_symlink("gone", folder / "d.txt");
   fs::create_symlink("self", folder / "self");
@@ -59,7 +58,7 @@ TEST_F(NamedFilesTest, LinksThatLeaveOrLeadToFoldersAreRefused) {
   EXPECT_EQ(fault(), (folder / "link").string() + ": is a link to a folder; put the folder itself there");
 }
 
-TEST_F(NamedFilesTest, FolderThatCannotBeReadIsSaid) {
+TEST_F(NamedFilesTest, AFolderThatCannotBeReadIsAFault) {
   if (geteuid() == 0) GTEST_SKIP() << "root may read everything";
   fs::permissions(folder / "sub", fs::perms::none);
   EXPECT_EQ(fault(), (folder / "sub").string() + ": cannot be read: Permission denied; all files of a folder count");
@@ -81,12 +80,37 @@ TEST_F(NamedFilesTest, DigestFollowsContentNotTimes) {
 
 TEST_F(NamedFilesTest, DigestOfASettledFileSeesAWriteThatKeepsSizeAndTime) {
   const fs::path file = folder / "b.txt";
-  sleep(3);  // settled: its digest is kept
+  sleep(3);  // then it is settled, and its digest is kept
   const marrow::Digest before = marrow::path_digest(file);
   const auto written = fs::last_write_time(file);
   std::ofstream(file) << "B";
   fs::last_write_time(file, written);
   EXPECT_NE(marrow::path_digest(file), before);
+}
+
+TEST(WrittenContent, OfAFileIsWhatItHolds) {
+  const Scratch scratch;
+  const marrow::Digest before = content_of(scratch.write("a", "text"));
+  EXPECT_EQ(content_of(scratch.write("b", "text")), before) << "wherever it was moved to";
+  EXPECT_NE(content_of(scratch.write("a", "texT")), before);
+  EXPECT_NE(content_of(scratch.write("a", "")), before);
+}
+
+TEST(WrittenContent, OfAFolderIsAllBelowIt) {
+  const Scratch scratch;
+  for (const char* folder : {"one", "two"}) {
+    fs::create_directories(scratch.path / folder / "inner");
+    scratch.write(std::string(folder) + "/image.png", "pixels");
+    scratch.write(std::string(folder) + "/inner/mask.png", "mask");
+  }
+  const marrow::Digest whole = content_of(scratch.path / "one");
+  EXPECT_EQ(content_of(scratch.path / "two"), whole);
+  fs::rename(scratch.path / "two/image.png", scratch.path / "two/other.png");
+  EXPECT_NE(content_of(scratch.path / "two"), whole);
+  fs::rename(scratch.path / "two/other.png", scratch.path / "two/image.png");
+  EXPECT_EQ(content_of(scratch.path / "two"), whole);
+  fs::remove(scratch.path / "two/inner/mask.png");
+  EXPECT_NE(content_of(scratch.path / "two"), whole);
 }
 
 }  // namespace named_files_test

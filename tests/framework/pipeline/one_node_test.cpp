@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The call of one node with values that a program has.
+// Calls of one node with values from memory.
 #include "marrow/runtime/pipeline/one_node.hpp"
 
 #include "tests/framework/fixture.hpp"

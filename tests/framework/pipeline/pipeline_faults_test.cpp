@@ -15,7 +15,7 @@ TEST_F(PipelineTest, RenamedNodeIsPointedAtWhereItIsDefined) {
   ASSERT_EQ(faults.size(), 3u) << diagnostics.text();
   EXPECT_EQ(faults[0].place.line, 3);
   EXPECT_EQ(faults[0].message, "nothing uses node 'lefft'");
-  EXPECT_EQ(faults[0].hint, "'left' is used, but is not there: is this it?");
+  EXPECT_EQ(faults[0].hint, "'left' is used but not defined; did you mean this name?");
   EXPECT_EQ(faults[1].message, "there is no node 'left'");
 }
 TEST_F(PipelineTest, RenamedInputIsPointedAtWhereItIsDeclared) {
@@ -50,100 +50,109 @@ TEST_F(PipelineTest, UnreadableFile) {
   marrow::read_pipeline(scratch.path / "none.yaml", {}, test_catalogue(), diagnostics);
   EXPECT_NE(diagnostics.text().find("the pipeline file cannot be read"), std::string::npos);
 }
-TEST_F(PipelineTest, NoMap) { expect_fault("- a\n", 1, 1, "the pipeline must be a map, got a list"); }
-TEST_F(PipelineTest, MissingVersion) {
-  expect_fault("nodes: {c: {uses: test.constant}}\noutputs: {o: c}\n", 1, 1, "the key 'marrow' is missing");
+
+/// A file with one fault, at its place.
+struct FileFault {
+  std::string name, text;
+  int line, column;
+  std::string message, hint = {};
+};
+class FaultOfFile : public PipelineTest, public testing::WithParamInterface<FileFault> {};
+const std::string kOne = "{c: {uses: test.constant}}\noutputs: {o: c}\n";
+const std::string kNodesBelow = "marrow: 1\nnodes:\n";
+INSTANTIATE_TEST_SUITE_P(
+    , FaultOfFile,
+    testing::ValuesIn(std::vector<FileFault>{
+        {"NoMap", "- a\n", 1, 1, "the pipeline must be a map, got a list"},
+        {"MissingVersion", "nodes: " + kOne, 1, 1, "the key 'marrow' is missing"},
+        {"OtherVersion", "marrow: 2\nnodes: " + kOne, 1, 1, "this file is of format 2, this program reads format 1"},
+        {"MissingOutputs", "marrow: 1\nnodes: {c: {uses: test.constant}}\n", 1, 1, "the key 'outputs' is missing"},
+        {"NoNodes", "marrow: 1\nnodes: {}\noutputs: {}\n", 1, 1, "the pipeline has no nodes",
+         "name them under  nodes:"},
+        {"UnknownKey", "marrow: 1\nnode: {}\nnodes: " + kOne, 2, 1, "unknown key 'node'", "did you mean 'nodes'?"},
+        {"DuplicateKey", kNodesBelow + "  c: {uses: test.constant}\n  c: {uses: test.sides}\noutputs: {o: c}\n", 4, 3,
+         "'c' is given twice", "line 3"},
+        {"MergeKey", kNodesBelow + "  c: {uses: test.constant, <<: {with: {}}}\noutputs: {o: c}\n", 3, 28,
+         "merge keys (<<) are not supported"},
+        {"NodeWithoutName", kNodesBelow + "  \"\": {uses: test.constant}\noutputs: {o: \"\"}\n", 3, 3,
+         "a node has no name", "write it as  name: {uses: kind.name}"},
+        {"DotInName", kNodesBelow + "  a.b: {uses: test.constant}\n  c: {uses: test.constant}\noutputs: {o: c}\n", 3, 3,
+         "has a dot"},
+        {"WrongType",
+         kNodesBelow + "  t: {uses: test.truth}\n  a: {uses: test.apply, in: {adder: c, to: c}}\n"
+                       "  c: {uses: test.constant}\noutputs: {o: c}\n",
+         4, 30, "input 'adder' of test.apply expects adder, but 'c' is metrics"},
+        {"Circle",
+         kNodesBelow + "  a: {uses: test.add, in: {a: b}}\n  b: {uses: test.add, in: {a: a}}\noutputs: {o: a}\n", 3, 3,
+         "these nodes wait for each other in a circle: a, b"},
+        {"MissingInputValue",
+         "marrow: 1\ninputs:\n  v: {type: number}\nnodes: {c: {uses: test.constant, with: {value: $v}}}\n"
+         "outputs: {o: c}\n",
+         3, 3, "input 'v' has no value", "v=VALUE"},
+        {"UnknownInputType", "marrow: 1\ninputs:\n  v: {type: nummber, default: 1}\nnodes: " + kOne, 3, 7,
+         "unknown type 'nummber'", "did you mean 'number'?"},
+    }),
+    [](const auto& test) { return test.param.name; });
+TEST_P(FaultOfFile, IsAtItsPlace) {
+  const FileFault& fault = GetParam();
+  expect_fault(fault.text, fault.line, fault.column, fault.message, fault.hint);
 }
-TEST_F(PipelineTest, OtherVersion) {
-  expect_fault("marrow: 2\nnodes: {c: {uses: test.constant}}\noutputs: {o: c}\n", 1, 1,
-               "this file is of format 2, this program reads format 1");
+TEST_F(PipelineTest, UnknownGivenInput) {
+  expect_fault("marrow: 1\ninputs: {value: {type: number, default: 1}}\nnodes: " + kOne, 0, 0,
+               "the pipeline has no input 'valu'", "did you mean 'value'?", {{{"valu", "2"}}, {}});
 }
-TEST_F(PipelineTest, MissingOutputs) {
-  expect_fault("marrow: 1\nnodes: {c: {uses: test.constant}}\n", 1, 1, "the key 'outputs' is missing");
+
+/// A node with one fault, in the file of expect_node_fault().
+struct NodeFault {
+  std::string name, node;
+  int column;
+  std::string message, hint = {};
+};
+/// A fault at an option, which begins in column 35.
+NodeFault option_fault(const std::string& name, const std::string& option, const std::string& message,
+                       const std::string& hint = {}) {
+  return {name, "{uses: test.constant, with: {" + option + "}}", 35, message, hint};
 }
-TEST_F(PipelineTest, UnknownKey) {
-  expect_fault("marrow: 1\nnode: {}\nnodes: {c: {uses: test.constant}}\noutputs: {o: c}\n", 2, 1, "unknown key 'node'",
-               "did you mean 'nodes'?");
+class FaultOfNode : public PipelineTest, public testing::WithParamInterface<NodeFault> {};
+INSTANTIATE_TEST_SUITE_P(
+    , FaultOfNode,
+    testing::ValuesIn(std::vector<NodeFault>{
+        {"UnknownNode", "{uses: test.constnat}", 13, "unknown node 'test.constnat'", "did you mean 'test.constant'?"},
+        {"MissingUses", "{with: {value: 1}}", 3, "node 'n' does not say what it uses"},
+        option_fault("UnknownOption", "vlaue: 1", "has no option 'vlaue'", "did you mean 'value'?"),
+        option_fault("NumberExpected", "value: big", "expected a number, got 'big'"),
+        option_fault("QuotedNumberIsText", "value: \"1\"", "expected a number, got the quoted text \"1\""),
+        option_fault("NotANumber", "value: nan", "expected a number, got 'nan'"),
+        option_fault("BelowRange", "value: -2000", "-2000 is below the least allowed, -1000"),
+        option_fault("AboveRange", "value: 2000", "2000 is above the most allowed, 1000"),
+        option_fault("WholeNumberThatTheOptionCannotHold", "count: 5000000000",
+                     "5000000000 is above the most allowed, 2147483647"),
+        option_fault("OctalLookingInteger", "count: 010", "expected an integer, got '010'",
+                     "write it without leading zeros"),
+        option_fault("FractionForInteger", "count: 1.5", "expected an integer, got '1.5'"),
+        option_fault("YesIsNotTrue", "flag: yes", "expected true or false, got 'yes'"),
+        option_fault("UnknownChoice", "word: tow", "'tow' is not one of its choices", "did you mean 'two'?"),
+        option_fault("ListExpected", "numbers: 3", "expected a list, got '3'", "[a, b, c]"),
+        option_fault("WrongLength", "point: [1, 2]", "expected 3 numbers, got 2"),
+        {"UnknownInputName", "{uses: test.constant, with: {value: $v}}", 42, "the pipeline has no input 'v'"},
+        {"UnknownPort", "{uses: test.add, in: {a: c, bb: c}}", 34, "has no input 'bb'", "did you mean 'b'?"},
+        {"UnwiredPort", "{uses: test.add, in: {b: c}}", 3, "input 'a' of test.add is not wired"},
+        {"UnknownSource", "{uses: test.add, in: {a: d}}", 28, "there is no node 'd'", "did you mean 'c'?"},
+        {"UnknownOutput", "{uses: test.add, in: {a: s.lefft}}", 28, "node 's' has no output 'lefft'",
+         "did you mean 'left'?"},
+        {"AmbiguousOutput", "{uses: test.add, in: {a: s}}", 28,
+         "node 's' has several outputs, and not exactly one of them is metrics"},
+        {"ListForSingle", "{uses: test.add, in: {a: [c, c]}}", 28, "takes one metrics, not a list"},
+        {"TooManyPicks", "{uses: test.add, in: {a: s.left.x}}", 28, "'s.left.x' picks 'x', but it is not a list"},
+    }),
+    [](const auto& test) { return test.param.name; });
+TEST_P(FaultOfNode, IsAtItsPlace) {
+  const NodeFault& fault = GetParam();
+  expect_node_fault(fault.node, fault.column, fault.message, fault.hint);
 }
-TEST_F(PipelineTest, DuplicateKey) {
-  expect_fault("marrow: 1\nnodes:\n  c: {uses: test.constant}\n  c: {uses: test.sides}\noutputs: {o: c}\n", 4, 3,
-               "'c' is given twice", "line 3");
-}
-TEST_F(PipelineTest, MergeKey) {
-  expect_fault("marrow: 1\nnodes:\n  c: {uses: test.constant, <<: {with: {}}}\noutputs: {o: c}\n", 3, 28,
-               "merge keys (<<) are not supported");
-}
-TEST_F(PipelineTest, UnknownNode) {
-  expect_node_fault("{uses: test.constnat}", 13, "unknown node 'test.constnat'", "did you mean 'test.constant'?");
-}
-TEST_F(PipelineTest, NodeWithoutName) {
-  expect_fault("marrow: 1\nnodes:\n  \"\": {uses: test.constant}\noutputs: {o: \"\"}\n", 3, 3, "a node has no name",
-               "write it as  name: {uses: kind.name}");
-}
-TEST_F(PipelineTest, MissingUses) { expect_node_fault("{with: {value: 1}}", 3, "node 'n' does not say what it uses"); }
-TEST_F(PipelineTest, DotInName) {
-  expect_fault("marrow: 1\nnodes:\n  a.b: {uses: test.constant}\n  c: {uses: test.constant}\noutputs: {o: c}\n", 3, 3,
-               "has a dot");
-}
-TEST_F(PipelineTest, UnknownOption) {
-  expect_node_fault("{uses: test.constant, with: {vlaue: 1}}", 35, "has no option 'vlaue'", "did you mean 'value'?");
-}
-TEST_F(PipelineTest, NumberExpected) {
-  expect_node_fault("{uses: test.constant, with: {value: big}}", 35, "expected a number, got 'big'");
-}
-TEST_F(PipelineTest, QuotedNumberIsText) {
-  expect_node_fault("{uses: test.constant, with: {value: \"1\"}}", 35, "expected a number, got the quoted text \"1\"");
-}
-TEST_F(PipelineTest, NotANumber) {
-  expect_node_fault("{uses: test.constant, with: {value: nan}}", 35, "expected a number, got 'nan'");
-}
-TEST_F(PipelineTest, BelowRange) {
-  expect_node_fault("{uses: test.constant, with: {value: -2000}}", 35, "-2000 is below the least allowed, -1000");
-}
-TEST_F(PipelineTest, AboveRange) {
-  expect_node_fault("{uses: test.constant, with: {value: 2000}}", 35, "2000 is above the most allowed, 1000");
-}
-TEST_F(PipelineTest, WholeNumberThatTheOptionCannotHold) {
-  expect_node_fault("{uses: test.constant, with: {count: 5000000000}}", 35,
-                    "5000000000 is above the most allowed, 2147483647");
-}
-TEST_F(PipelineTest, OctalLookingInteger) {
-  expect_node_fault("{uses: test.constant, with: {count: 010}}", 35, "expected an integer, got '010'",
-                    "write it without leading zeros");
-}
-TEST_F(PipelineTest, FractionForInteger) {
-  expect_node_fault("{uses: test.constant, with: {count: 1.5}}", 35, "expected an integer, got '1.5'");
-}
-TEST_F(PipelineTest, YesIsNotTrue) {
-  expect_node_fault("{uses: test.constant, with: {flag: yes}}", 35, "expected true or false, got 'yes'");
-}
-TEST_F(PipelineTest, UnknownChoice) {
-  expect_node_fault("{uses: test.constant, with: {word: tow}}", 35, "'tow' is not one of its choices",
-                    "did you mean 'two'?");
-}
-TEST_F(PipelineTest, ListExpected) {
-  expect_node_fault("{uses: test.constant, with: {numbers: 3}}", 35, "expected a list, got '3'", "[a, b, c]");
-}
-TEST_F(PipelineTest, WrongLength) {
-  expect_node_fault("{uses: test.constant, with: {point: [1, 2]}}", 35, "expected 3 numbers, got 2");
-}
-TEST_F(PipelineTest, UnknownInputName) {
-  expect_node_fault("{uses: test.constant, with: {value: $v}}", 42, "the pipeline has no input 'v'");
-}
-TEST_F(PipelineTest, UnknownPort) {
-  expect_node_fault("{uses: test.add, in: {a: c, bb: c}}", 34, "has no input 'bb'", "did you mean 'b'?");
-}
-TEST_F(PipelineTest, UnwiredPort) {
-  expect_node_fault("{uses: test.add, in: {b: c}}", 3, "input 'a' of test.add is not wired");
-}
-TEST_F(PipelineTest, UnknownSource) {
-  expect_node_fault("{uses: test.add, in: {a: d}}", 28, "there is no node 'd'", "did you mean 'c'?");
-}
-TEST_F(PipelineTest, UnknownOutput) {
-  expect_node_fault("{uses: test.add, in: {a: s.lefft}}", 28, "node 's' has no output 'lefft'", "did you mean 'left'?");
-}
+
 TEST_F(PipelineTest, OutputOfAnotherNodeOfTheKindIsNoItem) {
-  const std::string before = "marrow: 1\nnodes:\n  l: {uses: test.letters}\n  n: {uses: test.add, in: {a: ";
+  const std::string before = kNodesBelow + "  l: {uses: test.letters}\n  n: {uses: test.add, in: {a: ";
   expect_fault(before + "l.left}}\noutputs: {o: n}\n", 4, 28, "node 'l' has no output 'left'",
                "other nodes of the kind test have one; an item of that name is l.letters.left");
   for (const char* item : {"l.letters.left", "l.far_left"}) {
@@ -151,49 +160,13 @@ TEST_F(PipelineTest, OutputOfAnotherNodeOfTheKindIsNoItem) {
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
   }
 }
-TEST_F(PipelineTest, AmbiguousOutput) {
-  expect_node_fault("{uses: test.add, in: {a: s}}", 28, "node 's' has several outputs and not just one metrics");
-}
-TEST_F(PipelineTest, ListForSingle) {
-  expect_node_fault("{uses: test.add, in: {a: [c, c]}}", 28, "takes one metrics, not a list");
-}
-TEST_F(PipelineTest, TooManyPicks) {
-  expect_node_fault("{uses: test.add, in: {a: s.left.x}}", 28, "'s.left.x' picks 'x', but it is no list");
-}
-TEST_F(PipelineTest, WrongType) {
-  expect_fault(
-      "marrow: 1\nnodes:\n  t: {uses: test.truth}\n  a: {uses: test.apply, in: {adder: c, to: c}}\n  c: {uses: "
-      "test.constant}\noutputs: {o: c}\n",
-      4, 30, "input 'adder' of test.apply expects adder, but 'c' is metrics");
-}
 TEST_F(PipelineTest, TruthOnlyForEvaluation) {
-  expect_fault("marrow: 1\nnodes:\n  t: {uses: test.truth}\n  a: {uses: test.add, in: {a: t}}\noutputs: {o: a}\n", 4,
-               28, "the truth may be wired only to nodes of a kind that may see it, not to test.add");
-  read(
-      "marrow: 1\nnodes:\n  t: {uses: test.truth}\n  c: {uses: test.constant}\n  a: {uses: judge.test, in: {of: c, "
-      "truth: t}}\noutputs: {o: a}\n");
+  expect_fault(kNodesBelow + "  t: {uses: test.truth}\n  a: {uses: test.add, in: {a: t}}\noutputs: {o: a}\n", 4, 28,
+               "the truth may be wired only to nodes of a kind that may see it, not to test.add");
+  read(kNodesBelow +
+       "  t: {uses: test.truth}\n  c: {uses: test.constant}\n  a: {uses: judge.test, in: {of: c, truth: t}}\n"
+       "outputs: {o: a}\n");
   EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
-}
-TEST_F(PipelineTest, Circle) {
-  expect_fault(
-      "marrow: 1\nnodes:\n  a: {uses: test.add, in: {a: b}}\n  b: {uses: test.add, in: {a: a}}\noutputs: {o: a}\n", 3,
-      3, "these nodes wait for each other in a circle: a, b");
-}
-TEST_F(PipelineTest, MissingInputValue) {
-  expect_fault(
-      "marrow: 1\ninputs:\n  v: {type: number}\nnodes: {c: {uses: test.constant, with: {value: $v}}}\noutputs: {o: "
-      "c}\n",
-      3, 3, "input 'v' has no value", "v=VALUE");
-}
-TEST_F(PipelineTest, UnknownInputType) {
-  expect_fault(
-      "marrow: 1\ninputs:\n  v: {type: nummber, default: 1}\nnodes: {c: {uses: test.constant}}\noutputs: {o: c}\n", 3,
-      7, "unknown type 'nummber'", "did you mean 'number'?");
-}
-TEST_F(PipelineTest, UnknownGivenInput) {
-  expect_fault(
-      "marrow: 1\ninputs: {value: {type: number, default: 1}}\nnodes: {c: {uses: test.constant}}\noutputs: {o: c}\n", 0,
-      0, "the pipeline has no input 'valu'", "did you mean 'value'?", {{{"valu", "2"}}, {}});
 }
 
 TEST_F(PipelineTest, TenMistakesGiveTenDiagnostics) {
@@ -222,10 +195,6 @@ TEST_F(PipelineTest, SourceLineIsShown) {
                 "p.yaml:3:13: error: unknown node 'test.constnat'\n    c: {uses: test.constnat}\n              ^\n"),
             std::string::npos)
       << diagnostics.text();
-}
-
-TEST_F(PipelineTest, NoNodes) {
-  expect_fault("marrow: 1\nnodes: {}\noutputs: {}\n", 1, 1, "the pipeline has no nodes", "name them under  nodes:");
 }
 
 }  // namespace pipeline_faults_test

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the tests of pipeline files share: reading a text, and the one fault that is expected of it.
+// What the tests of pipeline files share: reading a text, and the one fault that it must have.
 #include <string>
 
 #include "tests/framework/fixture.hpp"
@@ -14,19 +14,30 @@ class PipelineTest : public testing::Test {
  protected:
   marrow::Pipeline read(const std::string& text, const marrow::PipelineArguments& arguments = {}) {
     diagnostics = marrow::Diagnostics();
-    return marrow::read_pipeline(scratch.write("p.yaml", text), arguments, test_catalogue(), diagnostics);
+    return marrow::read_pipeline(scratch.write("p.yaml", text), arguments, catalogue(), diagnostics);
   }
-  /// That there is one fault, at that place, whose message and hint hold the texts.
+  virtual const marrow::Catalogue& catalogue() const { return test_catalogue(); }
+  /// The fault of the last text that was read. There must be only one.
+  marrow::Diagnostic only_fault() const {
+    EXPECT_EQ(diagnostics.size(), 1u) << diagnostics.text();
+    return diagnostics.empty() ? marrow::Diagnostic() : diagnostics.sorted()[0];
+  }
+  /// The pipeline must have one fault, at this place. Its message and hint contain these texts.
   void expect_fault(const std::string& text, int line, int column, const std::string& message,
                     const std::string& hint = "", const marrow::PipelineArguments& arguments = {}) {
     read(text, arguments);
-    ASSERT_EQ(diagnostics.size(), 1u) << text << diagnostics.text();
-    const marrow::Diagnostic fault = diagnostics.sorted()[0];
+    const marrow::Diagnostic fault = only_fault();
     EXPECT_EQ(fault.place.line, line) << diagnostics.text();
     EXPECT_EQ(fault.place.column, column) << diagnostics.text();
     EXPECT_NE(fault.message.find(message), std::string::npos) << diagnostics.text();
     EXPECT_NE(fault.hint.find(hint), std::string::npos) << diagnostics.text();
   }
+  /// The last text that was read must have one fault. It is shown with this text.
+  void expect_shown(const std::string& shown) const {
+    only_fault();
+    EXPECT_NE(diagnostics.text().find(shown), std::string::npos) << diagnostics.text();
+  }
+  /// The node 'n', in line 5 of a pipeline with the nodes 'c' and 's', must have this fault.
   void expect_node_fault(const std::string& node, int column, const std::string& message,
                          const std::string& hint = "") {
     expect_fault(

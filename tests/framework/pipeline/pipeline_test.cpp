@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a good pipeline file is resolved to, and what overrides make of it.
+// What is read from a good pipeline file, and how overrides change it.
 #include "marrow/base/file_names.hpp"
 #include "tests/framework/pipeline/pipeline_fixture.hpp"
 
@@ -143,8 +143,8 @@ TEST_F(PipelineTest, SourcesComeFirstInTheFilesOrderOtherwise) {
   EXPECT_EQ(order, "acbfde");
   for (std::size_t i = 0; i < p.nodes.size(); ++i)
     for (const marrow::Wire& wire : p.nodes[i].wires)
-      for (const marrow::Reference& source : wire.sources) EXPECT_EQ(p.nodes[std::size_t(source.node)].id, source.text);
-  EXPECT_EQ(p.nodes[std::size_t(p.outputs[0].source.node)].id, "e");
+      for (const marrow::Reference& source : wire.sources) EXPECT_EQ(p.node_of(source).id, source.text);
+  EXPECT_EQ(p.node_of(p.outputs[0].source).id, "e");
 }
 
 }  // namespace pipeline_test

@@ -1,57 +1,50 @@
 // SPDX-License-Identifier: Apache-2.0
-// What options must be to each other: a pipeline that breaks it is refused at its place, and a declaration that makes
-// no sense when its plugin registers.
-#include "tests/framework/fixture.hpp"
+// Relations between options. A pipeline that breaks one has a fault at the option. A relation that makes no sense is a
+// fault of the plugin that declares it.
+#include "tests/framework/pipeline/pipeline_fixture.hpp"
 
 namespace relations_test {
 
-using marrow::Diagnostics;
 using marrow::Override;
 using marrow::Plugin;
-using runtime_fixture::Scratch;
 
 const marrow::Catalogue& related_nodes() {
   static const marrow::Catalogue catalogue({std::filesystem::path(MARROW_BINARY_DIR) / "tests" / "relation_plugins"});
   return catalogue;
 }
 
-class RelationsTest : public testing::Test {
+class RelationsTest : public pipeline_fixture::PipelineTest {
  protected:
+  const marrow::Catalogue& catalogue() const override { return related_nodes(); }
   /// Reads a pipeline whose node n, in line 4, is this text.
-  void read(const std::string& node, const std::vector<Override>& overrides = {}) {
-    diagnostics = Diagnostics();
-    marrow::read_pipeline(scratch.write("p.yaml", kBefore + node + "\noutputs: {o: n}\n"), {{}, overrides},
-                          related_nodes(), diagnostics);
+  void read_node(const std::string& node, const std::vector<Override>& overrides = {}) {
+    read(kBefore + node + "\noutputs: {o: n}\n", {{}, overrides});
   }
   void expect_kept(const std::string& node, const std::vector<Override>& overrides = {}) {
-    read(node, overrides);
+    read_node(node, overrides);
     EXPECT_TRUE(diagnostics.empty()) << node << "\n" << diagnostics.text();
   }
-  /// That there is one fault, with this message and hint, where the line has `at`.
+  /// There must be one fault, with this message and hint, at the text `at` of the line.
   void expect_broken(const std::string& node, const std::string& at, const std::string& message,
                      const std::string& hint = "") {
-    read(node);
-    ASSERT_EQ(diagnostics.size(), 1u) << node << "\n" << diagnostics.text();
-    const marrow::Diagnostic fault = diagnostics.sorted()[0];
+    read_node(node);
+    const marrow::Diagnostic fault = only_fault();
     const std::string line = kBefore.substr(kBefore.rfind('\n') + 1) + node;
     EXPECT_EQ(fault.message, message);
     EXPECT_EQ(fault.hint, hint);
     EXPECT_EQ(fault.place.line, 4);
     EXPECT_EQ(fault.place.column, int(line.find(at)) + 1) << diagnostics.text();
   }
-  /// The same where an override breaks it.
+  /// The same for a relation that an override breaks.
   void expect_broken_by(const std::string& node, const Override& override, const std::string& message) {
-    read(node, {override});
-    ASSERT_EQ(diagnostics.size(), 1u) << node << "\n" << diagnostics.text();
-    const marrow::Diagnostic fault = diagnostics.sorted()[0];
+    read_node(node, {override});
+    const marrow::Diagnostic fault = only_fault();
     EXPECT_EQ(fault.message, message);
     EXPECT_EQ(fault.place.line, 0);
     EXPECT_EQ(fault.place.file, "--set " + override.key + "=" + override.value);
   }
 
   const std::string kBefore = "marrow: 1\nnodes:\n  one: {uses: test.number}\n  n: ";
-  Scratch scratch;
-  Diagnostics diagnostics;
 };
 
 TEST_F(RelationsTest, NotAbove) {
@@ -95,11 +88,8 @@ TEST_F(RelationsTest, AsManyOrNone) {
   const std::string hint = "give one for each, or none";
   expect_broken("{uses: test.lists, with: {names: [x]}}", "names",
                 "option 'names' of test.lists has 1 item, but 'paths' has 0", hint);
-  read("{uses: test.lists, with: {paths: [a, b, c], names: [x, y]}}");
-  ASSERT_EQ(diagnostics.size(), 1u) << diagnostics.text();
-  EXPECT_EQ(diagnostics.sorted()[0].message, "option 'names' of test.lists has 2 items, but 'paths' has 3");
-  EXPECT_EQ(diagnostics.sorted()[0].hint, hint);
-  EXPECT_EQ(diagnostics.sorted()[0].place.line, 4);
+  expect_broken("{uses: test.lists, with: {paths: [a, b, c], names: [x, y]}}", "paths",
+                "option 'names' of test.lists has 2 items, but 'paths' has 3", hint);
 }
 
 TEST_F(RelationsTest, ExactlyOne) {
@@ -159,26 +149,23 @@ TEST_F(RelationsTest, OverridesBreakAndMend) {
   expect_kept("{uses: test.one_of_two, in: {number: one}, with: {file: a}}", {{"n.file", "''"}});
 }
 
-TEST_F(RelationsTest, EachThatIsBrokenIsTold) {
-  read("{uses: test.limits, with: {low: 90, first: 20}}");
+TEST_F(RelationsTest, EachBrokenRelationIsReported) {
+  read_node("{uses: test.limits, with: {low: 90, first: 20}}");
   EXPECT_EQ(diagnostics.size(), 2u) << diagnostics.text();
 }
 
-TEST_F(RelationsTest, AnOptionThatCannotBeReadIsToldOnce) {
-  read("{uses: test.limits, with: {low: ninety}}");
-  ASSERT_EQ(diagnostics.size(), 1u) << diagnostics.text();
-  EXPECT_NE(diagnostics.text().find("expected a number, got 'ninety'"), std::string::npos) << diagnostics.text();
-  read("{uses: test.limits, with: {low: 101}}");
-  ASSERT_EQ(diagnostics.size(), 1u) << diagnostics.text();
-  EXPECT_NE(diagnostics.text().find("101 is above the most allowed, 100"), std::string::npos) << diagnostics.text();
+TEST_F(RelationsTest, AnOptionThatCannotBeReadIsReportedOnce) {
+  read_node("{uses: test.limits, with: {low: ninety}}");
+  expect_shown("expected a number, got 'ninety'");
+  read_node("{uses: test.limits, with: {low: 101}}");
+  expect_shown("101 is above the most allowed, 100");
 }
 
 TEST_F(RelationsTest, TheLineIsShown) {
-  read("{uses: test.limits, with: {low: 90}}");
-  EXPECT_NE(diagnostics.text().find("p.yaml:4:33: error: option 'low' of test.limits is 90, which is above option "
-                                    "'high' (75)\n    n: {uses: test.limits, with: {low: 90}}\n"),
-            std::string::npos)
-      << diagnostics.text();
+  read_node("{uses: test.limits, with: {low: 90}}");
+  expect_shown(
+      "p.yaml:4:33: error: option 'low' of test.limits is 90, which is above option 'high' (75)\n"
+      "    n: {uses: test.limits, with: {low: 90}}\n");
 }
 
 struct Options {
@@ -188,7 +175,7 @@ struct Options {
 };
 marrow::Metrics node_function(const marrow::Metrics*, const Options&) { return {}; }
 
-/// What is said of a node with this relation.
+/// The faults of a plugin that declares this relation, one a line.
 std::string faults_of(const marrow::RelationInfo& relation) {
   Plugin plugin;
   plugin.node("test.node", node_function)
@@ -209,35 +196,26 @@ TEST(RelationDeclaration, GoodOnesAreKept) {
   EXPECT_EQ(faults_of(marrow::not_above("low", "high")), "");
   EXPECT_EQ(faults_of(marrow::exactly_one({"in.input", "name"})), "");
   EXPECT_EQ(faults_of(marrow::exactly_one({"list", "name"})), "");
+  EXPECT_EQ(faults_of(marrow::at_least_one({"name"})), "");
   const marrow::NodeInfo* limits = related_nodes().find("test.limits");
   ASSERT_TRUE(limits);
   ASSERT_EQ(limits->relations.size(), 3u);
   EXPECT_EQ(limits->relations[1].type, marrow::RelationType::below);
   EXPECT_EQ(limits->relations[1].names, (std::vector<std::string>{"near_mm", "far_mm"}));
 }
-TEST(RelationDeclaration, UnknownName) {
-  EXPECT_EQ(faults_of(marrow::not_above("lo", "high")),
-            "relation not_above: there is no option 'lo'; did you mean 'low'?\n");
-}
-TEST(RelationDeclaration, TextsAreInNoOrder) {
-  EXPECT_EQ(faults_of(marrow::not_above("name", "high")), "relation not_above: option 'name' is not a number\n");
-  EXPECT_EQ(faults_of(marrow::below("low", "name")), "relation below: option 'name' is not a number\n");
-}
-TEST(RelationDeclaration, NumbersHaveNoLength) {
-  EXPECT_EQ(faults_of(marrow::same_length({"low", "list"})), "relation same_length: option 'low' is not a list\n");
-  EXPECT_EQ(faults_of(marrow::as_many_or_none("list", "high")),
-            "relation as_many_or_none: option 'high' is not a list\n");
-}
-TEST(RelationDeclaration, OneNameAlone) {
-  EXPECT_EQ(faults_of(marrow::exactly_one({"name"})), "relation exactly_one: it needs two names or more\n");
-  EXPECT_EQ(faults_of(marrow::at_least_one({"name"})), "");
-}
-TEST(RelationDeclaration, TooFewOrTooManyNames) {
-  EXPECT_EQ(faults_of(marrow::at_least_one({})), "relation at_least_one: it needs a name\n");
-  EXPECT_EQ(faults_of({marrow::RelationType::distinct, {"list", "list"}}), "relation distinct: it needs one name\n");
-  EXPECT_EQ(faults_of(marrow::distinct("name")), "relation distinct: option 'name' is not a list\n");
-  EXPECT_EQ(faults_of(marrow::at_least_one({"low"})),
-            "relation at_least_one: option 'low' is never empty, so it is always given\n");
+TEST(RelationDeclaration, BadOnesAreFaults) {
+  for (const auto& [relation, fault] : std::vector<std::pair<marrow::RelationInfo, std::string>>{
+           {marrow::not_above("lo", "high"), "not_above: there is no option 'lo'; did you mean 'low'?"},
+           {marrow::not_above("name", "high"), "not_above: option 'name' is not a number"},
+           {marrow::below("low", "name"), "below: option 'name' is not a number"},
+           {marrow::same_length({"low", "list"}), "same_length: option 'low' is not a list"},
+           {marrow::as_many_or_none("list", "high"), "as_many_or_none: option 'high' is not a list"},
+           {marrow::exactly_one({"name"}), "exactly_one: it needs two names or more"},
+           {marrow::at_least_one({}), "at_least_one: it needs a name"},
+           {{marrow::RelationType::distinct, {"list", "list"}}, "distinct: it needs one name"},
+           {marrow::distinct("name"), "distinct: option 'name' is not a list"},
+           {marrow::at_least_one({"low"}), "at_least_one: option 'low' is never empty, so it is always given"}})
+    EXPECT_EQ(faults_of(relation), "relation " + fault + "\n");
 }
 
 }  // namespace relations_test

@@ -227,7 +227,7 @@ TEST_F(RepetitionTest, FaultsAreFoundBeforeAnythingRuns) {
     const std::string found = faults(letters + "  r: {" + node + "}\n", "o: r.sum");
     EXPECT_NE(found.find(fault), std::string::npos) << node << "\n" << found;
   };
-  expect("repeat: sum.yaml, carry: {before: sum}", "node 'r' need not end: it goes over no axis and has no limit");
+  expect("repeat: sum.yaml, carry: {before: sum}", "node 'r' may never end: it goes over no axis and has no limit");
   expect("repeat: sum.yaml, over: letter, in: {itme: l}", "there is no node 'itme'");
   expect("repeat: sum.yaml, over: letter, in: {item: l}, carry: {before: sums}", "the body has no output 'sums'");
   expect("repeat: sum.yaml, over: side, in: {item: l}",

@@ -17,7 +17,7 @@ class DigestMemoryTest : public StoreTest {
  protected:
   /// A file that is large enough to be kept. It was changed just now.
   fs::path large(char content) { return scratch.write("ct.mha", std::string(5 << 20, content)); }
-  /// As the keys of results get it.
+  /// The digest as it goes into the keys of results.
   Digest digest_of(const fs::path& file) {
     const marrow::FileState state = *marrow::state_of(file);
     const auto read = [&] {
@@ -38,7 +38,8 @@ TEST_F(DigestMemoryTest, ALargeFileIsReadOnceUntilItChanges) {
   digest_of(file);
   EXPECT_EQ(readings, 2) << "a file that was changed just now may change again within the resolution of its time";
   wait_until_settled();
-  if (!marrow::is_settled(file, *marrow::state_of(file))) GTEST_SKIP() << "no file system of a disk of this host";
+  if (!marrow::is_settled(file, *marrow::state_of(file)))
+    GTEST_SKIP() << "the scratch folder is not on a disk of this host";
   const Digest kept = digest_of(file);
   EXPECT_EQ(readings, 3);
   EXPECT_EQ(digest_of(file), kept);
@@ -46,11 +47,11 @@ TEST_F(DigestMemoryTest, ALargeFileIsReadOnceUntilItChanges) {
 
   const fs::path record = only_record();
   fs::resize_file(record, fs::file_size(record) - 1);
-  EXPECT_NE(digest_of(file), kept) << "a damaged record does not count";
+  EXPECT_NE(digest_of(file), kept) << "a damaged record is ignored";
   EXPECT_EQ(readings, 4);
   fs::rename(record, record.parent_path() / marrow::hash_of(1).hex());
   digest_of(file);
-  EXPECT_EQ(readings, 5) << "nor does that of another state";
+  EXPECT_EQ(readings, 5) << "the record of another state is ignored too";
 
   large('b');
   wait_until_settled();

@@ -61,7 +61,7 @@ TEST(KnownKeys, DeadDataAreForgotten) {
   for (int i = 0; i < 1000; ++i) keys.key_of(number(std::make_shared<const int>(i)));
   EXPECT_EQ(times_hashed, 1000);
   EXPECT_EQ(keys.key_of(number(kept)), (Digest{5, 1}));
-  EXPECT_EQ(times_hashed, 1000) << "what lives is still known";
+  EXPECT_EQ(times_hashed, 1000) << "data that still exist are still known";
 }
 
 }  // namespace

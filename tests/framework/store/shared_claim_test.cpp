@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "tests/framework/environment.hpp"
-#include "tests/framework/fixture.hpp"
 #include "tests/framework/identities.hpp"
+#include "tests/framework/store/store_fixture.hpp"
 
 namespace shared_claim_test {
 
@@ -23,7 +23,11 @@ using marrow::SharedClaim;
 class SharedClaimTest : public testing::Test {
  protected:
   SharedClaim claim(const std::atomic<bool>* cancelled = nullptr, const std::function<void(bool)>& on_wait = {}) {
-    return marrow::claim_file(file, {0600, 0700, getegid()}, cancelled, on_wait, fault);
+    return marrow::claim_file(file, of_group, cancelled, on_wait, fault);
+  }
+  SharedClaim claim_of_another() const {
+    std::string ignored;
+    return marrow::claim_file(file, of_group, nullptr, {}, ignored);
   }
   std::string text() const {
     std::ifstream in(file);
@@ -44,6 +48,7 @@ class SharedClaimTest : public testing::Test {
   void SetUp() override { fs::create_directories(file.parent_path()); }
   runtime_fixture::Scratch scratch;
   runtime_fixture::Environment environment;
+  const marrow::Permissions of_group{0600, 0700, getegid()};
   fs::path file = scratch.path / "claims" / "key";
   std::string fault;
   bool is_held = false;
@@ -59,7 +64,7 @@ TEST_F(SharedClaimTest, ManyClaimsAtOnceMakeTheirFolder) {
     for (int i = 0; i < kClaims; ++i)
       threads.emplace_back([&, i] {
         start.arrive_and_wait();
-        marrow::claim_file(folder / std::to_string(i), {0600, 0700, getegid()}, nullptr, {}, faults[i]);
+        marrow::claim_file(folder / std::to_string(i), of_group, nullptr, {}, faults[i]);
       });
     for (std::thread& thread : threads) thread.join();
     for (const std::string& text : faults) EXPECT_EQ(text, "") << "round " << round;
@@ -81,8 +86,7 @@ TEST_F(SharedClaimTest, OnlyOneHoldsIt) {
   std::atomic<int> holders{0}, most{0}, done{0};
   const auto work = [&] {
     for (int i = 0; i < 5; ++i) {
-      std::string ignored;
-      const SharedClaim held = marrow::claim_file(file, {0600, 0700, getegid()}, nullptr, {}, ignored);
+      const SharedClaim held = claim_of_another();
       const int now = ++holders;
       if (now > most) most = now;
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -97,18 +101,7 @@ TEST_F(SharedClaimTest, OnlyOneHoldsIt) {
 }
 
 TEST_F(SharedClaimTest, AKilledOwnerOfThisHostLosesItAtOnce) {
-  int ends[2];
-  ASSERT_EQ(pipe(ends), 0);
-  const pid_t child = fork();
-  if (child == 0) {
-    std::string ignored;
-    const SharedClaim held = marrow::claim_file(file, {0600, 0700, getegid()}, nullptr, {}, ignored);
-    if (write(ends[1], "c", 1) != 1) _exit(1);
-    for (;;) pause();
-  }
-  char told = 0;
-  ASSERT_EQ(read(ends[0], &told, 1), 1);
-  for (const int end : ends) close(end);
+  const pid_t child = store_fixture::claimer([&] { return claim_of_another(); }, [] { pause(); });
   std::atomic<bool> cancelled{false};
   const auto give_up = [&](bool) { cancelled = true; };
   EXPECT_FALSE(claim(&cancelled, give_up).is_held()) << "its owner lives";

@@ -13,7 +13,6 @@
 #include <thread>
 
 #include "marrow/runtime/store/store_entry.hpp"
-#include "marrow/runtime/store/store_folder.hpp"
 #include "tests/framework/environment.hpp"
 #include "tests/framework/identities.hpp"
 #include "tests/framework/store/store_fixture.hpp"
@@ -28,20 +27,15 @@ using marrow::SharedStore;
 using marrow::Store;
 using marrow::StoredResult;
 using store_fixture::many;
+using store_fixture::mode_of;
 using store_fixture::number;
 using store_fixture::StoreTest;
-
-mode_t mode_of(const fs::path& path) {
-  struct stat status {};
-  EXPECT_EQ(stat(path.c_str(), &status), 0) << path;
-  return status.st_mode & 07777;
-}
 
 void set_age(const fs::path& path, std::chrono::hours age) {
   fs::last_write_time(path, fs::file_time_type::clock::now() - age);
 }
 
-/// Of a result that took so long.
+/// The provenance of a result that took this many seconds.
 marrow::Provenance took(double seconds) {
   marrow::Provenance provenance;
   provenance.node = "test.work";
@@ -57,7 +51,7 @@ class SharedStoreTest : public StoreTest {
     chmod(folder.c_str(), 0700);
   }
   std::shared_ptr<SharedStore> open() const { return std::make_shared<SharedStore>(folder); }
-  fs::path file_of(const Digest& key) const { return folder / key.hex().substr(0, 2) / key.hex(); }
+  fs::path file_of(const Digest& one) const { return marrow::entry_file(folder, one); }
   std::size_t files_below(const fs::path& path) const {
     std::size_t count = 0;
     for (const auto& entry : fs::recursive_directory_iterator(path)) count += entry.is_regular_file();
@@ -70,7 +64,7 @@ class SharedStoreTest : public StoreTest {
     if (!found) return std::nullopt;
     return found->outputs.at(0).as<marrow::Metrics>().items.at(0).value;
   }
-  /// What is said of the folder.
+  /// Why the folder cannot be used.
   std::string fault() const { return open()->fault(); }
 
   fs::path folder = scratch.path / "shared";
@@ -131,12 +125,12 @@ TEST_F(SharedStoreTest, ADamagedResultIsNotUsedAndIsReplaced) {
   std::fstream(file_of(key), std::ios::in | std::ios::out).seekp(-3, std::ios::end).put('x');
   const Store host(scratch.path / "host", shared);
   EXPECT_FALSE(host.find(key));
-  EXPECT_FALSE(host.find(key, Store::Where::here)) << "nor was it copied";
+  EXPECT_FALSE(host.find(key, Store::Where::here)) << "it was not copied either";
   EXPECT_EQ(shared->complaint(), "") << "another host may replace it";
   offer(*shared, key, 7);
   EXPECT_EQ(value_of(host.find(key)), 7);
   fs::resize_file(file_of(key), 10);
-  fs::remove_all(host.folder() / key.hex().substr(0, 2));
+  fs::remove(marrow::entry_file(host.folder(), key));
   EXPECT_FALSE(host.find(key));
   fs::rename(file_of(key), scratch.path / "cut");
   offer(*shared, hash_of(2), 8);
@@ -158,7 +152,7 @@ TEST_F(SharedStoreTest, ItIsUsedByRunsOfTwoHosts) {
   EXPECT_EQ(first.nodes[0].calls, 1);
   EXPECT_EQ(second.nodes[0].calls, 0);
   EXPECT_EQ(second.nodes[0].cached, 1);
-  EXPECT_EQ(second.nodes[1].calls, 1) << "nobody else wants it, and it is quick";
+  EXPECT_EQ(second.nodes[1].calls, 1) << "no other cell needs it, and it is quick";
   EXPECT_EQ(result_of(first), result_of(second));
   EXPECT_EQ(files_below(folder), 2u) << "the result and the marker";
 }
@@ -166,8 +160,7 @@ TEST_F(SharedStoreTest, ItIsUsedByRunsOfTwoHosts) {
 TEST_F(SharedStoreTest, AFaultIsSaidOnceAndTheRunGoesOn) {
   const auto shared = open();
   offer(*shared, hash_of(0), 7);
-  const std::string two = key.hex().substr(0, 2);
-  std::ofstream(folder / two) << "no folder";
+  std::ofstream(file_of(key).parent_path()) << "no folder";
   const Store host(scratch.path / "host", shared);
   EXPECT_FALSE(host.find(key));
   EXPECT_EQ(shared->complaint(),
@@ -182,7 +175,7 @@ TEST_F(SharedStoreTest, AFaultIsSaidOnceAndTheRunGoesOn) {
   offer(*writes, key, 7);
   EXPECT_EQ(writes->complaint(),
             "cannot write " + file_of(key).string() + ": Not a directory; nothing more is written to the shared store");
-  EXPECT_EQ(value_of(Store(scratch.path / "other", writes).find(hash_of(0))), 7) << "what is there is read";
+  EXPECT_EQ(value_of(Store(scratch.path / "other", writes).find(hash_of(0))), 7) << "existing results are still read";
 }
 
 TEST_F(SharedStoreTest, ItsUseIsNotedOnceADay) {
@@ -337,7 +330,7 @@ TEST_F(SharedStoreTest, WhatIsCollected) {
   }
   const std::uint64_t size = fs::file_size(file_of(hash_of(1)));
   EXPECT_EQ(shared->collect(2 * size).entries, 1u);
-  EXPECT_FALSE(fs::exists(file_of(hash_of(2)))) << "it was used longest ago";
+  EXPECT_FALSE(fs::exists(file_of(hash_of(2)))) << "it is the least recently used";
   EXPECT_TRUE(fs::exists(file_of(hash_of(1))));
   EXPECT_TRUE(fs::exists(temporary(elsewhere)));
   EXPECT_TRUE(fs::exists(folder / "claims" / hash_of(elsewhere).hex()));
@@ -371,7 +364,7 @@ TEST_F(SharedStoreTest, ManyThatMakeItAtTheSameTimeAllUseIt) {
 TEST_F(SharedStoreTest, TheTimeIsThatOfTheFileSystem) {
   const auto now = marrow::time_in(folder);
   ASSERT_TRUE(now);
-  EXPECT_NEAR(double(now->tv_sec), double(time(nullptr)), 60) << "here it is a disk of this host";
+  EXPECT_NEAR(double(now->tv_sec), double(time(nullptr)), 60) << "the folder is on a disk of this host";
   EXPECT_TRUE(fs::is_empty(folder));
   EXPECT_FALSE(marrow::time_in(folder / "absent"));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A result that one process is making: others wait for it, until it is there or nobody makes it any more.
+// While one process makes a result, others wait until it is kept or nobody makes it any more.
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -17,30 +17,17 @@ using marrow::Store;
 using store_fixture::number;
 using store_fixture::StoreTest;
 
-/// Starts a process that claims a key, then does `work`; returns once the key is claimed.
+/// A process that claims a key, then does `work`.
 template <class Work>
-pid_t claimer(const Store& store, const Digest& key, const Work& work) {
-  int pipe_ends[2];
-  EXPECT_EQ(pipe(pipe_ends), 0);
-  const pid_t child = fork();
-  if (child == 0) {
-    const Store::Claim claim = store.claim(key, nullptr);
-    if (write(pipe_ends[1], "c", 1) != 1) _exit(1);
-    work();
-    _exit(0);
-  }
-  char told = 0;
-  EXPECT_EQ(read(pipe_ends[0], &told, 1), 1);
-  close(pipe_ends[0]);
-  close(pipe_ends[1]);
-  return child;
+pid_t claimer_of(const Store& store, const Digest& key, const Work& work) {
+  return store_fixture::claimer([&] { return store.claim(key, nullptr); }, work);
 }
 
 TEST_F(StoreTest, AResultThatAnotherProcessMakesIsWaitedFor) {
   const Digest key = marrow::hash_of(1);
   int go_on[2];
   ASSERT_EQ(pipe(go_on), 0);
-  const pid_t child = claimer(store, key, [&] {
+  const pid_t child = claimer_of(store, key, [&] {
     char told = 0;
     if (::read(go_on[0], &told, 1) != 1) _exit(1);
     std::this_thread::sleep_for(std::chrono::milliseconds(100));  // so that it is waited for
@@ -60,7 +47,7 @@ TEST_F(StoreTest, NoFileStaysOpen) {
   };
   const Digest key = marrow::hash_of(1);
   ASSERT_EQ(store.prepare(), "");
-  std::filesystem::create_directories(store.folder() / key.hex().substr(0, 2) / key.hex());  // a folder is no entry
+  std::filesystem::create_directories(marrow::entry_file(store.folder(), key));  // a folder is no entry
   const auto before = open_files();
   {
     const Store::Claim claim = store.claim(marrow::hash_of(2), nullptr);
@@ -75,7 +62,7 @@ TEST_F(StoreTest, NoFileStaysOpen) {
 
 TEST_F(StoreTest, AKilledProcessGivesItsClaimsBack) {
   const Digest key = marrow::hash_of(1);
-  const pid_t child = claimer(store, key, [] { std::this_thread::sleep_for(std::chrono::hours(1)); });
+  const pid_t child = claimer_of(store, key, [] { std::this_thread::sleep_for(std::chrono::hours(1)); });
   std::atomic<bool> cancelled{true};
   { const Store::Claim none = store.claim(key, &cancelled); }  // does not wait for the hour
   kill(child, SIGKILL);
@@ -110,7 +97,7 @@ TEST_F(StoreTest, AForkedChildDoesNotKeepAClaim) {
 
 TEST_F(StoreTest, WaitingForAnotherIsSaidAndIsCancelled) {
   const Digest key = marrow::hash_of(1);
-  const pid_t child = claimer(store, key, [] { std::this_thread::sleep_for(std::chrono::hours(1)); });
+  const pid_t child = claimer_of(store, key, [] { std::this_thread::sleep_for(std::chrono::hours(1)); });
   std::atomic<bool> cancelled{false};
   std::string said;
   const auto start = std::chrono::steady_clock::now();

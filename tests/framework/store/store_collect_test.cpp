@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What leaves the store where it is to become smaller.
+// What is removed when the store must become smaller.
 #include <atomic>
 #include <chrono>
 #include <fstream>
@@ -30,7 +30,7 @@ TEST_F(StoreTest, TheLeastRecentlyUsedGoFirst) {
   EXPECT_TRUE(store.find(marrow::hash_of(3)));
 }
 
-TEST_F(StoreTest, WhatNodesCameToGoesWithTheirResults) {
+TEST_F(StoreTest, RecordsOfLastResultsGoWithTheResults) {
   const auto remembered = [&] {
     std::set<std::string> places;
     for (const char* place : {"old", "young"})
@@ -44,9 +44,9 @@ TEST_F(StoreTest, WhatNodesCameToGoesWithTheirResults) {
                       now - std::chrono::hours(72));
   const std::uint64_t one = store.entries()[0].bytes;
   for (const Store::Entry& entry : store.entries())
-    fs::last_write_time(store.folder() / entry.key.hex().substr(0, 2) / entry.key.hex(), now - std::chrono::hours(60));
+    fs::last_write_time(marrow::entry_file(store.folder(), entry.key), now - std::chrono::hours(60));
   EXPECT_EQ(store.collect(one).entries, 1u);
-  EXPECT_EQ(remembered().size(), 2u) << "the call of the result that is kept may have begun then";
+  EXPECT_EQ(remembered().size(), 2u) << "the call that made the kept result may have begun then";
   fs::last_write_time(store.folder() / "last" / marrow::hash_of(std::string("old")).hex(),
                       now - std::chrono::hours(90));
   EXPECT_EQ(store.collect(2 * one).entries, 0u);
@@ -58,7 +58,7 @@ TEST_F(StoreTest, WhatNodesCameToGoesWithTheirResults) {
 
 class TidyingTest : public StoreTest {
  protected:
-  /// A store with that many records of what nodes came to, all older than its only result.
+  /// A store with that many records of nodes' last results, all older than its only result.
   void fill(int records) {
     fs::remove_all(store.folder());
     ASSERT_EQ(store.save(marrow::hash_of(0), {many(10)}, {}), "");
@@ -73,7 +73,7 @@ class TidyingTest : public StoreTest {
   std::size_t records() const {
     return std::size_t(std::distance(fs::directory_iterator(store.folder() / "last"), fs::directory_iterator()));
   }
-  /// The shortest of several times to look through that many records. A limit that nothing exceeds removes none.
+  /// The shortest of several times to look through that many records. The limit is so high that none is removed.
   double seconds_to_look_through(int count) {
     fill(count);
     const std::uint64_t all = std::uint64_t(1) << 40;
@@ -105,7 +105,7 @@ TEST_F(TidyingTest, StopsWhenItIsAskedTo) {
   fill(100);
   std::atomic<bool> cancelled{true};
   EXPECT_EQ(store.tidy(&cancelled), "");
-  EXPECT_EQ(records(), 100u) << "nothing is removed any more";
+  EXPECT_EQ(records(), 100u) << "it stopped before it removed anything";
   fs::remove(store.folder() / "tidied");
   cancelled = false;
   EXPECT_EQ(store.tidy(&cancelled), "");

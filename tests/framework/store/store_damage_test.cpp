@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is damaged in the store is made again, and nothing is ever half there.
+// Damaged results are made again, and no result is ever half written.
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -63,7 +63,7 @@ TEST_F(StoreTest, DamagedInputOfANodeThatRunsIsMadeAgain) {
 TEST_F(StoreTest, KilledWritersLeaveNothingHalf) {
   std::mt19937 chance(1);
   int found = 0;
-  // Where a machine is so slow that nothing is ever written in that time, they live longer.
+  // On a machine so slow that nothing is written in this time, the writers live longer.
   for (int round = 0; round < 20 || (found <= 20 && round < 200); ++round) {
     const pid_t child = fork();
     if (child == 0) {

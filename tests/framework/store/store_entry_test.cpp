@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Entries that are not what their names say, or that no run ever wrote.
+// Entries that do not match their names, or that no run ever wrote.
 #include "marrow/runtime/store/store_entry.hpp"
 
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "tests/framework/fixture.hpp"
+#include "tests/framework/store/store_fixture.hpp"
 
 namespace store_entry_test {
 
@@ -18,19 +18,12 @@ using marrow::Store;
 using marrow::Value;
 using runtime_fixture::Scratch;
 using runtime_fixture::test_catalogue;
-
-template <class T>
-Value value_of(T item) {
-  Value result = Value::of<T>(std::make_shared<const T>(std::move(item)));
-  result.key = result.type.content->hash(result.data.get());
-  return result;
-}
-
-Value number(double value) { return value_of(Metrics{{{"value", value, "mm"}}}); }
+using store_fixture::kept_value;
+using store_fixture::number;
 
 class StoreEntryTest : public testing::Test {
  protected:
-  fs::path file_of(const Digest& key) const { return store.folder() / key.hex().substr(0, 2) / key.hex(); }
+  fs::path file_of(const Digest& one) const { return marrow::entry_file(store.folder(), one); }
   /// Writes an entry with that description, whole and with its hash.
   void forge(EntryDescription description) {
     description.key = key;
@@ -54,7 +47,7 @@ TEST_F(StoreEntryTest, AnEntryUnderAnothersNameIsNotAccepted) {
   ASSERT_EQ(store.save(other, {number(2)}, {}), "");
   fs::copy_file(file_of(key), file_of(other), fs::copy_options::overwrite_existing);
   EXPECT_FALSE(store.find(other));
-  EXPECT_FALSE(fs::exists(file_of(other))) << "removed, as a damaged one is";
+  EXPECT_FALSE(fs::exists(file_of(other))) << "removed like a damaged entry";
   ASSERT_TRUE(store.find(key));
   EXPECT_EQ(store.find(key)->outputs[0].as<Metrics>().items[0].value, 1);
 }
@@ -106,7 +99,7 @@ TEST_F(StoreEntryTest, SizesThatWrapOrLieOutsideAreDamage) {
   }
   forge({{}, {}, {leaf(true, 0, 0)}, 0});
   ASSERT_TRUE(store.find(key));
-  EXPECT_THROW(store.find(key)->outputs[0].as<Metrics>(), marrow::DamagedEntry) << "no bytes are no metrics";
+  EXPECT_THROW(store.find(key)->outputs[0].as<Metrics>(), marrow::DamagedEntry) << "an empty value cannot be metrics";
 }
 
 TEST_F(StoreEntryTest, ListsThatAreNoneAreDamage) {
@@ -132,7 +125,7 @@ TEST_F(StoreEntryTest, AFileThatGetsShorterWhileItIsReadIsDamageAndNoCrash) {
   marrow::Volume volume;
   volume.grid.size = {1 << 20, 1, 1};
   volume.values.assign(volume.grid.count(), 1.5f);
-  ASSERT_EQ(store.save(key, {value_of(volume)}, {}), "");
+  ASSERT_EQ(store.save(key, {kept_value(volume)}, {}), "");
   const auto found = store.find(key);
   ASSERT_TRUE(found);
   ASSERT_EQ(truncate(file_of(key).c_str(), 100000), 0);
@@ -184,7 +177,7 @@ TEST_F(StoreEntryTest, AResultOfOtherTypesThanTheNodesIsMadeAgain) {
   list.names = {"a"};
   list.items = {number(1)};
   list.data = nullptr;
-  for (const Value& wrong : {value_of(marrow::Mesh{}), newer, larger, list}) {
+  for (const Value& wrong : {kept_value(marrow::Mesh{}), newer, larger, list}) {
     ASSERT_EQ(store.save(result, {wrong}, {}), "");
     EXPECT_EQ(calls(), 1) << wrong.type.id << " " << wrong.type.version << " " << wrong.axis;
     EXPECT_EQ(calls(), 0);

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the tests of the store share: values to be kept, and runs with a store of their own.
+// What the tests of the store share: values to keep, and runs with their own store.
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include "marrow/runtime/store/store.hpp"
+#include "marrow/runtime/store/store_folder.hpp"
 #include "tests/framework/fixture.hpp"
 
 namespace store_fixture {
@@ -9,20 +13,26 @@ namespace store_fixture {
 using runtime_fixture::Scratch;
 using runtime_fixture::test_catalogue;
 
-inline marrow::Value number(double value) {
-  marrow::Value result = marrow::Value::of<marrow::Metrics>(
-      std::make_shared<const marrow::Metrics>(marrow::Metrics{{{"value", value, "mm"}}}));
+template <class T>
+marrow::Value kept_value(T item) {
+  marrow::Value result = marrow::Value::of<T>(std::make_shared<const T>(std::move(item)));
   result.key = result.type.content->hash(result.data.get());
   return result;
 }
+
+inline marrow::Value number(double value) { return kept_value(marrow::Metrics{{{"value", value, "mm"}}}); }
 
 inline marrow::Value many(std::size_t count) {
   marrow::Volume volume;
   volume.grid.size = {int(count), 1, 1};
   for (std::size_t i = 0; i < count; ++i) volume.values.push_back(float(i % 1000));
-  marrow::Value result = marrow::Value::of<marrow::Volume>(std::make_shared<const marrow::Volume>(std::move(volume)));
-  result.key = result.type.content->hash(result.data.get());
-  return result;
+  return kept_value(std::move(volume));
+}
+
+inline mode_t mode_of(const std::filesystem::path& path) {
+  struct stat status {};
+  EXPECT_EQ(stat(path.c_str(), &status), 0) << path;
+  return status.st_mode & 07777;
 }
 
 inline std::filesystem::path only_file(const std::filesystem::path& folder) {
@@ -32,6 +42,24 @@ inline std::filesystem::path only_file(const std::filesystem::path& folder) {
         entry.path().parent_path().filename() != "last")
       found = entry.path();
   return found;
+}
+
+/// Starts a process that holds what `claim` returns while it does `work`. Returns its number once it has claimed.
+template <class Claim, class Work>
+pid_t claimer(const Claim& claim, const Work& work) {
+  int pipe_ends[2];
+  EXPECT_EQ(pipe(pipe_ends), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    const auto held = claim();
+    if (write(pipe_ends[1], "c", 1) != 1) _exit(1);
+    work();
+    _exit(0);
+  }
+  char told = 0;
+  EXPECT_EQ(read(pipe_ends[0], &told, 1), 1);
+  for (const int end : pipe_ends) close(end);
+  return child;
 }
 
 class StoreTest : public testing::Test {

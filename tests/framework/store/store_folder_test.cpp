@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whose a store is, what it touches and what it leaves alone, and that it stays within its size.
+// Who owns a store, what it touches and what it leaves alone, and that it keeps its size.
 #include <pwd.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -13,26 +13,18 @@
 #include <thread>
 
 #include "marrow/base/folder_use.hpp"
-#include "marrow/runtime/store/store.hpp"
 #include "tests/framework/environment.hpp"
-#include "tests/framework/fixture.hpp"
 #include "tests/framework/identities.hpp"
+#include "tests/framework/store/store_fixture.hpp"
 
 namespace store_folder_test {
 
 namespace fs = std::filesystem;
-using marrow::Digest;
-using marrow::Metrics;
 using marrow::Store;
-using marrow::Value;
 using runtime_fixture::Environment;
 using runtime_fixture::Scratch;
-
-Value number(double value) {
-  Value result = Value::of<Metrics>(std::make_shared<const Metrics>(Metrics{{{"value", value, "mm"}}}));
-  result.key = result.type.content->hash(result.data.get());
-  return result;
-}
+using store_fixture::mode_of;
+using store_fixture::number;
 
 void put(const fs::path& file, const std::string& text = "someone's data") {
   fs::create_directories(file.parent_path());
@@ -47,16 +39,10 @@ std::set<std::string> tree(const fs::path& folder) {
   return paths;
 }
 
-mode_t mode_of(const fs::path& path) {
-  struct stat status {};
-  EXPECT_EQ(stat(path.c_str(), &status), 0) << path;
-  return status.st_mode & 07777;
-}
-
 class StoreFolderTest : public testing::Test {
  protected:
   std::string save(const Store& to, int name = 1) { return to.save(marrow::hash_of(name), {number(7)}, {}); }
-  /// Runs `work` in a process of its own that is not root's; the scratch folder is its own. Returns what it returns.
+  /// Runs `work` in another process, as a user who is not root and who owns the scratch folder. Returns its result.
   template <class Work>
   std::string as_someone(uid_t user, const Work& work) {
     int ends[2];
@@ -115,8 +101,8 @@ TEST_F(StoreFolderTest, ACaseInUseIsLeft) {
   std::shared_ptr<const void> first = marrow::use_folder(one), second = marrow::use_folder(one);
   ASSERT_TRUE(first && second);
   Store::Freed freed = store.collect(0);
-  EXPECT_EQ(freed.fault, "") << "what is in use is no fault";
-  EXPECT_EQ(freed.entries, 1u) << "the entry alone";
+  EXPECT_EQ(freed.fault, "") << "a case in use is not a fault";
+  EXPECT_EQ(freed.entries, 1u) << "only the entry";
   EXPECT_TRUE(fs::exists(one / "outputs" / "ct.mha"));
   first.reset();
   EXPECT_EQ(store.collect(0).entries, 0u);
@@ -228,7 +214,7 @@ TEST_F(StoreFolderTest, AFolderThatOthersMayWriteIsNotUsed) {
 }
 
 TEST_F(StoreFolderTest, AFolderOfAnotherUserIsNotUsed) {
-  if (geteuid() != 0) GTEST_SKIP() << "only root can make one";
+  if (geteuid() != 0) GTEST_SKIP() << "only root can make a folder of another user";
   ASSERT_EQ(save(store), "");
   const passwd* other = getpwuid(1);
   ASSERT_EQ(chown(folder.c_str(), 1, 1), 0);
@@ -245,15 +231,14 @@ TEST_F(StoreFolderTest, AFolderOfAnotherUserIsNotUsed) {
 TEST_F(StoreFolderTest, WhatCannotBeRemovedIsNotCounted) {
   const std::string told = as_someone(65534, [&] {
     save(store);
-    const fs::path entries = folder / marrow::hash_of(1).hex().substr(0, 2);
+    const fs::path entries = marrow::entry_file(folder, marrow::hash_of(1)).parent_path();
     chmod(entries.c_str(), 0500);
     const Store::Freed freed = store.collect(0);
     chmod(entries.c_str(), 0700);
     return std::to_string(freed.entries) + " " + std::to_string(freed.bytes) + " " + freed.fault;
   });
-  EXPECT_EQ(told, "0 0 cannot remove " +
-                      (folder / marrow::hash_of(1).hex().substr(0, 2) / marrow::hash_of(1).hex()).string() +
-                      ": Permission denied");
+  EXPECT_EQ(told,
+            "0 0 cannot remove " + marrow::entry_file(folder, marrow::hash_of(1)).string() + ": Permission denied");
 }
 
 TEST_F(StoreFolderTest, AReadOnlyFolderIsOneSentence) {
@@ -280,7 +265,7 @@ TEST_F(StoreFolderTest, WhereTheStoreIs) {
   for (const auto& home : {std::optional<std::string>(), std::optional<std::string>("")}) {
     environment.set("HOME", home);
     EXPECT_EQ(Store::default_folder(), own ? fs::path(own->pw_dir) / ".cache/marrow/store" : fs::path())
-        << "never a folder that all share";
+        << "it is never a folder that all users share";
   }
 }
 
@@ -329,7 +314,7 @@ TEST_F(StoreFolderTest, ItIsTidiedOnceAMinuteWhateverTheClockOnceSaid) {
   EXPECT_FALSE(store.find(marrow::hash_of(1)));
 }
 
-/// What `look` says first that is not empty, while `change` goes on in another thread.
+/// The first text of `look` that is not empty, while another thread runs `change`.
 std::string said_during(const std::function<void()>& change, const std::function<std::string()>& look) {
   std::string said;
   std::atomic<bool> has_looked{false}, is_over{false};

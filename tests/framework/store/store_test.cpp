@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What earlier runs left is read back, and a plan says so before.
+// Results of earlier runs are read back, and a plan says so beforehand.
 #include "tests/framework/store/store_fixture.hpp"
 
 namespace store_test {
@@ -86,7 +86,7 @@ TEST_F(StoreTest, UnchangedContentStopsTheWave) {
   const RunResult second =
       run("  c: {uses: test.constant, with: {value: 5, word: two}}\n  d: {uses: test.add, in: {a: c}}\n", "d: d");
   EXPECT_EQ(second.nodes[0].calls, 1);
-  EXPECT_EQ(second.nodes[1].calls, 0) << "the constant came out the same";
+  EXPECT_EQ(second.nodes[1].calls, 0) << "the constant is the same as before";
 }
 
 TEST_F(StoreTest, ASeedMattersToRandomNodesOnly) {

@@ -11,7 +11,10 @@ nodes:
   m: {uses: test.misbehave, in: {a: n}}
 outputs: {number: m}
 """
-NOTE = "node 'n': the wire to 'a' is not used: only other nodes of the kind test have this input, test.constant has not"
+NOTE = (
+    "node 'n': the wire to 'a' is not used: "
+    "test.constant does not have this input, only other nodes of the kind test do"
+)
 
 
 class Unused(Comparison):

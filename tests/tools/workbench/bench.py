@@ -11,20 +11,21 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 from harness import MARROW, SHARED_CACHE, SOURCE, skip
 from harness import browser as chromium
 from harness.sample import sample
 
-os.environ["MARROW_CACHE"] = tempfile.mkdtemp(prefix="marrow-cache-")  # not the store of who runs the tests
+os.environ["MARROW_CACHE"] = tempfile.mkdtemp(prefix="marrow-cache-")  # not the store of the person who runs the tests
 atexit.register(shutil.rmtree, os.environ["MARROW_CACHE"], ignore_errors=True)
 
 SMALL = ["--set", "ct.spacing_mm=[1.2, 1.2, 1.5]", "--set", "ct.range_mm=[0, 300]"]  # 0.8 s instead of 5 s to make
 
 
 def simulate(folder, *arguments, pipeline=SOURCE / "pipelines" / "simulate.yaml"):
-    """The folder of what a simulation makes. The same one is made once for all tests."""
+    """Runs a simulation, and returns the folder of its outputs. Equal simulations are computed once for all tests."""
     environment = {**os.environ, "MARROW_CACHE": str(SHARED_CACHE)}
     command = [MARROW, "run", pipeline, "--out", folder, "--quiet", *arguments]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment)
@@ -146,6 +147,57 @@ class PageTest(BenchTest):
 
     def wait_for_page(self, name, seconds=120):
         self.browser.wait("return document.documentElement.dataset.ready === '%s'" % name, seconds)
+
+    def find(self, selector, seconds=120):
+        """Waits for an element."""
+        self.browser.wait("return !!document.querySelector(%s)" % json.dumps(selector), seconds)
+        return self.browser.driver.find_element("css selector", selector)
+
+    def find_in_sight(self, selector):
+        element = self.find(selector)
+        self.browser.js("arguments[0].scrollIntoView({block: 'center'})", element)
+        return element
+
+    def click(self, selector):
+        from selenium.common.exceptions import StaleElementReferenceException
+
+        for _ in range(5):
+            try:
+                return self.find_in_sight(selector).click()
+            except StaleElementReferenceException:  # the page was drawn again after it was found
+                pass
+        self.fail("%s is drawn again and again" % selector)
+
+    def document(self):
+        """The draft of the case 'mine', as the server keeps it."""
+        return self.browser.driver.execute_async_script(
+            "fetch('api/draft?case=mine').then((answer) => answer.json())"
+            ".then((state) => arguments[0](state.document))"
+        )
+
+    def saved_when(self, condition, seconds=240):
+        """Waits until the draft of the case 'mine' fulfils a condition, and returns it."""
+        end = time.monotonic() + seconds
+        while not condition(document := self.document()):
+            self.assertLess(time.monotonic(), end, document)
+            time.sleep(0.05)
+        return document
+
+    def wait_for_slices(self):
+        """Waits until all three slices of a CT are drawn."""
+        self.browser.wait(
+            "return document.querySelectorAll('[data-slice]').length === 3 &&"
+            " [...document.querySelectorAll('[data-slice]')].every((one) => one.dataset.shown)",
+            240,
+        )
+
+    def go_to_slice(self, name, number):
+        self.browser.js(
+            "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'))",
+            self.find('input[aria-label="%s slice"]' % name),
+            number,
+        )
+        self.browser.wait("return document.querySelector('[data-slice=%s]').dataset.shown === '%d'" % (name, number))
 
 
 def named_tests(suite):

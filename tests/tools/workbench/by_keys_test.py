@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """The whole way without a mouse: from a DICOM CT, two X-rays and the C-arm's angles to a pose that was moved by hand
-and registered, and to another node in a pipeline. Everything is reached by Tab and used by keys, as a person would."""
+and registered, and to another node in a pipeline. Tab reaches everything, and keys use it, as a person would."""
 import json
 import shutil
 import time
@@ -20,12 +20,12 @@ CHECKED = "return arguments[0].matches('input[type=checkbox], input[type=radio]'
 
 class ByKeysTest(WholeWay):
     def keys(self, *keys):
-        """To whatever has the focus."""
+        """Sends keys to the element with the focus."""
         ActionChains(self.browser.driver, duration=0).send_keys(*keys).perform()
 
     def reach(self, selector):
-        """Presses Tab until the focus is there."""
-        self.css(selector)
+        """Presses Tab until the element has the focus."""
+        self.find(selector)
         for _ in range(MOST_TABS):
             if self.browser.js("return !!document.activeElement.matches(%s)" % json.dumps(selector)):
                 return self.browser.driver.switch_to.active_element
@@ -33,7 +33,7 @@ class ByKeysTest(WholeWay):
         self.fail("Tab never reaches " + selector)
 
     def click(self, selector):
-        """What a click does is done by Enter, or by the space bar."""
+        """Presses Enter or the space bar in place of a click."""
         element = self.reach(selector)
         if self.browser.js(
             "return arguments[0].matches('input:not([type=checkbox]):not([type=radio]), canvas')", element
@@ -44,7 +44,7 @@ class ByKeysTest(WholeWay):
     def add_fragment(self, name, seed_mm):
         box = 'section[aria-label="Fragments"] input[type="text"]'
         self.reach(box).send_keys(name + Keys.ENTER)
-        self.until(lambda document: name in document["fragments"])
+        self.saved_when(lambda document: name in document["fragments"])
         self.click('[data-tool="seed %s"]' % name)
         index = [
             round((mm - origin) / spacing)
@@ -55,10 +55,10 @@ class ByKeysTest(WholeWay):
         self.go("sagittal", index[0], Keys.ARROW_RIGHT)
         self.go("coronal", index[1], Keys.ARROW_DOWN)
         self.keys(Keys.ENTER)
-        self.until(lambda document: document["fragments"][name]["seeds"])
+        self.saved_when(lambda document: document["fragments"][name]["seeds"])
 
     def go(self, slices, wanted, more):
-        """Moves the crosshair until these slices show what is wanted. `more` leads to a higher number, or a lower."""
+        """Moves the crosshair until these slices show the wanted one. `more` raises or lowers the number."""
         less = {Keys.PAGE_UP: Keys.PAGE_DOWN, Keys.ARROW_RIGHT: Keys.ARROW_LEFT, Keys.ARROW_DOWN: Keys.ARROW_UP}[more]
         shown = lambda: int(self.browser.js("return document.querySelector('[data-slice=%s]').dataset.shown" % slices))
         begin = shown()
@@ -82,14 +82,14 @@ class ByKeysTest(WholeWay):
             box.send_keys(Keys.CONTROL + "a")
             box.send_keys(str(value))
         self.keys(Keys.ENTER)
-        self.until(lambda document: any(one["name"] == view["name"] for one in document["views"]))
+        self.saved_when(lambda document: any(one["name"] == view["name"] for one in document["views"]))
 
     def moved_by_keys(self):
-        """The bone, a step to the left in the first view and back, and turned about its axis: the draft has it."""
+        """Moves and turns the bone in the first view and back. The draft keeps it."""
         self.reach(".place-canvas")
         before = self.browser.js("return marrow.place().placed.distal")
         self.keys(Keys.ARROW_LEFT, "a", "q", "w", "r")
-        self.until(lambda document: document["fragments"]["distal"].get("start") not in (None, before))
+        self.saved_when(lambda document: document["fragments"]["distal"].get("start") not in (None, before))
         self.keys("f", "s", "e", "d", Keys.ARROW_RIGHT)
         self.browser.wait("return !marrow.place().keyMoves && !marrow.place().isKeeping")
 

@@ -5,7 +5,6 @@ keys. Its X-ray views are in the draft from the beginning."""
 import os
 import re
 import subprocess
-import time
 
 import yaml
 
@@ -46,15 +45,6 @@ class CasePageTest(PageTest):
         self.show(server, "case=mine")
         return server
 
-    def css(self, selector):
-        return self.browser.driver.find_element("css selector", selector)
-
-    def click(self, selector):
-        self.browser.wait("return !!document.querySelector(%r)" % selector)
-        element = self.css(selector)
-        self.browser.js("arguments[0].scrollIntoView({block: 'center'})", element)
-        element.click()
-
     def panel(self, title):
         return 'section[aria-label="%s"] ' % title
 
@@ -62,9 +52,7 @@ class CasePageTest(PageTest):
         self.browser.wait("return " + condition, 240)
 
     def type_name(self, panel, name):
-        box = self.css(self.panel(panel) + 'input[type="text"]')
-        self.browser.js("arguments[0].scrollIntoView({block: 'center'})", box)
-        box.send_keys(name + "\n")
+        self.find_in_sight(self.panel(panel) + 'input[type="text"]').send_keys(name + "\n")
         self.wait("document.querySelector(%r).textContent.includes(%r)" % (self.panel(panel), name))
 
     def choose_series(self):
@@ -73,28 +61,11 @@ class CasePageTest(PageTest):
         self.click('#dialog [data-choose="scan"]')
         self.wait_for_slices()
 
-    def wait_for_slices(self):
-        self.wait(
-            "document.querySelectorAll('[data-slice]').length === 3 &&"
-            " [...document.querySelectorAll('[data-slice]')].every((one) => one.dataset.shown)"
-        )
-
-    def go_to(self, name, number):
-        self.browser.js(
-            """const slider = document.querySelector('input[aria-label="' + arguments[0] + ' slice"]');
-            slider.value = arguments[1];
-            slider.dispatchEvent(new Event('input'));""",
-            name,
-            number,
-        )
-        self.wait("document.querySelector('[data-slice=%s]').dataset.shown === '%d'" % (name, number))
-
     def click_voxel(self, name, right, down, counts):
-        """Clicks the middle of a voxel; counts: voxels to the right and down that the whole slice has."""
+        """Clicks the middle of a voxel. counts: how many voxels the whole slice has to the right and down."""
         from selenium.webdriver import ActionChains
 
-        canvas = self.css('[data-slice="%s"]' % name)
-        self.browser.js("arguments[0].scrollIntoView({block: 'center'})", canvas)
+        canvas = self.find_in_sight('[data-slice="%s"]' % name)
         box = self.browser.js("const r = arguments[0].getBoundingClientRect(); return [r.width, r.height]", canvas)
         scale = min(box[0] / counts[0], box[1] / counts[1])
         x, y = ((at + 0.5 - count / 2) * scale for at, count in zip((right, down), counts))
@@ -103,23 +74,8 @@ class CasePageTest(PageTest):
         ).click().perform()
 
     def click_axial(self, index):
-        self.go_to("axial", index[2])
+        self.go_to_slice("axial", index[2])
         self.click_voxel("axial", index[0], index[1], SIZE[:2])
-
-    def document(self):
-        """What the server keeps."""
-        return self.browser.driver.execute_async_script(
-            "fetch('api/draft?case=mine').then((answer) => answer.json())"
-            ".then((state) => arguments[0](state.document))"
-        )
-
-    def saved_when(self, condition):
-        """Waits until the kept document fulfils it, and returns it."""
-        end = time.monotonic() + 120
-        while not condition(document := self.document()):
-            self.assertLess(time.monotonic(), end, document)
-            time.sleep(0.05)
-        return document
 
     def add_seed(self, fragment, index):
         self.click('[data-tool="seed %s"]' % fragment)
@@ -145,12 +101,12 @@ class CasePageTest(PageTest):
         self.click('[data-landmark="%s"] [data-tool]' % NASTY)
         self.click_axial((15, 18, 11))
         self.saved_when(lambda document: "model_mm" in document["landmarks"][0])
-        self.css('[data-landmark="%s"] select' % NASTY).send_keys("distal")
+        self.find('[data-landmark="%s"] select' % NASTY).send_keys("distal")
         self.saved_when(lambda document: document["landmarks"][0].get("fragment") == "distal")
 
         self.click('[data-do="segment"]')
         self.wait("!!document.querySelector('[data-segmented=\"full\"]')")
-        text = self.css("[data-segmented]").text
+        text = self.find("[data-segmented]").text
         volume_ml = float(re.search(r"distal ([\d.]+) ml", text).group(1))
         self.assertAlmostEqual(volume_ml, 4 / 3 * 3.1416 * 8**3 / 1000, delta=0.35)
         self.wait("Number(document.querySelector('canvas.surface').dataset.triangles) > 100")
@@ -164,9 +120,9 @@ class CasePageTest(PageTest):
         marks = yaml.safe_load((case / "landmarks.yaml").read_text())
         self.assertEqual(list(marks["fragments"]["distal"]["points"]), [NASTY])
         self.assertEqual(self.browser.js("return document.querySelectorAll('main b').length"), 0)
-        self.assertEqual(self.css("[data-ct]").text, "mine/ct")
+        self.assertEqual(self.find("[data-ct]").text, "mine/ct")
         self.assertEqual(self.browser.js(OUTLINED), True, "the copied CT is the same, so what is shown stays")
-        commands = self.css("[data-saved]").text
+        commands = self.find("[data-saved]").text
         self.assertIn("bone.yaml case=%s" % case.resolve(), commands)
         environment = {**os.environ, "MARROW_CACHE": str(self.scratch / "store")}
         arguments = ["run", SOURCE / "pipelines/workbench/segment-bone.yaml", "case=%s" % case]
@@ -183,7 +139,7 @@ class CasePageTest(PageTest):
         return server
 
     def press(self, name, *keys):
-        canvas = self.css('[data-slice="%s"]' % name)
+        canvas = self.find('[data-slice="%s"]' % name)
         self.browser.js("arguments[0].focus()", canvas)
         canvas.send_keys(*keys)
 
@@ -203,7 +159,7 @@ class CasePageTest(PageTest):
         self.press("sagittal", Keys.ARROW_LEFT, Keys.SHIFT + Keys.PAGE_DOWN)
         self.assertEqual(self.crosshair(), [x - 8, y + 1, z + 2])
         self.browser.js("document.querySelector('[data-tool=\"seed distal\"]').focus()")
-        self.css('[data-tool="seed distal"]').send_keys(Keys.ENTER)
+        self.find('[data-tool="seed distal"]').send_keys(Keys.ENTER)
         self.press("axial", Keys.ENTER)
         seeds = self.saved_when(lambda document: len(document["fragments"]["distal"]["seeds"]) == 2)
         self.assertEqual(seeds["fragments"]["distal"]["seeds"][1], [x - 8, y + 1, z + 2])
@@ -221,8 +177,7 @@ class CasePageTest(PageTest):
         self.with_ct()
         self.click('[aria-label="Go to seed 1 of distal"]')
         self.wait("document.querySelector('[data-slice=axial]').dataset.shown === '11'")
-        canvas = self.css('[data-slice="axial"]')
-        self.browser.js("arguments[0].scrollIntoView({block: 'center'})", canvas)
+        canvas = self.find_in_sight('[data-slice="axial"]')
         scale = self.browser.js("return arguments[0].clientWidth", canvas) / 40
         chain = ActionChains(self.browser.driver, duration=0)
         start = [(at + 0.5 - count / 2) * scale for at, count in zip(LOWER, SIZE[:2])]
@@ -245,7 +200,7 @@ class CasePageTest(PageTest):
         (self.folder / "scan" / "slice7-107.dcm").write_bytes(b"damaged")
         self.begin(ct={"file": "scan"})
         self.wait("!!document.querySelector('.ct-panel .fault')")
-        self.assertIn("slice7-107.dcm", self.css(".ct-panel .fault").text)
+        self.assertIn("slice7-107.dcm", self.find(".ct-panel .fault").text)
         self.assertEqual(self.browser.js("return document.querySelector('.ct-options').open"), True)
 
     def test_of_several_series_one_is_chosen(self):
@@ -254,7 +209,7 @@ class CasePageTest(PageTest):
         self.wait("document.querySelectorAll('[data-series]').length === 2")
         self.click('[data-series="1.2.826.0.1.3680043.2.1143.8.2"]')
         self.wait_for_slices()
-        self.assertIn("20 × 20 × 20 voxels", self.css(".ct-panel").text)
+        self.assertIn("20 × 20 × 20 voxels", self.find(".ct-panel").text)
         self.assertEqual(self.document()["ct"]["series_uid"], "1.2.826.0.1.3680043.2.1143.8.2")
 
     def test_faults_of_saving_are_listed(self):
@@ -288,7 +243,7 @@ class CasePageTest(PageTest):
             self.wait("!document.querySelector('[data-do=save]').disabled")
             self.click('[data-do="save"]')
             self.wait("document.querySelector('dialog[open] [data-lost]') !== null")
-            self.assertEqual(self.css("[data-lost]").text, "# the first")
+            self.assertEqual(self.find("[data-lost]").text, "# the first")
             self.click('#dialog [data-do="%s"]' % answer)
             self.wait("!document.getElementById('dialog').open")
             if is_saved:

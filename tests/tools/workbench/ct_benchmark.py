@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""How long a CT of 512 x 512 x 400 voxels takes to open and to segment, and its slices to follow the wheel. It
-prints figures and tests nothing.
+"""Measures how long a CT of 512 x 512 x 400 voxels takes to open and to segment, and how fast its slices follow the
+wheel. Prints figures and tests nothing.
 
     tests/tools/workbench/ct_benchmark.py
 """
@@ -58,10 +58,7 @@ class Benchmark(PageTest):
             },
         )
         self.show(self.open(), "case=c")  # the address of a server works in one browser
-        self.browser.wait(
-            "return [...document.querySelectorAll('[data-slice]')].every((one) => one.dataset.shown) &&"
-            " document.querySelectorAll('[data-slice]').length === 3"
-        )
+        self.wait_for_slices()
         self.browser.driver.set_script_timeout(300)
         for view in ("axial", "coronal", "sagittal"):
             times = self.browser.driver.execute_async_script(

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""The CT of the page "Case": how it is read and doubted, where its voxels are shown, and what the server says of it."""
+"""The CT of the page "Case": reading it, doubts about it, the places of its voxels, and the server's answers."""
 import array
 import json
 import math
@@ -136,7 +136,7 @@ class CtServerTest(BenchTest):
             "bone, or store it with larger voxels$",
         )
 
-    def test_a_ct_that_vanishes_stays_open_and_is_not_opened_anew(self):
+    def test_a_ct_that_vanishes_stays_open_and_is_not_opened_again(self):
         self.write("ct.mha")
         server = self.enter()
         name = self.opened(server, file="ct.mha")["result"]["name"]
@@ -192,18 +192,8 @@ class CtPageTest(PageTest):
 
     def choose(self, name):
         self.click('[data-do="choose-ct"]')
-        self.browser.wait("return !!document.querySelector('#dialog [data-choose=\"%s\"]')" % name)
         self.click('#dialog [data-choose="%s"]' % name)
         self.wait_for_slices()
-
-    def wait_for_slices(self):
-        self.browser.wait(
-            "return [...document.querySelectorAll('[data-slice]')].every((one) => one.dataset.shown) &&"
-            " document.querySelectorAll('[data-slice]').length === 3"
-        )
-
-    def click(self, selector):
-        self.browser.driver.find_element("css selector", selector).click()
 
     def test_what_is_clicked_comes_back_in_1000_geometries(self):
         """A voxel's centre that is drawn somewhere is what a click there means."""
@@ -276,7 +266,7 @@ class CtPageTest(PageTest):
             self.assertEqual(value_hu, 2000)
         for keys in ("+++", "-", "++"):  # closer, with another part of the slice in the middle
             for name in ("axial", "coronal", "sagittal"):
-                canvas = self.browser.driver.find_element("css selector", '[data-slice="%s"]' % name)
+                canvas = self.find('[data-slice="%s"]' % name)
                 self.browser.js("arguments[0].focus()", canvas)
                 canvas.send_keys(keys, Keys.SHIFT + Keys.ARROW_LEFT, Keys.SHIFT + Keys.ARROW_DOWN)
                 self.click_at(name, *self.middle_of_bright(name))
@@ -286,26 +276,13 @@ class CtPageTest(PageTest):
         from selenium.webdriver.common.actions.action_builder import ActionBuilder
 
         self.open_case(formats.straight((20, 20, 20)), 8000 * [-1000])
-        canvas = self.browser.driver.find_element("css selector", '[data-slice="axial"]')
-        self.browser.js("arguments[0].scrollIntoView({block: 'center'})", canvas)
+        canvas = self.find_in_sight('[data-slice="axial"]')
         for dx, dy, changed in ((60, 0, ("400", "2580")), (0, 40, ("480", "2580"))):
             builder = ActionBuilder(self.browser.driver, duration=0)
             builder.pointer_action.move_to(canvas).pointer_down(2).move_by(dx, dy).pointer_up(2)
             builder.perform()
             boxes = "[...document.querySelectorAll('.ct-panel input.short')].slice(-2).map((one) => one.value)"
             self.browser.wait("return %s.join() === '%s'" % (boxes, ",".join(changed)))
-
-    def go_to_slice(self, name, number):
-        self.browser.js(
-            """const slider = document.querySelector('[aria-label="' + arguments[0] + ' slice"][type="range"]');
-            slider.value = arguments[1];
-            slider.dispatchEvent(new Event('input'));""",
-            name,
-            number,
-        )
-        self.browser.wait(
-            "return document.querySelector('[data-slice=\"%s\"]').dataset.shown === '%d'" % (name, number)
-        )
 
     def middle_of_bright(self, name):
         """The middle of the white pixels of a slice."""
@@ -323,8 +300,7 @@ class CtPageTest(PageTest):
     def click_at(self, name, x, y):
         from selenium.webdriver import ActionChains
 
-        canvas = self.browser.driver.find_element("css selector", '[data-slice="%s"]' % name)
-        self.browser.js("arguments[0].scrollIntoView({block: 'center'})", canvas)
+        canvas = self.find_in_sight('[data-slice="%s"]' % name)
         size = canvas.size
         chain = ActionChains(self.browser.driver, duration=0)
         chain.move_to_element_with_offset(canvas, round(x - size["width"] / 2), round(y - size["height"] / 2))

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""What the page "Case" writes for other programs, and reads from their camera files."""
+"""The files that the page "Case" writes for other programs, and the camera files of these that it reads."""
 import json
 import shlex
 import subprocess

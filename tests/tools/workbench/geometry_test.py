@@ -1,10 +1,9 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""The geometry of the X-rays in the page "Case": what is clicked, projected and triangulated over random cameras and
-random ways to show an image. Expected values are computed with numpy by the formulas of docs/case.md, and by marrow."""
+"""The geometry of the X-rays on the page "Case": clicks, projections and triangulations with random cameras and random
+ways to show an image. Expected values are computed with numpy by the formulas of docs/case.md, and by marrow."""
 import json
 import subprocess
-import unittest
 
 import numpy
 

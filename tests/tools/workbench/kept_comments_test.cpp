@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A case that is saved again: comments stay with what did not change, and what is lost is told.
+// A case that is saved again: comments stay with the parts that did not change, and lost comments are reported.
 #include "workbench/kept_comments.hpp"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ fragments:
   # end of the fragments
 )";
 
-/// As the workbench writes the same case.
+/// The same case as the workbench writes it.
 const std::string kNewer = R"(marrow-case: 1
 ct: "ct.mha"
 views:
@@ -63,7 +63,7 @@ void expect_kept(const std::string& newer, const std::string& expected, const Lo
 
 TEST(KeptComments, TheSameCaseIsTheSameText) { expect_kept(kNewer, kOlder); }
 
-TEST(KeptComments, OnlyWhatChangedIsWrittenAnew) {
+TEST(KeptComments, OnlyWhatChangedIsWrittenAgain) {
   expect_kept(with(kNewer, "- [1, 2, 3]", "- [1, 2, 3.5]\n      - [7, 8, 9]"),
               with(kOlder, "seeds: [[1, 2, 3]]", "seeds:\n      - [1, 2, 3.5]\n      - [7, 8, 9]"));
   expect_kept(with(kNewer, "\"frontal.png\"", "\"other.png\""), with(kOlder, "frontal.png", "\"other.png\""));
@@ -79,7 +79,7 @@ TEST(KeptComments, ViewsAndFragmentsAreAdded) {
               with(kOlder, "[4, 5, 6]\n", "[4, 5, 6]\n  \"proximal\":\n    seeds:\n      - [4, 5, 6]\n"));
 }
 
-TEST(KeptComments, WhatIsTakenOutTakesItsCommentsWithIt) {
+TEST(KeptComments, WhatIsRemovedTakesItsCommentsWithIt) {
   const std::string start = kNewer.substr(kNewer.find("    start:"));
   expect_kept(
       with(kNewer, start, ""),
@@ -90,7 +90,7 @@ TEST(KeptComments, WhatIsTakenOutTakesItsCommentsWithIt) {
               {"# in the condyle"});
 }
 
-TEST(KeptComments, AViewThatIsTakenOutLosesThoseOfTheList) {
+TEST(KeptComments, ARemovedViewLosesTheCommentsOfTheList) {
   const auto kept = with_comments_of(kOlder, with(kNewer, "\"frontal\"", "\"oblique\""));
   EXPECT_EQ(kept.lost, (Lost{"# taken first", "# 12 March"}));
   EXPECT_NE(kept.text.find("# in the condyle"), std::string::npos);

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Masks that are painted on straightened images: what a pipeline gets from the saved case is what was painted."""
+"""Masks that are painted on straightened images: a pipeline gets exactly the painted mask from the saved case."""
 import subprocess
 
 import numpy
@@ -20,7 +20,7 @@ outputs: {view: case.views.frontal}
 
 
 def distorted(u, v):
-    """Where the original image shows a pixel of the straight one, by docs/method.md."""
+    """The place in the original image of a pixel of the straightened one, by docs/method.md."""
     intrinsics, _, _ = camera_matrices(0, 0)
     x, y = (u - intrinsics[0, 2]) / intrinsics[0, 0], (v - intrinsics[1, 2]) / intrinsics[1, 1]
     square = x * x + y * y
@@ -58,7 +58,7 @@ class DistortedMaskTest(XrayTest):
         return self.document()["views"][0].get("mask")
 
     def painted(self):
-        """Where the page shows the colour of what is masked over the grey image, as an image of truth values."""
+        """The pixels over which the page shows the colour of the mask, as an image of truth values."""
         script = """
             const canvas = document.querySelector('[data-view=frontal] canvas'), found = [];
             const [width, height] = arguments, zoom = Math.min(canvas.width / width, canvas.height / height);
@@ -75,7 +75,7 @@ class DistortedMaskTest(XrayTest):
         return numpy.array(self.browser.js(script, WIDTH, HEIGHT)).reshape(HEIGHT, WIDTH) > 0
 
     def saved_mask(self):
-        """The mask of the view that read.case gives, after saving the case."""
+        """Saves the case, and returns the mask of the view that read.case gives."""
         self.click('[data-do="save"]')
         self.wait_text("[data-saved]", "Saved in", 240)
         pipeline = self.scratch / "read.yaml"

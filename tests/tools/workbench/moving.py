@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the test of sequences on the page "Place" needs: a femur that moves through small X-rays, whose pose is known in
-each frame."""
+"""What the tests of sequences on the page "Place" need: a femur that moves through small X-rays. Its pose in each frame
+is known."""
 import pathlib
 import shutil
 import struct
@@ -68,7 +68,7 @@ NONE = ",".join(["NaN"] * 16)  # of a .tra file: no pose in this frame
 
 
 def line(pose):
-    """Of a .tra file."""
+    """A line of a .tra file."""
     return ",".join("%.17g" % value for row in pose for value in row)
 
 

@@ -184,7 +184,7 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-/// The lines of `before`, from 1, between the first and the last one that `after` has differently.
+/// The first and the last line of `before`, from 1, that differ in `after`.
 std::pair<std::size_t, std::size_t> changed_lines(const std::string& before, const std::string& after) {
   const auto a = lines_of(before), b = lines_of(after);
   std::size_t same = 0, behind = 0;
@@ -193,7 +193,7 @@ std::pair<std::size_t, std::size_t> changed_lines(const std::string& before, con
   return {same + 1, a.size() - behind};
 }
 
-/// All edits that can be made of a node: each option and wire changed, added and taken out, another node.
+/// All possible edits of a node: each option and wire changed, added and removed, and another node.
 std::vector<Edit> edits_of(const std::string& id, const YAML::Node& node) {
   std::vector<Edit> edits{
       {option, id, "new_option", "[1, 2]"}, {wire, id, "new_port", "other.output"}, {may_fail, id, "", "true"}};
@@ -271,7 +271,7 @@ TEST_F(EditedPipeline, IsThePipelineThatSetWouldGive) {
     }
 }
 
-TEST_F(EditedPipeline, TakingAnOptionOutGivesItsDefault) {
+TEST_F(EditedPipeline, RemovingAnOptionGivesItsDefault) {
   const std::string text =
       "marrow: 1\nname: p\nnodes:\n  c: {uses: test.constant, with: {value: 5, word: two}}\noutputs: {o: c}\n";
   const std::string without = edited_text(text, {option, "c", "word", {}});

@@ -323,7 +323,7 @@ class PipelinePageTest(PageTest, PipelineBench):
         self.browser.wait("return document.querySelectorAll('.outputs img').length === 2", 60)
         self.assertEqual(self.js("return document.querySelector('.outputs img').naturalWidth"), 96)
         self.click("[data-node=truth]")
-        self.browser.wait("return !!document.querySelector('.outputs canvas.scene')", 60)
+        self.browser.wait("return !!document.querySelector('.outputs canvas.surface')", 60)
         self.assertIn("triangles", self.text_of(".outputs [data-kind=mesh]"))
         self.assertEqual(self.browser.logs()[0], [])
 

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""How long the page "Place" takes from a change of the pose until both overlays are painted, in headless Chromium; the
-server's part of it; and the memory of server and page before and after 1,000 drags. Its figures are for people: no
-test depends on them.
+"""Measures how long the page "Place" takes from a change of the pose until both overlays are painted, in headless
+Chromium, and the server's part of this. Also measures the memory of server and page before and after 1,000 drags. The
+figures are for people: no test depends on them.
 
     tests/tools/workbench/place_speed.py [WIDTH_PX ...]
 """

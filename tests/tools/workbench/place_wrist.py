@@ -5,9 +5,9 @@
 
     tests/tools/workbench/place_wrist.py WRIST [PICTURES]      # WRIST: the folder with volumes, images, cameras
 
-The script acts as a person who sees where the bone belongs. It aims with the pointer at whole steps of 4 pixels and
-2 degrees. Where the bone belongs is the placement that is shipped for pipelines/wrist-intensity.yaml, which was made
-by hand, too. The result is compared with a registration from that placement.
+The script acts as a person who sees where the bone belongs. It aims with the pointer in whole steps of 4 pixels and 2
+degrees. Its goal is the placement by hand that is shipped for pipelines/wrist-intensity.yaml. The result is compared
+with a registration from that placement.
 """
 import json
 import math
@@ -49,7 +49,7 @@ def turned_about(axis, angle_deg):
 
 
 def displaced(pose, middle):
-    """20 degrees about, and 20 mm along, directions that are in no view's plane."""
+    """The pose rotated by 20 degrees and shifted by 20 mm, in directions that are in no view's plane."""
     generator = random.Random(1)
     direction = lambda: [generator.gauss(0, 1) for _ in range(3)]
     far = times(turned_about(direction(), 20), pose)
@@ -96,7 +96,7 @@ class Wrist(placing.PageOfCase, bench.PageTest):
         return math.degrees(math.atan2(v2 - v, u2 - u))
 
     def aim(self, view, goal):
-        """The bone is dragged to its place in a view, then turned there."""
+        """Drags the bone to its place in a view, then turns it there."""
         camera = self.camera(view)
         now, there = (seen(camera, self.middle(pose))[:2] for pose in (self.pose(), goal))
         steps = [AIM_PX * round((b - a) / AIM_PX) for a, b in zip(now, there)]
@@ -113,7 +113,7 @@ class Wrist(placing.PageOfCase, bench.PageTest):
             self.kept()
 
     def roll(self, goal):
-        """Keys that turn the bone about its long axis until it looks as it should."""
+        """Turns the bone about its long axis by keys until it looks as it should."""
         for step, key, other in ((5, "a", "d"), (1, "a", "d")):
             self.js("document.querySelector('.place-tools [data-value=\"%d\"]').click()" % step)
             best = placing.angle_deg(self.pose(), goal)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests of the page "Place" share: a femur whose pose is known, what a camera sees of it, and what a person
-does on the page."""
+"""What the tests of the page "Place" share: a femur with a known pose, its projection, and the actions of a person on
+the page."""
 import math
 import pathlib
 import shutil
@@ -101,7 +101,7 @@ class PageOfCase:
         )
 
     def touch(self, view, *steps):
-        """Fingers that come down at the first step, move from step to step and leave. A step is a pixel a finger."""
+        """Fingers touch at the first step, move from step to step and leave. A step has a pixel for each finger."""
         send = lambda kind, pixels: self.browser.driver.execute_cdp_cmd(
             "Input.dispatchTouchEvent",
             {

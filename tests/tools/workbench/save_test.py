@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Saving a draft as a case: it is read back, nothing that was there is lost, and each fault is said."""
+"""Saving a draft as a case: the case is read back, nothing in its folder is lost, and each fault is reported."""
 import json
 import os
 import shutil
@@ -65,7 +65,7 @@ class SaveTest(BenchTest):
         self.assertIn(fault, state["error"])
 
     def reads(self, case, *only):
-        """What `marrow run` says of the case."""
+        """Expects that `marrow run` reads the case."""
         arguments = ["run", SOURCE / "pipelines/workbench/case.yaml", "case=%s" % case, "--out", self.scratch / "out"]
         shutil.rmtree(self.scratch / "out", ignore_errors=True)
         for name in only or ("seeds", "views", "ct"):
@@ -209,7 +209,7 @@ class SaveTest(BenchTest):
         old = self.change(server, self.document())
         self.change(server, self.document())
         state = server.finish(server.json("POST", "/api/case/save", {"case": "cases/7", "revision": old})["job"])
-        self.assertEqual(state["error"], "this case was changed in another tab; look at it, and save again")
+        self.assertEqual(state["error"], "this case was changed in another tab; look at it and save again")
 
     def test_when_it_is_killed_the_old_case_or_the_new_one_is_there(self):
         server = self.enter()

@@ -28,7 +28,7 @@ class SegmentTest(BenchTest):
         return server.json("POST", "/api/segment", {"ct": ct, "fragments": fragments, "method": method, **more})["job"]
 
     def outlines(self, server, segmentation, axis, index):
-        """Of each fragment the ends of its lines, in indices of the two other axes."""
+        """The ends of the lines of each fragment, in indices of the two other axes."""
         query = "segmentation=%s&axis=%d&index=%d" % (segmentation, axis, index)
         status, headers, content = server.ask("GET", "/api/segmentation/outlines?" + query)
         self.assertEqual(status, 200, content)
@@ -53,7 +53,7 @@ class SegmentTest(BenchTest):
         self.assertEqual(state["state"], "done", state["error"])
         result = state["result"]
         self.assertEqual([event["stage"] for event in state["events"] if event["event"] == "grown"], ["full"])
-        self.assertEqual(list(result["volumes_ml"]), ["one"], "the other one is only kept apart")
+        self.assertEqual(list(result["volumes_ml"]), ["one"], "the other one is only separated from it")
         ball_ml = 4 / 3 * math.pi * radius**3 * 0.8 * 0.8 * 1.6 / 1000
         self.assertAlmostEqual(result["volumes_ml"]["one"] / ball_ml, 1, delta=0.1)
         for axis in range(3):

@@ -16,7 +16,7 @@ from placing import at
 
 
 def wish(**changes):
-    """What the page asks for to have the bone tracked."""
+    """The request of the page that tracks the bone."""
     asked = {"case": "case", "views": VIEWS, "frame_rate_hz": 60, "frames": FRAMES}
     return {**asked, "starts": {"bone": truth(1)}, "keyframes": {}, **changes}
 
@@ -30,7 +30,7 @@ class RequestsTest(Moving, BenchTest):
         self.assertEqual(state["error"], "")
 
     def marrow(self, *words):
-        """The command line in the open folder, with its own store."""
+        """Runs the command line in the opened folder, with its own store."""
         environment = {**bench.os.environ, "MARROW_CACHE": str(self.scratch / "another-store")}
         subprocess.run([MARROW, *words, "--quiet"], cwd=self.folder, check=True, env=environment)
 

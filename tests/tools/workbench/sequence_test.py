@@ -22,7 +22,7 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
     bone = "bone"
 
     def place(self, **options):
-        """The page with the sequence open, whose places were typed in."""
+        """Shows the page, types in where the frames are, and opens the sequence."""
         server = super().place(**options)
         self.press("open-sequence")
         for view, one in VIEWS.items():
@@ -57,7 +57,7 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         return {int(frame): one["pose"] for frame, one in (sequence["keyframes"].get("bone") or {}).items()}
 
     def put(self, frame, pose):
-        """Places the bone in a frame, as a person does who then sets the keyframe."""
+        """Places the bone in a frame and sets the keyframe, as a person does."""
         self.js("marrow.place().sequence.go(%d)" % frame)
         self.arrived(frame)
         self.js("marrow.place().show({bone: arguments[0]})", pose)
@@ -85,7 +85,7 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.assertEqual(self.status(), "Frame 3 of 6 · 0.033 s · bone: keyframe")
         self.keys("[")
         self.arrived(2)
-        self.assertEqual(self.pose(), self.keyframes()[3], "before the first keyframe, it is as in that")
+        self.assertEqual(self.pose(), self.keyframes()[3], "before the first keyframe, the pose is that of the first")
         self.assertEqual(self.status(), "Frame 2 of 6 · 0.017 s · bone: as in frame 3")
         self.keys("]", "]", "]", "k")
         self.browser.wait("return !!marrow.place().sequence.keyframes('bone')[5]")

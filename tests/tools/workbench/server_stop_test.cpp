@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The server of `marrow open` ends whenever it is told to.
+// The server of `marrow open` ends at any time when it is told to.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>

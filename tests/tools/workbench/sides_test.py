@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""What is said at once about an X-ray that may be mirrored."""
+"""The warnings about an X-ray that may be mirrored."""
 import json
 import struct
 import unittest

@@ -2,12 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The whole way in the browser: from a DICOM CT, two X-rays and the C-arm's angles to a registered pose. Mouse clicks
 are counted, and the command line finds the same pose from the saved case."""
-import json
 import os
 import shlex
 import shutil
 import subprocess
-import time
 import zlib
 
 import numpy
@@ -47,62 +45,35 @@ class WholeWayTest(PageTest):
             shutil.copy(case / view["image"], self.folder)
         self.clicks = 0
 
-    def css(self, selector):
-        self.browser.wait("return !!document.querySelector(%s)" % json.dumps(selector), 120)
-        return self.browser.driver.find_element("css selector", selector)
-
     def click(self, selector):
-        element = self.css(selector)
-        self.browser.js("arguments[0].scrollIntoView({block: 'center'})", element)
-        element.click()
+        super().click(selector)
         self.clicks += 1
-
-    def document(self):
-        return self.browser.driver.execute_async_script(
-            "fetch('api/draft?case=mine').then((answer) => answer.json())"
-            ".then((state) => arguments[0](state.document))"
-        )
-
-    def until(self, condition):
-        """Waits until what the server keeps fulfils it."""
-        end = time.monotonic() + 240
-        while not condition(self.document()):
-            self.assertLess(time.monotonic(), end, self.document())
-            time.sleep(0.05)
 
     def choose_ct(self):
         self.click('[data-do="choose-ct"]')
         self.click('#dialog [data-open="scan"]')
         self.click('#dialog [data-choose="scan"]')
-        self.browser.wait(
-            "return document.querySelectorAll('[data-slice]').length === 3 &&"
-            " [...document.querySelectorAll('[data-slice]')].every((one) => one.dataset.shown)"
-        )
+        self.wait_for_slices()
 
     def add_fragment(self, name, seed_mm):
-        """Its seed is put at the crosshair of the slices, which a click in one slice and the wheel have moved there."""
+        """Adds a fragment, and puts its seed into a slice by a click."""
         box = 'section[aria-label="Fragments"] input[type="text"]'
         self.click(box)
-        self.css(box).send_keys(name + Keys.ENTER)
-        self.until(lambda document: name in document["fragments"])
+        self.find(box).send_keys(name + Keys.ENTER)
+        self.saved_when(lambda document: name in document["fragments"])
         self.click('[data-tool="seed %s"]' % name)
         index = [
             round((mm - origin) / spacing)
             for mm, origin, spacing in zip(seed_mm, self.grid["origin_mm"], self.grid["spacing_mm"])
         ]
-        slider = self.css('input[aria-label="axial slice"]')
-        self.browser.js(
-            "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'))", slider, index[2]
-        )
-        self.browser.wait("return document.querySelector('[data-slice=axial]').dataset.shown === '%d'" % index[2])
+        self.go_to_slice("axial", index[2])
         self.click_axial(index)
-        self.until(lambda document: document["fragments"][name]["seeds"])
+        self.saved_when(lambda document: document["fragments"][name]["seeds"])
 
     def click_axial(self, index):
         from selenium.webdriver import ActionChains
 
-        canvas = self.css('[data-slice="axial"]')
-        self.browser.js("arguments[0].scrollIntoView({block: 'center'})", canvas)
+        canvas = self.find_in_sight('[data-slice="axial"]')
         width, height = self.browser.js(
             "const r = arguments[0].getBoundingClientRect(); return [r.width, r.height]", canvas
         )
@@ -119,11 +90,11 @@ class WholeWayTest(PageTest):
         self.click("#dialog details summary")
         self.click('#dialog [data-arm="beta_deg"]')
         for key, value in (("beta_deg", beta_deg), ("pixel_mm", 0.586)):
-            box = self.css('#dialog [data-arm="%s"]' % key)
+            box = self.find('#dialog [data-arm="%s"]' % key)
             box.clear()
             box.send_keys(str(value))
         box.send_keys(Keys.ENTER)
-        self.until(lambda document: any(one["name"] == view["name"] for one in document["views"]))
+        self.saved_when(lambda document: any(one["name"] == view["name"] for one in document["views"]))
 
     def make_case(self):
         """The case from the CT to the saved folder."""
@@ -145,7 +116,7 @@ class WholeWayTest(PageTest):
         self.click('#pages a[data-page="place"]')
         self.click('a[href="#place=mine"]')
         self.click('[data-do="register"]:not(:disabled)')
-        self.until(lambda document: "start" in document["fragments"]["distal"])
+        self.saved_when(lambda document: "start" in document["fragments"]["distal"])
         self.browser.wait("return !!document.querySelector('[data-judgement]')", 120)
         print("clicks: %d" % self.clicks)
         self.assertLessEqual(self.clicks, MOST_CLICKS)

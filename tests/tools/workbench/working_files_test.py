@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Files that `marrow open` made for itself: those that nothing uses any more are removed when it starts."""
+"""Files that `marrow open` makes for itself: it removes those that nothing uses any more when it starts."""
 import json
 import os
 import time

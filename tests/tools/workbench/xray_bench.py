@@ -7,10 +7,7 @@ import time
 import zlib
 
 import numpy
-from selenium.common.exceptions import StaleElementReferenceException
 from selenium.webdriver.common.action_chains import ActionChains
-from selenium.webdriver.common.by import By
-from selenium.webdriver.common.keys import Keys
 
 from bench import PageTest
 
@@ -57,7 +54,7 @@ def write_png(path, image, bits=16):
 
 
 def read_png(path):
-    """Of one channel of 8 bits, without filters other than those that copy or add the neighbours."""
+    """Reads a PNG of one channel of 8 bits."""
     data, at, body = path.read_bytes(), 8, b""
     while at < len(data):
         size, kind = struct.unpack(">I4s", data[at : at + 8])
@@ -81,7 +78,7 @@ def read_png(path):
 
 
 def shadow(view):
-    """Grey values from 20000 (air) down, of an ellipsoid with half axes 40, 30 and 400 mm, as of a limb."""
+    """Grey values of an ellipsoid, shaped like a limb, with half axes 40, 30 and 400 mm. Air has 20000."""
     intrinsics, rotation, shift = camera_matrices(*ANGLES[view])
     u, v = numpy.meshgrid(numpy.arange(WIDTH), numpy.arange(HEIGHT))
     rays = numpy.stack([u, v, numpy.ones_like(u)], -1) @ numpy.linalg.inv(intrinsics).T @ rotation
@@ -122,10 +119,10 @@ class XrayTest(PageTest):
         self.show(self.server, "case=knee", **how)
         self.browser.logs()
         if document and document.get("views"):
-            self.find("[data-check] > *")  # what comes last on the page, and moves what is below it
+            self.find("[data-check] > *")  # it comes last on the page, and moves everything below it
 
     def document(self):
-        """As the draft's file has it, which a crash would leave."""
+        """The document in the draft's file, as a crash would leave it."""
         lines = (self.folder / ".marrow" / "drafts" / "knee.jsonl").read_text().splitlines()
         steps, at = [], 0
         for line in map(json.loads, lines):
@@ -133,20 +130,6 @@ class XrayTest(PageTest):
                 steps, at = steps[: at + 1] + [line["document"]], len(steps[: at + 1])
             at += ("redo" in line) - ("undo" in line)
         return steps[at]
-
-    def find(self, selector, seconds=120):
-        self.browser.wait("return !!document.querySelector(%s)" % json.dumps(selector), seconds)
-        return self.driver.find_element(By.CSS_SELECTOR, selector)
-
-    def click(self, selector):
-        for _ in range(5):
-            try:
-                element = self.find(selector)
-                self.browser.js("arguments[0].scrollIntoView({block: 'center'})", element)
-                return element.click()
-            except StaleElementReferenceException:  # the page was drawn again between the two
-                pass
-        self.fail("%s is drawn anew again and again" % selector)
 
     def text(self, selector):
         return self.find(selector).text
@@ -164,8 +147,7 @@ class XrayTest(PageTest):
 
     def box(self, view):
         self.browser.wait("return !!document.querySelector('[data-view=\"%s\"] canvas')?.width" % view)
-        element = self.find('[data-view="%s"]' % view)
-        self.browser.js("arguments[0].scrollIntoView({block: 'center'})", element)
+        element = self.find_in_sight('[data-view="%s"]' % view)
         return element, self.browser.js(
             "const r = arguments[0].getBoundingClientRect(); return [r.left, r.top, r.width, r.height]", element
         )

@@ -42,7 +42,7 @@ class ViewsTest(XrayTest):
         self.wait_text("[data-figures]", "90.0°")
         self.wait_text("[data-figures]", "(0.0, 0.0, 0.0) mm in the world; they pass each other at 0.000 mm")
         self.wait_text("[data-figures]", "600 mm")
-        self.wait_text("[data-good]", "Nothing speaks against these cameras.")
+        self.wait_text("[data-good]", "No fault was found in these cameras.")
         self.wait_text("[data-check] code", "check-cameras.yaml")
         self.no_faults()
 

@@ -124,7 +124,7 @@ export class Table {
         Dom.select(
             'Variant', [['', 'all'], ...data.variants.map((variant, i) => [i, variant.name])], '', set('variant')),
         Dom.select('Case', [['', 'all'], ...data.cases.map((name, i) => [i, name])], '', set('case')), outcome,
-        el('label', {class: 'field'}, el('span', {}, 'Text'), this.text));
+        Dom.labelled('Text', this.text));
   }
 
   // The text that the filter searches.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Figures of one case and start: the optimizer's way down, and the cost about the result along each axis.
+// Figures of one case and start: the cost that the optimizer reached, and the cost about the result along each axis.
 import {el, number, svg} from './dom.js';
 import * as Plots from './plots.js';
 

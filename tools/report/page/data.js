@@ -15,7 +15,7 @@
 //   cases: ["case-01", ...], starts: ["0", ...]
 //   cells: [{id, variant, case, start (indices), status: "done" | "failed", reason, tries,
 //     success: bool | null (no limits),
-//     absent (why values are missing: a node failed that may fail; may be missing itself),
+//     absent (why values are missing: a node failed, and the run may go on without it; may be missing itself),
 //     initial_error, seconds, evaluations, cached_nodes, values: [number | null per metric],
 //     key (first digits of the digest of what the row was made from; null or missing if it is not known),
 //     verdict (the worst), failure_probability, verdicts: [{item, judgement: "trusted" | "doubtful" | "wrong",
@@ -142,7 +142,7 @@ export function load() {
   return index(complete(data));
 }
 
-// The outcome of a cell: a failed one gave no pose; a missed one gave a pose that is no success.
+// The outcome of a cell: a failed one gave no pose; a missed one gave a pose that is not a success.
 export function outcome(cell) {
   if (cell.status === 'failed') return 'failed';
   if (cell.success === true) return 'success';
@@ -159,15 +159,6 @@ export const worseEnd = (metric, item) => (metric.higher_is_better ? item.p5 : i
 
 export const isBetter = (metric, value, base) => (metric.higher_is_better ? value > base : value < base);
 
-// Wilson's 95 % interval of a proportion.
-export function wilson(count, of) {
-  if (!of) return {count, of, rate: null, low: null, high: null};
-  const z = 1.959964, rate = count / of, shrink = 1 + z * z / of;
-  const centre = (rate + z * z / (2 * of)) / shrink;
-  const half = z * Math.sqrt(rate * (1 - rate) / of + z * z / (4 * of * of)) / shrink;
-  return {count, of, rate, low: Math.max(0, centre - half), high: Math.min(1, centre + half)};
-}
-
 // Quantile of sorted numbers, linear between the two neighbours.
 export function quantile(sorted, fraction) {
   if (!sorted.length) return null;
@@ -175,7 +166,7 @@ export function quantile(sorted, fraction) {
   return sorted[low] + (position - low) * ((sorted[low + 1] ?? sorted[low]) - sorted[low]);
 }
 
-// The finite values of a metric, one variant's, with their cells.
+// The finite values of a metric for one variant, with their cells.
 export function valuesOf(data, variant, metric) {
   return data.cellsOf[variant]
       .filter((cell) => cell.status !== 'failed' && Number.isFinite(cell.values[metric]))

@@ -16,10 +16,7 @@ let opened = null;  // the dialog's 3D view, which holds memory of the graphics 
 
 const rows = (entries) =>
     el('div', {class: 'scroll'},
-       el('table', {class: 'values'},
-          el('tbody', {},
-             entries.filter((entry) => entry[1] !== null && entry[1] !== undefined && entry[1] !== '')
-                 .map(([name, value]) => el('tr', {}, el('th', {scope: 'row'}, name), el('td', {}, value))))));
+       Dom.valueTable(entries.filter((entry) => entry[1] !== null && entry[1] !== undefined && entry[1] !== '')));
 
 const startError = (data, cell) =>
     (data.initial_error && Number.isFinite(cell.initial_error) ?
@@ -121,7 +118,7 @@ export const reason = (cell) =>
          el('div', {}, el('h3', {}, 'Why it failed'), el('pre', {class: 'reason'}, cell.reason || 'no reason given')) :
          null);
 
-// What is missing because a node failed that may fail.
+// What is missing because a node failed; the run may go on without it.
 export const absent = (cell) =>
     (cell.absent ? el('div', {}, el('h3', {}, 'What is not there'), el('pre', {class: 'reason'}, cell.absent)) : null);
 
@@ -182,7 +179,7 @@ function show() {
   return dialog;
 }
 
-// Opens a cell. What lies beside the page is loaded, and shown as soon as it is there.
+// Opens a cell. Its part beside the page is loaded, and shown as soon as it is there.
 export function open(data, cell) {
   const dialog = show(), pair = data.pairOf(cell), shown = {};
   if (pair.part) {

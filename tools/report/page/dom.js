@@ -43,18 +43,20 @@ export function percent(share, decimals) {
 export const probability = (p) => (!Number.isFinite(p) ? '–' : p < 0.0001 ? '< 0.0001' : p.toFixed(p < 0.01 ? 4 : 3));
 export const withUnit = (value, unit) => number(value) + (unit && Number.isFinite(value) ? '\u00a0' + unit : '');
 
-// A labelled drop-down; options: [[value, text], ...] or [[group, [[value, text], ...]], ...].
+// A control below its label.
+export const labelled = (label, control) => el('label', {class: 'field'}, el('span', {}, label), control);
+
+// A drop-down with a label; options: [[value, text], ...] or [[group, [[value, text], ...]], ...].
 export function select(label, options, chosen, changed) {
   const option = ([value, text]) => el('option', {value, selected: String(value) === String(chosen)}, text);
   const items = options.map(
       (item) => (Array.isArray(item[1]) ? el('optgroup', {label: item[0]}, item[1].map(option)) : option(item)));
-  const box = el('select', {onchange: () => changed(box.value)}, items);
-  const field = el('label', {class: 'field'}, el('span', {}, label), box);
+  const box = el('select', {onchange: () => changed(box.value)}, items), field = labelled(label, box);
   field.box = box;
   return field;
 }
 
-// A row of buttons of which one is pressed.
+// A row of buttons. One of them is pressed.
 export function choice(label, options, chosen, changed) {
   const buttons = options.map(
       ([value, text]) =>
@@ -83,15 +85,18 @@ export function slider(label, value, changed) {
   const box =
       el('input',
          {type: 'range', min: 0, max: 100, value: Math.round(100 * value), oninput: () => changed(box.value / 100)});
-  const field = el('label', {class: 'field'}, el('span', {}, label), box);
-  field.box = box;
-  return field;
+  return labelled(label, box);
 }
+
+// A table of names and values.
+export const valueTable = (entries) => el(
+    'table', {class: 'values'},
+    el('tbody', {}, entries.map(([name, value]) => el('tr', {}, el('th', {scope: 'row'}, name), el('td', {}, value)))));
 
 export const button = (text, pressed, attributes) =>
     el('button', {type: 'button', onclick: pressed, ...attributes}, text);
 
-// Text to be typed into a shell, with a button that copies it. Opened from disk, a page may lack the clipboard's API.
+// A command for a shell, with a button that copies it. Opened from disk, a page may lack the clipboard's API.
 export function command(text) {
   const code = el('code', {}, text);
   const copy = button('Copy', async () => {
@@ -112,7 +117,7 @@ export const shellWord = (text) =>
     (/^[\w@%+:,.\/-]+$/.test(text) ? text : '\'' + String(text).replaceAll('\'', '\'\\\'\'') + '\'');
 export const shellPath = (path) => shellWord(path.startsWith('-') ? './' + path : path);
 
-// The box that says more about what the pointer is on: any element with data-tip.
+// A box that says more about the element under the pointer, if that has data-tip.
 export function startTooltip() {
   const box = document.body.appendChild(el('div', {id: 'tooltip', role: 'tooltip', hidden: true}));
   const place = (x, y) => {
@@ -123,7 +128,7 @@ export function startTooltip() {
     const holder = target && target.closest && target.closest('[data-tip]');
     box.hidden = !holder;
     if (!holder) return;
-    (holder.closest('dialog') || document.body).append(box);  // a dialog lies above all else
+    (holder.closest('dialog') || document.body).append(box);  // a dialog is above everything else
     box.textContent = holder.dataset.tip;
     place(x, y);
   };

@@ -50,7 +50,7 @@ export function drawDistribution(data, metricIndex, kind, width) {
   const {root, box: area, x} = Plots.frame({
     width,
     height: ROW_HEIGHT * rows.length + 62,
-    label: 'Distribution of ' + metric.label + ', a row a variant; the numbers are in the table of the result',
+    label: 'Distribution of ' + metric.label + ', one row for each variant; the numbers are in the table of the result',
     x: {kind, domain: Plots.domain(all.concat(drawn ? limit : []), kind, true), title: axisTitle(metric)}
   });
   if (drawn) {
@@ -92,7 +92,7 @@ const compared = (data) => data.variants.map((_, i) => i).filter((i) => i !== da
 const comparison = (data, variant, metric) =>
     data.comparisons.find((item) => data.variantIndex(item.variant) === variant && item.metric === metric.name);
 
-// Pairs that cannot be drawn, because only one of the two has a value.
+// Says how many pairs are not drawn because only one of the two has a value.
 function lostText(item) {
   const {runs_variant_lost: own, runs_baseline_lost: others} = item || {};
   return own || others ? '; it alone lost ' + own + ', the baseline alone ' + others : '';
@@ -107,11 +107,12 @@ export function drawDifferences(data, metricIndex, kind, width) {
   const sizes = rows.flat().map((item) => item.difference),
         typical = Data.quantile(sizes.map(Math.abs).sort((a, b) => a - b), 0.5) || 1;
   const found = variants.map((variant) => comparison(data, variant, metric)),
-        unit = 10 ** Math.floor(Math.log10(typical)) || typical;  // no power of ten is as small as the least double
+        unit = 10 ** Math.floor(Math.log10(typical)) || typical;  // for the least double, the power of ten is 0
   const {root, box: area, x} = Plots.frame({
     width,
     height: ROW_HEIGHT * rows.length + 62,
-    label: 'Difference of ' + metric.label + ' to the baseline, a row a variant; the numbers are in the table below',
+    label: 'Difference of ' + metric.label +
+        ' to the baseline, one row for each variant; the numbers are in the table below',
     x: {
       kind,
       unit,

@@ -10,8 +10,8 @@ const BOX = {
   rise: 46
 };
 
-// The layer of a node is the longest way to it from a node without inputs. A pipeline has no cycles; in a damaged one
-// the number of nodes is the limit.
+// The layer of a node is the length of the longest way to it from a node without inputs. A pipeline has no cycles. The
+// number of nodes limits the rounds for a damaged one that has.
 function layersOf(nodes, edges) {
   const layer = new Map(nodes.map((node) => [node.id, 0]));
   for (let round = 0; round < nodes.length; ++round) {
@@ -24,7 +24,7 @@ function layersOf(nodes, edges) {
     }
     if (!changed) break;
   }
-  for (const node of nodes) {  // what needs nothing stands right above its first use
+  for (const node of nodes) {  // a node without inputs is right above its first user
     const uses = edges.filter((edge) => edge.from === node.id).map((edge) => layer.get(edge.to));
     if (uses.length && !edges.some((edge) => edge.to === node.id))
       layer.set(node.id, Math.max(0, Math.min(...uses) - 1));
@@ -32,8 +32,8 @@ function layersOf(nodes, edges) {
   return layer;
 }
 
-// Rows of items, with a place held in every layer that an edge crosses, so that edges pass between the boxes; edges
-// that leave one node share these places.
+// Rows of items. An edge holds a place in every layer that it crosses, so that edges pass between the boxes. Edges that
+// leave the same node share these places.
 function rowsOf(nodes, edges) {
   const layer = layersOf(nodes, edges), rows = [];
   const place = (item, at) => ((rows[at] = rows[at] || []).push(item), item);

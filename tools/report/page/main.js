@@ -41,25 +41,24 @@ function skewed(data) {
 function metricFigure(data, kinds, extra, draw) {
   const state = {metric: 0, kind: kinds[skewed(data) ? 1 : 0][0], extra: extra && extra.options[0][0]};
   const place = Plots.responsive((width) => draw(state, width)), again = () => place.redraw();
-  const toolbar =
-      el('div', {class: 'toolbar'},
-         data.metrics.length > 1 && Dom.select('Metric', data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => {
-           state.metric = Number(i);
-           again();
-         }), extra && Dom.choice(extra.label, extra.options, state.extra, (value) => {
-           state.extra = value;
-           again();
-         }), Dom.choice('Scale', kinds, state.kind, (kind) => {
-           state.kind = kind;
-           again();
-         }));
+  const toolbar = el('div', {class: 'toolbar'}, Summary.metricChoice(data, (i) => {
+    state.metric = i;
+    again();
+  }), extra && Dom.choice(extra.label, extra.options, state.extra, (value) => {
+    state.extra = value;
+    again();
+  }), Dom.choice('Scale', kinds, state.kind, (kind) => {
+    state.kind = kind;
+    again();
+  }));
   return el('div', {}, toolbar, place);
 }
 
 function distributions(data) {
   return section(
       'distributions', 'Distributions',
-      'A mark a run; the box spans the quartiles, its bar the median, the whiskers the 5th to the 95th percentile. ' +
+      'Each mark is a run. The box spans the quartiles, its bar is the median, and the whiskers reach from the ' +
+          '5th to the 95th percentile. ' +
           'Click a mark to open its run.',
       metricFigure(
           data, [['linear', 'linear'], ['log', 'log']], null,
@@ -75,7 +74,7 @@ function paired(data) {
   return section(
       'paired', 'Against the baseline',
       'Each case and start, run with a variant and with ' + data.variants[data.baseline].name +
-          '. Left of zero the variant is better; right of zero for figures of which higher is better. ' +
+          '. Left of zero the variant is better; right of zero if a higher figure is better. ' +
           'The black bar is the estimated difference with its 95 % interval.',
       metricFigure(
           data, [['linear', 'linear'], ['signed', 'log']],
@@ -93,10 +92,9 @@ function capture(data) {
                  el('li', {style: '--mark: ' + Plots.colour(i)}, variant.name + ': ' + Figures.captureRange(data, i))));
   return section(
       'capture', 'Capture range',
-      'How far from the truth a start may lie: up to the given error, each bin of starts ' +
-          'has a success rate of 95 % or more. ' +
-          'Bars are 95 % intervals, which know that the starts of a case are not independent. ' +
-          'Failed runs count as no success.',
+      'How far from the truth a start may be: up to the given error, each bin of starts has a success rate of 95 % ' +
+          'or more. Bars are 95 % intervals; they take into account that the starts of a case are not independent. A ' +
+          'failed run is not a success.',
       ranges, Plots.legend(data.variants), Plots.responsive((width) => Figures.drawCapture(data, bins, width)),
       el('details', {}, el('summary', {}, 'The counts'), Figures.captureTable(data, bins)));
 }
@@ -118,7 +116,7 @@ function tuning(data) {
       section(
              'tuning', 'Tuning',
              'An optimizer chose the tuned variant’s options on training cases. ' +
-                 'All other sections but the response to options are of the cases that were held out.',
+                 'The response to options is of these cases, too. All other sections are of the held-out cases.',
              figure);
 }
 
@@ -129,12 +127,7 @@ function byCase(data) {
       'by-case', 'Case by case',
       'The median over a case’s starts, and how many of them end in success. ' +
           'Sort by a column to find the hard cases.',
-      data.metrics.length > 1 &&
-          el('div', {class: 'toolbar'},
-             Dom.select(
-                 'Metric', data.metrics.map((metric, i) => [i, metric.label]), 0,
-                 (i) => place.replaceChildren(Summary.caseTable(data, Number(i))))),
-      place);
+      Summary.metricBar(data, (i) => place.replaceChildren(Summary.caseTable(data, i))), place);
 }
 
 // Pictures, 3D view, convergence and landscapes of one case and start, chosen once for all of them.
@@ -208,8 +201,8 @@ function closer(data) {
     kinds.has('pictures') &&
         section(
             'pictures', 'Pictures',
-            many ? 'Two variants on the same X-ray. Arrow keys move the wipe; in a blink the space bar switches.' :
-                   'Two pictures on each other. Arrow keys move the wipe; in a blink the space bar switches.',
+            (many ? 'Two variants on the same X-ray.' : 'Two pictures on top of each other.') +
+                ' Arrow keys move the wipe; in a blink the space bar switches.',
             picker(), places.pictures,
             data.is_run && data.cells[0] &&
                 el('details', {open: true}, el('summary', {}, 'All pictures'),
@@ -217,8 +210,8 @@ function closer(data) {
     kinds.has('scene') &&
         section(
             'scene', '3D view',
-            'The model in the pose that was found, in the true one and at the start, ' +
-                'among the X-rays or through the eye of one.',
+            'The model in the found pose, in the true pose and at the start, among the X-rays or as one of them ' +
+                'sees it.',
             picker(), places.scene),
     kinds.has('convergence') &&
         section(
@@ -243,7 +236,7 @@ function sequence(data) {
                  null;
 }
 
-const nothing = (what) => el('p', {class: 'note'}, 'Of this case and start no ' + what + ' was kept.');
+const nothing = (what) => el('p', {class: 'note'}, 'No ' + what + ' of this case and start was kept.');
 
 function whenNear(place, action) {
   const observer = new IntersectionObserver(
@@ -264,11 +257,7 @@ function repeat(data) {
   ].filter((line) => line[1] !== undefined && line[1] !== null && line[1] !== '');
   return section(
       'repeat', 'Repeat it', null, experiment.command && Dom.command(experiment.command),
-      el('div', {class: 'scroll'},
-         el('table', {class: 'values'},
-            el('tbody', {},
-               lines.map(
-                   ([name, value]) => el('tr', {}, el('th', {scope: 'row'}, name), el('td', {}, String(value))))))),
+      el('div', {class: 'scroll'}, Dom.valueTable(lines.map(([name, value]) => [name, String(value)]))),
       file(data.is_run ? 'The run’s settings' : 'The experiment’s file', experiment.text),
       file('The pipeline’s file', experiment.pipeline_text),
       (experiment.plugins || []).length > 0 &&
@@ -286,7 +275,7 @@ function summary(data) {
   const {experiment} = data, cell = data.cells[0], judged = data.is_run && cell && Verdict.all(data, cell);
   const verdict = judged && section('verdict', 'Verdict', null, judged);
   const head = section(
-      'summary', data.is_run ? 'Result' : 'Result', null,
+      'summary', 'Result', null,
       ...(data.is_run ?
               (cell ? [Detail.reason(cell), Detail.absent(cell), Detail.values(data, cell), ...Detail.figures(data)] :
                       []) :
@@ -317,8 +306,8 @@ function build(data) {
   }
   if (many) {
     shown.table = new Cells.Table(data);
-    const intro = 'Click a row for all of one run; its address in the browser’s bar is a link to it. Only the rows ' +
-        'that are seen are drawn, so Ctrl+F goes to the filter here.';
+    const intro = 'Click a row for all of one run; its address in the browser’s bar is a link to it. Only the ' +
+        'visible rows are drawn, so Ctrl+F goes to the filter instead.';
     add(section('cells', 'All runs', intro, shown.table.element),
         section('failures', 'Failures', null, Cells.failures(data)));
   }

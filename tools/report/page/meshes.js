@@ -3,10 +3,11 @@
 
 const cache = new Map();
 
-function decode(text) {
+// The bytes of a text in base64.
+export function decoded(text) {
   const raw = atob(text), bytes = new Uint8Array(raw.length);
   for (let i = 0; i < raw.length; ++i) bytes[i] = raw.charCodeAt(i);
-  return bytes.buffer;
+  return bytes;
 }
 
 // The buffers of a scene's mesh, decoded once: its own, or the shared one that it names.
@@ -15,9 +16,10 @@ export function buffers(data, sceneId, meshIndex) {
         key = mesh.geometry ? 'shared ' + mesh.geometry : sceneId + ' ' + meshIndex;
   if (!cache.has(key)) {
     const source = mesh.geometry ? data.geometries[mesh.geometry] : mesh;
-    cache.set(
-        key,
-        {vertices: new Float32Array(decode(source.vertices)), triangles: new Uint32Array(decode(source.triangles))});
+    cache.set(key, {
+      vertices: new Float32Array(decoded(source.vertices).buffer),
+      triangles: new Uint32Array(decoded(source.triangles).buffer)
+    });
   }
   return cache.get(key);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What does not fit into the page is beside it, in the folder report/: a file for each case and start, which is loaded
-// on demand. A file is named after its content, so a page never shows that of another report. It
-// has three lines: Parts.take("NAME",  /  the data as JSON  /  );
+// on demand. A file is named after its content, so a page never shows a file of another report. A file has three lines:
+// Parts.take("NAME",  /  the data as JSON  /  );
 //
 // A page from disk may load scripts, and nothing else. A page in a frame of marrow's workbench may load nothing: the
 // workbench, which says so by a message, reads the file for it.

@@ -22,7 +22,7 @@ function sideControls(data, letter, side, names, many, changed) {
 }
 
 export class Comparer {
-  // pair: {cells: [per variant]}; same: both sides show the picture of one name
+  // pair: {cells: [per variant]}; this.same: both sides show pictures of the same name
   constructor(data, pair) {
     this.data = data;
     this.pair = pair;
@@ -164,7 +164,7 @@ export class Comparer {
       if (!source) absent.push(title);
     });
     this.missing.hidden = !absent.length;
-    this.missing.textContent = 'Of this case and start no such picture was kept of: ' + absent.join(', ') + '.';
+    this.missing.textContent = 'No such picture of this case and start was kept for: ' + absent.join(', ') + '.';
   }
 
   fit() {

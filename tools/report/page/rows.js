@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// A table of any number of rows. Only visible rows are drawn, so thousands sort and filter at once. It tells how many
-// rows it has and which are visible. The arrow keys move from row to row.
+// A table of any number of rows. Only visible rows are drawn, so that thousands are sorted and filtered at once. Screen
+// readers are told how many rows there are, and which are visible. The arrow keys move from row to row.
 import * as Dom from './dom.js';
 import {el} from './dom.js';
 
-const MORE = 4;  // rows that are drawn above and below those that are seen, so that scrolling shows no gap
+const MORE = 4;  // further rows that are drawn above and below the visible ones, so that scrolling shows no gap
 
-// Places of the items in ascending order of key(item), a text or a number. Equal ones keep their order; those without
-// a key come last, also if `down`.
+// The places of the items, sorted by key(item), a text or a number: ascending, or descending if `down`. Items with
+// equal keys keep their order. Items without a key always come last.
 export function order(items, key, down) {
   const keys = items.map(key), collator = new Intl.Collator(undefined, {numeric: true});
   const texts = [...new Set(keys.filter((one) => typeof one === 'string'))].sort(collator.compare);
@@ -54,7 +54,7 @@ export class Table {
     new ResizeObserver(() => this.draw()).observe(this.element);
   }
 
-  // Draws these items from the first one on; the column of this number is the sorted one.
+  // Draws these items from the first one on. `sorted`: the number of the sorted column.
   show(items, sorted, down) {
     this.items = items;
     this.current = 0;
@@ -96,7 +96,7 @@ export class Table {
     }
   }
 
-  // One button of all rows is reached by the tabulator; the arrow keys go on from there.
+  // The Tab key reaches only one button of all rows; the arrow keys go on from there.
   row(i) {
     const item = this.items[i];
     const row =

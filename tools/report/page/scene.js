@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The 3D view: models in the result's, the true and the start's pose, among the X-rays or seen through one of them.
+// The 3D view: models in the pose of the result, the true pose and the start, among the X-rays or as one of them sees
+// it.
 import * as THREE from 'three';
 
 import {button, checkbox, el, select, slider} from './dom.js';
@@ -35,7 +36,7 @@ export class SceneView {
 
   open() {
     if (!THREE.WebGLRenderer)
-      return 'The 3D view was left out: three.js was not at hand when this report was written ' +
+      return 'The 3D view was left out: three.js was missing when this report was written ' +
           '(Debian package libjs-three).';
     try {
       this.renderer =
@@ -78,7 +79,7 @@ export class SceneView {
     this.draw();
   }
 
-  // A point from which all X-rays are seen from the front: the mean side of their sources.
+  // The direction from which all X-rays are seen from the front: the mean direction of their sources.
   facing() {
     const [x, y] = [8, 9].map((i) => -this.source.views.reduce((sum, view) => sum + view.camera_from_world[i], 0));
     return Math.hypot(x, y) > 0.01 ? Math.atan2(y, x) * 180 / Math.PI + 12 : -65;

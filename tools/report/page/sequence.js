@@ -16,8 +16,8 @@ function partsOf(name) {
   return at < 0 ? null : {frame: parts[at], name: parts.filter((_, i) => i !== at).join('/')};
 }
 
-// {frames: [names in order], films: Map(name -> Map(frame -> picture id)), ways: trajectories}; null if a run has no
-// sequence.
+// {frames: [names in order], films: Map(name -> Map(frame -> picture id)), ways: trajectories}; null for a run without
+// a sequence.
 export function of (cell) {
   const films = new Map();
   for (const entry of cell.pictures) {

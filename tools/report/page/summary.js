@@ -20,7 +20,7 @@ export function facts(data) {
       '.';
 }
 
-// The main metric's sentences; where it has none, all.
+// The sentences about the main metric; all sentences if it has none.
 export function verdicts(data) {
   const main = data.metrics[0] && data.comparisons.filter((item) => item.metric === data.metrics[0].name);
   const shown = (main && main.length ? main : data.comparisons).filter((item) => item.sentence);
@@ -51,14 +51,14 @@ const spread = (item, unit) =>
          [number(item.median), ' ', el('small', {}, '[' + number(item.q1) + ', ' + number(item.q3) + ']')] :
          '–');
 
-// Where bounds are known, the median's.
+// With the bounds of the median, where they are known.
 const median = (item) =>
     (item && Number.isFinite(item.median_low) ?
          el('span', {'data-tip': '95 % interval ' + number(item.median_low) + ' to ' + number(item.median_high)},
             spread(item)) :
          spread(item));
 
-// Runs that failed, and those that are done without a figure whose node may fail.
+// Runs that failed, and runs that went on without a figure because its node may fail.
 const lost = ({failed, incomplete}) =>
     [String(failed ?? '–'),
      incomplete > 0 &&
@@ -157,6 +157,12 @@ export function sortable(rows, all, state, caption) {
          body));
 }
 
+// The choice of a metric; false if there is only one.
+export const metricChoice = (data, changed) => data.metrics.length > 1 &&
+    select('Metric', data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => changed(Number(i)));
+export const metricBar = (data, changed) =>
+    data.metrics.length > 1 && el('div', {class: 'toolbar'}, metricChoice(data, changed));
+
 export function table(data) {
   const place = el('div'), state = {};
   const show = (metric) => place.replaceChildren(
@@ -166,16 +172,11 @@ export function table(data) {
       ...(data.metrics[metric].same_runs === false ? [el('p', {class: 'note'}, OTHER_RUNS)] : []));
   if (!data.metrics.length) return null;
   show(0);
-  return el(
-      'div', {},
-      data.metrics.length > 1 &&
-          el('div', {class: 'toolbar'},
-             select('Metric', data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => show(Number(i)))),
-      place);
+  return el('div', {}, metricBar(data, show), place);
 }
 
-// Shows which cases are hard: each case's median and successes, a column for each variant. Without limits of success,
-// the number of starts with the figure.
+// Shows which cases are hard: each case's median and successes, with a column for each variant. Without limits of
+// success, it counts the starts that have the figure.
 export function caseTable(data, metric) {
   const cells = data.variants.map(() => data.cases.map(() => []));
   for (const cell of data.cells) cells[cell.variant][cell.case].push(cell);
@@ -210,13 +211,13 @@ export function caseTable(data, metric) {
       data.cases.map((_, i) => i), all, {}, 'Medians and successes of each case: ' + data.metrics[metric].label);
 }
 
-// The median difference, or who fails more often where that decides.
+// The median difference. If failures decide, says who fails more often.
 function difference(item, unit) {
   if (Number.isFinite(item.difference)) return withUnit(item.difference, unit);
   return {variant: 'fails more often', baseline: 'the baseline fails more often'}[item.fails_more] || '–';
 }
 
-// A bound that is no number stands for a failure of one of the two. If both are missing, there are too few cases.
+// A bound that is not a number stands for a failure of one of the two. Without both bounds, there are too few cases.
 function interval(item, metric) {
   if (!Number.isFinite(item.low) && !Number.isFinite(item.high)) return '–';
   const failure = (is_high) => (is_high !== Boolean(metric.higher_is_better) ? 'a failure' : 'the baseline’s failure');

@@ -20,7 +20,7 @@ const list = (title, texts) =>
     (texts.length ? [el('h3', {}, title), el('ul', {class: 'verdict-list'}, texts.map((text) => el('li', {}, text)))] :
                     []);
 
-// Of the outputs with pictures of this item, those that show the result; else those of the first output.
+// The pictures of an item that show the result; otherwise those of the first output with pictures of it.
 function overlays(cell, item) {
   const parts = (entry) => entry.name.split('/');
   const own = cell.pictures.filter((entry) => !item || parts(entry).slice(1).includes(item));
@@ -50,14 +50,17 @@ function pose(entry) {
                  text(3, ' mm')));
 }
 
+// The judgement, its reasons, and what would settle it.
+export const words = (verdict) =>
+    [el('p', {class: 'verdict-head'}, verdict.item && el('span', {}, verdict.item + ': '),
+        el('strong', {}, verdict.judgement), ' ', el('small', {}, failure(verdict.failure_probability))),
+     ...list('Why', verdict.reasons), ...list('What would settle it', verdict.remedies)];
+
 function one(data, cell, verdict) {
   const pictures = overlays(cell, verdict.item),
         poses = cell.poses.filter((entry) => !verdict.item || entry.name.split('/').includes(verdict.item));
   return el(
-      'article', {class: 'verdict ' + verdict.judgement},
-      el('p', {class: 'verdict-head'}, verdict.item && el('span', {}, verdict.item + ': '),
-         el('strong', {}, verdict.judgement), ' ', el('small', {}, failure(verdict.failure_probability))),
-      list('Why', verdict.reasons), list('What would settle it', verdict.remedies),
+      'article', {class: 'verdict ' + verdict.judgement}, words(verdict),
       pictures.length > 0 &&
           el('div', {class: 'overlays'},
              pictures.map(
@@ -82,8 +85,8 @@ export function table(data) {
   return el(
       'div', {}, el('h3', {}, 'Verdicts'),
       el('p', {class: 'note'},
-         'A silent failure is a run that is no success, and whose verdict is “trusted”. A false alarm is a success ' +
-             'whose verdict is “doubtful” or “wrong”.'),
+         'A silent failure is a run that is no success, although its verdict is “trusted”. A false alarm is a ' +
+             'success with the verdict “doubtful” or “wrong”.'),
       Summary.sortable(
           data.variants.map((_, i) => i),
           [

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page "Case". Its parts are panels: each shows a part of the draft's document and changes it.
-import {button, el} from '../../report/page/dom.js';
+import {el} from '../../report/page/dom.js';
 
 import {CaseDraft} from './draft.js';
 import * as Shell from './shell.js';
 
 const panels = [];
-const keys = [['Ctrl+z', 'undo', () => draft.undo()], ['Ctrl+y or Ctrl+Z', 'redo', () => draft.redo()]];
+const keys = [['Ctrl+z', 'undo', () => draft.step('undo')], ['Ctrl+y or Ctrl+Z', 'redo', () => draft.step('redo')]];
 let draft = null, open = [];
 
 // Adds a panel. make(draft) returns {element, update(), dispose()}; update() is called after each change of the
@@ -18,17 +18,13 @@ export function panel(title, order, make, more_keys = []) {
 }
 
 function bar() {
-  const undo = button('Undo', () => draft.undo(), {'data-do': 'undo'});
-  const redo = button('Redo', () => draft.redo(), {'data-do': 'redo'});
+  const changes = Shell.undoButtons((way) => draft.step(way));
   const state = el('span', {class: 'note', role: 'status'});
   const update = () => {
-    undo.disabled = draft.state_undo === null;
-    undo.title = draft.state_undo ? 'Undo: ' + draft.state_undo : 'There is nothing to undo';
-    redo.disabled = draft.state_redo === null;
-    redo.title = draft.state_redo ? 'Redo: ' + draft.state_redo : 'There is nothing to redo';
+    changes.update(draft.state_undo, draft.state_redo);
     state.textContent = draft.is_saved ? 'saved' : 'kept as a draft';
   };
-  return {element: el('div', {class: 'toolbar'}, undo, redo, state), update};
+  return {element: el('div', {class: 'toolbar'}, changes.boxes, state), update};
 }
 
 async function show(place, parameters, first) {

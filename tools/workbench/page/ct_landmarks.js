@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The panel "Landmarks in the CT": named points of a bone, put into the slices. Where they are seen in the X-rays is
-// kept in the same landmarks by another panel.
+// The panel "Landmarks in the CT": named points of a bone, placed in the slices. Another panel adds their places in the
+// X-rays to the same landmarks.
 import {button, el, select} from '../../report/page/dom.js';
 
 import * as CasePage from './case.js';
@@ -24,7 +24,7 @@ function place(draft, state, name, point_mm, what) {
 
 const actions = (draft, state, name) => ({
   moveTo: (point_mm) => place(draft, state, name, point_mm, 'move'),
-  // Removes only its place in the CT. The landmark and its pixels stay.
+  // Removes only the place in the CT. The landmark and its pixels stay.
   remove: () =>
       draft.change('remove the landmark ' + name + ' from the CT', (document) => delete find(document, name).model_mm)
 });

@@ -15,15 +15,14 @@ const PRESETS = [['bone', 'Bone', 400, 1800], ['soft', 'Soft tissue', 40, 400]];
 
 const numberOf = (box) => (box.value.trim() === '' ? null : Number(box.value));
 
-// How the file is read where it does not say everything. changed(options) gets the keys of a case's `ct`.
+// The options of reading, for files that do not say everything. changed(options) gets the keys of a case's `ct`.
 function optionsForm(changed) {
-  const number = (label) =>
-      el('label', {class: 'field'}, el('span', {}, label), el('input', {type: 'number', step: 'any', class: 'short'}));
+  const number = (label) => Dom.labelled(label, el('input', {type: 'number', step: 'any', class: 'short'}));
   const box = (field) => field.querySelector('input');
   const sizes = ['x', 'y', 'z'].map((axis) => number('voxel ' + axis + ', mm'));
   const offset = number('offset, HU');
   const flips = ['x', 'y', 'z'].map((axis) => Dom.checkbox('flip ' + axis, false, () => {}));
-  const series = el('label', {class: 'field'}, el('span', {}, 'series UID'), el('input', {type: 'text'}));
+  const series = Dom.labelled('series UID', el('input', {type: 'text'}));
   function read() {
     const size = sizes.map((field) => numberOf(box(field))), options = {};
     if (size.some((value) => value !== null)) {
@@ -55,7 +54,7 @@ function optionsForm(changed) {
          sizes, flips, offset, series, el('button', {type: 'submit', 'data-do': 'read-ct'}, 'Read again'));
   const element =
       el('details', {class: 'ct-options'}, el('summary', {}, 'How it is read'),
-         el('p', {class: 'note'}, 'Only where its files do not say it, or say it wrongly.'), form);
+         el('p', {class: 'note'}, 'Needed only if its files do not say it, or are wrong.'), form);
   return {element, fill};
 }
 
@@ -65,7 +64,7 @@ async function choose(draft) {
       {folders: true, accepts: (name) => VOLUME.test(name), at: startOf(draft)});
   if (file !== undefined) draft.change('choose the CT ' + file, (document) => (document.ct = {file}));
 }
-// The chooser begins beside the present CT.
+// The chooser begins in the folder of the present CT.
 const startOf = ({document: {ct}}) => (ct ? ct.file.split('/').slice(0, -1).join('/') : '');
 
 // A button for each series of the folder, if the fault lists them.
@@ -85,12 +84,11 @@ function windowBar(state) {
   const level = el('input', {type: 'number', class: 'short', onchange: () => take()});
   const width = el('input', {type: 'number', class: 'short', min: 1, onchange: () => take()});
   const take = () => state.setWindow(Number(level.value), Number(width.value));
-  const field = (label, box) => el('label', {class: 'field'}, el('span', {}, label), box);
   return {
     element:
         el('div', {class: 'toolbar'},
            el('span', {class: 'field'}, el('span', {}, 'Window'), el('span', {class: 'choice'}, presets, all)),
-           field('level, HU', level), field('width, HU', width)),
+           Dom.labelled('level, HU', level), Dom.labelled('width, HU', width)),
     update() {
       if (document.activeElement !== level) level.value = state.window.level;
       if (document.activeElement !== width) width.value = state.window.width;
@@ -100,7 +98,7 @@ function windowBar(state) {
   };
 }
 
-// What is at the crosshair, or under the pointer.
+// The place and the value at the crosshair and under the pointer.
 function readout(state, views) {
   const here = el('span', {'data-read': 'crosshair'}), pointer = el('span', {'data-read': 'pointer'});
   const words = (point_mm, value_hu) =>

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The CT of the case that is open, and what its panels share: the crosshair, the window, what a click does, and what is
-// drawn over the slices. Events: 'ct' (another CT, or a fault), 'slice' (values of a slice have come), 'view' (anything
-// else).
+// The CT of the open case, and what its panels share: the crosshair, the window, the tool of a click, and the drawings
+// over the slices. Events: 'ct' (another CT, or a fault), 'slice' (the values of a slice have arrived), 'view'
+// (anything else).
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
 import * as SliceGeometry from './slice_geometry.js';
 
 export class CtState extends EventTarget {
-  // The panels of one page share one.
+  // All panels of a draft share one state.
   static of(draft) {
     if (!CtState.known.has(draft)) CtState.known.set(draft, new CtState(draft));
     return CtState.known.get(draft);
@@ -53,14 +53,14 @@ export class CtState extends EventTarget {
     } catch (error) {
       fault = error.message;
     }
-    if (this.read !== wanted) return;  // another one was chosen in the meantime
+    if (this.read !== wanted) return;  // another CT was chosen in the meantime
     const is_other = !isAgain && ct && !(before && before.name === ct.name);
     Object.assign(this, {ct, fault, isReading: false});
     if (is_other) this.cursor_mm = SliceGeometry.point(ct, ct.size.map((n) => Math.floor(n / 2)));
     this.tell('ct');
   }
 
-  // int16 in HU, as slice_of() of the server gives them.
+  // The values of a slice: int16 in HU, in the order of the server's slice_of().
   async slice(axis, index, signal) {
     const name = this.ct.name;
     try {

@@ -22,8 +22,8 @@ export class CaseDraft extends EventTarget {
     this.dispatchEvent(new Event('change'));
   }
 
-  // Changes a copy of the document and sends it to the server. "Undo" shows `what`, such as "move landmark tip".
-  // Changes are made one after the other. Resolves to whether the server kept it; if not, the page says why.
+  // Changes a copy of the document and sends it to the server, one change after the other. "Undo" shows `what`, such as
+  // "move landmark tip". Resolves to whether the server kept the change; if not, the page says why.
   change(what, mutate) {
     return this.after(() => {
       const document = structuredClone(this.document);
@@ -31,11 +31,9 @@ export class CaseDraft extends EventTarget {
       return Ask.post('api/draft/change', {case: this.path, revision: this.revision, what, document});
     });
   }
-  undo() {
-    return this.after(() => Ask.post('api/draft/undo', {case: this.path, revision: this.revision}));
-  }
-  redo() {
-    return this.after(() => Ask.post('api/draft/redo', {case: this.path, revision: this.revision}));
+  // way: 'undo' or 'redo'
+  step(way) {
+    return this.after(() => Ask.post('api/draft/' + way, {case: this.path, revision: this.revision}));
   }
 
   // Sends a request with the newest revision, and takes over the state in the answer.

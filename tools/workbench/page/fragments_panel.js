@@ -97,12 +97,12 @@ function make(draft) {
   const ends = (event) => event.key === 'Escape' && state.tool && state.setTool(null);
   document.addEventListener('keydown', ends);
   return {
-    element:
-        el('div', {class: 'fragments-panel'},
-           el('p', {class: 'note'},
-              'A bone fragment grows from its seeds: points inside its bone. Those that are not registered are only ' +
-                  'kept apart from the others.'),
-           add, list),
+    element: el(
+        'div', {class: 'fragments-panel'},
+        el('p', {class: 'note'},
+           'A bone fragment grows from its seeds: points inside its bone. A fragment that is not registered is only ' +
+               'separated from the others.'),
+        add, list),
     update,
     dispose() {
       state.removeEventListener('ct', update);

@@ -1,17 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a node made: pictures, slices, surfaces, figures and texts.
-import * as THREE from 'three';
-
+// The outputs of a node: pictures, slices, surfaces, figures and texts.
 import {el, number, withUnit} from '../../report/page/dom.js';
-import {Orbit} from '../../report/page/orbit.js';
+import {decoded} from '../../report/page/meshes.js';
+import * as Verdict from '../../report/page/verdict.js';
 
-let open = [];  // what must be freed when other outputs are shown
+import {SurfaceView} from './surface_view.js';
 
-function bytes(text) {
-  const raw = atob(text), all = new Uint8Array(raw.length);
-  for (let i = 0; i < raw.length; ++i) all[i] = raw.charCodeAt(i);
-  return all;
-}
+let open = [];  // the 3D views that are shown
 
 function slices(part) {
   const words = ['from the side', 'from the front', 'from above'];
@@ -24,7 +19,7 @@ function slices(part) {
           'aria-label': 'Slice through the middle, ' + words[i],
           style: 'aspect-ratio: ' + slice.width + ' / ' + slice.height * slice.stretch
         });
-        const pixels = new ImageData(slice.width, slice.height), grey = bytes(slice.grey);
+        const pixels = new ImageData(slice.width, slice.height), grey = decoded(slice.grey);
         for (let k = 0; k < grey.length; ++k) pixels.data.set([grey[k], grey[k], grey[k], 255], 4 * k);
         canvas.getContext('2d').putImageData(pixels, 0, 0);
         return canvas;
@@ -34,61 +29,16 @@ function slices(part) {
 }
 
 function surface(part) {
-  if (!THREE.WebGLRenderer) return el('p', {class: 'note'}, 'The 3D view needs three.js: ' + part.text);
-  const canvas = el('canvas', {
-    class: 'scene',
-    tabindex: 0,
-    role: 'img',
-    'aria-label': 'Surface in 3D, ' + part.text + '. Arrow keys turn it, plus and minus zoom, 0 goes back'
-  });
-  let renderer;
-  try {
-    renderer = new THREE.WebGLRenderer({canvas, antialias: true, alpha: true});
-  } catch (error) {
-    return el('p', {class: 'note'}, 'This browser draws no 3D: ' + part.text);
-  }
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(bytes(part.vertices).buffer), 3));
-  geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(bytes(part.triangles).buffer), 1));
-  geometry.computeVertexNormals();
-  geometry.computeBoundingSphere();
-  const scene = new THREE.Scene(), light = new THREE.DirectionalLight(0xffffff, 0.9);
-  const camera = new THREE.PerspectiveCamera(2 * Orbit.HALF_FIELD * 180 / Math.PI, 1, 1, 20000);
-  camera.up.set(0, 0, 1);
-  scene.add(
-      new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({color: 0xd8c9a8, side: THREE.DoubleSide})), light,
-      new THREE.AmbientLight(0xffffff, 0.35));
-  let orbit = null, is_waiting = false, is_over = false;
-  const draw = () => {
-    is_waiting = false;
-    if (is_over || !canvas.clientWidth) return;
-    renderer.setPixelRatio(Math.min(2, devicePixelRatio));
-    renderer.setSize(canvas.clientWidth, canvas.clientHeight, false);
-    camera.aspect = canvas.clientWidth / canvas.clientHeight;
-    camera.updateProjectionMatrix();
-    camera.position.set(...orbit.eye());
-    camera.lookAt(...orbit.target);
-    light.position.copy(camera.position);
-    renderer.render(scene, camera);
-  };
-  const changed = () => {
-    if (!orbit || is_waiting) return;
-    is_waiting = true;
-    requestAnimationFrame(draw);
-  };
-  orbit = new Orbit(canvas, changed);
-  const {center, radius} = geometry.boundingSphere;
-  orbit.reset({target: center.toArray(), distance: radius / Math.sin(Orbit.HALF_FIELD) * 1.05, azimuth_deg: -65});
-  const size = new ResizeObserver(changed);
-  size.observe(canvas);
-  open.push(() => {
-    is_over = true;
-    size.disconnect();
-    geometry.dispose();
-    renderer.dispose();
-    renderer.forceContextLoss();
-  });
-  return el('div', {}, canvas, el('p', {class: 'note'}, part.text + '. Drag or arrow keys turn it, + and − zoom.'));
+  const view =
+      new SurfaceView('Surface in 3D, ' + part.text + '. Arrow keys turn it, plus and minus zoom, 0 goes back');
+  open.push(view);
+  view.set([{
+    vertices: new Float32Array(decoded(part.vertices).buffer),
+    triangles: new Uint32Array(decoded(part.triangles).buffer),
+    colour: 0xd8c9a8
+  }]);
+  return el(
+      'div', {}, view.element, el('p', {class: 'note'}, part.text + '. Drag or arrow keys turn it, + and − zoom.'));
 }
 
 const figures = (part) =>
@@ -100,31 +50,24 @@ const figures = (part) =>
                      el('tr', {}, el('th', {scope: 'row'}, one.name),
                         el('td', {class: 'number'}, withUnit(one.value, one.unit)))))));
 
-const verdict = (part) =>
-    el('div', {class: 'verdict ' + part.judgement},
-       el('p', {class: 'verdict-head'}, el('strong', {}, part.judgement), ' ',
-          el('small', {},
-             part.failure_probability === null ? '' : 'failure ' + (100 * part.failure_probability).toFixed(1) + ' %')),
-       el('ul', {class: 'verdict-list'}, [...part.reasons, ...part.remedies].map((text) => el('li', {}, text))));
-
 function shown(part, what) {
   const name = part.name && el('p', {class: 'note'}, part.name);
   const content = part.kind === 'picture' ?
       el('img', {src: part.picture, alt: what + (part.name ? ', ' + part.name : '')}) :
       part.kind === 'slices'  ? slices(part) :
       part.kind === 'mesh'    ? surface(part) :
-      part.kind === 'verdict' ? verdict(part) :
+      part.kind === 'verdict' ? el('div', {class: 'verdict ' + part.judgement}, Verdict.words(part)) :
       part.kind === 'figures' ? figures(part) :
                                 el('pre', {class: 'file', tabindex: 0}, part.text);
   return el('div', {class: 'part', 'data-kind': part.kind}, name || '', content);
 }
 
 export function clear() {
-  for (const end of open) end();
+  for (const view of open) view.dispose();
   open = [];
 }
 
-// Elements for what api/pipeline/look answers.
+// Elements for the answer of api/pipeline/look.
 export function show(node, outputs) {
   clear();
   return outputs.map(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page "Pipeline": the graph, the text beside it, the form of a node, what it made, and runs.
+// The page "Pipeline": the graph, the text beside it, the form of a node, its outputs, and runs.
 import * as Dom from '../../report/page/dom.js';
 import {el} from '../../report/page/dom.js';
 import * as Graph from '../../report/page/graph.js';
@@ -24,8 +24,7 @@ class Page {
 
   build(place) {
     const button = (text, action, name) => Dom.button(text, action, {'data-do': name});
-    this.undo = button('Undo', () => this.step('undo'), 'undo');
-    this.redo = button('Redo', () => this.step('redo'), 'redo');
+    this.changes = Shell.undoButtons((way) => this.step(way));
     this.status = el('span', {class: 'note', role: 'status', 'data-do': 'status'});
     this.run = button('Run what is stale', () => this.start(), 'run');
     this.graphBox = el('div', {});
@@ -40,7 +39,7 @@ class Page {
         el('section', {class: 'panel pipeline-' + name, 'aria-label': title}, el('h2', {}, title), content);
     place.append(
         el('div', {class: 'page-head'}, el('h1', {}, this.file),
-           el('div', {class: 'toolbar'}, this.run, this.undo, this.redo, this.status)),
+           el('div', {class: 'toolbar'}, this.run, this.changes.boxes, this.status)),
         el('details', {class: 'pipeline-inputs', open: true}, this.inputTitle, this.inputBox), this.result,
         el('div', {class: 'pipeline-grid'}, panel('Graph', 'graph', this.picker, this.graphBox),
            panel('Text', 'text', this.text.element), panel('Node', 'node', this.formBox),
@@ -56,11 +55,7 @@ class Page {
     const before = this.state;
     this.state = state;
     this.text.set(state.text, state.faults, state.faults_text);
-    for (const [name, box] of [['undo', this.undo], ['redo', this.redo]]) {
-      const what = state[name], word = name === 'undo' ? 'Undo' : 'Redo';
-      box.disabled = what === null;
-      box.title = what ? word + ': ' + what : 'There is nothing to ' + name;
-    }
+    this.changes.update(state.undo, state.redo);
     if (state.graph) this.draw(state.graph);
     this.graphBox.classList.toggle('outdated', !state.graph);
     if (!state.graph && !this.graph)
@@ -110,7 +105,7 @@ class Page {
     this.look();
   }
 
-  // The node itself, or the one whose body it is in.
+  // The chosen node; null for a node of a body, which this file does not have.
   known() {
     return this.chosen && this.state.nodes[this.chosen] ? this.chosen : null;
   }
@@ -132,7 +127,7 @@ class Page {
     this.showNoForm();
   }
 
-  // Nothing is chosen, or a node of a body, which is changed in the body's own file.
+  // For no node, or for a node of a body: the body's own file has that.
   showNoForm() {
     const [id] = (this.chosen || '').split('/'), outer = this.state.nodes[id];
     if (!outer)
@@ -145,7 +140,7 @@ class Page {
                   'Change it in the text.'));
   }
 
-  // The heading says how many are given, because they may be folded away.
+  // The heading lists the given inputs, because the list below may be folded away.
   countInputs() {
     const count = this.state.inputs.length;
     const given =
@@ -173,7 +168,7 @@ class Page {
     this.commands.replaceChildren(...commands.filter(Boolean).map((text) => Dom.command(text)));
   }
 
-  // What a run would do now. Without this, the page says nothing about stale nodes.
+  // Asks what a run would do now. Until the answer comes, the page says nothing about stale nodes.
   async refreshPlan() {
     const count = ++this.planCount;
     this.plan = null;
@@ -184,7 +179,7 @@ class Page {
     if (missing.length)
       return void (
           this.status.textContent = 'give ' + missing.map((one) => one.name).join(', ') + ' to see what is stale');
-    this.status.textContent = 'looking what is stale …';
+    this.status.textContent = 'checking what is stale …';
     try {
       const plan = await Ask.post('api/pipeline/plan', {file: this.file, inputs: this.inputs});
       if (count !== this.planCount || this !== page) return;
@@ -204,7 +199,7 @@ class Page {
     this.status.textContent = to_run + may_run === 0 ?
         'everything is up to date' :
         to_run + ' to run' + (may_run ? ', ' + may_run + ' that may run' : '') + ', ' + cached + ' up to date' +
-            (seconds > 0 ? '; what runs took ' + seconds.toFixed(1) + ' s the last time' : '');
+            (seconds > 0 ? '; the nodes to run took ' + seconds.toFixed(1) + ' s the last time' : '');
   }
 
   async start() {
@@ -247,7 +242,7 @@ class Page {
            Dom.command(command)));
   }
 
-  // Shows what the chosen node made, if that is known.
+  // Shows the outputs of the chosen node, if they are known.
   async look() {
     const id = this.known(), count = ++this.lookCount;
     NodeOutput.clear();
@@ -256,7 +251,7 @@ class Page {
     const planned = this.plan && this.plan.nodes[id];
     if (!planned) return say('It is shown when the inputs are given and the file has no faults.');
     if (planned.state !== 'cached' && planned.state !== 'function')
-      return say('Not there yet (' + planned.text + '). Run what is stale.');
+      return say('Not made yet (' + planned.text + '). Run what is stale.');
     say('Reading it back …');
     try {
       const {job} = await Ask.post('api/pipeline/look', {file: this.file, inputs: this.inputs, node: id});
@@ -325,7 +320,7 @@ class Page {
         const {revision} = await Ask.json('api/pipeline/revision', {file: this.file});
         if (this === page && revision !== this.state.revision) await this.refetch();
       }
-    } catch (error) { /* the next request of the user says so */
+    } catch (error) { /* the user's next request shows it */
     }
     if (this === page) this.timer = setTimeout(() => this.poll(), 1000);
   }
@@ -335,10 +330,8 @@ async function list(place) {
   const {pipelines} = await Ask.json('api/folder');
   place.append(
       el('div', {class: 'page-head'}, el('h1', {}, 'Pipelines')),
-      pipelines.length ?
-          el('ul', {class: 'files'},
-             pipelines.map((path) => el('li', {}, el('a', {href: Shell.addressOf('pipeline', path)}, path)))) :
-          el('p', {class: 'note'}, 'There is no pipeline in this folder. One is made by: marrow new pipeline NAME'));
+      Shell.links(
+          'pipeline', pipelines, 'There is no pipeline in this folder. Make one with: marrow new pipeline NAME'));
 }
 
 Shell.page('pipeline', {

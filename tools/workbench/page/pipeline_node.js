@@ -44,7 +44,7 @@ function optionField(option, written, edit) {
   const given = written !== undefined;
   const about = [
     option.help, option.range,
-    option.required ? 'it must be given' :
+    option.required ? 'required' :
         given       ? 'default ' + option.default :
                       'at its default'
   ].filter(Boolean).join('; ');
@@ -53,10 +53,10 @@ function optionField(option, written, edit) {
       given && !option.required &&
           button(
               'Default', () => changed(null),
-              {'data-default': option.name, 'aria-label': 'Take out ' + option.name + ', so that its default holds'}));
+              {'data-default': option.name, 'aria-label': 'Reset ' + option.name + ' to its default'}));
 }
 
-// What can be wired to a port: outputs of its type of the other nodes.
+// The possible sources of a port: outputs of other nodes with its type.
 function sources(nodes, id, port) {
   const names = [];
   for (const [other, {info}] of Object.entries(nodes)) {
@@ -112,7 +112,7 @@ function fitting(file, node, edit) {
         if (!fits.length) place.append(el('p', {class: 'note'}, 'No other node fits here.'));
       }),
       {'data-do': 'fits'});
-  return el('div', {}, el('p', {class: 'note'}, 'Another node begins with the defaults of its options.'), find, place);
+  return el('div', {}, el('p', {class: 'note'}, 'Another node starts with the defaults of its options.'), find, place);
 }
 
 // The form of node `id` in `state` (api/pipeline). edit(change) asks for a change of the file.
@@ -122,7 +122,7 @@ export function form(state, id, edit, goTo) {
       el('p', {class: 'node-head'}, el('strong', {}, id), ' ', el('code', {}, node.uses || 'repeats ' + node.body), ' ',
          button('line ' + node.line, () => goTo(node.line), {class: 'link', 'data-do': 'line'}));
   const info = node.info;
-  if (!info) return el('div', {}, head, el('p', {class: 'note'}, 'The form comes when the file has no faults.'));
+  if (!info) return el('div', {}, head, el('p', {class: 'note'}, 'The form is shown when the file has no faults.'));
   const inputs = info.inputs.map((port) => wireField(port, node.in[port.name], state.nodes, id, own));
   if (node.is_repeated)
     return el(
@@ -139,6 +139,6 @@ export function form(state, id, edit, goTo) {
       checkbox(
           'may fail without ending the run', node.may_fail,
           (value) => own({what: 'may_fail', value: value ? 'true' : null})),
-      el('h3', {}, 'Wires'), inputs.length ? inputs : el('p', {class: 'note'}, 'It takes nothing from other nodes.'),
+      el('h3', {}, 'Wires'), inputs.length ? inputs : el('p', {class: 'note'}, 'It has no inputs.'),
       el('h3', {}, 'Another node in its place'), fitting(state.file, id, own));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page "Place": bones are placed by hand over the X-rays, and registered from there. Poses are kept as `start` of
-// the case's draft.
+// The page "Place": bones are placed by hand over the X-rays, and registered from there. The case's draft keeps the
+// poses as `start`.
 import {el} from '../../report/page/dom.js';
 
 import * as Geometry from './geometry.js';
@@ -68,17 +68,17 @@ Shell.page('place', {
     ['q or Q', 'turn left in the view', turn(-1)],
     ['e or E', 'turn right in the view', turn(1)],
     ['a or A', 'turn about the long axis', roll(1)],
-    ['d or D', 'the same, the other way', roll(-1)],
+    ['d or D', 'turn about it the other way', roll(-1)],
     ['w or W', 'move away from the X-ray source', depth(1)],
     ['s or S', 'move towards it', depth(-1)],
     ['r or R', 'tip the upper end away', tip(1)],
     ['f or F', 'tip it towards the source', tip(-1)],
     ['v', 'the next view', nextView],
-    ['m', 'show the bone in another way', nextMode],
+    ['m', 'show the bone in the next way', nextMode],
     ['z', 'zoom in to the bone, and out', nextZoom],
-    ['[ or ,', 'the frame before', () => inSequence((sequence) => sequence.step(-1))],
+    ['[ or ,', 'the previous frame', () => inSequence((sequence) => sequence.step(-1))],
     ['] or .', 'the next frame', () => inSequence((sequence) => sequence.step(1))],
-    ['{ or <', 'the keyframe before', () => inSequence((sequence) => sequence.stepKeyframe(-1))],
+    ['{ or <', 'the previous keyframe', () => inSequence((sequence) => sequence.stepKeyframe(-1))],
     ['} or >', 'the next keyframe', () => inSequence((sequence) => sequence.stepKeyframe(1))],
     ['k', 'make the present pose a keyframe', () => inSequence((sequence) => sequence.set())],
     ['K', 'remove the keyframe', () => inSequence((sequence) => sequence.remove())],
@@ -88,8 +88,8 @@ Shell.page('place', {
       'Enter', 'register or track from here',
       (event) => page && page.bar && event.target.matches('canvas') && page.fromHere()
     ],
-    ['Ctrl+z', 'undo', () => page && page.draft && page.undo()],
-    ['Ctrl+y or Ctrl+Z', 'redo', () => page && page.draft && page.draft.redo()],
+    ['Ctrl+z', 'undo', () => page && page.draft && page.change('undo')],
+    ['Ctrl+y or Ctrl+Z', 'redo', () => page && page.draft && page.change('redo')],
     ['drag', 'move in the view; with Shift or the right button: turn; with Alt: turn about the long axis'],
     ['Ctrl+wheel', 'move in depth'],
     ['one finger', 'move'],
@@ -97,17 +97,12 @@ Shell.page('place', {
   ]
 });
 
-// If no case is open: a list of the cases in the folder.
+// Lists the cases in the folder.
 async function choose(place) {
   const {cases} = await Ask.json('api/folder');
   place.append(
       el('h1', {}, 'Place'), el('p', {}, 'Choose a case. Its bones are placed over its X-rays by hand.'),
-      cases.length ?
-          el('ul', {class: 'files'},
-             cases.map(
-                 (path) =>
-                     el('li', {}, el('a', {href: Shell.addressOf('place', path || '.')}, path || '(this folder)')))) :
-          el('p', {class: 'note'}, 'There is no case yet.'));
+      Shell.links('place', cases.map((path) => path || '.'), 'There is no case yet.'));
 }
 
 // For measurements and tests: the case that is shown.

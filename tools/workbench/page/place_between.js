@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pose of a bone in a frame of a sequence, from keyframes and tracked poses. Keyframes: {FRAME: {pose, used}};
-// `used`: the tracking used it. Tracked: a list of poses, frame 1 first, with null where the bone was lost.
+// The pose of a bone in a frame of a sequence, from keyframes and tracked poses. Keyframes: {FRAME: {pose, used}},
+// where `used` says that the tracking used the keyframe. Tracked: the poses from frame 1 on, with null where the bone
+// was lost.
 import {minus, moved, plus, times} from './geometry.js';
 
 // [x, y, z, w] of a motion's rotation, by its largest component.
@@ -39,7 +40,8 @@ function slerp(a, b, share) {
   return mixed.map((value) => value / length);
 }
 
-// The rotation by slerp, the middle of the bone on a straight line. share 0: the first pose, 1: the second.
+// Interpolates the rotation by slerp, and the middle of the bone on a straight line. share 0: the first pose, 1: the
+// second.
 export function between(first, second, share, middle_mm) {
   const rotation = rotationOf(slerp(quaternion(first), quaternion(second), share));
   const begin = moved(first, middle_mm), end = moved(second, middle_mm);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A case on the page "Place": the poses of its bones, how they are moved, kept, judged and registered.
+// A case on the page "Place": moves its bones, keeps their poses, and has them judged and registered.
 import * as Dom from '../../report/page/dom.js';
 
 import {CaseDraft} from './draft.js';
@@ -85,12 +85,12 @@ export class PlacedCase extends PlaceControls {
     return this.about.bones.filter((bone) => this.moving.has(bone.name));
   }
 
-  // The bones to look at when all are locked.
+  // The moved bones; all bones if all are locked.
   watched() {
     return this.bones().length ? this.bones() : this.about.bones;
   }
 
-  // The place of the moved bones: the middle of all, and the long axis of the first.
+  // The common middle of the moved bones, and the long axis of the first.
   hold(poses) {
     const bones = this.watched(), middles = bones.map((bone) => Geometry.moved(poses[bone.name], bone.middle_mm));
     const middle = Geometry.times(middles.reduce(Geometry.plus, [0, 0, 0]), 1 / bones.length);
@@ -124,7 +124,7 @@ export class PlacedCase extends PlaceControls {
     this.keep(drag.kind === 'shift' ? 'move' : drag.kind === 'roll' ? 'turn about the long axis of' : 'turn');
   }
 
-  // A key, or a notch of the wheel. Further ones within a moment belong to the same step.
+  // A key, or a notch of the wheel. Further keys and notches within half a second belong to the same step.
   byKeys(view, what, motionOf) {
     if (!view || !this.bones().length) return;
     this.move(this.placed, motionOf({...this.hold(this.placed), camera: view.camera}), false);
@@ -132,7 +132,7 @@ export class PlacedCase extends PlaceControls {
     this.keyMoves = setTimeout(() => this.keep(what), 500);
   }
 
-  // Keeps the present poses of all bones as a step: a case has all starts or none.
+  // Keeps the present poses of all bones as a step, because a case has the starts of all bones or none.
   async keep(what) {
     clearTimeout(this.keyMoves);
     this.keyMoves = null;
@@ -155,9 +155,10 @@ export class PlacedCase extends PlaceControls {
     if (!more.verdicts) this.pause();
   }
 
-  async undo() {
+  // way: 'undo' or 'redo'
+  async change(way) {
     if (this.keyMoves) await this.keep('move');
-    this.draft.undo();
+    this.draft.step(way);
   }
 
   async goTo(step) {
@@ -187,7 +188,7 @@ export class PlacedCase extends PlaceControls {
     this.pause();
   }
 
-  // A sequence was opened or left. Costs and verdicts are of the case's own images.
+  // A sequence was opened or left. Costs and verdicts exist only for the case's own images.
   sequenceChanged() {
     const {isOn} = this.sequence;
     this.pipelineField.hidden = isOn;
@@ -214,7 +215,6 @@ export class PlacedCase extends PlaceControls {
     view.canvas.dataset.painted = Number(view.canvas.dataset.painted || 0) + 1;
   }
 
-  // A case that the server has forgotten is opened again.
   failed(error) {
     if (!this.isOpen || error.name === 'AbortError') return;
     Shell.notice(error.message, 'fault');
@@ -265,7 +265,7 @@ export class PlacedCase extends PlaceControls {
     try {
       const {job, command} = await Ask.post('api/place/verdict', {case: this.path, poses: step.poses});
       this.verdictJob = job;
-      this.steps.showVerdict(null, 'is being judged ...');
+      this.steps.showVerdict(null, 'being judged …');
       const result = await Ask.follow(job);
       if (this.verdictJob !== job) return;
       this.verdictJob = null;
@@ -313,7 +313,7 @@ export class PlacedCase extends PlaceControls {
     if (this.isOpen) this.updateBar();
   }
 
-  // The same for a sequence.
+  // Tracks the bones through a sequence.
   async track() {
     this.isRegistering = true;
     this.updateBar();

@@ -3,15 +3,13 @@
 import {button, checkbox, choice, el, select, slider} from '../../report/page/dom.js';
 
 import * as Geometry from './geometry.js';
+import * as Shell from './shell.js';
 
 export class PlaceControls {
   updateBar() {
     if (!this.bar) return;
-    const {undo, redo, from, state} = this.bar, {draft} = this;
-    undo.disabled = draft.state_undo === null;
-    redo.disabled = draft.state_redo === null;
-    undo.title = draft.state_undo ? 'Undo: ' + draft.state_undo : 'There is nothing to undo';
-    redo.title = draft.state_redo ? 'Redo: ' + draft.state_redo : 'There is nothing to redo';
+    const {changes, from, state} = this.bar, {draft} = this;
+    changes.update(draft.state_undo, draft.state_redo);
     from.disabled = Boolean(this.isRegistering) || !(this.pipeline || this.sequence.isOn);
     from.textContent = this.sequence.isOn ? 'Track from here' : 'From here';
     state.textContent = draft.is_saved ? 'saved' : 'kept as a draft';
@@ -25,8 +23,7 @@ export class PlaceControls {
   fill(place) {
     this.commandPlace = el('div', {class: 'place-command'});
     this.bar = {
-      undo: button('Undo', () => this.undo(), {'data-do': 'undo'}),
-      redo: button('Redo', () => this.draft.redo(), {'data-do': 'redo'}),
+      changes: Shell.undoButtons((way) => this.change(way)),
       from: button('From here', () => this.fromHere(), {'data-do': 'register', class: 'primary'}),
       sequence: button(
           'Sequence', () => this.sequence.timeline.toggle(this.bar.sequence),
@@ -39,7 +36,7 @@ export class PlaceControls {
     this.ofOneFrame = [part('Costs', this.steps.costTable), part('Verdict', this.judgeBox(), this.steps.verdict)];
     place.append(
         el('div', {class: 'page-head'}, el('h1', {}, this.path || '(this folder)'),
-           el('div', {class: 'toolbar'}, this.bar.undo, this.bar.redo, this.bar.state),
+           el('div', {class: 'toolbar'}, this.bar.changes.boxes, this.bar.state),
            el('div', {class: 'toolbar'}, this.bar.sequence, this.pipelineField, this.bar.from)),
         this.sequence.timeline.setup, this.tools(), this.sequence.timeline.element,
         el('div', {class: 'place-work'}, el('div', {class: 'place-views'}, this.views.map((view) => view.element)),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a bone moves when it is dragged in a view. Each function returns a motion of the world, a 4 x 4 matrix that is
-// put before the bone's pose. Depth is along z of the camera, away from the X-ray source.
+// How a bone moves when it is dragged in a view. Each function returns a motion of the world: a 4 x 4 matrix to
+// multiply the bone's pose by, from the left. Depth is along z of the camera, away from the X-ray source.
 import * as Geometry from './geometry.js';
 import {inverse, length, minus, moved, plus, times, turned, unit} from './geometry.js';
 
@@ -25,7 +25,7 @@ export function shiftInView(camera, middle_mm, from, to) {
 export const turnInView = (camera, middle_mm, angle_rad) =>
     Geometry.rotation(minus(middle_mm, source_mm(camera)), angle_rad, middle_mm);
 
-// The angle about the middle between two pixels of a pointer's way.
+// The angle between two pixels of a pointer's way, seen from the middle.
 export function angleAbout(camera, middle_mm, from, to) {
   const centre = Geometry.pixel(camera, middle_mm);
   if (!centre) return 0;

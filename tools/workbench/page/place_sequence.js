@@ -76,7 +76,7 @@ export class PlaceSequence {
     this.page.sequenceChanged();
     if (this.images) {
       this.timeline.update();
-      await this.arriving;  // of the sequence before
+      await this.arriving;  // a frame of the previous sequence
       await this.go(this.frame);
     }
   }
@@ -100,7 +100,7 @@ export class PlaceSequence {
     return Object.fromEntries(this.page.about.bones.map((bone) => [bone.name, this.at(bone, frame).pose]));
   }
 
-  // Shows a frame: first at the slider; images and bones together, when they are there.
+  // Shows a frame: the slider moves at once; images and bones follow together when they have arrived.
   go(frame) {
     if (!this.isOn) return this.arriving;
     this.wanted = Math.max(1, Math.min(this.frames, frame));
@@ -109,7 +109,7 @@ export class PlaceSequence {
     return this.arriving;
   }
 
-  // Requests one frame at a time; then the one that was wanted last.
+  // Requests one frame at a time, and next the newest wanted one.
   async arrive() {
     const {page, images} = this;
     this.isArriving = true;
@@ -171,7 +171,7 @@ export class PlaceSequence {
     const keyframes = Object.fromEntries(this.page.about.bones.map(
         ({name}) => [name, Object.fromEntries(Object.entries(this.keyframes(name)).map(([frame,
                                                                                          {pose}]) => [frame, pose]))]));
-    // The poses in the first frame are those by the keyframes alone, so that tracking again finds the same.
+    // The poses in the first frame come from the keyframes alone, so that tracking again finds the same poses.
     const starts = Object.fromEntries(this.page.about.bones.map((bone) => {
       const found = PlaceBetween.at(1, this.frames, bone, this.keyframes(bone.name), null);
       return [bone.name, found ? found.pose : this.page.startOf(bone)];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the page "Place" says about poses: the steps that led to the present one, their costs and verdicts.
+// The texts of the page "Place" about poses: the steps that led to the present one, their costs and verdicts.
 import {button, el, number, percent, withUnit} from '../../report/page/dom.js';
 
 export class PlaceSteps {
@@ -54,7 +54,7 @@ export class PlaceSteps {
   comparison(value, bone, measure) {
     const best = this.best(bone, measure);
     if (!Number.isFinite(best)) return '–';
-    return value <= best * 1.0005 ? 'the best' : number(value / best) + ' × it';
+    return value <= best * 1.0005 ? 'the best' : number(value / best) + ' × the best';
   }
 
   showVerdict(verdicts, note) {

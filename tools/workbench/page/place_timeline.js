@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the page "Place" shows of a sequence: where its frames are, the slider with the keyframes and the tracked poses,
-// and the list of keyframes.
+// The controls of a sequence on the page "Place": the places of its frames, the slider with keyframes and tracked
+// poses, and the list of keyframes.
 import * as Dom from '../../report/page/dom.js';
 import {el, svg} from '../../report/page/dom.js';
 
@@ -48,7 +48,7 @@ export class PlaceTimeline {
       const is_kept = await page.draft.change('the sequence', (document) => {
         const before = document.sequence || {};
         document.sequence = {keyframes: {}, ...before, views, frame_rate_hz};
-        // Poses that were tracked in other images do not fit these.
+        // Poses that were tracked in other images do not fit these images.
         const isAsBefore = ([name, {images, pattern}]) => {
           const one = (before.views || {})[name] || {};
           return one.images === images && one.pattern === pattern;
@@ -67,7 +67,7 @@ export class PlaceTimeline {
         el('p', {class: 'note'},
            'For each view a folder with an image for each frame, or a file with several frames. All views show the ' +
                'same moments.'),
-        ...fields.map((one) => one.element), el('label', {class: 'field'}, el('span', {}, 'frames a second'), rate),
+        ...fields.map((one) => one.element), Dom.labelled('frames a second', rate),
         el('div', {class: 'toolbar'}, Dom.button('Show the sequence', apply, {class: 'primary', 'data-do': 'sequence'}),
            kept && Dom.button('Remove the sequence', remove, {'data-do': 'remove-sequence'}),
            Dom.button('Close', () => this.close())));
@@ -90,14 +90,13 @@ export class PlaceTimeline {
       name,
       value: () => ({images: images.value.trim(), pattern: pattern.value.trim()}),
       element:
-          el('fieldset', {}, el('legend', {}, name),
-             el('label', {class: 'field'}, el('span', {}, 'folder or file'), images),
+          el('fieldset', {}, el('legend', {}, name), Dom.labelled('folder or file', images),
              Dom.button('Choose', choose, {'aria-label': 'Choose the frames of ' + name}),
-             el('label', {class: 'field'}, el('span', {}, 'pattern of the file names'), pattern))
+             Dom.labelled('pattern of the file names', pattern))
     };
   }
 
-  // Shows everything again, after a change of keyframes or tracked poses.
+  // Shows everything again after a change of keyframes or tracked poses.
   update() {
     const {sequence, page} = this;
     this.element.hidden = !sequence.isOn;
@@ -122,8 +121,8 @@ export class PlaceTimeline {
     const {sequence} = this;
     const button = (text, label, action) => Dom.button(text, action, {'aria-label': label, title: label});
     this.element.append(
-        el('div', {class: 'toolbar'}, button('◆◀', 'Keyframe before', () => sequence.stepKeyframe(-1)),
-           button('◀', 'Frame before', () => sequence.step(-1)), button('▶', 'Next frame', () => sequence.step(1)),
+        el('div', {class: 'toolbar'}, button('◆◀', 'Previous keyframe', () => sequence.stepKeyframe(-1)),
+           button('◀', 'Previous frame', () => sequence.step(-1)), button('▶', 'Next frame', () => sequence.step(1)),
            button('▶◆', 'Next keyframe', () => sequence.stepKeyframe(1)),
            Dom.button('Set keyframe', () => sequence.set(), {'data-do': 'set-keyframe'}),
            Dom.button('Remove keyframe', () => sequence.remove(), {'data-do': 'remove-keyframe'}),
@@ -133,7 +132,7 @@ export class PlaceTimeline {
            ' tracked ', el('span', {class: 'lost', 'aria-hidden': 'true'}), ' lost'));
   }
 
-  // A bone's keyframes and tracked frames, under the slider. Frames in a row are one mark.
+  // The keyframes and tracked frames of a bone, under the slider. Consecutive frames are one mark.
   row(bone) {
     const {sequence, page} = this, {frames} = sequence, tracked = sequence.tracked[bone.name];
     const at = (frame) => (frames > 1 ? 100 * (frame - 1) / (frames - 1) : 50), half = 50 / Math.max(1, frames - 1);
@@ -161,7 +160,7 @@ export class PlaceTimeline {
         svg('svg', {height: 14, width: '100%', overflow: 'visible', 'aria-hidden': 'true'}, marks));
   }
 
-  // The frame and what its poses are.
+  // Shows the frame, and the source of its poses.
   moved() {
     const {sequence, page} = this, frame = sequence.wanted;
     this.slider.value = frame;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One X-ray view of the page "Place": asks the server for the bones at their newest poses, paints them, and tells what
-// the pointer does.
+// One X-ray view of the page "Place": requests the bones at their newest poses, paints them, and reports the pointer's
+// actions.
 import {el} from '../../report/page/dom.js';
 
 import {PlacePaint} from './place_paint.js';
@@ -107,7 +107,7 @@ export class PlaceView {
     this.page.dragEnded(drag);
   }
 
-  // While a bone moves, only every second pixel is drawn where all of them would take too long. On release all are.
+  // If drawing all pixels takes too long, only every second one is drawn while a bone moves. On release, all are drawn.
   judgeSpeed(took_ms, isMoving) {
     const LONG_MS = 40, SHORT_MS = 8;
     if (!isMoving) return;
@@ -118,7 +118,7 @@ export class PlaceView {
       Object.assign(this, {isSlow: false, usual_ms: LONG_MS / 2});
   }
 
-  // Requests pictures of bones: {BONE: pose}. One request at a time; then the one that was wanted last.
+  // Requests pictures of bones: {BONE: pose}. One request runs at a time, and the newest wish comes next.
   want(poses, isMoving) {
     this.wanted = {poses: {...(this.wanted || {}).poses, ...poses}, isMoving, since: performance.now()};
     if (!this.inFlight) this.ask();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points of a CT as a list that keys alone can use, and fields for their names.
-import {button, el} from '../../report/page/dom.js';
+// Points of a CT as a list that works with keys alone, and fields for their names.
+import {button, el, labelled} from '../../report/page/dom.js';
 
 import * as Shell from './shell.js';
 
@@ -34,14 +34,14 @@ export function nameField(label, text, taken, chosen) {
           chosen(name);
         }
       },
-         el('label', {class: 'field'}, el('span', {}, label), box), el('button', {type: 'submit'}, text));
+         labelled(label, box), el('button', {type: 'submit'}, text));
   form.box = box;
   return form;
 }
 
 function faultOf(name, taken) {
   if (!name) return 'Give a name.';
-  if (taken.includes(name)) return 'There is one named "' + name + '" already; choose another name.';
+  if (taken.includes(name)) return 'The name "' + name + '" is taken; choose another one.';
   return '';
 }
 
@@ -52,7 +52,7 @@ export const rename = (title, name, taken) => Shell.dialog(title, (close) => {
   return field;
 });
 
-// Fills a list again when its content has changed, and keeps the focus. what() says what the content is.
+// Returns a function that fills a list again if its content, what(), has changed. The focus stays.
 export function renewed(list, what, rows) {
   const nameOf = (one) => one.dataset.tool || one.getAttribute('aria-label');
   let shown = '';
@@ -67,7 +67,7 @@ export function renewed(list, what, rows) {
   };
 }
 
-// Buttons of one panel act as a choice: pressing one again ends it.
+// A button that switches a tool on. Pressing it again switches the tool off.
 export function toggle(state, key, text, tool) {
   const is_on = Boolean(state.tool && state.tool.key === key);
   return button(text, () => state.setTool(is_on ? null : tool), {'aria-pressed': String(is_on), 'data-tool': key});

@@ -2,11 +2,11 @@
 // The page "Results": the runs and comparisons of the folder, one of them opened, two of them compared.
 import * as Dom from '../../report/page/dom.js';
 import {el} from '../../report/page/dom.js';
+import * as Verdict from '../../report/page/verdict.js';
 
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
 
-const place_of = (folder) => (folder && folder !== '.' ? folder : '(this folder)');
 const when = (text) => text.replace('T', ' ').replace(/(\.\d+)?Z$/, ' UTC');
 const reportAddress = (folder, more) => 'results/report.html?' + new URLSearchParams({folder, ...more});
 
@@ -14,13 +14,11 @@ function verdictCell(row) {
   if (row.fault) return el('span', {class: 'outcome failed'}, row.fault);
   if (row.status !== 'done') return el('span', {class: 'outcome failed'}, row.status);
   if (!row.verdicts.length) return el('span', {}, 'done');
-  const outcome = {trusted: 'success', doubtful: 'doubtful', wrong: 'failed'};
-  return row.verdicts.map(
-      (one) => el(
-          'div', {class: 'outcome ' + (outcome[one.judgement] || '')}, one.judgement, one.item ? ' ' + one.item : ''));
+  return row.verdicts.map((one) => el('div', {}, Verdict.badge(one.judgement), one.item ? ' ' + one.item : ''));
 }
 
-// The figures of a run, a few of them in its row: of several columns, such as the stages of a registration, the last.
+// The figures of a run; its row shows a few. Of several columns, such as the stages of a registration, it shows the
+// last.
 function figuresCell(row) {
   const lines = (row.sentences || []).map((text) => el('div', {}, text));
   for (const table of row.figures || [])
@@ -48,22 +46,23 @@ async function list(place) {
     else
       chosen.splice(chosen.indexOf(path), 1);
     compare.disabled = chosen.length !== 2;
-    said.textContent = chosen.length === 2 ? 'First: ' + place_of(chosen[0]) + ', second: ' + place_of(chosen[1]) :
-        chosen.length > 2                  ? 'Choose only two runs.' :
-                                             'Choose two runs to compare them.';
+    said.textContent = chosen.length === 2 ?
+        'First: ' + Shell.nameOf(chosen[0]) + ', second: ' + Shell.nameOf(chosen[1]) :
+        chosen.length > 2 ? 'Choose only two runs.' :
+                            'Choose two runs to compare them.';
   };
-  const row = (one) =>
-      el('tr', {'data-result': one.folder},
-         el('td', {},
-            one.kind === 'run' && !one.fault && el('input', {
-              type: 'checkbox',
-              'aria-label': 'Compare ' + place_of(one.folder),
-              onchange: (event) => toggle(one.folder || '.', event.target.checked)
-            }) ||
-                ''),
-         el('th', {scope: 'row'}, el('a', {href: Shell.addressOf('results', one.folder || '.')}, place_of(one.folder)),
-            el('small', {class: 'option'}, [one.kind, one.name].filter(Boolean).join(' '))),
-         el('td', {}, when(one.when)), el('td', {}, verdictCell(one)), el('td', {}, figuresCell(one)));
+  const row = (one) => el(
+      'tr', {'data-result': one.folder},
+      el('td', {},
+         one.kind === 'run' && !one.fault && el('input', {
+           type: 'checkbox',
+           'aria-label': 'Compare ' + Shell.nameOf(one.folder),
+           onchange: (event) => toggle(one.folder || '.', event.target.checked)
+         }) ||
+             ''),
+      el('th', {scope: 'row'}, el('a', {href: Shell.addressOf('results', one.folder || '.')}, Shell.nameOf(one.folder)),
+         el('small', {class: 'option'}, [one.kind, one.name].filter(Boolean).join(' '))),
+      el('td', {}, when(one.when)), el('td', {}, verdictCell(one)), el('td', {}, figuresCell(one)));
   const head = (text) => el('th', {scope: 'col'}, text);
   place.append(
       el('div', {class: 'page-head'}, el('h1', {}, 'Results'), el('div', {class: 'toolbar'}, compare, said)),
@@ -77,7 +76,7 @@ async function list(place) {
           el('p', {class: 'note'}, 'There is no run in ' + folder + ' yet. The page "Pipeline" makes some.'));
 }
 
-// A report in its frame reaches nothing. What lies beside its page is read for it when it asks by a message.
+// A report in its frame can load nothing. It asks for its parts by a message, and this page reads them for it.
 function reportFrame(folder) {
   const frame = el('iframe', {
     class: 'report',
@@ -106,8 +105,7 @@ async function one(place, folder) {
   place.append(
       el('div', {class: 'page-head'}, el('h1', {}, folder),
          el('div', {class: 'toolbar'},
-            el('a', {href: reportAddress(folder), target: '_blank', rel: 'noopener', 'data-do': 'tab'},
-               'In a tab of its own'),
+            el('a', {href: reportAddress(folder), target: '_blank', rel: 'noopener', 'data-do': 'tab'}, 'In a new tab'),
             el('a', {href: reportAddress(folder, {download: 1}), download: '', 'data-do': 'download'},
                'Download as one file'),
             el('a', {href: '#results='}, 'All results'))),
@@ -115,7 +113,7 @@ async function one(place, folder) {
       command ? Dom.command(command) : '');
 }
 
-// A few lines; the others are folded away.
+// The first lines; the others are folded away.
 function folded(lines) {
   const some = lines.map((line) => el('div', {}, line)), rest = some.splice(4);
   return rest.length ? [...some, el('details', {}, el('summary', {}, rest.length + ' more'), rest)] : some;
@@ -130,7 +128,7 @@ function differing(outputs) {
   return rows;
 }
 
-// The last columns, as many as `numbers` says, hold numbers.
+// numbers: how many of the last columns hold numbers
 const table = (caption, head, rows, numbers = 0) => rows.length ?
     el('div', {class: 'scroll', tabindex: 0, role: 'region', 'aria-label': caption},
        el('table', {}, el('caption', {}, caption),
@@ -147,8 +145,8 @@ function changesTable(findings) {
          el('td', {}, one.name ? one.what + ' ' + one.name : one.what), el('td', {}, one.before), el('td', {}, one.now),
          el('td', {}, how)));
   roots.forEach(
-      (root, i) => root.why.forEach((one) => row(one, i === 0 ? 'the first difference' : 'differs by itself')));
-  findings.other_changes.forEach((one) => row(one, 'without a difference of its own'));
+      (root, i) => root.why.forEach((one) => row(one, i === 0 ? 'the first difference' : 'differs on its own')));
+  findings.other_changes.forEach((one) => row(one, 'changes nothing by itself'));
   return table('What was changed', ['Node', 'What', 'First run', 'Second run', 'Effect'], rows);
 }
 

@@ -9,15 +9,16 @@ import * as Shell from './shell.js';
 
 const PIPELINES = [['femur-best', 'A fractured femur:'], ['bone', 'Any other bone:']];
 
-// Whether comments of the older files that cannot be kept may be lost. Without an answer of the server, for example
-// because the case is not whole yet, saving says what is wrong.
+// Asks whether comments of the older files may be lost, if some cannot be kept. If the server gives no answer, for
+// example because the case is incomplete, saving reports the fault.
 async function mayLose(draft) {
   const {lost} = await Ask.json('api/case/lost-comments', {case: draft.path}).catch(() => ({lost: []}));
   if (!lost.length) return true;
   return Boolean(await Shell.dialog(
       'Comments will be lost',
       (close) => el(
-          'div', {}, el('p', {}, 'What they belong to has changed, so these comments of the older files go:'),
+          'div', {},
+          el('p', {}, 'The parts that they belong to have changed, so these comments of the older files will be lost:'),
           el('ul', {class: 'faults', 'data-lost': ''}, lost.map((comment) => el('li', {}, comment))),
           el('div', {class: 'toolbar'}, Dom.button('Save without them', () => close(true), {'data-do': 'save-without'}),
              Dom.button('Do not save', () => close(false), {'data-do': 'do-not-save'})))));
@@ -28,7 +29,7 @@ function make(draft) {
   const button = Dom.button('Save the case', () => save(), {'data-do': 'save'});
 
   async function save() {
-    await draft.last;  // changes on their way come first
+    await draft.last;  // waits for changes that are being sent
     button.disabled = true;
     outcome.replaceChildren();
     if (!await mayLose(draft)) {
@@ -63,7 +64,7 @@ function make(draft) {
     element:
         el('div', {},
            el('p', {class: 'note'},
-              'Writes case.yaml and landmarks.yaml into the case\'s folder, copies files that lie elsewhere into it, ' +
+              'Writes case.yaml and landmarks.yaml into the case\'s folder, copies files from elsewhere into it, ' +
                   'and reads the case back before anything is replaced.'),
            el('div', {class: 'toolbar'}, button), outcome),
     update() {

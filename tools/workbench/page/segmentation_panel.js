@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The panel "Segmentation": the fragments' bone grows from the seeds, and is shown in the slices and in 3D.
-import {button, command, el, number, select, shellPath, shellWord} from '../../report/page/dom.js';
+// The panel "Segmentation": the fragments grow from their seeds, and are shown in the slices and in 3D.
+import {button, command, el, labelled, number, select, shellPath, shellWord} from '../../report/page/dom.js';
 
 import * as CasePage from './case.js';
 import {CtState} from './ct_state.js';
@@ -11,11 +11,11 @@ import {SurfaceView} from './surface_view.js';
 
 const METHODS = [['bone', 'by a threshold, as bone.yaml does'], ['femur', 'by a level set, as femur.yaml does']];
 const STAGES = {
-  coarse: 'on a coarse grid; the full one is being computed',
+  coarse: 'on a coarse grid; the full grid is being computed',
   full: 'on the grid of the CT'
 };
 
-// The outlines of one result, asked for slice by slice.
+// The outlines of one result, requested slice by slice.
 function outlines(segmentation, colourOf) {
   const known = new Map(), asked = new Set();
   async function ask(key, axis, index, later) {
@@ -70,7 +70,7 @@ class Panel {
     this.solid = new SurfaceView('Surfaces of the fragments; arrow keys turn them');
     this.solid.element.hidden = true;
     this.threshold = el('input', {type: 'number', class: 'short', value: 250, step: 10});
-    const field = el('label', {class: 'field'}, el('span', {}, 'threshold, HU'), this.threshold);
+    const field = labelled('threshold, HU', this.threshold);
     const how = select('how', METHODS, this.method, (value) => {
       this.method = value;
       field.hidden = value !== 'bone';

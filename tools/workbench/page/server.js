@@ -16,7 +16,7 @@ async function checked(reply) {
   let text = 'the server answered ' + reply.status;
   try {
     text = (await reply.json()).error || text;
-  } catch (error) { /* the number must do */
+  } catch (error) { /* the answer is no JSON: the number stays */
   }
   throw new Refused(text, reply.status);
 }
@@ -26,7 +26,7 @@ async function fetched(path, options) {
     return await checked(await fetch(path, options));
   } catch (error) {
     if (error instanceof Refused || error.name === 'AbortError') throw error;
-    throw new Refused('marrow does not answer; was it ended? Start it again by: marrow open', 0);
+    throw new Refused('marrow does not answer. If it has ended, start it again with: marrow open', 0);
   }
 }
 

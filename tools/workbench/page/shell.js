@@ -25,7 +25,7 @@ function parsed(hash) {
 export const addressOf = (name, first, more) =>
     '#' + new URLSearchParams([[name, first || ''], ...Object.entries(more || {})]).toString().replaceAll('%2F', '/');
 
-// Opens a page. Of the present page, only the address is changed.
+// Opens a page, or the present page with another address.
 export function go(name, first, more) {
   location.hash = addressOf(name, first, more);
 }
@@ -50,6 +50,32 @@ async function show() {
   document.documentElement.dataset.ready = name;
 }
 
+// The name of a path in the opened folder.
+export const nameOf = (path) => (path && path !== '.' ? path : '(this folder)');
+
+// Links to a page for these paths, or a note if there are none.
+export const links = (name, paths, none) =>
+    (paths.length ? el('ul', {class: 'files'},
+                       paths.map((path) => el('li', {}, el('a', {href: addressOf(name, path)}, nameOf(path))))) :
+                    el('p', {class: 'note'}, none));
+
+// Buttons to undo and redo: act(way) gets 'undo' or 'redo'. update(undo, redo) gets what each would change, or null.
+export function undoButtons(act) {
+  const undo = Dom.button('Undo', () => act('undo'), {'data-do': 'undo'});
+  const redo = Dom.button('Redo', () => act('redo'), {'data-do': 'redo'});
+  const set = (box, what) => {
+    box.disabled = what === null;
+    box.title = what ? box.textContent + ': ' + what : 'There is nothing to ' + box.dataset.do;
+  };
+  return {
+    boxes: [undo, redo],
+    update(to_undo, to_redo) {
+      set(undo, to_undo);
+      set(redo, to_redo);
+    }
+  };
+}
+
 // A line above the page. kind: 'fault' stays until it is closed, others go after some seconds.
 export function notice(text, kind) {
   const line =
@@ -72,8 +98,8 @@ export async function guarded(action) {
   }
 }
 
-// Shows the progress of a job and a button that stops it. told(event) may return how much is done, from 0 to 1, where
-// the events themselves tell it of a part only. Resolves to the job's result; rejects as Ask.follow().
+// Shows the progress of a job and a button that stops it. Events tell the progress of one node; told(event) may return
+// that of the whole job, from 0 to 1. Resolves to the job's result; rejects as Ask.follow().
 export async function follow(title, job, told) {
   const bar = el('progress', {'aria-label': title, max: 1}), text = el('span', {class: 'job-text'});
   const line =
@@ -147,13 +173,7 @@ const size = (bytes) =>
 const GENERAL_KEYS = [['?', 'this list'], ['Alt+1 … Alt+9', 'a page'], ['Esc', 'close a dialog']];
 function showKeys() {
   const keys = [...((current && current.keys) || []), ...GENERAL_KEYS];
-  return dialog(
-      'Keys of this page',
-      () =>
-          el('table', {class: 'values'},
-             el('tbody', {},
-                keys.map(
-                    ([key, does]) => el('tr', {}, el('th', {scope: 'row'}, el('kbd', {}, key)), el('td', {}, does))))));
+  return dialog('Keys of this page', () => Dom.valueTable(keys.map(([key, does]) => [el('kbd', {}, key), does])));
 }
 
 function pressed(event) {
@@ -171,7 +191,7 @@ function pressed(event) {
   if (event.target.matches && event.target.matches('input[type="range"]') && /^(Arrow|Page|Home|End)/.test(event.key))
     return;  // they move the slider
   const button = event.target.closest && event.target.closest('a, button, summary, [role="button"]');
-  if (button && /^( |Enter)$/.test(event.key)) return;  // it is pressed
+  if (button && /^( |Enter)$/.test(event.key)) return;  // they press it
   if (types && !event.ctrlKey && !event.metaKey) return;
   if (types && !event.target.matches('select') && /^Ctrl\+[zyZ]$/.test(name)) return;  // the field's own undo
   if (name === '?') return void showKeys();

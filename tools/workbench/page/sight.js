@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// What several views together say about a point: its place, how well the views agree, and where other views must show
-// it.
+// Geometry of a point in several views: its place, the agreement of the views, and the line on which another view must
+// show it.
 import * as Geometry from './geometry.js';
 import {cross, dot, length, minus, plus, times} from './geometry.js';
 
-// Of 3 x 3 equations; null if they have no single solution. Cramer's rule is exact enough for sums of projections.
+// Solves 3 x 3 equations; null without a unique solution. Cramer's rule is exact enough for sums of projections.
 function solved(rows, right) {
   const columns = [0, 1, 2].map((j) => rows.map((row) => row[j]));
   const volume = (a, b, c) => dot(a, cross(b, c)), whole = volume(...columns);
@@ -36,7 +36,7 @@ export function triangulated(seen) {
   return {world_mm, distance_mm, residuals_px};
 }
 
-// Of two lines in mm.
+// The distance of two lines in mm.
 function distance(a, b) {
   const between = minus(b.origin, a.origin), normal = cross(a.direction, b.direction), size = length(normal);
   if (size < 1e-9) return length(minus(between, times(a.direction, dot(between, a.direction))));
@@ -70,7 +70,7 @@ function clipped(a, b, c, width_px, height_px) {
 export const centralRay = ({intrinsics, ...camera}) =>
     Geometry.ray({intrinsics, ...camera}, [intrinsics[0][2], intrinsics[1][2]]);
 
-// Between the central rays of two cameras, 0 to 180.
+// The angle between the central rays of two cameras, 0 to 180.
 export function angle_deg(a, b) {
   const [one, two] = [a, b].map((camera) => centralRay(camera).direction);
   return Math.atan2(length(cross(one, two)), dot(one, two)) * 180 / Math.PI;

@@ -13,7 +13,7 @@ export const index = (ct, point_mm) => [0, 1, 2].map(
     (k) => [0, 1, 2].reduce((sum, row) => sum + ct.direction[row][k] * (point_mm[row] - ct.origin_mm[row]), 0) /
         ct.spacing_mm[k]);
 
-// For each of the patient's axes the axis of the grid that is nearest to it, and whether it runs the same way.
+// For each of the patient's axes: the nearest axis of the grid, and whether it has the same direction.
 function nearestAxes(ct) {
   const orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
   const agreement = (order) => order.reduce((sum, axis, row) => sum + Math.abs(ct.direction[row][axis]), 0);
@@ -72,7 +72,7 @@ export function whole(ct, plane, width, height) {
   };
 }
 
-// The patient's directions that the screen's right or down leads to: "L", or "LA" where the grid is oblique.
+// The patient's directions at the right or lower end of the screen: "L", or "LA" if the grid is oblique.
 export function letters(ct, {axis, sign}) {
   const names = [['L', 'R'], ['P', 'A'], ['H', 'F']];
   return [0, 1, 2]

@@ -7,7 +7,7 @@ const placeOf = (view, event) => {
   return [event.clientX - box.left, event.clientY - box.top];
 };
 
-// What dragging with a mouse button does: `moved` gets the way since the last call.
+// The action of a drag with a mouse button. `moved` gets the way since its last call.
 function begin(view, event) {
   const {state} = view, place = placeOf(view, event), mark = event.button === 0 && view.markAt(place);
   if (event.button === 2) {
@@ -84,7 +84,7 @@ function listenWheel(view) {
     event.preventDefault();
     if (event.ctrlKey) return view.zoom(Math.exp(-0.002 * event.deltaY), placeOf(view, event));
     turned += event.deltaMode ? 60 * event.deltaY : event.deltaY;
-    const slices = Math.trunc(turned / 60);  // a notch of a mouse is 100 to 120, a touch pad gives small ones
+    const slices = Math.trunc(turned / 60);  // a notch of a mouse wheel is 100 to 120; a touch pad gives smaller values
     turned -= 60 * slices;
     if (slices) view.goToSlice(view.wanted + Math.sign(slices) * Math.ceil(Math.abs(slices) / 2));
   }, {passive: false});

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a slice is drawn: its values, the outlines of fragments, the crosshair, points, and the patient's directions.
+// Draws a slice: its values, the outlines of fragments, the crosshair, points, and the patient's directions.
 import * as SliceGeometry from './slice_geometry.js';
 import {letters, opposite} from './slice_geometry.js';
 
-// Drawn by the processor: slices are small, and sending each to a graphics card takes longer than drawing it.
+// The processor draws: slices are small, and sending each to a graphics card takes longer.
 const PLAIN = {
   willReadFrequently: true
 };
@@ -106,7 +106,7 @@ function directions(view, pen) {
   label(pen, letters(ct, opposite(down)), width / 2, 11, colour, 'center');
 }
 
-// Draws the slice where it is seen. Until its values come, the last one stays.
+// Draws the slice in its place on the screen. Until its values arrive, the last slice stays.
 function place(view, density) {
   const {width, height} = view.canvas, {ct} = view.state;
   const numbers = SliceGeometry.pictureTransform(ct, view.plane, view.view);
@@ -119,7 +119,8 @@ function place(view, density) {
   pen.fillRect(0, 0, width, height);
   if (!view.filled) return;
   pen.setTransform(...numbers.map((number) => number * density));
-  pen.imageSmoothingEnabled = view.view.scale * Math.min(...ct.spacing_mm) < 4;  // then voxels are seen as squares
+  pen.imageSmoothingEnabled =
+      view.view.scale * Math.min(...ct.spacing_mm) < 4;  // voxels of 4 pixels and more are shown as squares
   pen.drawImage(view.picture, 0, 0);
 }
 

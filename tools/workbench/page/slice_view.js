@@ -18,7 +18,7 @@ export class SliceView {
            el('figcaption', {}, el('strong', {}, name[0].toUpperCase() + name.slice(1)), this.slider, this.number));
     this.slider.addEventListener('input', () => this.goToSlice(Number(this.slider.value)));
     this.picture = document.createElement('canvas');  // the slice, a pixel for each voxel
-    this.placed = document.createElement('canvas');   // the same where it is seen; kept while only lines move
+    this.placed = document.createElement('canvas');   // the same in its place on the screen; kept while only lines move
     this.observer = new ResizeObserver(() => this.resized());
     this.observer.observe(this.canvas);
     this.listen();
@@ -73,7 +73,7 @@ export class SliceView {
     this.frame = requestAnimationFrame(() => SlicePicture.draw(this));
   }
 
-  // One request at a time; the newest slice comes next. When all is quiet, the neighbours are fetched.
+  // One request runs at a time, and the newest slice comes next. Afterwards the neighbours are fetched.
   async ask() {
     if (this.isAsking) return;
     this.isAsking = true;
@@ -111,7 +111,7 @@ export class SliceView {
     this.state.moveCursor(index);
   }
 
-  // The index under a place on the canvas, and what the slice holds there (null outside).
+  // The index at a place on the canvas, and the value there (null outside).
   at(place) {
     const index = SliceGeometry.indexAt(this.state.ct, this.plane, this.view, place, this.wanted);
     const values = this.slices.get(this.wanted), {ct} = this.state;

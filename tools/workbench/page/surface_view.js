@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Surfaces of bone fragments in 3D, to be turned and looked at.
+// Surfaces in 3D. Mouse and keys turn them.
 import * as THREE from 'three';
 
 import {el} from '../../report/page/dom.js';
@@ -16,7 +16,10 @@ export class SurfaceView {
 
   dispose() {
     this.observer.disconnect();
-    if (this.renderer) this.renderer.dispose();
+    if (!this.renderer) return;
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
+    this.world = null;
   }
 
   // Null if this browser or this build has no WebGL; then the page says so.
@@ -26,7 +29,9 @@ export class SurfaceView {
       this.renderer = new THREE.WebGLRenderer({canvas: this.canvas, antialias: true, preserveDrawingBuffer: true});
     } catch (error) {
       this.isMissing = true;
-      this.element.replaceChildren(el('p', {class: 'note'}, 'The surface cannot be shown: there is no WebGL here.'));
+      this.element.replaceChildren(
+          el('p', {class: 'note'},
+             'The surface cannot be shown: this browser has no WebGL, or marrow was built without three.js.'));
       return null;
     }
     this.renderer.setClearColor(0x0b0e11, 1);

@@ -28,9 +28,9 @@ export function zoomed(port, factor, place) {
   const next = {...port, zoom};
   return {...next, centre: fixed.map((value, i) => value - (place[i] - port.frame[i] / 2) / scales(next)[i])};
 }
-// What is shown moves with the pointer by [dx, dy].
+// The image moves with the pointer by [dx, dy].
 export const panned = (port, by) => ({...port, centre: scales(port).map((scale, i) => port.centre[i] - by[i] / scale)});
-// The frame got another size; its middle stays.
+// The frame has another size; its middle stays.
 export const resized = (port, frame_width, frame_height) => ({
   ...port,
   zoom: port.zoom * Math.min(frame_width / port.frame[0], frame_height / port.frame[1]),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The dialogs that add a view to a case, or give another camera to one.
-import {button, el} from '../../report/page/dom.js';
+import {button, el, labelled} from '../../report/page/dom.js';
 
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
@@ -8,7 +8,7 @@ import * as XrayCameraFile from './xray_camera_file.js';
 
 const is_image = (name) => /\.(png|tiff?|dcm|dicom)$/i.test(name);
 const folderOf = (path) => path.split('/').slice(0, -1).join('/');
-// Of "a/frontal.0001.png" the name "frontal.0001".
+// "frontal.0001" of "a/frontal.0001.png".
 const stem = (path) => path.split('/').pop().replace(/\.[^.]*$/, '');
 
 // The keys of docs/case.md: [key, label, first value, least, most].
@@ -36,9 +36,7 @@ function armFields(known) {
                             value: known && known[key] !== undefined ? known[key] : value,
                             'data-arm': key
                           }));
-  const element =
-      el('div', {class: 'arm-fields'},
-         C_ARM.map(([, label], i) => el('label', {class: 'field'}, el('span', {}, label), boxes[i])));
+  const element = el('div', {class: 'arm-fields'}, C_ARM.map(([, label], i) => labelled(label, boxes[i])));
   const values = () => Object.fromEntries(C_ARM.map(([key], i) => [key, Number(boxes[i].value)]));
   return {element, values};
 }
@@ -53,12 +51,12 @@ function ask(title, image, name, taken, camera) {
       const chosen = box.value.trim();
       if (!chosen) return void (fault.textContent = 'Give the view a name.');
       if (chosen !== name && taken.includes(chosen))
-        return void (fault.textContent = `There is a view “${chosen}” already; give another name.`);
+        return void (fault.textContent = `The name “${chosen}” is taken; give another one.`);
       const c_arm = arm.values();
       if (kind === 'c_arm' && !(c_arm.source_to_isocentre_mm < c_arm.source_to_detector_mm))
         return void (
             fault.textContent =
-                'The isocentre lies between source and detector, so its distance must be the smaller one.');
+                'The isocentre is between source and detector, so its distance must be the smaller one.');
       close({name: chosen, kind, c_arm});
     };
     const form =
@@ -70,8 +68,7 @@ function ask(title, image, name, taken, camera) {
         },
            arm.element, el('button', {type: 'submit', 'data-camera': 'c_arm'}, 'Use these angles and distances'));
     return el(
-        'div', {class: 'add-view'}, el('p', {class: 'note'}, image),
-        el('label', {class: 'field'}, el('span', {}, 'Name of the view'), box), fault,
+        'div', {class: 'add-view'}, el('p', {class: 'note'}, image), labelled('Name of the view', box), fault,
         el('h3', {}, 'How was it taken?'),
         el('p', {}, button('Choose a camera file', () => finish('file'), {'data-camera': 'file'}), ' ',
            el('span', {class: 'note'}, 'marrow’s YAML, or a file of XMALab, plastimatch, RTK or xReg')),
@@ -83,7 +80,7 @@ function ask(title, image, name, taken, camera) {
   });
 }
 
-// What the document gets as the camera of an image, or undefined if the user leaves.
+// The camera of an image for the document, or undefined if the user leaves.
 async function cameraFor(answer, image) {
   if (answer.kind === 'file') {
     const file =
@@ -115,7 +112,7 @@ export async function add(draft) {
   });
 }
 
-// Everywhere in the document where the view is named.
+// Renames a view everywhere in the document.
 export function renameIn(document, name, next) {
   document.views.find((view) => view.name === name).name = next;
   for (const one of document.landmarks || [])

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The dialog that asks what a camera file of another program leaves open (docs/formats.md).
-import {el, select} from '../../report/page/dom.js';
+import {el, labelled, select} from '../../report/page/dom.js';
 
 import * as Shell from './shell.js';
 
 const MIRRORS = [
-  ['none', 'as it was: seen from the source, rows from above'],
-  ['left_right', 'left to right: it was seen from the detector'],
-  ['upside_down', 'upside down: its rows were from below']
+  ['none', 'not at all: it is seen from the source, with rows from the top'],
+  ['left_right', 'left to right: it is seen from the detector'],
+  ['upside_down', 'upside down: its rows begin at the bottom']
 ];
 const is_rtk = (file) => /\.xml$/i.test(file);
 const holdsProjections = (file) => /\.(xml|h5|hdf5)$/i.test(file);
@@ -31,12 +31,12 @@ const ask = (file) => Shell.dialog('Camera file with projections', (close) => {
   };
   return el(
       'form', {class: 'arm-fields', onsubmit: submit}, el('p', {class: 'note'}, file),
-      el('label', {class: 'field'}, el('span', {}, 'Number of the projection, counted from 0'), projection), mirror,
-      is_rtk(file) && el('label', {class: 'field'}, el('span', {}, 'Size of a pixel on the detector, mm'), pixel),
+      labelled('Number of the projection, counted from 0', projection), mirror,
+      is_rtk(file) && labelled('Size of a pixel on the detector, mm', pixel),
       el('div', {class: 'toolbar'}, el('button', {type: 'submit', 'data-camera-file': 'ok'}, 'Use this camera')));
 });
 
-// The draft's camera for a file that was chosen; asks what the file does not say.
+// The draft's camera for a chosen file. Asks for what the file does not say.
 export const cameraOf = (file) => (holdsProjections(file) ? ask(file) : {file});
 
 export const inWords = ({file, projection, mirror}) => file +

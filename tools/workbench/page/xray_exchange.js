@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Seeds, landmarks and starts from files of the folder, and to files.
+// Imports seeds, landmarks and starts from files of the folder, and exports them.
 import * as Dom from '../../report/page/dom.js';
 import {el} from '../../report/page/dom.js';
 
@@ -18,8 +18,8 @@ const fragmentOf = (document, name) => {
   return document.fragments[name] = document.fragments[name] || {seeds: [], register: true};
 };
 
-// Enters the content of a file into the document. Landmarks of the same name get the places of the file; everything
-// that the file does not say stays.
+// Enters the content of a file into the document. Landmarks of the same name get the places in the file. Everything
+// else stays.
 const PUT = {
   seeds(document, {seeds}) {
     for (const [name, one] of Object.entries(seeds)) Object.assign(fragmentOf(document, name), one);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Seeds, landmarks, starts and cameras to files of marrow and of other programs (docs/formats.md).
-import {button, el, select} from '../../report/page/dom.js';
+// Exports seeds, landmarks, starts and cameras to files of marrow and of other programs (docs/formats.md).
+import {button, el, labelled, select} from '../../report/page/dom.js';
 
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
@@ -26,7 +26,7 @@ const TITLES = {
   result: 'a result’s pose'
 };
 
-// What is written, or a sentence that says why there is nothing.
+// The content to write, or a sentence that says why there is none.
 const GET = {
   seeds(document) {
     const found = Object.entries(document.fragments || {}).filter(([, one]) => (one.seeds || []).length);
@@ -42,9 +42,7 @@ const GET = {
       to.points[one.name] = one.model_mm;
       for (const [view, at] of Object.entries(one.pixels || {})) (to.seen[view] = to.seen[view] || {})[one.name] = at;
     }
-    return Object.keys(fragments).length ?
-        {fragments} :
-        'No landmark has a place in the CT, and the file needs it; a landmark of X-rays alone stays in the case.';
+    return Object.keys(fragments).length ? {fragments} : 'No landmark has a place in the CT, which the file needs.';
   },
   pose(document, fragment) {
     const matrix = ((document.fragments || {})[fragment] || {}).start;
@@ -61,7 +59,7 @@ const GET = {
 const choiceOf = (label, names, chosen) =>
     select(label, names.map((one) => [one, one]), names.includes(chosen) ? chosen : names[0], () => {});
 
-// The size of a pixel that the case tells; '' if it does not.
+// The size of a pixel in the case; '' if the case does not have it.
 function pixelOf(shared) {
   for (const {camera} of shared.views()) {
     if (camera && camera.c_arm) return camera.c_arm.pixel_mm;
@@ -99,9 +97,8 @@ const ask = (shared, what, names, beside) => Shell.dialog(`Export: ${TITLES[what
   };
   setTimeout(() => box.focus());
   return el(
-      'form', {class: 'arm-fields', onsubmit: submit}, format,
-      el('label', {class: 'field'}, el('span', {}, 'File in the folder that is open'), box), one,
-      is_camera && el('label', {class: 'field'}, el('span', {}, 'Width of a pixel on the detector, mm'), pixel),
+      'form', {class: 'arm-fields', onsubmit: submit}, format, labelled('File in the folder that is open', box), one,
+      is_camera && labelled('Width of a pixel on the detector, mm', pixel),
       el('div', {class: 'toolbar'}, el('button', {type: 'submit', 'data-do': 'ok'}, 'Export')));
 });
 

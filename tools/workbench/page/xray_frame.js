@@ -5,9 +5,8 @@ import {el, svg} from '../../report/page/dom.js';
 import * as Viewport from './viewport.js';
 import * as XrayImages from './xray_images.js';
 
-// tool() gives the present tool: {press(pixel, event), key(name, step_px), marks(frame)} with optional functions.
-// press() returns {move(pixel), end(pixel), cancel()}, or nothing: then the pointer moves the image. said(text) gets
-// what is under the pointer.
+// tool() returns the present tool: {press(frame, pixel, event), arrow(frame, step), key(frame, name), marks(frame)}.
+// press() returns {move(pixel), end(pixel), cancel()}, or nothing: then the pointer moves the image.
 export function make(name, tool) {
   const canvas = el('canvas', {role: 'img', 'aria-label': 'X-ray ' + name});
   const overlay = svg('svg', {class: 'xray-marks', 'aria-hidden': 'true'});
@@ -108,7 +107,7 @@ function tell(frame, pixel) {
       `(${tenths(pixel[0])}, ${tenths(pixel[1])}) px: ` + (frame.entry.scale === 1 ? grey : grey.toPrecision(5));
 }
 
-// Pointers: one does what the tool says, or moves the image; two zoom and move it, on a touch screen.
+// One pointer uses the tool or moves the image. Two pointers on a touch screen zoom and move it.
 function listen(frame, tool) {
   const {box} = frame, pointers = new Map();
   let doing = null, last = null;
@@ -191,7 +190,7 @@ function pressed(frame, tool, event) {
   const arrow = ARROWS[event.key];
   if (arrow) {
     const step = event.shiftKey ? 10 : event.altKey ? 0.1 : 1;
-    // On the screen, right is right in a mirrored image, too.
+    // An arrow to the right moves to the right on the screen, also in a mirrored image.
     const turn = [frame.port.flip_u ? -1 : 1, frame.port.flip_v ? -1 : 1];
     if (tool.arrow && tool.arrow(frame, arrow.map((one, i) => one * step * turn[i]))) return true;
     frame.change(Viewport.panned(frame.port, arrow.map((one) => -40 * one)));

@@ -5,9 +5,9 @@ import * as Ask from './server.js';
 const known = new Map();
 const key = (view) => JSON.stringify([view.image, view.camera || null]);
 
-// What is known of a view: {is_ready, fault, width_px, height_px, numbers, offset, scale, camera, warnings, command}.
-// The grey value of a number is offset + scale * number. `fault` says why there is no camera, or no image at all:
-// then `numbers` is missing. changed() is called when it is ready.
+// The data of a view: {is_ready, fault, width_px, height_px, numbers, offset, scale, camera, warnings, command}. The
+// grey value of a number is offset + scale * number. `fault` says why there is no camera, or no image at all: then
+// `numbers` is missing. changed() is called when it is ready.
 export function of (view, changed) {
   const name = key(view);
   if (!known.has(name)) {
@@ -32,10 +32,10 @@ async function read(view, entry) {
   entry.is_ready = true;
 }
 
-// The server writes the low byte first, as do all machines that have a browser.
+// The server writes the low byte first, like all machines with a browser.
 const numbersOf = (bytes) => new Uint16Array(bytes);
 
-// The numbers below which 1 %, 50 % and 99 % of some pixels lie, between ranks linearly, as everywhere in marrow.
+// The quantiles of 1 %, 50 % and 99 % of some pixels, linear between ranks, as everywhere in marrow.
 function quantiles(numbers, picked) {
   const sorted = Uint16Array.from(picked, (index) => numbers[index]).sort();
   return [0.01, 0.5, 0.99].map((fraction) => {
@@ -55,8 +55,8 @@ function rangeOf(numbers) {
   return high > low ? [low, high] : [low, low + 1];
 }
 
-// Whether a limb is bright on a dark ground. It leaves the image at one side at least, and the ground is seen at two
-// sides that face each other. A round field or a collimator is dark at all four sides, or only in the corners.
+// Whether the image shows a bright limb on a dark ground. A limb leaves the image at one side or more, and the ground
+// is at two opposite sides. A round field or a collimator is dark at all four sides, or only in the corners.
 function looksInverted({numbers, width_px, height_px, range: [low, high]}) {
   const median = (left, top, right, bottom) => {
     const picked = [],

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Landmarks in X-rays: the tool that marks them, and what the views together say about each.
+// Landmarks in X-rays: the tool that marks them, and their places and errors from all views.
 import {svg} from '../../report/page/dom.js';
 
 import * as Geometry from './geometry.js';
@@ -61,7 +61,7 @@ export function fitOff(bench, landmark) {
   return off.length ? Math.max(...off) : null;
 }
 
-// Writes the moved place, once no key was pressed for a while or something else is done.
+// Writes the moved place to the draft. Called after a pause of the keys, and before any other action.
 export function commit(bench) {
   clearTimeout(bench.pause);
   const live = bench.live;
@@ -97,7 +97,7 @@ function nearest(bench, frame, pixel) {
   return best;
 }
 
-// The landmark that a click places: the chosen one where this view does not show it yet, or a new one.
+// The landmark that a click places: the chosen one if this view does not show it yet, otherwise a new one.
 const nameToPlace = (bench, view) =>
     (bench.chosen && !marked(bench, bench.chosen, view) ? bench.chosen : freeName(bench));
 
@@ -146,7 +146,7 @@ function key(bench, frame, name) {
   if (name === 'Delete' && bench.chosen && marked(bench, bench.chosen, frame.name)) {
     const chosen = bench.chosen;
     commit(bench);
-    bench.draft.change(`take ${chosen} out of ${frame.name}`, (document) => {
+    bench.draft.change(`remove ${chosen} from ${frame.name}`, (document) => {
       const one = document.landmarks.find((landmark) => landmark.name === chosen);
       delete one.pixels[frame.name];
     });
@@ -174,7 +174,7 @@ function cross(frame, pixel, size, attributes) {
   return svg('path', {d: `M${x - size} ${y}h${2 * size}M${x} ${y - size}v${2 * size}`, ...attributes});
 }
 
-// The chosen landmark as the other views see it: a line for each, and the place on which all agree.
+// The chosen landmark from the other views: a line for each, and the place on which all agree.
 function linesOf(bench, frame, landmark) {
   const camera = bench.cameraOf(frame.name);
   if (!camera) return [];
@@ -215,6 +215,6 @@ export const tool = (bench) => ({
 
 export const KEYS = [
   ['Enter', 'in an X-ray: place a landmark, or put the brush down and lift it'],
-  ['n', 'in an X-ray: the next landmark'], ['Delete', 'in an X-ray: take the landmark out of it'],
-  ['Esc', 'in an X-ray: no landmark']
+  ['n', 'in an X-ray: the next landmark'], ['Delete', 'in an X-ray: remove the landmark from it'],
+  ['Esc', 'in an X-ray: choose no landmark']
 ];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Masks of X-rays: zero where a view must not be used. Each stroke is one change of the case.
+// Masks of X-rays: zero marks pixels that must not be used. Each stroke is one change of the case.
 import {svg} from '../../report/page/dom.js';
 
 import * as Geometry from './geometry.js';
@@ -8,7 +8,7 @@ import * as Shell from './shell.js';
 import * as Viewport from './viewport.js';
 import * as XrayImages from './xray_images.js';
 
-// A mask has `used`, a byte for each pixel, 0 or 255, and `picture`, a canvas that shows what is not used.
+// A mask has `used`, a byte for each pixel, 0 or 255, and `picture`, a canvas that shows the unused pixels.
 function blank(width_px, height_px, used) {
   const picture = document.createElement('canvas');
   picture.width = width_px;
@@ -65,8 +65,8 @@ export function make(shared) {
   const known = new Map();  // by what keyOf() gives
   let working = null;       // {view, mask, what} while a stroke is being made or kept
 
-  // What the server needs to turn the file of a view's mask into the mask of the shown image, and back. Without a
-  // usable camera, the image is shown as its file has it.
+  // The data with which the server converts between the file of a mask and the mask of the shown image. Without a
+  // usable camera, the image is shown as it is in its file.
   const sourceOf = (view) => ({image: view.image, camera: XrayImages.of(view).fault ? null : view.camera || null});
   const keyOf = (view) => JSON.stringify([view.mask, view.image, view.camera || null]);
 
@@ -93,7 +93,7 @@ export function make(shared) {
     if (old && (old.width_px !== frame.entry.width_px || old.height_px !== frame.entry.height_px)) {
       Shell.notice(
           `${view.mask} has ${old.width_px} x ${old.height_px} pixels, but the image has ${frame.entry.width_px} x ` +
-              `${frame.entry.height_px}; take the mask away first`,
+              `${frame.entry.height_px}; remove the mask first`,
           'fault');
       return null;
     }
@@ -103,7 +103,7 @@ export function make(shared) {
     return mask;
   }
 
-  // Writes the stroke to a file, and names that in the draft.
+  // Writes the stroke to a file, and enters the file into the draft.
   async function keep() {
     const done = working;
     if (!done) return;
@@ -113,7 +113,7 @@ export function make(shared) {
       const {mask: path} = await Ask.post('api/xray/mask', body);
       const next = {...shown, mask: path};
       if (path && XrayImages.of(shown).is_straightened)
-        await read(next);  // pixels that are one in the image's file were painted together
+        await read(next);  // pixels that share a pixel of the image's file were painted together
       else
         known.set(keyOf(next), mask);
       await shared.draft.change(`paint the mask of ${view}`, (document) => {

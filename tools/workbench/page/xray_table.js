@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The list of landmarks with what the X-rays say about each, and the pose that they give.
+// The list of landmarks with their places and errors in the X-rays, and the pose that they give.
 import * as Dom from '../../report/page/dom.js';
 import {el} from '../../report/page/dom.js';
 
@@ -15,12 +15,12 @@ export function askName(title, value, taken) {
       event.preventDefault();
       const name = box.value.trim();
       if (!name) return void (fault.textContent = 'Give a name.');
-      if (name !== value && taken.includes(name)) return void (fault.textContent = `There is a “${name}” already.`);
+      if (name !== value && taken.includes(name)) return void (fault.textContent = `The name “${name}” is taken.`);
       close(name);
     };
     setTimeout(() => box.select());
     return el(
-        'form', {onsubmit: submit}, el('label', {class: 'field'}, el('span', {}, 'Name'), box), fault,
+        'form', {onsubmit: submit}, Dom.labelled('Name', box), fault,
         el('div', {class: 'toolbar'}, el('button', {type: 'submit', 'data-do': 'ok'}, 'OK')));
   });
 }
@@ -43,7 +43,7 @@ async function remove(bench, name) {
 // Tiny numbers are only rounding errors.
 export const figure = (value) => (value === null ? '–' : Math.abs(value) < 0.0005 ? '0.000' : Dom.number(value));
 
-// One row; update(landmark) renews its figures and leaves its buttons alone.
+// One row. update(landmark) changes only its figures.
 function row(bench, name) {
   const choose = Dom.button(
       name, () => bench.choose(bench.chosen === name ? null : name),
@@ -84,7 +84,7 @@ function fitPart(bench) {
     state.textContent = fit_fault ||
         (fit ? `Fitted pose: ${figure(fit.residual_px)} px root mean square` +
                  (fit.warnings.length ? '. ' + fit.warnings.join(' ') : '') :
-               'Landmarks that have a place in the CT, too, give the pose of the bone, if two views show three.');
+               'Landmarks with a place in the CT give the pose of the bone, if two views show three of them.');
     command.hidden = !fit;
     if (fit) command.replaceChildren(command.firstChild, Dom.command(fit.command));
     place.replaceChildren(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The panel "X-ray views" of the page "Case": which views there are, their geometry, and what is wrong with it.
+// The panel "X-ray views" of the page "Case": the list of views, their geometry, and its faults.
 import * as Dom from '../../report/page/dom.js';
 import {el} from '../../report/page/dom.js';
 
@@ -23,7 +23,7 @@ function cameraText(view) {
   return camera.intrinsics ? 'matrices in the case' : 'no camera';
 }
 
-// What an image says without any other: [sentence].
+// The faults that an image shows by itself: [sentence].
 function faultsOf(view, entry) {
   const faults = [];
   if (entry.fault) faults.push(entry.fault);
@@ -79,12 +79,14 @@ function item(draft, view, index, count, entry) {
       faults.map((fault) => el('p', {class: 'fault', 'data-fault-of': view.name}, fault)));
 }
 
-// Files that say nothing about the patient's sides: whether one is mirrored shows only in what it shows.
+// A sentence about files that do not state the patient's sides. Only the anatomy shows whether they are mirrored.
 function sidesText(views) {
   const silent = views.filter((view) => !/\.(dcm|dicom)$/i.test(view.image)).map((view) => view.name);
   return silent.length ?
-      `${silent.join(', ')}: PNG and TIFF do not say what is left. Compare with the anatomy: in a frontal view the ` +
-          'patient’s left is on the left. Landmarks in two views show a mirrored one, too.' :
+      `${
+          silent.join(
+              ', ')}: PNG and TIFF do not say which side is left. Compare with the anatomy: in a frontal view the ` +
+          'patient’s left is on the left. Landmarks in two views also reveal a mirrored image.' :
       '';
 }
 
@@ -125,7 +127,7 @@ function figuresOf(views) {
   return rows;
 }
 
-// Asks marrow to check the cameras, once views and landmarks no longer change. Calls told({warnings, command}) or
+// Asks marrow to check the cameras when views and landmarks no longer change. Calls told({warnings, command}) or
 // told({fault}).
 function checking(draft, told) {
   let asked = '', timer = null, aborter = null;
@@ -161,8 +163,8 @@ function checkText(answer) {
     lines.push(
         el('p', {class: 'note', 'data-good': ''},
            error === undefined ?
-               'Nothing speaks against these cameras.' :
-               `Nothing speaks against these cameras; the marked landmarks are ${XrayTable.figure(error)} px off.`));
+               'No fault was found in these cameras.' :
+               `No fault was found in these cameras; the marked landmarks are ${XrayTable.figure(error)} px off.`));
   if (answer.command)
     lines.push(el('details', {}, el('summary', {}, 'The same in a shell'), Dom.command(answer.command)));
   return lines;
@@ -192,7 +194,7 @@ function make(draft) {
     XrayImages.forget();
     list.dataset.shown = '';
     draft.dispatchEvent(new Event('change'));
-  }, {'data-do': 'read-again', title: 'Reads images and cameras from their files anew'});
+  }, {'data-do': 'read-again', title: 'Reads images and cameras from their files again'});
   return {
     element:
         el('div', {class: 'xray-views'},

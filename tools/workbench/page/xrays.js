@@ -81,8 +81,7 @@ function toolbar(shared, tools) {
     }
   });
   const number = el('span', {class: 'note'}, size.value + ' px');
-  const brush =
-      el('label', {class: 'field'}, el('span', {}, 'Brush'), el('span', {class: 'with-number'}, size, number));
+  const brush = Dom.labelled('Brush', el('span', {class: 'with-number'}, size, number));
   const all = Dom.button('Whole images', () => shared.frames.forEach((frame) => frame.fit()), {'data-do': 'fit'});
   const update = () => {
     brush.hidden = !['brush', 'eraser'].includes(shared.tool);
@@ -91,7 +90,7 @@ function toolbar(shared, tools) {
   return {element: el('div', {class: 'toolbar'}, choice, brush, all), update};
 }
 
-// A view in the row of X-rays, with its name, its fault and what is under the pointer.
+// A view in the row of X-rays, with its name, its fault, and the value under the pointer.
 function figure(shared, view, tool) {
   const frame = XrayFrame.make(view.name, tool);
   const fault = el('p', {class: 'fault', role: 'alert', hidden: true});
@@ -133,7 +132,7 @@ function row(shared, tool) {
   return {element: el('div', {}, empty, place), update};
 }
 
-// Asks for the pose that the landmarks give, once they no longer change.
+// Requests the pose from the landmarks when they no longer change.
 function fitting(shared, told) {
   let asked = '', timer = null, aborter = null;
   const ask = async (body) => {

@@ -9,8 +9,8 @@
 namespace marrow {
 namespace {
 
-/// What the node needs and the pipeline does not give it. Options that the file gives to the replaced node do not
-/// count.
+/// What the node needs and the pipeline does not give it. Options that the file gives to the replaced node are not
+/// given to this node.
 std::vector<std::string> missing_for(const PipelineNode& node, const PipelineArguments& arguments) {
   std::vector<std::string> missing;
   for (std::size_t i = 0; i < node.info.inputs.size(); ++i) {
@@ -39,7 +39,7 @@ Fit fit_of(const std::string& name, const std::string& id, const std::filesystem
   Fit fit{name, {}, {}};
   for (const PipelineNode& node : pipeline.nodes)
     if (node.id == id) fit.missing = missing_for(node, arguments);
-  // Each missing thing is a fault too. If there are no other faults, the pipeline can be completed.
+  // Each missing thing is a fault too. If there is no other fault, the pipeline can be completed.
   if (faults.size() > fit.missing.size())
     for (const Diagnostic& fault : faults.sorted()) fit.faults.push_back(fault.message);
   return fit;

@@ -11,16 +11,16 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// A node that may replace another one in a pipeline.
+/// A node that may replace another node of a pipeline.
 struct Fit {
-  std::string node;
+  std::string node;                  ///< kind.name
   std::vector<std::string> missing;  ///< what must be wired or given so that the node fits, one line each
   std::vector<std::string> faults;   ///< why it does not fit
 };
 
-/// The nodes that could replace node `id`, with the default values of their options. First all nodes of the same kind,
-/// even if they do not fit; then the nodes of other kinds that fit. If the pipeline itself has faults or `id` is
-/// unknown, this is reported to `diagnostics` and the result is empty.
+/// The nodes that could replace node `id`, with the default values of their options: all nodes of the same kind, even
+/// if they do not fit, and then the nodes of other kinds that fit. If the pipeline itself has faults or `id` is
+/// unknown, this goes to `diagnostics`, and the result is empty.
 std::vector<Fit> nodes_in_place_of(const std::string& id, const std::filesystem::path& file,
                                    const PipelineArguments& arguments, const Catalogue& catalogue,
                                    Diagnostics& diagnostics);

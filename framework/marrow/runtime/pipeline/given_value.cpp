@@ -11,7 +11,6 @@ namespace {
 
 constexpr const char* kOpening = "[{\"'";
 
-/// By the first character.
 std::string beginning_of(const std::string& text) {
   return text[0] == '['   ? "the value begins as a list"
          : text[0] == '{' ? "the value begins as a map"
@@ -31,17 +30,17 @@ std::optional<YAML::Node> given_value(const std::string& text, const Place& plac
   std::string why = "it does not end as one";
   try {
     if (text.find_first_of("\r\n") != std::string::npos) throw YAML::Exception({}, "it must be in one line");
-    // In a list of its own, it can have neither a comment nor another value after it.
+    // Inside a list of one item, neither a comment nor another value can follow the text.
     const YAML::Node all = parse_yaml("[" + text + "]");
     if (all.IsSequence() && all.size() == 1 && is_of_form(all[0], text)) return all[0];
   } catch (const YAML::Exception& fault) {
     why = fault.msg;
   }
-  const std::string in_it =
+  const std::string inside =
       text[0] == '[' || text[0] == '{' ? "a text in it with ' #', ': ', &, ! or * needs quotes; " : "";
   const std::string quoted = nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   diagnostics.add(place, beginning_of(text) + ", but cannot be read as one: " + why,
-                  in_it + "a text that begins so is given in double quotes, as " + cut(quoted, 200));
+                  inside + "to give it as a text, put it in double quotes: " + cut(quoted, 200));
   return std::nullopt;
 }
 

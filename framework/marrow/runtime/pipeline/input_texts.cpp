@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/pipeline/input_texts.hpp"
 
-#include <algorithm>
 #include <cctype>
 
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow {
 namespace {
 
-constexpr std::size_t kMostInputBytes =
-    256'000;  // else a long value that is named often fills memory, terminal and records
+/// Without a limit, a long value that is named often fills memory, terminal and records.
+constexpr std::size_t kMostInputBytes = 256'000;
 
 }  // namespace
 
@@ -45,11 +45,10 @@ const std::string* InputTexts::value_of(const std::string& name, const Place& pl
   used.insert(name);
   const auto input = pipeline_.inputs.find(name);
   if (input != pipeline_.inputs.end()) return &input->second;
-  const std::vector<std::string>& missing = pipeline_.missing_inputs;
-  if (std::find(missing.begin(), missing.end(), name) != missing.end()) return nullptr;
+  if (contains(pipeline_.missing_inputs, name)) return nullptr;
   std::string hint;
   if (!diagnostics_.is_full()) {
-    std::vector<std::string> names = missing;
+    std::vector<std::string> names = pipeline_.missing_inputs;
     for (const auto& [known, value] : pipeline_.inputs) names.push_back(known);
     hint = suggestion(name, names);
   }

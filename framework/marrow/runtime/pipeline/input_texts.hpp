@@ -14,8 +14,8 @@ class InputTexts {
   InputTexts(const WrittenPipeline& pipeline, Diagnostics& diagnostics)
       : pipeline_(pipeline), diagnostics_(diagnostics) {}
 
-  /// Returns nothing if a name has no value. A name that the pipeline does not declare is a fault. A declared input
-  /// without a value is not.
+  /// Returns nothing if a name has no value. This is a fault only if the pipeline does not declare an input of that
+  /// name.
   std::optional<std::string> put_into(const std::string& text, const Place& place);
 
   std::set<std::string> used, unknown;  ///< names found so far
@@ -25,7 +25,7 @@ class InputTexts {
 
   const WrittenPipeline& pipeline_;
   Diagnostics& diagnostics_;
-  std::size_t bytes_ = 0;  ///< bytes of values put in so far
+  std::size_t bytes_ = 0;  ///< of all values put in so far
 };
 
 }  // namespace marrow

@@ -5,46 +5,38 @@
 #include <set>
 
 #include "marrow/base/error.hpp"
-#include "marrow/base/names.hpp"
 #include "marrow/runtime/node/types.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow {
 namespace {
 
-constexpr const char* kJudged = "pose";  ///< the input of the kind verdict that is judged
-
-const PipelineNode& node_of(const Pipeline& pipeline, const PipelineOutput& output) {
-  return pipeline.nodes[std::size_t(output.source.node)];
-}
+constexpr const char* kJudged = "pose";  ///< the input that holds the judged pose, in nodes of the kind verdict
 
 template <class T>
 bool is_of(const Pipeline& pipeline, const PipelineOutput& output) {
-  return node_of(pipeline, output).info.outputs[std::size_t(output.source.output)].type == TypeInfo::of<T>();
+  return pipeline.output_of(output.source).type == TypeInfo::of<T>();
 }
 
-/// The nodes whose pose a verdict is of. A body that makes verdicts judges its own poses.
+/// The nodes whose poses a verdict judges. A body that makes verdicts judges its own poses.
 std::set<int> judged_by(const Pipeline& pipeline, const PipelineOutput& verdict) {
-  const PipelineNode& node = node_of(pipeline, verdict);
+  const PipelineNode& node = pipeline.node_of(verdict.source);
   if (node.repetition) return {verdict.source.node};
   std::set<int> judged;
   for (const Wire& wire : node.wires)
-    if (node.info.inputs[std::size_t(wire.port)].name == kJudged)
+    if (node.input_of(wire).name == kJudged)
       for (const Reference& source : wire.sources) judged.insert(source.node);
   return judged;
 }
 
-/// Whether a pose of one of these nodes reaches a node, at most with changes that no cost has made.
-bool comes_from(const Pipeline& pipeline, int node, const std::set<int>& judged) {
-  if (judged.contains(node)) return true;
-  const PipelineNode& made = pipeline.nodes[std::size_t(node)];
-  const auto takes = [&](const Wire& wire, const TypeInfo& type) {
-    return made.info.inputs[std::size_t(wire.port)].type == type;
-  };
-  if (std::any_of(made.wires.begin(), made.wires.end(),
-                  [&](const Wire& wire) { return takes(wire, TypeInfo::of<Cost>()); }))
-    return false;
-  for (const Wire& wire : made.wires) {
-    if (!takes(wire, TypeInfo::of<Pose>())) continue;
+/// Whether the pose of a node comes from one of the judged nodes, and no node in between has a cost.
+bool comes_from(const Pipeline& pipeline, int index, const std::set<int>& judged) {
+  if (judged.contains(index)) return true;
+  const PipelineNode& node = pipeline.nodes[std::size_t(index)];
+  for (const Wire& wire : node.wires)
+    if (node.input_of(wire).type == TypeInfo::of<Cost>()) return false;
+  for (const Wire& wire : node.wires) {
+    if (node.input_of(wire).type != TypeInfo::of<Pose>()) continue;
     for (const Reference& source : wire.sources)
       if (comes_from(pipeline, source.node, judged)) return true;
   }
@@ -54,18 +46,14 @@ bool comes_from(const Pipeline& pipeline, int node, const std::set<int>& judged)
 }  // namespace
 
 void keep_outputs(Pipeline& pipeline, const std::vector<std::string>& names) {
-  std::vector<std::string> known;
-  for (const PipelineOutput& output : pipeline.outputs) known.push_back(output.name);
+  const std::vector<std::string> known = names_of(pipeline.outputs);
   for (const std::string& name : names)
-    if (std::find(known.begin(), known.end(), name) == known.end())
-      throw Error("the pipeline has no output '" + name + "'; " + suggestion(name, known));
+    if (!contains(known, name)) throw Error("the pipeline has no output '" + name + "'; " + suggestion(name, known));
   Pipeline wanted = pipeline;
-  std::erase_if(wanted.outputs, [&](const PipelineOutput& output) {
-    return std::find(names.begin(), names.end(), output.name) == names.end();
-  });
+  std::erase_if(wanted.outputs, [&](const PipelineOutput& output) { return !contains(names, output.name); });
   const std::vector<bool> needed = wanted.needed();
   std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) {
-    if (std::find(names.begin(), names.end(), output.name) != names.end()) return false;
+    if (contains(names, output.name)) return false;
     if (!is_of<Verdict>(pipeline, output)) return true;
     const std::set<int> judged = judged_by(pipeline, output);
     return std::none_of(judged.begin(), judged.end(), [&](int node) { return needed[std::size_t(node)]; });

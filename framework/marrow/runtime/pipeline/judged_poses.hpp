@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Which poses of a pipeline somebody judges. A pose that nobody judged must not look like one that was.
+// Which poses of a pipeline get a verdict. A pose without one must not look like a judged pose.
 #include "marrow/base/export.hpp"
 #include "marrow/runtime/pipeline/pipeline.hpp"
 
 namespace MARROW_EXPORT marrow {
 
-/// Leaves only the outputs of these names, and the verdicts on all poses that are made for them: a part of a pipeline
-/// tells no less about its poses than the whole. Throws Error for a name that the pipeline does not have.
+/// Keeps only the outputs of these names, and the verdicts on all poses that are made for them. So a part of a pipeline
+/// tells as much about its poses as the whole. Throws Error if the pipeline has no output of a name.
 void keep_outputs(Pipeline& pipeline, const std::vector<std::string>& names);
 
-/// A sentence for each output that is a pose on which the pipeline has no verdict. A verdict also counts if it is on
-/// the pose that the output was made from, as after a change of its deviations, unless a cost led to another place.
+/// A sentence for each output that is a pose without a verdict. A verdict on an earlier pose also counts, if the output
+/// was made from that pose and no node in between has a cost. So new deviations keep the verdict; a new search does
+/// not.
 std::vector<std::string> notes_on_poses(const Pipeline& pipeline);
 
 }  // namespace marrow

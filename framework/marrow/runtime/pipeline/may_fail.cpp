@@ -12,7 +12,7 @@
 namespace marrow {
 namespace {
 
-/// "node 'x' failed", if the value or an item of it is missing for this reason, and x may fail.
+/// "node 'x' failed", if that is why the value or one of its items is missing, and x may fail. Otherwise empty.
 std::string failed_in(const Value& value) {
   if (value.is_absent()) return value.may_be_missing ? value.missing : "";
   for (const Value& item : value.items)
@@ -23,28 +23,28 @@ std::string failed_in(const Value& value) {
 /// Whether the node is called for each item along the axis because of this source.
 bool gives_items(const Pipeline& pipeline, const PipelineNode& node, const Wire& wire, const Reference& source,
                  const std::string& axis) {
-  return node.info.inputs[std::size_t(wire.port)].axis != axis && contains(pipeline.axes_of(source), axis);
+  return node.input_of(wire).axis != axis && contains(pipeline.axes_of(source), axis);
 }
 
-/// An axis along which the node is called only because of this source, among those that may not fail. Empty if there is
-/// none.
+/// An axis along which the node is called because of this source, and because of no source that may not fail. Empty if
+/// there is no such axis.
 std::string own_axis(const Pipeline& pipeline, const PipelineNode& node, const Wire& wire, const Reference& source) {
   for (const std::string& axis : node.mapped_axes) {
     if (!gives_items(pipeline, node, wire, source, axis)) continue;
     bool is_known = false;
     for (const Wire& other : node.wires)
       for (const Reference& from : other.sources)
-        is_known |= !pipeline.nodes[std::size_t(from.node)].may_fail && gives_items(pipeline, node, other, from, axis);
+        is_known |= !pipeline.node_of(from).may_fail && gives_items(pipeline, node, other, from, axis);
     if (!is_known) return axis;
   }
   return "";
 }
 
+/// The first relation between the node's inputs and options that does not hold without these inputs; empty if all hold.
 std::string broken_without(const PipelineNode& node, const std::set<std::string>& left_out) {
   const auto is_wired = [&](const std::string& name) {
-    return !left_out.contains(name) && std::any_of(node.wires.begin(), node.wires.end(), [&](const Wire& wire) {
-      return node.info.inputs[std::size_t(wire.port)].name == name;
-    });
+    return !left_out.contains(name) && std::any_of(node.wires.begin(), node.wires.end(),
+                                                   [&](const Wire& wire) { return node.input_of(wire).name == name; });
   };
   for (const RelationInfo& relation : node.info.relations)
     if (const auto fault = broken(relation, node.info, node.options, is_wired)) return fault->message;
@@ -58,9 +58,9 @@ void check_may_fail(const Pipeline& pipeline, Diagnostics& diagnostics) {
     if (node.may_fail) continue;
     for (const Wire& wire : node.wires)
       for (const Reference& source : wire.sources) {
-        const PipelineNode& from = pipeline.nodes[std::size_t(source.node)];
+        const PipelineNode& from = pipeline.node_of(source);
         if (!from.may_fail) continue;
-        const PortInfo& port = node.info.inputs[std::size_t(wire.port)];
+        const PortInfo& port = node.input_of(wire);
         const std::string axis = own_axis(pipeline, node, wire, source);
         if (!port.optional)
           diagnostics.add(source.place,
@@ -97,12 +97,11 @@ std::string leave_out_failed(const PipelineNode& node, std::vector<Value>& input
 void expect_items(const Pipeline& pipeline, const PipelineNode& node, const std::vector<Value>& inputs,
                   const std::string& axis) {
   for (const Wire& wire : node.wires) {
-    if (!node.info.inputs[std::size_t(wire.port)].optional) continue;  // leave_out_failed() says that it is needed
-    for (const Reference& source : wire.sources) {
-      const std::string failed = failed_in(inputs[std::size_t(wire.port)]);
-      if (!failed.empty() && gives_items(pipeline, node, wire, source, axis))
+    const std::string failed = failed_in(inputs[std::size_t(wire.port)]);
+    if (failed.empty() || !node.input_of(wire).optional) continue;
+    for (const Reference& source : wire.sources)
+      if (gives_items(pipeline, node, wire, source, axis))
         throw Error("it is called for each " + axis + " of " + in_quotes(source.text) + ", but " + failed);
-    }
   }
 }
 

@@ -15,7 +15,7 @@ bool is_below(const fs::path& folder, const fs::path& file) {
   return !from_folder.empty() && *from_folder.begin() != "..";
 }
 
-/// A link inside a folder that leads to a file of the folder, or to nothing. Throws Error for any other link.
+/// For a link inside a folder that leads to a file of the folder or to nothing. Throws Error for any other link.
 NamedFile linked_file(const fs::path& root, const fs::directory_entry& entry) {
   std::error_code error;
   const fs::path target = fs::canonical(entry.path(), error);

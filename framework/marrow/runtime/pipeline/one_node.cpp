@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A pipeline for the call of one node with values that a program has.
 #include "marrow/runtime/pipeline/one_node.hpp"
-
-#include <algorithm>
 
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/given_value.hpp"
@@ -29,18 +26,17 @@ class CallBuilder {
   void add_option(const std::string& name, const std::string& text) {
     const Place place = place_of(name);
     if (const auto value = given_value(text, place, diagnostics_))
-      written_.options.emplace_back(name, WrittenValue{place, *value, std::filesystem::current_path(), true});
+      written_.options.push_back({name, {place, *value, std::filesystem::current_path(), true}});
   }
 
   void add_input(const std::string& name, const Value& value) {
-    const auto port =
-        std::find_if(info_.inputs.begin(), info_.inputs.end(), [&](const PortInfo& one) { return one.name == name; });
-    if (port == info_.inputs.end()) {
+    const PortInfo* port = find_named(info_.inputs, name);
+    if (!port) {
       diagnostics_.add(place_of(name), in_quotes(info_.name) + " has no input " + in_quotes(name),
                        suggestion(name, names_of(info_.inputs)));
       return;
     }
-    written_.wires.emplace_back(name, WrittenValue{place_of(name), {}, {}, true});
+    written_.wires.push_back({name, {place_of(name), {}, {}, true}});
     if (value.type != port->type)
       diagnostics_.add(
           place_of(name),
@@ -53,7 +49,7 @@ class CallBuilder {
     source.info.outputs = {{name, port->help, port->type, false, ""}};
     for (const Value* one = &value; one->is_list(); one = &one->items[0]) source.mapped_axes.push_back(one->axis);
     Wire wire;
-    wire.port = int(port - info_.inputs.begin());
+    wire.port = int(port - info_.inputs.data());
     wire.sources = {{name, place_of(name), int(made_.pipeline.nodes.size()), 0, {}}};
     node_.wires.push_back(std::move(wire));
     made_.given[source.id] = {value};
@@ -66,7 +62,7 @@ class CallBuilder {
     UnknownValues unknown;
     resolve_options(written_, node_, texts, unknown, diagnostics_);
     for (const PortInfo& port : info_.inputs)
-      if (!port.optional && !is_written(written_.wires, port.name))
+      if (!port.optional && !find_named(written_.wires, port.name))
         diagnostics_.add(place_of(port.name),
                          info_.name + " needs the input " + in_quotes(port.name) + ", of type " + port.type.id,
                          port.help);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Makes a checked graph from a written pipeline: looks up names, converts options, checks the types of wires, finds
-// axes.
+// Makes a checked graph from a written pipeline: looks up names, converts options, checks wires, finds axes.
 #include "marrow/runtime/pipeline/pipeline.hpp"
 
 #include <algorithm>
@@ -11,16 +10,11 @@
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/types.hpp"
-#include "marrow/runtime/pipeline/input_texts.hpp"
 #include "marrow/runtime/pipeline/pipeline_axes.hpp"
-#include "marrow/runtime/pipeline/pipeline_circles.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/pipeline/pipeline_options.hpp"
 #include "marrow/runtime/pipeline/pipeline_references.hpp"
 #include "marrow/runtime/pipeline/pipeline_repetition.hpp"
-#include "marrow/runtime/pipeline/pipeline_replaced.hpp"
-#include "marrow/runtime/pipeline/pipeline_text.hpp"
-#include "marrow/runtime/pipeline/renamed.hpp"
 #include "marrow/runtime/plugins/contract.hpp"
 
 namespace marrow {
@@ -32,7 +26,7 @@ std::string with_article(const std::string& noun) { return (noun.find_first_of("
 
 class Resolver {
  public:
-  /// `is_trial`: only the faults of the result are of interest.
+  /// `is_trial`: only the faults matter, not their hints.
   Resolver(const WrittenPipeline& written, const Catalogue& catalogue, Diagnostics& diagnostics, bool is_trial = false)
       : written_(written),
         catalogue_(catalogue),
@@ -40,7 +34,7 @@ class Resolver {
         tries_others_(!is_trial && diagnostics.empty()),
         input_texts_(written, diagnostics) {}
 
-  /// `outer`: the files whose bodies hold this pipeline, and its own.
+  /// `outer`: the file of this pipeline and the files whose bodies it is in.
   Pipeline resolve(const std::vector<fs::path>& outer = {}) {
     files_ = outer;
     pipeline_.name = written_.name;
@@ -57,7 +51,7 @@ class Resolver {
     for (const auto& [name, value] : written_.outputs) resolve_output(name, value);
     point_at_renamed();
     check_circles(written_, diagnostics_);
-    if (diagnostics_.empty()) note_replaced_options();
+    if (diagnostics_.empty()) add_notes(notes_of_replaced_options(written_, pipeline_));
     if (diagnostics_.empty()) order_and_find_axes(pipeline_, diagnostics_);
     note_unused_inputs();
     return std::move(pipeline_);
@@ -79,22 +73,26 @@ class Resolver {
       resolve_options(written, node, input_texts_, unknown_values_, diagnostics_);
     } else if (!written.uses.empty()) {
       const std::vector<std::string>& names = node_names();
-      const std::string kind = written.uses.substr(0, written.uses.find('.'));
+      const std::size_t dot = written.uses.find('.');
+      const std::string kind = written.uses.substr(0, dot), own_name = written.uses.substr(dot + 1);
       std::vector<std::string> siblings;
       for (const std::string& name : names)
         if (name.starts_with(kind + ".")) siblings.push_back(name);
       std::string hint = suggested(diagnostics_, written.uses, siblings.empty() ? names : siblings);
       for (const LibraryInfo& library : catalogue_.libraries())
-        if (!library.refused.empty() &&
-            library.file.stem().string().find(written.uses.substr(written.uses.find('.') + 1)) != std::string::npos)
+        if (!library.refused.empty() && library.file.stem().string().find(own_name) != std::string::npos)
           hint += "; " + library.file.filename().string() + " was refused: it " + library.refused;
       diagnostics_.add(written.uses_place, "unknown node " + in_quotes(written.uses), hint);
     }
     pipeline_.nodes.push_back(std::move(node));
   }
 
+  void add_notes(const std::vector<std::string>& notes) {
+    pipeline_.notes.insert(pipeline_.notes.end(), notes.begin(), notes.end());
+  }
+
   ReadBody read_body(const WrittenNode& node, const PipelineArguments& arguments) {
-    constexpr std::size_t kMostBodies = 8;  // one in the other
+    constexpr std::size_t kMostBodies = 8;  // inside each other
     const WrittenValue& body = node.repetition->body;
     WrittenPipeline written;
     std::vector<fs::path> files = files_;
@@ -116,7 +114,7 @@ class Resolver {
     Resolver resolver(written, catalogue_, diagnostics_, !tries_others_);
     ReadBody read{resolver.resolve(files), {}};
     for (const auto& [option_of, option] : resolver.unknown_values_) read.incomplete.insert(option_of->id);
-    for (const std::string& note : read.pipeline.notes) pipeline_.notes.push_back(note);
+    add_notes(read.pipeline.notes);
     return read;
   }
 
@@ -130,17 +128,17 @@ class Resolver {
     return found != ports_.end() ? found->second : ports_.emplace(kind, catalogue_.ports_of_kind(kind)).first->second;
   }
 
-  /// Looks up a reference. node.word never picks the item `word` if that is an output of other nodes of the kind: the
-  /// word would name an output or an item, depending on which node of the kind is there.
+  /// Looks up a reference. node.word is a fault if only other nodes of the kind have the output `word`. Otherwise the
+  /// word would name an item with one node of the kind and an output with another.
   Reference resolve(const std::string& text, const Place& place, const std::vector<TypeInfo>* types) {
     Reference source = resolve_reference(text, place, types, pipeline_.nodes, ids_, diagnostics_);
     if (source.node < 0 || source.items.empty()) return source;
-    const PipelineNode& from = pipeline_.nodes[std::size_t(source.node)];
+    const PipelineNode& from = pipeline_.node_of(source);
     const std::string items = joined(source.items, ".");
     if (text != from.id + "." + items || !outputs_of_kind(from.info.kind()).contains(source.items[0])) return source;
     diagnostics_.add(place, "node " + in_quotes(from.id) + " has no output " + in_quotes(source.items[0]),
                      "other nodes of the kind " + from.info.kind() + " have one; an item of that name is " + from.id +
-                         "." + from.info.outputs[std::size_t(source.output)].name + "." + items);
+                         "." + pipeline_.output_of(source).name + "." + items);
     source.node = -1;
     return source;
   }
@@ -161,30 +159,26 @@ class Resolver {
     if (node.info.name.empty()) return;
     const std::vector<KindPort> of_kind = node.repetition ? std::vector<KindPort>() : ports_of_kind(node.info.kind());
     for (const auto& [name, value] : written.wires) {
-      const auto port = std::find_if(node.info.inputs.begin(), node.info.inputs.end(),
-                                     [&, n = name](const PortInfo& p) { return p.name == n; });
-      const bool own = port != node.info.inputs.end();
-      const auto sibling =
-          std::find_if(of_kind.begin(), of_kind.end(), [&, n = name](const KindPort& p) { return p.name == n; });
-      if (!own && sibling == of_kind.end()) {
+      const PortInfo* own = find_named(node.info.inputs, name);
+      const KindPort* of_others = own ? nullptr : find_named(of_kind, name);
+      if (!own && !of_others) {
         diagnostics_.add(value.place, in_quotes(node.info.name) + " has no input " + in_quotes(name),
                          suggested_for(node.info.name, name, names_of(of_kind), diagnostics_));
         continue;
       }
-      // A port that only other nodes of the kind have is checked like any other, and then left unwired.
-      Wire wire =
-          resolve_wire(value, own ? KindPort{port->name, port->help, {port->type}, port->axis} : *sibling, index);
+      // The wire to a port that only other nodes of the kind have is checked, and then left out.
+      Wire wire = resolve_wire(value, own ? KindPort{own->name, own->help, {own->type}, own->axis} : *of_others, index);
       if (!own) {
-        pipeline_.notes.push_back("node " + in_quotes(node.id) + ": the wire to " + in_quotes(name) +
-                                  " is not used: only other nodes of the kind " + node.info.kind() +
-                                  " have this input, " + node.info.name + " has not");
+        pipeline_.notes.push_back(
+            "node " + in_quotes(node.id) + ": the wire to " + in_quotes(name) + " is not used: " + node.info.name +
+            " does not have this input, only other nodes of the kind " + node.info.kind() + " do");
         continue;
       }
-      wire.port = int(port - node.info.inputs.begin());
+      wire.port = int(own - node.info.inputs.data());
       node.wires.push_back(std::move(wire));
     }
     for (const PortInfo& port : node.info.inputs)
-      if (!port.optional && !is_written(written.wires, port.name))
+      if (!port.optional && !find_named(written.wires, port.name))
         diagnostics_.add(written.place,
                          "node " + in_quotes(node.id) + ": input " + in_quotes(port.name) + " of " + node.info.name +
                              " is not wired",
@@ -223,8 +217,7 @@ class Resolver {
   void check_type(const Reference& source, const KindPort& port, std::size_t index) {
     if (source.node < 0) return;
     const PipelineNode& node = pipeline_.nodes[index];
-    const PipelineNode& from = pipeline_.nodes[std::size_t(source.node)];
-    const PortInfo& output = from.info.outputs[std::size_t(source.output)];
+    const PortInfo& output = pipeline_.output_of(source);
     const KindInfo* kind = catalogue_.find_kind(node.info.kind());
     if (output.type.id == TypeInfo::of<Truth>().id && !node.repetition && (!kind || !kind->sees_truth)) {
       diagnostics_.add(source.place,
@@ -241,8 +234,8 @@ class Resolver {
     }
   }
 
-  /// Nodes of the kind of `source`, or else of the kind of `user`, with which the pipeline would have no fault:
-  /// "kind.one fits in place of kind.other". Empty if there are none.
+  /// Which nodes could replace `source`, or else `user`, so that the pipeline has no fault: "kind.one fits in place of
+  /// kind.other". Empty if there are none.
   std::string fitting(std::size_t source, std::size_t user) {
     for (const std::size_t index : {source, user}) {
       const std::vector<std::string>& names = names_that_fit(index);
@@ -258,8 +251,8 @@ class Resolver {
     return names.empty() ? "" : ", or use " + joined(names, ", ");
   }
 
-  /// Nodes of the same kind with which the whole pipeline would have no fault. All of them are tried, so this is done
-  /// only for a few nodes and not in very long pipelines.
+  /// The nodes of the same kind with which the whole pipeline has no fault. All nodes of the kind are tried, so this is
+  /// limited to a few places, and to pipelines that are not very long.
   const std::vector<std::string>& names_that_fit(std::size_t index) {
     constexpr std::size_t kMostNodes = 300, kMostTried = 4;
     static const std::vector<std::string> kNone;
@@ -289,8 +282,8 @@ class Resolver {
     pipeline_.outputs.push_back({name, resolve(value.value.Scalar(), value.place, nullptr)});
   }
 
-  /// If a name is unknown, the typing error may be at its definition. So this points at the nearest defined name, if
-  /// nothing uses it.
+  /// If a name is unknown, the typing error may be in its definition. So this points at the nearest defined name that
+  /// nothing uses.
   void point_at_renamed() {
     std::map<std::string, Place> nodes;
     for (const WrittenNode& node : written_.nodes) nodes.emplace(node.id, node.place);
@@ -298,11 +291,6 @@ class Resolver {
     point_at_renamed("input", written_.input_places, input_texts_.used, input_texts_.unknown);
   }
 
-  void note_replaced_options() {
-    for (std::string& note : notes_of_replaced_options(written_, pipeline_)) pipeline_.notes.push_back(std::move(note));
-  }
-
-  /// A value of such an input would change nothing.
   void note_unused_inputs() {
     for (const auto& [name, place] : written_.input_places)
       if (!input_texts_.used.contains(name)) pipeline_.notes.push_back("nothing uses the input " + in_quotes(name));
@@ -317,14 +305,14 @@ class Resolver {
       const std::string nearest = nearest_name(wanted, names);
       if (!nearest.empty() && !used.contains(nearest))
         diagnostics_.add(defined.at(nearest), "nothing uses " + what + " " + in_quotes(nearest),
-                         in_quotes(wanted) + " is used, but is not there: is this it?");
+                         in_quotes(wanted) + " is used but not defined; did you mean this name?");
     }
   }
 
   const WrittenPipeline& written_;
   const Catalogue& catalogue_;
   Diagnostics& diagnostics_;
-  const bool tries_others_;  ///< not if the file has faults: its nodes may be incomplete
+  const bool tries_others_;  ///< false if the file has faults, because its nodes may be incomplete
   Pipeline pipeline_;
   NodeIds ids_;
   std::vector<std::string> node_names_;

@@ -21,13 +21,15 @@ struct Reference {
   int node = -1;                   ///< index into Pipeline::nodes
   int output = -1;                 ///< index into the node's outputs
   std::vector<std::string> items;  ///< the items that it picks along the axes, outermost first
+
+  bool has_same_output(const Reference& other) const { return node == other.node && output == other.output; }
 };
 
-/// What one input port is wired to: one reference, or several that make a list.
+/// What one input port is wired to.
 struct Wire {
   int port = -1;  ///< index into the node's inputs
   std::vector<Reference> sources;
-  bool is_list_literal = false;
+  bool is_list_literal = false;  ///< written as a list of references: the port gets the list of their values
 };
 
 struct Repetition;
@@ -36,13 +38,16 @@ struct PipelineNode {
   std::string id;
   Place place;
   NodeInfo info;
-  Apart apart = Apart::no;           ///< as its kind says
-  bool may_fail = false;             ///< if it fails, its outputs are absent, and the run goes on
+  Apart apart = Apart::no;           ///< as its kind declares
+  bool may_fail = false;             ///< if it fails, its outputs are absent, and the run continues
   std::vector<OptionValue> options;  ///< in the order of info.options
   std::vector<Wire> wires;
   std::vector<std::string> mapped_axes;  ///< the node is called for each item along these, outermost first
-  /// If the node has a body, `info` is made from it: its name is "repeat", its inputs are what the body is given.
+  /// For a node with a body, else null. `info` is then made from the body: its name is "repeat", and its inputs are the
+  /// values that the body is given.
   std::shared_ptr<const Repetition> repetition;
+
+  const PortInfo& input_of(const Wire& wire) const { return info.inputs[std::size_t(wire.port)]; }
 };
 
 struct PipelineOutput {
@@ -50,55 +55,63 @@ struct PipelineOutput {
   Reference source;
 };
 
-/// A pipeline that was read, checked and resolved: every node is known, every option has a value, every wire fits.
+/// A pipeline that was read and checked: every node is known, every option has a value, every wire fits.
 struct Pipeline {
   std::string name;
   std::string help;
   std::filesystem::path file;
   std::vector<PipelineNode> nodes;  ///< sorted so that sources come before users
   std::vector<PipelineOutput> outputs;
-  bool only_inside = false;        ///< it runs only inside the program, so its outputs may be functions
+  bool only_inside = false;        ///< only the program itself runs it, so its outputs may be functions
   std::vector<std::string> notes;  ///< remarks for people that are not faults
 
-  /// The axes of a value that a reference names, outermost first.
+  /// The node that a reference names, and its output. The reference must be resolved.
+  const PipelineNode& node_of(const Reference& source) const { return nodes[std::size_t(source.node)]; }
+  const PortInfo& output_of(const Reference& source) const {
+    return node_of(source).info.outputs[std::size_t(source.output)];
+  }
+  /// The axes of the value that a reference names, outermost first.
   std::vector<std::string> axes_of(const Reference& source) const;
-  /// For each node, whether it must be run for the outputs. given(id) says whether the outputs of a node are already
-  /// known.
+  /// For each node, whether it must run to make the outputs. given(id) says whether the outputs of a node are known
+  /// already.
   std::vector<bool> needed(const std::function<bool(const std::string&)>& given = {}) const;
 };
 
-/// A body: a pipeline that a node runs again and again, one pass after the other. A pass runs for each item of an axis,
-/// or until a stop rule holds. Outputs of the node: for each output NAME of the body, NAME (the list over all passes)
-/// and last_NAME (that of the last pass that did not fail).
+/// The body of a node: a pipeline that the node runs again and again, one pass after the other. There is one pass for
+/// each item of an axis, or the passes end when a stop rule holds. For each output NAME of the body, the node has the
+/// outputs NAME (the list over all passes) and last_NAME (from the last pass that did not fail).
 struct Repetition {
-  /// What is given to the body in the place of an output of one of its nodes.
+  /// A value that the body is given. It replaces an output of one of the body's nodes.
   struct Given {
-    std::string name;               ///< node or node.output of the body; the name of the port
-    Reference target;               ///< the same in `alone`
-    std::string node;               ///< the node of `body` that stands for it
-    std::vector<std::string> axes;  ///< that a pass is given, outermost first
-    int carried = -1;               ///< the output of the body that takes its place in the next pass; -1: none
+    std::string name;               ///< node or node.output of the body; also the name of the node's input
+    Reference target;               ///< the replaced output, in `alone`
+    std::string node;               ///< the id of the node of `body` that holds the value
+    std::vector<std::string> axes;  ///< axes of the value in one pass, outermost first
+    int carried = -1;               ///< index of the body's output that replaces the value in the next pass; -1: none
   };
-  Pipeline alone;  ///< the body as it was read, a pipeline that can be run alone
-  /// The body as it is run in a pass: for each value that is given it has a node that is never called.
+  Pipeline alone;  ///< the body as it was read; it could run alone
+  /// The body as a pass runs it. Each given value has a node that is never called.
   Pipeline body;
-  /// The same for the first pass. It makes those carried values itself that the node's inputs do not give.
+  /// The same for the first pass. It computes the carried values that the node's inputs do not give.
   Pipeline first;
-  std::vector<Given> given;  ///< in the order of the node's inputs; then those that are only carried
-  std::string axis;          ///< of the passes: that of the items; of a loop "pass", or "once" if it has one pass only
-  bool is_loop = false;      ///< not over the items of an axis; passes are named 1, 2, 3...
-  int at_most = 0;           ///< passes; 0: as many as there are items
-  int until = -1;            ///< the output of the body, of type stop, that ends the passes; -1: none
-  bool goes_on = false;      ///< after a pass that failed; what it did not make is absent then
+  std::vector<Given> given;  ///< in the order of the node's inputs; then the values that are only carried
+  std::string axis;          ///< of the list over all passes; for a loop "pass", or "once" if it has only one pass
+  bool is_loop = false;      ///< whether the passes do not follow the items of an axis; they are named 1, 2, 3...
+  int at_most = 0;           ///< the most passes; 0: one for each item
+  int until = -1;            ///< index of the body's output, of type stop, that ends the passes; -1: none
+  bool goes_on = false;      ///< whether a failed pass is followed by the next; its missing outputs are then absent
+
+  /// Whether the node of `body` or `first` with this id holds a given value.
+  bool is_given(const std::string& id) const;
 };
 
-/// The nodes that a run may call: those that the outputs need, and of nodes with a body, those of the body.
+/// The nodes that a run may call: those that the outputs need. A node with a body is replaced by the nodes of its body.
 std::vector<const PipelineNode*> called_nodes(const Pipeline& pipeline);
 
-/// A value of one of the pipeline's inputs.
+/// The value of one of the pipeline's inputs.
 struct InputValue {
   std::string name, value;
-  /// Where the value is written. Relative paths start at the folder of that file. No file means the command line.
+  /// Where the value is written. Relative paths start at the folder of that file. An empty file means the command line.
   Place place = {};
 };
 
@@ -113,22 +126,24 @@ struct PipelineArguments {
   std::vector<Override> overrides;
 };
 
-/// Reads and checks a pipeline. All faults go to `diagnostics`; the result may be used only if there are none.
-/// `inputs_required` is false for `marrow check`: inputs without a default may then have no value.
+/// Reads and checks a pipeline. All faults go to `diagnostics`. The result may be used only if there are none. If
+/// `inputs_required` is false, as in `marrow check`, an input without a default needs no value.
 Pipeline read_pipeline(const std::filesystem::path& file, const PipelineArguments& arguments,
                        const Catalogue& catalogue, Diagnostics& diagnostics, bool inputs_required = true);
 
-/// The same, for a caller that tries many changes of one file and wants to know what is wrong with each, but not what
-/// to do about it: no hint names nodes that would fit, because finding them means to check the pipeline with each other
-/// node. Inputs without a default may have no value.
+/// The same, for a caller that tries many changes of one file. Hints do not name other nodes that would fit, because to
+/// find them the pipeline is checked with each node. An input without a default needs no value.
 Pipeline try_pipeline(const std::filesystem::path& file, const PipelineArguments& arguments, const Catalogue& catalogue,
                       Diagnostics& diagnostics);
 
 /// The pipeline as YAML, with the values of all options. Reading it gives the same pipeline.
 std::string resolved_yaml(const Pipeline& pipeline);
 
-/// Adds a fault for each output of the pipeline that could not be written: no library has a writer for its type.
-/// Functions are no faults in a pipeline that only runs inside the program.
+/// Why a value of this type cannot become a file.
+std::string no_writer(const TypeInfo& type);
+
+/// Adds a fault for each output of the pipeline whose type no library can write. A pipeline that only the program runs
+/// may have any outputs.
 void check_writers(const Pipeline& pipeline, const Catalogue& catalogue, Diagnostics& diagnostics);
 
 }  // namespace marrow

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/runtime/pipeline/pipeline_circles.hpp"
-
+// Circles of nodes that wait for each other.
 #include <algorithm>
 #include <map>
 
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
+#include "marrow/runtime/pipeline/pipeline_text.hpp"
 
 namespace marrow {
 namespace {
@@ -15,7 +15,7 @@ struct WaitedFor {
   std::size_t node;
 };
 
-/// Who waits for whom, without the nodes that were taken out.
+/// Which nodes wait for which. Nodes can be taken out.
 class WaitingNodes {
  public:
   explicit WaitingNodes(const WrittenPipeline& written)
@@ -47,7 +47,7 @@ class WaitingNodes {
   std::size_t count() const { return sources_.size(); }
   bool is_left(std::size_t node) const { return is_left_[node]; }
 
-  /// Takes out these nodes, and with them those that wait for nothing else.
+  /// Takes out these nodes and all nodes that wait for nothing else.
   void take_out(std::vector<std::size_t> nodes) {
     while (!nodes.empty()) {
       const std::size_t node = nodes.back();
@@ -59,14 +59,14 @@ class WaitingNodes {
     }
   }
 
-  /// The first source of the node that is left. Each node that is left has one.
+  /// The first source that is left of a node that is left. There always is one.
   const WaitedFor& source_of(std::size_t node) const {
     return *std::find_if(sources_[node].begin(), sources_[node].end(),
                          [&](const WaitedFor& source) { return is_left_[source.node]; });
   }
 
-  /// A circle that the node waits for, or is in. Each node waits for the next one. It begins with the first in the
-  /// file.
+  /// A circle that holds the node or that the node waits for. Each node of it waits for the next. It begins with the
+  /// node that is first in the file.
   std::vector<std::size_t> circle_before(std::size_t node) const {
     std::vector<std::size_t> path;
     std::map<std::size_t, std::size_t> place;

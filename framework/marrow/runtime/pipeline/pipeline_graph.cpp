@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Queries about a checked pipeline, and its YAML.
+// What a checked pipeline can be asked, and its YAML.
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 namespace marrow {
 namespace {
 
-/// An item of an option, as written in YAML. A dollar in a text is doubled, so that it does not begin the name of an
+/// An item of an option as YAML shows it. Dollars in a text are doubled, because one dollar begins the name of an
 /// input.
 template <class T>
 T written(const T& item) {
@@ -21,14 +21,26 @@ std::string written(const std::string& text) {
   return result;
 }
 
-/// The outputs of a body come twice: as the list over all passes, and as that of the last pass.
-std::vector<std::string> axes_of_passes(const PipelineNode& node, const Reference& source) {
-  const Repetition& repetition = *node.repetition;
-  std::vector<std::string> axes =
-      repetition.body.axes_of(repetition.body.outputs[std::size_t(source.output / 2)].source);
-  if (source.output % 2 == 0) axes.insert(axes.begin(), repetition.axis);
-  axes.erase(axes.begin(), axes.begin() + std::ptrdiff_t(std::min(axes.size(), source.items.size())));
+/// The axes of an output of a node with a body. It has each output of the body twice: over all passes, and of the last
+/// pass.
+std::vector<std::string> axes_of_passes(const Repetition& repetition, int output) {
+  std::vector<std::string> axes = repetition.body.axes_of(repetition.body.outputs[std::size_t(output / 2)].source);
+  if (output % 2 == 0) axes.insert(axes.begin(), repetition.axis);
   return axes;
+}
+
+/// `repetition`: the one whose body the pipeline is, or null.
+void add_called(const Pipeline& pipeline, const Repetition* repetition, std::vector<const PipelineNode*>& called) {
+  const std::vector<bool> needed =
+      pipeline.needed([&](const std::string& id) { return repetition && repetition->is_given(id); });
+  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
+    if (!needed[i]) continue;
+    const PipelineNode& node = pipeline.nodes[i];
+    if (node.repetition)
+      add_called(node.repetition->first, node.repetition.get(), called);
+    else
+      called.push_back(&node);
+  }
 }
 
 void write_options(YAML::Emitter& out, const PipelineNode& node) {
@@ -76,7 +88,7 @@ void write_graph(YAML::Emitter& out, const Pipeline& pipeline) {
     if (!node.wires.empty()) {
       out << YAML::Key << "in" << YAML::Value << YAML::Flow << YAML::BeginMap;
       for (const Wire& wire : node.wires) {
-        out << YAML::Key << node.info.inputs[std::size_t(wire.port)].name << YAML::Value;
+        out << YAML::Key << node.input_of(wire).name << YAML::Value;
         if (wire.is_list_literal) out << YAML::BeginSeq;
         for (const Reference& source : wire.sources) out << source.text;
         if (wire.is_list_literal) out << YAML::EndSeq;
@@ -96,11 +108,12 @@ void write_graph(YAML::Emitter& out, const Pipeline& pipeline) {
 }  // namespace
 
 std::vector<std::string> Pipeline::axes_of(const Reference& source) const {
-  const PipelineNode& node = nodes[std::size_t(source.node)];
+  const PipelineNode& node = node_of(source);
   std::vector<std::string> axes = node.mapped_axes;
-  if (node.repetition) return axes_of_passes(node, source);
-  const std::string& own = node.info.outputs[std::size_t(source.output)].axis;
-  if (!own.empty()) axes.push_back(own);
+  if (node.repetition)
+    axes = axes_of_passes(*node.repetition, source.output);
+  else if (const std::string& own = output_of(source).axis; !own.empty())
+    axes.push_back(own);
   axes.erase(axes.begin(), axes.begin() + std::ptrdiff_t(std::min(axes.size(), source.items.size())));
   return axes;
 }
@@ -117,24 +130,14 @@ std::vector<bool> Pipeline::needed(const std::function<bool(const std::string&)>
   return result;
 }
 
+bool Repetition::is_given(const std::string& id) const {
+  return std::any_of(given.begin(), given.end(), [&](const Given& one) { return one.node == id; });
+}
+
 std::vector<const PipelineNode*> called_nodes(const Pipeline& pipeline) {
-  std::vector<const PipelineNode*> all;
-  const auto add = [&](const auto& self, const Pipeline& graph, const std::vector<Repetition::Given>& given) -> void {
-    const auto is_given = [&](const std::string& id) {
-      return std::any_of(given.begin(), given.end(), [&](const Repetition::Given& one) { return one.node == id; });
-    };
-    const std::vector<bool> needed = graph.needed(is_given);
-    for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
-      if (!needed[i]) continue;
-      const PipelineNode& node = graph.nodes[i];
-      if (node.repetition)
-        self(self, node.repetition->first, node.repetition->given);
-      else
-        all.push_back(&node);
-    }
-  };
-  add(add, pipeline, {});
-  return all;
+  std::vector<const PipelineNode*> called;
+  add_called(pipeline, nullptr, called);
+  return called;
 }
 
 std::string resolved_yaml(const Pipeline& pipeline) {
@@ -145,6 +148,23 @@ std::string resolved_yaml(const Pipeline& pipeline) {
   write_graph(out, pipeline);
   out << YAML::EndMap;
   return std::string(out.c_str()) + "\n";
+}
+
+std::string no_writer(const TypeInfo& type) { return "no plugin writes values of type '" + type.id + "'"; }
+
+void check_writers(const Pipeline& pipeline, const Catalogue& catalogue, Diagnostics& diagnostics) {
+  for (const auto& [name, source] : pipeline.outputs) {
+    if (source.node < 0) continue;  // its node is unknown, which was reported already
+    const TypeInfo& type = pipeline.output_of(source).type;
+    if (catalogue.find_writer(type) || pipeline.only_inside) continue;
+    if (type.is_function)
+      diagnostics.add(source.place, "output '" + name + "' is a function (" + type.id + "), which no file can hold",
+                      "leave it out; or, if no command runs the pipeline but only the program itself, say  "
+                      "only_inside: true");
+    else
+      diagnostics.add(source.place, "output '" + name + "': " + no_writer(type),
+                      "leave it out, or name a result of another type");
+  }
 }
 
 }  // namespace marrow

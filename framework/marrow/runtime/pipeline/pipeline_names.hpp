@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Names in the messages about a pipeline.
+// Names of the parts of a pipeline: how they are found, and how messages show them.
 #include <algorithm>
 #include <string>
 #include <vector>
@@ -18,6 +18,13 @@ std::vector<std::string> names_of(const std::vector<T>& items) {
   return names;
 }
 
+/// The item of this name, or null.
+template <class T>
+const T* find_named(const std::vector<T>& items, const std::string& name) {
+  const auto found = std::find_if(items.begin(), items.end(), [&](const T& item) { return item.name == name; });
+  return found == items.end() ? nullptr : &*found;
+}
+
 inline bool contains(const std::vector<std::string>& list, const std::string& item) {
   return std::find(list.begin(), list.end(), item) != list.end();
 }
@@ -28,11 +35,14 @@ inline std::string joined(const std::vector<std::string>& list, const char* sepa
   return text;
 }
 
-/// A suggestion, as long as faults are kept; then an empty text. Thousands of unknown names among thousands of known
-/// ones would take long.
-inline std::string suggested(const Diagnostics& diagnostics, const std::string& wrong,
-                             const std::vector<std::string>& known) {
-  return diagnostics.is_full() ? "" : suggestion(wrong, known);
-}
+/// suggestion() as long as `diagnostics` keeps faults, then an empty text: to compare thousands of unknown names with
+/// thousands of known ones would take long.
+std::string suggested(const Diagnostics& diagnostics, const std::string& wrong, const std::vector<std::string>& known);
+
+/// The hint for an option or port that the node does not have. If it is an old name, the hint gives the new one; else
+/// it is suggested(). A folder of plugins lists the old names in its file renamed.txt. Each line there holds the
+/// version that brought the new name, the node or its kind, the old name and the new name.
+std::string suggested_for(const std::string& node, const std::string& wrong, const std::vector<std::string>& known,
+                          const Diagnostics& diagnostics);
 
 }  // namespace marrow

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// References to nodes and their outputs, as written in a pipeline.
 #include "marrow/runtime/pipeline/pipeline_references.hpp"
 
 #include <algorithm>
@@ -8,7 +7,6 @@
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
-#include "marrow/runtime/pipeline/renamed.hpp"
 #include "marrow/runtime/plugins/contract.hpp"
 
 namespace marrow {
@@ -22,8 +20,8 @@ std::vector<std::string> split(const std::string& text) {
   return parts;
 }
 
-/// The output that a node's name alone means: its only output, or the only one of the wanted types. -1 if there is
-/// none.
+/// The index of the output that a node's id alone means: its only output, or its only output of a wanted type. -1 if
+/// there is no such output.
 int default_output(const std::vector<PortInfo>& outputs, const std::vector<TypeInfo>* types, bool picks_item) {
   if (outputs.size() == 1) return 0;
   if (picks_item || !types) return -1;
@@ -46,7 +44,7 @@ Reference resolve_reference(const std::string& text, const Place& place, const s
                             const std::vector<PipelineNode>& nodes, NodeIds& ids, Diagnostics& diagnostics) {
   Reference source{text, place, -1, -1, {}};
   const std::vector<std::string> parts = split(text);
-  const std::string id = parts.empty() ? text : parts[0];
+  const std::string& id = parts[0];
   const auto found = ids.index.find(id);
   ids.used.insert(id);
   if (found == ids.index.end()) {
@@ -56,30 +54,23 @@ Reference resolve_reference(const std::string& text, const Place& place, const s
   }
   const std::size_t index = found->second;
   const std::vector<PortInfo>& outputs = nodes[index].info.outputs;
-  if (outputs.empty()) return source;  // its node is unknown; this was already reported
-  std::size_t used = 1;
-  int output = -1;
-  for (std::size_t i = 0; i < outputs.size(); ++i)
-    if (parts.size() > 1 && outputs[i].name == parts[1]) output = int(i);
-  if (output >= 0) {
-    used = 2;
-  } else {
-    output = default_output(outputs, types, parts.size() > 1);
-  }
+  if (outputs.empty()) return source;  // what the node uses is unknown; this was reported already
+  const PortInfo* named = parts.size() > 1 ? find_named(outputs, parts[1]) : nullptr;
+  const int output = named ? int(named - outputs.data()) : default_output(outputs, types, parts.size() > 1);
   if (output < 0) {
     if (parts.size() > 1)
-      diagnostics.add(place, "node " + in_quotes(parts[0]) + " has no output " + in_quotes(parts[1]),
+      diagnostics.add(place, "node " + in_quotes(id) + " has no output " + in_quotes(parts[1]),
                       suggested_for(nodes[index].info.name, parts[1], names_of(outputs), diagnostics));
     else
       diagnostics.add(place,
-                      "node " + in_quotes(parts[0]) + " has several outputs" +
-                          (types ? " and not just one " + types_text(*types, "") : ""),
-                      "say which: " + parts[0] + "." + joined(names_of(outputs), ", "));
+                      "node " + in_quotes(id) + " has several outputs" +
+                          (types ? ", and not exactly one of them is " + types_text(*types, "") : ""),
+                      "say which: " + id + "." + joined(names_of(outputs), ", "));
     return source;
   }
   source.node = int(index);
   source.output = output;
-  source.items.assign(parts.begin() + std::ptrdiff_t(used), parts.end());
+  source.items.assign(parts.begin() + (named ? 2 : 1), parts.end());
   return source;
 }
 

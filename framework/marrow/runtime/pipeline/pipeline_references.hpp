@@ -9,15 +9,16 @@
 
 namespace marrow {
 
-/// The nodes' ids, and which of them references have named so far.
+/// The ids of nodes, and the ids that references have named so far.
 struct NodeIds {
   std::vector<std::string> all;
   std::map<std::string, std::size_t> index;  ///< the index of each node, by its id
-  std::set<std::string> used, unknown;       ///< ids that references have named
+  std::set<std::string> used;                ///< named by references
+  std::set<std::string> unknown;             ///< named by references, but no node has this id
 };
 
-/// Looks up node, node.output, node.item or node.output.item. `types` are the wanted types, if they are known: a node's
-/// name alone then means its only output of one of these types.
+/// Looks up node, node.output, node.item or node.output.item. `types` are the wanted types, or null if they are not
+/// known. A node's id alone means its only output, or its only output of a wanted type.
 Reference resolve_reference(const std::string& text, const Place& place, const std::vector<TypeInfo>* types,
                             const std::vector<PipelineNode>& nodes, NodeIds& ids, Diagnostics& diagnostics);
 

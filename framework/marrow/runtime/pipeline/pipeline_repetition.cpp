@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nodes with a body: what the body is given, what is carried from one pass to the next, and what comes out.
+// Nodes with a body: the values that the body is given, those that a pass carries to the next, and the outputs.
 #include "marrow/runtime/pipeline/pipeline_repetition.hpp"
 
 #include <algorithm>
@@ -16,20 +16,21 @@ std::string axes_text(const std::vector<std::string>& axes) {
   return axes.empty() ? "one item" : "a list over " + joined(axes, " and ");
 }
 
-/// Puts nodes that are never called in front of the body's nodes, and wires the body's nodes to them.
+/// The body in which given values replace outputs. For each value that `is_given`, a node that is never called is put
+/// in front, and the users of the output are wired to it.
 Pipeline with_given(const Pipeline& body, const std::vector<Repetition::Given>& given,
-                    const std::vector<Reference>& targets, const std::vector<bool>& is_given) {
+                    const std::vector<bool>& is_given) {
   Pipeline result = body;
   std::vector<PipelineNode> nodes;
   std::vector<std::size_t> place(given.size());
   for (std::size_t i = 0; i < given.size(); ++i) {
     if (!is_given[i]) continue;
-    const PipelineNode& replaced = body.nodes[std::size_t(targets[i].node)];
+    const PipelineNode& replaced = body.node_of(given[i].target);
     PipelineNode node;
     node.id = given[i].node;
     node.place = replaced.place;
     node.info.name = replaced.info.name;
-    node.info.outputs = {replaced.info.outputs[std::size_t(targets[i].output)]};
+    node.info.outputs = {body.output_of(given[i].target)};
     node.mapped_axes = replaced.mapped_axes;
     place[i] = nodes.size();
     nodes.push_back(std::move(node));
@@ -37,7 +38,7 @@ Pipeline with_given(const Pipeline& body, const std::vector<Repetition::Given>& 
   const int count = int(nodes.size());
   const auto rewire = [&](Reference& source) {
     for (std::size_t i = 0; i < given.size(); ++i)
-      if (is_given[i] && source.node == targets[i].node && source.output == targets[i].output) {
+      if (is_given[i] && source.has_same_output(given[i].target)) {
         source.node = int(place[i]);
         source.output = 0;
         return;
@@ -70,16 +71,15 @@ class RepetitionResolver {
     body_ = &read.pipeline;
     if (diagnostics_.size() > faults_before || body_->nodes.empty()) return;
     made_->alone = *body_;
-    // A pipeline within a pipeline may have repetitions of its own.
     made_->axis = !repeat_.over.empty() ? repeat_.over : repeat_.at_most == 1 ? "once" : "pass";
     made_->is_loop = repeat_.over.empty();
     made_->at_most = repeat_.at_most;
     made_->goes_on = repeat_.goes_on;
     if (!find_given() || !find_carried() || !find_until()) return;
     std::vector<bool> all(made_->given.size(), true), at_first(made_->given.size());
-    for (std::size_t i = 0; i < all.size(); ++i) at_first[i] = is_written(written_.wires, made_->given[i].name);
-    made_->body = with_given(*body_, made_->given, targets_, all);
-    made_->first = with_given(*body_, made_->given, targets_, at_first);
+    for (std::size_t i = 0; i < all.size(); ++i) at_first[i] = find_named(written_.wires, made_->given[i].name);
+    made_->body = with_given(*body_, made_->given, all);
+    made_->first = with_given(*body_, made_->given, at_first);
     if (!check_inputs(read.incomplete)) return;
     name_ports();
   }
@@ -111,21 +111,20 @@ class RepetitionResolver {
     const auto add = [&](const std::string& name, const Place& place) {
       const Reference target = resolve_reference(name, place, nullptr, body_->nodes, ids, diagnostics_);
       if (target.node >= 0 && !target.items.empty())
-        diagnostics_.add(place, in_quotes(name) + " names one item; the body can be given a whole output only");
+        diagnostics_.add(place, in_quotes(name) + " names one item; only a whole output can be given to the body");
       is_good = is_good && target.node >= 0 && target.items.empty();
-      for (const Reference& other : targets_)
-        if (target.node >= 0 && other.node == target.node && other.output == target.output) {
-          diagnostics_.add(place, in_quotes(name) + " is given twice, as " + in_quotes(other.text) + " too");
+      for (const Repetition::Given& other : made_->given)
+        if (target.node >= 0 && target.has_same_output(other.target)) {
+          diagnostics_.add(place, in_quotes(name) + " is given twice, as " + in_quotes(other.name) + " too");
           is_good = false;
         }
-      targets_.push_back(target);
       Repetition::Given given{name, target, "given " + name, {}, -1};
       if (target.node >= 0) given.axes = body_->axes_of(target);
       made_->given.push_back(std::move(given));
     };
     for (const auto& [name, value] : written_.wires) add(name, value.place);
     for (const auto& [name, value] : repeat_.carry)
-      if (!is_written(written_.wires, name)) add(name, value.place);
+      if (!find_named(written_.wires, name)) add(name, value.place);
     return is_good;
   }
 
@@ -138,9 +137,7 @@ class RepetitionResolver {
     return -1;
   }
 
-  const TypeInfo& type_of(const Reference& source) const {
-    return body_->nodes[std::size_t(source.node)].info.outputs[std::size_t(source.output)].type;
-  }
+  const TypeInfo& type_of(const Reference& source) const { return body_->output_of(source).type; }
 
   bool find_carried() {
     const std::size_t before = diagnostics_.size();
@@ -151,19 +148,17 @@ class RepetitionResolver {
       }
       const int output = output_named(value.value.Scalar(), value.place);
       if (output < 0) continue;
-      const auto given = std::find_if(made_->given.begin(), made_->given.end(),
-                                      [&, n = name](const Repetition::Given& one) { return one.name == n; });
-      given->carried = output;
       const Reference& source = body_->outputs[std::size_t(output)].source;
-      const Reference& target = targets_[std::size_t(given - made_->given.begin())];
-      if (type_of(source) != type_of(target))
+      for (Repetition::Given& given : made_->given) {
+        if (given.name != name) continue;
+        given.carried = output;
+        const bool same_type = type_of(source) == type_of(given.target);
+        if (same_type && body_->axes_of(source) == given.axes) continue;
         diagnostics_.add(value.place, "output " + in_quotes(value.value.Scalar()) + " of the body is " +
-                                          type_of(source).id + ", but takes the place of " + in_quotes(name) +
-                                          ", which is " + type_of(target).id);
-      else if (body_->axes_of(source) != given->axes)
-        diagnostics_.add(value.place, "output " + in_quotes(value.value.Scalar()) + " of the body is " +
-                                          axes_text(body_->axes_of(source)) + ", but takes the place of " +
-                                          in_quotes(name) + ", which is " + axes_text(given->axes));
+                                          (same_type ? axes_text(body_->axes_of(source)) : type_of(source).id) +
+                                          ", but takes the place of " + in_quotes(name) + ", which is " +
+                                          (same_type ? axes_text(given.axes) : type_of(given.target).id));
+      }
     }
     if (made_->is_loop && repeat_.at_most > 1 && repeat_.carry.empty())
       diagnostics_.add(written_.place, "node " + in_quotes(written_.id) + " carries nothing from pass to pass",
@@ -182,16 +177,17 @@ class RepetitionResolver {
     return false;
   }
 
-  /// Nodes of the body that run must know all of their options.
+  /// Checks that all options are known of the nodes of the body that run.
   bool check_inputs(const std::set<std::string>& incomplete) {
     if (!is_complete_) return true;
     bool is_good = true;
     for (const Pipeline* pipeline : {&made_->first, &made_->body}) {
-      const std::vector<bool> needed = pipeline->needed([&](const std::string& id) { return is_given_node(id); });
+      const std::vector<bool> needed = pipeline->needed([&](const std::string& id) { return made_->is_given(id); });
       for (std::size_t i = 0; i < needed.size() && is_good; ++i) {
-        if (!needed[i] || is_given_node(pipeline->nodes[i].id) || !incomplete.contains(pipeline->nodes[i].id)) continue;
+        const std::string& id = pipeline->nodes[i].id;
+        if (!needed[i] || made_->is_given(id) || !incomplete.contains(id)) continue;
         diagnostics_.add(written_.place,
-                         "node " + in_quotes(written_.id) + ": node " + in_quotes(pipeline->nodes[i].id) +
+                         "node " + in_quotes(written_.id) + ": node " + in_quotes(id) +
                              " of the body needs an input of the body that has no value",
                          "give it as  with: {INPUT: VALUE},  or give the node's output under  in:");
         is_good = false;
@@ -199,19 +195,12 @@ class RepetitionResolver {
     }
     return is_good;
   }
-  bool is_given_node(const std::string& id) const {
-    return std::any_of(made_->given.begin(), made_->given.end(), [&](const auto& one) { return one.node == id; });
-  }
-
-  bool has_output(const std::string& name) const {
-    return std::any_of(body_->outputs.begin(), body_->outputs.end(), [&](const auto& one) { return one.name == name; });
-  }
 
   void name_ports() {
     const std::size_t inputs = written_.wires.size();
     for (std::size_t i = 0; i < inputs; ++i) {
       const Repetition::Given& given = made_->given[i];
-      node_.info.inputs.push_back({given.name, "in the place of " + given.name + " of the body", type_of(targets_[i]),
+      node_.info.inputs.push_back({given.name, "in the place of " + given.name + " of the body", type_of(given.target),
                                    false, given.axes.empty() ? "" : given.axes.back()});
     }
     for (const PipelineOutput& output : body_->outputs) {
@@ -220,7 +209,7 @@ class RepetitionResolver {
       if (type.is_function) {
         diagnostics_.add(written_.place,
                          "output " + in_quotes(output.name) + " of the body is a function (" + type.id + ")",
-                         "a body can give out data only; leave the output out");
+                         "the outputs of a body must be data; leave this one out");
         return;
       }
       if (contains(axes, made_->axis)) {
@@ -228,17 +217,15 @@ class RepetitionResolver {
                                              in_quotes(made_->axis));
         return;
       }
-      if (has_output("last_" + output.name)) {
+      const std::string last = "last_" + output.name;
+      if (find_named(body_->outputs, last)) {
         diagnostics_.add(
-            written_.place,
-            "the body has the outputs " + in_quotes(output.name) + " and " + in_quotes("last_" + output.name),
-            in_quotes("last_" + output.name) + " is already the name of the last " + in_quotes(output.name) +
-                "; rename one of them");
+            written_.place, "the body has the outputs " + in_quotes(output.name) + " and " + in_quotes(last),
+            in_quotes(last) + " is already the name of the last " + in_quotes(output.name) + "; rename one of them");
         return;
       }
       node_.info.outputs.push_back({output.name, "of each pass", type, true, made_->axis});
-      node_.info.outputs.push_back(
-          {"last_" + output.name, "of the last pass", type, true, axes.empty() ? "" : axes.back()});
+      node_.info.outputs.push_back({last, "of the last pass", type, true, axes.empty() ? "" : axes.back()});
     }
     node_.info.name = "repeat";
     node_.info.summary = "runs its body again and again";
@@ -252,7 +239,6 @@ class RepetitionResolver {
   Diagnostics& diagnostics_;
   std::shared_ptr<Repetition> made_;
   const Pipeline* body_ = nullptr;
-  std::vector<Reference> targets_;
   bool is_complete_ = true;
 };
 
@@ -275,9 +261,9 @@ void check_axes_of_repetition(const Pipeline& pipeline, const PipelineNode& node
       if (wire.is_list_literal && !expected.empty()) expected.pop_back();
       const bool is_one = axes.empty() && expected.size() == 1;  // one item is taken as a list of one
       if (axes != expected && !is_one)
-        diagnostics.add(source.place, "in a pass, " + in_quotes(node.info.inputs[std::size_t(wire.port)].name) +
-                                          " of the body is " + axes_text(expected) + ", but " + in_quotes(source.text) +
-                                          " is " + axes_text(found));
+        diagnostics.add(source.place, "in a pass, " + in_quotes(node.input_of(wire).name) + " of the body is " +
+                                          axes_text(expected) + ", but " + in_quotes(source.text) + " is " +
+                                          axes_text(found));
     }
   if (!repetition.is_loop && !has_axis && diagnostics.empty())
     diagnostics.add(node.place,

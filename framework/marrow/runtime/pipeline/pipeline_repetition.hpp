@@ -8,19 +8,19 @@
 
 namespace marrow {
 
-/// A body that was read and checked as a pipeline of its own.
+/// A body that was read and checked as a pipeline.
 struct ReadBody {
   Pipeline pipeline;
-  std::set<std::string> incomplete;  ///< nodes with an option that names an input without a value
+  std::set<std::string> incomplete;  ///< nodes with an option whose value is unknown, because an input has no value
 };
 using BodyReader = std::function<ReadBody(const PipelineArguments& arguments)>;
 
-/// Makes the repetition of a node and its inputs and outputs from its body. If the body has faults, `node.info` stays
-/// empty.
+/// Reads the body of a node, and makes the node's repetition, inputs and outputs from it. If the body has faults,
+/// `node.info` stays empty.
 void resolve_repetition(const WrittenNode& written, PipelineNode& node, InputTexts& input_texts,
                         const BodyReader& read_body, Diagnostics& diagnostics);
 
-/// Checks that what a node gives to its body has the axes that the body expects.
+/// Checks that the values that a node gives to its body have the axes that the body expects.
 void check_axes_of_repetition(const Pipeline& pipeline, const PipelineNode& node, Diagnostics& diagnostics);
 
 }  // namespace marrow

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/pipeline/pipeline_text.hpp"
-#include "marrow/base/number_text.hpp"
-#include "marrow/runtime/node/option_yaml.hpp"
 
 #include <algorithm>
 #include <set>
 
 #include "marrow/base/file_names.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/plain_path.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/runtime/node/option_yaml.hpp"
 #include "marrow/runtime/pipeline/given_value.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow {
 namespace {
@@ -31,35 +32,35 @@ class PipelineReader {
   WrittenPipeline read_body(const std::string& name, const YAML::Node& root) {
     is_body_ = true;
     pipeline_.name = name;
-    read_root(root);
-    for (const Override& one : arguments_.overrides) apply_override(one.key, one.value, one.place);
-    return pipeline_;
+    return read_root(root);
   }
 
   WrittenPipeline read() {
     const auto text = read_source(pipeline_.file, "the pipeline file", diagnostics_);
     if (!text) return pipeline_;
     const YAML::Node root = yaml_.parse(*text);
-    if (!diagnostics_.empty()) return pipeline_;
-    read_root(root);
+    return diagnostics_.empty() ? read_root(root) : pipeline_;
+  }
+
+ private:
+  WrittenPipeline read_root(const YAML::Node& root) {
+    read_keys(root);
     for (const Override& one : arguments_.overrides) apply_override(one.key, one.value, one.place);
     return pipeline_;
   }
 
- private:
-  void read_root(const YAML::Node& root) {
+  void read_keys(const YAML::Node& root) {
     static const std::vector<std::string> kKeys{"marrow", "name", "help", "only_inside", "inputs", "nodes", "outputs"};
     const Place start = is_body_ ? yaml_.place(root) : Place{pipeline_.file.string(), 1, 1};
-    bool versioned = false, has_name = false, has_nodes = false, has_outputs = false;
+    std::set<std::string> given;
     for (const YamlEntry& entry : yaml_.map(root, start, "the pipeline", &kKeys)) {
+      given.insert(entry.key);
       if (entry.key == "marrow") {
-        versioned = true;
         const auto version = yaml_.integer(entry.value, entry.place, "marrow");
         if (version && *version != 1)
           yaml_.fault(entry.place, formatted("this file is of format {}, this program reads format 1", *version));
       }
       if (entry.key == "name") {
-        has_name = true;
         pipeline_.name = yaml_.text(entry.value, entry.place, "name").value_or("");
         if (entry.value.IsScalar()) check_file_name(diagnostics_, entry.place, pipeline_.name, "a pipeline's name");
       }
@@ -67,27 +68,25 @@ class PipelineReader {
       if (entry.key == "only_inside")
         pipeline_.only_inside = yaml_.boolean(entry.value, entry.place, "only_inside").value_or(false);
       if (entry.key == "inputs") read_inputs(entry);
-      if (entry.key == "nodes") {
-        has_nodes = true;
+      if (entry.key == "nodes")
         for (const YamlEntry& node : yaml_.map(entry.value, entry.place, "nodes")) read_node(node);
-      }
-      if (entry.key == "outputs") {
-        has_outputs = true;
-        for (const YamlEntry& output : yaml_.map(entry.value, entry.place, "outputs"))
-          pipeline_.outputs.emplace_back(output.key, WrittenValue{output.place, output.value, folder_});
-      }
+      if (entry.key == "outputs") pipeline_.outputs = entries(entry, "outputs");
     }
     if (!root.IsMap()) return;
-    if (!has_name && !is_body_) name_after_file(start);
-    if (!versioned && !is_body_) yaml_.fault(start, "the key 'marrow' is missing", "begin the file with  marrow: 1");
-    if (!has_nodes)
+    check_keys(given, start);
+    check_given_inputs();
+  }
+
+  void check_keys(const std::set<std::string>& given, const Place& start) {
+    if (!given.contains("name") && !is_body_) name_after_file(start);
+    if (!given.contains("marrow") && !is_body_)
+      yaml_.fault(start, "the key 'marrow' is missing", "begin the file with  marrow: 1");
+    if (!given.contains("nodes"))
       yaml_.fault(start, "the key 'nodes' is missing", "name the nodes of the pipeline under it");
     else if (pipeline_.nodes.empty() && diagnostics_.empty())
       yaml_.fault(start, "the pipeline has no nodes", "name them under  nodes:");
-    if (!has_outputs)
-      yaml_.fault(start, "the key 'outputs' is missing",
-                  "name what the pipeline is to compute, as  outputs: {name: node}");
-    check_given_inputs();
+    if (!given.contains("outputs"))
+      yaml_.fault(start, "the key 'outputs' is missing", "name what the pipeline computes, as  outputs: {name: node}");
   }
 
   void name_after_file(const Place& start) {
@@ -107,24 +106,18 @@ class PipelineReader {
       pipeline_.input_places[input.key] = input.place;
       OptionInfo info;
       info.type = OptionType::text;
-      WrittenValue value;
-      bool given = false, may_be_empty = false;
-      const auto give = [&](const Place& place, const YAML::Node& node, const fs::path& folder) {
-        given = true;
-        value.place = place;
-        value.value.reset(node);
-        value.folder = folder;
-      };
+      std::optional<WrittenValue> value;
+      bool may_be_empty = false;
       for (const YamlEntry& entry : yaml_.map(input.value, input.place, "input " + in_quotes(input.key), &kKeys)) {
         if (entry.key == "help") yaml_.text(entry.value, entry.place, "help");
         if (entry.key == "default") {
-          give(entry.place, entry.value, folder_);
+          value.emplace(WrittenValue{entry.place, entry.value, folder_});
           may_be_empty = entry.value.IsScalar() && entry.value.Scalar().empty();
         }
         if (entry.key != "type") continue;
         const auto type = yaml_.text(entry.value, entry.place, "type");
         if (!type) continue;
-        if (std::find(kTypes.begin(), kTypes.end(), *type) == kTypes.end())
+        if (!contains(kTypes, *type))
           yaml_.fault(entry.place, "unknown type " + in_quotes(*type) + " of input " + in_quotes(input.key),
                       suggestion(*type, kTypes));
         if (*type == "path") info.type = OptionType::path;
@@ -133,13 +126,15 @@ class PipelineReader {
         if (*type == "boolean") info.type = OptionType::boolean;
       }
       for (const InputValue& one : arguments_.inputs)
-        if (one.name == input.key) give(place_of(one), YAML::Node(one.value), folder_of(one.place));
-      set_input(input, info, given ? &value : nullptr, may_be_empty);
+        if (one.name == input.key)
+          value.emplace(WrittenValue{place_of(one), YAML::Node(one.value), folder_of(one.place)});
+      set_input(input, info, value, may_be_empty);
     }
   }
 
-  /// `may_be_empty`: its default is empty, so it is of use without a value.
-  void set_input(const YamlEntry& input, const OptionInfo& info, const WrittenValue* value, bool may_be_empty) {
+  /// `may_be_empty`: its default is an empty text, so an empty path is a good value.
+  void set_input(const YamlEntry& input, const OptionInfo& info, const std::optional<WrittenValue>& value,
+                 bool may_be_empty) {
     if (!value) {
       pipeline_.missing_inputs.push_back(input.key);
       if (inputs_required_)
@@ -159,7 +154,7 @@ class PipelineReader {
 
   void check_given_inputs() {
     for (const InputValue& one : arguments_.inputs)
-      if (std::find(declared_.begin(), declared_.end(), one.name) == declared_.end())
+      if (!contains(declared_, one.name))
         diagnostics_.add(place_of(one), "the pipeline has no input " + in_quotes(one.name),
                          suggestion(one.name, declared_));
   }
@@ -197,9 +192,7 @@ class PipelineReader {
         read_repetition(node, part);
       } else {
         auto& target = part.key == "with" ? node.options : node.wires;
-        for (const YamlEntry& item :
-             yaml_.map(part.value, part.place, in_quotes(part.key) + " of node " + in_quotes(node.id)))
-          target.emplace_back(item.key, WrittenValue{item.place, item.value, folder_});
+        target = entries(part, in_quotes(part.key) + " of node " + in_quotes(node.id));
       }
     }
     if (node.repetition) {
@@ -219,35 +212,45 @@ class PipelineReader {
     } else if (part.key == "over") {
       repetition.over_place = part.place;
       repetition.over = yaml_.text(part.value, part.place, what).value_or("");
-    } else if (part.key == "until") {
-      repetition.until_place = part.place;
-      repetition.until = yaml_.text(part.value, part.place, what).value_or("");
     } else if (part.key == "carry") {
-      for (const YamlEntry& item : yaml_.map(part.value, part.place, what))
-        repetition.carry.emplace_back(item.key, WrittenValue{item.place, item.value, folder_});
-    } else if (part.key == "at_most") {
-      repetition.at_most_place = part.place;
-      set_at_most(repetition, yaml_.integer(part.value, part.place, what));
+      repetition.carry = entries(part, what);
     } else {
-      set_if_pass_fails(repetition, part.place, yaml_.text(part.value, part.place, what));
+      set_passes(node, part.key, part.value, part.place, yaml_);
     }
   }
 
-  void set_at_most(WrittenRepetition& repetition, const std::optional<std::int64_t>& passes) {
-    constexpr std::int64_t kMostPasses = 1'000'000;
-    if (passes && (*passes < 1 || *passes > kMostPasses))
-      diagnostics_.add(repetition.at_most_place,
-                       formatted("'at_most' is {}, but must be a number of passes from 1 to 1000000", *passes));
-    else if (passes)
-      repetition.at_most = int(*passes);
+  std::vector<WrittenEntry> entries(const YamlEntry& map, const std::string& what) {
+    std::vector<WrittenEntry> entries;
+    for (const YamlEntry& item : yaml_.map(map.value, map.place, what))
+      entries.push_back({item.key, {item.place, item.value, folder_}});
+    return entries;
   }
 
-  void set_if_pass_fails(WrittenRepetition& repetition, const Place& place, const std::optional<std::string>& what) {
+  /// Sets how many passes there are. `key`: at_most, until or if_pass_fails.
+  void set_passes(WrittenNode& node, const std::string& key, const YAML::Node& value, const Place& place,
+                  StrictYaml& yaml) {
+    constexpr std::int64_t kMostPasses = 1'000'000;
     static const std::vector<std::string> kChoices{"end", "go_on"};
-    if (what && std::find(kChoices.begin(), kChoices.end(), *what) == kChoices.end())
-      diagnostics_.add(place, "'if_pass_fails' is " + in_quotes(*what) + ", but must be end or go_on",
-                       suggestion(*what, kChoices));
-    repetition.goes_on = what == "go_on";
+    WrittenRepetition& repetition = *node.repetition;
+    const std::string what = in_quotes(key) + " of node " + in_quotes(node.id);
+    if (key == "at_most") {
+      const auto passes = yaml.integer(value, place, what);
+      if (!passes) return;
+      if (*passes >= 1 && *passes <= kMostPasses)
+        repetition.at_most = int(*passes);
+      else
+        diagnostics_.add(
+            place, formatted("'at_most' is {}, but must be a number of passes from 1 to {}", *passes, kMostPasses));
+    } else if (key == "until") {
+      repetition.until_place = place;
+      repetition.until = yaml.text(value, place, what).value_or("");
+    } else {
+      const auto choice = yaml.text(value, place, what);
+      if (choice && !contains(kChoices, *choice))
+        diagnostics_.add(place, "'if_pass_fails' is " + in_quotes(*choice) + ", but must be end or go_on",
+                         suggestion(*choice, kChoices));
+      repetition.goes_on = choice == "go_on";
+    }
   }
 
   void check_repetition(const WrittenNode& node, bool has_uses) {
@@ -259,7 +262,7 @@ class PipelineReader {
       yaml_.fault(node.place, who + " does not say what it repeats",
                   "add  repeat: FILE  with the body, a pipeline file");
     else if (repetition.over.empty() && repetition.at_most == 0 && !repetition.over_place.line)
-      yaml_.fault(node.place, who + " need not end: it goes over no axis and has no limit of passes",
+      yaml_.fault(node.place, who + " may never end: it goes over no axis and has no limit of passes",
                   "add  over: AXIS,  or  at_most: PASSES");
   }
 
@@ -267,45 +270,44 @@ class PipelineReader {
 
   void apply_override(const std::string& key, const std::string& text, const Place& written) {
     const Place place = written.file.empty() ? Place{"--set " + key + "=" + text} : written;
-    StrictYaml yaml(place, diagnostics_);
     const std::size_t dot = key.find('.');
+    if (dot == std::string::npos || dot + 1 == key.size())
+      return diagnostics_.add(place,
+                              "an override is node.option=value, node.uses=kind.name, node.may_fail=true or "
+                              "node.in.port=reference");
+    const std::string id = key.substr(0, dot), what = key.substr(dot + 1);
     std::vector<std::string> ids;
-    for (const WrittenNode& node : pipeline_.nodes) ids.push_back(node.id);
-    const auto node = std::find_if(pipeline_.nodes.begin(), pipeline_.nodes.end(),
-                                   [&](const WrittenNode& n) { return n.id == key.substr(0, dot); });
-    if (dot == std::string::npos || dot + 1 == key.size()) {
-      diagnostics_.add(place,
-                       "an override is node.option=value, node.uses=kind.name, node.may_fail=true or "
-                       "node.in.port=reference");
-      return;
-    }
-    if (node == pipeline_.nodes.end()) {
-      diagnostics_.add(place, "the pipeline has no node " + in_quotes(key.substr(0, dot)),
-                       suggestion(key.substr(0, dot), ids));
-      return;
-    }
-    const std::string what = key.substr(dot + 1);
-    if (node->repetition && set_repetition(*node, what, text, place, written)) return;
-    if (node->repetition && what == "uses") {
-      diagnostics_.add(place, "node " + in_quotes(node->id) + " repeats a body, so no other node can take its place",
-                       "a node of the body is changed by  " + node->id + ".body.NODE.uses=kind.name");
-      return;
-    }
+    for (const WrittenNode& one : pipeline_.nodes) ids.push_back(one.id);
+    const auto found = std::find(ids.begin(), ids.end(), id);
+    if (found == ids.end())
+      return diagnostics_.add(place, "the pipeline has no node " + in_quotes(id), suggestion(id, ids));
+    WrittenNode& node = pipeline_.nodes[std::size_t(found - ids.begin())];
+    if (node.repetition && set_repetition(node, what, text, place, written)) return;
+    if (node.repetition && what == "uses")
+      return diagnostics_.add(place, "node " + in_quotes(id) + " repeats a body, so no other node can take its place",
+                              "a node of the body is changed by  " + id + ".body.NODE.uses=kind.name");
     const auto given = given_value(text, place, diagnostics_);
     if (!given) return;
-    if (what == "uses") return set_uses(*node, key, yaml.text(*given, place, "uses"), place);
-    if (what == "may_fail") {
-      node->may_fail = yaml.boolean(*given, place, may_fail_of(node->id)).value_or(false);
-      return;
-    }
-    const WrittenValue value{place, *given, folder_of(written), true};
-    auto& target = what.starts_with("in.") ? node->wires : node->options;
-    const std::string name = what.starts_with("in.") ? what.substr(3) : what;
-    const auto old = std::find_if(target.begin(), target.end(), [&](const auto& item) { return item.first == name; });
-    if (old != target.end())
-      old->second = value;
+    StrictYaml yaml(place, diagnostics_);
+    if (what == "uses")
+      set_uses(node, key, yaml.text(*given, place, "uses"), place);
+    else if (what == "may_fail")
+      node.may_fail = yaml.boolean(*given, place, may_fail_of(id)).value_or(false);
     else
-      target.emplace_back(name, value);
+      set_entry(node, what, {place, *given, folder_of(written), true});
+  }
+
+  /// `what`: an option, or in.port.
+  static void set_entry(WrittenNode& node, const std::string& what, const WrittenValue& value) {
+    const bool is_wire = what.starts_with("in.");
+    const std::string name = is_wire ? what.substr(3) : what;
+    auto& target = is_wire ? node.wires : node.options;
+    const auto old =
+        std::find_if(target.begin(), target.end(), [&](const WrittenEntry& one) { return one.name == name; });
+    if (old != target.end())
+      old->value = value;
+    else
+      target.push_back({name, value});
   }
 
   void set_uses(WrittenNode& node, const std::string& key, const std::optional<std::string>& name, const Place& place) {
@@ -315,9 +317,9 @@ class PipelineReader {
                        "write it as  " + key + "=kind.name");
       return;
     }
-    // The options under `with` were written for the node that is replaced, so they mean nothing to another node.
-    // Overrides are meant for this run, so they are kept, in any order.
-    const auto of_file = [](const auto& option) { return !option.second.is_override; };
+    // The options under `with` were written for the replaced node, so another node must not get them. Overrides are
+    // meant for this run, so they stay, in whatever order they come.
+    const auto of_file = [](const WrittenEntry& option) { return !option.value.is_override; };
     if (*name != node.uses && std::erase_if(node.options, of_file) > 0)
       pipeline_.notes.push_back("node " + in_quotes(node.id) + ": the options written for " + node.uses +
                                 " are not used by " + *name);
@@ -325,27 +327,17 @@ class PipelineReader {
     node.uses_place = place;
   }
 
-  /// Whether the override is one of the repetition; then it is done.
+  /// Applies an override of the repetition. Returns false if it overrides something else.
   bool set_repetition(WrittenNode& node, const std::string& what, const std::string& text, const Place& place,
                       const Place& written) {
-    WrittenRepetition& repetition = *node.repetition;
+    static const std::vector<std::string> kKeys{"at_most", "until", "if_pass_fails"};
     if (what.starts_with("body.")) {
-      repetition.overrides.push_back({what.substr(5), text, written.file.empty() ? Place{} : place});
+      node.repetition->overrides.push_back({what.substr(5), text, written.file.empty() ? Place{} : place});
       return true;
     }
-    if (what != "at_most" && what != "until" && what != "if_pass_fails") return false;
-    const auto value = given_value(text, place, diagnostics_);
-    if (!value) return true;
+    if (!contains(kKeys, what)) return false;
     StrictYaml yaml(place, diagnostics_);
-    if (what == "at_most") {
-      repetition.at_most_place = place;
-      set_at_most(repetition, yaml.integer(*value, place, "'at_most'"));
-    } else if (what == "until") {
-      repetition.until_place = place;
-      repetition.until = yaml.text(*value, place, "'until'").value_or("");
-    } else {
-      set_if_pass_fails(repetition, place, yaml.text(*value, place, "'if_pass_fails'"));
-    }
+    if (const auto value = given_value(text, place, diagnostics_)) set_passes(node, what, *value, place, yaml);
     return true;
   }
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -12,12 +11,18 @@
 
 namespace marrow {
 
-/// A value as written, with its place and with the folder at which relative paths in it start.
+/// A value as written.
 struct WrittenValue {
   Place place;
   YAML::Node value;
-  std::filesystem::path folder;
-  bool is_override = false;  ///< from an override: the parts of its text have no places of their own
+  std::filesystem::path folder;  ///< where relative paths in the value start
+  bool is_override = false;      ///< whether it comes from an override; its parts then have no places
+};
+
+/// A value and the name that it is given to.
+struct WrittenEntry {
+  std::string name;
+  WrittenValue value;
 };
 
 /// The body of a node, as written.
@@ -25,13 +30,12 @@ struct WrittenRepetition {
   WrittenValue body;  ///< the name of a file, or the body itself
   std::string over;   ///< empty for a loop
   Place over_place;
-  std::vector<std::pair<std::string, WrittenValue>> carry;
+  std::vector<WrittenEntry> carry;
   std::string until;
   Place until_place;
   int at_most = 0;
-  Place at_most_place;
   bool goes_on = false;
-  std::vector<Override> overrides;  ///< of the body
+  std::vector<Override> overrides;  ///< changes of the body
 };
 
 struct WrittenNode {
@@ -40,8 +44,7 @@ struct WrittenNode {
   std::string uses;
   Place uses_place;
   bool may_fail = false;
-  std::vector<std::pair<std::string, WrittenValue>> options;
-  std::vector<std::pair<std::string, WrittenValue>> wires;
+  std::vector<WrittenEntry> options, wires;
   std::optional<WrittenRepetition> repetition;
 };
 
@@ -50,28 +53,29 @@ struct WrittenPipeline {
   std::string name, help;
   std::filesystem::path file;
   std::map<std::string, std::string> inputs;  ///< values, as texts
-  std::vector<std::string> missing_inputs;    ///< inputs that are declared but have neither a value nor a default
+  std::vector<std::string> missing_inputs;    ///< declared inputs without a value and without a default
   std::map<std::string, Place> input_places;  ///< where each is declared
   std::vector<WrittenNode> nodes;
-  std::vector<std::pair<std::string, WrittenValue>> outputs;
+  std::vector<WrittenEntry> outputs;
   bool only_inside = false;
   std::vector<std::string> notes;
 };
 
-/// A reader for the parts of a value. It reports faults at their places.
+/// A reader for the parts of a value, which reports faults at their places.
 inline StrictYaml yaml_of(const WrittenValue& value, Diagnostics& diagnostics) {
   return value.is_override ? StrictYaml(value.place, diagnostics) : StrictYaml(value.place.file, diagnostics);
 }
 
-/// Whether a node's options or wires give that name.
-inline bool is_written(const std::vector<std::pair<std::string, WrittenValue>>& list, const std::string& name) {
-  return std::any_of(list.begin(), list.end(), [&](const auto& item) { return item.first == name; });
-}
-
 WrittenPipeline read_written_pipeline(const std::filesystem::path& file, const PipelineArguments& arguments,
                                       Diagnostics& diagnostics, bool inputs_required);
-/// The body of a node that is written in the file of the pipeline itself. `name`: of the node.
+/// Reads the body of node `name` from the pipeline's own file.
 WrittenPipeline read_written_body(const std::filesystem::path& file, const std::string& name, const YAML::Node& body,
                                   const PipelineArguments& arguments, Diagnostics& diagnostics);
+
+/// Reports circles of nodes that wait for each other, each with its own nodes only. All written wires count: a wire
+/// that a node does not use is used as soon as another node of the kind takes its place. Only the nodes' ids must be
+/// known, so circles are found beside all other faults. Of two circles that share a node, the second is reported when
+/// the first is mended.
+void check_circles(const WrittenPipeline& written, Diagnostics& diagnostics);
 
 }  // namespace marrow

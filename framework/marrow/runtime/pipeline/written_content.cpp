@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/pipeline/written_content.hpp"
-#include "marrow/base/regular_file.hpp"
 
+#include "marrow/base/regular_file.hpp"
 #include "marrow/runtime/pipeline/named_files.hpp"
-#include "marrow/runtime/plugins/library.hpp"
 
 namespace marrow {
 

@@ -7,8 +7,8 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// Digest of the content of a file, or of all files below a folder with their relative names. It identifies what a run
-/// wrote, even if the folder was moved. Throws Error if something cannot be read.
+/// Digest of the content of a file, or of all files below a folder and their relative names. By it, what a run wrote is
+/// recognised even in a folder that was moved. Throws Error if something cannot be read.
 Digest content_of(const std::filesystem::path& path);
 
 }  // namespace marrow

@@ -206,7 +206,7 @@ std::string Evaluation::failure_text(std::size_t index, const std::string& item,
   text += " failed: " + reason;
   std::string inputs;
   for (const Wire& wire : node.wires) {
-    inputs += (inputs.empty() ? "" : ", ") + node.info.inputs[std::size_t(wire.port)].name + " = ";
+    inputs += (inputs.empty() ? "" : ", ") + node.input_of(wire).name + " = ";
     for (std::size_t i = 0; i < wire.sources.size(); ++i) inputs += (i ? " + " : "") + wire.sources[i].text;
   }
   return inputs.empty() ? text : text + " (its inputs: " + inputs + ")";

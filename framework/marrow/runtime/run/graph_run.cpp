@@ -91,8 +91,8 @@ void GraphRun::complete_key(Value& value) {
 void GraphRun::make_outputs() {
   for (const PipelineOutput& output : pipeline_.outputs) {
     NodeRecord& record = result_.nodes[std::size_t(output.source.node)];
-    const PipelineNode& node = pipeline_.nodes[std::size_t(output.source.node)];
-    const std::string& wanted = node.info.outputs[std::size_t(output.source.output)].type.id;
+    const PipelineNode& node = pipeline_.node_of(output.source);
+    const std::string& wanted = pipeline_.output_of(output.source).type.id;
     const auto type = [&]() -> const TypeInfo& {
       for (const PortInfo& port : catalogue_.load(node.info.name).info.outputs)
         if (port.type.id == wanted) return port.type;
@@ -108,7 +108,7 @@ PlannedNode GraphRun::plan_node(std::size_t index, const std::vector<PlannedNode
   for (const Wire& wire : node.wires)
     for (const Reference& source : wire.sources) {
       const PlannedNode& from = planned[std::size_t(source.node)];
-      if (from.what == PlannedNode::What::runs) result.waits_for.insert(pipeline_.nodes[std::size_t(source.node)].id);
+      if (from.what == PlannedNode::What::runs) result.waits_for.insert(pipeline_.node_of(source).id);
       if (from.what == PlannedNode::What::depends)
         result.waits_for.insert(from.waits_for.begin(), from.waits_for.end());
     }

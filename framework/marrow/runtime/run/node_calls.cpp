@@ -19,7 +19,7 @@ std::string list_text(const std::vector<std::string>& names) {
 }
 
 std::string short_name(const Pipeline& pipeline, const Reference& source) {
-  return source.items.empty() ? pipeline.nodes[std::size_t(source.node)].id : source.items.back();
+  return source.items.empty() ? pipeline.node_of(source).id : source.items.back();
 }
 
 /// Makes a list of one from a single item, because a list port may be given one item. If the value has other axes, this
@@ -117,7 +117,7 @@ void make_calls(const Pipeline& pipeline, const RunResult& result, std::size_t i
   const PipelineNode& node = pipeline.nodes[index];
   std::vector<Value> inputs(node.info.inputs.size());
   for (const Wire& wire : node.wires)
-    inputs[std::size_t(wire.port)] = wired_value(pipeline, result, wire, node.info.inputs[std::size_t(wire.port)]);
+    inputs[std::size_t(wire.port)] = wired_value(pipeline, result, wire, node.input_of(wire));
   for (const std::string& axis : node.mapped_axes) {
     std::vector<std::string> names;
     std::string first;

@@ -40,7 +40,7 @@ Pipeline with_constants(Pipeline body, const std::vector<std::string>& constant_
     for (const Wire& wire : node.wires) used.insert(used.end(), wire.sources.begin(), wire.sources.end());
   body.outputs.clear();
   for (const Reference& source : used) {
-    if (source.node < 0 || !contains(constant_nodes, body.nodes[std::size_t(source.node)].id)) continue;
+    if (source.node < 0 || !contains(constant_nodes, body.node_of(source).id)) continue;
     body.outputs.push_back({formatted("{}", body.outputs.size()), source});
   }
   return body;

@@ -25,7 +25,7 @@
 #include "marrow/base/regular_file.hpp"
 #include "marrow/base/text_file.hpp"
 #include "marrow/runtime/node/mapping.hpp"
-#include "marrow/runtime/pipeline/pipeline_writers.hpp"
+#include "marrow/runtime/pipeline/pipeline.hpp"
 #include "marrow/runtime/pipeline/written_content.hpp"
 #include "marrow/runtime/plugins/manifest.hpp"
 #include "marrow/runtime/process/plugin_code.hpp"
@@ -120,7 +120,7 @@ json inputs_of(const PipelineNode& node, const RunResult& result) {
       for (const Reference& source : wire.sources) hasher.add(key_of(value_of(result, source)));
     } catch (const Error&) {  // the list does not have this item: the node failed
     }
-    inputs[node.info.inputs[std::size_t(wire.port)].name] = hasher.digest().hex();
+    inputs[node.input_of(wire).name] = hasher.digest().hex();
   }
   return inputs;
 }
@@ -135,10 +135,10 @@ json inputs_in_body(const PipelineNode& node, const Repetition& repetition, cons
       if (std::size_t(source.output) < outputs.size()) hasher.add(key_of(outputs[std::size_t(source.output)]));
       for (std::size_t i = 0; i < passes.given.size(); ++i) {
         const Reference& target = repetition.given.at(i).target;
-        if (target.node == source.node && target.output == source.output) hasher.add(key_of(passes.given[i]));
+        if (target.has_same_output(source)) hasher.add(key_of(passes.given[i]));
       }
     }
-    inputs[node.info.inputs[std::size_t(wire.port)].name] = hasher.digest().hex();
+    inputs[node.input_of(wire).name] = hasher.digest().hex();
   }
   return inputs;
 }

@@ -23,8 +23,7 @@ void add_verdicts(const Value& value, const std::string& output, const std::stri
 std::vector<NamedVerdict> verdicts_of(const Pipeline& pipeline, const RunResult& result) {
   std::vector<NamedVerdict> verdicts;
   for (const PipelineOutput& output : pipeline.outputs) {
-    const PipelineNode& node = pipeline.nodes[std::size_t(output.source.node)];
-    if (node.info.outputs[std::size_t(output.source.output)].type != TypeInfo::of<Verdict>()) continue;
+    if (pipeline.output_of(output.source).type != TypeInfo::of<Verdict>()) continue;
     try {
       add_verdicts(value_of(result, output.source), output.name, "", verdicts);
     } catch (const Error&) {  // the list does not have this item: the output's own fault says so

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Claims: who makes a result. For each key, one byte of one file is locked. So there is nothing to clean up, and the
-// kernel gives the lock back if its holder dies.
+// Claims say which process makes a result. Each key locks one byte of one file. So there is nothing to clean up, and
+// the kernel releases the lock if its holder dies.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -39,7 +39,7 @@ Store::Claim::~Claim() {
 Store::Claim Store::claim(const Digest& key, const std::atomic<bool>* cancelled,
                           const std::function<void(bool)>& on_wait) const {
   if (!prepare().empty()) return Claim();
-  // This opens the file anew, so that two threads of one process exclude each other too.
+  // Each claim opens the file again, so that two threads of one process exclude each other too.
   Descriptor descriptor(
       open((folder_ / "claims").c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0600));
   if (!descriptor.is_open()) return Claim();

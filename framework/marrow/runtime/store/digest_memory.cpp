@@ -12,9 +12,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr off_t kLarge_bytes = 4 << 20;  // a smaller one is read about as quickly as its record
+constexpr off_t kLarge_bytes = 4 << 20;  // reading a smaller file takes about as long as reading its record
 
-/// A record. It names the state, so that a file that was renamed to another record's name is noticed.
+/// A record. It holds the state too, so that a file that was renamed to another record's name is noticed.
 struct KeptDigest {
   Digest state, digest;
   using fields = Fields<&KeptDigest::state, &KeptDigest::digest>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Digests of large files, kept in the store of a host, so that not each process reads a whole CT.
+// The store of a host keeps the digests of large files. So a whole CT is not read by every process.
 #include <filesystem>
 #include <functional>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Keys of data that were made outside of a run, such as a volume made from a Python array. Large data are hashed once,
-// however often they are given to a run.
+// Keys of data that were made outside of a run, such as a volume made from a Python array. Large data are hashed only
+// once, even if several runs use them.
 #include <cstddef>
 #include <map>
 #include <memory>
@@ -12,14 +12,14 @@
 
 namespace MARROW_EXPORT_TO_TESTS marrow {
 
-/// Remembers the keys of data as long as these live. Data never change once a value has them. Safe to use from several
-/// threads.
+/// Remembers the keys of data for as long as the data exist. Data never change once a value holds them. Safe to use
+/// from several threads.
 class KnownKeys {
  public:
-  /// The digest of the content of an item that is here; its type must have a content.
+  /// The digest of an item's content. The item must have its data, and its type a content.
   Digest key_of(const Value& item);
 
-  /// Those of this process.
+  /// The keys of this process.
   static KnownKeys& all();
 
  private:
@@ -32,7 +32,7 @@ class KnownKeys {
 
   std::mutex mutex_;
   std::map<const void*, Entry> entries_;
-  std::size_t look_again_at_ = 64;  ///< number of entries from which on dead ones are looked for
+  std::size_t look_again_at_ = 64;  ///< with this many entries, expired ones are removed
 };
 
 }  // namespace marrow

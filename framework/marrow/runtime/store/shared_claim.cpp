@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <charconv>
 #include <chrono>
@@ -53,8 +52,8 @@ ClaimText parsed(const std::string& text) {
   return {};  // it was made just now, or its owner was killed before it wrote
 }
 
-/// The text of a claim; nothing if it is not there or cannot be read. Opening a file anew shows what other hosts wrote
-/// to it.
+/// The text of a claim; nothing if the file does not exist or cannot be read. Only opening the file again shows what
+/// other hosts wrote to it.
 std::optional<std::string> claim_text(const fs::path& file) {
   constexpr std::size_t kMost = 256;
   constexpr int kMostTries = 5;
@@ -72,7 +71,8 @@ std::optional<std::string> claim_text(const fs::path& file) {
 
 }  // namespace
 
-/// A claim file of this process. It stays open, so that a sign of life never goes to another's file of the same name.
+/// A claim file of this process. It stays open, so that a sign of life is never written to another process's file of
+/// the same name.
 class HeldClaim {
  public:
   HeldClaim(fs::path file, Descriptor descriptor)
@@ -80,7 +80,7 @@ class HeldClaim {
     beat();
   }
   ~HeldClaim() {
-    // Not in a child that was forked in the meantime. Not if it was taken over, and the file is another's.
+    // A child that was forked in the meantime keeps the file. So does a process whose claim was taken over.
     if (process_ == getpid())
       if (const ClaimText now = parsed(claim_text(file_).value_or(""));
           now.owner == this_process() && now.number == number_)
@@ -89,8 +89,9 @@ class HeldClaim {
   HeldClaim(const HeldClaim&) = delete;
   HeldClaim& operator=(const HeldClaim&) = delete;
 
-  /// Writes a sign of life. Closing any descriptor of a file sends to the server what was written, so that other hosts
-  /// see it; fsync() would also wait for its disk. A fault is no harm: at worst others take the claim over.
+  /// Writes a sign of life. Closing any descriptor of a file sends what was written to the server, so that other hosts
+  /// see it; fsync() would also wait for the disk. A fault does no harm: at worst, another process takes the claim
+  /// over.
   void beat() {
     const std::string text = formatted("{} {} {:.3f} {:012}\n", this_process(), number_, claim_seconds(), ++beats_);
     if (pwrite(descriptor_, text.data(), text.size(), 0) == ssize_t(text.size())) Descriptor(dup(descriptor_)).close();
@@ -169,8 +170,8 @@ Heart& heart() {
   return heart;
 }
 
-/// Removes a claim that was judged by its text. Renaming decides between several that do this at once: only one finds
-/// the file. If the owner was quicker, or another has claimed it anew meanwhile, the file is put back.
+/// Removes a claim whose owner has ended, as its text said. If several processes do this at once, only one of them can
+/// rename the file. If the owner was quicker, or the result was claimed again in the meantime, the file is put back.
 void take_away(const fs::path& file, const std::string& text) {
   const fs::path aside = temporary_beside(file);
   if (std::rename(file.c_str(), aside.c_str()) != 0) return;
@@ -178,8 +179,8 @@ void take_away(const fs::path& file, const std::string& text) {
   unlink(aside.c_str());
 }
 
-/// Watches a claim of another process. Only the time counts in which this process looked at it: one that was suspended,
-/// or waited for the file system itself, does not take its own absence for the owner's.
+/// Watches a claim of another process. Only the time during which this process looked at the claim counts. So a process
+/// that was suspended, or that waited for the file system, does not take its own absence for the owner's.
 class Watch {
  public:
   /// Whether the owner of the claim has ended, as far as this can be known. A claim that could not be read (no text)
@@ -239,7 +240,7 @@ SharedClaim claim_file(const fs::path& file, const Permissions& permissions, con
       return {};
     }
     if (watch.is_left(claim_text(file))) {
-      if (!watch.text()) return {};  // nobody can tell whose it is: rather make the result twice than wait for ever
+      if (!watch.text()) return {};  // its owner is unknown: making the result twice is better than waiting for ever
       take_away(file, *watch.text());
       watch = Watch();
       continue;

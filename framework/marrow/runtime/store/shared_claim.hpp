@@ -2,7 +2,7 @@
 #pragma once
 // Claims on results between hosts. Locks are not used, because many shared folders refuse them or keep them to one
 // host. A claim is a file that one process alone can make (O_EXCL). Its owner raises a number in it from time to time.
-// Others wait as long as they see the number change. A claim that is lost costs double work, and never a wrong result.
+// Others wait while they see the number change. A lost claim costs double work, but never gives a wrong result.
 #include <atomic>
 #include <filesystem>
 #include <functional>
@@ -16,7 +16,7 @@ namespace MARROW_EXPORT marrow {
 
 class HeldClaim;
 
-/// The right to make one result, among all hosts. It is given back at the end.
+/// The right to make one result, among all hosts. The destructor gives it back.
 class SharedClaim {
  public:
   SharedClaim() = default;  ///< holds nothing

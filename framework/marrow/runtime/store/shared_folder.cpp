@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kSharedLine = "marrow shared store of results, layout 1\n";
 constexpr int kMostLooks = 6;
-constexpr auto kFirstPause = std::chrono::milliseconds(20);  // each one is twice as long as the one before
+constexpr auto kFirstPause = std::chrono::milliseconds(20);  // each pause is twice as long as the one before
 const std::string kWhereTo = "; set MARROW_SHARED_CACHE to a folder for it, or unset it";
 
 bool is_marked(const fs::path& folder, SharedLook look) {
@@ -63,7 +63,7 @@ SharedFolderState examine_shared(const fs::path& folder) {
     state.fault = "cannot look into the folder " + folder.string() + ": " + std::strerror(errno);
   else if (is_marked(folder, SharedLook::quick))
     state.is_store = true;
-  else if (!holds_nothing(folder)) {  // looked at once: another process may be making it a store just now
+  else if (!holds_nothing(folder)) {  // another process may be making it a store at this moment
     state.is_store = is_marked(folder, SharedLook::listed);
     if (!state.is_store) state.fault = name + " holds other things and is no shared store of marrow" + kWhereTo;
   } else if (!state.may_write)

@@ -19,17 +19,16 @@ struct SharedFolderState {
   std::string fault;  ///< why it cannot be used
   Permissions permissions;
 };
-/// A shared store may belong to another user. It must exist, so that a folder that is not mounted on this host is not
-/// mistaken for it. What is written to it may be read and written by its group if the folder may, and by nobody else.
+/// A shared store may belong to another user. The folder must exist; so a mount point without its mount is not taken
+/// for it. Its files have the group's rights of the folder. Nobody else may read or write them.
 SharedFolderState examine_shared(const std::filesystem::path& folder);
-/// Makes a store of an empty folder. Returns what examine_shared() then says.
+/// Turns an empty folder into a store. Returns what examine_shared() then says.
 SharedFolderState make_shared(const std::filesystem::path& folder);
 
 /// Whether the file's name is in its folder. Listing asks the server again. The folder itself may be new to this host.
 bool is_listed(const std::filesystem::path& file);
 
-/// How far what this host remembers about a folder is relied on. `listed`: it lists the folder first, so that it learns
-/// of new files.
+/// `quick` relies on what this host remembers about a folder. `listed` lists the folder first, to learn of new files.
 enum class SharedLook { quick, listed };
 
 /// Opens a file and calls use(file). If it returns false, because the file cannot be read or is not whole, or if a file

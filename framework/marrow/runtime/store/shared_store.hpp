@@ -19,12 +19,12 @@ class SharedClaim;
 struct SharedFolderState;
 enum class SharedLook;
 
-/// Results in a folder that several hosts and users see (NFS, Lustre, BeeGFS). It stands behind the store of each host
-/// and never takes its place: a fault here is said once (complaint()), and runs go on without it.
+/// Results in a folder that several hosts and users see (NFS, Lustre, BeeGFS). It supports the store of each host but
+/// does not replace it: a fault here is reported once (complaint()), and runs continue without it.
 ///
-/// Each file is written under a temporary name and then renamed. Whatever is read is checked by its hash, so a file
-/// that another host sees too early, in part or damaged counts as absent. Nothing relies on locks, on equal clocks, or
-/// on numbers of processes of other hosts. Safe to use from several threads.
+/// Each file is written under a temporary name and then renamed. Everything that is read is checked by its hash. So a
+/// file counts as absent if another host sees it too early, in part or damaged. Nothing relies on locks, on equal
+/// clocks, or on numbers of processes of other hosts. Safe to use from several threads.
 class SharedStore {
  public:
   explicit SharedStore(const std::filesystem::path& folder);
@@ -33,15 +33,15 @@ class SharedStore {
   const std::filesystem::path& folder() const { return folder_; }
   /// Why the folder cannot be used, or an empty text. Makes nothing.
   std::string fault() const;
-  /// The first fault that was met since the last call, or an empty text. Only the first one is ever returned.
+  /// The first fault, or an empty text if there was none. The fault is returned only once.
   std::string complaint();
 
   /// Copies the result of a key to a file of another store. Returns false if the result is not there, or is not whole.
   /// If it is too large to be copied, or cannot be, `in_place` receives the result; it is read when it is needed.
   bool fetch(const Digest& key, const std::filesystem::path& to, SharedLook look,
              std::optional<StoredResult>& in_place);
-  /// Keeps a result if that is worth it: if it took so long that reading it is much quicker, and if a file is left to
-  /// be written (allow_files()).
+  /// Keeps a result if reading it is much quicker than making it again, and if another file may be written
+  /// (allow_files()).
   void offer(const Digest& key, const std::vector<Value>& outputs, const Provenance& provenance);
   /// Limits how many results are kept. A comparison allows one for each of its cells; otherwise there is no limit.
   void allow_files(long more);
@@ -61,9 +61,10 @@ class SharedStore {
   Store::Freed collect(std::uint64_t keep_bytes) const;
 
  private:
-  std::filesystem::path file_of(const Digest& key) const;
   std::shared_ptr<const SharedFolderState> state();
   void complain(const std::string& fault, bool only_writing);
+  template <class Use>
+  bool read(const Digest& key, SharedLook look, const Use& use);
   template <class Write>
   void write(const Digest& key, const Write& write);
 

@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <charconv>
-#include <cmath>
 #include <cstdlib>
 #include <new>
 
@@ -45,11 +44,6 @@ fs::path Store::default_folder() {
   return cache.empty() ? cache : cache / "marrow" / "store";
 }
 
-fs::path Store::file_of(const Digest& key) const {
-  const std::string name = key.hex();
-  return folder_ / name.substr(0, 2) / name;
-}
-
 std::string Store::fault() const { return examine_store(folder_).fault; }
 
 bool Store::is_there() const {
@@ -70,14 +64,15 @@ std::optional<StoredResult> Store::find(const Digest& key, Where where) const {
   std::optional<StoredResult> found = find_here(key);
   if (found || where == Where::here || !shared_ || !prepare().empty()) return found;
   std::optional<StoredResult> in_place;
-  if (!shared_->fetch(key, file_of(key), where == Where::anew ? SharedLook::listed : SharedLook::quick, in_place))
+  if (!shared_->fetch(key, entry_file(folder_, key), where == Where::anew ? SharedLook::listed : SharedLook::quick,
+                      in_place))
     return found;
   return in_place ? std::move(in_place) : find_here(key);
 }
 
 std::optional<StoredResult> Store::find_here(const Digest& key) const {
   if (!is_there()) return std::nullopt;
-  const fs::path path = file_of(key);
+  const fs::path path = entry_file(folder_, key);
   const StoreFile file(path);
   if (!file.is_open()) return std::nullopt;
   try {
@@ -95,14 +90,14 @@ std::optional<StoredResult> Store::find_here(const Digest& key) const {
 }
 
 void Store::drop(const Digest& key) const {
-  if (is_there()) unlink(file_of(key).c_str());
+  if (is_there()) unlink(entry_file(folder_, key).c_str());
 }
 
 std::string Store::save(const Digest& key, const std::vector<Value>& outputs, const Provenance& provenance) const {
   if (std::string fault = prepare(); !fault.empty()) return fault;
   try {
     const EntryDescription description = describe_entry(key, outputs, provenance);
-    return write_whole(file_of(key), [&](Archive& out) { write_entry(out, description, outputs); });
+    return write_whole(entry_file(folder_, key), [&](Archive& out) { write_entry(out, description, outputs); });
   } catch (const std::bad_alloc&) {
     return "out of memory";
   } catch (...) {  // a value of a plugin's own type

@@ -83,8 +83,8 @@ class Store {
   /// another key, is removed and counts as absent. If the shared store has the result, it is copied into this store, or
   /// read there if it is large.
   std::optional<StoredResult> find(const Digest& key) const;
-  /// `here`: only in this store. `anywhere`: as find(key). `anew`: the same, but what the file system remembers about
-  /// the shared folder is not relied on. That takes longer, and is for a result that another host may just have made.
+  /// `here`: only in this store. `anywhere`: as find(key). `anew`: the same, but does not rely on what the file system
+  /// remembers about the shared folder. It takes longer, and finds a result that another host has only just made.
   enum class Where { here, anywhere, anew };
   std::optional<StoredResult> find(const Digest& key, Where where) const;
   /// Keeps a result that consists of data, absent items and lists of them. Returns why it was not kept, or an empty
@@ -151,7 +151,6 @@ class Store {
 
  private:
   bool is_there() const;
-  std::filesystem::path file_of(const Digest& key) const;
   std::optional<StoredResult> find_here(const Digest& key) const;
 
   std::filesystem::path folder_;

@@ -39,8 +39,8 @@ std::uint64_t bytes_of(const fs::path& path) {
   return sum;
 }
 
-/// Returns false, with the reason in `error`, if some of the item is left. A simulated case is renamed first, so that
-/// no process takes half of it for the whole. A case that is in use is left.
+/// Returns false, with the reason in `error`, if a part of the item could not be removed. A simulated case is renamed
+/// first, so that no process takes half of it for the whole. A case that is in use stays.
 bool remove_item(const StoreItem& item, std::error_code& error) {
   error.clear();
   fs::path path = item.path;
@@ -50,11 +50,6 @@ bool remove_item(const StoreItem& item, std::error_code& error) {
   }
   if (!error) fs::remove_all(path, error);
   return !error;
-}
-
-void list_keys(const std::vector<Leaf>& leaves, std::vector<Digest>& keys) {
-  for (const Leaf& leaf : leaves)
-    if (leaf.present) keys.push_back(leaf.key);
 }
 
 /// Brings a store back to its size. Each item is looked at once, and so is each folder that holds items.
@@ -83,7 +78,7 @@ class Collection {
 
   bool is_stopped() const { return cancelled_ && cancelled_->load(); }
 
-  /// Whether something is mounted on the folder that holds the item, on the item, or below it. What is there belongs to
+  /// Whether something is mounted on the folder that holds the item, on the item, or below it. Mounted files belong to
   /// somebody else.
   bool is_mounted(const StoreItem& item) {
     const fs::path parent = item.path.parent_path();
@@ -126,8 +121,8 @@ class Collection {
     kept_.push_back(std::move(kept));
   }
 
-  /// Removes entries and cases until the rest is small enough. Returns when the oldest of the rest was used; the end of
-  /// time if nothing shall be kept; nothing if that is not known.
+  /// Removes entries and cases until the rest is small enough. Returns when the oldest of the rest was last used; the
+  /// latest possible time if nothing is to be kept; nothing if the time is unknown.
   std::optional<fs::file_time_type> remove_oldest(std::uint64_t keep_bytes) {
     for (const Kept& one : kept_) {
       if (is_stopped()) return std::nullopt;
@@ -142,7 +137,7 @@ class Collection {
   }
 
   /// Removes old records of what nodes last made. A record is written when a call begins, and the call may take long.
-  /// So its own result is surely gone only if the record is much older than all results that are kept.
+  /// So the result of a record is certainly gone only if the record is much older than all results that are kept.
   void remove_remembered(fs::file_time_type oldest) {
     std::error_code error;
     for (const StoreItem& item : remembered_) {
@@ -164,6 +159,11 @@ class Collection {
 
 }  // namespace
 
+std::string given_gigabytes() {
+  const char* text = std::getenv("MARROW_CACHE_GB");
+  return text && *text ? text : "20";
+}
+
 std::vector<Store::Entry> entries_in(const fs::path& folder) {
   std::vector<Store::Entry> entries;
   std::string fault;
@@ -177,7 +177,8 @@ std::vector<Store::Entry> entries_in(const fs::path& folder) {
     try {
       ReadEntry read = read_entry(file, item.key);
       entry.provenance = std::move(read.description.provenance);
-      list_keys(read.description.leaves, entry.outputs);
+      for (const Leaf& leaf : read.description.leaves)
+        if (leaf.present) entry.outputs.push_back(leaf.key);
     } catch (const Error&) {  // listed nevertheless, so that it can be collected
     }
     entries.push_back(std::move(entry));
@@ -204,10 +205,9 @@ Store::Freed Store::collect(std::uint64_t keep_bytes) const {
 }
 
 std::string Store::tidy(const std::atomic<bool>* cancelled) const {
-  const char* text = std::getenv("MARROW_CACHE_GB");
-  const auto limit = bytes_of_gigabytes(text && *text ? text : "20");
+  const auto limit = bytes_of_gigabytes(given_gigabytes());
   if (!limit)
-    return "MARROW_CACHE_GB is '" + std::string(text) +
+    return "MARROW_CACHE_GB is '" + given_gigabytes() +
            "', but must be a number of gigabytes from 0 to 1000000; nothing is removed";
   if (!is_there()) return "";
   const fs::path mark = folder_ / "tidied";

@@ -7,11 +7,15 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "marrow/runtime/store/store.hpp"
 
 namespace marrow {
+
+/// MARROW_CACHE_GB, or "20" if it is not set or empty.
+std::string given_gigabytes();
 
 /// As Store::entries().
 std::vector<Store::Entry> entries_in(const std::filesystem::path& folder);

@@ -27,7 +27,7 @@ struct Leaf {
 };
 
 struct EntryDescription {
-  Digest key;  ///< the key of the entry; it does not fit if the file was renamed to another entry's name
+  Digest key;  ///< the key of the entry; it differs from the file's name if the file was renamed
   Provenance provenance;
   std::vector<Leaf> leaves;
   std::uint64_t payload = 0;  ///< bytes of all packed values
@@ -55,8 +55,8 @@ bool is_within(const Leaf& leaf, const ReadEntry& entry);
 bool copy_leaf(const StoreFile& file, const ReadEntry& entry, const Leaf& leaf, Archive& to);
 /// Copies an entry with all packed values. Returns false if it is not whole.
 bool copy_entry(const StoreFile& file, const ReadEntry& entry, Archive& to);
-/// The outputs. Their data are read from the file when they are first needed. Throws Error if the description is not
-/// one of outputs.
+/// The outputs. Their data are read from the file when they are first needed. Throws Error if the description does not
+/// describe outputs.
 std::vector<Value> outputs_of(const ReadEntry& entry, const std::filesystem::path& file);
 
 }  // namespace marrow

@@ -61,7 +61,7 @@ bool permit(int descriptor, mode_t mode, const Permissions& permissions) {
   if (fstat(descriptor, &status) != 0) return false;
   if (permissions.group && status.st_gid != *permissions.group &&
       fchown(descriptor, uid_t(-1), *permissions.group) != 0)
-    mode &= ~kOfGroup;  // it has another group, which must not read it
+    mode &= ~kOfGroup;  // the file stays with another group, which must not read it
   return fchmod(descriptor, mode) == 0;
 }
 
@@ -70,7 +70,7 @@ int open_new_file(const fs::path& file, const Permissions& permissions) {
   constexpr int kMostTries = 20;
   const fs::path folder = file.parent_path();
   int descriptor = open(file.c_str(), kMode, 0600);
-  // Another process that makes the same folder may put its own, empty one in the place of the one that was just made.
+  // Another process that makes the same folder may replace the new folder by its own empty one.
   for (int tries = 0; descriptor < 0 && errno == ENOENT && tries < kMostTries; ++tries) {
     if (!(permissions.group ? make_shared_folder(folder, permissions) : make_private_folder(folder)).empty()) break;
     descriptor = open(file.c_str(), kMode, 0600);
@@ -80,7 +80,7 @@ int open_new_file(const fs::path& file, const Permissions& permissions) {
 }
 
 StoreFile::StoreFile(const fs::path& path) {
-  // On a shared folder a name may lead to a file that another host has just replaced. The next try finds the new one.
+  // In a shared folder, a name may lead to a file that another host has just replaced. The next try finds the new one.
   for (int tries = 0; !is_open() && tries < kMostOpenings && (tries == 0 || errno == ESTALE); ++tries)
     descriptor_ = Descriptor(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY));
   if (!is_open()) fault_ = errno;

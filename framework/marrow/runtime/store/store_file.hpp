@@ -17,8 +17,8 @@
 
 namespace MARROW_EXPORT_TO_TESTS marrow {
 
-/// What new files and folders of a store allow, with any umask. If a group is named, what is made allows it to no other
-/// group.
+/// Permissions of new files and folders of a store, with any umask. If a group is named, no other group gets its
+/// rights.
 struct Permissions {
   mode_t file = 0600, folder = 0700;
   std::optional<gid_t> group = {};
@@ -26,11 +26,11 @@ struct Permissions {
 /// Gives an open file or folder the permissions. Returns false, with errno, if that is not possible.
 bool permit(int descriptor, mode_t mode, const Permissions& permissions);
 
-/// Opens a file for writing that must not be there yet. Makes its folder if it is missing, also while other processes
-/// do the same. Returns -1 with errno: EEXIST if the file is there.
+/// Opens a new file for writing. Makes its folder if it is missing, even while other processes do the same. Returns -1
+/// with errno on a fault: EEXIST if the file exists.
 int open_new_file(const std::filesystem::path& file, const Permissions& permissions);
 
-/// A regular file that is open for reading. A link is not opened.
+/// A regular file that is open for reading. Links are not followed.
 class StoreFile {
  public:
   explicit StoreFile(const std::filesystem::path& path);
@@ -41,7 +41,7 @@ class StoreFile {
   /// Returns false if the file has become shorter or cannot be read.
   bool read(void* data, std::size_t size, std::uint64_t offset) const;
   void mark_as_used() const;
-  /// The same, but only if this was not done for a day.
+  /// The same, but at most once a day.
   void mark_as_used_today() const;
 
  private:
@@ -67,7 +67,7 @@ class FileUnpacker : public Unpacker {
   const StoreFile& file_;
   std::uint64_t offset_, unread_;
   std::vector<char> buffer_;
-  std::size_t next_ = 0, end_ = 0;  ///< the part of the buffer that was not taken yet
+  std::size_t next_ = 0, end_ = 0;  ///< the unused part of the buffer
   Hasher hasher_;
 };
 
@@ -77,7 +77,7 @@ class FileUnpacker : public Unpacker {
 std::string write_whole(const std::filesystem::path& file, const std::function<void(Archive&)>& fill,
                         bool is_durable = false, const Permissions& permissions = {});
 
-/// Writes a small file with its digest in front, and reads it. A file that does not fit its digest, or has more than
+/// Write and read a small file with its digest in front. A file that does not match its digest, or has more than
 /// `most_bytes`, counts as absent.
 std::string write_checked(const std::filesystem::path& file, std::string_view text);
 std::optional<std::string> read_checked(const std::filesystem::path& file, std::uint64_t most_bytes);

@@ -35,7 +35,7 @@ std::optional<Digest> key_of_name(const std::string& name) {
   return is_digits(name, "0123456789abcdef") ? digest_of_hex(name) : std::nullopt;
 }
 
-/// What the files of a folder of a store are, if it is none of entries.
+/// The kind of the files in a folder of a store; nothing for a folder of entries.
 std::optional<StoreItem::Kind> kind_in(const std::string& folder) {
   if (folder == "last" || folder == "digests") return StoreItem::Kind::remembered;
   if (folder == "claims") return StoreItem::Kind::claim;
@@ -59,8 +59,8 @@ std::optional<TemporaryName> temporary_of_name(const std::string& name) {
   return TemporaryName{name.substr(0, middle), std::string(writer)};
 }
 
-/// Calls visit(name, path, is_folder) for each regular file and folder in a folder. Links and everything else are left
-/// out. If the folder cannot be read, `fault` says so, unless it already has a text.
+/// Calls visit(name, path, is_folder) for each regular file and folder in a folder; links and everything else are
+/// ignored. If the folder cannot be read, `fault` says so, unless it already has a text.
 template <class Visit>
 void for_each_in(const fs::path& folder, std::string& fault, const Visit& visit) {
   std::error_code error;
@@ -93,7 +93,7 @@ FolderState examine_own(const fs::path& folder, mode_t mode) {
   Mark mark = mark_of(folder);
   const bool is_new = mark == Mark::none && holds_nothing(folder);
   if (mark == Mark::none && !is_new) mark = mark_of(folder);  // another process may just have made it a store
-  // Such a process makes the folder private before it marks it. So the mode of before may no longer hold.
+  // That process makes the folder private before it marks it. So `mode` may be out of date.
   struct stat status;
   if (mark == Mark::ours && stat(folder.c_str(), &status) == 0) mode = status.st_mode;
   const std::string name = "the folder " + folder.string();
@@ -147,6 +147,11 @@ std::string make_store(const fs::path& folder) {
       },
       true);
   return fault.empty() ? examine_store(folder).fault : fault;
+}
+
+fs::path entry_file(const fs::path& folder, const Digest& key) {
+  const std::string name = key.hex();
+  return folder / name.substr(0, 2) / name;
 }
 
 bool holds_nothing(const fs::path& folder) {

@@ -32,17 +32,20 @@ struct FolderState {
   std::string fault;  ///< why it cannot be used; empty for a store, and for a folder that is absent or empty
 };
 FolderState examine_store(const std::filesystem::path& folder);
-/// Makes a store of an absent or empty folder. Returns why the folder cannot be used, or an empty text.
+/// Turns an absent or empty folder into a store. Returns why the folder cannot be used, or an empty text.
 std::string make_store(const std::filesystem::path& folder);
+
+/// The file of the entry with this key.
+std::filesystem::path entry_file(const std::filesystem::path& folder, const Digest& key);
 
 /// Whether a folder is empty, apart from markers that are being written. False if it cannot be read.
 bool holds_nothing(const std::filesystem::path& folder);
 
-/// Makes a folder that only its owner can look into, with any umask. Also makes the missing folders above it in this
-/// way. A folder that exists is left as it is. Returns why this failed, or an empty text.
+/// Makes a folder that only its owner can look into, with any umask. Makes missing folders above it in the same way. An
+/// existing folder is not changed. Returns why this failed, or an empty text.
 std::string make_private_folder(const std::filesystem::path& folder);
-/// Makes a folder of a shared store with its permissions; nobody sees it with others. The folder above must exist. A
-/// folder that exists is left as it is. Returns why this failed, or an empty text.
+/// Makes a folder of a shared store. It has its permissions from the moment it can be seen. The folder above must
+/// exist. An existing folder is not changed. Returns why this failed, or an empty text.
 std::string make_shared_folder(const std::filesystem::path& folder, const Permissions& permissions);
 
 /// Makes a new private folder with a temporary name. Throws Error if it cannot.
@@ -61,8 +64,8 @@ struct StoreItem {
 /// be more items.
 std::vector<StoreItem> items_of_store(const std::filesystem::path& folder, std::string& fault);
 
-/// The time now by the clock of the folder's file system: that of a file that is written for this. Nothing if none can
-/// be written.
+/// The present time by the clock of the folder's file system: the time of a file that is written for this purpose.
+/// Nothing if no file can be written.
 std::optional<timespec> time_in(const std::filesystem::path& folder, const Permissions& permissions = {});
 /// Whether the process that writes a temporary has ended. If that cannot be known, because it runs on another host or
 /// left no identity, it counts as ended when the file was not changed for a day before `now`.

@@ -17,7 +17,7 @@ namespace {
 
 using marrow::fuzz::put;
 
-/// What a case.yaml may name: an image of 4 x 4, a CT of 2 x 2 x 2 and a camera.
+/// Writes the files that a case.yaml may name: an image of 4 x 4, a CT of 2 x 2 x 2 and a camera.
 void put_case_files() {
   static constexpr unsigned char kPng[] = {
       137, 'P', 'N', 'G', 13, 10, 26,  10,  0,   0,   0, 13, 'I', 'H', 'D', 'R', 0,   0,   0,   4,   0,  0,  0,

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a fuzz target without libFuzzer, so that the ordinary tests need no clang: the seeds, then what a seeded mutator
-// makes of them, until the time is over: 2 s, or 10 s if MARROW_TEST_ALL is 1. The mutator makes the same in each run,
-// unless MARROW_TEST_SEED or --seed gives another seed. This driver sees crashes, foreign exceptions, too much memory
-// and too much time; leaks and errors of memory that do no harm at once need the sanitizers of tools/checks/fuzz.
+// Runs a fuzz target without libFuzzer, so that the ordinary tests need no clang. It tries the seeds, then mutations of
+// them, for 2 s, or 10 s if MARROW_TEST_ALL is 1. The mutations are the same in each run, unless MARROW_TEST_SEED or
+// --seed gives another seed. This driver notices crashes, foreign exceptions, too much memory and too much time. Leaks
+// and memory errors without an immediate effect need the sanitizers of tools/checks/fuzz.
 //   fuzz_NAME --seeds FOLDER --dictionary FILE [--seconds 10] [--seed 1]        fuzz_NAME FILE...
 #include <fcntl.h>
 #include <sys/time.h>
@@ -28,12 +28,14 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kLongest = 65536;
 constexpr std::size_t kHeap = 256 << 20;
-constexpr int kProcessor_s = 2, kWaiting_s = 60;  // the second only catches what sleeps: other tests run beside
+constexpr int kProcessor_s = 2,
+              kWaiting_s =
+                  60;  // the second limit only catches inputs that sleep, because other tests run at the same time
 
 std::string current;     // the input that is tried
 std::string reproducer;  // the file for a finding
 
-/// Also from handlers of signals: no allocation here.
+/// Signal handlers call this, too, so it allocates nothing.
 [[noreturn]] void report(const char* what) {
   const auto say = [](const char* text) { (void)!write(STDERR_FILENO, text, std::strlen(text)); };
   const int file = open(reproducer.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
@@ -136,7 +138,7 @@ Settings settings_of(int count, char** words) {
   return settings;
 }
 
-/// Runs the seeds and what becomes of them; gives the number of executions.
+/// Runs the seeds and their mutations. Returns the number of executions.
 std::size_t fuzz(const Settings& settings, std::size_t& largest_heap) {
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + std::chrono::duration<double>(settings.seconds);

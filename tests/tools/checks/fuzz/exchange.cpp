@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Formats of other programs: points, transforms, surfaces and cameras. HDF5 and VTK read .h5 and .vtp themselves, and
-// reserve what a damaged file claims to hold, which the limits of the nodes' own process stop. So those two are not
-// tried here.
+// reserve as much memory as a damaged file asks for. The limits of the nodes' own process stop them, so these two
+// formats are not tried here.
 #include "marrow/read/projections.hpp"
 #include "marrow/toolbox/exchange/itk_transform.hpp"
 #include "marrow/toolbox/exchange/marked_values.hpp"

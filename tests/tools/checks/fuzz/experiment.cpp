@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Experiments, beside a pipeline, one that simulates, and folders of cases.
+// Experiments, in a folder with a pipeline, a pipeline that simulates, and folders of cases.
 #include "marrow/compare/experiment.hpp"
 #include "nodes.hpp"
 #include "target.hpp"
@@ -20,7 +20,7 @@ void put_neighbours() {
   for (const char* name : {"cases/a", "cases/b"}) std::filesystem::create_directories(fuzz::folder() / name);
 }
 
-/// Numbers of many digits make many cases, up to the most that there may be, which takes a thousand times as long.
+/// Numbers of many digits make many cases, up to the largest allowed number, which takes a thousand times as long.
 bool has_long_number(std::string_view text) {
   std::size_t digits = 0;
   for (const char letter : text) {

@@ -4,11 +4,11 @@
 
 namespace marrow::fuzz {
 
-/// From now on the process may hold so many bytes more on its heap than it holds now; what asks for more ends it, by
-/// `exceeded`. Counts what malloc() gives, to all libraries; nothing under a sanitizer, which has a heap of its own.
+/// From now on, the heap of the process may grow by this many bytes; an allocation beyond that ends the process by
+/// `exceeded`. Counts malloc() of all libraries. Does nothing under a sanitizer, which has its own heap.
 void limit_heap(std::size_t more_bytes, void (*exceeded)());
 
-/// The most bytes that were held since then.
+/// The largest growth since then, in bytes.
 std::size_t heap_peak();
 
 }  // namespace marrow::fuzz

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images: PNG, whose checksums are put right in half of the inputs so that what they guard is tried too, TIFF, JPEG and
-// BMP.
+// Images: PNG, TIFF, JPEG and BMP. Half of the PNG inputs get right checksums, so that the code behind these is tried,
+// too.
 #include <zlib.h>
 
 #include <cstring>
@@ -16,7 +16,7 @@ std::uint32_t big_endian(const char* at) {
   return value;
 }
 
-/// The chunks of a PNG with the checksums that they should have.
+/// The chunks of a PNG with right checksums.
 std::string with_checksums(std::string_view bytes) {
   std::string png(bytes);
   for (std::size_t at = 8; at + 12 <= png.size();) {

@@ -4,7 +4,7 @@
 
 namespace marrow::fuzz {
 
-/// What the node read.implant does with the file of an implant's holes.
+/// Reads a file with an implant's holes as the node read.implant does.
 void read_implant_holes(const std::filesystem::path& path);
 
 }  // namespace marrow::fuzz

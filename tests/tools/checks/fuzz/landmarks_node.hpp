@@ -4,7 +4,7 @@
 
 namespace marrow::fuzz {
 
-/// What the node read.landmarks does with a file.
+/// Reads a file as the node read.landmarks does.
 void read_landmarks(const std::filesystem::path& path);
 
 }  // namespace marrow::fuzz

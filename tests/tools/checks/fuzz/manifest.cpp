@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Manifests: as they are, and with the checksum that belongs to them, behind which all else is.
+// Manifests: as they are, and with the right checksum, without which nothing else of them is read.
 #include "marrow/runtime/plugins/manifest.hpp"
 
 #include "target.hpp"
@@ -8,7 +8,7 @@ namespace {
 
 using namespace marrow;
 
-/// nlohmann's writer calls itself for each level.
+/// nlohmann's writer is recursive.
 bool is_deep(std::string_view text) {
   int depth = 0, deepest = 0;
   for (const char c : text) {

@@ -131,7 +131,7 @@ void Mutator::change(std::string& bytes, const std::string& other) {
   }
 }
 
-/// A number that tends to be at a border, of 1 to 8 bytes in either order.
+/// Writes a number of 1 to 8 bytes in either order. It is often at the border of a range.
 void Mutator::put_number(std::string& bytes) {
   const std::size_t width = std::size_t(1) << below(4);
   if (bytes.size() < width) return;
@@ -141,7 +141,7 @@ void Mutator::put_number(std::string& bytes) {
   for (std::size_t i = 0; i < width; ++i) bytes[at + i] = char(number >> 8 * (big_endian ? width - 1 - i : i));
 }
 
-/// Another number for one that is written out.
+/// Replaces a number in digits by another one.
 void Mutator::put_digits(std::string& bytes) {
   std::vector<std::size_t> begins;
   const auto is_digit = [&](std::size_t i) {

@@ -7,16 +7,16 @@
 
 namespace marrow::fuzz {
 
-/// The words of a dictionary as libFuzzer takes it: "text" or name="text" a line, with \xNN, \" and \\.
+/// The words of a libFuzzer dictionary: "text" or name="text" on each line, with \xNN, \" and \\.
 std::vector<std::string> read_dictionary(const std::filesystem::path& path);
 
-/// Makes inputs out of others, the same ones for the same seed.
+/// Makes inputs from others: the same ones for the same seed.
 class Mutator {
  public:
   Mutator(std::vector<std::string> words, std::uint64_t seed) : words_(std::move(words)), random_(seed) {}
 
   std::size_t below(std::size_t count) { return count ? std::size_t(random_() % count) : 0; }
-  /// One to eight changes; `other` is an input to take parts from.
+  /// Makes one to eight changes. `other` is another input that gives parts.
   std::string mutated(std::string bytes, const std::string& other, std::size_t longest);
 
  private:

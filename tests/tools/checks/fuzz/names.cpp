@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names that become names of files: what is accepted stays in its folder, and different names give different files.
+// Names that become names of files: an accepted name stays in its folder, and different names give different files.
 #include "marrow/base/file_names.hpp"
 
 #include <algorithm>
@@ -21,7 +21,7 @@ void expect_inside(const std::string& name, const std::string& from) {
     fuzz::finding("'" + from + "' becomes the file name '" + name + "', which is none");
 }
 
-/// What a file name was made of, where it was not shortened.
+/// The text that a file name was made from, if the name was not shortened.
 std::string decoded(const std::string& name) {
   if (name == "%") return "";
   std::string text;

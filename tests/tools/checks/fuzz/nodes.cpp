@@ -8,7 +8,7 @@
 namespace marrow::fuzz {
 
 const Catalogue& nodes() {
-  // What is found out about the library is kept in our own folder.
+  // The index of libraries is kept in a folder of this process.
   static const Catalogue known = [] {
     setenv("XDG_CACHE_HOME", folder().c_str(), 1);
     return Catalogue({MARROW_FUZZ_PLUGINS});

@@ -4,7 +4,7 @@
 
 namespace marrow::fuzz {
 
-/// The nodes that pipelines may use here: those of the small plugin by which the runtime is tested.
+/// The nodes that pipelines may use here: those of the small plugin for tests of the runtime.
 const Catalogue& nodes();
 
 }  // namespace marrow::fuzz

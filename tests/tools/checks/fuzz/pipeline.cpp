@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pipelines, with what the command line adds to them behind the first zero byte: key=value, one a line.
+// Pipelines. Behind the first zero byte are the arguments of the command line: key=value, one a line.
 #include "marrow/runtime/pipeline/pipeline.hpp"
 #include "nodes.hpp"
 #include "target.hpp"
@@ -24,7 +24,7 @@ PipelineArguments arguments_of(std::string_view lines) {
   return arguments;
 }
 
-/// The promise of resolved_yaml(): reading it gives the same pipeline.
+/// Checks the promise of resolved_yaml(): reading its text gives the same pipeline.
 void expect_same_again(const Pipeline& pipeline) {
   const std::string once = resolved_yaml(pipeline);
   Diagnostics faults;

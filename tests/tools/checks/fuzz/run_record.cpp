@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a run has left: run.json, the pipeline.yaml beside it, the row of a cell, and a picture.
+// The files that a run leaves: run.json, the pipeline.yaml beside it, the row of a cell, and a picture.
 #include "difference/run_record.hpp"
 
 #include "marrow/base/hash.hpp"
@@ -19,7 +19,7 @@ constexpr std::string_view kRecord =
     R"({"pipeline":"p","status":"done","seed":1,"nodes":[)"
     R"({"id":"one","status":"done","keys":{"number":"0f"},"items":{"number":[["","0f"]]}}]})";
 
-/// Of one variant, case and start, and two figures.
+/// An experiment with one variant, case and start, and two figures.
 const compare::Experiment& experiment() {
   static const compare::Experiment one = [] {
     compare::Experiment made;
@@ -32,7 +32,7 @@ const compare::Experiment& experiment() {
   return one;
 }
 
-/// The text with a good digest, without which nothing of it is read.
+/// The text with a right digest, without which nothing of it is read.
 std::string with_digest(std::string_view text) {
   nlohmann::json row = parse_json(std::string(text), "a cell's row");
   if (!row.is_object()) return std::string(text);

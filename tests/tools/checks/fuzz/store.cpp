@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Entries of the store: as they lie there, with a description whose hash is right, and the packed values by themselves.
+// Entries of the store: as they are, with a description that has the right hash, and the packed values alone.
 #include "marrow/runtime/store/store.hpp"
 
 #include <cstring>
@@ -13,8 +13,8 @@ using namespace marrow;
 
 constexpr Digest kKey{0x0123456789abcdefull, 0xfedcba9876543210ull};
 
-/// In front of the description, as store_entry.cpp writes it: what the file is, how long the description is, and its
-/// hash.
+/// The beginning of an entry, as store_entry.cpp writes it: the mark of the format, the length of the description, and
+/// its hash.
 std::string with_preamble(std::string_view description, std::string_view payload) {
   Packer packer;
   packer.bytes("marrowr2", 8);

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 constexpr std::string_view kPrefix = "marrow-fuzz-";
 
-/// Folders of processes that crashed.
+/// Removes the folders of processes that crashed.
 void remove_abandoned(const fs::path& where) {
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(where, ignored)) {

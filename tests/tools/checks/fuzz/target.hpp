@@ -14,22 +14,23 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
 namespace marrow::fuzz {
 
-/// A folder of this process in memory: the readers take paths. Removed at the end of the process, or by a later one.
+/// A folder of this process in memory, because the readers take paths. It is removed when the process ends, or by a
+/// later process.
 const std::filesystem::path& folder();
 
-/// Writes a file below the folder, over what was there, and gives its path.
+/// Writes a file into the folder, replaces an older one, and returns its path.
 std::filesystem::path put(const std::string& name, std::string_view bytes);
 
 /// Ends the process as a finding.
 [[noreturn]] void finding(const std::string& what);
 
-/// The bytes of one input. Where a target reads several formats the first byte chooses one, so that an input is one
-/// file.
+/// The bytes of one input. If a target reads several formats, the first byte chooses one, so that an input is one file.
 struct Input {
   std::string_view rest;
 
   Input(const std::uint8_t* data, std::size_t size) : rest(reinterpret_cast<const char*>(data), size) {}
-  /// One of the letters: the first byte, where it is one of them; else the one that it falls on.
+  /// Takes the first byte and returns one of the letters: the byte itself if it is one of them, otherwise the one that
+  /// its value selects.
   char choice(std::string_view letters);
   /// The text before the first zero byte; the rest begins behind it.
   std::string_view text();

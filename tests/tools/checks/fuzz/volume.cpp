@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Volumes: MetaImage, NRRD, NIfTI and TIFF; headers alone, with their samples in a file beside them.
+// Volumes: MetaImage, NRRD, NIfTI and TIFF, also headers with their samples in a separate file.
 #include <zlib.h>
 
 #include "marrow/toolbox/files/volume_file.hpp"
@@ -9,7 +9,7 @@ namespace {
 
 using marrow::fuzz::put;
 
-/// As a .nii.gz holds it: the bytes that are tried are those of the header, not of the packing.
+/// Packs the bytes as in a .nii.gz, so that the input's bytes are those of the header and not of the packing.
 std::string packed(std::string_view bytes) {
   z_stream stream{};
   deflateInit2(&stream, 1, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
@@ -24,7 +24,7 @@ std::string packed(std::string_view bytes) {
   return result;
 }
 
-/// A folder with a header and the file that it is to name.
+/// A folder with a header, and the file that the header should name.
 std::filesystem::path detached(const std::string& name, std::string_view header) {
   const std::filesystem::path file = put(name + "/a." + name, header);
   static const std::string kSamples(64, 'x');

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a worker that went wrong may send: lines of its protocol, and values in shared memory. (Compiled without access
-// control: a worker's lines are understood by a private function.)
+// Messages of a faulty worker: lines of its protocol, and values in shared memory. (Compiled without access control,
+// because a private function reads a worker's lines.)
 #include "marrow/runtime/process/worker.hpp"
 
 #include <unistd.h>
@@ -16,7 +16,7 @@ using namespace marrow;
 
 constexpr int kMostLines = 8;  // more would only make an input slower
 
-/// A worker that has ended already, at job 7.
+/// A worker at job 7. Its process has ended already.
 void understand(std::string_view text) {
   static Worker worker({{"/bin/true"}});
   for (int i = 0; i < kMostLines && !text.empty(); ++i) {

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What tools/checks/mutate takes for a place to change, and that what tests/mutants.txt explains still stands in the
-sources."""
+"""The places that tools/checks/mutate would change, and whether the sources still have the lines that tests/mutants.txt
+explains."""
 import subprocess
 import sys
 import unittest
@@ -13,7 +13,7 @@ from places import places_of  # noqa: E402
 
 
 def changes(text):
-    """What is changed, and to what."""
+    """Each changed text with its replacements."""
     return [(place.old, choice) for place in places_of("x.cpp", text) for choice in place.choices]
 
 

@@ -32,7 +32,7 @@ class Noise(unittest.TestCase):
                     self.assertTrue(0.5 < of[group] < 2, "%s: %.2f" % (group, of[group]))
                 self.assertTrue(0.58 < of["within one"] < 0.78, of["within one"])
                 self.assertTrue(0.9 < of["within two"] < 0.99, of["within two"])
-                # One view knows the depth to 19 mm. That far, errors do not lie in an ellipsoid any more.
+                # With one view, the depth is known to 19 mm. Over such a distance, errors no longer form an ellipsoid.
                 most = 4 if "1 view" in name else 1.4
                 self.assertTrue(0.7 < of["mahalanobis"] < most, of["mahalanobis"])
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any 6 x 6 numbers are not yet a covariance. Each node that takes a pose with its covariance refuses what is not
-// symmetric or has a negative eigenvalue. (Files of poses and what nodes give are tested with their readers and with
-// the runtime.)
+// Not every 6 x 6 matrix is a covariance. Each node that takes a pose with its covariance refuses a matrix that is not
+// symmetric or has a negative eigenvalue. (The tests of readers and of the runtime do the same for files and outputs.)
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -24,7 +23,7 @@ Pose with(const Matrix6d& covariance) {
   return pose;
 }
 
-/// The matrices, each with the end of what is said of it. The eigenvalues of the last one are by hand: 1 - 2 = -1 in
+/// The matrices, each with the end of its message. The eigenvalue of the last one is computed by hand: 1 - 2 = -1 in
 /// units of the two variances, which are 4 and 9 with a covariance of 2 * 2 * 3.
 struct Wrong {
   Matrix6d matrix;
@@ -41,7 +40,7 @@ std::vector<Wrong> wrong() {
           {indefinite, ": the covariance has a negative eigenvalue (-1 times its variances)" + remedy}};
 }
 
-/// Expects that a node refuses all of them where `inputs` makes its inputs from a pose, and takes the identity.
+/// Expects that a node refuses all of them and accepts the identity. `inputs` makes the node's inputs from a pose.
 template <class Inputs>
 void expect_refused(const std::string& node, const std::string& pose_in_words, const Inputs& inputs,
                     const shipped::Options& options = {}) {

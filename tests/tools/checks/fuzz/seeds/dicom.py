@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""DICOM files element by element, as the target `dicom` takes them: how it is read, then the file."""
+"""DICOM files element by element, for the target `dicom`: the way of reading, then the file."""
 import struct
 
 LONG = {"OB", "OW", "SQ", "UN", "UT", "OF"}

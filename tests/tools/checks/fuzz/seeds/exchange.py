@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files of other programs, as the target `exchange` takes them."""
+"""Files of other programs, for the target `exchange`."""
 
 MARKUPS = """{"@schema": "markups-schema-v1.0.3.json#", "markups": [{"type": "Fiducial", "coordinateSystem": "RAS",
  "coordinateUnits": "mm", "controlPoints": [{"id": "1", "label": "head", "position": [1.5, -2, 3e1],

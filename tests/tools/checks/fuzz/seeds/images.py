@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images, as the target `image` takes them: the frame, then the format, then the file."""
+"""Images, for the target `image`: the frame, then the format, then the file."""
 import struct
 import zlib
 

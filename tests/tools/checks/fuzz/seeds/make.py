@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the inputs that the fuzz targets begin with: make.py FOLDER. Each is small, whole and made here; a byte in
-front says which format it is where a target reads several."""
+"""Writes the inputs that the fuzz targets begin with: make.py FOLDER. Each is small, whole and made here. If a target
+reads several formats, the first byte names the format."""
 import pathlib
 import sys
 

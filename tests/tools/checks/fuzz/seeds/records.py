@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What marrow itself writes and reads back: entries of the store, manifests, runs, cells."""
+"""Files that marrow itself writes and reads back: entries of the store, manifests, runs, cells."""
 import json
 import struct
 
@@ -86,7 +86,7 @@ def leaf(kind, version, size, offset, length, axis="", names=(), present=True):
 
 
 def entry(leaves, payload):
-    """The description of an entry; a list's items follow it."""
+    """The description of an entry. The items of a list follow it."""
     return (
         struct.pack("<QQ", 0x0123456789ABCDEF, 0xFEDCBA9876543210)
         + provenance()
@@ -234,7 +234,7 @@ def manifest_seeds():
 
 
 def shared(kind, packed, items=(), names=(), axis=""):
-    """Values in shared memory: the packed data, their description, and where that is."""
+    """Values in shared memory: the packed data, their description, and the place of the description."""
 
     def described(type_, axis_, names_, items_, place):
         head = (

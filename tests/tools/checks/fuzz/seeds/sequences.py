@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sequences, as the target `sequence` takes them: the range of frames, then the format, then the file."""
+"""Sequences, for the target `sequence`: the range of frames, then the format, then the file."""
 import struct
 
 import dicom
@@ -15,7 +15,7 @@ def rows(kind, *parts):
 
 
 def avi(frames=3, width=8, height=6):
-    """Without compression: 24 bits a pixel."""
+    """An uncompressed video with 24 bits a pixel."""
     size = 3 * width * height
     main = struct.pack("<14I", 100000, 0, 0, 0x10, frames, 0, 1, size, width, height, 0, 0, 0, 0)
     stream = b"vidsDIB " + struct.pack(

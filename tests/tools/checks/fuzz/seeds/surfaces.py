@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A tetrahedron in every format of surfaces, as the target `mesh` takes it."""
+"""A tetrahedron in every format of surfaces, for the target `mesh`."""
 import struct
 
 POINTS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]

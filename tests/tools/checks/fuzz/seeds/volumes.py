@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Volumes of 4 x 3 x 2 samples in every format, as the target `volume` takes them."""
+"""Volumes of 4 x 3 x 2 samples in every format, for the target `volume`."""
 import gzip
 import struct
 import zlib

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the correction of cameras and a calibration say of themselves."""
+"""The covariances of corrected cameras and of a calibration."""
 import pathlib
 
 import costs
@@ -9,13 +9,13 @@ import scene
 import marrow
 
 ROOT = pathlib.Path(__file__).resolve().parents[5]
-# Of the cameras' errors, as the options of refine.cameras have them by default.
+# The deviations of the cameras' errors: the defaults of refine.cameras.
 CAMERA_DEG, CAMERA_MM, FOCAL_PERCENT, CENTRE_PX = 0.5 / np.sqrt(3), 1 / np.sqrt(3), 1.0, 5 / np.sqrt(2)
 IMAGES = 8
 
 
 def wrong_camera(camera, random):
-    """The camera as a calibration gives it: a little off, turned about the world's origin, where the bone is."""
+    """The camera of an inexact calibration: turned a little about the world's origin, where the bone is."""
     off = scene.rigid(np.radians(CAMERA_DEG) * random.normal(size=3), CAMERA_MM * random.normal(size=3))
     middle = np.array(camera.camera_from_world)[:3, 3]
     off[:3, 3] += middle - off[:3, :3] @ middle
@@ -26,7 +26,7 @@ def wrong_camera(camera, random):
 
 
 def refined(name, count, random):
-    """A pose by cameras that are off, and by those that were corrected together with it."""
+    """A pose from inexact cameras, and one from cameras that were corrected together with it."""
     truth = costs.a_pose(random)
     views = {}
     for view_name, view in scene.views_of(costs.bone(), truth, count, random).items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Poses found by each cost of the kind similarity, in images with new noise and another pose for each draw."""
+"""The poses that each cost of the kind similarity finds. Each draw has new noise and another pose."""
 import functools
 import inspect
 
@@ -8,7 +8,7 @@ import scene
 
 import marrow
 
-# Only the finest level of the searches, from a start that is nearly right.
+# The searches use only the finest level, from a start that is nearly right.
 SEARCH = {
     "scan_rotation_deg": 0,
     "scan_translation_mm": 0,
@@ -31,7 +31,7 @@ def bone():
 
 
 def names():
-    """All costs, except that which adds a known pose to another."""
+    """All costs, except the one that adds a known pose to another cost."""
     return [name for name in dir(marrow.similarity) if "cost" not in inputs_of(name)]
 
 
@@ -48,7 +48,7 @@ def found(name, cost, start):
 
 def cost_of(name, views):
     wanted = inputs_of(name)
-    # The rendered bone has soft edges, so its edges are taken as they are, without the shift of a sharp surface.
+    # The rendered bone has soft edges, so the shift for sharp surfaces is switched off.
     given = {port: value for port, value in bone().inputs(views, marrow.edges.canny(views)).items() if port in wanted}
     if "projector" in wanted and "model" not in wanted:
         given["projector"] = bone().outlines if "edges" in wanted and "outline" not in wanted else bone().radiographs
@@ -60,7 +60,7 @@ def a_pose(random):
 
 
 def draw(name, views, random):
-    """The error of a pose and its covariance (None: it is not predicted)."""
+    """The error of a pose, and its covariance or None."""
     truth = a_pose(random)
     start = truth @ scene.rigid(np.radians(START_DEG) * random.normal(size=3), START_MM * random.normal(size=3))
     pose = found(name, cost_of(name, scene.views_of(bone(), truth, views, random)), start)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the errors and the predicted covariances of several draws say together."""
+"""Figures from the errors and the predicted covariances of several draws."""
 import numpy as np
 
 GROUPS = {"tilt": (0, 1), "axial turn": (2,), "shift across": (3, 4), "axial shift": (5,)}
@@ -13,8 +13,8 @@ def is_known(covariance):
 
 
 def of(draws, groups):
-    """draws: pairs of an error and its covariance, which is None where none was predicted. The median of the predicted
-    variances counts, so that one draw cannot decide."""
+    """draws: pairs of an error and its predicted covariance or None. Uses the median of the predicted variances, so
+    that a single draw cannot decide."""
     known = [(error, covariance) for error, covariance in draws if is_known(covariance)]
     figures = {"known": len(known)}
     if len(known) < 2:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Poses by nodes that fit points or filter motions, from data with the noise that their options say."""
+"""Poses by nodes that fit points or filter motions. The data have the noise that the nodes' options state."""
 import pathlib
 import tempfile
 
@@ -113,7 +113,7 @@ def with_covariance(matrix, deviations):
 
 
 def moved_by(matrix, motion):
-    """A pose after a motion (rad, mm) about and along the bone's axes, as scene.error() has it."""
+    """A pose after a motion (rad, mm) about and along the bone's axes, as in scene.error()."""
     axes, origin = bone().axes, bone().origin_mm
     turn = scene.rigid(axes @ motion[:3], [0, 0, 0])
     turn[:3, 3] = origin - turn[:3, :3] @ origin + axes @ motion[3:]
@@ -151,7 +151,7 @@ def sequence(random):
 
 
 def flown(truth, velocity, random):
-    """One frame later; the acceleration changes ten times within it."""
+    """The state one frame later. The acceleration changes ten times in between."""
     parts = 10
     for _ in range(parts):
         truth = moved_by(truth, velocity / RATE_HZ / parts)

@@ -29,7 +29,7 @@ VIEWS = (1, 2, 3)
 
 
 def studies():
-    """Functions of a random generator, by name: each gives an error and its covariance."""
+    """Functions of a random generator by their names. Each returns an error and its covariance."""
     found = {}
     for name in costs.names():
         for views in VIEWS:
@@ -40,7 +40,7 @@ def studies():
 
 
 def draw(task):
-    """One draw; None where no pose was found."""
+    """One draw; None if no pose was found."""
     name, seed, number = task
     try:
         return studies()[name](np.random.default_rng([seed, number]))

@@ -16,7 +16,7 @@ TILT = Rotation.from_rotvec((0.1, 0.05, 0.4)).as_matrix()
 
 
 def distances_mm(points_mm):
-    """About the signed distance from the bone's surface: right to first order near it."""
+    """Approximately the signed distance from the bone's surface, exact to first order near it."""
     least = np.full(points_mm.shape[:-1], np.inf)
     for middle, radii in ELLIPSOIDS:
         inside = (points_mm - middle) @ TILT / radii
@@ -27,7 +27,7 @@ def distances_mm(points_mm):
 
 
 class Bone:
-    """The CT of the bone, its surface and its distance, and what draws it."""
+    """The CT of the bone, its surface, its distance field and its projectors."""
 
     def __init__(self):
         spacing, origin = 1.0, np.array([-36.0, -30.0, -42.0])
@@ -43,7 +43,7 @@ class Bone:
         self.axes, self.origin_mm = np.array(start.axes), np.array(start.origin_mm)
 
     def inputs(self, views, edges):
-        """What the inputs of a cost are, by their names."""
+        """The inputs of a cost by their names."""
         return {
             "model": self.mesh,
             "volume": self.volume,
@@ -62,7 +62,7 @@ def rigid(rotation_vector_rad, shift_mm):
 
 
 def camera(angle_deg, side_px=SIDE_PX):
-    """It looks across the world's z axis at its origin, z up in the image."""
+    """A camera that looks at the world's origin, across the z axis, with z up in the image."""
     pixel_mm = PIXEL_MM * SIDE_PX / side_px
     focal_px, middle_px = SOURCE_TO_DETECTOR_MM / pixel_mm, (side_px - 1) / 2
     angle = np.radians(angle_deg)

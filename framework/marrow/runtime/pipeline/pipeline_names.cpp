@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/runtime/pipeline/renamed.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 #include <fstream>
 
 #include "marrow/base/printable.hpp"
-#include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/plugins/catalogue.hpp"
 
 namespace marrow {
+
+std::string suggested(const Diagnostics& diagnostics, const std::string& wrong, const std::vector<std::string>& known) {
+  return diagnostics.is_full() ? "" : suggestion(wrong, known);
+}
 
 std::string suggested_for(const std::string& node, const std::string& wrong, const std::vector<std::string>& known,
                           const Diagnostics& diagnostics) {
@@ -18,7 +21,7 @@ std::string suggested_for(const std::string& node, const std::string& wrong, con
       if (old == wrong && contains(known, now) && (of == node || node.starts_with(of + ".")))
         return in_quotes(old) + " is called " + in_quotes(now) + " since " + since;
   }
-  return suggested(diagnostics, wrong, known);
+  return suggestion(wrong, known);
 }
 
 }  // namespace marrow
