@@ -111,6 +111,22 @@ TEST_F(PipelineTest, OverriddenNodeLeavesItsOptionsBehind) {
   EXPECT_EQ(p.nodes[0].info.name, "test.draw");
   ASSERT_EQ(p.notes.size(), 1u);
 }
+TEST_F(PipelineTest, OverridesOfReplacedNodeKeepTheirOwnValues) {
+  const Pipeline p = read("marrow: 1\nnodes: {c: {uses: test.sides, with: {names: [a]}}}\noutputs: {o: c}\n",
+                          {{}, {{"c.value", "7"}, {"c.count", "5"}, {"c.uses", "test.constant"}}});
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  EXPECT_EQ(std::get<double>(p.nodes[0].options[0]), 7.0);
+  EXPECT_EQ(std::get<std::int64_t>(p.nodes[0].options[1]), 5);
+}
+TEST_F(PipelineTest, OverrideLeavesAliasesAlone) {
+  const Pipeline p = read(
+      "marrow: 1\nnodes:\n  c: {uses: test.constant, with: &o {value: 2}}\n  d: {uses: test.constant, with: *o}\n"
+      "outputs: {o: c, p: d}\n",
+      {{}, {{"c.value", "7"}}});
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  EXPECT_EQ(std::get<double>(p.nodes[0].options[0]), 7.0);
+  EXPECT_EQ(std::get<double>(p.nodes[1].options[0]), 2.0);
+}
 TEST_F(PipelineTest, OverrideOfUnknownNode) {
   expect_fault(kTwoNodes, 0, 0, "the pipeline has no node 'cc'", "did you mean 'c'?", {{}, {{"cc.value", "7"}}});
 }

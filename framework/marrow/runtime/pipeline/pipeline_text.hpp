@@ -11,10 +11,23 @@
 
 namespace marrow {
 
+/// A YAML node that becomes the other one when it is assigned. YAML::Node would change what both of them share with
+/// others: an alias elsewhere in the file, or a neighbour that moves up in a vector.
+class WrittenYaml : public YAML::Node {
+ public:
+  WrittenYaml() = default;
+  WrittenYaml(const YAML::Node& node) : YAML::Node(node) {}
+  WrittenYaml(const WrittenYaml&) = default;
+  WrittenYaml& operator=(const WrittenYaml& other) {
+    reset(other);
+    return *this;
+  }
+};
+
 /// A value as written.
 struct WrittenValue {
   Place place;
-  YAML::Node value;
+  WrittenYaml value;
   std::filesystem::path folder;  ///< where relative paths in the value start
   bool is_override = false;      ///< whether it comes from an override; its parts then have no places
 };
