@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which kept result a plan compares with. The differences are counted by hand.
-#include "marrow/runtime/run/nearest_result.hpp"
-
+// Which kept result a plan compares with. The differences were counted by hand.
 #include <gtest/gtest.h>
 
+#include "marrow/runtime/run/evaluation.hpp"
 #include "marrow/runtime/run/keys.hpp"
 
 namespace nearest_result_test {

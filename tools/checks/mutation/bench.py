@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds what depends on a changed file, runs the tests near it, and puts everything back: sources, objects and
-programs, with their times."""
+"""Builds everything that depends on a changed file, runs the tests near it, and puts everything back: sources, objects
+and programs, with their times."""
 import filecmp
 import json
 import os
@@ -17,21 +17,10 @@ from graph import Graph
 # For each folder, the tests near it, by the beginnings of their names. A GoogleTest suite is named program.suite.
 NEAR = {
     "framework/marrow/base": ["domain.", "runtime", "cli_bad", "cli_ca", "cli_na", "faults_"],
-    "framework/marrow/domain": [
-        "domain.",
-        "fracture.",
-        "evaluate.",
-        "register.",
-        "camera.",
-        "mesh.",
-        "read.",
-        "initial.",
-        "runtime",
-    ],
-    "framework/marrow/runtime": [
-        "runtime",
-        "domain.",
-        "compare.",
+    "framework/marrow/domain": ["domain.", "runtime"]
+    + ["fracture.", "evaluate.", "register.", "camera.", "mesh.", "read.", "initial."],
+    "framework/marrow/runtime": ["runtime", "domain.", "compare.", "conformance_optimizer"]
+    + [
         "cli_bad",
         "cli_ca",
         "cli_co",
@@ -44,7 +33,6 @@ NEAR = {
         "cli_r",
         "cli_sc",
         "cli_w",
-        "conformance_optimizer",
     ],
     "framework/marrow/compare": ["compare.", "compare_", "cli_compare", "cli_commands"],
     "plugins/camera": ["camera.", "conformance_camera", "cli_schema"],
@@ -144,13 +132,10 @@ class Bench:
         if code is not None and good:
             return None
         failed = re.search(r"^\[  FAILED  \] ([\w./]+)|^(?:FAIL|ERROR): (\w+)", text, re.M)
-        name = "%s (%s)" % (test.name, failed.group(1) or failed.group(2)) if failed else test.name
-        return (
-            name
-            if failed
-            else "%s, %s"
-            % (name, "time limit" if code is None else "signal %d" % -code if code < 0 else "exit code %d" % code)
-        )
+        if failed:
+            return "%s (%s)" % (test.name, failed.group(1) or failed.group(2))
+        how = "time limit" if code is None else "signal %d" % -code if code < 0 else "exit code %d" % code
+        return "%s, %s" % (test.name, how)
 
     def ninja(self, targets):
         names = [os.path.relpath(target, self.build) for target in targets]
@@ -159,8 +144,8 @@ class Bench:
         )
 
     def measure(self, tests):
-        """Measures the times of the tests with unchanged sources. Ends if one fails, because it could not catch a
-        change. Times are kept until the program of a test changes."""
+        """Measures the times of the tests with unchanged sources, and keeps them until the program of a test changes.
+        Ends if a test fails, because such a test says nothing about a change."""
         programs = {test.command[0] for test in tests if test.command[0].startswith(str(self.build))}
         built = self.ninja(programs | {str(self.build / "bin/marrow")})
         if built.returncode:
@@ -179,8 +164,8 @@ class Bench:
             test.seconds = times[test.name][1]
 
     def try_change(self, path, text, tests):
-        """The test that fails if the file has another text, or None. Everything is put back. If this test then still
-        fails, ends, because the failure says nothing about the change."""
+        """The test that fails if the file has another text, or None. Puts everything back. Ends if the test then still
+        fails, because its failure says nothing about the change."""
         source = self.root / path
         made = self.graph.made_from(source)
         self.save([str(source), *made])

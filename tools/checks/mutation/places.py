@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds places of a C++ file where a change gives another behaviour. It uses the tokens, not the grammar."""
+"""Finds places of a C++ file where a change gives another behaviour. Works on the tokens, without the grammar."""
 import re
 from dataclasses import dataclass, field
 
@@ -38,35 +38,10 @@ OPERATORS = {
 CLOSING = {"(": ")", "[": "]", "{": "}"}
 ASSIGNMENTS = {"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "++", "--"}
 NOT_AN_OPERAND = {"return", "case", "else", "co_return", "throw", "in"}
-NO_EXPRESSION = {
-    "return",
-    "using",
-    "typedef",
-    "delete",
-    "static_assert",
-    "goto",
-    "case",
-    "default",
-    "if",
-    "for",
-    "while",
-    "do",
-    "switch",
-    "else",
-    "try",
-    "catch",
-    "namespace",
-    "struct",
-    "class",
-    "enum",
-    "template",
-    "public",
-    "private",
-    "protected",
-    "operator",
-    "friend",
-    "MARROW_PLUGIN",
-}
+NO_EXPRESSION = set(
+    """return using typedef delete static_assert goto case default if for while do switch else try catch namespace
+    struct class enum template public private protected operator friend MARROW_PLUGIN""".split()
+)
 
 
 @dataclass
@@ -286,9 +261,8 @@ class Finder:
         if token.text not in ("if", "while", "for") or i + 1 >= len(self.tokens) or self.tokens[i + 1].text != "(":
             return
         first, last = i + 2, self.tokens[i + 1].partner
-        while (
-            semicolon := end_of_statement(self.tokens[:last], first)
-        ) >= 0:  # if (x = ...; condition), for (...; condition; ...)
+        # if (x = ...; condition), for (...; condition; ...)
+        while (semicolon := end_of_statement(self.tokens[:last], first)) >= 0:
             if token.text == "for" and any(t.text == ";" for t in self.tokens[i + 2 : first]):
                 last = semicolon
                 break

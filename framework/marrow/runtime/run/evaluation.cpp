@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <optional>
 #include <set>
+#include <tuple>
 
 #include "marrow/runtime/node/mapping.hpp"
 #include "marrow/runtime/run/keys.hpp"
-#include "marrow/runtime/run/nearest_result.hpp"
 #include "marrow/runtime/store/digest_memory.hpp"
 #include "marrow/runtime/store/shared_claim.hpp"
 #include "marrow/runtime/store/shared_folder.hpp"
@@ -17,6 +17,21 @@
 namespace marrow {
 
 using Status = NodeRecord::Status;
+
+namespace {
+
+/// Whether the kept result has another input where `now` has the same as the last time.
+bool has_other_inputs(const Provenance& kept, const Provenance& last, const Provenance& now) {
+  const auto key_in = [](const Provenance& from, const std::string& port) {
+    const auto found = from.inputs.find(port);
+    return found == from.inputs.end() ? Digest{} : found->second;
+  };
+  return std::any_of(now.inputs.begin(), now.inputs.end(), [&](const auto& input) {
+    return key_in(last, input.first) == input.second && key_in(kept, input.first) != input.second;
+  });
+}
+
+}  // namespace
 
 /// The result of a recipe. It is being made until `done` is set. Then all calls with the same key share it.
 struct Evaluation::Memo {
@@ -280,6 +295,20 @@ std::string Evaluation::reason_to_run(std::size_t node, const Call& call) const 
   return changes.empty()
              ? "the store has no result of it: it failed, was stopped or removed, or the processor is another"
              : changes;
+}
+
+const Provenance* nearest_result(const std::vector<Store::Last>& kept, const Store::Last& last, const Provenance& now) {
+  const Provenance* nearest = nullptr;
+  std::tuple<bool, std::size_t, bool> least;
+  for (const Store::Last& one : kept) {
+    if (one.provenance.node != now.node) continue;
+    const std::tuple rank(has_other_inputs(one.provenance, last.provenance, now),
+                          differences(one.provenance, now).size(), one.key != last.key);
+    if (nearest && rank > least) continue;
+    nearest = &one.provenance;
+    least = rank;
+  }
+  return nearest;
 }
 
 }  // namespace marrow

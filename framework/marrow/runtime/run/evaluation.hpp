@@ -9,11 +9,25 @@
 #include <string>
 #include <vector>
 
+#include "marrow/base/export.hpp"
 #include "marrow/base/process_state.hpp"
 #include "marrow/runtime/run/executor.hpp"
 #include "marrow/runtime/run/files_read.hpp"
 
 namespace marrow {
+
+/// Calls visit(item) for each single value in `value`, in order. Goes into lists.
+template <class V, class Visit>
+void for_leaves(V& value, const Visit& visit) {
+  if (!value.is_list()) return visit(value);
+  for (auto& item : value.items) for_leaves(item, visit);
+}
+
+/// Thrown if an input cannot be made because the node that makes it failed or was not run.
+struct MissingInput {
+  NodeRecord::Status status;
+  std::string missing;
+};
 
 /// How one call of a node ended.
 struct CallResult {
@@ -114,5 +128,12 @@ class Evaluation {
   mutable std::mutex observer_mutex_, warnings_mutex_;
   bool store_complained_ = false;
 };
+
+/// The kept result of the same node that differs least from `now` in what its key is made from. The differences are why
+/// the node runs again. An input that is the same as the `last` time is no reason. A result in which such an input
+/// differs may be of another item, so it is taken only if there is no other. Of equally near results, the last one is
+/// taken, or else the latest in `kept`. nullptr if no result of the node is kept.
+MARROW_EXPORT_TO_TESTS const Provenance* nearest_result(const std::vector<Store::Last>& kept, const Store::Last& last,
+                                                        const Provenance& now);
 
 }  // namespace marrow

@@ -14,7 +14,6 @@
 #include "marrow/runtime/process/plugin_code.hpp"
 #include "marrow/runtime/run/apart.hpp"
 #include "marrow/runtime/run/evaluation.hpp"
-#include "marrow/runtime/run/evaluation_values.hpp"
 #include "marrow/runtime/run/keys.hpp"
 #include "marrow/runtime/run/output_faults.hpp"
 #include "marrow/runtime/store/shared_store.hpp"
@@ -106,8 +105,8 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
   return result;
 }
 
-/// What was read must be what the key covers. Otherwise the store would keep the result for another content, for ever.
-/// A file that was changed and changed back has another state than before.
+/// The content that was read must be the content that the key covers. Otherwise the store would keep a wrong result for
+/// ever. A file that was changed and changed back is noticed, too: its state is another one.
 void Evaluation::check_unchanged(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe,
                                  const Digest& states) const {
   const std::vector<std::string> paths = paths_of(pipeline_.nodes[node]);

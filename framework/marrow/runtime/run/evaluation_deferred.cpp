@@ -5,7 +5,6 @@
 #include <optional>
 
 #include "marrow/runtime/run/evaluation.hpp"
-#include "marrow/runtime/run/evaluation_values.hpp"
 #include "marrow/runtime/run/keys.hpp"
 
 namespace marrow {

@@ -8,12 +8,31 @@
 #include "marrow/base/no_process.hpp"
 #include "marrow/base/process_tree.hpp"
 #include "marrow/runtime/run/passes.hpp"
-#include "marrow/runtime/run/stopped_nodes.hpp"
 #include "marrow/runtime/store/known_keys.hpp"
 
 namespace marrow {
 
 using Status = NodeRecord::Status;
+
+namespace {
+
+/// Sets `stopped` of each node that failed or was cancelled: how many of the nodes that depend on it were not called at
+/// all. A node that depends on several of them counts for each.
+void count_stopped_nodes(const Pipeline& pipeline, std::vector<NodeRecord>& records) {
+  for (std::size_t cause = 0; cause < records.size(); ++cause) {
+    if (records[cause].status != Status::failed && records[cause].status != Status::cancelled) continue;
+    std::vector<bool> is_behind(records.size(), false);
+    is_behind[cause] = true;
+    for (std::size_t node = cause + 1; node < records.size(); ++node) {  // sources come before users
+      for (const Wire& wire : pipeline.nodes[node].wires)
+        for (const Reference& source : wire.sources)
+          if (source.node >= 0 && is_behind[std::size_t(source.node)]) is_behind[node] = true;
+      if (is_behind[node] && records[node].was_stopped()) ++records[cause].stopped;
+    }
+  }
+}
+
+}  // namespace
 
 GraphRun::GraphRun(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings)
     : pipeline_(pipeline),

@@ -18,9 +18,9 @@ struct NodeCalls {
 /// different names along an axis.
 void make_calls(const Pipeline& pipeline, const RunResult& result, std::size_t index, NodeCalls& made);
 
-/// Why a call cannot be made, or an empty text. If it cannot be made, `status` is set: skipped if an input simply does
-/// not exist, not_run if it could not be made, failed if the node that was to make it may fail and did. Takes out such
-/// inputs where the call can do without them.
+/// Why a call cannot be made; empty if it can. If it cannot, `status` is set: skipped if an input does not exist,
+/// not_run if an input could not be made, failed if its node failed and may fail. Removes such inputs if the call can
+/// do without them.
 std::string obstacle(const PipelineNode& node, Call& call, NodeRecord::Status& status);
 
 /// Sets the status of the node from its calls, with the reason if it is not done.

@@ -31,8 +31,8 @@ Value left_out(const TypeInfo& type) {
   return value;
 }
 
-/// The body with those values of its constant nodes as outputs that it uses. A node that is called makes all its values
-/// at once. A node with a body makes only those that are asked for.
+/// The body, with those values of its constant nodes as outputs that the body uses. A node that is called makes all its
+/// values at once. A node with a body makes only those that something asks for.
 Pipeline with_constants(Pipeline body, const std::vector<std::string>& constant_nodes) {
   std::vector<Reference> used;
   for (const PipelineOutput& output : body.outputs) used.push_back(output.source);
@@ -131,7 +131,7 @@ void Passes::find_constant_nodes() {
       for (const Reference& source : wire.sources) is_used[std::size_t(source.node)] = true;
   }
   for (const PipelineOutput& output : body.outputs) is_used[std::size_t(output.source.node)] = true;
-  // What only the first pass runs, to make the values that are carried, uses constant nodes, too.
+  // Some nodes run only in the first pass, to make the carried values. They use constant nodes, too.
   const Pipeline first = with_outputs(repetition_.first, needed_outputs_);
   const std::vector<bool> needed_first = first.needed(is_given);
   const std::size_t given_to_first = first.nodes.size() - repetition_.alone.nodes.size(),
@@ -199,7 +199,7 @@ std::unique_ptr<Passes::Run> Passes::next_pass() {
   return run;
 }
 
-/// Adds work to the outer run that is done even if that is ending, so that the passes end before it does.
+/// Adds work to the outer run. It is done even if the outer run is ending, so that the passes end first.
 void Passes::release(const std::function<void()>& work) { outer_.enqueue(work, true); }
 
 void Passes::begin() {

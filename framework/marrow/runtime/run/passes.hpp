@@ -11,7 +11,7 @@ namespace marrow {
 /// The passes of one node with a body, one after the other. No thread waits for a pass: the end of one starts the next.
 class Passes {
  public:
-  /// `call` holds the node's inputs, and takes its outputs.
+  /// `call` has the node's inputs and receives its outputs.
   Passes(GraphRun& outer, std::size_t node, Call& call);
   ~Passes();
 
@@ -44,7 +44,7 @@ class Passes {
   const PipelineNode& node_;
   const Repetition& repetition_;
   std::vector<std::string> names_;                       ///< of the items that the passes are for
-  std::vector<bool> is_sliced_;                          ///< inputs of which each pass gets one item
+  std::vector<bool> is_sliced_;                          ///< by input: whether each pass gets one item of it
   std::vector<int> needed_outputs_;                      ///< of the body
   std::map<std::string, std::vector<Value>> constants_;  ///< outputs of nodes that are the same in all passes
   std::vector<std::string> constant_nodes_;

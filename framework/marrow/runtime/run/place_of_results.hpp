@@ -10,8 +10,8 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// Throws Error if `place`, to which a run writes, is in a folder that a node of the run reads. All files of that
-/// folder count, so its content would not be the same before and after. `what` and `advice` are parts of the message.
+/// Throws Error if a run writes to `place` and a node of the run reads a folder that contains it. All files of that
+/// folder count as its content, so the run would change what it reads. `what` and `advice` are parts of the message.
 void expect_nothing_reads(const Pipeline& pipeline, const std::filesystem::path& place, const std::string& what,
                           const std::string& advice);
 

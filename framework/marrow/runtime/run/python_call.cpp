@@ -165,7 +165,7 @@ json PythonNodes::ask(const NodeInfo& node, json request, const PythonArguments&
     if (!end.died) give_back(std::move(process));
     throw Error(failure_of_call(described_.file, node, end, limits));
   }
-  // It has changed what all calls in its process share. So the process is ended.
+  // The call has changed something that all calls in its process share. So the process is ended.
   if (end.answer.contains("spoilt")) throw Error(end.answer.at("spoilt").get<std::string>());
   if (outputs) *outputs = handed_over(process->worker, process->made, content_of_own);
   learn(end.answer);
@@ -203,7 +203,7 @@ std::string PythonNodes::changed() const {
   return described_.file.string() + " or a module that it imports was changed since this program began; start it again";
 }
 
-/// Takes note of what a process has loaded or looked for and the description does not name.
+/// Notes the files that a process has loaded or looked for, if the description does not name them.
 void PythonNodes::learn(const json& answer) {
   if (answer.at("files").empty()) return;  // nothing since its last answer
   const std::scoped_lock lock(mutex_);

@@ -2,6 +2,7 @@
 // Queries about the result of a run.
 #include <algorithm>
 
+#include "marrow/base/number_text.hpp"
 #include "marrow/runtime/node/mapping.hpp"
 #include "marrow/runtime/run/executor.hpp"
 
@@ -13,6 +14,12 @@ const char* status_name(Status status) {
   static constexpr const char* kNames[] = {"not needed", "done",      "skipped",     "failed",
                                            "not run",    "cancelled", "failed alone"};
   return kNames[int(status)];
+}
+
+bool NodeRecord::was_stopped() const { return status == Status::not_run && calls + cached == 0; }
+
+std::string not_run_text(int nodes) {
+  return formatted("{} not run because of it", counted(nodes, "node was", "nodes were"));
 }
 
 bool RunResult::failed() const {
