@@ -324,6 +324,7 @@ class Slurm(Quoting):
         self.expect_lost(self.compare_here("--status"), "no disk here", where="stdout")
         job = json.loads((self.out / "slurm.json").read_text())["gather"]
         self.assertIn(LOST, (self.out / "log" / (job + ".txt")).read_text())
+        wait_until(is_idle, "the job that gathers goes on")  # the command ends once tables and report are made
         shown = subprocess.run(["scontrol", "show", "job", job], capture_output=True, text=True).stdout
         self.assertIn("ExitCode=1:0", shown)
 
