@@ -59,6 +59,12 @@ void add_pipeline_arguments(CLI::App* command, PipelineRequest& request) {
           "value is taken as a text; if it begins with [, {, \" or ', it is YAML")
       ->allow_extra_args(false)  // so that an input may follow it
       ->type_name("NODE.OPTION=VALUE");
+  command
+      ->add_option("--set-file", request.settings,
+                   "YAML file with values that differ from machine to machine: {inputs: {name: value}, set: "
+                   "{node.option: value}}. Arguments and --set count more")
+      ->allow_extra_args(false)
+      ->type_name("FILE");
 }
 
 void add_file_limits(CLI::App* command, FileLimits& limits, const std::string& otherwise) {

@@ -23,6 +23,8 @@ struct PipelineRequest {
   std::filesystem::path file;
   std::vector<std::string> inputs;     ///< name=value
   std::vector<std::string> overrides;  ///< node.option=value
+  std::vector<std::filesystem::path> settings =
+      {};  ///< files with values of inputs and overrides; both of the above count more
 };
 
 struct RunRequest {
@@ -106,11 +108,15 @@ std::vector<std::pair<std::string, std::string>> pairs_of(const std::vector<std:
 nlohmann::json faults_json(const Diagnostics& diagnostics);
 /// Prints all faults and their number to the standard error stream.
 void print_faults(const Diagnostics& diagnostics);
-/// Splits texts of the form name=value. Throws Error for a text without '='.
+/// The values of inputs and the overrides of a request. Throws Error for a text without '=' and for faults of a file
+/// with settings.
 PipelineArguments arguments_of(const PipelineRequest& request);
 /// Reads the pipeline. If it has faults, prints all of them and returns false.
 bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required,
           bool json = false);
+
+/// Prints the pipeline whole, with the place of each node and value. Returns the exit code.
+int print_resolved(const PipelineRequest& request);
 
 struct RunOutcome {
   RunResult result;

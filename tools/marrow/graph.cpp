@@ -4,6 +4,7 @@
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "drawn_graph.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 
@@ -20,16 +21,23 @@ std::string dot_text(const std::string& text) {
   return result;
 }
 
+/// Where a node is written if that is another file than the pipeline's own.
+std::string origin_of(const PipelineNode& node, const Pipeline& pipeline) {
+  if (node.place.file == pipeline.file.string()) return "";
+  return "  [" + printable(node.place.file) + formatted(":{}]", node.place.line);
+}
+
 /// The nodes with their wires; a body further to the right.
 void print_nodes(const Pipeline& pipeline, const std::string& margin) {
   const std::vector<bool> needed = pipeline.needed();
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
     const PipelineNode& node = pipeline.nodes[i];
-    std::printf("%s%s  (%s)%s%s%s\n", margin.c_str(), node.id.c_str(), node.info.name.c_str(),
+    std::printf("%s%s  (%s)%s%s%s%s\n", margin.c_str(), node.id.c_str(), node.info.name.c_str(),
                 node.repetition            ? ("  " + passes_text(*node.repetition)).c_str()
                 : node.mapped_axes.empty() ? ""
                                            : ("  for each " + joined(node.mapped_axes, " x ")).c_str(),
-                node.may_fail ? "  [may fail]" : "", needed[i] ? "" : "  [not needed]");
+                node.may_fail ? "  [may fail]" : "", needed[i] ? "" : "  [not needed]",
+                origin_of(node, pipeline).c_str());
     for (const Wire& wire : node.wires) {
       std::string sources;
       for (const Reference& source : wire.sources) sources += (sources.empty() ? "" : " + ") + source.text;
@@ -63,8 +71,9 @@ void print_dot_nodes(const DrawnGraph& graph, const std::string& body, const std
                              : node.mapped_axes.empty() ? ""
                                                         : "\\nfor each " + joined(node.mapped_axes, " x ");
     const std::string id = dot_text(drawn.id);
-    std::printf("%s\"%s\" [label=\"%s\\n%s%s%s\"];\n", margin.c_str(), id.c_str(), dot_text(node.id).c_str(),
-                dot_text(node.info.name).c_str(), axes.c_str(), node.may_fail ? "\\nmay fail" : "");
+    std::printf("%s\"%s\" [label=\"%s\\n%s%s%s\", tooltip=\"%s:%d\"];\n", margin.c_str(), id.c_str(),
+                dot_text(node.id).c_str(), dot_text(node.info.name).c_str(), axes.c_str(),
+                node.may_fail ? "\\nmay fail" : "", dot_text(node.place.file).c_str(), node.place.line);
     if (!node.repetition) continue;
     std::printf("%ssubgraph \"cluster %s\" {\n%s  style=rounded; color=gray70;\n", margin.c_str(), id.c_str(),
                 margin.c_str());

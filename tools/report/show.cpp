@@ -176,10 +176,21 @@ fs::path write_run_page(const fs::path& folder, fs::path file) {
 
 void add_show(CLI::App& app, int& code) {
   const auto run = std::make_shared<fs::path>(), file = std::make_shared<fs::path>();
+  const auto inputs = std::make_shared<std::vector<std::string>>();
+  const auto resolved = std::make_shared<bool>(false);
   CLI::App* command = app.add_subcommand("show", "write a page that shows a run: figures, pictures, 3D view");
-  command->add_option("run", *run, "folder of the run")->required();
+  command->add_option("run", *run, "folder of the run; with --resolved, a pipeline file")->required();
+  command->add_option("inputs", *inputs, "with --resolved: values of the pipeline's inputs, as name=value");
   command->add_option("--out", *file, "HTML file to write; an existing one is replaced (default: RUN/report.html)");
-  command->callback([run, file, &code] {
+  command->add_flag("--resolved", *resolved,
+                    "print a pipeline file whole: with what it extends, its parts, and all options, and where each is "
+                    "written");
+  command->callback([run, file, inputs, resolved, &code] {
+    if (*resolved) {
+      code = print_resolved({*run, *inputs, {}, {}});
+      return;
+    }
+    if (!inputs->empty()) throw Error("values of inputs are for --resolved; the page of a run takes none");
     std::printf("%s\n", printable(plain_path(fs::absolute(write_run_page(*run, *file))).string()).c_str());
     code = 0;
   });

@@ -29,7 +29,7 @@ void add_below(const fs::path& folder, FileStates& states) {
 }
 
 void add_files(const Pipeline& pipeline, std::vector<fs::path>& files) {
-  if (!pipeline.file.empty()) files.push_back(pipeline.file);
+  files.insert(files.end(), pipeline.files.begin(), pipeline.files.end());
   for (const PipelineNode& node : pipeline.nodes) {
     for (const std::string& path : paths_of(node)) files.push_back(path);
     if (node.repetition) add_files(node.repetition->alone, files);
@@ -46,6 +46,7 @@ bool holds_sources(const fs::path& folder) {
 WatchedFiles files_of(const PipelineRequest& request) {
   const Catalogue catalogue;
   WatchedFiles files{{request.file}, catalogue.folders()};
+  files.paths.insert(files.paths.end(), request.settings.begin(), request.settings.end());
   Diagnostics diagnostics;
   add_files(read_pipeline(request.file, arguments_of(request), catalogue, diagnostics, false), files.paths);
   return files;

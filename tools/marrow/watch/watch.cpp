@@ -144,6 +144,8 @@ class Watch {
     std::vector<std::string> command{this_program().string(), "run", request_.pipeline.file.string()};
     command.insert(command.end(), request_.pipeline.inputs.begin(), request_.pipeline.inputs.end());
     for (const std::string& change : request_.pipeline.overrides) command.insert(command.end(), {"--set", change});
+    for (const fs::path& file : request_.pipeline.settings)
+      command.insert(command.end(), {"--set-file", file.string()});
     command.insert(command.end(), {"--out", run.string()});
     ChildEnd end = run_child(command, [&] { return should_stop(); });
     const bool is_good = end.code == 0 || end.code == kWrongVerdict;

@@ -2,6 +2,7 @@
 #include "marrow/runtime/pipeline/input_texts.hpp"
 
 #include <cctype>
+#include <cstdlib>
 
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
@@ -13,9 +14,15 @@ namespace {
 /// Without a limit, a long value that is named often fills memory, terminal and records.
 constexpr std::size_t kMostInputBytes = 256'000;
 
+const std::string kVariable = "$env:";
+
 }  // namespace
 
-std::optional<std::string> InputTexts::put_into(const std::string& text, const Place& place) {
+std::optional<std::string> InputTexts::put_into(const std::string& text, const Place& place,
+                                                const DeclaredInputs* inputs) {
+  static const DeclaredInputs kNone;
+  const DeclaredInputs& declared = inputs ? *inputs : kNone;
+  const bool has_env = find_named(declared.all, "env") != nullptr;
   std::string result;
   bool known = true;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -25,9 +32,12 @@ std::optional<std::string> InputTexts::put_into(const std::string& text, const P
       i += doubled;
       continue;
     }
-    std::size_t end = i + 1;
+    const bool is_variable = !has_env && text.compare(i, kVariable.size(), kVariable) == 0;
+    const std::size_t begin = i + (is_variable ? kVariable.size() : 1);
+    std::size_t end = begin;
     while (end < text.size() && (std::isalnum(static_cast<unsigned char>(text[end])) || text[end] == '_')) ++end;
-    const std::string* value = value_of(text.substr(i + 1, end - i - 1), place);
+    const std::string name = text.substr(begin, end - begin);
+    const auto value = is_variable ? value_of_variable(name, place) : value_of(name, place, declared);
     if (value && (bytes_ += value->size()) > kMostInputBytes) {
       diagnostics_.add(place,
                        formatted("the values of inputs make the pipeline longer than {} kB", kMostInputBytes / 1000),
@@ -41,20 +51,32 @@ std::optional<std::string> InputTexts::put_into(const std::string& text, const P
   return known ? std::optional(result) : std::nullopt;
 }
 
-const std::string* InputTexts::value_of(const std::string& name, const Place& place) {
-  used.insert(name);
-  const auto input = pipeline_.inputs.find(name);
-  if (input != pipeline_.inputs.end()) return &input->second;
-  if (contains(pipeline_.missing_inputs, name)) return nullptr;
-  std::string hint;
-  if (!diagnostics_.is_full()) {
-    std::vector<std::string> names = pipeline_.missing_inputs;
-    for (const auto& [known, value] : pipeline_.inputs) names.push_back(known);
-    hint = suggestion(name, names);
-  }
-  diagnostics_.add(place, "the pipeline has no input " + in_quotes(name), hint);
-  unknown.insert(name);
-  return nullptr;
+std::optional<std::string> InputTexts::value_of(const std::string& name, const Place& place,
+                                                const DeclaredInputs& inputs) {
+  const bool is_own = &inputs == pipeline_.inputs.get();
+  if (is_own) used.insert(name);
+  const auto value = inputs.values.find(name);
+  if (value != inputs.values.end()) return value->second;
+  if (contains(inputs.missing, name)) return std::nullopt;
+  std::vector<std::string> names;
+  for (const DeclaredInput& input : inputs.all)
+    if (!input.data) names.push_back(input.name);
+  const DeclaredInput* declared = find_named(inputs.all, name);
+  diagnostics_.add(place,
+                   declared ? "input " + in_quotes(name) + " is data of type " + declared->type + ", not a text"
+                            : "the pipeline has no input " + in_quotes(name),
+                   declared ? "wire it under  in:  by its name" : suggested(diagnostics_, name, names));
+  if (is_own) unknown.insert(name);
+  return std::nullopt;
+}
+
+std::optional<std::string> InputTexts::value_of_variable(const std::string& name, const Place& place) {
+  if (const char* value = name.empty() ? nullptr : std::getenv(name.c_str())) return value;
+  diagnostics_.add(
+      place,
+      name.empty() ? "$env: names no environment variable" : "the environment has no variable " + in_quotes(name),
+      name.empty() ? "write it as  $env:NAME" : "set it, as in  export " + name + "=...");
+  return std::nullopt;
 }
 
 }  // namespace marrow

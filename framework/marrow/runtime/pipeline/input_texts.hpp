@@ -8,20 +8,22 @@
 
 namespace marrow {
 
-/// Replaces $name in a text by the value of the pipeline's input of that name. $$ stands for a dollar.
+/// Replaces $name in a text by the value of the pipeline's input of that name, and $env:NAME by the environment
+/// variable NAME. $$ stands for a dollar.
 class InputTexts {
  public:
   InputTexts(const WrittenPipeline& pipeline, Diagnostics& diagnostics)
       : pipeline_(pipeline), diagnostics_(diagnostics) {}
 
-  /// Returns nothing if a name has no value. This is a fault only if the pipeline does not declare an input of that
-  /// name.
-  std::optional<std::string> put_into(const std::string& text, const Place& place);
+  /// `inputs`: those of the file that the text is written in; null: none. Returns nothing if a name has no value. This
+  /// is a fault only if it is not the name of a declared input.
+  std::optional<std::string> put_into(const std::string& text, const Place& place, const DeclaredInputs* inputs);
 
-  std::set<std::string> used, unknown;  ///< names found so far
+  std::set<std::string> used, unknown;  ///< names of the pipeline's own inputs that were found so far
 
  private:
-  const std::string* value_of(const std::string& name, const Place& place);
+  std::optional<std::string> value_of(const std::string& name, const Place& place, const DeclaredInputs& inputs);
+  std::optional<std::string> value_of_variable(const std::string& name, const Place& place);
 
   const WrittenPipeline& pipeline_;
   Diagnostics& diagnostics_;

@@ -26,7 +26,7 @@ class CallBuilder {
   void add_option(const std::string& name, const std::string& text) {
     const Place place = place_of(name);
     if (const auto value = given_value(text, place, diagnostics_))
-      written_.options.push_back({name, {place, *value, std::filesystem::current_path(), true}});
+      written_.options.push_back({name, {place, *value, std::filesystem::current_path(), nullptr, 0, true}});
   }
 
   void add_input(const std::string& name, const Value& value) {
@@ -36,7 +36,7 @@ class CallBuilder {
                        suggestion(name, names_of(info_.inputs)));
       return;
     }
-    written_.wires.push_back({name, {place_of(name), {}, {}, true}});
+    written_.wires.push_back({name, {place_of(name), {}, {}, nullptr, 0, true}});
     if (value.type != port->type)
       diagnostics_.add(
           place_of(name),

@@ -41,6 +41,7 @@ class Resolver {
     pipeline_.help = written_.help;
     pipeline_.only_inside = written_.only_inside;
     pipeline_.file = written_.file;
+    pipeline_.files = written_.files;
     pipeline_.notes = written_.notes;
     for (const WrittenNode& node : written_.nodes) {
       ids_.index.emplace(node.id, ids_.all.size());
@@ -63,10 +64,14 @@ class Resolver {
     node.id = written.id;
     node.place = written.place;
     node.may_fail = written.may_fail;
-    if (written.repetition) {
+    if (written.stands_for) {
+      node.stands_for_input = true;
+      node.info.name = "input";
+      node.info.outputs = {*written.stands_for};
+    } else if (written.repetition) {
       resolve_repetition(
           written, node, input_texts_,
-          [&](const PipelineArguments& arguments) { return read_body(written, arguments); }, diagnostics_);
+          [&](std::vector<InputValue> inputs) { return read_body(written, std::move(inputs)); }, diagnostics_);
     } else if (const NodeInfo* info = catalogue_.find(written.uses)) {
       node.info = *info;
       if (const KindInfo* kind = catalogue_.find_kind(info->kind())) node.apart = kind->apart;
@@ -91,29 +96,33 @@ class Resolver {
     pipeline_.notes.insert(pipeline_.notes.end(), notes.begin(), notes.end());
   }
 
-  ReadBody read_body(const WrittenNode& node, const PipelineArguments& arguments) {
+  ReadBody read_body(const WrittenNode& node, std::vector<InputValue> inputs) {
     constexpr std::size_t kMostBodies = 8;  // inside each other
     const WrittenValue& body = node.repetition->body;
+    PipelineReading reading{std::move(inputs), node.changes, files_, PipelineReading::Use::body};
     WrittenPipeline written;
-    std::vector<fs::path> files = files_;
     if (body.value.IsScalar()) {
-      const auto text = input_texts_.put_into(body.value.Scalar(), body.place);
+      const auto text = input_texts_.put_into(body.value.Scalar(), body.place, body.inputs.get());
       if (!text) return {};
       const fs::path file = body.folder / *text;
       std::error_code ignored;
+      std::vector<fs::path>& files = reading.inside;
       files.push_back(fs::weakly_canonical(file, ignored));
       if (std::count(files.begin(), files.end(), files.back()) > 1 || files.size() > kMostBodies) {
         diagnostics_.add(body.place, in_quotes(*text) + " repeats itself: a body must not be its own body");
         return {};
       }
-      written = read_written_pipeline(file, arguments, diagnostics_, false);
+      written = read_written_pipeline(file, reading, catalogue_, diagnostics_);
     } else {
-      written = read_written_body(written_.file, node.id, body.value, arguments, diagnostics_);
+      written = read_written_body(body.place.file, node.id, body.value, reading, catalogue_, diagnostics_);
     }
     if (written.nodes.empty()) return {};
     Resolver resolver(written, catalogue_, diagnostics_, !tries_others_);
-    ReadBody read{resolver.resolve(files), {}};
+    ReadBody read{resolver.resolve(reading.inside), {}};
+    pipeline_.files.insert(pipeline_.files.end(), read.pipeline.files.begin(), read.pipeline.files.end());
     for (const auto& [option_of, option] : resolver.unknown_values_) read.incomplete.insert(option_of->id);
+    for (const PipelineNode& one : read.pipeline.nodes)
+      if (one.stands_for_input) read.incomplete.insert(one.id);
     add_notes(read.pipeline.notes);
     return read;
   }
@@ -288,12 +297,20 @@ class Resolver {
     std::map<std::string, Place> nodes;
     for (const WrittenNode& node : written_.nodes) nodes.emplace(node.id, node.place);
     point_at_renamed("node", nodes, ids_.used, ids_.unknown);
-    point_at_renamed("input", written_.input_places, input_texts_.used, input_texts_.unknown);
+    point_at_renamed("input", text_inputs(), input_texts_.used, input_texts_.unknown);
   }
 
   void note_unused_inputs() {
-    for (const auto& [name, place] : written_.input_places)
-      if (!input_texts_.used.contains(name)) pipeline_.notes.push_back("nothing uses the input " + in_quotes(name));
+    for (const auto& [name, place] : text_inputs())
+      if (!input_texts_.used.contains(name) && !written_.inputs_of_parts.contains(name))
+        pipeline_.notes.push_back("nothing uses the input " + in_quotes(name));
+  }
+
+  std::map<std::string, Place> text_inputs() const {
+    std::map<std::string, Place> places;
+    for (const DeclaredInput& input : written_.inputs->all)
+      if (!input.data) places.emplace(input.name, input.place);
+    return places;
   }
 
   void point_at_renamed(const std::string& what, const std::map<std::string, Place>& defined,
@@ -330,16 +347,26 @@ Pipeline resolved(const WrittenPipeline& written, const Catalogue& catalogue, Di
   return Resolver(written, catalogue, diagnostics, is_trial).resolve({fs::weakly_canonical(written.file, ignored)});
 }
 
+WrittenPipeline written(const fs::path& file, const PipelineArguments& arguments, const Catalogue& catalogue,
+                        Diagnostics& diagnostics, PipelineReading::Use use) {
+  std::error_code ignored;
+  PipelineReading reading{arguments.inputs, changes_of(arguments.overrides, diagnostics), {}, use};
+  reading.inside.push_back(fs::weakly_canonical(file, ignored));
+  return read_written_pipeline(file, reading, catalogue, diagnostics);
+}
+
 }  // namespace
 
 Pipeline read_pipeline(const fs::path& file, const PipelineArguments& arguments, const Catalogue& catalogue,
                        Diagnostics& diagnostics, bool inputs_required) {
-  return resolved(read_written_pipeline(file, arguments, diagnostics, inputs_required), catalogue, diagnostics, false);
+  const auto use = inputs_required ? PipelineReading::Use::alone : PipelineReading::Use::check;
+  return resolved(written(file, arguments, catalogue, diagnostics, use), catalogue, diagnostics, false);
 }
 
 Pipeline try_pipeline(const fs::path& file, const PipelineArguments& arguments, const Catalogue& catalogue,
                       Diagnostics& diagnostics) {
-  return resolved(read_written_pipeline(file, arguments, diagnostics, false), catalogue, diagnostics, true);
+  return resolved(written(file, arguments, catalogue, diagnostics, PipelineReading::Use::check), catalogue, diagnostics,
+                  true);
 }
 
 }  // namespace marrow

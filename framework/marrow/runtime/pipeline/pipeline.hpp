@@ -41,11 +41,13 @@ struct PipelineNode {
   Apart apart = Apart::no;           ///< as its kind declares
   bool may_fail = false;             ///< if it fails, its outputs are absent, and the run continues
   std::vector<OptionValue> options;  ///< in the order of info.options
+  std::vector<Place> option_places;  ///< where each value is written; no file: it is the default
   std::vector<Wire> wires;
   std::vector<std::string> mapped_axes;  ///< the node is called for each item along these, outermost first
   /// For a node with a body, else null. `info` is then made from the body: its name is "repeat", and its inputs are the
   /// values that the body is given.
   std::shared_ptr<const Repetition> repetition;
+  bool stands_for_input = false;  ///< of a part that is read alone; only checked, never called
 
   const PortInfo& input_of(const Wire& wire) const { return info.inputs[std::size_t(wire.port)]; }
 };
@@ -60,7 +62,8 @@ struct Pipeline {
   std::string name;
   std::string help;
   std::filesystem::path file;
-  std::vector<PipelineNode> nodes;  ///< sorted so that sources come before users
+  std::vector<std::filesystem::path> files;  ///< all that it was read from: the file, what it extends, parts, bodies
+  std::vector<PipelineNode> nodes;           ///< sorted so that sources come before users
   std::vector<PipelineOutput> outputs;
   bool only_inside = false;        ///< only the program itself runs it, so its outputs may be functions
   std::vector<std::string> notes;  ///< remarks for people that are not faults
@@ -115,10 +118,12 @@ struct InputValue {
   Place place = {};
 };
 
-/// A change of the pipeline: node.option=value, node.uses=kind.name, node.may_fail=true or node.in.port=reference.
+/// A change of the pipeline: node.option=value, node.uses=kind.name, node.may_fail=true or node.in.port=reference. For
+/// a node of a part, PART.node.option=value and so on.
 struct Override {
   std::string key, value;
   Place place = {};  ///< as InputValue::place
+  int layer = 0;  ///< where uses= replaces a node, the options that overrides of lower layers gave it no longer count
 };
 
 struct PipelineArguments {
@@ -136,8 +141,10 @@ Pipeline read_pipeline(const std::filesystem::path& file, const PipelineArgument
 Pipeline try_pipeline(const std::filesystem::path& file, const PipelineArguments& arguments, const Catalogue& catalogue,
                       Diagnostics& diagnostics);
 
-/// The pipeline as YAML, with the values of all options. Reading it gives the same pipeline.
-std::string resolved_yaml(const Pipeline& pipeline);
+/// The pipeline as YAML, with the values of all options. Reading it gives the same pipeline. `with_places`: comments
+/// say in which file and line each node is written, and each value that is written elsewhere. Files are relative to the
+/// pipeline's folder.
+std::string resolved_yaml(const Pipeline& pipeline, bool with_places = false);
 
 /// Why a value of this type cannot become a file.
 std::string no_writer(const TypeInfo& type);

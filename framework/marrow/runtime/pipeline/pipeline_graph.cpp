@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "marrow/base/number_text.hpp"
+#include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/pipeline.hpp"
 
 namespace marrow {
@@ -43,67 +45,115 @@ void add_called(const Pipeline& pipeline, const Repetition* repetition, std::vec
   }
 }
 
-void write_options(YAML::Emitter& out, const PipelineNode& node) {
-  out << YAML::Key << "with" << YAML::Value << YAML::BeginMap;
-  for (std::size_t i = 0; i < node.options.size(); ++i) {
-    out << YAML::Key << node.info.options[i].name << YAML::Value;
-    std::visit(
-        [&](const auto& value) {
-          if constexpr (requires { value.begin(); } && !std::is_same_v<std::decay_t<decltype(value)>, std::string>) {
-            out << YAML::Flow << YAML::BeginSeq;
-            for (const auto& item : value) out << written(item);
-            out << YAML::EndSeq;
-          } else {
-            out << written(value);
-          }
-        },
-        node.options[i]);
+class GraphWriter {
+ public:
+  /// `file`: that of the whole pipeline, if places are wanted.
+  GraphWriter(YAML::Emitter& out, const std::filesystem::path* file) : out_(out), file_(file) {}
+
+  void write(const Pipeline& pipeline) {
+    out_ << YAML::Key << "nodes" << YAML::Value << YAML::BeginMap;
+    for (const PipelineNode& node : pipeline.nodes)
+      if (!node.stands_for_input) write(node);
+    out_ << YAML::EndMap << YAML::Key << "outputs" << YAML::Value << YAML::BeginMap;
+    for (const PipelineOutput& output : pipeline.outputs)
+      out_ << YAML::Key << output.name << YAML::Value << output.source.text;
+    out_ << YAML::EndMap;
   }
-  out << YAML::EndMap;
-}
 
-void write_graph(YAML::Emitter& out, const Pipeline& pipeline);
-
-void write_repetition(YAML::Emitter& out, const Repetition& repetition) {
-  if (!repetition.is_loop) out << YAML::Key << "over" << YAML::Value << repetition.axis;
-  if (repetition.at_most) out << YAML::Key << "at_most" << YAML::Value << repetition.at_most;
-  if (repetition.until >= 0)
-    out << YAML::Key << "until" << YAML::Value << repetition.alone.outputs[std::size_t(repetition.until)].name;
-  if (repetition.goes_on) out << YAML::Key << "if_pass_fails" << YAML::Value << "go_on";
-  out << YAML::Key << "carry" << YAML::Value << YAML::Flow << YAML::BeginMap;
-  for (const Repetition::Given& given : repetition.given)
-    if (given.carried >= 0)
-      out << YAML::Key << given.name << YAML::Value << repetition.alone.outputs[std::size_t(given.carried)].name;
-  out << YAML::EndMap << YAML::Key << "repeat" << YAML::Value << YAML::BeginMap;
-  write_graph(out, repetition.alone);
-  out << YAML::EndMap;
-}
-
-void write_graph(YAML::Emitter& out, const Pipeline& pipeline) {
-  out << YAML::Key << "nodes" << YAML::Value << YAML::BeginMap;
-  for (const PipelineNode& node : pipeline.nodes) {
-    out << YAML::Key << node.id << YAML::Value << YAML::BeginMap;
-    if (!node.repetition) out << YAML::Key << "uses" << YAML::Value << node.info.name;
-    if (node.may_fail) out << YAML::Key << "may_fail" << YAML::Value << true;
-    if (!node.wires.empty()) {
-      out << YAML::Key << "in" << YAML::Value << YAML::Flow << YAML::BeginMap;
-      for (const Wire& wire : node.wires) {
-        out << YAML::Key << node.input_of(wire).name << YAML::Value;
-        if (wire.is_list_literal) out << YAML::BeginSeq;
-        for (const Reference& source : wire.sources) out << source.text;
-        if (wire.is_list_literal) out << YAML::EndSeq;
-      }
-      out << YAML::EndMap;
+  void write_inputs(const Pipeline& pipeline) {
+    bool has_inputs = false;
+    for (const PipelineNode& node : pipeline.nodes) {
+      if (!node.stands_for_input) continue;
+      if (!has_inputs) out_ << YAML::Key << "inputs" << YAML::Value << YAML::BeginMap;
+      has_inputs = true;
+      const PortInfo& input = node.info.outputs[0];
+      out_ << YAML::Key << node.id << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "type" << YAML::Value
+           << input.type.id;
+      if (!input.axis.empty()) out_ << YAML::Key << "over" << YAML::Value << input.axis;
+      if (input.optional) out_ << YAML::Key << "optional" << YAML::Value << true;
+      out_ << YAML::EndMap;
     }
-    if (!node.options.empty()) write_options(out, node);
-    if (node.repetition) write_repetition(out, *node.repetition);
-    out << YAML::EndMap;
+    if (has_inputs) out_ << YAML::EndMap;
   }
-  out << YAML::EndMap << YAML::Key << "outputs" << YAML::Value << YAML::BeginMap;
-  for (const PipelineOutput& output : pipeline.outputs)
-    out << YAML::Key << output.name << YAML::Value << output.source.text;
-  out << YAML::EndMap;
-}
+
+ private:
+  void write(const PipelineNode& node) {
+    out_ << YAML::Key << node.id << YAML::Value;
+    if (file_) out_ << YAML::Comment(shown(node.place));
+    out_ << YAML::BeginMap;
+    if (!node.repetition) out_ << YAML::Key << "uses" << YAML::Value << node.info.name;
+    if (node.may_fail) out_ << YAML::Key << "may_fail" << YAML::Value << true;
+    if (!node.wires.empty()) {
+      out_ << YAML::Key << "in" << YAML::Value << YAML::Flow << YAML::BeginMap;
+      for (const Wire& wire : node.wires) {
+        out_ << YAML::Key << node.input_of(wire).name << YAML::Value;
+        if (wire.is_list_literal) out_ << YAML::BeginSeq;
+        for (const Reference& source : wire.sources) out_ << source.text;
+        if (wire.is_list_literal) out_ << YAML::EndSeq;
+      }
+      out_ << YAML::EndMap;
+    }
+    if (!node.options.empty()) write_options(node);
+    if (node.repetition) write(*node.repetition);
+    out_ << YAML::EndMap;
+  }
+
+  void write_options(const PipelineNode& node) {
+    out_ << YAML::Key << "with" << YAML::Value << YAML::BeginMap;
+    for (std::size_t i = 0; i < node.options.size(); ++i) {
+      out_ << YAML::Key << node.info.options[i].name << YAML::Value;
+      std::visit(
+          [&](const auto& value) {
+            if constexpr (requires { value.begin(); } && !std::is_same_v<std::decay_t<decltype(value)>, std::string>) {
+              out_ << YAML::Flow << YAML::BeginSeq;
+              for (const auto& item : value) out_ << written(item);
+              out_ << YAML::EndSeq;
+            } else {
+              out_ << written(value);
+            }
+          },
+          node.options[i]);
+      if (file_) write_place(node, node.option_places[i]);
+    }
+    out_ << YAML::EndMap;
+  }
+
+  void write_place(const PipelineNode& node, const Place& place) {
+    if (place.file.empty())
+      out_ << YAML::Comment("default");
+    else if (place.file != node.place.file)
+      out_ << YAML::Comment(shown(place));
+  }
+
+  /// Relative to the whole pipeline, so that the text is the same wherever that lies.
+  std::string shown(const Place& place) const {
+    if (place.line == 0) return on_one_line(place.file);
+    const std::filesystem::path folder = std::filesystem::absolute(*file_).parent_path();
+    return formatted("{}:{}", on_one_line(std::filesystem::absolute(place.file).lexically_relative(folder).string()),
+                     place.line);
+  }
+
+  static std::string on_one_line(const std::string& text) { return cut(printable(text), 200); }
+
+  void write(const Repetition& repetition) {
+    if (!repetition.is_loop) out_ << YAML::Key << "over" << YAML::Value << repetition.axis;
+    if (repetition.at_most) out_ << YAML::Key << "at_most" << YAML::Value << repetition.at_most;
+    if (repetition.until >= 0)
+      out_ << YAML::Key << "until" << YAML::Value << repetition.alone.outputs[std::size_t(repetition.until)].name;
+    if (repetition.goes_on) out_ << YAML::Key << "if_pass_fails" << YAML::Value << "go_on";
+    out_ << YAML::Key << "carry" << YAML::Value << YAML::Flow << YAML::BeginMap;
+    for (const Repetition::Given& given : repetition.given)
+      if (given.carried >= 0)
+        out_ << YAML::Key << given.name << YAML::Value << repetition.alone.outputs[std::size_t(given.carried)].name;
+    out_ << YAML::EndMap << YAML::Key << "repeat" << YAML::Value << YAML::BeginMap;
+    write_inputs(repetition.alone);
+    write(repetition.alone);
+    out_ << YAML::EndMap;
+  }
+
+  YAML::Emitter& out_;
+  const std::filesystem::path* file_;
+};
 
 }  // namespace
 
@@ -140,12 +190,14 @@ std::vector<const PipelineNode*> called_nodes(const Pipeline& pipeline) {
   return called;
 }
 
-std::string resolved_yaml(const Pipeline& pipeline) {
+std::string resolved_yaml(const Pipeline& pipeline, bool with_places) {
   YAML::Emitter out;
   out.SetDoublePrecision(17);
   out << YAML::BeginMap << YAML::Key << "marrow" << YAML::Value << 1 << YAML::Key << "name" << YAML::Value
       << pipeline.name;
-  write_graph(out, pipeline);
+  GraphWriter writer(out, with_places ? &pipeline.file : nullptr);
+  writer.write_inputs(pipeline);
+  writer.write(pipeline);
   out << YAML::EndMap;
   return std::string(out.c_str()) + "\n";
 }

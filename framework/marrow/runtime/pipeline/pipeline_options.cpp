@@ -73,11 +73,13 @@ void resolve_options(const WrittenNode& written, PipelineNode& node, InputTexts&
                       suggested_for(node.info.name, name, known, diagnostics));
   for (const OptionInfo& option : node.info.options) {
     OptionValue result = option.default_value;
+    Place place;
     if (const WrittenEntry* given = find_named(written.options, option.name)) {
       const WrittenValue& value = given->value;
+      place = value.place;
       StrictYaml yaml = yaml_of(value, diagnostics);
       const auto substitute = [&](const std::string& text, const Place& place) {
-        return input_texts.put_into(text, place.line ? place : value.place);
+        return input_texts.put_into(text, place.line ? place : value.place, value.inputs.get());
       };
       auto converted = read_option(yaml, value.value, value.place, option,
                                    "option " + in_quotes(option.name) + " of " + node.info.name, substitute);
@@ -93,6 +95,7 @@ void resolve_options(const WrittenNode& written, PipelineNode& node, InputTexts&
                       option.help);
     }
     node.options.push_back(std::move(result));
+    node.option_places.push_back(std::move(place));
   }
 }
 

@@ -65,9 +65,9 @@ class RepetitionResolver {
         made_(std::make_shared<Repetition>()) {}
 
   void resolve(const BodyReader& read_body) {
-    const PipelineArguments arguments = arguments_of_body();
+    std::vector<InputValue> inputs = inputs_of_body();
     const std::size_t faults_before = diagnostics_.size();
-    const ReadBody read = read_body(arguments);
+    const ReadBody read = read_body(std::move(inputs));
     body_ = &read.pipeline;
     if (diagnostics_.size() > faults_before || body_->nodes.empty()) return;
     made_->alone = *body_;
@@ -85,20 +85,19 @@ class RepetitionResolver {
   }
 
  private:
-  PipelineArguments arguments_of_body() {
-    PipelineArguments arguments;
-    arguments.overrides = repeat_.overrides;
+  std::vector<InputValue> inputs_of_body() {
+    std::vector<InputValue> inputs;
     for (const auto& [name, value] : written_.options) {
       if (!value.value.IsScalar()) {
         diagnostics_.add(value.place, "input " + in_quotes(name) + " of the body must be one value");
         continue;
       }
-      const auto text = input_texts_.put_into(value.value.Scalar(), value.place);
+      const auto text = input_texts_.put_into(value.value.Scalar(), value.place, value.inputs.get());
       is_complete_ = is_complete_ && text;
       if (!text) continue;
-      arguments.inputs.push_back({name, *text, value.place});
+      inputs.push_back({name, *text, value.place});
     }
-    return arguments;
+    return inputs;
   }
 
   bool find_given() {

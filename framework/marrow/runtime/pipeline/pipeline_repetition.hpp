@@ -13,7 +13,7 @@ struct ReadBody {
   Pipeline pipeline;
   std::set<std::string> incomplete;  ///< nodes with an option whose value is unknown, because an input has no value
 };
-using BodyReader = std::function<ReadBody(const PipelineArguments& arguments)>;
+using BodyReader = std::function<ReadBody(std::vector<InputValue> inputs)>;
 
 /// Reads the body of a node, and makes the node's repetition, inputs and outputs from it. If the body has faults,
 /// `node.info` stays empty.
