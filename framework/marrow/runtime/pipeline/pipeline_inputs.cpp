@@ -85,9 +85,7 @@ OptionInfo info_of(const DeclaredInput& input) {
   return info;
 }
 
-Place place_of(const InputValue& one) {
-  return one.place.file.empty() ? Place{one.name + "=" + one.value} : one.place;
-}
+Place place_of(const InputValue& one) { return one.place.file.empty() ? Place{one.name + "=" + one.value} : one.place; }
 
 /// The value as a text, if it is good. A path becomes a whole path.
 std::optional<std::string> checked(const DeclaredInput& input, const WrittenValue& value, Diagnostics& diagnostics) {
@@ -137,9 +135,10 @@ void set_inputs(DeclaredInputs& inputs, const PipelineReading& reading, Diagnost
     std::optional<WrittenValue> value = input.default_value;
     for (const InputValue& one : reading.inputs)
       if (one.name == input.name && input.data)
-        diagnostics.add(place_of(one), "input " + in_quotes(input.name) + " is data of type " + input.type +
-                                           ", which only a node can give",
-                        "give it under  in:");
+        diagnostics.add(
+            place_of(one),
+            "input " + in_quotes(input.name) + " is data of type " + input.type + ", which only a node can give",
+            "give it under  in:");
       else if (one.name == input.name)
         value = WrittenValue{place_of(one), YAML::Node(one.value), folder_of(one.place)};
     if (input.data) continue;

@@ -75,8 +75,8 @@ bool is_part(const std::string& uses) { return uses.ends_with(".yaml") || uses.e
 void put_over(std::vector<WrittenEntry>& entries, const YamlEntry& map, const std::string& what,
               const PipelineLayer& layer) {
   for (const YamlEntry& item : layer.yaml.map(map.value, map.place, what)) {
-    const auto old = std::find_if(entries.begin(), entries.end(),
-                                  [&](const WrittenEntry& one) { return one.name == item.key; });
+    const auto old =
+        std::find_if(entries.begin(), entries.end(), [&](const WrittenEntry& one) { return one.name == item.key; });
     if (old == entries.end())
       entries.push_back({item.key, layer.value_of(item)});
     else if (item.value.IsNull())
@@ -126,8 +126,8 @@ void set_passes(WrittenNode& node, const std::string& key, const YAML::Node& val
 }
 
 void put_node_over(WrittenPipeline& pipeline, const YamlEntry& entry, const PipelineLayer& layer) {
-  static const std::vector<std::string> kKeys{"uses",  "with",    "in",    "may_fail",      "set", "repeat", "over",
-                                              "carry", "at_most", "until", "if_pass_fails"};
+  static const std::vector<std::string> kKeys{"uses", "with",  "in",      "may_fail", "set",          "repeat",
+                                              "over", "carry", "at_most", "until",    "if_pass_fails"};
   const auto old = std::find_if(pipeline.nodes.begin(), pipeline.nodes.end(),
                                 [&](const WrittenNode& one) { return one.id == entry.key; });
   const bool is_new = old == pipeline.nodes.end();
@@ -140,8 +140,7 @@ void put_node_over(WrittenPipeline& pipeline, const YamlEntry& entry, const Pipe
   node.place = entry.place;
   if (is_new) node.uses_place = entry.place;
   check_name(node.id, node.place, layer.yaml);
-  const std::vector<YamlEntry> parts =
-      layer.yaml.map(entry.value, entry.place, "node " + in_quotes(entry.key), &kKeys);
+  const std::vector<YamlEntry> parts = layer.yaml.map(entry.value, entry.place, "node " + in_quotes(entry.key), &kKeys);
   replace_what_it_is(node, parts, layer.number);
   for (const YamlEntry& part : parts)
     if (part.key == "uses")
@@ -158,14 +157,14 @@ void put_node_over(WrittenPipeline& pipeline, const YamlEntry& entry, const Pipe
     else
       read_repetition(node, part, layer);
   }
-  const bool says_uses =
-      std::any_of(parts.begin(), parts.end(), [](const YamlEntry& part) {
-        return part.key == "uses" && (!part.value.IsScalar() || !part.value.Scalar().empty());
-      });
+  const bool says_uses = std::any_of(parts.begin(), parts.end(), [](const YamlEntry& part) {
+    return part.key == "uses" && (!part.value.IsScalar() || !part.value.Scalar().empty());
+  });
   if (node.repetition)
     check_repetition(node, layer.yaml);
   else if (node.uses.empty() && !says_uses && entry.value.IsMap())
-    layer.yaml.fault(entry.place, "node " + in_quotes(entry.key) + " does not say what it uses", "add  uses: kind.name");
+    layer.yaml.fault(entry.place, "node " + in_quotes(entry.key) + " does not say what it uses",
+                     "add  uses: kind.name");
   if (is_new)
     pipeline.nodes.push_back(std::move(node));
   else

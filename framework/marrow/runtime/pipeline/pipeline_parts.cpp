@@ -98,9 +98,8 @@ class PartReader {
     pipeline_.nodes = std::move(nodes);
     const Replace replace = [&](const std::string& text, const Place& place) { return of_part(text, place); };
     for (WrittenNode& node : pipeline_.nodes)
-      std::erase_if(node.wires, [&](WrittenEntry& wire) {
-        return !replace_references(wire.value, replace, diagnostics_);
-      });
+      std::erase_if(node.wires,
+                    [&](WrittenEntry& wire) { return !replace_references(wire.value, replace, diagnostics_); });
     for (WrittenEntry& output : pipeline_.outputs) replace_references(output.value, replace, diagnostics_);
     for (const std::string& id : faulty_) pipeline_.nodes.push_back({id});
     pipeline_.inputs_of_parts = input_texts_.used;
@@ -156,11 +155,10 @@ class PartReader {
     WrittenPipeline inner = read_written_pipeline(shown, reading, catalogue_, diagnostics_);
     pipeline_.files.insert(pipeline_.files.end(), inner.files.begin(), inner.files.end());
     if (inner.nodes.empty()) return {};
-    const bool is_good = diagnostics_.size() == faults;
     pipeline_.notes.insert(pipeline_.notes.end(), inner.notes.begin(), inner.notes.end());
-    if (is_good) check_inputs(node, *inner.inputs, unknown);
+    if (diagnostics_.size() == faults) check_inputs(node, *inner.inputs, unknown);
     wire(node, inner);
-    if (!is_good) return inner;
+    if (diagnostics_.size() > faults) return inner;
     faulty_.erase(node.id);
     outputs_[node.id] = inner.outputs;
     return inner;
@@ -219,18 +217,16 @@ class PartReader {
         return std::nullopt;
       }
       const WrittenEntry* given = find_named(node.wires, input->name);
-      if (!given) return Replacement{};
+      if (!given) return input->is_optional ? Replacement{} : Replacement{{node.id}, false, {}};  // a fault already
       return given_to(*given, words.rest, place);
     };
     for (WrittenNode& one : inner.nodes) {
       one.id = node.id + "/" + one.id;
-      std::erase_if(one.wires, [&](WrittenEntry& wire) {
-        return !replace_references(wire.value, replace, diagnostics_);
-      });
+      std::erase_if(one.wires,
+                    [&](WrittenEntry& wire) { return !replace_references(wire.value, replace, diagnostics_); });
     }
-    std::erase_if(inner.outputs, [&](WrittenEntry& output) {
-      return !replace_references(output.value, replace, diagnostics_);
-    });
+    std::erase_if(inner.outputs,
+                  [&](WrittenEntry& output) { return !replace_references(output.value, replace, diagnostics_); });
   }
 
   Replacement given_to(const WrittenEntry& given, const std::string& items, const Place& place) {
