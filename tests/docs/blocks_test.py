@@ -61,7 +61,7 @@ class Yaml(Documents):
 
     def check(self, content, text):
         folder = self.pipelines_folder()
-        if "nodes" in content and "marrow" in content:
+        if "marrow" in content:
             code, told = self.checked(["check"], text, folder)
             self.assertEqual(code, 0, told)
             return "pipeline"
@@ -75,6 +75,12 @@ class Yaml(Documents):
             return "experiment"
         if "nodes" in content:
             self.check_part(content["nodes"])
+            return "part"
+        if set(content) == {"inputs", "set"}:  # a file of settings
+            file = self.folder / "settings.yaml"
+            file.write_text(text)
+            told = self.run_here(MARROW, "check", SOURCE / "pipelines" / "femur.yaml", "--set-file", file)
+            self.assertEqual(told.returncode, 0, told.stderr)
             return "part"
         self.assertTrue(any(str(key).startswith("marrow-") for key in content), "it is no file of marrow")
         return "data"

@@ -17,6 +17,7 @@ GROUPS = {
         "faq",
     ],
     "Guides": [
+        "pipeline-file",
         "case",
         "formats",
         "workbench",
