@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Names in the documents: where marrow has no such node, option, command or key, the site is not built."""
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -32,6 +33,13 @@ class Names(unittest.TestCase):
         documents = document_pages.documents(SOURCE)
         self.assertGreater(len(documents), 12)
         self.assertEqual(mentions.faults(documents, self.names), [])
+
+    def test_every_node_is_named_where_it_belongs(self):
+        """The vocabulary, a table of all ports and options, does not count."""
+        text = "\n".join(text for page, text in document_pages.documents(SOURCE).items() if page != "docs/vocabulary")
+        told = [name for name in self.names.catalogue.nodes if re.search(r"\b%s\b" % re.escape(name), text)]
+        self.assertGreater(len(told), 100)
+        self.assertEqual(sorted(set(self.names.catalogue.nodes) - set(told)), [])
 
     def test_what_is_not_there_is_named(self):
         for text, fault in (
