@@ -4,8 +4,7 @@ import text from '../../../docs/glossary.md';
 
 import {el} from './dom.js';
 
-// The names of figures and of columns are looked up without their units.
-const plain = (word) => word.toLowerCase().replaceAll('_', ' ').replace(/ (mm|deg|px|percent)$/, '');
+const plain = (word) => word.toLowerCase().replaceAll('_', ' ');
 
 // Each item of a list that begins with names in bold: - **name**, **other name**: meaning
 function entries() {
@@ -28,8 +27,11 @@ const PHRASES = new RegExp(
         ')',
     'i');
 
-// The meaning of a word; undefined if it is in no glossary.
-export const meaning = (word) => ENTRIES.get(plain(word));
+// The meaning of a word, such as the name of a figure with or without its unit; undefined if it is not explained.
+export function meaning(word) {
+  const name = plain(word);
+  return ENTRIES.get(name) ?? ENTRIES.get(name.replace(/ (mm|deg|px|percent)$/, ''));
+}
 
 // The word, with its meaning to point at.
 export function term(word) {
