@@ -61,7 +61,8 @@ function pose(entry) {
 export const words = (verdict) =>
     [el('p', {class: 'verdict-head'}, verdict.item && el('span', {}, verdict.item + ': '),
         el('strong', {}, Glossary.term(verdict.judgement)), ' ',
-        el('small', {'data-tip': Glossary.meaning('failure')}, failure(verdict.failure_probability))),
+        el('small', {class: 'term', tabindex: 0, 'data-tip': Glossary.meaning('failure')},
+           failure(verdict.failure_probability))),
      ...list('Why', verdict.reasons), ...list('What would settle it', verdict.remedies)];
 
 function one(data, cell, verdict) {
