@@ -146,9 +146,12 @@ class PartReader {
     reading.nodes_left = reading_.nodes_left;
     std::error_code ignored;
     reading.inside.push_back(fs::weakly_canonical(file, ignored));
-    if (std::count(reading.inside.begin(), reading.inside.end(), reading.inside.back()) > 1 ||
-        reading.inside.size() > kMostInside) {
+    if (std::count(reading.inside.begin(), reading.inside.end(), reading.inside.back()) > 1) {
       diagnostics_.add(node.uses_place, in_quotes(node.uses) + " uses itself: a pipeline must not be its own part");
+      return {};
+    }
+    if (reading.inside.size() > kMostInside) {
+      diagnostics_.add(node.uses_place, formatted("parts lie more than {} deep in each other", kMostInside));
       return {};
     }
     if (!fs::exists(file, ignored)) {

@@ -277,7 +277,7 @@ bool RunFolder::take(const Pipeline& pipeline) {
       refuse(folder_);
     }
   try {
-    write_text_file(folder_ / "pipeline.yaml", resolved_yaml(pipeline, true));
+    write_text_file(folder_ / "pipeline.yaml", resolved_yaml(pipeline));
     fs::create_directory(folder_ / "outputs");
     log_ = std::make_unique<RunLog>(log);
     return true;
