@@ -23,6 +23,7 @@ GROUPS = {
         "comparing",
         "verdict",
         "repetition",
+        "programs",
         "tracking",
         "python",
         "simulation",

@@ -7,8 +7,10 @@
 #include <set>
 #include <tuple>
 
+#include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/mapping.hpp"
 #include "marrow/runtime/run/keys.hpp"
+#include "marrow/runtime/run/program_versions.hpp"
 #include "marrow/runtime/run/replay.hpp"
 #include "marrow/runtime/store/digest_memory.hpp"
 #include "marrow/runtime/store/shared_claim.hpp"
@@ -273,6 +275,8 @@ Provenance Evaluation::provenance(std::size_t index, const std::vector<Value>& i
   const Contents read = files_read_.of(node);
   for (std::size_t i = 0; i < node.options.size(); ++i)
     result.options[node.info.options[i].name] = text_of(node.options[i], node.info.options[i].type, read);
+  if (const std::string version = version_of_program(node); !version.empty())
+    result.options["version_command"] += " (prints " + in_quotes(version) + ")";
   for (std::size_t i = 0; i < inputs.size(); ++i) result.inputs[node.info.inputs[i].name] = key_of(inputs[i]);
   result.random = node.info.random;
   result.seed = settings_.seed;

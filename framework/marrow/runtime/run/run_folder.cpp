@@ -28,6 +28,7 @@
 #include "marrow/runtime/plugins/manifest.hpp"
 #include "marrow/runtime/run/failed_calls.hpp"
 #include "marrow/runtime/run/keys.hpp"
+#include "marrow/runtime/run/program_versions.hpp"
 #include "marrow/runtime/run/verdict_json.hpp"
 #include "marrow/runtime/run/written_values.hpp"
 
@@ -156,6 +157,7 @@ json json_of(const NodeRecord& record, const PipelineNode& node, const Catalogue
     j["library"] = library->file.filename().string();
     j["build_id"] = library->build_id.hex();
   }
+  if (const std::string version = version_of_program(node); !version.empty()) j["program_version"] = version;
   for (std::size_t i = 0; i < record.outputs.size(); ++i) {
     const std::string& name = node.info.outputs[i].name;
     j["keys"][name] = key_of(record.outputs[i]).hex();
