@@ -5,8 +5,8 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// Adds what a file of settings says, with the keys `inputs` and `set`, to the arguments of a pipeline. Its overrides are
-/// a layer above those that are there.
+/// Adds what a file of settings says, with the keys `inputs` and `set`, to the arguments of a pipeline. Its overrides
+/// are a layer above those that are there.
 void add_settings(const std::filesystem::path& file, PipelineArguments& arguments, Diagnostics& diagnostics);
 
 }  // namespace marrow
