@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // How long a registration takes, in one process, with the model and two 512 x 512 images in memory, on a simulated
 // case. What is made of the CT alone, before any image is taken, counts as the model: the surface, and projectors of
-// it. both_stages: edges, shaft borders, first stage, cost and registration of pipelines/femur.yaml. Then 100 starts of
+// it. both_stages: edges, shaft borders, first stage, cost and registration of pipelines/femur/femur.yaml. Then 100 starts of
 // up to 5 degrees and 5 mm about the truth: by grey values alone, coarse to fine, and by contour and then grey values
-// (pipelines/femur-intensity.yaml), with how far from the truth they end.
+// (pipelines/femur/femur-intensity.yaml), with how far from the truth they end.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

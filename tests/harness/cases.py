@@ -10,7 +10,7 @@ import yaml
 from harness import SHARED_CACHE, SOURCE
 from harness.program import marrow
 
-FEMUR = SOURCE / "pipelines" / "femur.yaml"
+FEMUR = SOURCE / "pipelines" / "femur" / "femur.yaml"
 SMALL = ["--set", "ct.spacing_mm=[1.2, 1.2, 1.5]", "--set", "ct.range_mm=[0, 300]"]  # runs in 2 seconds instead of 7
 
 

@@ -7,7 +7,7 @@ from sources import USES
 
 
 def page_of(path):
-    """The page of a file: pipelines/femur.yaml has pipelines/femur."""
+    """The page of a file: pipelines/femur/femur.yaml has pipelines/femur."""
     return str(path.with_suffix(""))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""pipelines/femur-best.yaml on a small simulated femur with an old plate: with right cameras and with wrong ones."""
+"""pipelines/femur/femur-best.yaml on a small simulated femur with an old plate: with right cameras and with wrong ones."""
 import json
 
 from harness.cases import metrics, simulate

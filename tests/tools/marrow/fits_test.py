@@ -10,7 +10,7 @@ from harness.program import Case, main, marrow
 from harness.sample import sample
 
 PIPELINES = sorted((SOURCE / "pipelines").glob("*.yaml"))
-INTENSITY = SOURCE / "pipelines" / "femur-intensity.yaml"
+INTENSITY = SOURCE / "pipelines" / "femur" / "femur-intensity.yaml"
 
 
 def fits_of(pipeline, node):
@@ -92,10 +92,10 @@ class Fits(Case):
         self.assertIn("or use project.joseph, project.ray_casting, project.siddon_jacobs", checked.stderr)
 
     def test_a_result_that_nothing_writes(self):
-        fits = {fit["node"]: fit for fit in fits_of(SOURCE / "pipelines" / "simulate.yaml", "case")}
+        fits = {fit["node"]: fit for fit in fits_of(SOURCE / "pipelines" / "simulate" / "simulate.yaml", "case")}
         fault = "output 'case': no plugin writes values of type 'simulated_bone'"
         self.assertEqual(fits["simulate.femur"]["faults"], [fault])
-        checked = check(SOURCE / "pipelines" / "simulate.yaml", "case", "simulate.femur")
+        checked = check(SOURCE / "pipelines" / "simulate" / "simulate.yaml", "case", "simulate.femur")
         self.assertEqual(checked.returncode, 2)
         self.assertIn(fault, checked.stderr)
         self.assertIn("leave it out, or name a result of another type", checked.stderr)

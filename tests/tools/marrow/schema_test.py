@@ -38,7 +38,7 @@ class Schema(SchemaCase):
             self.assertEqual(marrow("check", path).returncode, 0, str(path))
 
     def test_faults_are_found(self):
-        good = yaml.safe_load((SOURCE / "pipelines" / "femur.yaml").read_text())
+        good = yaml.safe_load((SOURCE / "pipelines" / "femur" / "femur.yaml").read_text())
         for spoil in (
             lambda p: p["nodes"]["edges"].update(uses="edges.nothing"),
             lambda p: p["nodes"]["edges"]["with"].update(low=1000),
