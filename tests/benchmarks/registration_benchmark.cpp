@@ -75,7 +75,7 @@ const marrow::Catalogue& catalogue() {
 }
 
 const marrow::Case& simulated() {
-  static const marrow::Pipeline simulation = read(catalogue(), "simulate.yaml", "case", {});
+  static const marrow::Pipeline simulation = read(catalogue(), "simulate/simulate.yaml", "case", {});
   static const marrow::RunResult result = [] {
     marrow::RunSettings settings;
     settings.threads = 2;
@@ -85,7 +85,7 @@ const marrow::Case& simulated() {
 }
 
 void both_stages(benchmark::State& state) {
-  static const Prepared contour(catalogue(), simulated(), "femur.yaml", {"bone", "model", "outline"});
+  static const Prepared contour(catalogue(), simulated(), "femur/femur.yaml", {"bone", "model", "outline"});
   std::map<std::string, double> seconds;
   for (auto _ : state) {
     const marrow::RunResult result = contour.result();
@@ -161,8 +161,8 @@ int main(int argc, char** argv) {
     benchmark::RunSpecifiedBenchmarks();
     if (is_filtered) return 0;
     const std::set<std::string> of_ct{"bone", "model", "outline", "drr"};
-    from_random_starts("contour, then grey values", Prepared(catalogue(), simulated(), "femur-intensity.yaml", of_ct));
-    from_random_starts("grey values alone", Prepared(catalogue(), simulated(), "femur-grey-values.yaml", of_ct));
+    from_random_starts("contour, then grey values", Prepared(catalogue(), simulated(), "femur/femur-intensity.yaml", of_ct));
+    from_random_starts("grey values alone", Prepared(catalogue(), simulated(), "femur/femur-grey-values.yaml", of_ct));
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
     return 1;

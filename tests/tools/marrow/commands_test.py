@@ -124,8 +124,8 @@ class Commands(Case):
 
     def test_overrides_hold_in_any_order(self):
         for settings in (
-            ["cost.sigma=0.1", "cost.uses=similarity.pattern_intensity"],
-            ["cost.uses=similarity.pattern_intensity", "cost.sigma=0.1"],
+            ["grey_cost.sigma=0.1", "grey_cost.uses=similarity.pattern_intensity"],
+            ["grey_cost.uses=similarity.pattern_intensity", "grey_cost.sigma=0.1"],
         ):
             out = self.scratch / settings[0]
             marrow(
@@ -141,12 +141,12 @@ class Commands(Case):
             "check",
             SOURCE / "pipelines" / "femur" / "femur-grey-values.yaml",
             "--set",
-            "cost.sigma=0.1",
+            "grey_cost.sigma=0.1",
             "--set",
-            "cost.uses=similarity.mutual_information",
+            "grey_cost.uses=similarity.mutual_information",
         )
         self.assertIn(
-            "--set cost.sigma=0.1: error: 'similarity.mutual_information' has no option 'sigma'", wrong.stderr
+            "--set grey_cost.sigma=0.1: error: 'similarity.mutual_information' has no option 'sigma'", wrong.stderr
         )
 
     def test_run_writes_its_record(self):
