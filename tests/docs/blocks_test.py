@@ -89,7 +89,7 @@ class Yaml(Documents):
         if set(content) == {"inputs", "set"}:  # a file of settings
             file = self.folder / "settings.yaml"
             file.write_text(text)
-            told = self.run_here(MARROW, "check", SOURCE / "pipelines" / "femur.yaml", "--set-file", file)
+            told = self.run_here(MARROW, "check", SOURCE / "pipelines" / "femur" / "femur.yaml", "--set-file", file)
             self.assertEqual(told.returncode, 0, told.stderr)
             return "part"
         self.assertTrue(any(str(key).startswith("marrow-") for key in content), "it is no file of marrow")

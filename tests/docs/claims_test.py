@@ -107,7 +107,7 @@ class Claims(Documents):
 
     def test_the_short_pipeline_is_a_part_of_the_shipped_one(self):
         text = next(block.text for block in blocks.blocks_of(self.documents["index"]) if block.language == "yaml")
-        short, whole = yaml.safe_load(text), yaml.safe_load((SOURCE / "pipelines" / "femur.yaml").read_text())
+        short, whole = yaml.safe_load(text), yaml.safe_load((SOURCE / "pipelines" / "femur" / "femur.yaml").read_text())
         self.assertGreater(len(short["nodes"]), 10)
         for part in ("inputs", "nodes", "outputs"):
             for name, value in short[part].items():

@@ -12,6 +12,7 @@ import unittest
 import zlib
 
 from harness import BUILD, MARROW, SOURCE
+from harness.shipped import shipped
 
 LINK = re.compile(r'<(?:a|img|link|script)\b[^>]*?\b(?:href|src)="([^"#]*)(?:#([^"]*))?"')
 ID = re.compile(r'\bid="([^"]+)"')
@@ -141,8 +142,8 @@ class Site(unittest.TestCase):
     def test_every_document_pipeline_and_header_has_its_page(self):
         for path in (SOURCE / "docs").rglob("*.md"):
             self.page(path.relative_to(SOURCE).with_suffix(".html"))
-        for path in (SOURCE / "pipelines").glob("*.yaml"):
-            self.page("pipelines/%s.html" % path.stem)
+        for path in shipped():
+            self.page(path.relative_to(SOURCE).with_suffix(".html"))
         headers = SOURCE / "framework" / "include" / "marrow"
         for path in headers.rglob("*.hpp"):
             self.page("cpp" / path.relative_to(headers).with_suffix(".html"))

@@ -162,7 +162,7 @@ class CaseReader {
     }
     if (!section.value.IsMap()) return;
     if (!has_pipeline)
-      yaml_.fault(section.place, "'simulate' does not name its pipeline", "add  pipeline: ../simulate.yaml");
+      yaml_.fault(section.place, "'simulate' does not name its pipeline", "add  pipeline: ../simulate/simulate.yaml");
     if (!has_seeds) yaml_.fault(section.place, "'simulate' does not say which seeds", "add  seeds: 1..20  or a list");
     add_seeds(seeds, true, section.place);
   }
