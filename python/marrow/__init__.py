@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """marrow finds the 3D pose of bones in X-ray images, by pipelines of plugins described in YAML.
 
-p = marrow.Pipeline("pipelines/femur.yaml", case="cases/7")
+p = marrow.Pipeline("pipelines/femur/femur.yaml", case="cases/7")
 r = p.run(progress=True)
 r["pose"]["distal"].matrix
 

@@ -25,7 +25,7 @@ def checked_pipeline(read: Tuple[_T, List[Dict[str, Any]], str]) -> _T:
 class Pipeline:
     """A pipeline file, read and checked.
 
-    p = marrow.Pipeline("pipelines/femur.yaml", case="cases/7")
+    p = marrow.Pipeline("pipelines/femur/femur.yaml", case="cases/7")
     p.set("edges.high", 80)
     r = p.run(progress=True)
 

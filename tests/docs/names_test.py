@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Names in the documents: where marrow has no such node, option, command or key, the site is not built."""
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -14,6 +15,10 @@ import catalogue  # noqa: E402
 import document_pages  # noqa: E402
 import mentions  # noqa: E402
 
+# Nodes whose figures stand in reports.
+EXPLAINED = """evaluate.pose_error evaluate.mtre evaluate.outline_distance evaluate.pose_difference evaluate.reduced
+evaluate.reduction_gap evaluate.surface_distance evaluate.projection_distance evaluate.reprojection_distance
+fracture.misalignment""".split()
 # A marrow in which one option has another name.
 RENAMED = """#!/bin/sh
 "%s" "$@" | sed 's/"name": "pixel_step"/"name": "pixel_stride"/'
@@ -32,6 +37,29 @@ class Names(unittest.TestCase):
         documents = document_pages.documents(SOURCE)
         self.assertGreater(len(documents), 12)
         self.assertEqual(mentions.faults(documents, self.names), [])
+
+    def test_every_node_is_named_where_it_belongs(self):
+        """The vocabulary, a table of all ports and options, does not count."""
+        text = "\n".join(text for page, text in document_pages.documents(SOURCE).items() if page != "docs/vocabulary")
+        told = [name for name in self.names.catalogue.nodes if re.search(r"\b%s\b" % re.escape(name), text)]
+        self.assertGreater(len(told), 100)
+        self.assertEqual(sorted(set(self.names.catalogue.nodes) - set(told)), [])
+
+    def test_figures_that_people_read_are_in_the_glossary(self):
+        """Those of a view, such as frontal_median_px, have the name of the view in front and are not looked up."""
+        entries = re.findall(r"\*\*([^*]+)\*\*", document_pages.documents(SOURCE)["docs/glossary"])
+        known = {" ".join(entry.lower().split()) for entry in entries}
+        count = 0
+        for name in EXPLAINED:
+            for output in self.names.catalogue.nodes[name]["outputs"]:
+                for figure in output.get("figures", []):
+                    words = figure.replace("_", " ")
+                    if "*" not in words:
+                        count += 1
+                        self.assertTrue(
+                            {words, re.sub(" (mm|deg|px|percent)$", "", words)} & known, name + ": " + figure
+                        )
+        self.assertGreater(count, 50)
 
     def test_what_is_not_there_is_named(self):
         for text, fault in (

@@ -12,10 +12,16 @@ import unittest
 import zlib
 
 from harness import BUILD, MARROW, SOURCE
+from harness.shipped import shipped
 
 LINK = re.compile(r'<(?:a|img|link|script)\b[^>]*?\b(?:href|src)="([^"#]*)(?:#([^"]*))?"')
 ID = re.compile(r'\bid="([^"]+)"')
 MISSING_PACKAGES = 77
+ASKED = re.split(
+    r",\s+",
+    """one view, batch patients, CSV, units, label map, cite, GPU, Windows, upgrade, uninstall, memory, log level,
+threads, exit codes, troubleshooting""",
+)
 # Nodes of other libraries have their pages, too.
 OTHERS = BUILD / "tests" / "plugins"
 os.environ["MARROW_PLUGIN_PATH"] = str(OTHERS)
@@ -136,8 +142,8 @@ class Site(unittest.TestCase):
     def test_every_document_pipeline_and_header_has_its_page(self):
         for path in (SOURCE / "docs").rglob("*.md"):
             self.page(path.relative_to(SOURCE).with_suffix(".html"))
-        for path in (SOURCE / "pipelines").glob("*.yaml"):
-            self.page("pipelines/%s.html" % path.stem)
+        for path in shipped():
+            self.page(path.relative_to(SOURCE).with_suffix(".html"))
         headers = SOURCE / "framework" / "include" / "marrow"
         for path in headers.rglob("*.hpp"):
             self.page("cpp" / path.relative_to(headers).with_suffix(".html"))
@@ -164,7 +170,9 @@ class Site(unittest.TestCase):
             loaded = re.findall(r'<(?:script|img|link)\b[^>]*?(?:src|href)="(https?:[^"]*)"', text)
             self.assertEqual(loaded, [], str(page))
 
-    def test_the_search_finds_the_calibration(self):
+    def test_the_search_finds_what_people_ask(self):
+        from sphinx.search.en import SearchEnglish
+
         text = (self.site / "searchindex.js").read_text()
         index = json.loads(text[text.index("(") + 1 : text.rindex(")")])
 
@@ -173,6 +181,11 @@ class Site(unittest.TestCase):
             numbers = [number for one in places for number in (one if isinstance(one, list) else [one])]
             return {index["docnames"][number] for number in numbers}
 
+        # What people look for. A page counts if it has all words, as the browser's search has it.
+        stem = SearchEnglish({}).stem
+        for words in ASKED:
+            pages = set.intersection(*(pages_with(stem(word.lower())) for word in words.split()))
+            self.assertTrue({"docs/questions", "docs/running"} & pages, words)
         self.assertIn("nodes/camera.bead_board", pages_with("pincushion"))
         self.assertIn("docs/case", pages_with("pincushion"))
         self.assertEqual(pages_with("pincushionn"), set())

@@ -10,11 +10,11 @@ import yaml
 from harness import SHARED_CACHE, SOURCE
 from harness.program import marrow
 
-FEMUR = SOURCE / "pipelines" / "femur.yaml"
+FEMUR = SOURCE / "pipelines" / "femur" / "femur.yaml"
 SMALL = ["--set", "ct.spacing_mm=[1.2, 1.2, 1.5]", "--set", "ct.range_mm=[0, 300]"]  # runs in 2 seconds instead of 7
 
 
-def simulate(folder, *arguments, pipeline="simulate.yaml"):
+def simulate(folder, *arguments, pipeline="simulate/simulate.yaml"):
     """The folder of a simulated case. The same case is made once for all tests."""
     result = marrow(
         *["run", SOURCE / "pipelines" / pipeline, "--out", folder, "--quiet", *arguments],

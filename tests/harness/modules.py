@@ -11,7 +11,7 @@ def modules(**paths):
     """A script that puts modules into variables: modules(Dom="report/page/dom.js") makes one that is called Dom."""
     entry = "".join("export * as %s from './%s';" % item for item in paths.items())
     bundled = subprocess.run(
-        ["esbuild", "--bundle", "--format=iife", "--global-name=modules", "--log-level=warning"],
+        ["esbuild", "--bundle", "--format=iife", "--global-name=modules", "--log-level=warning", "--loader:.md=text"],
         cwd=TOOLS,
         input=entry,
         capture_output=True,

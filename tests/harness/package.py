@@ -13,7 +13,7 @@ import threading
 from harness import BUILD, MARROW, SHARED_CACHE, SOURCE, TEST_PLUGINS  # noqa: F401
 from harness.program import Case, main, wait_until  # noqa: F401
 
-FEMUR = SOURCE / "pipelines" / "femur.yaml"
+FEMUR = SOURCE / "pipelines" / "femur" / "femur.yaml"
 SCRATCH = pathlib.Path(tempfile.mkdtemp(prefix="marrow-python-"))
 atexit.register(shutil.rmtree, SCRATCH, ignore_errors=True)
 tempfile.tempdir = str(SCRATCH)  # whatever is left there goes with it
@@ -32,7 +32,7 @@ def small_case():
         own = os.environ["MARROW_CACHE"]
         os.environ["MARROW_CACHE"] = str(SHARED_CACHE)
         try:
-            pipeline = marrow.Pipeline(SOURCE / "pipelines" / "simulate.yaml").set(SMALL)
+            pipeline = marrow.Pipeline(SOURCE / "pipelines" / "simulate" / "simulate.yaml").set(SMALL)
             result = pipeline.run(folder=SCRATCH / "simulated")
         finally:
             os.environ["MARROW_CACHE"] = own

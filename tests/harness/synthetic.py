@@ -149,14 +149,14 @@ def add_material(data, chance, pairs):
 
 
 def experiment(kind):
-    pipeline = SOURCE / "pipelines" / "femur.yaml"
+    pipeline = SOURCE / "pipelines" / "femur" / "femur.yaml"
     return {
         "name": "edge detectors on the femur",
         "file": "experiments/edges.yaml",
         "help": (
             "Does the edge detector or the optimizer change how far a start may lie and how close the result comes?"
         ),
-        "text": "marrow: 1\npipeline: ../pipelines/femur.yaml\nvariants:\n  canny: {edges.uses: edges.canny}\n",
+        "text": "marrow: 1\npipeline: ../pipelines/femur/femur.yaml\nvariants:\n  canny: {edges.uses: edges.canny}\n",
         "pipeline_text": pipeline.read_text(),
         "seed": 7,
         "started": "2025-01-01T10:00:00",
@@ -164,7 +164,7 @@ def experiment(kind):
         "command": (
             "marrow compare experiments/edges.yaml --seed 7"
             if kind == "comparison"
-            else "marrow run pipelines/femur.yaml case=case-01 --seed 7"
+            else "marrow run pipelines/femur/femur.yaml case=case-01 --seed 7"
         ),
         "folder": "runs/edges",
         "machine": {"cpu": "Example CPU", "cores": 2, "cpu_level": "x86-64-v3"},

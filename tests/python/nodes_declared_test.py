@@ -37,7 +37,7 @@ class Declared(Written):
                 one.pop(varying, None)
         self.assertEqual(described[0], described[1])
         self.assertIn("edges.steepest_python", self.program("list", "edges"))
-        checked = ("check", SOURCE / "pipelines" / "femur.yaml", "--set", "edges.uses=edges.steepest_python")
+        checked = ("check", SOURCE / "pipelines" / "femur" / "femur.yaml", "--set", "edges.uses=edges.steepest_python")
         self.program(*checked)
         self.assertIn("'lowest'", self.program(*checked, "--set", "edges.lowest=3", code=2))
         self.assertIn("below the least allowed, 0", self.program(*checked, "--set", "edges.least=-3", code=2))

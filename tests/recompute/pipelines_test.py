@@ -49,20 +49,20 @@ class Pipelines(Case):
     def test_the_contour(self):
         unknown = ("verdict.verdict", "shaft.lines")
         whole = simulate(self.scratch / "made", *SMALL[:2])  # of the CT that other tests use, the ends are missing
-        self.check(run(self.scratch / "run", "femur.yaml", "case=%s" % whole), 70, unknown)
+        self.check(run(self.scratch / "run", "femur/femur.yaml", "case=%s" % whole), 70, unknown)
 
     def test_grey_values(self):
-        out = run(self.scratch / "run", "femur-intensity.yaml", "case=%s" % self.case)
+        out = run(self.scratch / "run", "femur/femur-intensity.yaml", "case=%s" % self.case)
         self.check(out, 60, ["verdict.verdict"])
 
     def test_landmarks_and_distances_in_images(self):
-        self.check(run(self.scratch / "run", "landmarks.yaml"), 120, ["verdict.verdict"])
+        self.check(run(self.scratch / "run", "femur/landmarks.yaml"), 120, ["verdict.verdict"])
 
     def test_markers_and_their_prior(self):
-        self.check(run(self.scratch / "run", "markers.yaml"), 100)
+        self.check(run(self.scratch / "run", "femur/markers.yaml"), 100)
 
     def test_borders_of_the_shaft(self):
-        self.check(run(self.scratch / "run", "shaft-lines.yaml"), 54)
+        self.check(run(self.scratch / "run", "femur/shaft-lines.yaml"), 54)
 
     def test_bones_that_are_followed(self):
         out = run(self.scratch / "run", "track-knee.yaml", "frames=4", *sets(LEG))
@@ -72,7 +72,7 @@ class Pipelines(Case):
         views = ["cameras.height_px=1200", "case.register=[proximal, distal]"]
         made = self.scratch / "made"
         case = simulate(made, "isocentre_from_distal_end_mm=225", *SMALL[:2], *sets(views))
-        out = run(self.scratch / "run", "femur-reduction.yaml", "case=%s" % case, "side=left")
+        out = run(self.scratch / "run", "femur/femur-reduction.yaml", "case=%s" % case, "side=left")
         self.check(out, 150, ["verdict.verdict"])
 
     def test_a_nail_and_the_plan_for_its_holes(self):

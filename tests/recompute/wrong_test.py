@@ -26,7 +26,7 @@ class Wrong(Case):
     @classmethod
     def setUpClass(cls):
         cls.shared = cls.shared_folder()
-        cls.made = run(cls.shared / "run", "landmarks.yaml")
+        cls.made = run(cls.shared / "run", "femur/landmarks.yaml")
 
     def setUp(self):
         super().setUp()

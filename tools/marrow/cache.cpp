@@ -127,10 +127,10 @@ int cache_collect(double keep_gb, bool is_shared) {
 void add_cache(CLI::App& app, int& code) {
   const auto key = std::make_shared<std::string>();
   const auto keep_gb = std::make_shared<double>(10);
-  CLI::App* command = app.add_subcommand(
-      "cache",
-      "look at the store of results (MARROW_CACHE, else ~/.cache/marrow/store) and at the shared one\n"
-      "(MARROW_SHARED_CACHE), and tidy them up");
+  CLI::App* command =
+      app.add_subcommand("cache",
+                         "look at the store of results (MARROW_CACHE, else marrow/store in XDG_CACHE_HOME or\n"
+                         "~/.cache) and at the shared one (MARROW_SHARED_CACHE), and tidy them up");
   command->require_subcommand(1);
   command->add_subcommand("info", "how much is kept, and of which nodes")->callback([&code] { code = cache_info(); });
   CLI::App* why = command->add_subcommand("why", "what a kept result was made from");

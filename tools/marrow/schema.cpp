@@ -60,22 +60,33 @@ Json inputs_schema(const std::vector<KindPort>& ports) {
   return {{"type", "object"}, {"additionalProperties", false}, {"properties", properties}};
 }
 
-/// The schema of one node: its options, and the inputs of its kind.
+Json if_used(const NodeInfo& node, const Json& schema) {
+  return {{"if", {{"required", {"uses"}}, {"properties", {{"uses", {{"const", node.name}}}}}}}, {"then", schema}};
+}
+
+/// What one node may have: its options, and the inputs of its kind.
 Json node_schema(const NodeInfo& node) {
   Json with = {{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
-  Json in = {{"allOf", Json::array({reference_to(inputs_of(node.kind()))})}};
-  Json needs = Json::array();
-  for (const OptionInfo& option : node.options) {
-    with["properties"][option.name] = option_schema(option);
-    if (option.required) with["required"].push_back(option.name);
+  for (const OptionInfo& option : node.options) with["properties"][option.name] = option_schema(option);
+  return if_used(node, {{"properties", {{"with", with}, {"in", reference_to(inputs_of(node.kind()))}}}});
+}
+
+/// What nodes must have in a file that extends no other one.
+Json whole_node_schema(const Catalogue& catalogue) {
+  Json all = {reference_to("node_change"), {{"anyOf", {{{"required", {"uses"}}}, {{"required", {"repeat"}}}}}}};
+  for (const std::string& name : catalogue.node_names()) {
+    const NodeInfo& node = *catalogue.find(name);
+    Json needs = Json::object();
+    for (const OptionInfo& option : node.options)
+      if (option.required) needs["with"]["required"].push_back(option.name);
+    for (const PortInfo& port : node.inputs)
+      if (!port.optional) needs["in"]["required"].push_back(port.name);
+    if (needs.empty()) continue;
+    Json sections = Json::array();
+    for (const auto& [section, names] : needs.items()) sections.push_back(section);
+    all.push_back(if_used(node, {{"required", sections}, {"properties", needs}}));
   }
-  for (const PortInfo& port : node.inputs)
-    if (!port.optional) in["required"].push_back(port.name);
-  if (with.contains("required")) needs.push_back("with");
-  if (in.contains("required")) needs.push_back("in");
-  Json schema = {{"properties", {{"with", with}, {"in", in}}}};
-  if (!needs.empty()) schema["required"] = needs;
-  return {{"if", {{"required", {"uses"}}, {"properties", {{"uses", {{"const", node.name}}}}}}}, {"then", schema}};
+  return {{"allOf", all}};
 }
 
 Json any_node_schema(const Catalogue& catalogue) {
@@ -85,17 +96,18 @@ Json any_node_schema(const Catalogue& catalogue) {
     conditions.push_back(node_schema(*catalogue.find(name)));
   }
   const Json place = {{"type", "string"}};
-  return {{"type", "object"},
-          {"anyOf", {{{"required", {"uses"}}}, {{"required", {"repeat"}}}}},
+  uses.push_back({{"pattern", "\\.ya?ml$"}, {"description", "a pipeline file, whose inputs are options and ports"}});
+  return {{"type", {"object", "null"}},
           {"additionalProperties", false},
           {"properties",
-           {{"uses", {{"description", "kind.name of the node"}, {"oneOf", uses}}},
+           {{"uses", {{"description", "kind.name of the node, or a pipeline file"}, {"anyOf", uses}}},
             {"with", {{"type", "object"}, {"description", "options"}}},
             {"in", {{"type", "object"}, {"description", "port: node, node.output or node.output.item"}}},
             {"may_fail",
              {{"type", "boolean"},
               {"default", false},
               {"description", "whether the run goes on without the node's outputs if it fails"}}},
+            {"set", reference_to("changes")},
             {"repeat",
              {{"description", "the body that is run again and again: a pipeline file, or nodes and outputs"},
               {"anyOf", {place, reference_to("body")}}}},
@@ -112,15 +124,20 @@ Json any_node_schema(const Catalogue& catalogue) {
 }
 
 /// The parts that a pipeline and the body of a repetition have in common.
-Json common_parts() {
+Json common_parts(const Catalogue& catalogue) {
+  Json types = {"path", "text", "number", "integer", "boolean"};
+  for (const auto& [name, type] : catalogue.types()) types.push_back(name);
   const Json input = {
-      {"type", "object"},
+      {"type", {"object", "null"}},
       {"additionalProperties", false},
       {"properties",
-       {{"type", {{"enum", {"path", "text", "number", "integer", "boolean"}}, {"description", "type of its values"}}},
+       {{"type",
+         {{"enum", types}, {"description", "type of its values; data make the file a part of other pipelines"}}},
         {"default",
-         {{"type", {"string", "number", "boolean"}},
+         {{"type", {"string", "number", "boolean", "null"}},
           {"description", "its value if none is given; without it, one must be given"}}},
+        {"over", {{"type", "string"}, {"description", "of data: the axis of a list; without it, one item"}}},
+        {"optional", {{"type", "boolean"}, {"description", "of data: whether a user of the part may leave it out"}}},
         {"help", {{"type", "string"}, {"description", "what it means, for those who give it"}}}}}};
   return {{"inputs",
            {{"type", "object"},
@@ -129,24 +146,30 @@ Json common_parts() {
           {"nodes",
            {{"type", "object"},
             {"description", "the nodes by their names, in any order"},
-            {"additionalProperties", reference_to("node")}}},
+            {"additionalProperties", reference_to("node_change")}}},
           {"outputs",
            {{"type", "object"},
             {"description", "what is computed and written: name of the output, and node or node.output"},
-            {"additionalProperties", {{"type", "string"}}}}}};
+            {"additionalProperties", {{"type", {"string", "null"}}}}}}};
 }
 
 Json definitions(const Catalogue& catalogue) {
   const Json text = {{"type", "string"}};
-  Json all = {{"node", any_node_schema(catalogue)},
+  Json all = {{"node_change", any_node_schema(catalogue)},
+              {"node", whole_node_schema(catalogue)},
+              {"whole", {{"properties", {{"nodes", {{"additionalProperties", reference_to("node")}}}}}}},
               {"body",
                {{"type", "object"},
                 {"required", {"nodes", "outputs"}},
+                {"allOf", Json::array({reference_to("whole")})},
                 {"additionalProperties", false},
-                {"properties", common_parts()}}},
+                {"properties", common_parts(catalogue)}}},
               // An option's value may be the name of an input of the pipeline, whatever the option's type.
               {"name_of_input", {{"type", "string"}, {"pattern", "\\$"}}},
-              {"wire", {{"anyOf", {text, {{"type", "array"}, {"items", text}}}}}}};
+              {"changes",
+               {{"type", "object"},
+                {"description", "changes, as --set has them: node.option, node.uses, node.in.port; null removes"}}},
+              {"wire", {{"anyOf", {text, {{"type", "array"}, {"items", text}}, {{"type", "null"}}}}}}};
   for (const std::string& kind : catalogue.kind_names())
     all[inputs_of(kind)] = inputs_schema(catalogue.ports_of_kind(kind));
   return all;
@@ -157,15 +180,21 @@ Json pipeline_schema(const Catalogue& catalogue) {
       {"marrow", {{"const", 1}, {"description", "version of the format"}}},
       {"name",
        {{"type", "string"}, {"description", "of the folder that a run writes, runs/NAME (default: the file's name)"}}},
+      {"extends", {{"type", "string"}, {"description", "pipeline file over which this one puts its own"}}},
+      {"set", reference_to("changes")},
+      {"moved", {{"type", "boolean"}, {"description", "this is an old name of the file that it extends"}}},
       {"help", {{"type", "string"}, {"description", "what the pipeline does, and for which data"}}},
       {"only_inside",
        {{"type", "boolean"},
         {"description", "no command runs it, but the program itself, so no file need hold its outputs"}}}};
-  properties.update(common_parts());
+  properties.update(common_parts(catalogue));
   return {{"$schema", "http://json-schema.org/draft-07/schema#"},
           {"title", "marrow pipeline"},
           {"type", "object"},
-          {"required", {"marrow", "nodes", "outputs"}},
+          {"required", {"marrow"}},
+          {"if", {{"required", {"extends"}}}},
+          {"then", true},
+          {"else", {{"required", {"nodes", "outputs"}}, {"allOf", Json::array({reference_to("whole")})}}},
           {"additionalProperties", false},
           {"properties", properties},
           {"definitions", definitions(catalogue)}};

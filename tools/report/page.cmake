@@ -3,6 +3,7 @@ find_package(Python3 REQUIRED COMPONENTS Interpreter)
 find_program(ESBUILD esbuild REQUIRED)  # bundle.py calls it
 set(report_page ${CMAKE_CURRENT_BINARY_DIR}/report_page.html)
 file(GLOB report_parts CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tools/report/page/*)
+list(APPEND report_parts ${PROJECT_SOURCE_DIR}/docs/glossary.md)
 add_custom_command(OUTPUT ${report_page} DEPENDS ${report_parts}
   COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/tools/report/page/bundle.py
     ${PROJECT_SOURCE_DIR}/tools/report/page/report.html ${report_page})

@@ -3,6 +3,8 @@
 import pathlib
 import sys
 
+from sphinx.search.en import SearchEnglish
+
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 
 project = "marrow"
@@ -18,3 +20,13 @@ html_copy_source = False
 html_show_sourcelink = False
 html_show_copyright = False
 html_show_sphinx = False
+
+
+class Search(SearchEnglish):
+    """Finds "one view": the stem of "one" is "on", which is left out of the index otherwise, but is searched for."""
+
+    stopwords = SearchEnglish.stopwords - {"on"}
+
+
+def setup(app):
+    app.add_search_language(Search)

@@ -12,7 +12,7 @@ from blocks import blocks_of
 SPAN = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
 WORD = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)+")
 NODE = re.compile(r"([a-z_]+)\.[a-z_0-9]+")
-USES = re.compile(r"\buses(?:: +|=)([a-z_0-9]+\.[a-z_0-9]+)")
+USES = re.compile(r"\buses(?:: +|=)([a-z_0-9]+\.(?!yaml\b)[a-z_0-9]+)")
 OPTION = re.compile(r"\boptions? (?:of type \w+ )?`([a-z_0-9]+)`")
 OF_NODE = re.compile(r"`([a-z_0-9]+)` of `([a-z_0-9]+\.[a-z_0-9]+)`")
 # Words of the field that look like names of marrow.

@@ -73,7 +73,7 @@ def make(marrow, root, catalogue, folder):
     """Makes folder/NAME.png for all nodes that can have one. Returns {name: (file, legend, whether it is
     much wider than high)} and [why a node has none]."""
     folder.mkdir(parents=True, exist_ok=True)
-    outputs, fault = run(marrow, folder / "runs" / "case", root / "pipelines" / "simulate.yaml")
+    outputs, fault = run(marrow, folder / "runs" / "case", root / "pipelines" / "simulate" / "simulate.yaml")
     if fault is not None:
         return {}, fault
     tasks = {}

@@ -7,27 +7,41 @@ from sources import USES
 
 
 def page_of(path):
-    """The page of a file: pipelines/femur.yaml has pipelines/femur."""
+    """The page of a file: pipelines/femur/femur.yaml has pipelines/femur."""
     return str(path.with_suffix(""))
 
 
 def kind_of(document):
-    """pipeline, experiment, or '' for other files."""
-    if not isinstance(document, dict):
+    """pipeline, experiment, or '' for other files and for names that have moved."""
+    if not isinstance(document, dict) or document.get("moved"):
         return ""
-    return (
-        "pipeline" if "marrow" in document and "nodes" in document else "experiment" if "experiment" in document else ""
-    )
+    return "pipeline" if "marrow" in document else "experiment" if "experiment" in document else ""
+
+
+def merged(old, new):
+    """A map with another put over it, down to the last entry; None removes one."""
+    if not isinstance(old, dict) or not isinstance(new, dict):
+        return new
+    names = list(old) + [name for name in new if name not in old]
+    kept = [name for name in names if name not in new or new[name] is not None]
+    return {name: merged(old.get(name), new[name]) if name in new else old[name] for name in kept}
+
+
+def whole(path):
+    """The content of a file with that of the files that it extends."""
+    content = yaml.safe_load(path.read_text())
+    if not kind_of(content) or "extends" not in content:
+        return content
+    return merged(whole(path.parent / content["extends"]), content)
 
 
 def files(root):
     """{path from the root: (kind, text, content)} of pipelines and experiments."""
     found = {}
     for path in sorted((root / "pipelines").rglob("*.yaml")):
-        text = path.read_text()
-        content = yaml.safe_load(text)
+        content = whole(path)
         if kind_of(content):
-            found[path.relative_to(root)] = (kind_of(content), text, content)
+            found[path.relative_to(root)] = (kind_of(content), path.read_text(), content)
     return found
 
 
@@ -50,12 +64,14 @@ def file_page(path, kind, text, content, up):
     names = sorted(set(USES.findall(text)))
     nodes = ", ".join("[%s](%snodes/%s.md)" % (name, up, name) for name in names)
     pipeline = "" if kind == "pipeline" else "It compares variants of %s." % code(str(content["pipeline"]))
+    extended = "It says what differs from %s." % code(content["extends"]) if "extends" in content else ""
     outputs = content.get("outputs") if kind == "pipeline" else None
     return sections(
         ORPHAN,
         "# " + path.name,
         plain(content.get("help", "")),
         pipeline,
+        extended,
         block(command_for(path, kind, content), "bash"),
         section("Inputs", inputs_table(content) if kind == "pipeline" else ""),
         section("Outputs", ", ".join(code(name) for name in outputs or {})),

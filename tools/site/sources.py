@@ -5,7 +5,7 @@ import re
 from markdown import slug
 
 NODE = re.compile(r'\bnode\(\s*"([a-z_0-9]+\.[a-z_0-9]+)"')
-USES = re.compile(r"\buses: *([a-z_0-9]+\.[a-z_0-9]+)")
+USES = re.compile(r"\buses: *([a-z_0-9]+\.(?!yaml\b)[a-z_0-9]+)")
 MENTION = re.compile(r"[a-z_0-9]+\.[a-z_0-9]+")
 
 

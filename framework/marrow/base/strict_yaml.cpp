@@ -13,23 +13,35 @@
 
 namespace marrow {
 
-YAML::Node StrictYaml::parse(const std::string& written) {
-  const std::string text = plain_text(written);
+YAML::Node StrictYaml::parse(const std::string& text) { return parsed(plain_text(text), 0); }
+
+YAML::Node StrictYaml::parse_also(const std::string& file, const std::string& text) {
+  further_.push_back({file, lines_});
+  return parsed(plain_text(text), lines_);
+}
+
+YAML::Node StrictYaml::parsed(const std::string& text, int first_line) {
+  lines_ = first_line + int(std::count(text.begin(), text.end(), '\n')) + 1;
   try {
-    return parse_yaml(text);
+    return parse_yaml(std::string(std::size_t(first_line), '\n') + text);
   } catch (const YAML::ParserException& error) {
-    fault({file_, error.mark.line + 1, error.mark.column + 1}, "not valid YAML: " + error.msg);
+    fault(place_of(error.mark), "not valid YAML: " + error.msg);
     // The parser reports where the text ends or makes no sense. The mistake is where a bracket or quote was left open.
     if (const auto opened = last_unclosed(text))
-      fault({file_, opened->line, opened->column}, std::string("this ") + opened->mark + " is not closed");
+      fault({place_of(error.mark).file, opened->line, opened->column},
+            std::string("this ") + opened->mark + " is not closed");
   } catch (const YAML::Exception& error) {
-    fault({file_, error.mark.line + 1, error.mark.column + 1}, "cannot be read as YAML: " + error.msg);
+    fault(place_of(error.mark), "cannot be read as YAML: " + error.msg);
   }
   return {};
 }
 
 Place StrictYaml::place_of(const YAML::Mark& mark) const {
-  return only_ ? *only_ : Place{file_, mark.line + 1, mark.column + 1};
+  if (only_) return *only_;
+  for (std::size_t i = further_.size(); i-- > 0;)
+    if (mark.line >= further_[i].first_line)
+      return {further_[i].name, mark.line - further_[i].first_line + 1, mark.column + 1};
+  return {file_, mark.line + 1, mark.column + 1};
 }
 
 std::vector<YamlEntry> StrictYaml::map(const YAML::Node& node, const Place& where, const std::string& what,

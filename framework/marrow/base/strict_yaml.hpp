@@ -30,6 +30,9 @@ class StrictYaml {
   /// Parses a text, however its writer stored it (plain_text()). A syntax error becomes a diagnostic and gives a null
   /// node.
   YAML::Node parse(const std::string& text);
+  /// The same for the text of another file. Its nodes and those of the first file may then be in one tree: each has its
+  /// place in its own file.
+  YAML::Node parse_also(const std::string& file, const std::string& text);
   Place place(const YAML::Node& node) const { return place_of(node.Mark()); }
   /// The entries of a map in their order. `what` names the map in messages. If `known` is given, other keys are faults.
   std::vector<YamlEntry> map(const YAML::Node& node, const Place& where, const std::string& what,
@@ -46,9 +49,18 @@ class StrictYaml {
  private:
   Place place_of(const YAML::Mark& mark) const;
 
+  YAML::Node parsed(const std::string& text, int first_line);
+
+  struct FurtherFile {
+    std::string name;
+    int first_line;  ///< as yaml-cpp counts: the files' texts are read as if they followed each other
+  };
+
   std::string file_;
   Diagnostics& diagnostics_;
   std::optional<Place> only_;
+  std::vector<FurtherFile> further_;
+  int lines_ = 0;  ///< of all texts so far
 };
 
 /// The text of a file that people write. It is remembered so that its lines can be shown. If the file cannot be read or

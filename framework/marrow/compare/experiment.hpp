@@ -106,7 +106,8 @@ inline constexpr std::size_t kMostMetrics = 1000;
 struct Experiment {
   std::string name, help;
   std::filesystem::path file;
-  std::string text;  ///< text of the file
+  std::string text;                          ///< text of the file
+  std::vector<std::filesystem::path> files;  ///< all that it was read from, also those of its pipelines
   std::filesystem::path pipeline;
   std::vector<InputValue> inputs;  ///< inputs of the pipeline, the same in every cell
   std::vector<Override> common;    ///< changes of the pipeline for all variants, applied before their own

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "experiment_layers.hpp"
 #include "experiment_text.hpp"
 #include "folder_search.hpp"
 #include "marrow/base/error.hpp"
@@ -32,8 +33,8 @@ bool read_range_of_seeds(const std::string& text, std::uint64_t& first, std::uin
 
 class CaseReader {
  public:
-  CaseReader(StrictYaml& yaml, const fs::path& folder, WrittenExperiment& written)
-      : yaml_(yaml), folder_(folder), written_(written), experiment_(written.experiment) {}
+  CaseReader(StrictYaml& yaml, WrittenExperiment& written)
+      : yaml_(yaml), written_(written), experiment_(written.experiment) {}
 
   void read(const YamlEntry& section) {
     static const std::vector<std::string> kKeys{"input", "folders", "seeds", "simulate", "draw", "seed_input"};
@@ -111,7 +112,7 @@ class CaseReader {
       return yaml_.fault(place, "a folder of 'folders' is empty", "name a folder; that of the experiment's file is  .");
     std::vector<fs::path> found;
     try {
-      found = search_.matches(folder_, pattern);
+      found = search_.matches(folder_of(place), pattern);
       // With '..' after a '*', the same folder is found many times.
       std::transform(found.begin(), found.end(), found.begin(), plain_path);
       std::sort(found.begin(), found.end());
@@ -149,7 +150,7 @@ class CaseReader {
     for (const YamlEntry& entry : yaml_.map(section.value, section.place, "'simulate'", &kKeys)) {
       has_pipeline |= entry.key == "pipeline";
       has_seeds |= entry.key == "seeds";
-      if (entry.key == "pipeline") simulation.pipeline = file_of(yaml_, entry, folder_);
+      if (entry.key == "pipeline") simulation.pipeline = file_of(yaml_, entry);
       if (entry.key == "output") {
         simulation.output = yaml_.text(entry.value, entry.place, "output").value_or("");
         written_.simulation_place = entry.place;
@@ -161,7 +162,7 @@ class CaseReader {
     }
     if (!section.value.IsMap()) return;
     if (!has_pipeline)
-      yaml_.fault(section.place, "'simulate' does not name its pipeline", "add  pipeline: ../simulate.yaml");
+      yaml_.fault(section.place, "'simulate' does not name its pipeline", "add  pipeline: ../simulate/simulate.yaml");
     if (!has_seeds) yaml_.fault(section.place, "'simulate' does not say which seeds", "add  seeds: 1..20  or a list");
     add_seeds(seeds, true, section.place);
   }
@@ -231,7 +232,6 @@ class CaseReader {
   }
 
   StrictYaml& yaml_;
-  const fs::path& folder_;
   WrittenExperiment& written_;
   Experiment& experiment_;
   std::map<std::string, std::size_t> known_;  ///< cases by their names in small letters
@@ -242,8 +242,8 @@ class CaseReader {
 
 }  // namespace
 
-void read_cases(StrictYaml& yaml, const YamlEntry& section, const fs::path& folder, WrittenExperiment& written) {
-  CaseReader(yaml, folder, written).read(section);
+void read_cases(StrictYaml& yaml, const YamlEntry& section, WrittenExperiment& written) {
+  CaseReader(yaml, written).read(section);
 }
 
 }  // namespace marrow::compare

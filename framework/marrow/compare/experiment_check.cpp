@@ -9,8 +9,11 @@ namespace marrow::compare {
 namespace {
 
 struct CheckedPipelines {
-  std::vector<std::string> notes;  ///< of all variants: what one variant does not use, another may need
-  std::vector<NamedItem> items;    ///< Experiment::named_items
+  std::vector<std::string> notes;            ///< of all variants: what one variant does not use, another may need
+  std::vector<NamedItem> items;              ///< Experiment::named_items
+  std::vector<std::filesystem::path> files;  ///< of the pipelines
+
+  void add_files(const Pipeline& pipeline) { files.insert(files.end(), pipeline.files.begin(), pipeline.files.end()); }
 };
 
 /// Reads the pipelines with the inputs of the cells and the changes of each variant. Checks that they have everything
@@ -26,13 +29,14 @@ class Checker {
 
   CheckedPipelines check() {
     CheckedPipelines checked;
-    check_simulation();
+    check_simulation(checked);
     for (std::size_t v = 0; v < experiment_.variants.size(); ++v) {
       Diagnostics faults;
       const Pipeline pipeline =
           read_pipeline(experiment_.pipeline, arguments_of(experiment_, {v, 0, 0}, "case"), catalogue_, faults, true);
       diagnostics_.add_all(faults);  // a fault of every variant is reported once
       if (!faults.empty()) continue;
+      checked.add_files(pipeline);
       if (v == 0) checked.notes = pipeline.notes;
       std::erase_if(checked.notes, [&](const std::string& note) { return !contains(pipeline.notes, note); });
       figures_.check(v, pipeline);
@@ -44,13 +48,14 @@ class Checker {
   }
 
  private:
-  void check_simulation() {
+  void check_simulation(CheckedPipelines& checked) {
     for (std::size_t c = 0; c < experiment_.cases.size(); ++c) {
       if (!experiment_.cases[c].is_simulated) continue;
       Diagnostics faults;
       const Pipeline pipeline = read_pipeline(experiment_.simulation.pipeline, simulation_arguments_of(experiment_, c),
                                               catalogue_, faults, true);
       diagnostics_.add_all(faults);
+      checked.add_files(pipeline);
       if (faults.empty()) find_output(pipeline, experiment_.simulation.output, written_.simulation_place, diagnostics_);
       return;  // the other cases differ only in numbers
     }
@@ -106,6 +111,9 @@ Experiment read_experiment(const std::filesystem::path& file, const Catalogue& c
   Experiment& experiment = written.experiment;
   experiment.named_items = checked.items;
   experiment.notes = checked.notes;
+  for (const std::filesystem::path& one : checked.files)
+    if (std::find(experiment.files.begin(), experiment.files.end(), one) == experiment.files.end())
+      experiment.files.push_back(one);
   return std::move(experiment);
 }
 

@@ -6,17 +6,15 @@
 #include <set>
 
 #include "draw.hpp"
+#include "experiment_layers.hpp"
 #include "experiment_replaced.hpp"
 #include "experiment_stop.hpp"
 #include "experiment_sweep.hpp"
 #include "experiment_tune.hpp"
 #include "marrow/base/characters.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/base/plain_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/base/text_file.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -29,30 +27,22 @@ class Reader {
       : diagnostics_(diagnostics), yaml_(file.string(), diagnostics) {
     experiment_.file = file;
     experiment_.more_cases = more_cases;
-    folder_ = fs::absolute(file).parent_path();
   }
 
   WrittenExperiment read() {
-    const fs::path& file = experiment_.file;
-    try {
-      experiment_.text = read_text_file(file, kMostSourceBytes);
-    } catch (const Error& error) {
-      diagnostics_.add({file.string()}, "the experiment file" + std::string(error.what()).substr(file.string().size()),
-                       "check the path");
-      return written_;
-    }
-    diagnostics_.remember(file.string(), plain_text(experiment_.text));
-    const YAML::Node root = yaml_.parse(experiment_.text);
-    if (diagnostics_.empty()) read_root(root);
+    LayeredExperiment layered = read_layers(yaml_, experiment_.file, diagnostics_);
+    experiment_.text = std::move(layered.text);
+    experiment_.files = std::move(layered.files);
+    if (diagnostics_.empty()) read_root(layered.root);
     return written_;
   }
 
  private:
   void read_root(const YAML::Node& root) {
-    static const std::vector<std::string> kKeys{"experiment",  "name",    "help",          "pipeline", "inputs",
-                                                "set",         "cases",   "variants",      "matrix",   "starts",
-                                                "metrics",     "success", "initial_error", "baseline", "pictures",
-                                                "timed_cells", "stop",    "sweep",         "tune"};
+    static const std::vector<std::string> kKeys{"extends",  "experiment",  "name",    "help",          "pipeline",
+                                                "inputs",   "set",         "cases",   "variants",      "matrix",
+                                                "starts",   "metrics",     "success", "initial_error", "baseline",
+                                                "pictures", "timed_cells", "stop",    "sweep",         "tune"};
     const Place start{experiment_.file.string(), 1, 1};
     const std::vector<YamlEntry> entries = yaml_.map(root, start, "the experiment", &kKeys);
     if (!root.IsMap()) return;
@@ -134,10 +124,10 @@ class Reader {
         experiment_.name = "?";
     }
     if (entry.key == "help") experiment_.help = text();
-    if (entry.key == "pipeline") experiment_.pipeline = file_of(yaml_, entry, folder_);
+    if (entry.key == "pipeline") experiment_.pipeline = file_of(yaml_, entry);
     if (entry.key == "inputs") experiment_.inputs = inputs_of(yaml_, entry);
     if (entry.key == "set") experiment_.common = patches_of(yaml_, entry, "'set'");
-    if (entry.key == "cases") read_cases(yaml_, entry, folder_, written_);
+    if (entry.key == "cases") read_cases(yaml_, entry, written_);
     if (entry.key == "variants") read_variants(entry);
     if (entry.key == "matrix") read_matrix(entry);
     if (entry.key == "starts") read_starts(entry);
@@ -361,7 +351,6 @@ class Reader {
   StrictYaml yaml_;
   WrittenExperiment written_;
   Experiment& experiment_ = written_.experiment;
-  fs::path folder_;
   StopReader stop_{yaml_};
   SweepReader sweep_{yaml_};
   TuneReader tune_{yaml_};

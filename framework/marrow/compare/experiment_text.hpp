@@ -20,7 +20,6 @@ WrittenExperiment read_written_experiment(const std::filesystem::path& file, Dia
 
 /// Reads the section 'cases': folders, seeds, and simulations whose inputs are drawn. `experiment.more_cases` seeds
 /// follow those that it names.
-void read_cases(StrictYaml& yaml, const YamlEntry& section, const std::filesystem::path& folder,
-                WrittenExperiment& written);
+void read_cases(StrictYaml& yaml, const YamlEntry& section, WrittenExperiment& written);
 
 }  // namespace marrow::compare

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "experiment_yaml.hpp"
 
+#include "experiment_layers.hpp"
+
 #include <algorithm>
 
 #include "marrow/base/file_names.hpp"
@@ -108,14 +110,14 @@ std::vector<Named> names_of_options(const std::vector<SweptOption>& options) {
   return names;
 }
 
-fs::path file_of(StrictYaml& yaml, const YamlEntry& entry, const fs::path& folder) {
+fs::path file_of(StrictYaml& yaml, const YamlEntry& entry) {
   const auto text = yaml.text(entry.value, entry.place, entry.key);
   if (!text) return {};
   if (text->empty()) {
     yaml.fault(entry.place, "'" + entry.key + "' is empty", "name a file; the path starts at the experiment's file");
     return {};
   }
-  fs::path file = plain_path(folder / *text);
+  fs::path file = plain_path(folder_of(entry.place) / *text);
   std::error_code error;
   if (fs::is_regular_file(file, error)) return file;
   yaml.fault(entry.place, "there is no file '" + *text + "'", "the path starts at the experiment's file");

@@ -46,7 +46,8 @@ void find_variant(StrictYaml& yaml, const Experiment& experiment, const Named& a
 /// The number of the metric with this path. Reports a fault if there is none.
 std::optional<std::size_t> find_metric(StrictYaml& yaml, const Experiment& experiment, const Named& asked);
 std::vector<Named> names_of_options(const std::vector<SweptOption>& options);
-/// The file that a key names, relative to `folder`. If there is none, reports a fault and returns an empty path.
-std::filesystem::path file_of(StrictYaml& yaml, const YamlEntry& entry, const std::filesystem::path& folder);
+/// The file that a key names, relative to the file that the key is in. If there is none, reports a fault and returns an
+/// empty path.
+std::filesystem::path file_of(StrictYaml& yaml, const YamlEntry& entry);
 
 }  // namespace marrow::compare

@@ -169,7 +169,7 @@ TEST_F(ExperimentFaults, Simulation) {
   expect_fault(std::string(kHead) + "cases:\n  simulate: s.yaml\n" + kAfterCases, 4,
                "'simulate' must be a map, got 's.yaml'", kMapHint);
   expect_fault(std::string(kHead) + "cases:\n  simulate: {seeds: 1..2}\n" + kAfterCases, 4,
-               "'simulate' does not name its pipeline", "add  pipeline: ../simulate.yaml");
+               "'simulate' does not name its pipeline", "add  pipeline: ../simulate/simulate.yaml");
   expect_fault(std::string(kHead) + "cases:\n  simulate: {pipeline: s.yaml}\n" + kAfterCases, 4,
                "'simulate' does not say which seeds", "add  seeds: 1..20  or a list");
   expect_simulation_fault("pipelin: s.yaml", "unknown key 'pipelin' in 'simulate'", "did you mean 'pipeline'?");

@@ -57,8 +57,9 @@ TEST_F(ExtendsTest, SetIsTheShortForm) {
 }
 
 TEST_F(ExtendsTest, AnotherNodeGetsOnlyOptionsWrittenForIt) {
-  Pipeline p = good(extend(kBase, "nodes:\n  c: {uses: test.sides, with: {names: [x]}}\nset: {sum.in.a: c.left}\n"
-                                  "outputs: {c: c.left}\n"));
+  Pipeline p = good(extend(kBase,
+                           "nodes:\n  c: {uses: test.sides, with: {names: [x]}}\nset: {sum.in.a: c.left}\n"
+                           "outputs: {c: c.left}\n"));
   EXPECT_EQ(std::get<std::vector<std::string>>(option(p, "c", "names")), std::vector<std::string>{"x"});
   p = good(extend(kBase, "set: {c.names: [x], c.uses: test.sides, sum.in.a: c.left}\noutputs: {c: c.left}\n"));
   EXPECT_EQ(std::get<std::vector<std::string>>(option(p, "c", "names")), std::vector<std::string>{"x"});
@@ -89,10 +90,11 @@ TEST_F(ExtendsTest, InputsChangeTheirDefaultOrGo) {
 
 TEST_F(ExtendsTest, PathsStartWhereTheyAreWritten) {
   std::filesystem::create_directory(scratch.path / "below");
-  scratch.write("below/base.yaml", "marrow: 1\ninputs: {at: {type: path, default: a.txt}}\nnodes:\n"
-                                   "  c: {uses: test.constant, with: {path: $at}}\n"
-                                   "  d: {uses: test.constant, with: {path: a.txt}}\n"
-                                   "  e: {uses: test.constant}\noutputs: {c: c, d: d, e: e}\n");
+  scratch.write("below/base.yaml",
+                "marrow: 1\ninputs: {at: {type: path, default: a.txt}}\nnodes:\n"
+                "  c: {uses: test.constant, with: {path: $at}}\n"
+                "  d: {uses: test.constant, with: {path: a.txt}}\n"
+                "  e: {uses: test.constant}\noutputs: {c: c, d: d, e: e}\n");
   const Pipeline p = good(read("marrow: 1\nextends: below/base.yaml\nset: {e.path: a.txt}\n"));
   const auto path = [&](const char* id) { return std::get<std::string>(option(p, id, "path")); };
   EXPECT_EQ(path("c"), (scratch.path / "below" / "a.txt").string());
@@ -145,8 +147,7 @@ TEST_F(ExtendsTest, FaultsOfExtends) {
   read("marrow: 1\nextends: [base.yaml]\n");
   expect_fault_in("p.yaml", 2, "extends: expected a text, got a list of 1");
   extend("extends: p.yaml\n" + kBase, "");
-  expect_fault_in("base.yaml", 2,
-                  "the files extend each other in a circle: p.yaml extends base.yaml extends p.yaml",
+  expect_fault_in("base.yaml", 2, "the files extend each other in a circle: p.yaml extends base.yaml extends p.yaml",
                   "one of them must stand alone");
   read("marrow: 1\nextends: p.yaml\n");
   expect_fault_in("p.yaml", 2, "the files extend each other in a circle: p.yaml extends p.yaml");
@@ -186,8 +187,8 @@ TEST_F(ExtendsTest, VariablesOfTheEnvironment) {
   const std::string with = "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: ";
   EXPECT_EQ(number(good(read(with + "'$env:MARROW_TEST_VALUE'}}" + tail)), "c"), 12);
   unsetenv("MARROW_TEST_VALUE");
-  expect_fault(with + "'$env:MARROW_TEST_VALUE'}}" + tail, 3, 42,
-               "the environment has no variable 'MARROW_TEST_VALUE'", "export MARROW_TEST_VALUE=...");
+  expect_fault(with + "'$env:MARROW_TEST_VALUE'}}" + tail, 3, 42, "the environment has no variable 'MARROW_TEST_VALUE'",
+               "export MARROW_TEST_VALUE=...");
   expect_fault(with + "'$env:'}}" + tail, 3, 42, "$env: names no environment variable", "$env:NAME");
 }
 

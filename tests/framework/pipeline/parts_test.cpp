@@ -38,9 +38,10 @@ TEST_F(PartsTest, ItIsThePipelineThatOneWouldHaveWritten) {
 }
 
 TEST_F(PartsTest, InputsAreOptionsAndPorts) {
-  const Pipeline p = good(read("marrow: 1\ninputs: {n: {type: number, default: 2}}\nnodes:\n  d: {uses: test.draw}\n"
-                               "  plus: {uses: part.yaml, in: {to: d}, with: {by: $n}}\n"
-                               "  again: {uses: part.yaml, in: {to: plus}, with: {by: 5}}\noutputs: {o: again}\n"));
+  const Pipeline p =
+      good(read("marrow: 1\ninputs: {n: {type: number, default: 2}}\nnodes:\n  d: {uses: test.draw}\n"
+                "  plus: {uses: part.yaml, in: {to: d}, with: {by: $n}}\n"
+                "  again: {uses: part.yaml, in: {to: plus}, with: {by: 5}}\noutputs: {o: again}\n"));
   EXPECT_EQ(number(p, "plus/c"), 2);
   EXPECT_EQ(number(p, "again/c"), 5);
   EXPECT_EQ(wires(p, "again/sum"), "a <- plus/sum, b <- again/c");
@@ -60,32 +61,38 @@ TEST_F(PartsTest, ListsOfReferencesGoIn) {
                 "marrow: 1\ninputs: {all: {type: metrics, over: item}, more: {type: metrics, optional: true}}\nnodes:\n"
                 "  c: {uses: test.constant}\n  s: {uses: test.sum, in: {items: all}}\n"
                 "  t: {uses: test.sum, in: {items: [c, more]}}\noutputs: {s: s, t: t}\n");
-  const Pipeline p = good(whole("  a: {uses: test.draw}\n  b: {uses: test.draw}\n"
-                                "  plus: {uses: list.yaml, in: {all: [a, b]}}\n"
-                                "  with: {uses: list.yaml, in: {all: [a, b], more: b}}\n",
-                                "o: plus.s, p: plus.t, q: with.t"));
+  const Pipeline p =
+      good(whole("  a: {uses: test.draw}\n  b: {uses: test.draw}\n"
+                 "  plus: {uses: list.yaml, in: {all: [a, b]}}\n"
+                 "  with: {uses: list.yaml, in: {all: [a, b], more: b}}\n",
+                 "o: plus.s, p: plus.t, q: with.t"));
   EXPECT_EQ(wires(p, "plus/s"), "items <- a b");
   EXPECT_EQ(wires(p, "plus/t"), "items <- plus/c") << "an optional input that is left out";
   EXPECT_EQ(wires(p, "with/t"), "items <- with/c b");
 }
 
 TEST_F(PartsTest, FunctionsGoInAndOut) {
-  scratch.write("maker.yaml", "marrow: 1\nonly_inside: true\ninputs: {amount: {type: metrics}}\n"
-                              "nodes: {f: {uses: test.adder, in: {amount: amount}}}\noutputs: {f: f}\n");
-  scratch.write("user.yaml", "marrow: 1\ninputs: {f: {type: adder}, to: {type: metrics}}\n"
-                             "nodes: {n: {uses: test.apply, in: {adder: f, to: to}}}\noutputs: {n: n}\n");
-  const Pipeline p = good(whole("  d: {uses: test.draw}\n  make: {uses: maker.yaml, in: {amount: d}}\n"
-                                "  plus: {uses: user.yaml, in: {f: make.f, to: d}}\n"));
+  scratch.write("maker.yaml",
+                "marrow: 1\nonly_inside: true\ninputs: {amount: {type: metrics}}\n"
+                "nodes: {f: {uses: test.adder, in: {amount: amount}}}\noutputs: {f: f}\n");
+  scratch.write("user.yaml",
+                "marrow: 1\ninputs: {f: {type: adder}, to: {type: metrics}}\n"
+                "nodes: {n: {uses: test.apply, in: {adder: f, to: to}}}\noutputs: {n: n}\n");
+  const Pipeline p =
+      good(whole("  d: {uses: test.draw}\n  make: {uses: maker.yaml, in: {amount: d}}\n"
+                 "  plus: {uses: user.yaml, in: {f: make.f, to: d}}\n"));
   EXPECT_EQ(wires(p, "plus/n"), "adder <- make/f, to <- d");
 }
 
 TEST_F(PartsTest, APartMayHaveParts) {
-  scratch.write("twice.yaml", "marrow: 1\ninputs: {x: {type: metrics}}\nnodes:\n"
-                              "  one: {uses: part.yaml, in: {to: x}}\n  two: {uses: part.yaml, in: {to: one.sum}}\n"
-                              "outputs: {y: two.sum, x: x}\n");
-  const Pipeline p = good(whole("  d: {uses: test.draw}\n  plus: {uses: twice.yaml, in: {x: d}}\n"
-                                "  n: {uses: test.add, in: {a: plus.y, b: plus.x}}\n",
-                                "o: n"));
+  scratch.write("twice.yaml",
+                "marrow: 1\ninputs: {x: {type: metrics}}\nnodes:\n"
+                "  one: {uses: part.yaml, in: {to: x}}\n  two: {uses: part.yaml, in: {to: one.sum}}\n"
+                "outputs: {y: two.sum, x: x}\n");
+  const Pipeline p =
+      good(whole("  d: {uses: test.draw}\n  plus: {uses: twice.yaml, in: {x: d}}\n"
+                 "  n: {uses: test.add, in: {a: plus.y, b: plus.x}}\n",
+                 "o: n"));
   EXPECT_EQ(wires(p, "plus/two/sum"), "a <- plus/one/sum, b <- plus/two/c");
   EXPECT_EQ(wires(p, "n"), "a <- plus/two/sum, b <- d") << "what goes through is what was given";
 }
@@ -96,8 +103,7 @@ TEST_F(PartsTest, ChangesReachIn) {
   EXPECT_EQ(number(good(whole(set, "o: plus", {{}, {{"plus.c.value", "8"}}})), "plus/c"), 8);
   EXPECT_EQ(number(good(whole(set, "o: plus", {{}, {{"plus/c.value", "9"}}})), "plus/c"), 9) << "as runs call it";
   EXPECT_EQ(number(good(whole(kUse, "o: plus", {{}, {{"plus.by", "2"}}})), "plus/c"), 2);
-  const Pipeline added =
-      good(whole(kUse, "o: plus", {{}, {{"plus.sum.in.a", "e"}, {"plus.e.uses", "test.constant"}}}));
+  const Pipeline added = good(whole(kUse, "o: plus", {{}, {{"plus.sum.in.a", "e"}, {"plus.e.uses", "test.constant"}}}));
   EXPECT_EQ(wires(added, "plus/sum"), "a <- plus/e, b <- plus/c");
   const Pipeline other = good(whole(set, "o: plus", {{}, {{"plus.c.uses", "test.draw"}}}));
   EXPECT_EQ(node(other, "plus/c").info.name, "test.draw");
@@ -106,10 +112,12 @@ TEST_F(PartsTest, ChangesReachIn) {
 }
 
 TEST_F(PartsTest, APartIsSwappedForAnother) {
-  scratch.write("other.yaml", "marrow: 1\ninputs: {to: {type: metrics}}\nnodes:\n  c: {uses: test.draw}\n"
-                              "  sum: {uses: test.add, in: {a: to, b: c}}\noutputs: {sum: sum}\n");
-  scratch.write("base.yaml", "marrow: 1\nnodes:\n  d: {uses: test.draw}\n"
-                             "  plus: {uses: part.yaml, in: {to: d}, with: {by: 4}, set: {c.word: two}}\noutputs: {o: plus}\n");
+  scratch.write("other.yaml",
+                "marrow: 1\ninputs: {to: {type: metrics}}\nnodes:\n  c: {uses: test.draw}\n"
+                "  sum: {uses: test.add, in: {a: to, b: c}}\noutputs: {sum: sum}\n");
+  scratch.write("base.yaml",
+                "marrow: 1\nnodes:\n  d: {uses: test.draw}\n"
+                "  plus: {uses: part.yaml, in: {to: d}, with: {by: 4}, set: {c.word: two}}\noutputs: {o: plus}\n");
   const Pipeline p = good(read("marrow: 1\nextends: base.yaml\nset: {plus.uses: other.yaml}\n"));
   EXPECT_EQ(node(p, "plus/c").info.name, "test.draw");
 }
@@ -120,8 +128,9 @@ TEST_F(PartsTest, OneThatExtends) {
 }
 
 TEST_F(PartsTest, ABodyMayHaveParts) {
-  scratch.write("body.yaml", "marrow: 1\ninputs: {x: {type: metrics}}\nnodes:\n"
-                             "  plus: {uses: part.yaml, in: {to: x}}\noutputs: {y: plus}\n");
+  scratch.write("body.yaml",
+                "marrow: 1\ninputs: {x: {type: metrics}}\nnodes:\n"
+                "  plus: {uses: part.yaml, in: {to: x}}\noutputs: {y: plus}\n");
   const std::string letters = "  l: {uses: test.letters}\n";
   const Pipeline p = good(whole(letters + "  loop: {over: letter, repeat: body.yaml, in: {x: l}}\n", "o: loop.y"));
   EXPECT_EQ(ids(node(p, "loop").repetition->alone), "x plus/c plus/sum");
@@ -178,8 +187,9 @@ TEST_F(PartsTest, TheOutputIsNamedUnlessThereIsOne) {
 }
 
 TEST_F(PartsTest, FaultsAreShownWhereTheyAre) {
-  scratch.write("wrong.yaml", "marrow: 1\ninputs: {to: {type: metrics}}\nnodes:\n  c: {uses: test.constnt}\n"
-                              "outputs: {c: c}\n");
+  scratch.write("wrong.yaml",
+                "marrow: 1\ninputs: {to: {type: metrics}}\nnodes:\n  c: {uses: test.constnt}\n"
+                "outputs: {c: c}\n");
   whole("  d: {uses: test.draw}\n  plus: {uses: wrong.yaml, in: {to: d}}\n");
   expect_fault_in("wrong.yaml", 4, "unknown node 'test.constnt'");
   whole("  f: {uses: test.adder, in: {amount: d}}\n  d: {uses: test.draw}\n  plus: {uses: part.yaml, in: {to: f}}\n");
@@ -191,15 +201,16 @@ TEST_F(PartsTest, FaultsAreShownWhereTheyAre) {
 }
 
 TEST_F(PartsTest, ItsTypes) {
-  scratch.write("types.yaml", "marrow: 1\ninputs:\n  a: {type: metrix}\n  b: {type: number, over: item}\n"
-                              "  c: {type: metrics, default: 3}\n  d: {optional: true}\nnodes:\n"
-                              "  e: {uses: test.draw}\noutputs: {e: e}\n");
+  scratch.write("types.yaml",
+                "marrow: 1\ninputs:\n  a: {type: metrix}\n  b: {type: number, over: item}\n"
+                "  c: {type: metrics, default: 3}\n  d: {optional: true}\nnodes:\n"
+                "  e: {uses: test.draw}\noutputs: {e: e}\n");
   marrow::read_pipeline(scratch.path / "types.yaml", {}, catalogue(), diagnostics, false);
   const std::string text = diagnostics.text();
-  for (const char* wanted : {"unknown type 'metrix' of input 'a'", "did you mean 'metrics'?",
-                             "'over' is for inputs of data, and input 'b' is a number",
-                             "input 'c' is of type metrics, which has no default",
-                             "'optional' is for inputs of data, and input 'd' is a text", "give it a  default:  instead"})
+  for (const char* wanted :
+       {"unknown type 'metrix' of input 'a'", "did you mean 'metrics'?",
+        "'over' is for inputs of data, and input 'b' is a number", "input 'c' is of type metrics, which has no default",
+        "'optional' is for inputs of data, and input 'd' is a text", "give it a  default:  instead"})
     EXPECT_NE(text.find(wanted), std::string::npos) << wanted << "\n" << text;
 }
 
@@ -213,8 +224,7 @@ TEST_F(PartsTest, ManyParts) {
   scratch.write("n0.yaml", "marrow: 1\nnodes: {d: {uses: test.draw}}\noutputs: {d: d}\n");
   for (int i = 0; i < 5; ++i) {
     std::string nodes;
-    for (int k = 0; k < 10; ++k)
-      nodes += "  p" + std::to_string(k) + ": {uses: n" + std::to_string(i) + ".yaml}\n";
+    for (int k = 0; k < 10; ++k) nodes += "  p" + std::to_string(k) + ": {uses: n" + std::to_string(i) + ".yaml}\n";
     scratch.write("n" + std::to_string(i + 1) + ".yaml", "marrow: 1\nnodes:\n" + nodes + "outputs: {d: p0}\n");
   }
   whole("  plus: {uses: n5.yaml}\n");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The chain from a bone to a case, as pipelines/simulate.yaml wires it.
+// The chain from a bone to a case, as pipelines/simulate/simulate.yaml wires it.
 #include <gtest/gtest.h>
 
 #include "nodes.hpp"

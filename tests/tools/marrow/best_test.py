@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""pipelines/femur-best.yaml on a small simulated femur with an old plate: with right cameras and with wrong ones."""
+"""pipelines/femur/femur-best.yaml on a small simulated femur with an old plate: with right cameras and with wrong ones."""
 import json
 
 from harness.cases import metrics, simulate
@@ -26,13 +26,13 @@ class Best(Case):
                 *["%s=off" % name for name in OFF],
                 "camera_faults=%s" % level,
                 *sets(SMALL),
-                pipeline="simulate-clutter.yaml",
+                pipeline="simulate/simulate-clutter.yaml",
             )
 
     def registered(self, level, *arguments, codes=(0,)):
         result = marrow(
             "run",
-            PIPELINES / "femur-best.yaml",
+            PIPELINES / "femur/femur-best.yaml",
             "case=%s" % self.cases[level],
             "--out",
             self.scratch / level,

@@ -23,7 +23,7 @@ class Bone(Case):
     @classmethod
     def setUpClass(cls):
         cls.shared = cls.shared_folder()
-        cls.case = simulate(cls.shared / "made", *sets(SMALL + VIEWS), pipeline="simulate-vertebra.yaml")
+        cls.case = simulate(cls.shared / "made", *sets(SMALL + VIEWS), pipeline="simulate/simulate-vertebra.yaml")
         cls.landmarks = cls.shared / "made" / "outputs" / "landmarks" / "bone.yaml"
 
     def copy(self, views=("frontal", "lateral"), start=None, landmarks=False):

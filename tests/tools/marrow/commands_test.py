@@ -102,7 +102,7 @@ class Commands(Case):
         )
 
     def test_list_check_inspect_load_no_plugin_and_are_quick(self):
-        for command in (["list"], ["check", SOURCE / "pipelines" / "femur.yaml"], ["inspect", "mesh.marching_cubes"]):
+        for command in (["list"], ["check", SOURCE / "pipelines" / "femur" / "femur.yaml"], ["inspect", "mesh.marching_cubes"]):
             loads = marrow(*command, extra_environment={"LD_DEBUG": "files"})
             self.assertEqual(loads.returncode, 0, loads.stdout)
             self.assertNotIn("calling init: " + str(BUILD / "lib" / "marrow"), loads.stderr)
@@ -124,13 +124,13 @@ class Commands(Case):
 
     def test_overrides_hold_in_any_order(self):
         for settings in (
-            ["cost.sigma=0.1", "cost.uses=similarity.pattern_intensity"],
-            ["cost.uses=similarity.pattern_intensity", "cost.sigma=0.1"],
+            ["grey_cost.sigma=0.1", "grey_cost.uses=similarity.pattern_intensity"],
+            ["grey_cost.uses=similarity.pattern_intensity", "grey_cost.sigma=0.1"],
         ):
             out = self.scratch / settings[0]
             marrow(
                 "run",
-                SOURCE / "pipelines" / "femur-grey-values.yaml",
+                SOURCE / "pipelines" / "femur" / "femur-grey-values.yaml",
                 "case=/nowhere",
                 "--out",
                 out,
@@ -139,14 +139,14 @@ class Commands(Case):
             self.assertIn("sigma: 0.1", (out / "pipeline.yaml").read_text())
         wrong = marrow(
             "check",
-            SOURCE / "pipelines" / "femur-grey-values.yaml",
+            SOURCE / "pipelines" / "femur" / "femur-grey-values.yaml",
             "--set",
-            "cost.sigma=0.1",
+            "grey_cost.sigma=0.1",
             "--set",
-            "cost.uses=similarity.mutual_information",
+            "grey_cost.uses=similarity.mutual_information",
         )
         self.assertIn(
-            "--set cost.sigma=0.1: error: 'similarity.mutual_information' has no option 'sigma'", wrong.stderr
+            "--set grey_cost.sigma=0.1: error: 'similarity.mutual_information' has no option 'sigma'", wrong.stderr
         )
 
     def test_run_writes_its_record(self):
@@ -318,9 +318,9 @@ class Commands(Case):
         self.assertTrue((self.scratch / "out" / "outputs" / "c.json").exists())
 
     def test_graph(self):
-        text = marrow("graph", SOURCE / "pipelines" / "femur.yaml").stdout
+        text = marrow("graph", SOURCE / "pipelines" / "femur" / "femur.yaml").stdout
         self.assertIn("for each view", text)
-        dot = marrow("graph", SOURCE / "pipelines" / "femur.yaml", "--dot").stdout
+        dot = marrow("graph", SOURCE / "pipelines" / "femur" / "femur.yaml", "--dot").stdout
         self.assertTrue(dot.startswith("digraph"))
         self.assertIn("style=dashed", dot)
 

@@ -3,14 +3,12 @@
 import json
 import unittest
 
-import yaml
-
 from harness import SOURCE
 from harness.program import Case, main, marrow
 from harness.sample import sample
+from harness.shipped import nodes_of, shipped
 
-PIPELINES = sorted((SOURCE / "pipelines").glob("*.yaml"))
-INTENSITY = SOURCE / "pipelines" / "femur-intensity.yaml"
+INTENSITY = SOURCE / "pipelines" / "femur" / "femur-intensity.yaml"
 
 
 def fits_of(pipeline, node):
@@ -27,8 +25,8 @@ def places():
     """(pipeline, name of a node, what it uses) for each place that a node has in a shipped pipeline. Of places with the
     same node and the same inputs wired, only the first."""
     found, known = [], set()
-    for pipeline in PIPELINES:
-        for name, node in yaml.safe_load(pipeline.read_text())["nodes"].items():
+    for pipeline in shipped():
+        for name, node in nodes_of(pipeline).items():
             if "repeat" in node:
                 continue  # nothing takes the place of a body
             wiring = (node["uses"], tuple(sorted(node.get("in", {}))))
@@ -76,7 +74,7 @@ class Fits(Case):
         self.assertIn("project.silhouette, project.silhouette_edges fit in place of project.joseph", checked.stderr)
 
     def test_a_cost_that_takes_another_projector(self):
-        checked = check(INTENSITY, "cost", "similarity.contour_distance")
+        checked = check(INTENSITY, "grey_cost", "similarity.contour_distance")
         self.assertEqual(checked.returncode, 2)
         self.assertIn("expects outline_projector, but 'drr' is radiograph_projector", checked.stderr)
         self.assertIn("is not wired", checked.stderr)
@@ -92,10 +90,10 @@ class Fits(Case):
         self.assertIn("or use project.joseph, project.ray_casting, project.siddon_jacobs", checked.stderr)
 
     def test_a_result_that_nothing_writes(self):
-        fits = {fit["node"]: fit for fit in fits_of(SOURCE / "pipelines" / "simulate.yaml", "case")}
+        fits = {fit["node"]: fit for fit in fits_of(SOURCE / "pipelines" / "simulate" / "simulate.yaml", "case")}
         fault = "output 'case': no plugin writes values of type 'simulated_bone'"
         self.assertEqual(fits["simulate.femur"]["faults"], [fault])
-        checked = check(SOURCE / "pipelines" / "simulate.yaml", "case", "simulate.femur")
+        checked = check(SOURCE / "pipelines" / "simulate" / "simulate.yaml", "case", "simulate.femur")
         self.assertEqual(checked.returncode, 2)
         self.assertIn(fault, checked.stderr)
         self.assertIn("leave it out, or name a result of another type", checked.stderr)

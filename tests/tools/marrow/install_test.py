@@ -35,7 +35,7 @@ class Install(Case):
         self.assertNotIn("note:", said, "no manifest is stale")
         self.assertIn("edges.canny", self.marrow("list", "edges"))
         pipelines = self.root / "share" / "marrow" / "pipelines"
-        self.marrow("check", pipelines / "femur.yaml")
+        self.marrow("check", pipelines / "femur" / "femur.yaml")
         self.assertTrue((self.root / "share" / "marrow" / "schemas" / "pipeline.schema.json").is_file())
 
 

@@ -16,7 +16,7 @@ class Landmarks(Case):
     def setUpClass(cls):
         cls.shared = cls.shared_folder()
         cls.result = marrow(
-            "run", PIPELINES / "landmarks.yaml", "--out", cls.shared / "run", "--quiet", "--set", "bone.resolution_mm=2"
+            "run", PIPELINES / "femur" / "landmarks.yaml", "--out", cls.shared / "run", "--quiet", "--set", "bone.resolution_mm=2"
         )
 
     def figures(self, *path):
@@ -94,7 +94,7 @@ outputs: {pose: pose}
         self.assertEqual(result.returncode, 0, result.stderr)
         result = marrow(
             "run",
-            PIPELINES / "surfaces.yaml",
+            PIPELINES / "bone" / "surfaces.yaml",
             "model=model.stl",
             "target=target.stl",
             "--out",

@@ -5,9 +5,9 @@ import json
 import random
 import shutil
 
-from harness import SOURCE
 from harness.program import Case, main, marrow
 from harness.sample import sample
+from harness.shipped import PIPELINES, shipped
 
 
 def mutated(text, chance):
@@ -35,15 +35,15 @@ def mutated(text, chance):
 class Mutations(Case):
     def test_each_is_good_or_diagnosed(self):
         chance = random.Random(20261121)
-        files = sorted((SOURCE / "pipelines").glob("*.yaml"))
+        files = shipped()
         self.assertGreater(len(files), 2)
-        folder = shutil.copytree(SOURCE / "pipelines", self.scratch / "pipelines")  # with the files that they name
+        folder = shutil.copytree(PIPELINES, self.scratch / "pipelines")  # with the files that they name
         good = at_line = elsewhere = 0
         paths = [files[number % len(files)] for number in range(200)]
         trials = [(path, *mutated(path.read_text(), chance)) for path in paths]
         chosen = sample(trials, 60, key=lambda trial: trial[0])
         for path, text, line in chosen:
-            copy = folder / path.name
+            copy = folder / path.relative_to(PIPELINES)
             copy.write_text(text)
             result = marrow("check", copy, "--json")
             copy.write_text(path.read_text())

@@ -127,7 +127,7 @@ class New(Case):
     def test_a_case_says_what_is_still_missing(self):
         self.assertEqual(self.new("case", "patient").returncode, 0)
         result = marrow(
-            "run", SOURCE / "pipelines/femur.yaml", "case=%s" % (self.scratch / "patient"), cwd=self.scratch
+            "run", SOURCE / "pipelines/femur/femur.yaml", "case=%s" % (self.scratch / "patient"), cwd=self.scratch
         )
         self.assertEqual(result.returncode, 1)
         self.assertIn("ct.mha", result.stderr)

@@ -2,9 +2,8 @@
 """What a picture of a shipped pipeline calls "before" is the start of the search whose result it calls "after"."""
 import unittest
 
-import yaml
-from harness import SOURCE
 from harness.program import main
+from harness.shipped import nodes_of, shipped
 
 # The inputs by which poses go from one node to the next.
 WAYS = ("initial", "pose", "poses", "stages", "start", "first", "second", "third", "fourth")
@@ -27,8 +26,8 @@ def before(nodes, name):
 class Overlays(unittest.TestCase):
     def test_the_start_leads_to_the_result(self):
         compared = 0
-        for file in sorted((SOURCE / "pipelines").rglob("*.yaml")):
-            nodes = (yaml.safe_load(file.read_text()) or {}).get("nodes", {})
+        for file in shipped():
+            nodes = nodes_of(file)
             for name, node in nodes.items():
                 wires = node.get("in", {})
                 if not node.get("uses", "").startswith("render.") or "start" not in wires:

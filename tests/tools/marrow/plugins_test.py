@@ -34,7 +34,7 @@ class Plugins(Case):
         self.assertIn("edges.steepest", marrow("list", "edges", plugins=[folder / "build"]).stdout)
         checked = marrow(
             "check",
-            SOURCE / "pipelines" / "femur.yaml",
+            SOURCE / "pipelines" / "femur" / "femur.yaml",
             "--set",
             "edges.uses=edges.steepest",
             plugins=[folder / "build"],
@@ -58,7 +58,7 @@ class Plugins(Case):
         listed = marrow("list", "edges", plugins=[folder / "build"])
         self.assertIn("edges.mine", listed.stdout)
         checked = marrow(
-            "check", SOURCE / "pipelines" / "femur.yaml", "--set", "edges.uses=edges.mine", plugins=[folder / "build"]
+            "check", SOURCE / "pipelines" / "femur" / "femur.yaml", "--set", "edges.uses=edges.mine", plugins=[folder / "build"]
         )
         self.assertEqual(checked.returncode, 0, checked.stderr)
 
@@ -135,7 +135,7 @@ class Plugins(Case):
                 ["list"],
                 ["inspect", "test.add"],
                 ["schema"],
-                ["check", SOURCE / "pipelines" / "femur.yaml"],
+                ["check", SOURCE / "pipelines" / "femur" / "femur.yaml"],
             ):
                 result = marrow(*command, plugins=[folder], extra_environment=self.own(), timeout=240)
                 self.assertEqual(result.returncode, 0, result.stderr)

@@ -208,13 +208,13 @@ class Repetition(Runs):
         self.assertNotIn("\nFits\n", self.told(0, "list", "--fits", path, "r"))
         self.told(0, "check", path, "--set", "r.body.sum.uses=test.add")
 
-    def test_names_have_no_slash(self):
-        self.write("p.yaml", OVER.replace("  l: ", "  a/l: "))
+    def test_names_are_no_names_of_the_body(self):
+        self.write("p.yaml", OVER.replace("  l: ", "  r/l: ").replace("item: l}", "item: r/l}"))
         self.assertIn(
-            "p.yaml:3:3: error: the node's name 'a/l' has a slash\n"
-            "    a/l: {uses: test.letters}\n"
+            "p.yaml:3:3: error: the node's name 'r/l' has a slash\n"
+            "    r/l: {uses: test.letters}\n"
             "    ^\n"
-            "  hint: slashes are for nodes of a body, as in track/edges",
+            "  hint: slashes are for nodes of a body or of a part, as in track/edges",
             self.told(2, "check", "p.yaml"),
         )
 

@@ -9,6 +9,7 @@ import yaml
 from harness import SOURCE
 from harness.program import Case, main, marrow
 from harness.sample import sample
+from harness.shipped import shipped
 
 
 class SchemaCase(Case):
@@ -30,15 +31,23 @@ class Schema(SchemaCase):
         return marrow("schema").stdout
 
     def test_every_pipeline_is_valid(self):
-        files = sorted((SOURCE / "pipelines").glob("*.yaml"))
-        self.assertGreater(len(files), 2)
+        files = shipped() + sorted((SOURCE / "pipelines" / "parts").glob("*.yaml"))
+        self.assertGreater(len(files), 30)
         for path in files:
             errors = [error.message for error in self.validator.iter_errors(yaml.safe_load(path.read_text()))]
             self.assertEqual(errors, [], str(path))
             self.assertEqual(marrow("check", path).returncode, 0, str(path))
 
+    def test_old_names_lead_to_the_files(self):
+        for path in (SOURCE / "pipelines").glob("*.yaml"):
+            content = yaml.safe_load(path.read_text())
+            self.assertEqual({**content, "extends": ""}, {"marrow": 1, "extends": "", "moved": True}, path.name)
+            new = path.parent / content["extends"]
+            self.assertEqual(new.name, path.name)
+            self.assertIn(new, shipped(), path.name)
+
     def test_faults_are_found(self):
-        good = yaml.safe_load((SOURCE / "pipelines" / "femur.yaml").read_text())
+        good = yaml.safe_load((SOURCE / "pipelines" / "femur" / "femur.yaml").read_text())
         for spoil in (
             lambda p: p["nodes"]["edges"].update(uses="edges.nothing"),
             lambda p: p["nodes"]["edges"]["with"].update(low=1000),
@@ -63,14 +72,14 @@ class Schema(SchemaCase):
 EXPERIMENT = """experiment: 1
 name: all
 help: one of each
-pipeline: PIPELINES/femur.yaml
+pipeline: PIPELINES/femur/femur.yaml
 inputs: {}
-set: {start.uses: initial.manual, edges.low: 40, cost.in.views: [case.views.frontal, case.views.lateral]}
+set: {start.uses: initial.manual, edges.low: 40, contour_cost.in.views: [case.views.frontal, case.views.lateral]}
 cases:
   input: case
   folders: [cases/*]
   simulate:
-    pipeline: PIPELINES/simulate.yaml
+    pipeline: PIPELINES/simulate/simulate.yaml
     output: case
     set: {cameras.beta_deg: [0, 60]}
     seeds: 1..2
@@ -106,14 +115,14 @@ WRONG = {
     "experiment: 1": "experiment: 2",
     "name: all": "name: a/b",
     "help: one": "halp: one",
-    "pipeline: PIPELINES/femur.yaml\n": "",
+    "pipeline: PIPELINES/femur/femur.yaml\n": "",
     "edges.low": "edges",
     "inputs: {}": "inputs: {case: [1]}",
     "  input: case": "  input: [case]",
     "folders: [cases/*]": "folders: cases/*",
     "    output: case": "    out: case",
     "seeds: 1..2": "seeds: 1-2",
-    "    pipeline: PIPELINES/simulate.yaml\n": "",
+    "    pipeline: PIPELINES/simulate/simulate.yaml\n": "",
     "set: {cameras.beta_deg: [0, 60]}": "set: [cameras]",
     "[-10, 10]": "[-10]",
     "[shape_seed]": "shape_seed",

@@ -14,8 +14,8 @@ ENTRIES = [TOOLS / "report" / "page" / "main.js", TOOLS / "workbench" / "page" /
 BROWSER = set(
     """
     AbortController Array Blob Boolean CSS Error Event EventTarget Float32Array Float64Array Image ImageData Infinity
-    Int16Array Int32Array IntersectionObserver Intl JSON Map Math NaN Number Object Promise ResizeObserver Set String
-    URL
+    Int16Array Int32Array IntersectionObserver Intl JSON Map Math NaN Number Object Promise RegExp ResizeObserver Set
+    String URL
     URLSearchParams Uint16Array Uint32Array Uint8Array WeakMap addEventListener atob cancelAnimationFrame clearInterval
     clearTimeout console decodeURIComponent devicePixelRatio document encodeURIComponent fetch getComputedStyle
     getSelection globalThis history innerHeight innerWidth localStorage location matchMedia navigator parent parseFloat
@@ -31,7 +31,7 @@ KEYWORDS = set(
     """.split()
 )
 NAME = r"[A-Za-z_$][\w$]*"
-IMPORT = re.compile(r"import (?:(?P<names>\{[^}]*\}|\* as %s) from )?'(?P<path>[^']+)';\n" % NAME)
+IMPORT = re.compile(r"import (?:(?P<names>\{[^}]*\}|\* as %s|text) from )?'(?P<path>[^']+)';\n" % NAME)
 
 
 def members(text, space, target):
@@ -50,7 +50,7 @@ class Module:
         self.path, text = path, path.read_text()
         self.named, self.spaces, self.imports = [], {}, []
         for found in IMPORT.finditer(text):
-            if found["path"] == "three":
+            if found["path"] == "three" or found["path"].endswith(".md"):
                 continue
             target = (path.parent / found["path"]).resolve()
             self.imports.append(target)

@@ -18,7 +18,7 @@ from harness import BUILD, SOURCE
 
 EXPERIMENT = """experiment: 1
 name: small
-pipeline: %(source)s/pipelines/femur.yaml
+pipeline: %(source)s/pipelines/femur/femur.yaml
 cases: {folders: [%(case)s], input: case}
 variants:
   as_it_is: {}
@@ -39,7 +39,7 @@ class Program(unittest.TestCase):
         cls.environment = dict(os.environ, MARROW_CACHE=str(cls.folder / "cache"))
         cls.marrow(
             "run",
-            SOURCE / "pipelines" / "simulate.yaml",
+            SOURCE / "pipelines" / "simulate" / "simulate.yaml",
             "--set",
             "ct.spacing_mm=[1.2, 1.2, 1.5]",
             "--set",
@@ -88,7 +88,7 @@ class Program(unittest.TestCase):
 
     def test_a_run(self):
         run = self.folder / "run"
-        self.marrow("run", SOURCE / "pipelines" / "femur.yaml", "case=%s" % self.case, "--out", run, "--quiet")
+        self.marrow("run", SOURCE / "pipelines" / "femur" / "femur.yaml", "case=%s" % self.case, "--out", run, "--quiet")
         page = self.marrow("show", run).strip()
         self.assertEqual(page, str(run / "report.html"))
         sections = ["verdict", "summary", "pictures", "scene", "convergence", "landscape", "graph", "repeat"]

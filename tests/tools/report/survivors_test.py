@@ -102,7 +102,7 @@ class SurvivorsTest(PageTest):
         self.choose("Outcome", "done", "#cells")
         self.assertNotIn("missed", self.texts("#cells option"))
         tips = self.browser.js(
-            "return [...document.querySelectorAll('#by-case [data-tip]')].map((item) => item.dataset.tip)"
+            "return [...document.querySelectorAll('#by-case td [data-tip]')].map((item) => item.dataset.tip)"
         )
         self.assertTrue(all(tip.endswith(" starts have the figure") for tip in tips))
 
@@ -160,7 +160,7 @@ class SurvivorsTest(PageTest):
 
         self.page(change)
         tips = lambda: self.browser.js(
-            "return [...document.querySelectorAll('#response [data-tip]')].map((item) => item.dataset.tip)"
+            "return [...document.querySelectorAll('#response svg [data-tip]')].map((item) => item.dataset.tip)"
         )
         self.eventually(
             tips,

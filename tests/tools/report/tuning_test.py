@@ -45,7 +45,7 @@ class TuningTest(PageTest):
         )
 
     def tips(self):
-        marks = "return [...document.querySelectorAll('#tuning [data-tip]')].map((mark) => mark.dataset.tip)"
+        marks = "return [...document.querySelectorAll('#tuning svg [data-tip]')].map((mark) => mark.dataset.tip)"
         return [tip.replace("\u00a0", " ") for tip in self.browser.js(marks)]
 
     def axis_titles(self):
@@ -99,7 +99,7 @@ class TuningTest(PageTest):
         self.assertIn("none was chosen", self.texts("#tuning")[0])
         self.assertEqual(len(self.tips()), 3)
         sizes = self.browser.js(
-            "return [...document.querySelectorAll('#tuning [data-tip]')].map((mark) => mark.getBBox().width)"
+            "return [...document.querySelectorAll('#tuning svg [data-tip]')].map((mark) => mark.getBBox().width)"
         )
         self.assertEqual(len(set(sizes)), 1)
 

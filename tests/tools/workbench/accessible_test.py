@@ -67,7 +67,7 @@ class AccessibleTest(PageTest):
         cls.addClassCleanup(shutil.rmtree, cls.made, ignore_errors=True)
         folder = cls.made / "folder"
         shutil.copytree(simulate(cls.made / "simulated", *SMALL) / "case", folder / "case")
-        shutil.copy(SOURCE / "pipelines/femur.yaml", folder)
+        shutil.copy(SOURCE / "pipelines/femur/femur.yaml", folder)
         shutil.copytree(SOURCE / "pipelines/verdict", folder / "verdict")
         subprocess.run(
             [MARROW, "run", "femur.yaml", "case=case", "--out", "run", "--quiet"],

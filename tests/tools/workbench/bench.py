@@ -24,7 +24,7 @@ atexit.register(shutil.rmtree, os.environ["MARROW_CACHE"], ignore_errors=True)
 SMALL = ["--set", "ct.spacing_mm=[1.2, 1.2, 1.5]", "--set", "ct.range_mm=[0, 300]"]  # 0.8 s instead of 5 s to make
 
 
-def simulate(folder, *arguments, pipeline=SOURCE / "pipelines" / "simulate.yaml"):
+def simulate(folder, *arguments, pipeline=SOURCE / "pipelines" / "simulate" / "simulate.yaml"):
     """Runs a simulation, and returns the folder of its outputs. Equal simulations are computed once for all tests."""
     environment = {**os.environ, "MARROW_CACHE": str(SHARED_CACHE)}
     command = [MARROW, "run", pipeline, "--out", folder, "--quiet", *arguments]

@@ -113,7 +113,7 @@ class ByKeysTest(WholeWay):
 
     def test_another_node_in_a_pipeline(self):
         file = self.folder / "femur.yaml"
-        shutil.copy(SOURCE / "pipelines" / "femur.yaml", file)
+        shutil.copy(SOURCE / "pipelines" / "femur" / "femur.yaml", file)
         shutil.copytree(SOURCE / "pipelines" / "verdict", self.folder / "verdict")
         server = self.open()
         self.show(server, "pipeline=femur.yaml")

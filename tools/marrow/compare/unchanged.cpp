@@ -39,8 +39,8 @@ std::string difference(const compare::Experiment& before, const compare::Experim
 
 Unchanged::Unchanged(const compare::Experiment& experiment, Cases cases)
     : experiment_(experiment), cases_(cases), texts_{{experiment.file, experiment.text}} {
-  for (const fs::path& file : {experiment.pipeline, experiment.simulation.pipeline})
-    if (!file.empty()) texts_[file] = read_text_file(file, kMostSourceBytes);
+  for (const fs::path& file : experiment.files)
+    if (file != experiment.file) texts_[file] = read_text_file(file, kMostSourceBytes);
 }
 
 void Unchanged::check(const compare::Dependencies& dependencies) const {

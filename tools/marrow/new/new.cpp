@@ -57,16 +57,25 @@ NewCommand add_what(CLI::App* command, const std::string& what, const std::strin
   return made;
 }
 
-/// An existing file, or one of marrow's own in `folder`, with or without .yaml.
-fs::path file_named(const std::string& from, const fs::path& folder) {
+/// The folders of marrow's own pipelines, one for each family. A file beside them says only where it has moved.
+std::vector<fs::path> families() {
+  std::vector<fs::path> found;
+  for (const fs::directory_entry& entry : fs::directory_iterator(shared_files("pipelines")))
+    if (entry.is_directory() && entry.path().filename() != "experiments") found.push_back(entry.path());
+  return found;
+}
+
+/// An existing file, or one of marrow's own in these folders, with or without .yaml.
+fs::path file_named(const std::string& from, const std::vector<fs::path>& folders) {
   if (fs::is_regular_file(from)) return from;
   std::vector<std::string> known;
-  for (const fs::directory_entry& entry : fs::directory_iterator(shared_files(folder))) {
-    const fs::path& path = entry.path();
-    if (path.extension() != ".yaml") continue;
-    if (path.filename() == from || path.stem() == from) return path;
-    known.push_back(path.stem().string());
-  }
+  for (const fs::path& folder : folders)
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+      const fs::path& path = entry.path();
+      if (path.extension() != ".yaml") continue;
+      if (path.filename() == from || path.stem() == from) return path;
+      known.push_back(path.stem().string());
+    }
   std::sort(known.begin(), known.end());
   throw Error("--from '" + printable(from) + "': neither a file here nor one of marrow's own; " +
               suggestion(from, known));
@@ -96,10 +105,10 @@ Made make_kind(const NewRequest& r) {
   return {new_kind(r.name, r.out), "{}/ci builds it, tests it, and compares variants"};
 }
 Made make_pipeline(const NewRequest& r) {
-  return {copy(r.name, file_named(r.from, "pipelines"), r.out), "marrow check {}"};
+  return {copy(r.name, file_named(r.from, families()), r.out), "marrow check {}"};
 }
 Made make_experiment(const NewRequest& r) {
-  return {copy(r.name, file_named(r.from, "pipelines/experiments"), r.out), "marrow compare {} --dry-run"};
+  return {copy(r.name, file_named(r.from, {shared_files("pipelines/experiments")}), r.out), "marrow compare {} --dry-run"};
 }
 Made make_case(const NewRequest& r) {
   return {new_case(r.name, r.out), "put the CT and the images there, and correct {}/case.yaml"};

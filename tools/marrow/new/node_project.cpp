@@ -53,7 +53,7 @@ std::size_t line_of_node(const std::string& pipeline, const std::string& place) 
 }
 
 std::string whole_pipeline() {
-  return read_text_file(shared_files("pipelines/simulated-femur.yaml"), kMostSourceBytes);
+  return read_text_file(shared_files("pipelines/femur/simulated-femur.yaml"), kMostSourceBytes);
 }
 
 /// The name of the node that the pipeline uses at `place`.

@@ -14,7 +14,7 @@ import re
 import subprocess
 
 THREE = pathlib.Path("/usr/share/javascript/three/three.module.js")  # Debian's libjs-three
-FLAGS = "--bundle --minify --format=iife --target=es2020 --charset=utf8 --log-level=warning".split()
+FLAGS = "--bundle --minify --format=iife --target=es2020 --charset=utf8 --log-level=warning --loader:.md=text".split()
 
 
 def bundle(entry, three=THREE):

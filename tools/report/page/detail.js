@@ -5,6 +5,7 @@ import * as Curves from './curves.js';
 import * as Data from './data.js';
 import * as Dom from './dom.js';
 import {el, number, withUnit} from './dom.js';
+import * as Glossary from './glossary.js';
 import * as Links from './links.js';
 import * as Parts from './parts.js';
 import * as Pictures from './pictures.js';
@@ -16,7 +17,8 @@ let opened = null;  // the dialog's 3D view, which holds memory of the graphics 
 
 const rows = (entries) =>
     el('div', {class: 'scroll'},
-       Dom.valueTable(entries.filter((entry) => entry[1] !== null && entry[1] !== undefined && entry[1] !== '')));
+       Dom.valueTable(entries.filter((entry) => entry[1] !== null && entry[1] !== undefined && entry[1] !== '')
+                          .map(([name, value]) => [typeof name === 'string' ? Glossary.term(name) : name, value])));
 
 const startError = (data, cell) =>
     (data.initial_error && Number.isFinite(cell.initial_error) ?
@@ -26,7 +28,10 @@ const startError = (data, cell) =>
 // Sets the function that shows a cell's case and start in the comparison of pictures.
 export const setLookAt = (show) => (lookAt = show);
 
-export const outcomeBadge = (cell) => el('span', {class: 'outcome ' + Data.outcome(cell)}, Data.outcome(cell));
+export function outcomeBadge(cell) {
+  const outcome = Data.outcome(cell);
+  return el('span', {class: 'outcome ' + outcome, 'data-tip': Glossary.meaning(outcome)}, outcome);
+}
 
 export function values(data, cell) {
   return rows([
@@ -73,7 +78,7 @@ export const figures = (data) => data.figures.map(upright).map(
               el('tbody', {},
                  table.rows.map(
                      (row) => el(
-                         'tr', {}, el('th', {scope: 'row'}, row.name),
+                         'tr', {}, el('th', {scope: 'row'}, Glossary.term(row.name)),
                          table.columns.map(
                              (_, i) => el(
                                  'td', {class: 'number'}, Number.isFinite(row.values[i]) ? number(row.values[i]) : '')),

@@ -7,6 +7,7 @@ import * as Detail from './detail.js';
 import * as Dom from './dom.js';
 import {el} from './dom.js';
 import * as Figures from './figures.js';
+import * as Glossary from './glossary.js';
 import * as Graph from './graph.js';
 import * as Parts from './parts.js';
 import * as Passes from './passes.js';
@@ -24,7 +25,7 @@ import * as Verdict from './verdict.js';
 // A section with a heading and an entry in the list of contents. Parts that are null are left out.
 function section(id, title, intro, ...parts) {
   const node =
-      el('section', {id, 'aria-labelledby': id + '-title'}, el('h2', {id: id + '-title'}, title),
+      el('section', {id, 'aria-labelledby': id + '-title'}, el('h2', {id: id + '-title'}, Glossary.term(title)),
          intro && el('p', {class: 'intro'}, intro), parts);
   document.getElementById('contents').append(el('a', {href: '#' + id}, title));
   return node;

@@ -3,6 +3,7 @@
 // readers are told how many rows there are, and which are visible. The arrow keys move from row to row.
 import * as Dom from './dom.js';
 import {el} from './dom.js';
+import * as Glossary from './glossary.js';
 
 const MORE = 4;  // further rows that are drawn above and below the visible ones, so that scrolling shows no gap
 
@@ -25,7 +26,7 @@ export class Table {
     Object.assign(this, {columns, attributes, open, items: [], drawn: new Map(), current: 0});
     this.heads = columns.map(
         (column, i) =>
-            el('th', {scope: 'col', class: column.number ? 'number' : null},
+            el('th', {scope: 'col', class: column.number ? 'number' : null, 'data-tip': Glossary.meaning(column.title)},
                Dom.button(
                    [column.title, column.unit && el('small', {}, ' ' + column.unit)].filter(Boolean), () => sort(i),
                    {class: 'sort'})));

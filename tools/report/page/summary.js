@@ -2,6 +2,7 @@
 // The head of the page: what was compared, each result as a sentence, and the table of the variants.
 import * as Data from './data.js';
 import {button, el, number, percent, probability, select, withUnit} from './dom.js';
+import * as Glossary from './glossary.js';
 import * as Plots from './plots.js';
 
 const OTHER_RUNS =
@@ -129,7 +130,7 @@ export function sortable(rows, all, state, caption) {
   const body = el('tbody');
   const heads = all.map(
       (column, i) =>
-          el('th', {scope: 'col', class: column.number ? 'number' : null},
+          el('th', {scope: 'col', class: column.number ? 'number' : null, 'data-tip': Glossary.meaning(column.title)},
              button([column.title, column.unit && el('small', {}, ' ' + column.unit)].filter(Boolean), () => {
                state.down = state.column === i ? !state.down : false;
                state.column = i;

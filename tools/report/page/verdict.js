@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The verdict on a pose: the judgement, its reasons, what would settle it, the overlays and the pose.
 import {el, number, percent} from './dom.js';
+import * as Glossary from './glossary.js';
 import * as Summary from './summary.js';
 
 const CLASSES = {
@@ -14,11 +15,17 @@ export const failure = (probability) =>
 
 // The judgement as a mark and a word.
 export const badge = (judgement) =>
-    (judgement ? el('span', {class: 'outcome ' + (CLASSES[judgement] || '')}, judgement) : null);
+    (judgement ? el('span', {class: 'outcome ' + (CLASSES[judgement] || ''), 'data-tip': Glossary.meaning(judgement)},
+                    judgement) :
+                 null);
 
 const list = (title, texts) =>
-    (texts.length ? [el('h3', {}, title), el('ul', {class: 'verdict-list'}, texts.map((text) => el('li', {}, text)))] :
-                    []);
+    (texts.length ?
+         [
+           el('h3', {}, title),
+           el('ul', {class: 'verdict-list'}, texts.map((text) => el('li', {}, Glossary.explained(text))))
+         ] :
+         []);
 
 // The pictures of an item that show the result; otherwise those of the first output with pictures of it.
 function overlays(cell, item) {
@@ -53,7 +60,9 @@ function pose(entry) {
 // The judgement, its reasons, and what would settle it.
 export const words = (verdict) =>
     [el('p', {class: 'verdict-head'}, verdict.item && el('span', {}, verdict.item + ': '),
-        el('strong', {}, verdict.judgement), ' ', el('small', {}, failure(verdict.failure_probability))),
+        el('strong', {}, Glossary.term(verdict.judgement)), ' ',
+        el('small', {class: 'term', tabindex: 0, 'data-tip': Glossary.meaning('failure')},
+           failure(verdict.failure_probability))),
      ...list('Why', verdict.reasons), ...list('What would settle it', verdict.remedies)];
 
 function one(data, cell, verdict) {

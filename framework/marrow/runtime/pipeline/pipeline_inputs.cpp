@@ -16,24 +16,13 @@ namespace fs = std::filesystem;
 
 const std::vector<std::string> kTextTypes{"path", "text", "number", "integer", "boolean"};
 
-/// All types of values that nodes take or make, by their names.
-std::map<std::string, TypeInfo> types_of(const Catalogue& catalogue) {
-  std::map<std::string, TypeInfo> types;
-  for (const std::string& name : catalogue.node_names()) {
-    const NodeInfo& node = *catalogue.find(name);
-    for (const auto* ports : {&node.inputs, &node.outputs})
-      for (const PortInfo& port : *ports) types.emplace(port.type.id, port.type);
-  }
-  return types;
-}
-
 void set_type(DeclaredInput& input, const YamlEntry& entry, const PipelineLayer& layer, const Catalogue& catalogue) {
   const auto type = layer.yaml.text(entry.value, entry.place, "type");
   if (!type) return;
   input.type = *type;
   input.data.reset();
   if (contains(kTextTypes, *type)) return;
-  const std::map<std::string, TypeInfo> types = types_of(catalogue);
+  const std::map<std::string, TypeInfo> types = catalogue.types();
   if (const auto found = types.find(*type); found != types.end()) {
     input.data = found->second;
     return;

@@ -10,7 +10,4 @@ namespace marrow {
 void put_parts_in(WrittenPipeline& pipeline, const PipelineReading& reading, const Catalogue& catalogue,
                   Diagnostics& diagnostics);
 
-/// The hint for a pipeline file that is not there: the nearest name in its folder, or nothing.
-std::string nearest_file(const std::filesystem::path& missing);
-
 }  // namespace marrow

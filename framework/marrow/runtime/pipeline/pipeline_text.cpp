@@ -8,6 +8,7 @@
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/nearest_file.hpp"
 #include "marrow/runtime/pipeline/pipeline_changes.hpp"
 #include "marrow/runtime/pipeline/pipeline_inputs.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"

@@ -153,6 +153,16 @@ std::vector<KindPort> Catalogue::ports_of_kind(const std::string& kind) const {
   return ports;
 }
 
+std::map<std::string, TypeInfo> Catalogue::types() const {
+  std::map<std::string, TypeInfo> types;
+  for (const auto& [name, entry] : nodes_) {
+    const NodeInfo& node = *find(name);
+    for (const auto* ports : {&node.inputs, &node.outputs})
+      for (const PortInfo& port : *ports) types.emplace(port.type.id, port.type);
+  }
+  return types;
+}
+
 const WriterInfo* Catalogue::find_writer(const TypeInfo& type) const {
   const auto found = writers_.find(type.id);
   if (found == writers_.end()) return nullptr;

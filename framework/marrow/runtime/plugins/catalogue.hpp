@@ -43,6 +43,8 @@ class Catalogue {
   /// known nodes.
   std::vector<KindPort> ports_of_kind(const std::string& kind) const;
   const WriterInfo* find_writer(const TypeInfo& type) const;
+  /// The types of all values that nodes take or make, by their names.
+  std::map<std::string, TypeInfo> types() const;
 
   /// Loads the node's library. Throws Error if that fails.
   const NodeDefinition& load(const std::string& name) const;
