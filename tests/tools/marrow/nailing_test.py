@@ -8,7 +8,7 @@ from harness.cases import metrics
 from harness import SOURCE
 from harness.program import Case, main, marrow
 
-PIPELINE = SOURCE / "pipelines" / "nailing.yaml"
+PIPELINE = SOURCE / "pipelines" / "guidance" / "nailing.yaml"
 
 
 class Nailing(Case):

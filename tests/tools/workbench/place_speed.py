@@ -169,7 +169,14 @@ def main():
         for width_px in widths_px:
             out = scratch / str(width_px)
             subprocess.run(
-                [bench.MARROW, "run", bench.SOURCE / "pipelines" / "simulate" / "simulate.yaml", "--out", out, "--quiet"]
+                [
+                    bench.MARROW,
+                    "run",
+                    bench.SOURCE / "pipelines" / "simulate" / "simulate.yaml",
+                    "--out",
+                    out,
+                    "--quiet",
+                ]
                 + [word for name in ("width_px", "height_px") for word in ("--set", "cameras.%s=%d" % (name, width_px))]
                 + ["--set", "cameras.pixel_mm=%r" % (0.586 * 512 / width_px)],
                 check=True,
