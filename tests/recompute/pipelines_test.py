@@ -5,7 +5,7 @@ from recomputing import counts, recompute_all, run  # it finds the modules below
 from harness.cases import SMALL, simulate
 from harness.program import Case, main, marrow
 
-NAIL = ["femur.resolution_mm=2", "implant.resolution_mm=1", "nail_searched.poses=2000"]
+NAIL = ["bone.resolution_mm=2", "implant.resolution_mm=1", "nail_searched.poses=2000"]
 LEG = ["femur.resolution_mm=2", "ct.spacing_mm=[1.2, 1.2, 1.5]"]
 # Of segmentations and surfaces that are close, and of two poses: no shipped pipeline compares these.
 COMPARED = """marrow: 1

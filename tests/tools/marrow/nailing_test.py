@@ -20,7 +20,7 @@ class Nailing(Case):
             "--out",
             out,
             "--set",
-            "femur.resolution_mm=2",
+            "bone.resolution_mm=2",
             "--set",
             "implant.resolution_mm=1",
             "--set",
