@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // How long a registration takes, in one process, with the model and two 512 x 512 images in memory, on a simulated
 // case. What is made of the CT alone, before any image is taken, counts as the model: the surface, and projectors of
-// it. both_stages: edges, shaft borders, first stage, cost and registration of pipelines/femur/femur.yaml. Then 100 starts of
-// up to 5 degrees and 5 mm about the truth: by grey values alone, coarse to fine, and by contour and then grey values
-// (pipelines/femur/femur-intensity.yaml), with how far from the truth they end.
+// it. both_stages: edges, shaft borders, first stage, cost and registration of pipelines/femur/femur.yaml. Then 100
+// starts of up to 5 degrees and 5 mm about the truth: by grey values alone, coarse to fine, and by contour and then
+// grey values (pipelines/femur/femur-intensity.yaml), with how far from the truth they end.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -161,7 +161,8 @@ int main(int argc, char** argv) {
     benchmark::RunSpecifiedBenchmarks();
     if (is_filtered) return 0;
     const std::set<std::string> of_ct{"bone", "model", "outline", "drr"};
-    from_random_starts("contour, then grey values", Prepared(catalogue(), simulated(), "femur/femur-intensity.yaml", of_ct));
+    from_random_starts("contour, then grey values",
+                       Prepared(catalogue(), simulated(), "femur/femur-intensity.yaml", of_ct));
     from_random_starts("grey values alone", Prepared(catalogue(), simulated(), "femur/femur-grey-values.yaml", of_ct));
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";

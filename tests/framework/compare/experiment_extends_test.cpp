@@ -47,9 +47,9 @@ TEST_F(ExperimentExtends, MapsMergeAndListsAreReplaced) {
   const Experiment base = read(kBase);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   const std::string first = base.variants[0].name, metric = base.metrics[0].path;
-  const Experiment e = extend("name: base\nhelp: of all\n" + kBase,
-                              "variants: {" + first + ": null, new: {c.value: 4}}\nmetrics: [{figure: " + metric +
-                                  ", label: mine}]\n");
+  const Experiment e =
+      extend("name: base\nhelp: of all\n" + kBase,
+             "variants: {" + first + ": null, new: {c.value: 4}}\nmetrics: [{figure: " + metric + ", label: mine}]\n");
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   EXPECT_EQ(e.name, "e");
   EXPECT_EQ(e.help, "of all");
@@ -62,7 +62,8 @@ TEST_F(ExperimentExtends, MapsMergeAndListsAreReplaced) {
 TEST_F(ExperimentExtends, PathsStartWhereTheyAreWritten) {
   std::filesystem::create_directory(scratch.path / "below");
   std::filesystem::copy(scratch.path / "p.yaml", scratch.path / "below" / "p.yaml");
-  scratch.write("below/base.yaml", "experiment: 1\npipeline: p.yaml\ncases: {seeds: 1..2}\n" + std::string(kVariants) + kMetrics);
+  scratch.write("below/base.yaml",
+                "experiment: 1\npipeline: p.yaml\ncases: {seeds: 1..2}\n" + std::string(kVariants) + kMetrics);
   const Experiment e = read("experiment: 1\nextends: below/base.yaml\n");
   EXPECT_EQ(e.pipeline, scratch.path / "below" / "p.yaml");
 }
@@ -88,8 +89,7 @@ TEST_F(ExperimentExtends, FaultsOfExtends) {
   read("experiment: 1\nextends: [base.yaml]\n");
   expect_fault_in("e.yaml", 2, "extends: expected a text, got a list of 1");
   extend("extends: e.yaml\n" + kBase, "");
-  expect_fault_in("base.yaml", 1,
-                  "the files extend each other in a circle: e.yaml extends base.yaml extends e.yaml",
+  expect_fault_in("base.yaml", 1, "the files extend each other in a circle: e.yaml extends base.yaml extends e.yaml",
                   "one of them must stand alone");
 }
 

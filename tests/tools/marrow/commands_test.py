@@ -102,7 +102,11 @@ class Commands(Case):
         )
 
     def test_list_check_inspect_load_no_plugin_and_are_quick(self):
-        for command in (["list"], ["check", SOURCE / "pipelines" / "femur" / "femur.yaml"], ["inspect", "mesh.marching_cubes"]):
+        for command in (
+            ["list"],
+            ["check", SOURCE / "pipelines" / "femur" / "femur.yaml"],
+            ["inspect", "mesh.marching_cubes"],
+        ):
             loads = marrow(*command, extra_environment={"LD_DEBUG": "files"})
             self.assertEqual(loads.returncode, 0, loads.stdout)
             self.assertNotIn("calling init: " + str(BUILD / "lib" / "marrow"), loads.stderr)

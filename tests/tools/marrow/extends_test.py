@@ -88,16 +88,20 @@ class Extends(Case):
         self.assertEqual(self.value("v=1", "--set-file", "here.yaml", "--set", "d.value=2", out="two"), 1 + 2 + 1)
         (self.scratch / "here.yaml").write_text("input: {v: 6}\n")
         told = self.run_marrow("run", "whole.yaml", "--set-file", "here.yaml", code=2).stderr
-        self.assertRegex(told, r"here\.yaml:1:1: error: unknown key 'input' in the file of settings\n.*\n.*\n"
-                               r" +hint: did you mean 'inputs'\?")
+        self.assertRegex(
+            told,
+            r"here\.yaml:1:1: error: unknown key 'input' in the file of settings\n.*\n.*\n"
+            r" +hint: did you mean 'inputs'\?",
+        )
         told = self.run_marrow("run", "whole.yaml", "--set-file", "none.yaml", code=2).stderr
         self.assertIn("none.yaml: error: the file of settings cannot be read", told)
 
     def test_a_file_that_has_moved(self):
         (self.scratch / "old.yaml").write_text("{marrow: 1, extends: base.yaml, moved: true}\n")
         told = self.run_marrow("run", "old.yaml", "--out", "run")
-        self.assertIn("old.yaml has moved to base.yaml; its old name will go with the next release",
-                      told.stdout + told.stderr)
+        self.assertIn(
+            "old.yaml has moved to base.yaml; its old name will go with the next release", told.stdout + told.stderr
+        )
 
     def test_an_experiment_that_extends(self):
         (self.scratch / "e.yaml").write_text(

@@ -16,7 +16,13 @@ class Landmarks(Case):
     def setUpClass(cls):
         cls.shared = cls.shared_folder()
         cls.result = marrow(
-            "run", PIPELINES / "femur" / "landmarks.yaml", "--out", cls.shared / "run", "--quiet", "--set", "bone.resolution_mm=2"
+            "run",
+            PIPELINES / "femur" / "landmarks.yaml",
+            "--out",
+            cls.shared / "run",
+            "--quiet",
+            "--set",
+            "bone.resolution_mm=2",
         )
 
     def figures(self, *path):

@@ -58,7 +58,11 @@ class Plugins(Case):
         listed = marrow("list", "edges", plugins=[folder / "build"])
         self.assertIn("edges.mine", listed.stdout)
         checked = marrow(
-            "check", SOURCE / "pipelines" / "femur" / "femur.yaml", "--set", "edges.uses=edges.mine", plugins=[folder / "build"]
+            "check",
+            SOURCE / "pipelines" / "femur" / "femur.yaml",
+            "--set",
+            "edges.uses=edges.mine",
+            plugins=[folder / "build"],
         )
         self.assertEqual(checked.returncode, 0, checked.stderr)
 

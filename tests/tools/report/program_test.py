@@ -88,7 +88,9 @@ class Program(unittest.TestCase):
 
     def test_a_run(self):
         run = self.folder / "run"
-        self.marrow("run", SOURCE / "pipelines" / "femur" / "femur.yaml", "case=%s" % self.case, "--out", run, "--quiet")
+        self.marrow(
+            "run", SOURCE / "pipelines" / "femur" / "femur.yaml", "case=%s" % self.case, "--out", run, "--quiet"
+        )
         page = self.marrow("show", run).strip()
         self.assertEqual(page, str(run / "report.html"))
         sections = ["verdict", "summary", "pictures", "scene", "convergence", "landscape", "graph", "repeat"]

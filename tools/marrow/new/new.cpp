@@ -108,7 +108,8 @@ Made make_pipeline(const NewRequest& r) {
   return {copy(r.name, file_named(r.from, families()), r.out), "marrow check {}"};
 }
 Made make_experiment(const NewRequest& r) {
-  return {copy(r.name, file_named(r.from, {shared_files("pipelines/experiments")}), r.out), "marrow compare {} --dry-run"};
+  return {copy(r.name, file_named(r.from, {shared_files("pipelines/experiments")}), r.out),
+          "marrow compare {} --dry-run"};
 }
 Made make_case(const NewRequest& r) {
   return {new_case(r.name, r.out), "put the CT and the images there, and correct {}/case.yaml"};
