@@ -166,7 +166,9 @@ class CtServerTest(BenchTest):
         self.assertEqual(ended.returncode, 0, ended.stderr)
         resolved = yaml.safe_load((self.folder / "runs" / "node" / "pipeline.yaml").read_text())
         self.assertEqual(resolved["nodes"]["node"]["with"]["flip"], ["z"])
-        self.assertEqual(resolved["nodes"]["node"]["with"]["path"], str(self.folder.resolve() / name))
+        self.assertEqual(
+            resolved["nodes"]["node"]["with"]["path"], str(self.folder.resolve() / name.replace("$", "$$"))
+        )
 
 
 def random_geometry(chance):
