@@ -5,7 +5,7 @@ from recomputing import counts, recompute_all, run  # it finds the modules below
 from harness.cases import SMALL, simulate
 from harness.program import Case, main, marrow
 
-NAIL = ["femur.resolution_mm=2", "implant.resolution_mm=1", "nail_searched.poses=2000"]
+NAIL = ["bone.resolution_mm=2", "implant.resolution_mm=1", "nail_searched.poses=2000"]
 LEG = ["femur.resolution_mm=2", "ct.spacing_mm=[1.2, 1.2, 1.5]"]
 # Of segmentations and surfaces that are close, and of two poses: no shipped pipeline compares these.
 COMPARED = """marrow: 1
@@ -65,7 +65,7 @@ class Pipelines(Case):
         self.check(run(self.scratch / "run", "femur/shaft-lines.yaml"), 54)
 
     def test_bones_that_are_followed(self):
-        out = run(self.scratch / "run", "track-knee.yaml", "frames=4", *sets(LEG))
+        out = run(self.scratch / "run", "track/track-knee.yaml", "frames=4", *sets(LEG))
         self.check(out, 400)
 
     def test_both_fragments_and_their_reduction(self):
@@ -77,10 +77,10 @@ class Pipelines(Case):
 
     def test_a_nail_and_the_plan_for_its_holes(self):
         only = [word for name in ("plan", "verdict", "implant", "locking", "nail_errors") for word in ("--only", name)]
-        self.check(run(self.scratch / "run", "nailing.yaml", *sets(NAIL), *only), 60, ["locking.verdict"])
+        self.check(run(self.scratch / "run", "guidance/nailing.yaml", *sets(NAIL), *only), 60, ["locking.verdict"])
 
     def test_a_calibration(self):
-        out = run(self.scratch / "run", "calibrate.yaml")
+        out = run(self.scratch / "run", "calibration/calibrate.yaml")
         self.check(out, 18, ["calibration.metrics", "calibration.view_metrics"])
 
     def test_segmentations_and_surfaces(self):

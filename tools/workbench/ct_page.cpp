@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The requests of the page "Case" about its CT: reading it, and its slices.
-#include "marrow/base/json_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "workbench/ct_memory.hpp"
 #include "workbench/ct_requests.hpp"
@@ -15,11 +14,10 @@ using nlohmann::json;
 /// The options of a CT that a case may give beside its file.
 constexpr const char* kOptions[] = {"voxel_size_mm", "flip", "value_offset_hu", "series_uid"};
 
-PipelineCall call_of(const fs::path& place, const json& ct) {
-  PipelineCall call{.file = workbench_pipeline("volume"), .keep = false};  // storing it takes longer than reading it
-  call.arguments.inputs.push_back({"ct", place.string()});
+NodeCall call_of(const fs::path& place, const json& ct) {
+  NodeCall call{"read.volume", {{"path", place.string()}}};
   for (const char* option : kOptions)
-    if (ct.contains(option)) call.arguments.overrides.push_back({std::string("ct.") + option, json_text(ct[option])});
+    if (ct.contains(option)) call.options.emplace_back(option, ct[option]);
   return call;
 }
 
@@ -34,7 +32,7 @@ std::shared_ptr<const OpenCt> opened(const fs::path& place, const json& ct, Work
   if (auto known = memory.by_content(content)) return known;
   memory.check_size(files.bytes);
   auto outputs = outputs_of(call_of(place, ct), workbench, job);
-  return memory.add(content, std::move(outputs.at("ct")));
+  return memory.add(content, std::move(outputs.at("volume")));
 }
 
 }  // namespace

@@ -25,13 +25,14 @@ std::string text_in(const json& object, const char* name) {
 /// Frames from `first` to `last` of a view; `last` 0: to the end.
 List<SequenceFrame> read_frames(const Workbench& workbench, const PlacedCase& placed, const ViewFrames& view, int first,
                                 int last, Job& job) {
-  PipelineCall call{.file = workbench_pipeline("frames"), .keep = false};
-  call.arguments.inputs = {{"view", view.name},
-                           {"images", workbench.folder.inside(view.images).string()},
-                           {"pattern", view.pattern},
-                           {"camera", camera_file_of(workbench, placed, view.name).string()},
-                           {"first", formatted("{}", first)},
-                           {"last", formatted("{}", last)}};
+  const auto one = [](const std::string& text) { return json::array({text}); };
+  const NodeCall call{"read.sequence",
+                      {{"names", one(view.name)},
+                       {"images", one(workbench.folder.inside(view.images).string())},
+                       {"patterns", one(view.pattern)},
+                       {"cameras", one(camera_file_of(workbench, placed, view.name).string())},
+                       {"first", first},
+                       {"last", last}}};
   return outputs_of(call, workbench, job).at("frames").as_list<SequenceFrame>();
 }
 

@@ -125,8 +125,12 @@ std::string write_placement(const OpenedFolder& folder, const std::string& into,
 json pipelines_from_starts(const Workbench& workbench) {
   std::vector<fs::path> files{workbench_pipeline("register")};
   std::vector<fs::path> shipped;
-  for (const fs::directory_entry& entry : fs::directory_iterator(cli::shared_files("pipelines")))
-    if (entry.path().extension() == ".yaml") shipped.push_back(entry.path());
+  // Those of the families, which have a folder each; a file beside the folders says only where it has moved.
+  for (const fs::directory_entry& family : fs::directory_iterator(cli::shared_files("pipelines"))) {
+    if (!family.is_directory() || family.path().filename() == "workbench") continue;
+    for (const fs::directory_entry& entry : fs::directory_iterator(family))
+      if (entry.path().extension() == ".yaml") shipped.push_back(entry.path());
+  }
   std::sort(shipped.begin(), shipped.end());
   files.insert(files.end(), shipped.begin(), shipped.end());
   for (const auto& own : workbench.folder.contents()["pipelines"])

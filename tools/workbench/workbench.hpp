@@ -34,16 +34,29 @@ struct PipelineCall {
   bool keep = true;                                      ///< in the store
 };
 
+/// A node that a page calls alone, such as a reader. What it returns is not kept in the store.
+struct NodeCall {
+  std::string name;                                              ///< as read.image
+  std::vector<std::pair<std::string, nlohmann::json>> options;  ///< a path is absolute
+};
+
 /// share/marrow/pipelines/workbench/NAME.yaml
 std::filesystem::path workbench_pipeline(const std::string& name);
+
+/// A value as text for `--set`: a JSON string or list, with '$' escaped.
+std::string set_text(const nlohmann::json& value);
 
 /// Runs it and returns its outputs; an output that could not be made is absent. The run's events go to the job, and
 /// stopping the job stops it. Throws Error with all faults of the file, or with the reason of the first node that
 /// failed.
 std::map<std::string, Value> outputs_of(const PipelineCall& call, const Workbench& workbench, Job& job);
+/// The same for a node; its outputs have the names that the node gives them.
+std::map<std::string, Value> outputs_of(const NodeCall& call, const Workbench& workbench, Job& job);
 
 /// The command that runs it in a shell.
 std::string command_of(const PipelineCall& call);
+/// The same for a node: the command runs workbench/node.yaml with it.
+std::string command_of(const NodeCall& call);
 /// "cd FOLDER && marrow COMMAND", with the opened folder.
 std::string command_in_folder(const Workbench& workbench, const std::string& command);
 

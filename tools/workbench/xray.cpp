@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "workbench/xray.hpp"
 
-#include "marrow/base/json_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
 
@@ -14,12 +13,6 @@ using nlohmann::json;
 void add_xray_page(Server& server, Workbench& workbench) {
   for (const auto add : {add_xray_views, add_xray_checks, add_xray_masks, add_xray_exchange, add_xray_export})
     add(server, workbench);
-}
-
-std::string set_text(const json& value) {
-  std::string text;
-  for (const char c : json_text(value)) text += c == '$' ? "$$" : std::string(1, c);
-  return text;
 }
 
 namespace {
@@ -71,13 +64,14 @@ std::vector<Override> overrides_of(const Workbench& workbench, const json& views
   return {{"views.names", set_text(names)}, {"views.images", set_text(images)}, {"views.cameras", set_text(cameras)}};
 }
 
-PipelineCall image_call(const Workbench& workbench, const std::string& image) {
-  return {.file = workbench_pipeline("image"),
-          .arguments = {{{"image", workbench.folder.inside(image).string()}}, {}},
-          .keep = false};
+NodeCall image_call(const Workbench& workbench, const std::string& image) {
+  return {"read.image", {{"path", workbench.folder.inside(image).string()}}};
 }
 
-Ran run(const PipelineCall& call, const Workbench& workbench) {
+namespace {
+
+template <class Call>
+Ran run_during_request(const Call& call, const Workbench& workbench) {
   Job job("", "");
   Ran ran{outputs_of(call, workbench, job), {}};
   const json events = job.state(0, 0)["events"];
@@ -85,5 +79,11 @@ Ran run(const PipelineCall& call, const Workbench& workbench) {
     if (event.value("event", "") == "warning") ran.warnings.push_back(event.value("text", ""));
   return ran;
 }
+
+}  // namespace
+
+Ran run(const PipelineCall& call, const Workbench& workbench) { return run_during_request(call, workbench); }
+
+Ran run(const NodeCall& call, const Workbench& workbench) { return run_during_request(call, workbench); }
 
 }  // namespace marrow::workbench

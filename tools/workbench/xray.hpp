@@ -12,9 +12,6 @@
 
 namespace marrow::workbench {
 
-/// A value as text for `--set`: a JSON string or list, with '$' escaped.
-std::string set_text(const nlohmann::json& value);
-
 /// The camera file of a view: the file that `camera` names by {file}, or a file in .marrow/drafts. The latter holds the
 /// keys in `camera` itself, or the camera of another program's file if `camera` has the keys for that. Throws Error if
 /// there is no camera, or if it cannot be read.
@@ -30,16 +27,17 @@ nlohmann::json camera_json(const Camera& camera);
 /// The overrides that name these views, a list of {name, image, camera}, for the node `views` of a pipeline.
 std::vector<Override> overrides_of(const Workbench& workbench, const nlohmann::json& views);
 
-/// A run of a small pipeline, during the request: its outputs and its warnings.
+/// A run of a small pipeline or of a node, during the request: its outputs and its warnings.
 struct Ran {
   std::map<std::string, Value> outputs;
   std::vector<std::string> warnings;
 };
-/// Throws Error as outputs_of() does.
+/// Each throws Error as outputs_of() does.
 Ran run(const PipelineCall& call, const Workbench& workbench);
+Ran run(const NodeCall& call, const Workbench& workbench);
 
-/// The run that reads an image alone. `image` is relative to the opened folder.
-PipelineCall image_call(const Workbench& workbench, const std::string& image);
+/// The call that reads an image alone. `image` is relative to the opened folder.
+NodeCall image_call(const Workbench& workbench, const std::string& image);
 
 /// Each function adds a part of the requests.
 void add_xray_views(Server& server, Workbench& workbench);

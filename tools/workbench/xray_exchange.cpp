@@ -40,8 +40,7 @@ json imported(const Workbench& workbench, const Request& request) {
   if (what != "seeds" && what != "landmarks" && what != "pose")
     throw Error("seeds, landmarks or a pose can be imported, not '" + printable(what) + "'");
   const std::string path = workbench.folder.inside(request.parameter("path")).string();
-  const PipelineCall call{
-      .file = workbench_pipeline("import-" + what), .arguments = {{{"path", path}}, {}}, .keep = false};
+  const NodeCall call{"read." + what, {{"path", path}}};
   const Ran ran = run(call, workbench);
   const Value& value = ran.outputs.at(what);
   json answer = {{"command", command_of(call)}, {"warnings", ran.warnings}};

@@ -54,9 +54,7 @@ Answer view_answer(const Workbench& workbench, const Request& request) {
   try {
     const std::filesystem::path camera = camera_file(workbench, request.body.value("camera", json()), image);
     const std::string file = workbench.folder.inside(image).string();
-    const PipelineCall call{.file = workbench_pipeline("view"),
-                            .arguments = {{{"image", file}, {"camera", camera.string()}}, {}},
-                            .keep = false};
+    const NodeCall call{"read.view", {{"image", file}, {"camera", camera.string()}}};
     about["command"] = command_of(call);
     const Ran ran = run(call, workbench);
     const View& view = ran.outputs.at("view").as<View>();
@@ -68,7 +66,7 @@ Answer view_answer(const Workbench& workbench, const Request& request) {
   } catch (const Error& error) {
     fault = error.what();
   }
-  const PipelineCall call = image_call(workbench, image);
+  const NodeCall call = image_call(workbench, image);
   about = {{"fault", printable_lines(fault)}, {"command", command_of(call)}, {"warnings", json::array()}};
   const Ran ran = run(call, workbench);
   std::string pixels = pixels_of(ran.outputs.at("image").as<Image>(), about);
@@ -87,10 +85,9 @@ void add_xray_views(Server& server, Workbench& workbench) {
   });
   server.get("/api/xray/header-camera", [&](const Request& request) {
     const std::string image = workbench.folder.inside(request.parameter("image")).string();
-    const PipelineCall call{
-        .file = workbench_pipeline("header-camera"), .arguments = {{{"image", image}}, {}}, .keep = false};
+    const NodeCall call{"camera.dicom", {{"paths", json::array({image})}, {"names", json::array({"view"})}}};
     const Ran ran = run(call, workbench);
-    return json_answer({{"camera", camera_json(ran.outputs.at("camera").as<Camera>())},
+    return json_answer({{"camera", camera_json(ran.outputs.at("camera").items.front().as<Camera>())},
                         {"warnings", ran.warnings},
                         {"command", command_of(call)}});
   });

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""pipelines/bone.yaml on a small simulated vertebra: each way to a start alone, none, and one to four views."""
+"""pipelines/bone/bone.yaml on a small simulated vertebra: each way to a start alone, none, and one to four views."""
 import shutil
 
 import yaml
@@ -38,7 +38,9 @@ class Bone(Case):
         return to
 
     def registered(self, case, *arguments):
-        result = marrow("run", PIPELINES / "bone.yaml", "case=%s" % case, "--out", self.scratch / "run", *arguments)
+        result = marrow(
+            "run", PIPELINES / "bone" / "bone.yaml", "case=%s" % case, "--out", self.scratch / "run", *arguments
+        )
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
         return result, metrics(self.scratch / "run" / "outputs" / "errors" / "bone" / "final.json")
 
@@ -54,7 +56,7 @@ class Bone(Case):
         result, errors = self.registered(self.copy(start=self.shifted))
         self.assertLess(errors["mtre_mm"], 1)
         self.assertIn("node 'marks' (read.landmarks) failed", result.stderr)
-        self.assertIn("node 'by_search' (initial.global_search) for bone failed: it has no poses to try", result.stderr)
+        self.assertIn("node 'by_search/search' (initial.global_search) for bone failed: it has no poses to try", result.stderr)
 
     def test_by_landmarks(self):
         result, errors = self.registered(self.copy(landmarks=True))
@@ -75,7 +77,7 @@ class Bone(Case):
                 self.setUp()
 
     def test_without_any_way_it_says_what_to_do(self):
-        result = marrow("run", PIPELINES / "bone.yaml", "case=%s" % self.copy(), "--out", self.scratch / "run")
+        result = marrow("run", PIPELINES / "bone" / "bone.yaml", "case=%s" % self.copy(), "--out", self.scratch / "run")
         self.assertEqual(result.returncode, 1)
         self.assertIn("there is no start; give the approximate placement of the fragment", result.stderr)
         self.assertIn("it has no poses to try; give their number", result.stderr)

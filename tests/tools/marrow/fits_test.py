@@ -99,7 +99,7 @@ class Fits(Case):
         self.assertIn("leave it out, or name a result of another type", checked.stderr)
 
     def test_an_output_that_only_the_replaced_node_has(self):
-        fits = {fit["node"]: fit for fit in fits_of(SOURCE / "pipelines" / "wrist-cameras.yaml", "check")}
+        fits = {fit["node"]: fit for fit in fits_of(SOURCE / "pipelines" / "wrist" / "wrist-cameras.yaml", "check")}
         self.assertEqual(
             fits["camera.carm"]["faults"],
             ["node 'check' has no output 'metrics'", "node 'check' has no output 'picture'"],

@@ -8,7 +8,7 @@ from harness.cases import metrics
 from harness import SOURCE
 from harness.program import Case, main, marrow
 
-PIPELINE = SOURCE / "pipelines" / "nailing.yaml"
+PIPELINE = SOURCE / "pipelines" / "guidance" / "nailing.yaml"
 
 
 class Nailing(Case):
@@ -20,7 +20,7 @@ class Nailing(Case):
             "--out",
             out,
             "--set",
-            "femur.resolution_mm=2",
+            "bone.resolution_mm=2",
             "--set",
             "implant.resolution_mm=1",
             "--set",

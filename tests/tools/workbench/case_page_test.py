@@ -123,7 +123,7 @@ class CasePageTest(PageTest):
         self.assertEqual(self.find("[data-ct]").text, "mine/ct")
         self.assertEqual(self.browser.js(OUTLINED), True, "the copied CT is the same, so what is shown stays")
         commands = self.find("[data-saved]").text
-        self.assertIn("bone.yaml case=%s" % case.resolve(), commands)
+        self.assertIn("pipelines/bone/bone.yaml case=%s" % case.resolve(), commands)
         environment = {**os.environ, "MARROW_CACHE": str(self.scratch / "store")}
         arguments = ["run", SOURCE / "pipelines/workbench/segment-bone.yaml", "case=%s" % case]
         ended = subprocess.run(

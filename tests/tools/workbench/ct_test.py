@@ -164,8 +164,9 @@ class CtServerTest(BenchTest):
         environment["MARROW_CACHE"] = str(self.scratch / "store")
         ended = subprocess.run(command, shell=True, cwd=self.folder, env=environment, capture_output=True, text=True)
         self.assertEqual(ended.returncode, 0, ended.stderr)
-        resolved = yaml.safe_load((self.folder / "runs" / "volume" / "pipeline.yaml").read_text())
-        self.assertEqual(resolved["nodes"]["ct"]["with"]["flip"], ["z"])
+        resolved = yaml.safe_load((self.folder / "runs" / "node" / "pipeline.yaml").read_text())
+        self.assertEqual(resolved["nodes"]["node"]["with"]["flip"], ["z"])
+        self.assertEqual(resolved["nodes"]["node"]["with"]["path"], str(self.folder.resolve() / name))
 
 
 def random_geometry(chance):

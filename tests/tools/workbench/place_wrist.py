@@ -6,8 +6,8 @@
     tests/tools/workbench/place_wrist.py WRIST [PICTURES]      # WRIST: the folder with volumes, images, cameras
 
 The script acts as a person who sees where the bone belongs. It aims with the pointer in whole steps of 4 pixels and 2
-degrees. Its goal is the placement by hand that is shipped for pipelines/wrist-intensity.yaml. The result is compared
-with a registration from that placement.
+degrees. Its goal is the placement by hand that is shipped for pipelines/wrist/wrist-intensity.yaml. The result is
+compared with a registration from that placement.
 """
 import json
 import math

@@ -146,7 +146,7 @@ class RequestsTest(Moving, BenchTest):
             words += ["%s=%s" % (view, one["images"]), "%s_pattern=%s" % (view, one["pattern"])]
             words.append("%s_camera=case/%s.camera.yaml" % (view, view))
         words += ["--set", "case.starts=placed/case/1", "--only", "tra", "--out", self.scratch / "run"]
-        self.marrow("run", SOURCE / "pipelines" / "track.yaml", *words)
+        self.marrow("run", SOURCE / "pipelines" / "track" / "track.yaml", *words)
         written = (self.scratch / "run" / "outputs" / "tra" / "bone.tra").read_bytes()
         self.assertEqual(written, (self.folder / "placed/case/1/tracked/bone.tra").read_bytes())
 

@@ -7,7 +7,7 @@ import * as CasePage from './case.js';
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
 
-const PIPELINES = [['femur-best', 'A fractured femur:'], ['bone', 'Any other bone:']];
+const PIPELINES = [['femur/femur-best', 'A fractured femur:'], ['bone/bone', 'Any other bone:']];
 
 // Asks whether comments of the older files may be lost, if some cannot be kept. If the server gives no answer, for
 // example because the case is incomplete, saving reports the fault.
