@@ -138,6 +138,7 @@ void run_into(Run& run, const RunOptions& options, RunSettings& settings, Observ
     }
     if (!fault.empty()) run.warnings.emplace_back("", "results are not kept: " + fault);
   }
+  if (folder) folder->keep_failed_calls(settings, known);
   run.result = run_pipeline(run.read->pipeline, known, settings);
   run.settings.seed = settings.seed;
   run.settings.threads = settings.threads;

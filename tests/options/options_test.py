@@ -5,6 +5,7 @@ import unittest
 
 import calls_of_bones  # noqa: E402
 import calls_of_files  # noqa: E402
+import calls_of_programs  # noqa: E402
 import calls_of_simulation  # noqa: E402
 from alternatives import alternatives  # noqa: E402
 from digests import digest_of  # noqa: E402
@@ -16,7 +17,7 @@ from untried import UNTRIED  # noqa: E402
 
 SCENE = Scene()
 CALLS = {}
-for module in (calls_of_bones, calls_of_simulation, calls_of_files):
+for module in (calls_of_bones, calls_of_simulation, calls_of_files, calls_of_programs):
     CALLS.update(module.calls(SCENE))
 NO_EFFECT = {}  # options that change no output, each with the reason
 OF_TESTS = ("test.", "parse.test_")

@@ -2,6 +2,7 @@
 """Values for options that cannot be guessed, or that count only together with others: by node.option, a function of the
 scene that gives sets of options. A key "in.NAME" is an input."""
 from calls_of_bones import GREY_VALUES
+from calls_of_programs import FORMATS
 from files_of_scene import surface_of, written
 
 
@@ -129,6 +130,18 @@ TRIES = {
     "simulate.case.register": one(to=["proximal"]),
     "simulate.sweeps.axes": one(to=["x"]),
 }
+for _node, _format in FORMATS.items():
+    TRIES.update(
+        {
+            "run.program_%s.command" % _node: one(to=["false", "{output.%s}" % _format]),
+            "run.program_%s.version_command" % _node: one(to=["true"]),
+            "run.program_%s.files" % _node: one(to=[]),
+            "run.program_%s.output_file" % _node: one(to="other"),
+            "run.program_%s.max_time_s" % _node: one(to=0.01),
+            "run.program_%s.max_memory_mb" % _node: one(to=1),
+        }
+    )
+TRIES["run.program_field.labels"] = one(to=[12345])
 for _node in (
     "evaluate.reduced",
     "evaluate.reduction_gap",

@@ -57,6 +57,7 @@ void add_cell(CLI::App& app, int& code);
 void add_chunk(CLI::App& app, int& code);
 void add_worker(CLI::App& app, int& code);
 void add_rerun(CLI::App& app, int& code);
+void add_replay(CLI::App& app, int& code);
 void add_diff(CLI::App& app, int& code);
 void add_show(CLI::App& app, int& code);
 void add_check(CLI::App& app, int& code);
@@ -140,6 +141,8 @@ void print_verdicts(const std::vector<NamedVerdict>& verdicts);
 /// What a run would do with a node, and why: "cached", "runs: ...".
 std::string planned_text(const PlannedNode& node);
 
+/// Prints a value, or the items of a list, if it is a pose or figures of merit.
+void print_value(const std::string& name, const Value& value);
 /// Prints the most important results: poses and figures of merit.
 void print_results(const Pipeline& pipeline, const RunResult& result);
 

@@ -37,6 +37,7 @@ bool FolderOfItsOwn::keep_if_fruitful(const Pipeline& pipeline, const RunOutcome
 FolderOfItsOwn::~FolderOfItsOwn() {
   // Only what a run without outputs writes, each by its name: whatever else came there stays, and so does the folder.
   std::error_code error;
+  if (!folder_.empty()) fs::remove_all(folder_ / "failed", error);
   for (const char* name : {"outputs", "run.json", "pipeline.yaml", "log.txt", ""})
     if (!folder_.empty()) fs::remove(folder_ / name, error);
   if (!had_parent_) fs::remove(parent_, error);

@@ -9,9 +9,8 @@
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/base/strict_yaml.hpp"
-#include "marrow/runtime/pipeline/given_value.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
+#include "marrow/runtime/pipeline/settings.hpp"
 #include "marrow/runtime/run/run_folder.hpp"
 
 namespace marrow::cli {
@@ -26,36 +25,12 @@ std::vector<std::pair<std::string, std::string>> pairs_of(const std::vector<std:
   return result;
 }
 
-namespace {
-
-/// Reads a file with the keys `inputs` and `set`. Its overrides are a layer of their own.
-void read_settings(const std::filesystem::path& file, std::vector<InputValue>& inputs,
-                   std::vector<Override>& overrides) {
-  static const std::vector<std::string> kKeys{"inputs", "set"};
-  Diagnostics diagnostics;
-  StrictYaml yaml(file.string(), diagnostics);
-  const int layer = overrides.empty() ? 0 : overrides.back().layer + 1;
-  if (const auto text = read_source(file, "the file of settings", diagnostics)) {
-    const YAML::Node root = yaml.parse(*text);
-    if (diagnostics.empty())
-      for (const YamlEntry& section : yaml.map(root, {file.string(), 1, 1}, "the file of settings", &kKeys))
-        for (const YamlEntry& entry : yaml.map(section.value, section.place, section.key)) {
-          const std::string value = text_to_give(entry.value);
-          if (section.key == "inputs")
-            inputs.push_back({entry.key, value, entry.place});
-          else
-            overrides.push_back({entry.key, value, entry.place, layer});
-        }
-  }
-  if (!diagnostics.empty()) throw Error(diagnostics.text());
-}
-
-}  // namespace
-
 PipelineArguments arguments_of(const PipelineRequest& request) {
   PipelineArguments arguments;
-  std::vector<InputValue> of_files;
-  for (const std::filesystem::path& file : request.settings) read_settings(file, of_files, arguments.overrides);
+  PipelineArguments of_files;
+  Diagnostics faults;
+  for (const std::filesystem::path& file : request.settings) add_settings(file, of_files, faults);
+  if (!faults.empty()) throw Error(faults.text());
   for (auto& [name, value] : pairs_of(request.inputs, "name=value")) {
     for (const InputValue& before : arguments.inputs)
       if (before.name == name)
@@ -64,7 +39,8 @@ PipelineArguments arguments_of(const PipelineRequest& request) {
     arguments.inputs.push_back({name, value});
   }
   // Of two values of an input, the pipeline takes the last.
-  arguments.inputs.insert(arguments.inputs.begin(), of_files.begin(), of_files.end());
+  arguments.inputs.insert(arguments.inputs.begin(), of_files.inputs.begin(), of_files.inputs.end());
+  arguments.overrides = std::move(of_files.overrides);
   for (auto& [key, value] : pairs_of(request.overrides, "node.option=value"))
     arguments.overrides.push_back({key, value, {}, int(request.settings.size())});
   return arguments;
@@ -149,7 +125,7 @@ int print_resolved(const PipelineRequest& request) {
   const Catalogue catalogue;
   Pipeline pipeline;
   if (!load(request, catalogue, pipeline, false)) return 2;
-  std::fputs(resolved_yaml(pipeline, true).c_str(), stdout);
+  std::fputs(resolved_yaml_with_places(pipeline).c_str(), stdout);
   return 0;
 }
 

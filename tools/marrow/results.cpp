@@ -57,23 +57,6 @@ void print_metrics(const std::string& name, const std::vector<std::string>& colu
   }
 }
 
-void print_value(const std::string& name, const Value& value) {
-  std::vector<const Metrics*> metrics;
-  std::vector<std::string> columns;
-  for (std::size_t i = 0; i < value.items.size(); ++i) {
-    if (value.items[i].data && value.type == TypeInfo::of<Metrics>()) {
-      metrics.push_back(&value.items[i].as<Metrics>());
-      columns.push_back(value.names[i]);
-    } else {
-      print_value(name + " " + value.names[i], value.items[i]);
-    }
-  }
-  if (!metrics.empty()) print_metrics(name, columns, metrics);
-  if (!value.data) return;
-  if (value.type == TypeInfo::of<Pose>()) print_pose(name, value.as<Pose>());
-  if (value.type == TypeInfo::of<Metrics>()) print_metrics(name, {""}, {&value.as<Metrics>()});
-}
-
 void say_note_in_lines(const std::string& text) {
   if (!text.empty()) std::fprintf(stderr, "marrow: note: %s\n", printable_lines(text).c_str());
 }
@@ -132,6 +115,23 @@ void print_verdicts(const std::vector<NamedVerdict>& verdicts) {
       std::printf("    would settle it: %s\n", printable_lines(remedy).c_str());
   }
   if (!verdicts.empty()) std::printf("\n");
+}
+
+void print_value(const std::string& name, const Value& value) {
+  std::vector<const Metrics*> metrics;
+  std::vector<std::string> columns;
+  for (std::size_t i = 0; i < value.items.size(); ++i) {
+    if (value.items[i].data && value.type == TypeInfo::of<Metrics>()) {
+      metrics.push_back(&value.items[i].as<Metrics>());
+      columns.push_back(value.names[i]);
+    } else {
+      print_value(name + " " + value.names[i], value.items[i]);
+    }
+  }
+  if (!metrics.empty()) print_metrics(name, columns, metrics);
+  if (!value.data) return;
+  if (value.type == TypeInfo::of<Pose>()) print_pose(name, value.as<Pose>());
+  if (value.type == TypeInfo::of<Metrics>()) print_metrics(name, {""}, {&value.as<Metrics>()});
 }
 
 void print_results(const Pipeline& pipeline, const RunResult& result) {

@@ -21,6 +21,7 @@
 #include "marrow/runtime/run/verdict_json.hpp"
 #include "marrow/runtime/store/shared_store.hpp"
 #include "process.hpp"
+#include "report/report.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -168,6 +169,18 @@ void print_nodes(const Pipeline& pipeline, const std::vector<NodeRecord>& record
   }
 }
 
+/// How to make the failed calls again. The first say enough.
+void print_failed_calls(const RunFolder& folder) {
+  constexpr std::size_t kMost = 3;
+  const std::vector<std::string> failed = folder.failed_calls();
+  if (failed.empty()) return;
+  std::printf("what failed can be called again alone:\n");
+  for (std::size_t i = 0; i < std::min(failed.size(), kMost); ++i)
+    std::printf("  marrow replay %s\n", shell_path(folder.path() / failed[i]).c_str());
+  if (failed.size() > kMost)
+    std::printf("  and %zu more below %s\n", failed.size() - kMost, shell_path(folder.path() / "failed").c_str());
+}
+
 /// `folder`: empty if it was not kept.
 void print_summary(const Pipeline& pipeline, const RunResult& result, const std::vector<RunFolder::Written>& written,
                    const std::string& folder) {
@@ -191,7 +204,8 @@ void print_summary(const Pipeline& pipeline, const RunResult& result, const std:
 }
 
 void print_json_summary(const Pipeline& pipeline, const RunResult& result,
-                        const std::vector<RunFolder::Written>& written, const std::string& folder) {
+                        const std::vector<RunFolder::Written>& written, const std::string& folder,
+                        const std::vector<std::string>& failed_calls) {
   for (const NamedVerdict& one : verdicts_of(pipeline, result)) {
     json verdict = json_of(one);
     verdict["event"] = "verdict";
@@ -202,14 +216,15 @@ void print_json_summary(const Pipeline& pipeline, const RunResult& result,
     files[output.output] = output.files;
     if (!output.absent.empty()) absent[output.output] = output.absent;
   }
-  const json end = {{"event", "ended"},
-                    {"status", result.cancelled() ? "cancelled"
-                               : result.failed()  ? "failed"
-                                                  : "done"},
-                    {"seconds", result.seconds},
-                    {"folder", folder},
-                    {"files", files},
-                    {"absent", absent}};
+  json end = {{"event", "ended"},
+              {"status", result.cancelled() ? "cancelled"
+                         : result.failed()  ? "failed"
+                                            : "done"},
+              {"seconds", result.seconds},
+              {"folder", folder},
+              {"files", files},
+              {"absent", absent}};
+  if (!folder.empty() && !failed_calls.empty()) end["failed_calls"] = failed_calls;
   print_as_json(end, -1);
 }
 
@@ -238,6 +253,7 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
     note("results are not kept: " + fault);
   else
     settings.store = store;
+  folder.keep_failed_calls(settings, catalogue);
   RunOutcome outcome;
   outcome.result = run_pipeline(pipeline, catalogue, settings);
   progress.clear();
@@ -324,9 +340,10 @@ int run(const RunRequest& request) {
                                      request.no_cache ? nullptr : &store, folder);
   const std::string kept = own.keep_if_fruitful(pipeline, outcome) ? folder.path().string() : "";
   if (request.json)
-    print_json_summary(pipeline, outcome.result, outcome.written, kept);
+    print_json_summary(pipeline, outcome.result, outcome.written, kept, folder.failed_calls());
   else if (!request.quiet)
     print_summary(pipeline, outcome.result, outcome.written, kept);
+  if (!request.json && !request.quiet && !kept.empty()) print_failed_calls(folder);
   if (outcome.result.cancelled()) return 130;
   if (outcome.is_faulty) return 1;
   return has_wrong_pose(verdicts_of(pipeline, outcome.result)) ? 3 : 0;

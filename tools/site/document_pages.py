@@ -29,6 +29,7 @@ GROUPS = {
         "verdict",
         "glossary",
         "repetition",
+        "programs",
         "tracking",
         "python",
         "simulation",

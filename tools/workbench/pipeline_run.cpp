@@ -92,6 +92,7 @@ json run_into_folder(std::shared_ptr<LastRun> run, const PipelineArguments& argu
     log_event(folder.log(), event);
     job.tell(cli::json_of(event));
   };
+  folder.keep_failed_calls(settings, workbench.catalogue);
   run->result = run_pipeline(run->pipeline, workbench.catalogue, settings);
   const auto written = folder.write_outputs(run->pipeline, run->result, workbench.catalogue);
   folder.write_record(run->pipeline, run->result, settings, workbench.catalogue, arguments, written);

@@ -73,6 +73,24 @@ void add_manifest(json& node, const PipelineNode& known) {
   }
 }
 
+/// A node that another file has: one that this file extends, or a part. It is shown, and not changed here.
+json node_of_another_file(const PipelineNode& node, const Workbench& workbench) {
+  std::error_code outside;
+  const std::filesystem::path file =
+      std::filesystem::relative(std::filesystem::absolute(node.place.file), workbench.folder.path(), outside);
+  return {{"line", node.place.line},   {"uses", node.info.name},     {"body", ""},
+          {"is_repeated", false},      {"may_fail", node.may_fail},  {"with", json::object()},
+          {"in", json::object()},      {"file", outside ? node.place.file : file.string()}};
+}
+
+void add_node(json& nodes, const PipelineNode& node, const Workbench& workbench) {
+  if (node.stands_for_input) return;
+  json& shown = nodes[node.id];
+  if (shown.is_null()) shown = node_of_another_file(node, workbench);
+  if (shown["uses"] == "" && !node.repetition) shown["uses"] = node.info.name;
+  add_manifest(shown, node);
+}
+
 }  // namespace
 
 void describe_pipeline(json& state, const Workbench& workbench) {
@@ -95,8 +113,7 @@ void describe_pipeline(json& state, const Workbench& workbench) {
   state["name"] = pipeline.name;
   state["help"] = pipeline.help;
   state["graph"] = cli::graph_of(pipeline, {});
-  for (const PipelineNode& node : pipeline.nodes)
-    if (state["nodes"].contains(node.id)) add_manifest(state["nodes"][node.id], node);
+  for (const PipelineNode& node : pipeline.nodes) add_node(state["nodes"], node, workbench);
   for (const PipelineOutput& output : pipeline.outputs)
     state["outputs"].push_back({{"name", output.name}, {"source", output.source.text}});
 }

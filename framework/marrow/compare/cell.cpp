@@ -207,6 +207,7 @@ CellRunner::Done CellRunner::run_into(const fs::path& folder, const Pipeline& pi
   RunSettings settings = settings_of(cell);
   settings.wanted_by_others = wanted_by_others(cell, pipeline);
   settings.observer = observer;
+  written.keep_failed_calls(settings, catalogue_);
   Done done{run_pipeline(pipeline, catalogue_, settings), ""};
   const auto outputs = written.write_outputs(pipeline, done.result, catalogue_);
   written.write_record(pipeline, done.result, settings, catalogue_,

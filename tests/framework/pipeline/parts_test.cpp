@@ -222,13 +222,15 @@ TEST_F(PartsTest, APartOfItself) {
 
 TEST_F(PartsTest, ManyParts) {
   scratch.write("n0.yaml", "marrow: 1\nnodes: {d: {uses: test.draw}}\noutputs: {d: d}\n");
-  for (int i = 0; i < 5; ++i) {
+  for (int i = 0; i < 7; ++i) {
     std::string nodes;
     for (int k = 0; k < 10; ++k) nodes += "  p" + std::to_string(k) + ": {uses: n" + std::to_string(i) + ".yaml}\n";
     scratch.write("n" + std::to_string(i + 1) + ".yaml", "marrow: 1\nnodes:\n" + nodes + "outputs: {d: p0}\n");
   }
-  whole("  plus: {uses: n5.yaml}\n");
-  EXPECT_NE(diagnostics.text().find("with its parts, the pipeline has more than 20000 nodes"), std::string::npos);
+  whole("  plus: {uses: n6.yaml}\n");
+  EXPECT_NE(diagnostics.text().find("the parts of the pipeline have 20000 nodes or more"), std::string::npos);
+  whole("  plus: {uses: n7.yaml}\n");
+  EXPECT_NE(diagnostics.text().find("parts lie more than 8 deep in each other"), std::string::npos);
 }
 
 TEST_F(PartsTest, NamesWithASlash) {

@@ -69,6 +69,14 @@ Metrics fail_above(const Metrics& a, const ConstantOptions& options) {
   if (value_of(a) > options.value) throw marrow::Error("the number is too large; give a smaller one");
   return a;
 }
+Metrics fail_applied(const numbers::Adder& adder, const Metrics& to, const ConstantOptions& options) {
+  const double result = adder(value_of(to));
+  if (result > options.value) throw marrow::Error("the function gave " + std::to_string(int(result)));
+  return number(result);
+}
+Metrics fail_drawn(marrow::Context& context) {
+  throw marrow::Error("it drew " + std::to_string(context.seed() % 1000003));
+}
 Metrics draw(marrow::Context& context) { return number(double(context.seed() % 1000003)); }
 Metrics work(const Metrics* after, const ConstantOptions& options, marrow::Context& context) {
   const auto start = std::chrono::steady_clock::now();
@@ -138,6 +146,13 @@ MARROW_PLUGIN(plugin) {
       .in("a", "number")
       .out("number", "the same")
       .option("value", &ConstantOptions::value, "largest number that passes");
+  plugin.node("test.fail_applied", fail_applied)
+      .summary("Fails if a function gives too much")
+      .in("adder", "function")
+      .in("to", "number")
+      .out("number", "result")
+      .option("value", &ConstantOptions::value, "largest result that passes");
+  plugin.node("test.fail_drawn", fail_drawn).summary("Fails and says its seed").random().out("number", "none");
   plugin.node("test.draw", draw).summary("Random").random().out("number", "from the seed");
   plugin.node("test.work", work)
       .summary("Keeps a core busy")

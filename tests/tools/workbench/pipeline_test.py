@@ -74,6 +74,28 @@ class RequestTest(PipelineBench):
         self.post("redo", revision=state["revision"])
         self.assertIn("width_px: 64", self.file.read_text())
 
+    def test_nodes_of_other_files_are_shown(self):
+        (self.folder / "below").mkdir()
+        (self.folder / "below" / "part.yaml").write_text(
+            "marrow: 1\ninputs: {views: {type: view, over: view}}\n"
+            "nodes: {edges: {uses: edges.canny, in: {view: views}}}\noutputs: {edges: edges}\n"
+        )
+        (self.folder / "base.yaml").write_text(PIPELINE)
+        self.file.write_text(
+            "marrow: 1\nextends: base.yaml\nnodes:\n  cameras: {with: {width_px: 64}}\n"
+            "  more: {uses: below/part.yaml, in: {views: views}}\noutputs: {more: more}\n"
+        )
+        state = self.state()
+        self.assertEqual(state["faults"], [])
+        nodes = state["nodes"]
+        self.assertEqual((nodes["bone"]["file"], nodes["bone"]["line"]), ("base.yaml", 6))
+        self.assertEqual((nodes["more/edges"]["file"], nodes["more/edges"]["line"]), ("below/part.yaml", 3))
+        self.assertEqual((nodes["cameras"]["uses"], nodes["cameras"]["with"]), ("camera.carm", {"width_px": "64"}))
+        self.assertNotIn("file", nodes["cameras"])
+        answer = self.edit(what="option", node="cameras", uses="camera.carm", name="width_px", value="32")
+        self.assertEqual(answer[0], 200, answer[2])
+        self.assertIn("{width_px: 32}", self.file.read_text())
+
     def test_a_text_is_quoted_where_yaml_needs_it(self):
         text = "marrow: 1\nnodes:\n  bone: {uses: read.mesh, with: {path: a.stl}}  # mine\noutputs: {bone: bone}\n"
         self.file.write_text(text)

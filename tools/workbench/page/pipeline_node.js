@@ -115,12 +115,27 @@ function fitting(file, node, edit) {
   return el('div', {}, el('p', {class: 'note'}, 'Another node starts with the defaults of its options.'), find, place);
 }
 
+// A node that this file does not write itself: what it is, where it is written, and how this file changes it.
+function elsewhere(id, node, head) {
+  const change = id.replaceAll('/', '.'), first = node.info && node.info.options[0];
+  return el(
+      'div', {}, head, el('p', {}, node.info ? node.info.summary : ''),
+      el('p', {class: 'note'}, 'Written in ',
+         el('a', {href: Shell.addressOf('pipeline', node.file), 'data-do': 'file'}, node.file), ', line ' + node.line +
+             '. To change it in this file only, write  set: {' + change + '.' + (first ? first.name : 'option') + ': …}'),
+      node.info && node.info.options.length ?
+          el('table', {},
+             node.info.options.map((option) => el('tr', {}, el('td', {}, option.name), el('td', {}, option.now)))) :
+          '');
+}
+
 // The form of node `id` in `state` (api/pipeline). edit(change) asks for a change of the file.
 export function form(state, id, edit, goTo) {
   const node = state.nodes[id], own = (change) => edit({node: id, uses: node.uses, ...change});
   const head =
       el('p', {class: 'node-head'}, el('strong', {}, id), ' ', el('code', {}, node.uses || 'repeats ' + node.body), ' ',
-         button('line ' + node.line, () => goTo(node.line), {class: 'link', 'data-do': 'line'}));
+         node.file ? '' : button('line ' + node.line, () => goTo(node.line), {class: 'link', 'data-do': 'line'}));
+  if (node.file) return elsewhere(id, node, head);
   const info = node.info;
   if (!info) return el('div', {}, head, el('p', {class: 'note'}, 'The form is shown when the file has no faults.'));
   const inputs = info.inputs.map((port) => wireField(port, node.in[port.name], state.nodes, id, own));

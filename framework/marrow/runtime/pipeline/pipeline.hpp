@@ -141,10 +141,11 @@ Pipeline read_pipeline(const std::filesystem::path& file, const PipelineArgument
 Pipeline try_pipeline(const std::filesystem::path& file, const PipelineArguments& arguments, const Catalogue& catalogue,
                       Diagnostics& diagnostics);
 
-/// The pipeline as YAML, with the values of all options. Reading it gives the same pipeline. `with_places`: comments
-/// say in which file and line each node is written, and each value that is written elsewhere. Files are relative to the
-/// pipeline's folder.
-std::string resolved_yaml(const Pipeline& pipeline, bool with_places = false);
+/// The pipeline as YAML, with the values of all options. Reading it gives the same pipeline.
+std::string resolved_yaml(const Pipeline& pipeline);
+/// The same, with comments that say in which file and line each node is written, and each value that is written
+/// elsewhere. Files are relative to the pipeline's folder.
+std::string resolved_yaml_with_places(const Pipeline& pipeline);
 
 /// Why a value of this type cannot become a file.
 std::string no_writer(const TypeInfo& type);

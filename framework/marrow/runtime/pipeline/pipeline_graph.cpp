@@ -155,6 +155,18 @@ class GraphWriter {
   const std::filesystem::path* file_;
 };
 
+std::string yaml_text(const Pipeline& pipeline, const std::filesystem::path* file) {
+  YAML::Emitter out;
+  out.SetDoublePrecision(17);
+  out << YAML::BeginMap << YAML::Key << "marrow" << YAML::Value << 1 << YAML::Key << "name" << YAML::Value
+      << pipeline.name;
+  GraphWriter writer(out, file);
+  writer.write_inputs(pipeline);
+  writer.write(pipeline);
+  out << YAML::EndMap;
+  return std::string(out.c_str()) + "\n";
+}
+
 }  // namespace
 
 std::vector<std::string> Pipeline::axes_of(const Reference& source) const {
@@ -190,17 +202,9 @@ std::vector<const PipelineNode*> called_nodes(const Pipeline& pipeline) {
   return called;
 }
 
-std::string resolved_yaml(const Pipeline& pipeline, bool with_places) {
-  YAML::Emitter out;
-  out.SetDoublePrecision(17);
-  out << YAML::BeginMap << YAML::Key << "marrow" << YAML::Value << 1 << YAML::Key << "name" << YAML::Value
-      << pipeline.name;
-  GraphWriter writer(out, with_places ? &pipeline.file : nullptr);
-  writer.write_inputs(pipeline);
-  writer.write(pipeline);
-  out << YAML::EndMap;
-  return std::string(out.c_str()) + "\n";
-}
+std::string resolved_yaml(const Pipeline& pipeline) { return yaml_text(pipeline, nullptr); }
+
+std::string resolved_yaml_with_places(const Pipeline& pipeline) { return yaml_text(pipeline, &pipeline.file); }
 
 std::string no_writer(const TypeInfo& type) { return "no plugin writes values of type '" + type.id + "'"; }
 

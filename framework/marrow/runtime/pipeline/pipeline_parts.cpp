@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostInside = 8, kMostNodes = 20'000;
+constexpr std::size_t kMostInside = 8;
 
 /// A reference as written: its first word, and the rest with its dot.
 struct Words {
@@ -84,6 +84,7 @@ class PartReader {
     if (reading_.use != PipelineReading::Use::part) add_stand_ins();
     std::vector<WrittenNode> nodes;
     for (WrittenNode& node : pipeline_.nodes) {
+      if (!has_place(node)) break;
       if (node.repetition || !is_part(node.uses)) {
         if (!node.repetition) std::move(node.changes.begin(), node.changes.end(), std::back_inserter(node.options));
         nodes.push_back(std::move(node));
@@ -91,10 +92,6 @@ class PartReader {
       }
       WrittenPipeline inner = read(node);
       std::move(inner.nodes.begin(), inner.nodes.end(), std::back_inserter(nodes));
-      if (nodes.size() > kMostNodes) {
-        diagnostics_.add(node.uses_place, formatted("with its parts, the pipeline has more than {} nodes", kMostNodes));
-        break;
-      }
     }
     pipeline_.nodes = std::move(nodes);
     const Replace replace = [&](const std::string& text, const Place& place) { return of_part(text, place); };
@@ -107,6 +104,15 @@ class PartReader {
   }
 
  private:
+  bool has_place(const WrittenNode& node) {
+    std::size_t& left = *reading_.nodes_left;
+    if (reading_.use != PipelineReading::Use::part || left == 0) return left > 0;
+    if (--left == 0)
+      diagnostics_.add(node.place, formatted("the parts of the pipeline have {} nodes or more", kMostNodesOfParts),
+                       "use fewer parts in each other");
+    return left > 0;
+  }
+
   void add_stand_ins() {
     std::vector<WrittenNode> nodes;
     for (const DeclaredInput& input : pipeline_.inputs->all) {
@@ -137,11 +143,15 @@ class PartReader {
     PipelineReading reading;
     reading.use = PipelineReading::Use::part;
     reading.inside = reading_.inside;
+    reading.nodes_left = reading_.nodes_left;
     std::error_code ignored;
     reading.inside.push_back(fs::weakly_canonical(file, ignored));
-    if (std::count(reading.inside.begin(), reading.inside.end(), reading.inside.back()) > 1 ||
-        reading.inside.size() > kMostInside) {
+    if (std::count(reading.inside.begin(), reading.inside.end(), reading.inside.back()) > 1) {
       diagnostics_.add(node.uses_place, in_quotes(node.uses) + " uses itself: a pipeline must not be its own part");
+      return {};
+    }
+    if (reading.inside.size() > kMostInside) {
+      diagnostics_.add(node.uses_place, formatted("parts lie more than {} deep in each other", kMostInside));
       return {};
     }
     if (!fs::exists(file, ignored)) {

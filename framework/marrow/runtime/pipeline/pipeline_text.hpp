@@ -108,12 +108,16 @@ inline StrictYaml yaml_of(const WrittenValue& value, Diagnostics& diagnostics) {
   return value.is_override ? StrictYaml(value.place, diagnostics) : StrictYaml(value.place.file, diagnostics);
 }
 
+/// Parts in parts multiply, so a few small files could fill the memory.
+inline constexpr std::size_t kMostNodesOfParts = 20'000;
+
 /// What a pipeline file is read for.
 struct PipelineReading {
   std::vector<InputValue> inputs;
   std::vector<WrittenEntry> changes;          ///< overrides
   std::vector<std::filesystem::path> inside;  ///< the files whose parts or bodies are read, outermost first
   enum class Use { alone, check, part, body } use = Use::alone;
+  std::shared_ptr<std::size_t> nodes_left = std::make_shared<std::size_t>(kMostNodesOfParts);  ///< of parts
 };
 
 /// The overrides of a program as changes of a pipeline.

@@ -7,8 +7,11 @@
 #include <set>
 #include <tuple>
 
+#include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/mapping.hpp"
 #include "marrow/runtime/run/keys.hpp"
+#include "marrow/runtime/run/program_versions.hpp"
+#include "marrow/runtime/run/replay.hpp"
 #include "marrow/runtime/store/digest_memory.hpp"
 #include "marrow/runtime/store/shared_claim.hpp"
 #include "marrow/runtime/store/shared_folder.hpp"
@@ -90,7 +93,30 @@ Evaluation::Recipe Evaluation::noted_recipe(std::size_t node, const Call& call) 
   const Recipe key = recipe(node, call, &contents);
   files_read_.note(contents);
   note(contents);
+  if (settings_.call_keys && !makes_functions(node))
+    settings_.call_keys->note(settings_.within, pipeline_.nodes[node].id, call.item, key.key);
   return key;
+}
+
+/// A replay reads back what its run kept, even if the plugin that made it has been rebuilt since. The call that is made
+/// again then has the same inputs.
+void Evaluation::take_kept_key(std::size_t node, const Call& call, Recipe& recipe) const {
+  if (!settings_.replay || !settings_.store || makes_functions(node)) return;
+  const auto kept = settings_.replay->kept_key(settings_.within, pipeline_.nodes[node].id, call.item);
+  if (!kept || *kept == recipe.key || !settings_.store->find(*kept)) return;
+  recipe.key = *kept;
+  recipe.is_kept = true;
+}
+
+bool Evaluation::is_replayed(std::size_t node, const std::string& item) const {
+  const Replay* replay = settings_.replay;
+  return replay && replay->within == settings_.within && replay->node == pipeline_.nodes[node].id &&
+         replay->item == item;
+}
+
+void Evaluation::end_replay(std::size_t node, const CallResult& result, double seconds) const {
+  if (settings_.replay->on_end)
+    settings_.replay->on_end(pipeline_.nodes[node], {result.status, result.reason, result.outputs, seconds});
 }
 
 bool Evaluation::makes_functions(std::size_t node) const {
@@ -111,9 +137,15 @@ void Evaluation::evaluate(std::size_t node, Call& call) {
     key = noted_recipe(node, call);
     remember(node, call, key);
   } catch (const std::exception& error) {  // a file that its options name cannot be read
+    note_failure(node, call.item, error.what(), 0, call.inputs);
     call.result = failure(node, call.item, error.what());
     return finished_(node, call);
   }
+  if (is_replayed(node, call.item)) {
+    call.result = perform(node, call.inputs, call.item, key);
+    return finished_(node, call);
+  }
+  take_kept_key(node, call, key);
   std::optional<CallResult> known;
   {
     const std::scoped_lock lock(mutex_);
@@ -213,6 +245,14 @@ CallResult Evaluation::failure(std::size_t node, const std::string& item, const 
   return {alone ? Status::failed_alone : Status::failed, reason, {}};
 }
 
+void Evaluation::note_failure(std::size_t node, const std::string& item, const std::string& reason, std::uint64_t seed,
+                              const std::vector<Value>& inputs) const {
+  const PipelineNode& failed = pipeline_.nodes[node];
+  if (settings_.on_failed_call)
+    settings_.on_failed_call({failed, settings_.within, item, failed.id, item, reason, seed, inputs});
+  if (is_replayed(node, item)) end_replay(node, {Status::failed, reason, {}}, 0);
+}
+
 std::string Evaluation::failure_text(std::size_t index, const std::string& item, const std::string& reason) const {
   const PipelineNode& node = pipeline_.nodes[index];
   std::string text = "node '" + node.id + "' (" + node.info.name + ")";
@@ -235,6 +275,8 @@ Provenance Evaluation::provenance(std::size_t index, const std::vector<Value>& i
   const Contents read = files_read_.of(node);
   for (std::size_t i = 0; i < node.options.size(); ++i)
     result.options[node.info.options[i].name] = text_of(node.options[i], node.info.options[i].type, read);
+  if (const std::string version = version_of_program(node); !version.empty())
+    result.options["version_command"] += " (prints " + in_quotes(version) + ")";
   for (std::size_t i = 0; i < inputs.size(); ++i) result.inputs[node.info.inputs[i].name] = key_of(inputs[i]);
   result.random = node.info.random;
   result.seed = settings_.seed;

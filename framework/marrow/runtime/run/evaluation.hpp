@@ -73,6 +73,12 @@ class Evaluation {
   /// The result of a call that failed, which it reports. If the node may fail and `is_own`, this is a warning. A
   /// failure is not the node's own if the system refused what any node needs.
   CallResult failure(std::size_t node, const std::string& item, const std::string& reason, bool is_own = true) const;
+  /// Tells RunSettings::on_failed_call, and the replay if it is its call. Throws nothing.
+  void note_failure(std::size_t node, const std::string& item, const std::string& reason, std::uint64_t seed,
+                    const std::vector<Value>& inputs) const;
+  /// Whether RunSettings::replay is about this call.
+  bool is_replayed(std::size_t node, const std::string& item) const;
+  void end_replay(std::size_t node, const CallResult& result, double seconds) const;
 
  private:
   struct Memo;
@@ -80,10 +86,12 @@ class Evaluation {
   class DeferredSource;
   struct Recipe {
     Digest recipe, key;
+    bool is_kept = false;  ///< the key under which the replayed run kept the result, and no key of a result made now
   };
 
   Recipe recipe(std::size_t node, const Call& call, Contents* contents = nullptr) const;
   Recipe noted_recipe(std::size_t node, const Call& call);
+  void take_kept_key(std::size_t node, const Call& call, Recipe& recipe) const;
   Provenance provenance(std::size_t node, const std::vector<Value>& inputs) const;
   std::string place() const;
   std::string name_of(std::size_t node, const Call& call) const;
@@ -105,6 +113,7 @@ class Evaluation {
   CallResult perform(std::size_t node, std::vector<Value> inputs, const std::string& item, const Recipe& recipe);
   std::vector<Value> call_node(std::size_t node, std::vector<Value>& inputs, const std::string& item,
                                const Recipe& recipe, std::vector<std::string>& warnings);
+  std::uint64_t seed_of_call(std::size_t node, const std::string& item, const Recipe& recipe) const;
   void save(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe, const CallResult& result,
             double seconds, std::vector<std::string> warnings);
   void check_unchanged(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe,

@@ -3,6 +3,7 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
+#include <csignal>
 #include <opencv2/core.hpp>
 
 #include "marrow/base/no_process.hpp"
@@ -16,6 +17,7 @@
 #include "marrow/runtime/run/evaluation.hpp"
 #include "marrow/runtime/run/keys.hpp"
 #include "marrow/runtime/run/output_faults.hpp"
+#include "marrow/runtime/run/replay.hpp"
 #include "marrow/runtime/store/shared_store.hpp"
 
 namespace marrow {
@@ -91,7 +93,10 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
     result.status = Status::failed;
     result.reason = reason_of_exception();
   }
-  if (result.status == Status::failed) result = failure(node, item, result.reason, is_own);
+  const bool is_failed = result.status == Status::failed;
+  if (is_failed) note_failure(node, item, result.reason, seed_of_call(node, item, recipe), inputs);
+  if (is_failed) result = failure(node, item, result.reason, is_own);
+  if (!is_failed && is_replayed(node, item)) end_replay(node, result, seconds);
   if (result.status == Status::done) save(node, inputs, recipe, result, seconds, std::move(warnings));
   const std::scoped_lock lock(mutex_);
   NodeRecord& record = records_[node];
@@ -126,15 +131,26 @@ void Evaluation::make_inputs(const NodeDefinition& definition, std::vector<Value
     });
 }
 
+/// A replayed call has the seed that it had, also if the node has got a new option since.
+std::uint64_t Evaluation::seed_of_call(std::size_t node, const std::string& item, const Recipe& recipe) const {
+  if (is_replayed(node, item) && settings_.replay->seed) return *settings_.replay->seed;
+  return seed_of(recipe.recipe, settings_.seed);
+}
+
 std::vector<Value> Evaluation::call_node(std::size_t node, std::vector<Value>& inputs, const std::string& item,
                                          const Recipe& recipe, std::vector<std::string>& warnings) {
   const PipelineNode& called = pipeline_.nodes[node];
-  const bool apart = runs_apart(called) && !is_python_plugin(catalogue_.library_of(called.info.name)->file);
+  const Replay* replay = is_replayed(node, item) ? settings_.replay : nullptr;
+  const bool apart = runs_apart(called) && !is_python_plugin(catalogue_.library_of(called.info.name)->file) &&
+                     !(replay && replay->in_this_process);
   if (!apart || !inputs.empty()) make_inputs(catalogue_.load(called.info.name), inputs);
   report(RunEvent::Kind::started, node, item, "");
-  const Context::Hooks hooks = make_hooks(node, item, seed_of(recipe.recipe, settings_.seed), warnings);
+  if (replay && replay->on_begin) replay->on_begin(called, inputs);
+  const std::uint64_t seed = seed_of_call(node, item, recipe);
+  const Context::Hooks hooks = make_hooks(node, item, seed, warnings);
   if (apart) return call_apart(catalogue_, called, inputs, hooks, settings_);
   const PluginCode code("node '" + called.id + "' (" + called.info.name + ")", [&](const std::string& reason) {
+    note_failure(node, item, reason, seed, inputs);
     report(RunEvent::Kind::failed, node, item, failure_text(node, item, reason), 0, 0, LogLevel::error);
   });
   const NodeDefinition& definition = catalogue_.load(called.info.name);
@@ -144,6 +160,7 @@ std::vector<Value> Evaluation::call_node(std::size_t node, std::vector<Value>& i
   state_->keep_during([&] {
     warnings.clear();
     Context context(hooks);
+    if (replay && replay->stops_before) std::raise(SIGTRAP);  // the next step enters the node
     outputs = definition.call(inputs, options.get(), context);
   });
   return outputs;
@@ -152,7 +169,7 @@ std::vector<Value> Evaluation::call_node(std::size_t node, std::vector<Value>& i
 void Evaluation::save(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe,
                       const CallResult& result, double seconds, std::vector<std::string> warnings) {
   const std::vector<PortInfo>& outputs = pipeline_.nodes[node].info.outputs;
-  if (!settings_.store ||
+  if (!settings_.store || recipe.is_kept ||
       std::any_of(outputs.begin(), outputs.end(), [](const PortInfo& output) { return output.type.is_function; }))
     return;
   // It depends on files that its key does not cover. The next run knows them.

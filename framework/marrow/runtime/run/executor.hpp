@@ -36,6 +36,10 @@ struct FileLimits {
   double seconds = 0;  ///< processor time
 };
 
+struct FailedCall;
+class CallKeys;
+struct Replay;
+
 struct RunSettings {
   std::uint64_t seed = 1;
   int threads = 0;  ///< 0 = one per hardware thread
@@ -54,6 +58,9 @@ struct RunSettings {
   bool remember = true;  ///< store what each node's result was made from, so that the next plan can say what changed
   FileLimits file_limits = {};
   std::string within = {};  ///< the node and the pass whose body is run, as "track/0007"; empty for a whole pipeline
+  std::function<void(const FailedCall&)> on_failed_call = {};  ///< called by the thread that made the call
+  CallKeys* call_keys = nullptr;                               ///< receives the keys of all results but functions
+  const Replay* replay = nullptr;  ///< makes one call of an earlier run again, and only what that needs
 };
 
 struct PassesRecord;

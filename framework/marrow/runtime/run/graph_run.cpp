@@ -8,6 +8,7 @@
 #include "marrow/base/no_process.hpp"
 #include "marrow/base/process_tree.hpp"
 #include "marrow/runtime/run/passes.hpp"
+#include "marrow/runtime/run/replay.hpp"
 #include "marrow/runtime/store/known_keys.hpp"
 
 namespace marrow {
@@ -244,10 +245,12 @@ void GraphRun::start_node(std::size_t index) {
   } catch (const std::exception& error) {
     state.names.assign(pipeline_.nodes[index].mapped_axes.size(), {""});
     state.calls.assign(1, {});
-    if (cancelled())
+    if (cancelled()) {
       state.calls[0].result = {Status::cancelled, error.what(), {}};
-    else
+    } else {
+      evaluation_.note_failure(index, "", error.what(), 0, {});
       state.calls[0].result = evaluation_.failure(index, "", error.what());
+    }
     finish_node(index);
     return;
   }
@@ -258,6 +261,10 @@ void GraphRun::start_node(std::size_t index) {
 
 void GraphRun::evaluate(std::size_t index, std::size_t c) {
   Call& call = states_[index].calls[c];
+  if (is_left_out(index, call)) {
+    call.result.status = Status::not_run;
+    return finish_call(index, call);
+  }
   call.result.reason = obstacle(pipeline_.nodes[index], call, call.result.status);
   if (!call.result.reason.empty()) {
     if (call.result.status == Status::failed) call.result = evaluation_.failure(index, call.item, call.result.reason);
@@ -269,6 +276,13 @@ void GraphRun::evaluate(std::size_t index, std::size_t c) {
     return states_[index].passes->begin();
   }
   evaluation_.evaluate(index, call);
+}
+
+/// A replay makes one call only of its node.
+bool GraphRun::is_left_out(std::size_t index, const Call& call) const {
+  const Replay* replay = settings_.replay;
+  return replay && replay->within == settings_.within && replay->node == pipeline_.nodes[index].id &&
+         !evaluation_.is_replayed(index, call.item);
 }
 
 void GraphRun::finish_call(std::size_t index, Call& call) {

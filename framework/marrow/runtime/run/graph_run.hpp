@@ -61,6 +61,7 @@ class GraphRun {
   bool cancelled() const { return settings_.cancelled && settings_.cancelled->load(); }
   void start_node(std::size_t index);
   void evaluate(std::size_t index, std::size_t c);
+  bool is_left_out(std::size_t index, const Call& call) const;
   void finish_call(std::size_t index, Call& call);
   void finish_node(std::size_t index);
   void assemble(std::size_t index);

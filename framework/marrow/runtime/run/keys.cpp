@@ -18,6 +18,7 @@
 #include "marrow/runtime/node/mapping.hpp"
 #include "marrow/runtime/pipeline/named_files.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
+#include "marrow/runtime/run/program_versions.hpp"
 #include "marrow/runtime/store/digest_memory.hpp"
 
 namespace marrow {
@@ -99,6 +100,7 @@ Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs, Con
       }
     } else {
       std::visit([&](const auto& value) { hasher.add(value); }, node.options[i]);
+      if (asks_for_version(info)) hasher.add(version_printed(std::get<std::vector<std::string>>(node.options[i])));
     }
   }
   for (std::size_t i = 0; i < inputs.size(); ++i) {

@@ -24,7 +24,8 @@ using Contents = std::map<std::string, PathContent>;  ///< by the path as an opt
 PathContent content_of(const std::string& path);
 
 /// The recipe of one call of a node: its name, all of its options and the keys of its inputs. A path counts by the
-/// names and contents of everything that it names. The build id is not included, so that a rebuilt plugin draws the
+/// names and contents of everything that it names, and the option version_command by what that command prints, too. The
+/// build id is not included, so that a rebuilt plugin draws the
 /// same random numbers. `contents` receives what the node's paths named, also if a later path throws Error.
 Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs, Contents* contents = nullptr);
 

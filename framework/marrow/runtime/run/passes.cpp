@@ -10,6 +10,7 @@
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/run/pass_records.hpp"
+#include "marrow/runtime/run/replay.hpp"
 
 namespace marrow {
 namespace {
@@ -74,11 +75,13 @@ void Passes::prepare() {
   const auto add_needed = [&](const Reference& source) {
     if (source.node == int(index_)) needed[std::size_t(source.output / 2)] = true;
   };
+  const bool is_replayed = is_replayed_inside();  // then nobody uses what the body makes
   for (const PipelineNode& user : outer_.pipeline_.nodes)
-    if (outer_.needed_[std::size_t(&user - outer_.pipeline_.nodes.data())])
+    if (!is_replayed && outer_.needed_[std::size_t(&user - outer_.pipeline_.nodes.data())])
       for (const Wire& wire : user.wires)
         for (const Reference& source : wire.sources) add_needed(source);
-  for (const PipelineOutput& output : outer_.pipeline_.outputs) add_needed(output.source);
+  for (const PipelineOutput& output : outer_.pipeline_.outputs)
+    if (!is_replayed) add_needed(output.source);
   for (std::size_t i = 0; i < outputs; ++i)
     if (needed[i]) needed_outputs_.push_back(int(i));
   lists_.resize(outputs);
@@ -151,8 +154,7 @@ std::unique_ptr<Passes::Run> Passes::make_run(Pipeline pipeline, const std::stri
   auto run = std::make_unique<Run>();
   run->pipeline = std::move(pipeline);
   run->settings = outer_.settings_;
-  const std::string outer = outer_.settings_.within.empty() ? "" : outer_.settings_.within + "/";
-  run->settings.within = outer + node_.id + (within.empty() ? "" : "/" + within);
+  run->settings.within = this->within() + (within.empty() ? "" : "/" + within);
   run->settings.given = constants_;
   for (const std::string& id : outer_.settings_.made_anew)
     if (id == node_.id)
@@ -164,6 +166,13 @@ std::unique_ptr<Passes::Run> Passes::make_run(Pipeline pipeline, const std::stri
       if (!within.empty()) here.item = within + (event.item.empty() ? "" : "/" + event.item);
       if (event.kind == RunEvent::Kind::failed && repetition_.goes_on) here.level = LogLevel::warning;
       outer_.evaluation_.forward(here);
+    };
+  if (outer_.settings_.on_failed_call)
+    run->settings.on_failed_call = [this, within](const FailedCall& call) {
+      FailedCall here = call;
+      here.path = node_.id + "/" + call.path;
+      if (!within.empty()) here.place = within + (call.place.empty() ? "" : "/" + call.place);
+      outer_.settings_.on_failed_call(here);
     };
   return run;
 }
@@ -195,6 +204,7 @@ std::unique_ptr<Passes::Run> Passes::next_pass() {
   }
   auto run = make_run(with_outputs(is_first_ ? repetition_.first : repetition_.body, needed_outputs_), name_of_pass());
   run->settings.given.merge(given);
+  is_last_ = is_replayed_inside() && keep_only_replayed(run->pipeline, run->settings);
   run->graph = std::make_unique<GraphRun>(run->pipeline, outer_.catalogue_, run->settings);
   return run;
 }
@@ -210,18 +220,30 @@ void Passes::begin() {
   try {
     prepare();
   } catch (const std::exception& error) {
+    outer_.evaluation_.note_failure(index_, call_.item, error.what(), 0, call_.inputs);
     return finish(Status::failed, error.what());
   }
-  if (constant_nodes_.empty()) return go_on();
+  if (constant_nodes_.empty() && !only_replays()) return go_on();
+  try {
+    run_constants();
+  } catch (...) {
+    outer_.set_fault();
+    finish(Status::failed, "its body could not be run");
+  }
+}
+
+void Passes::run_constants() {
   constants_run_ = make_run(with_constants(with_outputs(repetition_.body, needed_outputs_), constant_nodes_), "");
   for (std::size_t i = 0; i < call_.inputs.size(); ++i)
     if (!is_sliced_[i]) constants_run_->settings.given[repetition_.given[i].node] = {call_.inputs[i]};
+  if (only_replays()) keep_only_replayed(constants_run_->pipeline, constants_run_->settings);
   constants_run_->graph =
       std::make_unique<GraphRun>(constants_run_->pipeline, outer_.catalogue_, constants_run_->settings);
   constants_run_->graph->begin(*outer_.arena_, [this] { release([this] { after_constants(); }); });
 }
 
 void Passes::after_constants() {
+  if (only_replays()) return finish(Status::done, "");
   try {
     const RunResult& result = constants_run_->graph->result();
     for (std::size_t i = 0; i < result.nodes.size(); ++i)
@@ -258,6 +280,7 @@ void Passes::after_pass() {
     const RunResult result = run_->graph->finish();
     pass.seconds = result.seconds;
     if (result.cancelled()) return finish(Status::cancelled, "stopped before it was done");
+    if (is_last_) return finish(Status::done, "");
     take(result, pass);
   } catch (...) {
     outer_.set_fault();
@@ -343,6 +366,7 @@ void Passes::finish(Status status, const std::string& reason) {
     record.passes = record_;
   }
   if (status == Status::done) outer_.evaluation_.report(RunEvent::Kind::finished, index_, "", "", 1, seconds);
+  if (outer_.evaluation_.is_replayed(index_, call_.item)) outer_.evaluation_.end_replay(index_, call_.result, seconds);
   run_ = nullptr;
   constants_.clear();
   outer_.finish_call(index_, call_);

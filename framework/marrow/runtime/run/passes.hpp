@@ -30,7 +30,11 @@ class Passes {
   std::string name_of_pass() const;
   std::unique_ptr<Run> next_pass();
   std::unique_ptr<Run> make_run(Pipeline pipeline, const std::string& within);
+  std::string within() const;
+  bool is_replayed_inside() const;
+  bool only_replays() const;
   void go_on();
+  void run_constants();
   void after_constants();
   void after_pass();
   void take(const RunResult& result, const PassesRecord::Pass& pass);
@@ -55,6 +59,7 @@ class Passes {
   std::unique_ptr<Run> constants_run_, run_;
   std::size_t pass_ = 0;
   bool is_first_ = false;  ///< whether the pass that runs has to make carried values itself
+  bool is_last_ = false;   ///< whether the pass that runs is for the one call of a replay
 };
 
 }  // namespace marrow

@@ -20,17 +20,17 @@
 #include "marrow/base/machine.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/base/process_state.hpp"
-#include "marrow/base/reason_of_exception.hpp"
 #include "marrow/base/regular_file.hpp"
 #include "marrow/base/text_file.hpp"
 #include "marrow/runtime/node/mapping.hpp"
 #include "marrow/runtime/pipeline/pipeline.hpp"
 #include "marrow/runtime/pipeline/written_content.hpp"
 #include "marrow/runtime/plugins/manifest.hpp"
-#include "marrow/runtime/process/plugin_code.hpp"
+#include "marrow/runtime/run/failed_calls.hpp"
 #include "marrow/runtime/run/keys.hpp"
+#include "marrow/runtime/run/program_versions.hpp"
 #include "marrow/runtime/run/verdict_json.hpp"
+#include "marrow/runtime/run/written_values.hpp"
 
 namespace marrow {
 namespace {
@@ -44,44 +44,6 @@ constexpr const char* kAdvice = "; choose another with --out";
   std::error_code error;
   if (!fs::is_directory(folder, error)) throw Error("the output folder " + folder.string() + " is a file" + kAdvice);
   throw Error("the output folder " + folder.string() + " is already there and not empty" + kAdvice + ", or remove it");
-}
-
-void write_value(const Value& value, const fs::path& stem, const fs::path& root, const Catalogue& catalogue,
-                 RunFolder::Written& written) {
-  if (value.is_list()) {
-    const std::vector<std::string> names = distinct_names(value.names);
-    for (std::size_t i = 0; i < value.items.size(); ++i)
-      write_value(value.items[i], stem / file_name_of(names[i]), root, catalogue, written);
-    return;
-  }
-  if (value.is_absent()) {
-    if (value.may_be_missing)
-      written.absent = value.missing;
-    else if (!value.missing.empty())
-      written.fault = "not made: " + value.missing;
-    return;
-  }
-  const WriterInfo* writer = catalogue.find_writer(value.type);
-  if (!writer) {
-    written.fault = no_writer(value.type);
-    return;
-  }
-  const fs::path file = stem.string() + writer->extension;
-  if (fs::exists(fs::symlink_status(file))) {
-    written.fault = file.string() + " holds another output already; give one of them another name";
-    return;
-  }
-  try {
-    fs::create_directories(file.parent_path());  // so a list of which no item was made has no folder
-    const WriterDefinition& definition = catalogue.load_writer(value.type);
-    const PluginCode code("the writer of " + printable(file.string()));
-    ProcessState::of_runs()->keep_during([&] { definition.write(value.data.get(), file.string()); });
-    written.files.push_back(file.lexically_relative(root).string());
-  } catch (...) {
-    written.fault = reason_of_exception();
-    std::error_code ignored;
-    fs::remove_all(file, ignored);  // half a file is worse than none
-  }
 }
 
 std::string utc_now() {
@@ -195,6 +157,7 @@ json json_of(const NodeRecord& record, const PipelineNode& node, const Catalogue
     j["library"] = library->file.filename().string();
     j["build_id"] = library->build_id.hex();
   }
+  if (const std::string version = version_of_program(node); !version.empty()) j["program_version"] = version;
   for (std::size_t i = 0; i < record.outputs.size(); ++i) {
     const std::string& name = node.info.outputs[i].name;
     j["keys"][name] = key_of(record.outputs[i]).hex();
@@ -262,6 +225,19 @@ RunFolder RunFolder::with_free_name(const fs::path& base, const Pipeline& pipeli
   }
 }
 
+RunFolder::RunFolder() = default;
+RunFolder::RunFolder(RunFolder&&) noexcept = default;
+RunFolder::~RunFolder() = default;
+
+void RunFolder::keep_failed_calls(RunSettings& settings, const Catalogue& catalogue) {
+  if (!settings.given.empty()) return;  // values of another program: nothing could make them again
+  failed_calls_ = std::make_unique<FailedCalls>(folder_, catalogue, settings);
+}
+
+std::vector<std::string> RunFolder::failed_calls() const {
+  return failed_calls_ ? failed_calls_->folders() : std::vector<std::string>();
+}
+
 bool RunFolder::take(const Pipeline& pipeline) {
   const fs::path log = folder_ / "log.txt";
   // O_EXCL: this succeeds for one process only.
@@ -277,7 +253,7 @@ bool RunFolder::take(const Pipeline& pipeline) {
       refuse(folder_);
     }
   try {
-    write_text_file(folder_ / "pipeline.yaml", resolved_yaml(pipeline, true));
+    write_text_file(folder_ / "pipeline.yaml", resolved_yaml(pipeline));
     fs::create_directory(folder_ / "outputs");
     log_ = std::make_unique<RunLog>(log);
     return true;
@@ -350,6 +326,7 @@ void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, 
     }
     record["outputs"].push_back(std::move(output));
   }
+  if (failed_calls_) failed_calls_->finish();
   write_text_file(folder_ / "run.json", record.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 

@@ -11,8 +11,11 @@
 
 namespace MARROW_EXPORT marrow {
 
+class FailedCalls;
+
 /// The folder with the results of a run: pipeline.yaml (resolved), run.json (what ran, with which inputs, how long),
-/// log.txt, and outputs/ in formats that other programs can open. Existing files are never overwritten: the folder must
+/// log.txt, outputs/ in formats that other programs can open, and failed/ with what is needed to make a failed call
+/// again. Existing files are never overwritten: the folder must
 /// be new or empty. If several processes want the same folder, only one gets it.
 class RunFolder {
  public:
@@ -20,6 +23,15 @@ class RunFolder {
   RunFolder(const std::filesystem::path& folder, const Pipeline& pipeline);
   /// Makes the first of the folders base, base-2, base-3 ... that does not exist yet.
   static RunFolder with_free_name(const std::filesystem::path& base, const Pipeline& pipeline);
+  RunFolder(RunFolder&& other) noexcept;
+  ~RunFolder();
+
+  /// From now on, each failed call of a run with these settings leaves a folder failed/NODE/ITEM, from which
+  /// read_failed_call() reads how to make it again. Does nothing if the settings have given values. The folder must not
+  /// be moved from and must outlive the run.
+  void keep_failed_calls(RunSettings& settings, const Catalogue& catalogue);
+  /// The folders of the failed calls so far, relative to this one.
+  std::vector<std::string> failed_calls() const;
 
   struct Written {
     std::string output;
@@ -37,12 +49,13 @@ class RunFolder {
   const std::filesystem::path& path() const { return folder_; }
 
  private:
-  RunFolder() = default;
+  RunFolder();
   /// Tries to take the existing folder for this run. Returns false if another run has taken it.
   bool take(const Pipeline& pipeline);
 
   std::filesystem::path folder_;
   std::unique_ptr<RunLog> log_;
+  std::unique_ptr<FailedCalls> failed_calls_;
 };
 
 }  // namespace marrow
