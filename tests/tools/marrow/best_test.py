@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""pipelines/femur/femur-best.yaml on a small simulated femur with an old plate: with right cameras and with wrong ones."""
+"""pipelines/femur/femur-best.yaml on a small simulated femur with an old plate: with right and with wrong cameras."""
 import json
 
 from harness.cases import metrics, simulate
