@@ -100,7 +100,10 @@ class Yaml(Documents):
         text = yaml.safe_dump({"marrow": 1, "nodes": nodes, "outputs": {name: name for name in nodes}})
         _, told = self.checked(["check"], text, self.pipelines_folder())
         for fault in re.findall(r"error: (.*)", told):
-            self.assertRegex(fault, r"^there is no node '\w+'|^'\w+' has \d+ outputs|^node '\w+' has several outputs|^nothing uses node")
+            self.assertRegex(
+                fault,
+                r"^there is no node '\w+'|^'\w+' has \d+ outputs|^nothing uses node|^node '\w+' has several outputs",
+            )
 
     def test_the_files_of_a_case_are_read(self):
         text = self.documents["docs/case"]

@@ -157,7 +157,7 @@ def is_plain_camera(folder, camera):
 
 def for_output(reference):
     """The name of an output that is added for a reference."""
-    return "for_" + reference.replace(".", "_")
+    return "for_" + reference.replace(".", "_").replace("/", "_")  # nodes of parts have a slash
 
 
 class Options(dict):

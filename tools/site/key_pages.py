@@ -24,6 +24,7 @@ class Schema:
         self.definitions = schema.get("definitions", {})
         self.keys = {}
         self._read(schema, "", ())
+        self._demand(self._resolved(schema.get("else", {})), "")
 
     def _resolved(self, schema):
         """The schema with what it refers to. Its own words take precedence."""
@@ -55,6 +56,13 @@ class Schema:
                 self._read(free, "%s.%s" % (path, FREE.get(path.split(".")[-1], "NAME")), seen)
             if isinstance(form.get("items"), dict):
                 self._read(form["items"], path, seen)
+
+    def _demand(self, whole, path):
+        """Keys that a file must have if it extends no other one."""
+        for name in whole.get("required", []):
+            self.keys[path + name]["required"] = True
+        for name, inner in whole.get("properties", {}).items():
+            self._demand(inner, path + name + ".")
 
     def _enter(self, path, value, required, seen):
         forms = [form for form in self._alternatives(value) if form]

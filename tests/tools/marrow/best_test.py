@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""pipelines/femur/femur-best.yaml on a small simulated femur with an old plate: with right cameras and with wrong ones."""
+"""pipelines/femur/femur-best.yaml on a small simulated femur with an old plate: with right and with wrong cameras."""
 import json
 
 from harness.cases import metrics, simulate
@@ -43,7 +43,14 @@ class Best(Case):
 
     def test_right_cameras_stay(self):
         # Pixels of 1.2 mm make the 5 px that the cameras may share so large that no pose could be trusted.
-        known = sets(["pose.turn_deg=0.05", "pose.shift_mm=0.1", "pose.focal_percent=0.1", "pose.centre_px=0.1"])
+        known = sets(
+            [
+                "corrected.turn_deg=0.05",
+                "corrected.shift_mm=0.1",
+                "corrected.focal_percent=0.1",
+                "corrected.centre_px=0.1",
+            ]
+        )
         result, outputs = self.registered("off", "--no-cache", *known)
         self.assertLess(metrics(outputs / "errors" / "distal.json")["mtre_mm"], 1)
         self.assertIn("show long metal, and are bridged", result.stdout + result.stderr)

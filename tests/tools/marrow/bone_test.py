@@ -56,8 +56,9 @@ class Bone(Case):
         result, errors = self.registered(self.copy(start=self.shifted))
         self.assertLess(errors["mtre_mm"], 1)
         self.assertIn("node 'marks' (read.landmarks) failed", result.stderr)
-        said = "node 'by_search/search' (initial.global_search) for bone failed: it has no poses to try"
-        self.assertIn(said, result.stderr)
+        self.assertIn(
+            "node 'by_search/search' (initial.global_search) for bone failed: it has no poses to try", result.stderr
+        )
 
     def test_by_landmarks(self):
         result, errors = self.registered(self.copy(landmarks=True))
