@@ -59,6 +59,35 @@ class Told(Case):
         said = [self.checked(differences(numbers, factor=ten), str(ten)).split("cases, ")[1] for ten in (1, 10)]
         self.assertEqual(said[0].split("\n")[0], said[1].split("\n")[0])
 
+    def test_three_measures_by_two_optimizers(self):
+        # gradient is 0.5 better than mutual, which is 0.01 better or worse than ncc; powell is 0.2 better than nm.
+        of_measure, of_optimizer = {"gradient": 0.5, "mutual": 1.0, "ncc": 1.0}, {"nm": 0.2, "powell": 0.0}
+        cases, table = ["femur %d" % i for i in range(12)], {}
+        for i, case in enumerate(cases):
+            for measure, own in of_measure.items():
+                for optimizer, more in of_optimizer.items():
+                    sign = 0.01 if i % 2 and measure == "ncc" else -0.01 if measure == "ncc" else 0
+                    text = "%.3f mm" % (2 + 0.1 * (i % 5) + own + more + sign + 0.001 * i * (optimizer == "powell"))
+                    table[case, measure + optimizer, 0] = {"a": text}
+                table[case, measure, 0] = {"a": "0 mm", "evaluations": "1", "start_error": "1 mm"}
+        factors = [("variants", list(of_measure)), ("main.other", list(of_optimizer))]
+        variants = [
+            Variant("%s+%s" % (measure, optimizer), measure, levels=[m, o], other=optimizer)
+            for m, measure in enumerate(of_measure)
+            for o, optimizer in enumerate(of_optimizer)
+        ]
+        metrics = [Metric("main", "a", "mTRE", "lower", "mm")]
+        experiment = Experiment("three", metrics, variants, cases, displacements(1), table)
+        experiment.factors, experiment.compare_all = factors, True
+        said = self.checked(experiment, "three")
+        print(said)
+        self.assertIn("best in mTRE: gradient+powell; 13 of 15 pairs differ; not told apart from it: none\n", said)
+        self.assertRegex(said, r"\n1  gradient\+powell +2.705\d* +0  a\n2  gradient\+nm +2.9\d* +0  b\n")
+        self.assertIn(
+            "  variants: mutual against gradient: 0.500 mm worse, 95 % interval 0.500 to 0.500, 12 cases\n", said
+        )
+        self.assertRegex(said, r"\n  main.other: powell against nm: 0.19\d* mm better, 95 % interval ")
+
     def test_metres_and_millimetres_are_refused(self):
         experiment = differences([0.1] * 6)
         for case in experiment.cases:

@@ -125,6 +125,18 @@ class Before(Case):
                 )
                 self.assertEqual(self.cells(), ["a/c0/0", "a/c1/0", "b/c0/0"])
 
+    def test_without_a_truth_the_figures_that_there_can_be_are_named(self):
+        told = self.compare(2, "errors.distal.mtre_mm", "--jobs", "1", "--quiet").stderr
+        self.assertEqual(
+            told,
+            "marrow: error: 'errors.distal.mtre_mm' was not made: its case has no truth, or an item is absent; without "
+            "a truth this pipeline gives each.FRAGMENT.mtre_mm, each.FRAGMENT.*.median_px, free.FRAGMENT.*, "
+            "staged.FRAGMENT.STAGE.mtre_mm, staged.FRAGMENT.STAGE.*.median_px, errors.FRAGMENT.mtre_mm; this is so in "
+            "the first cells of all variants, so the others were not run; name another figure in %s\n"
+            % (self.scratch / "e.yaml"),
+        )
+        self.assertEqual(self.cells(), ["a/one/0", "a/two/0", "b/one/0"])
+
     def test_a_figure_that_one_variant_has(self):
         self.compare(0, "free.distal.extra", variants="{a: {free.also: extra}, b: {}}")
         self.assertEqual(self.cells(), ["a/one/0", "a/two/0", "b/one/0", "b/two/0"])
