@@ -62,7 +62,7 @@ class Told(Case):
     def test_three_measures_by_two_optimizers(self):
         # gradient is 0.5 better than mutual, which is 0.01 better or worse than ncc; powell is 0.2 better than nm.
         of_measure, of_optimizer = {"gradient": 0.5, "mutual": 1.0, "ncc": 1.0}, {"nm": 0.2, "powell": 0.0}
-        cases, table = ["femur %d" % i for i in range(12)], {}
+        cases, table = ["femur %02d" % i for i in range(12)], {}
         for i, case in enumerate(cases):
             for measure, own in of_measure.items():
                 for optimizer, more in of_optimizer.items():
@@ -80,13 +80,19 @@ class Told(Case):
         experiment = Experiment("three", metrics, variants, cases, displacements(1), table)
         experiment.factors, experiment.compare_all = factors, True
         said = self.checked(experiment, "three")
-        print(said)
-        self.assertIn("best in mTRE: gradient+powell; 13 of 15 pairs differ; not told apart from it: none\n", said)
-        self.assertRegex(said, r"\n1  gradient\+powell +2.705\d* +0  a\n2  gradient\+nm +2.9\d* +0  b\n")
-        self.assertIn(
-            "  variants: mutual against gradient: 0.500 mm worse, 95 % interval 0.500 to 0.500, 12 cases\n", said
-        )
-        self.assertRegex(said, r"\n  main.other: powell against nm: 0.19\d* mm better, 95 % interval ")
+        for line in (
+            "1  gradient+powell  2.6565     0  a",
+            "2  gradient+nm      2.8500     0  b",
+            "3  mutual+powell    3.1565     0  c",
+            "3  ncc+powell       3.1565     0  c",
+            "5  mutual+nm        3.3500     0  d",
+            "5  ncc+nm           3.3500     0  d",
+            "best in mTRE: gradient+powell; 13 of 15 pairs differ; not told apart from it: none",
+            "  variants: mutual against gradient: 0.50 mm worse, 95 % interval 0.50 to 0.50, 12 cases",
+            "  variants: ncc against gradient: 0.500 mm worse, 95 % interval 0.490 to 0.510, 12 cases",
+            "  main.other: powell against nm: 0.195 mm better, 95 % interval 0.191 to 0.198, 12 cases",
+        ):
+            self.assertIn("\n" + line + "\n", said)
 
     def test_metres_and_millimetres_are_refused(self):
         experiment = differences([0.1] * 6)

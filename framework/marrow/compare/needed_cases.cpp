@@ -4,19 +4,32 @@
 #include <algorithm>
 #include <cmath>
 
-#include "distributions.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
+#include "marrow/compare/median_interval.hpp"
 #include "marrow/compare/paired.hpp"
+#include "marrow/domain/random.hpp"
 
 namespace marrow::compare {
 namespace {
 
-constexpr std::size_t kMostCases = 1000000;
+constexpr std::size_t kExperiments = 1000;
 
 void check_probability(double probability) {
   if (!(probability > 0 && probability < 1))
     throw Error(formatted("the probability is {:g}; give a fraction between 0 and 1, such as 0.8", probability));
+}
+
+/// Whether the experiment of this number shows a difference, given in spreads. The same cases come first however many
+/// there are, so that more of them or larger differences are shown more often.
+bool is_shown(double size, std::size_t cases, std::size_t comparisons, double alpha, std::uint64_t number) {
+  Random random(1, number);
+  std::vector<double> differences(cases);
+  for (double& one : differences) one = size + random.normal();
+  Comparison comparison;
+  comparison.test = signed_rank_test(differences);
+  comparison.interval = order_statistic_interval(std::move(differences), alpha);
+  return difference_shown(comparison, std::min(1.0, double(comparisons) * comparison.test.p), alpha);
 }
 
 }  // namespace
@@ -38,15 +51,11 @@ double probability_to_show(double difference, double spread, std::size_t cases, 
   if (!(spread >= 0) || !std::isfinite(spread) || !std::isfinite(difference))
     throw Error(formatted("a difference of {:g} with a spread of {:g}; expected two numbers, and a spread of 0 or more",
                           difference, spread));
-  if (cases < fewest_cases(alpha, comparisons)) return 0;
-  if (difference == 0) return 0;
-  const double size = spread > 0 ? std::abs(difference) / spread : kInfinite;
-  const double n = double(cases);
-  // How far the probability of a positive difference, and that of a positive sum of two, are from a half.
-  const double of_one = 0.5 - upper_tail(size), of_two = 0.5 - upper_tail(std::sqrt(2.0) * size);
-  const double ranks = std::sqrt(3 * n) * of_two - z_of_tail(alpha / double(comparisons) / 2);
-  const double signs = 2 * std::sqrt(n) * of_one - z_of_tail(alpha / 2);
-  return upper_tail(-std::min(ranks, signs));
+  if (cases < fewest_cases(alpha, comparisons) || difference == 0) return 0;
+  if (spread == 0) return 1;
+  std::size_t shown = 0;
+  for (std::size_t k = 0; k < kExperiments; ++k) shown += is_shown(difference / spread, cases, comparisons, alpha, k);
+  return double(shown) / double(kExperiments);
 }
 
 std::optional<std::size_t> cases_to_show(double difference, double spread, std::size_t comparisons, double probability,
@@ -55,25 +64,26 @@ std::optional<std::size_t> cases_to_show(double difference, double spread, std::
   const auto is_enough = [&](std::size_t cases) {
     return probability_to_show(difference, spread, cases, comparisons, alpha) >= probability;
   };
-  std::size_t below = 0, enough = 1;  // it rises with the cases
+  std::size_t below = 0, enough = 1;
   while (!is_enough(enough)) {
+    if (enough == kMostNeededCases) return std::nullopt;
     below = enough;
-    if ((enough *= 2) > 2 * kMostCases) return std::nullopt;
+    enough = std::min(2 * enough, kMostNeededCases);
   }
   while (enough - below > 1) {
     const std::size_t middle = (below + enough) / 2;
     (is_enough(middle) ? enough : below) = middle;
   }
-  return enough <= kMostCases ? std::optional(enough) : std::nullopt;
+  return enough;
 }
 
 std::optional<double> difference_to_show(double spread, std::size_t cases, std::size_t comparisons, double probability,
                                          double alpha) {
   check_probability(probability);
-  double below = 0, enough = 40 * spread;  // the tail beyond is below the smallest double
-  if (probability_to_show(enough > 0 ? enough : 1, spread, cases, comparisons, alpha) < probability)
+  double below = 0, enough = 10 * spread;  // a normal variable lies as far from its mean with a probability of 1e-23
+  if (probability_to_show(spread > 0 ? enough : 1, spread, cases, comparisons, alpha) < probability)
     return std::nullopt;
-  for (int step = 0; step < 100; ++step) {
+  for (int step = 0; step < 16 && spread > 0; ++step) {
     const double middle = 0.5 * (below + enough);
     (probability_to_show(middle, spread, cases, comparisons, alpha) >= probability ? enough : below) = middle;
   }

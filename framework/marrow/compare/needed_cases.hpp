@@ -14,17 +14,15 @@ namespace compare {
 /// left out. Nothing for fewer than three others.
 std::optional<double> spread_of_differences(const std::vector<double>& differences);
 
-/// The probability with which so many cases show a difference of this size (difference_shown()), one of so many
-/// comparisons, at p < alpha. The differences of cases are normal about it, with this spread. It is the less probable
-/// one of two things, each by Noether 1987 (J Am Stat Assoc 82:645): that Wilcoxon's signed-rank test reaches alpha
-/// divided by the number of comparisons, and that the sign test reaches alpha, which stands for an interval without 0.
-/// 0 for fewer than fewest_cases(). In 1000 simulated experiments each, with 1, 6 and 20 comparisons and differences of
-/// 0.3 and 0.5 times the spread, 76 to 83 % showed the difference where this says 80 %, and 87 to 100 % with larger
-/// differences. Throws Error for a spread below 0, or as fewest_cases() does.
+/// The probability with which so many cases show a difference of this size, one of so many comparisons: the share of
+/// 1000 simulated experiments in which difference_shown() says so, with p times the number of comparisons (Bonferroni)
+/// and the interval at 1 - alpha. The differences of cases are normal about it, with this spread. The experiments are
+/// always the same. Throws Error for a spread below 0, or as fewest_cases() does.
 double probability_to_show(double difference, double spread, std::size_t cases, std::size_t comparisons = 1,
                            double alpha = 0.05);
 
-/// The fewest cases with at least this probability; nothing if a million are too few. Throws Error as
+inline constexpr std::size_t kMostNeededCases = 1000;
+/// The fewest cases with at least this probability; nothing if kMostNeededCases are too few. Throws Error as
 /// probability_to_show() does, and for a probability that is not within 0 to 1.
 std::optional<std::size_t> cases_to_show(double difference, double spread, std::size_t comparisons = 1,
                                          double probability = 0.8, double alpha = 0.05);

@@ -134,7 +134,7 @@ int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster)
     if (experiment.tune) say_what_is_tuned(experiment);
     print_plan(experiment, catalogue, request.no_cache ? nullptr : &store, folder);
     CellRunner runner(experiment, catalogue, request.no_cache ? nullptr : &store, folder, request.threads);
-    std::printf("%s", printable_lines(needed_cases_text(experiment, runner, request.differences)).c_str());
+    std::printf("%s", needed_cases_text(experiment, runner, request.differences).c_str());
     return 0;
   }
   if (by_tasks) return compare_on_cluster(request, cluster, catalogue, experiment, folder);

@@ -88,10 +88,11 @@ class Needed {
       if (!spreads_[m]) continue;
       const Spread& spread = *spreads_[m];
       const auto least = compare::difference_to_show(spread.value, counts_.cases, counts_.comparisons, kProbability);
-      text += "  " + experiment_.metrics[m].label + ": " + (least ? amount(*least, m) : std::string("none")) +
-              "; differences scatter by " + amount(spread.value, m) + " over " + counted(spread.cases, "case") + ", " +
-              experiment_.variants[spread.variant].name + " against " + experiment_.variants[spread.reference].name +
-              "\n";
+      text += "  " + printable(experiment_.metrics[m].label) + ": " +
+              (least ? amount(*least, m) : std::string("none")) + "; differences scatter by " +
+              amount(spread.value, m) + " over " + counted(spread.cases, "case") + ", " +
+              printable(experiment_.variants[spread.variant].name) + " against " +
+              printable(experiment_.variants[spread.reference].name) + "\n";
     }
     if (text.empty())
       return "which differences these cases show is known when three cases are done with two variants\n";
@@ -102,10 +103,11 @@ class Needed {
 
   std::string of_difference(const WantedDifference& wanted) const {
     const std::size_t m = number_of(wanted.figure);
-    const std::string what = "a difference of " + amount(wanted.amount, m) + " in " + experiment_.metrics[m].label;
+    const std::string what =
+        "a difference of " + amount(wanted.amount, m) + " in " + printable(experiment_.metrics[m].label);
     if (!spreads_[m]) return what + ": how many cases it takes is known when three cases are done with two variants\n";
     const auto cases = compare::cases_to_show(wanted.amount, spreads_[m]->value, counts_.comparisons, kProbability);
-    if (!cases) return what + " takes more than a million cases\n";
+    if (!cases) return what + formatted(" takes more than {} cases\n", compare::kMostNeededCases);
     std::string text = what + " takes about " + counted(*cases, "case");
     if (case_seconds_ > 0) text += formatted(", {} s of work in all", short_number(case_seconds_ * double(*cases), 2));
     return text + "\n";
@@ -114,7 +116,7 @@ class Needed {
  private:
   std::string amount(double value, std::size_t m) const {
     const std::string unit = units_.of_metrics()[m];
-    return short_number(value, 2) + (unit.empty() ? "" : " " + unit);
+    return short_number(value, 2) + (unit.empty() ? "" : " " + printable(unit));
   }
   std::size_t number_of(const std::string& figure) const {
     if (figure.empty()) return 0;
