@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The answer of an experiment, recomputed from what its plugin was given, with the keys of comparison.json."""
+import itertools
 import math
 
 from scipy import stats
 
+import findings
 import looks
 import medians
 import ranks
@@ -143,10 +145,10 @@ def pairs(baseline, variant, metric):
 
 
 class Compared:
-    """A variant against the baseline in one figure."""
+    """Pairs of values of each case: those of a variant against another one in one figure."""
 
-    def __init__(self, baseline, variant, metric, higher_is_better, level=ALPHA):
-        found = ranks.case_differences(pairs(baseline, variant, metric), higher_is_better)
+    def __init__(self, pairs_of_cases, higher_is_better, level=ALPHA):
+        found = ranks.case_differences(pairs_of_cases, higher_is_better)
         self.runs, self.cases, self.of_both = found["runs"], found["cases"], found["of_both"]
         values = found["values"]
         self.count = len(values)
@@ -166,48 +168,61 @@ class Compared:
         return bool(p < level and (by_failures or (self.low > 0 if self.is_positive else self.high < 0)))
 
 
+def all_pairs(experiment):
+    """The pairs that the experiment asks for, as (reference, variant)."""
+    baseline, count = experiment.baseline, len(experiment.variants)
+    asked = [(baseline, v) for v in range(count) if v != baseline]
+    if experiment.compare_all:
+        asked += [pair for pair in itertools.combinations(range(count), 2) if baseline not in pair]
+    return asked
+
+
 def comparisons(experiment, of_variant):
-    """[(metric, variant, Compared, p after Holm)]"""
+    """[(metric, reference, variant, Compared, p after Holm)]"""
     found = [
-        (m, v, Compared(of_variant[experiment.baseline], of_variant[v], m, metric.higher_is_better))
+        (m, r, v, Compared(pairs(of_variant[r], of_variant[v], m), metric.higher_is_better))
         for m, metric in enumerate(experiment.metrics)
-        for v in range(len(experiment.variants))
-        if v != experiment.baseline
+        for r, v in all_pairs(experiment)
     ]
-    corrected = ranks.holm([one.p for _, _, one in found]) if found else []
+    corrected = ranks.holm([one[-1].p for one in found]) if found else []
     return [(*one, p) for one, p in zip(found, corrected)]
 
 
-def fails_more(compared, higher_is_better):
+def fails_more(compared, higher_is_better, other):
     if compared.difference is None or not math.isinf(compared.difference):
         return None
-    return "variant" if (compared.difference > 0) != higher_is_better else "baseline"
+    return "variant" if (compared.difference > 0) != higher_is_better else other
 
 
-def comparison_tree(experiment, units, m, v, compared, p_holm):
-    metric = experiment.metrics[m]
+def numbers_tree(compared, metric, unit, other):
+    """Also of a comparison that is not tested. `other`: the word for what the variant is compared with."""
     return {
-        "variant": experiment.variants[v].name,
         "metric": metric.path,
-        "unit": units[m],
+        "unit": unit,
         "cases": compared.count,
         "of_cases": sum(compared.cases.values()),
         "cases_variant_lost": compared.cases["variant_lost"],
-        "cases_baseline_lost": compared.cases["reference_lost"],
+        "cases_%s_lost" % other: compared.cases["reference_lost"],
         "runs": sum(compared.runs.values()),
         "pairs": compared.runs["both"],
         "runs_variant_lost": compared.runs["variant_lost"],
-        "runs_baseline_lost": compared.runs["reference_lost"],
+        "runs_%s_lost" % other: compared.runs["reference_lost"],
         "runs_both_lost": compared.runs["neither"],
         "difference": finite(compared.difference),
-        "fails_more": fails_more(compared, metric.higher_is_better),
+        "fails_more": fails_more(compared, metric.higher_is_better, other),
         "difference_of_pairs": compared.median_of_both,
         "low": finite(compared.low),
         "high": finite(compared.high),
-        "p": compared.p,
-        "p_holm": p_holm,
-        "is_shown": compared.is_shown(p_holm),
     }
+
+
+def comparison_tree(experiment, units, found, other="baseline"):
+    m, r, v, compared, p_holm = found
+    tree = numbers_tree(compared, experiment.metrics[m], units[m], other)
+    tree["variant"] = experiment.variants[v].name
+    if other == "reference":
+        tree["reference"] = experiment.variants[r].name
+    return {**tree, "p": compared.p, "p_holm": p_holm, "is_shown": compared.is_shown(p_holm)}
 
 
 def units_of(experiment, rows):
@@ -280,9 +295,8 @@ def look_tree(experiment, of_variant, cases):
     tree.update(figure=figure_name, level=level)
     if not is_width:
         m, v = paths.index(figure_name), stop["variant"]
-        compared = Compared(
-            of_variant[experiment.baseline], of_variant[v], m, experiment.metrics[m].higher_is_better, level
-        )
+        both = pairs(of_variant[experiment.baseline], of_variant[v], m)
+        compared = Compared(both, experiment.metrics[m].higher_is_better, level)
         return {
             **tree,
             "is_met": compared.is_shown(compared.p, level),
@@ -342,7 +356,7 @@ def tuning_point(experiment, variant, values):
 def answer_tree(experiment, rows, seconds, cases=None):
     """All of comparison.json but the sentences and what the optimizer and the clock decide."""
     of_variant = by_variant(experiment, rows)
-    units = units_of(experiment, rows)
+    units, found = units_of(experiment, rows), comparisons(experiment, of_variant)
     tree = {
         "experiment": experiment.name,
         "metrics": metric_trees(experiment, of_variant, units),
@@ -350,8 +364,14 @@ def answer_tree(experiment, rows, seconds, cases=None):
             variant_tree(own, variant, v == experiment.baseline, rows, seconds)
             for v, (own, variant) in enumerate(zip(of_variant, experiment.variants))
         ],
-        "comparisons": [comparison_tree(experiment, units, *one) for one in comparisons(experiment, of_variant)],
+        "comparisons": [comparison_tree(experiment, units, one) for one in found if one[1] == experiment.baseline],
     }
+    if experiment.compare_all:
+        if found:
+            tree["all_pairs"] = [comparison_tree(experiment, units, one, "reference") for one in found]
+        tree["rankings"] = findings.ranking_trees(experiment, of_variant, units, found)
+    if findings.has_effects(experiment):
+        tree["effects"] = findings.effect_trees(experiment, of_variant, units)
     if experiment.has_initial_error:
         unit = "mm" if any(row.initial_error is not None for row in rows) else ""
         tree["initial_error"] = {"name": "main.start_error", "unit": unit}

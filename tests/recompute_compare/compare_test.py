@@ -59,6 +59,41 @@ class Told(Case):
         said = [self.checked(differences(numbers, factor=ten), str(ten)).split("cases, ")[1] for ten in (1, 10)]
         self.assertEqual(said[0].split("\n")[0], said[1].split("\n")[0])
 
+    def test_three_measures_by_two_optimizers(self):
+        # gradient is 0.5 better than mutual, which is 0.01 better or worse than ncc; powell is 0.2 better than nm.
+        of_measure, of_optimizer = {"gradient": 0.5, "mutual": 1.0, "ncc": 1.0}, {"nm": 0.2, "powell": 0.0}
+        cases, table = ["femur %02d" % i for i in range(12)], {}
+        for i, case in enumerate(cases):
+            for measure, own in of_measure.items():
+                for optimizer, more in of_optimizer.items():
+                    sign = 0.01 if i % 2 and measure == "ncc" else -0.01 if measure == "ncc" else 0
+                    text = "%.3f mm" % (2 + 0.1 * (i % 5) + own + more + sign + 0.001 * i * (optimizer == "powell"))
+                    table[case, measure + optimizer, 0] = {"a": text}
+                table[case, measure, 0] = {"a": "0 mm", "evaluations": "1", "start_error": "1 mm"}
+        factors = [("variants", list(of_measure)), ("main.other", list(of_optimizer))]
+        variants = [
+            Variant("%s+%s" % (measure, optimizer), measure, levels=[m, o], other=optimizer)
+            for m, measure in enumerate(of_measure)
+            for o, optimizer in enumerate(of_optimizer)
+        ]
+        metrics = [Metric("main", "a", "mTRE", "lower", "mm")]
+        experiment = Experiment("three", metrics, variants, cases, displacements(1), table)
+        experiment.factors, experiment.compare_all = factors, True
+        said = self.checked(experiment, "three")
+        for line in (
+            "1  gradient+powell  2.6565     0  a",
+            "2  gradient+nm      2.8500     0  b",
+            "3  mutual+powell    3.1565     0  c",
+            "3  ncc+powell       3.1565     0  c",
+            "5  mutual+nm        3.3500     0  d",
+            "5  ncc+nm           3.3500     0  d",
+            "best in mTRE: gradient+powell; 13 of 15 pairs differ; not told apart from it: none",
+            "  variants: mutual against gradient: 0.50 mm worse, 95 % interval 0.50 to 0.50, 12 cases",
+            "  variants: ncc against gradient: 0.500 mm worse, 95 % interval 0.490 to 0.510, 12 cases",
+            "  main.other: powell against nm: 0.195 mm better, 95 % interval 0.191 to 0.198, 12 cases",
+        ):
+            self.assertIn("\n" + line + "\n", said)
+
     def test_metres_and_millimetres_are_refused(self):
         experiment = differences([0.1] * 6)
         for case in experiment.cases:

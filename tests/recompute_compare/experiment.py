@@ -31,6 +31,8 @@ class Variant:
     column: str
     swept: List[float] = dataclasses.field(default_factory=list)  # the value of main.at, if it is swept
     swept_from: str = ""
+    levels: List[int] = dataclasses.field(default_factory=list)  # of each of the experiment's factors
+    other: Optional[str] = None  # the value of main.other, if the matrix varies it
 
 
 @dataclasses.dataclass
@@ -61,6 +63,8 @@ class Experiment:
     starts: List[float]  # the displacement of each
     table: Dict[Tuple[str, str, int], Dict[str, str]]  # by case, column and start: name and text
     baseline: int = 0
+    compare_all: bool = False
+    factors: List[Tuple[str, List[str]]] = dataclasses.field(default_factory=list)  # of the matrix: name and levels
     has_initial_error: bool = False
     has_verdict: bool = False
     timed_cells: int = 0
@@ -81,10 +85,11 @@ class Experiment:
         """What the cell is, by the documented rules."""
         row = Row(variant.name, case, str(start))
         texts = self.table[case, variant.column, start]
+        others = self.table[case, variant.column + variant.other, start] if variant.other else texts  # of main
         row.success = False if self.has_limits else None
         names = {node: [m.name for m in self.metrics if m.node == node] for node in ("main", "may")}
         names["main"] += ["start_error"] if self.has_initial_error else []
-        of = {node: [texts[name] for name in own] for node, own in names.items()}
+        of = {node: [(others if node == "main" else texts)[name] for name in own] for node, own in names.items()}
         may_failed = any(text in FAILS for text in of["may"])
         row.failed = any(text in FAILS + ("nan", "absent") for text in of["main"])
         row.failed |= not may_failed and any(text in ("nan", "absent") for text in of["may"])
@@ -94,7 +99,8 @@ class Experiment:
             return row
         at = Fraction(variant.swept[0]) if variant.swept else Fraction(0)
         for metric in self.metrics:
-            value = None if metric.node == "may" and may_failed else Fraction(texts[metric.name].split()[0])
+            text = (others if metric.node == "main" else texts)[metric.name]
+            value = None if metric.node == "may" and may_failed else Fraction(text.split()[0])
             if value is not None and metric.node == "main" and metric.name == names["main"][0]:
                 value += at * at
             row.values.append(abs(value) if value is not None and metric.better == "nearest_zero" else value)

@@ -35,6 +35,8 @@ def pipeline(experiment, table):
 def experiment_text(experiment):
     """In YAML, of which JSON is a part."""
     columns = {v.swept_from or v.name: v.column for v in experiment.variants}
+    if experiment.factors:
+        columns = {name: name for name in experiment.factors[0][1]}
     nodes = ["main", "pose"] + ["may"] * any(m.node == "may" for m in experiment.metrics)
     nodes += ["verdict"] * experiment.has_verdict
     text = {
@@ -48,6 +50,10 @@ def experiment_text(experiment):
         "baseline": experiment.variants[experiment.baseline].name,
         "timed_cells": experiment.timed_cells,
     }
+    if experiment.compare_all:
+        text["compare_all"] = True
+    if experiment.factors:
+        text["matrix"] = {name: levels for name, levels in experiment.factors if name != "variants"}
     if experiment.has_seeds:
         text["cases"] = {"seeds": "1..%d" % len(experiment.cases), "seed_input": ["seed"]}
     if experiment.has_limits:

@@ -144,6 +144,45 @@ def stop_of(chance, experiment):
     return stop
 
 
+def asks(chance, experiment):
+    """All pairs, or the main effects of a matrix: with one more option, whose value is appended to the column."""
+    experiment.compare_all = chance.random() < 0.5
+    if chance.random() < 0.5 or len(experiment.variants) * len(experiment.cases) * len(experiment.starts) > 50:
+        return
+    experiment.variants = experiment.variants[:3]
+    named = [variant.name for variant in experiment.variants]
+    others = ["nm", "powell", "bobyqa"][: 3 if len(named) == 1 else 2]
+    experiment.factors = [("variants", named), ("main.other", others)]
+    experiment.variants = [
+        Variant("%s+%s" % (name, other), name, levels=[i, k], other=other)
+        for i, name in enumerate(named)
+        for k, other in enumerate(others)
+    ]
+    experiment.baseline = chance.randrange(len(experiment.variants))
+    main = [metric.name for metric in experiment.metrics if metric.node == "main"]
+    for (case, column, start), texts in list(experiment.table.items()):
+        for k, other in enumerate(others):
+            own = experiment.table[case, column + other, start] = dict(texts)
+            for name in main if k else []:  # the first one leaves the figures as they are
+                own[name] = changed_a_little(chance, texts[name], k)
+
+
+def changed_a_little(chance, text, by):
+    """Another value of a figure that has one; at times the same, or a failure."""
+    number, *unit = text.split()
+    if number in ("fail", "crash", "nan", "absent") or chance.random() < 0.1:
+        return text
+    if chance.random() < 0.05:
+        return "fail"
+    digits, _, power = number.partition("e")
+    decimals = len(digits.partition(".")[2])
+    digits = "%.*f" % (
+        decimals,
+        float(digits) + chance.choice([0.1, 0.2]) * by + (chance.random() if decimals > 1 else 0),
+    )
+    return " ".join([digits + ("e" + power if power else ""), *unit])
+
+
 def generate(seed, mode=None):
     """The experiment of a seed. Modes: plain, sweep, stop, tune."""
     chance = random.Random(seed)
@@ -178,6 +217,8 @@ def generate(seed, mode=None):
             for one in variants
             for value in swept_values(experiment.sweep)
         ]
+    if mode == "plain":
+        asks(random.Random("what the experiment %d asks" % seed), experiment)
     if mode == "tune":
         bad = 0.0 if experiment.metrics[0].higher_is_better else 8.0
         experiment.tune = {"failed_as": bad, "training_cases": len(cases) // 2, "points": 6}

@@ -58,9 +58,10 @@ def check_answer(checks, kind, got, expected, rows):
     for key in expected:
         if key not in got:
             checks.same(kind, key, "missing", key)
-    for key in set(expected) - {"variants", "comparisons", "curves", "stop"}:
+    for key in set(expected) - {"variants", "comparisons", "all_pairs", "effects", "curves", "stop"}:
         check_tree(checks, kind + " " + key, got.get(key), expected[key], 0)
-    for key, name_of in (("comparisons", lambda one: one["metric"]), ("curves", lambda one: one["figure"])):
+    by_name = [(key, lambda one: one["metric"]) for key in ("comparisons", "all_pairs", "effects")]
+    for key, name_of in (*by_name, ("curves", lambda one: one["figure"])):
         if key not in expected:
             continue
         checks.same(kind + " " + key, "number", len(got.get(key, [])), len(expected[key]))

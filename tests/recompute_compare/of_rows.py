@@ -2,6 +2,7 @@
 """The rows of all cells: cells.csv, cells.jsonl and the table in report.html."""
 import csv
 import json
+import math
 
 NINE_DIGITS = 1e-8  # of numbers that are written with nine
 
@@ -74,6 +75,48 @@ def check_jsonl(checks, folder, experiment, rows, seconds):
             checks.same("cells.jsonl", row.id + " unit %d" % m, got["units"][m], unit)
         for key, value in numbers_of(row, seconds).items():
             checks.close("cells.jsonl", row.id + " " + key, got.get(key), value)
+
+
+def pose_of(evaluations):
+    """What plugins/given.cpp makes: the matrix, the deviations (None where none is known), and whether they are the
+    bone's."""
+    e = float(evaluations)
+    rotation = [[0, -1, 0], [1, 0, 0], [0, 0, 1]] if evaluations % 2 else [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    matrix = [[*map(float, row), shift] for row, shift in zip(rotation, (e, -0.5 * e, 0.25))]
+    if evaluations % 3:
+        return matrix, [], False
+    deviations = [math.degrees(0.001 * (e + i)) if i < 3 else 0.001 * (e + i) for i in range(6)]
+    return matrix, deviations[:5] + [None if evaluations % 6 == 0 else deviations[5]], evaluations % 9 == 0
+
+
+def check_poses(checks, folder, experiment, rows):
+    """A row of both tables for each cell that is done."""
+    with open(folder / "poses.csv", newline="") as stream:
+        table = list(csv.DictReader(stream))
+    lines = list(map(json.loads, (folder / "poses.jsonl").read_text().splitlines()))
+    done = [row for row in rows if not row.failed]
+    checks.same("poses", "rows", [len(table), len(lines)], [len(done)] * 2)
+    for got, line, row in zip(table, lines, done):
+        seed = row.case.partition("-")[2] if experiment.has_seeds else ""
+        names = [row.id, row.case, row.variant, row.start, seed, "pose", "", "world", "ct", row.verdict or ""]
+        keys = ["cell", "case", "variant", "start", "seed", "output", "item", "target", "source", "verdict"]
+        checks.same("poses", row.id + " names", [unquoted(got[key]) for key in keys], names)
+        in_line = ["" if line[key] is None else str(line[key]) for key in keys]
+        checks.same("poses", row.id + " names in JSON", in_line, names)
+        matrix, deviations, is_bone = pose_of(row.evaluations)
+        in_csv = [[float(got["m%d%s" % (r, c)]) for c in ("1", "2", "3", "4_mm")] for r in (1, 2, 3)]
+        checks.same("poses", row.id + " matrix", [in_csv, line["matrix"]], [matrix, [*matrix, [0, 0, 0, 1]]])
+        checks.close("poses", row.id + " probability", number(got["failure_probability"]), row.failure_probability)
+        checks.close("poses", row.id + " probability", line["failure_probability"], row.failure_probability)
+        checks.same("poses", row.id + " axes", got["axes"], ("bone" if is_bone else "model") if deviations else "")
+        axes = ["frontal_deg", "lateral_deg", "axial_deg", "along_frontal_mm", "along_lateral_mm", "along_mm"]
+        predicted = line["predicted_deviation"] or {"rotation_deg": [], "translation_mm": [], "axes": ""}
+        checks.same("poses", row.id + " axes in JSON", predicted["axes"], got["axes"])
+        in_json = predicted["rotation_deg"] + predicted["translation_mm"]
+        checks.same("poses", row.id + " deviations", len(in_json), len(deviations))
+        for axis, seen, value in zip(axes, in_json, deviations):
+            checks.close("poses", row.id + " " + axis, number(got["predicted_" + axis]), value, NINE_DIGITS)
+            checks.close("poses", row.id + " " + axis, seen, value)
 
 
 def check_timed(checks, experiment, rows, seconds, places):

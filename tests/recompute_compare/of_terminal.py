@@ -153,6 +153,45 @@ def sentences(text):
     return [line.strip() for line in lines[1:] if line.startswith("  ")]
 
 
+def sentences_of_pairs(text):
+    """Those about pairs without the baseline; None if there are none."""
+    lines = Sections(text).starting("The other pairs, ")
+    return lines and [line.strip() for line in lines[1:]]
+
+
+def check_rankings(checks, text, tree):
+    for ranking in tree.get("rankings", []):
+        metric = next(one for one in tree["metrics"] if one["name"] == ranking["metric"])
+        title = metric["label"] + (" [%s]" % metric["unit"] if metric["unit"] else "")
+        begin = "Ranking by %s; a lost run" % title
+        lines = Sections(text).starting(begin)
+        if lines is None:
+            checks.same("terminal ranking", "title", None, begin)
+            continue
+        for line, place in zip(lines[2:], ranking["places"]):
+            rank, name, *rest = cells_of(line.strip())
+            checks.same("terminal ranking", title, [int(rank), name], [place["rank"], place["variant"]])
+            median, lost, group = rest
+            if place["median"] is None:
+                checks.same("terminal ranking", name + " median", median, "a failure")
+            else:
+                checks.shown("terminal ranking", name + " median", median, place["median"])
+            checks.same("terminal ranking", name, [int(lost), group], [place["lost"], place["group"] or "-"])
+        checks.same("terminal ranking", title + " rows", len(lines) - 3, len(ranking["places"]))
+        said = "best in %s: %s" % (metric["label"], ranking["places"][0]["variant"])
+        said += "; %d of %d pairs differ" % (ranking["different"], ranking["pairs"])
+        if ranking["better_than_best"]:
+            said += "; shown to be better than it, compared case by case: " + ", ".join(ranking["better_than_best"])
+        said += "; not told apart from it: " + (", ".join(ranking["like_best"]) or "none")
+        checks.same("terminal ranking", title + " sentence", lines[-1], said)
+
+
+def effect_lines(text, title):
+    """The factor and the sentence of each effect on one figure."""
+    lines = Sections(text).starting("What each factor does to %s, averaged" % title) or [""]
+    return [line.strip().partition(": ")[::2] for line in lines[1:]]
+
+
 def number_of_comparisons(text):
     found = re.search(r"with Holm's correction over all (\d+):", text)
     return int(found[1]) if found else None

@@ -87,9 +87,11 @@ def check_tuning(checks, tuning, untuned, points, experiment, unit):
 def check_dry_run(checks, printed, experiment):
     """How many cases a difference takes, said before anything runs."""
     variants = len(experiment.variants) + (experiment.tune is not None)  # the tuned one is still to be found
-    comparisons = (variants - 1) * len(experiment.metrics)
-    found = re.search(
-        r"(\d+) comparisons? with the baseline, for which a difference takes at least (\d+) cases", printed
+    pairs = variants * (variants - 1) // 2 if experiment.compare_all else variants - 1
+    comparisons, which = (
+        pairs * len(experiment.metrics),
+        "of all pairs" if experiment.compare_all else "with the baseline",
     )
+    found = re.search(r"(\d+) comparisons? %s, for which a difference takes at least (\d+) cases" % which, printed)
     wanted = [comparisons, fewest_cases(0.05, comparisons)] if comparisons else None
     checks.same("words: dry run", "cases", found and [int(found[1]), int(found[2])], wanted)

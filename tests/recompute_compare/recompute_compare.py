@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """Runs random experiments whose cells are known, and recomputes every figure that marrow says of them: in the terminal,
-in sentences, in comparison.json, cells.csv, cells.jsonl and report.html.
+in sentences, in comparison.json, cells.csv, cells.jsonl, poses.csv, poses.jsonl and report.html.
 
     tests/recompute_compare/recompute_compare.py BUILD FIRST COUNT [--folder FOLDER]
 
@@ -19,6 +19,7 @@ sys.dont_write_bytecode = True
 
 import answer
 import files
+import findings
 import of_json
 import of_rows
 import of_sentences
@@ -57,9 +58,39 @@ def check_sentences(checks, experiment, rows, got, said):
     found = answer.comparisons(experiment, of_variant)
     units = answer.units_of(experiment, rows)
     checks.same("sentences", "in the terminal", said, [one["sentence"] for one in got["comparisons"]])
-    for one, (m, v, compared, p) in zip(got["comparisons"], found):
+    with_baseline = [one for one in found if one[1] == experiment.baseline]
+    for one, (m, _, v, compared, p) in zip(got["comparisons"], with_baseline):
         name, metric = experiment.variants[v].name, experiment.metrics[m]
         of_sentences.check_sentence(checks, one["sentence"], name, metric, units[m], compared, p, len(found))
+    for one, (m, r, v, compared, p) in zip(got.get("all_pairs", []), found):
+        names = [experiment.variants[i].name for i in (v, r)]
+        metric = experiment.metrics[m]
+        of_sentences.check_sentence(
+            checks, one["sentence"], names[0], metric, units[m], compared, p, len(found), names[1]
+        )
+
+
+def check_pairs_and_effects(checks, experiment, rows, got, printed, expected):
+    base = experiment.variants[experiment.baseline].name
+    others = [one for one in got.get("all_pairs", []) if one["reference"] != base]
+    in_order = sorted(others, key=lambda one: not one["is_shown"])
+    shown = of_terminal.sentences_of_pairs(printed)
+    checks.same("sentences", "of pairs, in the terminal", shown, [one["sentence"] for one in in_order] or None)
+    of_terminal.check_rankings(checks, printed, expected)
+    if not findings.has_effects(experiment):
+        return
+    units, found = answer.units_of(experiment, rows), findings.effects(experiment, answer.by_variant(experiment, rows))
+    for m, metric in enumerate(experiment.metrics):
+        own = [one for one in found if one[0] == m]
+        title = metric.label + (" [%s]" % units[m] if units[m] else "")
+        lines = of_terminal.effect_lines(printed, title)
+        checks.same("sentences", "effects", len(lines), len(own))
+        for (factor, said), (_, f, level, compared) in zip(lines, own):
+            name, levels = experiment.factors[f]
+            checks.same("sentences", "factor", factor, name)
+            of_sentences.check_effect(checks, said, (levels[level], levels[0]), metric, units[m], compared)
+    written = [one["factor"] + ": " + one["sentence"] for one in got["effects"]]
+    checks.same("sentences", "effects in the terminal", all("  %s\n" % one in printed for one in written), True)
 
 
 def check_look(checks, experiment, rows, got, printed, look):
@@ -97,6 +128,7 @@ def check(checks, experiment, folder, printed):
         expected["curves"] = tuned_curves
     of_rows.check_csv(checks, folder, experiment, rows, seconds)
     of_rows.check_jsonl(checks, folder, experiment, rows, seconds)
+    of_rows.check_poses(checks, folder, experiment, rows)
     of_json.check_answer(checks, "comparison.json", got, expected, rows)
     in_page = {"variants": data["summary"], "experiment": data["experiment"]["name"]}
     in_page.update({key: data[key] for key in data if key in expected and key not in in_page})
@@ -112,8 +144,10 @@ def check(checks, experiment, folder, printed):
     )
     checks.same("words: times", "in the report", data["experiment"]["time_rule"], got["times"])
     number = of_terminal.number_of_comparisons(printed)
-    checks.same("terminal counts", "comparisons", number, len(expected["comparisons"]) if number else None)
+    asked = expected["all_pairs" if experiment.compare_all and len(experiment.variants) > 1 else "comparisons"]
+    checks.same("terminal counts", "comparisons", number, len(asked) if number else None)
     check_sentences(checks, experiment, rows, got, of_terminal.sentences(printed))
+    check_pairs_and_effects(checks, experiment, rows, got, printed, expected)
     if experiment.stop:
         check_look(checks, experiment, rows, got, printed, expected["stop"])
 

@@ -139,7 +139,7 @@ class Wrong(Case):
         missed = []
         for seed, printed in self.made.items():
             out = self.shared / str(seed) / "out"
-            for name in ("cells.csv", "cells.jsonl"):
+            for name in ("cells.csv", "cells.jsonl", "poses.csv", "poses.jsonl"):
                 text = (out / name).read_text()
                 places = [s for s in re.finditer(r"(?<=[,:\[])\d+\.\d+(?=[,}\]\n])", text)]
                 # seconds and what a node's calls took are the clock's

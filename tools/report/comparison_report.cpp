@@ -86,7 +86,7 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
   for (const auto& start : experiment.starts) data["starts"].push_back(start.name);
   data["summary"] = answers["variants"];
   data["comparisons"] = answers["comparisons"];
-  for (const char* part : {"curves", "tuning", "initial_error"})
+  for (const char* part : {"all_pairs", "rankings", "effects", "curves", "tuning", "initial_error"})
     if (answers.contains(part)) data[part] = answers[part];
 
   data["cell_table"] = cell_table(experiment, rows);

@@ -33,6 +33,23 @@ struct UnknownName : Error {
   std::string axis;  ///< empty if it is the name of a figure
 };
 
+/// A figure is not made although no node failed: a node lacks an input.
+struct NotMade : Error {
+  using Error::Error;
+};
+
+constexpr std::size_t kMostFigures = 20;  // that a message names
+
+/// Why a figure is not made, and which ones can be.
+std::string without_truth_text(const Pipeline& pipeline) {
+  std::vector<std::string> figures = figures_without_truth(pipeline);
+  const std::size_t more = figures.size() - std::min(figures.size(), kMostFigures);
+  figures.resize(figures.size() - more);
+  return ": its case has no truth, or an item is absent; without a truth this pipeline gives " +
+         (figures.empty() ? std::string("no figures") : joined(figures, ", ")) +
+         (more ? formatted(" and {} more", more) : "");
+}
+
 Pipeline checked(const fs::path& file, const PipelineArguments& arguments, const Catalogue& catalogue) {
   Diagnostics diagnostics;
   Pipeline pipeline = read_pipeline(file, arguments, catalogue, diagnostics);
@@ -62,9 +79,8 @@ std::optional<marrow::Metric> figure(const Pipeline& pipeline, const RunResult& 
     absent += (absent.empty() ? "'" : "; '") + path + "' is not there because " + value.missing;
     return std::nullopt;
   }
-  if (value.is_absent())
-    throw Error("'" + path + "' was not made" +
-                (value.missing.empty() ? ": its case has no truth, or an item is absent" : ": " + value.missing));
+  if (value.is_absent() && value.missing.empty()) throw NotMade("'" + path + "' was not made");
+  if (value.is_absent()) throw Error("'" + path + "' was not made: " + value.missing);
   const std::string name = figure_from(parts, used);
   std::vector<std::string> known;
   for (const marrow::Metric& metric : value.as<Metrics>().items) {
@@ -227,7 +243,13 @@ CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const Ru
     row.key = before.key;
     if (SharedStore* shared = store_ ? store_->shared() : nullptr) shared->allow_files(kSharedFilesOfCell);
     const Done done = run_into(folder_of(cell), pipeline, cell, observer);
-    fill(row, pipeline, done);
+    try {
+      fill(row, pipeline, done);
+    } catch (const NotMade& error) {
+      row.lacks_figure = true;
+      const auto arguments = arguments_of(experiment_, cell, case_folder(cell.case_index));
+      throw Error(error.what() + without_truth_text(checked(experiment_.pipeline, arguments, catalogue_)));
+    }
     if (row.failed.empty() && watched(cell, pipeline) != before) row.failed = kChanged;
   } catch (const UnknownName& error) {
     row.failed = error.what();
@@ -244,6 +266,7 @@ CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const Ru
     row.verdict.reset();
     row.failure_probability.reset();
     row.verdict_figures.clear();
+    row.poses.clear();
   }
   row.values.resize(experiment_.metrics.size());
   row.units.resize(experiment_.metrics.size());
@@ -262,7 +285,9 @@ void CellRunner::fill(CellRow& row, const Pipeline& pipeline, const Done& done) 
   for (const PipelineOutput& output : pipeline.outputs)
     row.evaluations += evaluations_in(value_of(done.result, output.source));
   if (!row.failed.empty()) return;
-  if (const std::vector<NamedVerdict> verdicts = verdicts_of(pipeline, done.result); !verdicts.empty()) {
+  const std::vector<NamedVerdict> verdicts = verdicts_of(pipeline, done.result);
+  row.poses = poses_of(pipeline, done.result, verdicts);
+  if (!verdicts.empty()) {
     const Verdict worst = worst_of(verdicts);
     row.verdict = worst.judgement;
     if (std::isfinite(worst.failure_probability)) row.failure_probability = worst.failure_probability;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "marrow/base/export.hpp"
+#include "marrow/compare/cell_pose.hpp"
 #include "marrow/compare/experiment.hpp"
 #include "marrow/domain/verdict.hpp"
 #include "marrow/runtime/run/executor.hpp"
@@ -39,6 +40,7 @@ struct CellRow {
   std::optional<double> failure_probability;                     ///< the largest known one of the verdicts
   using Figures = std::map<std::string, std::optional<double>>;  ///< nothing for a figure that is not finite
   std::map<std::string, Figures> verdict_figures;  ///< the figures behind each verdict, by its place: "verdict.distal"
+  std::vector<CellPose> poses;                     ///< those among its pipeline's outputs; none of a cell that failed
   struct Calls {
     int made = 0, cached = 0;
     double seconds = 0;

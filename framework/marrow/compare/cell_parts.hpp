@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What the files of CellRunner share.
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "marrow/base/hash.hpp"
+#include "marrow/compare/cell_pose.hpp"
 #include "marrow/runtime/run/executor.hpp"
+#include "marrow/runtime/run/verdicts.hpp"
 
 namespace marrow::compare {
 
@@ -15,5 +18,12 @@ std::string reason_of(const Pipeline& pipeline, const RunResult& result);
 
 /// Digest of the states of all files that the pipeline's needed nodes name. It changes if any of them is written to.
 Digest states_of_files(const Pipeline& pipeline);
+
+/// The poses among the outputs of a run, in the order of the pipeline's outputs.
+std::vector<CellPose> poses_of(const Pipeline& pipeline, const RunResult& result,
+                               const std::vector<NamedVerdict>& verdicts);
+nlohmann::json poses_json(const std::vector<CellPose>& poses);
+/// Throws an exception if the value is not what poses_json() made.
+std::vector<CellPose> poses_from_json(const nlohmann::json& all);
 
 }  // namespace marrow::compare

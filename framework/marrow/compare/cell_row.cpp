@@ -2,6 +2,7 @@
 #include <climits>
 #include <cmath>
 
+#include "cell_parts.hpp"
 #include "marrow/base/hash.hpp"
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/number_text.hpp"
@@ -92,6 +93,7 @@ std::string to_json(const CellRow& row) {
     json& written = j["verdict_figures"][place] = json::object();
     for (const auto& [name, value] : figures) written[name] = of(value);
   }
+  j["poses"] = poses_json(row.poses);
   for (const auto& value : row.values) j["values"].push_back(of(value));
   for (const auto& [name, calls] : row.nodes)
     j["nodes"][name] = {{"made", calls.made}, {"cached", calls.cached}, {"seconds", calls.seconds}};
@@ -136,6 +138,7 @@ CellRow row_from_json(const std::string& text, const Experiment& experiment) {
       row.nodes[name] = {count(calls.at("made"), "'made'"), count(calls.at("cached"), "'cached'"),
                          number(calls.at("seconds"), "'seconds'").value_or(0)};
     if (j.contains("verdict")) read_verdict(j, row);
+    row.poses = poses_from_json(j.at("poses"));
     row.key = j.at("key");
     return row;
   } catch (const std::exception& error) {

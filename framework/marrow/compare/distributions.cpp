@@ -1,61 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "distributions.hpp"
 
+#include <boost/math/distributions/beta.hpp>
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 
 namespace marrow::compare {
 namespace {
 
-/// 1 + d1 / (1 + d2 / (1 + ...)) of the handbook's Eq 8.17.22, by the modified method of Lentz (Thompson and Barnett
-/// 1986, J Comput Phys 64:490). It converges fast for x below (a + 1) / (a + b + 2).
-double beta_fraction(double a, double b, double x) {
-  const auto not_zero = [](double value) { return std::abs(value) < 1e-300 ? 1e-300 : value; };
-  double value = 1, above = 1, below = 0;
-  for (int step = 1; step < 100000; ++step) {
-    const double m = step / 2;  // whole
-    const double d = step % 2 ? -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1))
-                              : m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m));
-    below = 1 / not_zero(1 + d * below);
-    above = not_zero(1 + d / above);
-    value *= above * below;
-    if (std::abs(above * below - 1) < 1e-15) break;
-  }
-  return value;
-}
+constexpr double kFarthest = 40;  // its tail is below the smallest double
+
+/// Not by long double: the levels of looks take millions of its tails.
+using Normal =
+    boost::math::normal_distribution<double,
+                                     boost::math::policies::policy<boost::math::policies::promote_double<false>>>;
 
 }  // namespace
 
 double incomplete_beta(double a, double b, double x) {
   if (x <= 0 || x >= 1) return x <= 0 ? 0 : 1;
-  if (x > (a + 1) / (a + b + 2)) return 1 - incomplete_beta(b, a, 1 - x);
-  const double log_factor = a * std::log(x) + b * std::log1p(-x) + std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b);
-  return std::exp(log_factor) / (a * beta_fraction(a, b, x));
+  return boost::math::cdf(boost::math::beta_distribution<>(a, b), x);
 }
 
 double beta_quantile(double p, double a, double b) {
-  double below = 0, above = 1;
-  while (above - below > 1e-15) {
-    const double middle = 0.5 * (below + above);
-    if (middle <= below || middle >= above) break;
-    (incomplete_beta(a, b, middle) < p ? below : above) = middle;
-  }
-  return 0.5 * (below + above);
+  return boost::math::quantile(boost::math::beta_distribution<>(a, b), p);
 }
 
 double student_quantile(double outside, double freedom) {
-  const double x = beta_quantile(outside, 0.5 * freedom, 0.5);  // of freedom / (freedom + t^2)
-  return std::sqrt(freedom * (1 - x) / x);
+  return boost::math::quantile(boost::math::complement(boost::math::students_t_distribution<>(freedom), outside / 2));
 }
 
-double upper_tail(double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); }
+double upper_tail(double z) { return boost::math::cdf(boost::math::complement(Normal(), z)); }
 
 double z_of_tail(double tail) {
-  double below = 0, above = 40;
-  for (;;) {
-    const double middle = 0.5 * (below + above);
-    if (middle <= below || middle >= above) return middle;
-    (upper_tail(middle) > tail ? below : above) = middle;
-  }
+  if (tail <= upper_tail(kFarthest)) return kFarthest;
+  return boost::math::quantile(boost::math::complement(Normal(), tail));
 }
 
 Interval score_interval(double rate, double runs, double confidence) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The beta and the normal distribution, and the quantiles and intervals that follow from them.
+// The beta, Student's and the normal distribution by Boost.Math, under the names that the statistics use, and the
+// interval that follows from the normal one.
 #include <limits>
 
 #include "marrow/compare/statistics.hpp"
@@ -15,7 +16,7 @@ inline constexpr double kInfinite = std::numeric_limits<double>::infinity();
 /// coin with a = n - k, b = k + 1 and x = 0.5.
 double incomplete_beta(double a, double b, double x);
 
-/// The x with I_x(a, b) = p, by bisection to within 1e-15. p is between 0 and 1.
+/// The x with I_x(a, b) = p. p is between 0 and 1.
 double beta_quantile(double p, double a, double b);
 
 /// The t for which Student's t with `freedom` degrees of freedom is farther from 0 with the probability `outside`.
@@ -24,7 +25,7 @@ double student_quantile(double outside, double freedom);
 /// Probability that a standard normal variable is larger than z.
 double upper_tail(double z);
 
-/// The z >= 0 with upper_tail(z) = tail, by bisection down to neighbouring doubles. 40 for a tail too small for that.
+/// The z with upper_tail(z) = tail; 40 for a tail too small for a double.
 double z_of_tail(double tail);
 
 /// Wilson's interval of a rate that was seen in `runs` independent runs, which need not be a whole number.

@@ -22,6 +22,14 @@ struct Variant {
   std::vector<Override> overrides;
   std::vector<double> swept = {};  ///< values of the experiment's swept options, in their order
   std::string swept_from = {};     ///< the variant whose options are swept; empty if it is the pipeline as it is
+  /// For each of the experiment's factors the place of its level; empty for a variant that 'matrix' did not make.
+  std::vector<std::size_t> levels = {};
+};
+
+/// What 'matrix' varies: an option, or the named variants with which it is combined. A variant has one level of each.
+struct Factor {
+  std::string name;                 ///< the option's key; "variants" for the named variants
+  std::vector<std::string> levels;  ///< the values in the order of the file
 };
 
 /// Data on which all variants run. It is a folder that exists, or a folder that a simulation makes. Without either, the
@@ -102,6 +110,7 @@ struct NamedItem {
 inline constexpr std::size_t kMostVariants = 1000;
 inline constexpr std::size_t kMostCells = 1000000;
 inline constexpr std::size_t kMostMetrics = 1000;
+inline constexpr std::size_t kMostComparisons = 20000;  ///< of pairs, with 'compare_all'
 
 struct Experiment {
   std::string name, help;
@@ -118,6 +127,9 @@ struct Experiment {
   std::vector<ExperimentCase> cases;
   std::size_t more_cases = 0;  ///< number of cases at the end that the file does not name
   std::vector<Variant> variants;
+  std::vector<Factor> factors;  ///< of 'matrix', in which all levels are combined; none without one
+  bool compare_all = false;     ///< every pair of variants is compared, not only each with the baseline
+  Place compare_all_place;
   std::vector<SweptOption> swept;
   bool sweep_is_grid = false;  ///< else Sobol's points
   std::size_t baseline = 0;

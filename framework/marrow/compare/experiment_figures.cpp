@@ -5,6 +5,7 @@
 
 #include "marrow/base/number_text.hpp"
 #include "marrow/compare/cell.hpp"
+#include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/run/output_faults.hpp"
 
@@ -109,6 +110,27 @@ const PipelineOutput* find_output(const Pipeline& pipeline, const std::string& n
   diagnostics.add(place, "the pipeline " + pipeline.name + " has no output '" + name + "'",
                   suggestion(name, names_of(pipeline.outputs)));
   return nullptr;
+}
+
+std::vector<std::string> figures_without_truth(const Pipeline& pipeline) {
+  std::vector<bool> is_called(pipeline.nodes.size());
+  const auto is_there = [&](const Reference& source) {
+    return is_called[std::size_t(source.node)] && pipeline.output_of(source).type != TypeInfo::of<Truth>();
+  };
+  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
+    is_called[i] = std::all_of(pipeline.nodes[i].wires.begin(), pipeline.nodes[i].wires.end(), [&](const Wire& wire) {
+      return pipeline.nodes[i].input_of(wire).optional ||
+             std::any_of(wire.sources.begin(), wire.sources.end(), is_there);
+    });
+  std::vector<std::string> paths;
+  for (const PipelineOutput& output : pipeline.outputs) {
+    const PortInfo& port = pipeline.output_of(output.source);
+    if (!is_there(output.source) || port.type.id != "metrics") continue;
+    const std::string start = start_of_path(output.name, pipeline.axes_of(output.source));
+    for (const std::string& figure : port.figures) paths.push_back(start + figure);
+    if (port.figures.empty()) paths.push_back(start + "*");
+  }
+  return paths;
 }
 
 void FigureChecker::check(std::size_t variant, const Pipeline& pipeline) {

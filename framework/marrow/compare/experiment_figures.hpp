@@ -18,6 +18,10 @@ std::string figure_from(const std::vector<std::string>& parts, std::size_t first
 const PipelineOutput* find_output(const Pipeline& pipeline, const std::string& name, const Place& place,
                                   Diagnostics& diagnostics);
 
+/// The paths of all figures that a pipeline can give for a case without a truth: "contour.FRAGMENT.rms_px", and
+/// "contour.FRAGMENT.*" where the node does not tell its names. In their order.
+MARROW_EXPORT_TO_TESTS std::vector<std::string> figures_without_truth(const Pipeline& pipeline);
+
 /// Checks the figures that an experiment names against the pipelines of its variants: that there is such an output of
 /// figures, that the path names an item of each of its lists, and that its node can make such a figure. Only the data
 /// show which items exist: items() returns what must be looked up there.

@@ -50,7 +50,9 @@ std::string fault_of_last_look(const StopRule& rule, std::size_t starts) {
 ComparisonCounts comparison_counts(const Experiment& experiment) {
   ComparisonCounts counts;
   counts.cases = experiment.cases.size() - (experiment.tune ? experiment.tune->training_cases : 0);
-  counts.comparisons = (experiment.variants.size() + (experiment.tune ? 1 : 0) - 1) * experiment.metrics.size();
+  const std::size_t variants = experiment.variants.size() + (experiment.tune ? 1 : 0);
+  counts.comparisons =
+      (experiment.compare_all ? variants * (variants - 1) / 2 : variants - 1) * experiment.metrics.size();
   if (counts.comparisons) counts.fewest_cases = fewest_cases(0.05, counts.comparisons);
   return counts;
 }

@@ -9,8 +9,9 @@
 namespace MARROW_EXPORT marrow {
 namespace compare {
 
-/// The comparisons with the baseline that an experiment makes: one for each figure of each other variant. If an
-/// optimizer chooses options, the tuned variant is another one, and only the cases that are held out count.
+/// The comparisons that an experiment makes: one for each figure of each variant beside the baseline, or of each pair
+/// with 'compare_all'. If an optimizer chooses options, the tuned variant is another one, and only the cases that are
+/// held out count.
 struct ComparisonCounts {
   std::size_t comparisons = 0, cases = 0;
   /// The fewest cases with which one of them can reach p < 0.05 (fewest_cases); 0 without comparisons.

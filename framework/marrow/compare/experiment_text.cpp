@@ -7,6 +7,7 @@
 
 #include "draw.hpp"
 #include "experiment_layers.hpp"
+#include "experiment_factors.hpp"
 #include "experiment_replaced.hpp"
 #include "experiment_stop.hpp"
 #include "experiment_sweep.hpp"
@@ -42,7 +43,8 @@ class Reader {
     static const std::vector<std::string> kKeys{"extends",  "experiment",  "name",    "help",          "pipeline",
                                                 "inputs",   "set",         "cases",   "variants",      "matrix",
                                                 "starts",   "metrics",     "success", "initial_error", "baseline",
-                                                "pictures", "timed_cells", "stop",    "sweep",         "tune"};
+                                                "pictures", "timed_cells", "stop",    "sweep",         "tune",
+                                                "compare_all"};
     const Place start{experiment_.file.string(), 1, 1};
     const std::vector<YamlEntry> entries = yaml_.map(root, start, "the experiment", &kKeys);
     if (!root.IsMap()) return;
@@ -77,6 +79,7 @@ class Reader {
     const std::size_t starts = experiment_.protocol ? experiment_.protocol->count : 1;
     stop_.apply(experiment_, starts);
     tune_.apply(experiment_, starts);
+    check_compare_all(yaml_, experiment_);
     if (experiment_.protocol)
       experiment_.starts = draw_starts(*experiment_.protocol);
     else
@@ -150,6 +153,7 @@ class Reader {
     if (entry.key == "sweep") sweep_.read(entry);
     if (entry.key == "tune") tune_.read(entry);
     if (entry.key == "timed_cells") experiment_.timed_cells = count_of(yaml_, entry, 0, 1000);
+    if (entry.key == "compare_all") read_compare_all(yaml_, entry, experiment_);
   }
 
   void read_variants(const YamlEntry& section) {
@@ -203,6 +207,7 @@ class Reader {
         }
       combined = std::move(next);
     }
+    set_factors(experiment_, matrix_, combined);
     make_names_distinct(combined);
     for (const Variant& variant : combined)
       if (!check_name(yaml_, variant.name, variant.place, "a variant's name"))

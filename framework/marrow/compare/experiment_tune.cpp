@@ -24,6 +24,7 @@ std::string add_tuned(Experiment& experiment, const std::vector<double>& values)
   const TuneRule& rule = *experiment.tune;
   Variant variant = experiment.variants[rule.variant];
   variant.name = kTuned;
+  variant.levels.clear();  // its options are not those of the matrix
   variant.swept = values;
   for (std::size_t o = 0; o < values.size(); ++o) {
     variant.name += "+" + exact_number(values[o]);

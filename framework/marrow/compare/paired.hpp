@@ -141,9 +141,16 @@ struct CorrectedP {
 /// "canny, target error: fails more often than the baseline, in 22 of 30 cases, p < 0.001; of 30 runs, only canny
 /// failed in 22, only the baseline in 0, both in 0; where both have a value, in 8 cases, the median is 0.20 mm better"
 /// If no difference is shown although p < alpha, it says why: the interval contains 0, or the ranks point to the other
-/// side. Throws Error as difference_shown() does.
+/// side. If `reference` is not empty, it stands for "the baseline" in all of this, and the sentence begins
+/// "canny against sobel, target error". Throws Error as difference_shown() does.
 std::string sentence(const std::string& variant, const Metric& metric, const Comparison& comparison,
-                     const CorrectedP& corrected, double alpha = 0.05);
+                     const CorrectedP& corrected, double alpha = 0.05, const std::string& reference = "");
+
+/// The same of a comparison that is not tested, such as the effect of a factor: without p, and without saying whether a
+/// difference is shown. `variant` and `reference` are the two levels.
+/// "powell against nelder_mead, target error: 0.12 mm worse, 95 % interval 0.08 to 0.17, 20 cases"
+std::string effect_sentence(const std::string& variant, const std::string& reference, const Metric& metric,
+                            const Comparison& comparison);
 
 }  // namespace compare
 }  // namespace marrow

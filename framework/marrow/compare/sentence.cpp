@@ -56,16 +56,21 @@ int decimals_of(double difference, const Interval& interval) {
   return std::max(decimals, std::min(decimals_for(nearest), decimals + 2));
 }
 
+/// What a sentence calls the two.
+struct Names {
+  std::string variant, reference;
+};
+
 /// A comparison in the direction that its sentence names: there, the difference is positive.
 struct Directed {
-  const std::string& variant;
+  const Names& names;
   const Metric& metric;
   double difference = 0;
   Interval interval;
   bool is_worse = false;  ///< the direction
 
-  Directed(const std::string& name, const Metric& of, double from, const Interval& within)
-      : variant(name), metric(of), difference(from), interval(within), is_worse((from >= 0) != of.larger_is_better) {
+  Directed(const Names& of_both, const Metric& of, double from, const Interval& within)
+      : names(of_both), metric(of), difference(from), interval(within), is_worse((from >= 0) != of.larger_is_better) {
     if (from >= 0) return;
     difference = -from;
     interval = {-within.upper, -within.lower, within.confidence};
@@ -78,7 +83,7 @@ struct Directed {
   }
   std::string bound(double value, int decimals) const {
     if (std::isfinite(value)) return fixed_number(value, decimals);
-    return "a failure of " + ((value > 0) == is_worse ? variant : std::string("the baseline"));
+    return "a failure of " + ((value > 0) == is_worse ? names.variant : names.reference);
   }
   std::string range(int decimals) const {
     const bool has_failure = std::isinf(interval.lower) || std::isinf(interval.upper);
@@ -92,23 +97,24 @@ struct Directed {
 };
 
 /// How many runs of whom failed; empty if none did.
-std::string failures_text(const std::string& variant, const Tally& runs) {
+std::string failures_text(const Names& names, const Tally& runs) {
   if (runs.all() == runs.both) return "";
-  return formatted("; of {}, only {} failed in {}, only the baseline in {}, both in {}", counted(runs.all(), "run"),
-                   variant, runs.variant_lost, runs.reference_lost, runs.neither);
+  return formatted("; of {}, only {} failed in {}, only {} in {}, both in {}", counted(runs.all(), "run"),
+                   names.variant, runs.variant_lost, names.reference, runs.reference_lost, runs.neither);
 }
 
 /// The beginning of a sentence whose median is a failure: who fails more often, and in how many cases.
-std::string more_failures(const Comparison& comparison, bool variant_fails) {
-  return formatted("{}{} of {}",
-                   variant_fails ? "fails more often than the baseline, in " : "the baseline fails more often, in ",
-                   variant_fails ? comparison.cases.variant_lost : comparison.cases.reference_lost,
-                   counted(comparison.compared(), "case"));
+std::string more_failures(const Names& names, const Comparison& comparison, bool variant_fails) {
+  return formatted(
+      "{}{} of {}",
+      variant_fails ? "fails more often than " + names.reference + ", in " : names.reference + " fails more often, in ",
+      variant_fails ? comparison.cases.variant_lost : comparison.cases.reference_lost,
+      counted(comparison.compared(), "case"));
 }
 
-std::string of_both(const std::string& variant, const Metric& metric, const Comparison& comparison) {
+std::string of_both(const Names& names, const Metric& metric, const Comparison& comparison) {
   if (!comparison.median_of_both) return "";
-  const Directed directed(variant, metric, *comparison.median_of_both, {});
+  const Directed directed(names, metric, *comparison.median_of_both, {});
   const int decimals = directed.difference == 0 ? 0 : decimals_for(directed.difference / 10);
   return "; where both have a value, in " + counted(comparison.cases_of_both, "case") + ", the median is " +
          directed.amount(decimals);
@@ -126,6 +132,35 @@ std::string doubts(const Comparison& comparison, const CorrectedP& corrected, do
   const bool contains_zero = comparison.interval.lower <= 0 && comparison.interval.upper >= 0;
   return std::string(contains_zero ? "; the interval contains 0" : "; the ranks and the median do not agree") +
          ", look at the single cases";
+}
+
+/// What was found, from "0.12 mm worse" to "20 of 22 cases".
+std::string found_text(const Comparison& comparison, const Directed& directed, bool has_interval) {
+  const Interval& interval = directed.interval;
+  const bool is_failure = std::isinf(directed.difference);
+  const int decimals = decimals_of(directed.difference, has_interval ? interval : Interval{-kInfinite, kInfinite});
+  std::string text =
+      is_failure ? more_failures(directed.names, comparison, directed.is_worse) : directed.amount(decimals);
+  if (has_interval && interval.lower < kInfinite) {
+    text += ", " + directed.range(decimals);
+    if (is_failure || shows_zero(fixed_number(directed.difference, decimals)))
+      text += directed.is_worse ? " (positive is worse)" : " (positive is better)";
+  }
+  if (!is_failure || comparison.cases.neither)
+    text += ", " + (comparison.cases.neither ? formatted("{} of ", comparison.compared()) : std::string()) +
+            counted(comparison.cases.all(), "case");
+  return text;
+}
+
+/// The whole sentence after its beginning. `p` is what it says of p, if anything.
+std::string said(const std::string& begin, const Names& names, const Metric& metric, const Comparison& comparison,
+                 const std::string& verb, const std::string& p) {
+  const std::string text = metric.label.empty() ? begin : begin + ", " + metric.label;
+  if (!comparison.compared()) return text + ": no case can be compared" + failures_text(names, comparison.runs);
+  const Directed directed(names, metric, comparison.median_difference, comparison.interval);
+  const bool has_interval = comparison.compared() >= fewest_cases(1 - directed.interval.confidence);
+  return text + verb + found_text(comparison, directed, has_interval) + p + failures_text(names, comparison.runs) +
+         (std::isinf(directed.difference) ? of_both(names, metric, comparison) : "");
 }
 
 }  // namespace
@@ -149,30 +184,20 @@ bool difference_shown(const Comparison& comparison, double p_after_holm, double 
 }
 
 std::string sentence(const std::string& variant, const Metric& metric, const Comparison& comparison,
-                     const CorrectedP& corrected, double alpha) {
+                     const CorrectedP& corrected, double alpha, const std::string& reference) {
   const bool is_shown = difference_shown(comparison, corrected.p, alpha);
-  std::string text = metric.label.empty() ? variant : variant + ", " + metric.label;
-  if (!comparison.compared()) return text + ": no case can be compared" + failures_text(variant, comparison.runs);
-  const Directed directed(variant, metric, comparison.median_difference, comparison.interval);
-  const Interval& interval = directed.interval;
-  const bool has_interval = comparison.compared() >= fewest_cases(1 - interval.confidence);
-  const bool is_failure = std::isinf(directed.difference);
-  const int decimals = decimals_of(directed.difference, has_interval ? interval : Interval{-kInfinite, kInfinite});
-
-  text += is_shown ? ": " : ": no difference shown: ";
-  text += is_failure ? more_failures(comparison, directed.is_worse) : directed.amount(decimals);
-  if (has_interval && interval.lower < kInfinite) {
-    text += ", " + directed.range(decimals);
-    if (is_failure || shows_zero(fixed_number(directed.difference, decimals)))
-      text += directed.is_worse ? " (positive is worse)" : " (positive is better)";
-  }
-  const std::size_t all = comparison.cases.all();
-  if (!is_failure || comparison.cases.neither)
-    text += ", " + (comparison.cases.neither ? formatted("{} of ", comparison.compared()) : std::string()) +
-            counted(all, "case");
-  text += ", " + p_text(corrected.p, alpha) + failures_text(variant, comparison.runs);
-  if (is_failure) text += of_both(variant, metric, comparison);
+  const Names names{variant, reference.empty() ? "the baseline" : reference};
+  const std::string text =
+      said(reference.empty() ? variant : variant + " against " + reference, names, metric, comparison,
+           is_shown ? ": " : ": no difference shown: ", ", " + p_text(corrected.p, alpha));
+  if (!comparison.compared()) return text;
+  const bool has_interval = comparison.compared() >= fewest_cases(1 - comparison.interval.confidence);
   return text + doubts(comparison, corrected, alpha, has_interval, is_shown);
+}
+
+std::string effect_sentence(const std::string& variant, const std::string& reference, const Metric& metric,
+                            const Comparison& comparison) {
+  return said(variant + " against " + reference, {variant, reference}, metric, comparison, ": ", "");
 }
 
 }  // namespace marrow::compare

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A figure that no output can have is a fault of the experiment's file. The nodes declare the figures that they make.
+#include "marrow/compare/experiment_figures.hpp"
 #include "experiment_files.hpp"
 #include "marrow/compare/cell.hpp"
 #include "marrow/compare/experiment_notes.hpp"
@@ -55,6 +56,23 @@ TEST_F(ExperimentFigures, WhatIsDeclaredPasses) {
     with_metric(path);
     EXPECT_TRUE(diagnostics.empty()) << path << diagnostics.text();
   }
+}
+
+TEST_F(ExperimentFigures, ThatNeedNoTruth) {
+  const auto file =
+      scratch.write("judged.yaml",
+                    "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  t: {uses: test.truth}\n"
+                    "  f: {uses: test.fragments, with: {path: $case}}\n  n: {uses: test.constant}\n"
+                    "  judged: {uses: jury.test, in: {of: n, truth: t}}\n"
+                    "  after: {uses: test.declared, in: {of: judged}}\n"
+                    "  each: {uses: test.declared, in: {of: f}}\n  free: {uses: test.undeclared, in: {of: f}}\n"
+                    "outputs: {truth: t, judged: judged, each: each, after: after, free: free}\n");
+  marrow::Diagnostics faults;
+  const marrow::Pipeline pipeline =
+      marrow::read_pipeline(file, {{{"case", (scratch.path / "case").string()}}, {}}, nodes, faults);
+  ASSERT_TRUE(faults.empty()) << faults.text();
+  EXPECT_EQ(marrow::compare::figures_without_truth(pipeline),
+            (std::vector<std::string>{"each.FRAGMENT.mtre_mm", "each.FRAGMENT.*.median_px", "free.FRAGMENT.*"}));
 }
 
 TEST_F(ExperimentFigures, APathWithTooFewParts) {

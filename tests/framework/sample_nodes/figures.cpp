@@ -46,6 +46,7 @@ Metrics figures_of(const Metrics& of, const std::string& also) {
   if (!also.empty()) made.items.push_back({also, 3, ""});
   return made;
 }
+Metrics judged(const Metrics& of, const marrow::Truth&) { return of; }
 Metrics measured(const Metrics& of, const Options& options) { return figures_of(of, options.also); }
 
 std::shared_ptr<const figures::Way> way() { return std::make_shared<const figures::Way>(); }
@@ -73,6 +74,13 @@ MARROW_PLUGIN(plugin) {
       .in("truth", "number")
       .out("metrics", "their difference")
       .figures({"mtre_mm"});
+  plugin.kind("jury").summary("may see the truth").sees_truth();
+  plugin.node("jury.test", judged)
+      .summary("Needs the truth")
+      .in("of", "number")
+      .in("truth", "truth")
+      .out("metrics", "the same")
+      .figures({"judged_mm"});
   plugin.node("test.declared", measured)
       .summary("Figures that are declared")
       .in("of", "number")

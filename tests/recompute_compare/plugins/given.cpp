@@ -6,10 +6,12 @@
 //
 // `row` is a number (0 where a table is of one case), `column` the variant's, `start` the first part of the
 // displacement. `text` is what a node makes of it: "1.25 mm", "nan", "absent" (the figure is not there), "fail",
-// "crash"; "doubtful 7" for a verdict, whose percentage may be missing; the evaluations of a pose.
+// "crash"; "doubtful 7" for a verdict, whose percentage may be missing; the evaluations of a pose, from which its place
+// and its predicted deviations follow.
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <sstream>
 
@@ -22,7 +24,7 @@ using marrow::Error, marrow::Metrics;
 struct Options {
   std::filesystem::path table;
   int row = 0;
-  std::string column;
+  std::string column, other;
   std::vector<std::string> names{"a"};
   double at = 0;
 };
@@ -46,7 +48,7 @@ Texts texts_of(const Options& options, double start) {
   for (std::string line; std::getline(stream, line);) {
     const std::vector<std::string> parts = parts_of(line, ',');
     if (parts.size() != 5) throw Error("a line of the table has not five parts: " + line);
-    if (std::stoi(parts[0]) == options.row && parts[1] == options.column)
+    if (std::stoi(parts[0]) == options.row && parts[1] == options.column + options.other)
       by_distance[std::abs(std::stod(parts[2]) - start)][parts[3]] = parts[4];
   }
   if (by_distance.empty()) throw Error("the table has no column '" + options.column + "'");
@@ -87,6 +89,15 @@ marrow::Verdict verdict(const Metrics& start, const Options& options) {
 marrow::Pose pose(const Metrics& start, const Options& options) {
   marrow::Pose pose;
   pose.evaluations = std::stoi(texts_of(options, value_of(start)).at("evaluations"));
+  const double e = pose.evaluations;
+  pose.world_from_model.translation_mm = {e, -0.5 * e, 0.25};
+  if (pose.evaluations % 2) pose.world_from_model.rotation << 0, -1, 0, 1, 0, 0, 0, 0, 1;  // by 90 degrees about z
+  if (pose.evaluations % 3) return pose;
+  marrow::Vector6d deviations;
+  for (int i = 0; i < 6; ++i) deviations[i] = 0.001 * (e + i);
+  if (pose.evaluations % 6 == 0) deviations[5] = std::numeric_limits<double>::infinity();
+  pose.covariance = marrow::Matrix6d(deviations.cwiseAbs2().asDiagonal());
+  pose.frame.is_anatomical = pose.evaluations % 9 == 0;
   return pose;
 }
 
@@ -111,6 +122,7 @@ MARROW_PLUGIN(plugin) {
                   .out("figures", "the figures")
                   .figures({"*"})
                   .option("names", &Options::names, "which figures")
+                  .option("other", &Options::other, "the end of the column's name")
                   .option("at", &Options::at, "its square is added to the first figure"));
   add_options(plugin.node("test.given_verdict", verdict)
                   .summary("A verdict that a table has")

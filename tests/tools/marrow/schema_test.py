@@ -97,6 +97,7 @@ initial_error: errors.distal.start.mtre_mm
 baseline: bobyqa+75+1
 pictures: [overlay]
 timed_cells: 1
+compare_all: true
 sweep: {options: {edges.sigma_px: {range: [1, 2], scale: log, whole: false}}, grid: 2}
 stop: {width: 0.1, figure: success, most_cases: 10, look_every: 5}
 """
@@ -141,6 +142,7 @@ WRONG = {
     "baseline: bobyqa+75+1": "baseline: [bobyqa]",
     "pictures: [overlay]": "pictures: overlay",
     "timed_cells: 1": "timed_cells: all",
+    "compare_all: true": "compare_all: pairs",
     "range: [1, 2]": "range: [1]",
     "scale: log": "scale: loud",
     "whole: false": "whole: perhaps",

@@ -58,7 +58,7 @@ CompareRequest request_of(const ClusterPlan& plan, const ChunkRequest& asked) {
 bool make_cases(const Task& task, const CellJobs& cells, const std::vector<std::size_t>& numbers,
                 const fs::path& scratch, std::map<std::size_t, std::string>& faults) {
   const std::vector<Job> jobs = cells.cases_of(numbers);
-  Progress progress(jobs.size(), task.request.quiet);
+  Progress progress(jobs.size(), "cases", task.request.quiet);
   return run_jobs(jobs, pool_of(task.request, scratch, task.request.threads), [&](const Job& job, const JobEnd& end) {
     if (std::string fault = cells.fault_of_case(job, end); !fault.empty()) faults[job.number] = std::move(fault);
     progress.add("case " + task.experiment.cases[job.number].name);
@@ -105,7 +105,7 @@ bool make_rows(const Task& task, const Chunk& chunk) {
     else
       jobs.push_back(cells.job_of("cell", number, task.experiment.cases[cell.case_index].name));
   }
-  Progress progress(jobs.size(), task.request.quiet);
+  Progress progress(jobs.size(), "cells", task.request.quiet);
   if (!run_jobs(jobs, pool_of(task.request, scratch.path(), task.request.threads),
                 [&](const Job& job, const JobEnd& end) {
                   const CellRow row = cells.row_of(job, end);

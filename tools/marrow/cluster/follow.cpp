@@ -31,7 +31,7 @@ const std::set<std::string> kUsualReasons{"None", "Resources", "Priority", "Depe
 class Follower {
  public:
   Follower(const ClusterPlan& plan, const ClusterProfile& profile, bool quiet)
-      : plan_(plan), profile_(profile), progress_(cells_of_plan(plan), quiet) {}
+      : plan_(plan), profile_(profile), progress_(cells_of_plan(plan), "cells", quiet) {}
 
   int run() {
     const std::atomic<bool>& stop = stop_on_signals();

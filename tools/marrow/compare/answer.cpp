@@ -164,24 +164,8 @@ Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows)
     answer.same_runs.push_back(is_of_same_runs(of_variant, m));
   add_look(experiment, of_variant, answer);
   answer.curves = curves_of(experiment, of_variant);
-  std::vector<double> p;
-  for (std::size_t m = 0; m < experiment.metrics.size(); ++m)
-    for (std::size_t v = 0; v < experiment.variants.size(); ++v) {
-      if (v == experiment.baseline) continue;
-      const std::vector<compare::Pair> pairs = cell_pairs(of_variant[experiment.baseline], of_variant[v], m);
-      const bool higher_is_better = experiment.metrics[m].higher_is_better();
-      answer.findings.push_back({v, m, compare::compare_pairs(pairs, higher_is_better), 1, ""});
-      p.push_back(answer.findings.back().comparison.test.p);
-    }
-  const std::vector<double> corrected = compare::holm(p);
-  for (std::size_t i = 0; i < corrected.size(); ++i) {
-    Finding& finding = answer.findings[i];
-    finding.p_holm = corrected[i];
-    finding.sentence = compare::sentence(experiment.variants[finding.variant].name,
-                                         {experiment.metrics[finding.metric].label, answer.units[finding.metric],
-                                          experiment.metrics[finding.metric].higher_is_better()},
-                                         finding.comparison, {finding.p_holm, corrected.size()});
-  }
+  add_findings(experiment, of_variant, answer);
+  add_effects(experiment, of_variant, answer);
   return answer;
 }
 

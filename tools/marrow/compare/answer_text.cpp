@@ -148,9 +148,11 @@ std::string table_text(const Experiment& experiment, const Answer& answer) {
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) text += figure_table(experiment, answer, m);
   text += verdict_table(experiment, answer) + capture_text(experiment, answer) + "\n* the baseline";
   if (experiment.variants.size() > 1)
-    text += formatted("; against it, with Holm's correction over all {}:", answer.findings.size());
+    text += formatted("; against it, with Holm's correction over all {}:",
+                      answer.pairs.empty() ? answer.findings.size() : answer.pairs.size());
   text += "\n";
   for (const Finding& finding : answer.findings) text += "  " + printable(finding.sentence) + "\n";
+  text += pairs_text(experiment, answer) + effects_text(experiment, answer);
   if (answer.look) {
     text += "\n" + printable(answer.look_sentence) + "\n";
     if (answer.look->number > 1) text += "The other intervals and p do not count the looks.\n";

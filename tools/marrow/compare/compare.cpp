@@ -120,6 +120,8 @@ int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster)
     throw Error(
         "'tune' looks at each point before it chooses the next one, so it runs here; leave the options for a cluster "
         "out");
+  if (!request.differences.empty() && !request.dry_run)
+    throw Error("--difference says how many cases a difference takes, without running any; add --dry-run");
   const fs::path folder = folder_of(request, experiment);
   if (!request.dry_run) expect_outside_cases(experiment, folder, request.no_cache);
   if (const int code = check_before_it_runs(request, cluster, catalogue, experiment)) return code;
@@ -131,6 +133,8 @@ int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster)
     say(compare::notes_of(experiment));
     if (experiment.tune) say_what_is_tuned(experiment);
     print_plan(experiment, catalogue, request.no_cache ? nullptr : &store, folder);
+    CellRunner runner(experiment, catalogue, request.no_cache ? nullptr : &store, folder, request.threads);
+    std::printf("%s", needed_cases_text(experiment, runner, request.differences).c_str());
     return 0;
   }
   if (by_tasks) return compare_on_cluster(request, cluster, catalogue, experiment, folder);
@@ -216,6 +220,16 @@ void add_compare(CLI::App& app, int& code) {
                           "megabytes that report.html may have; pictures that do not fit go to the folder report/"),
                request->page_mb);
   command->add_flag("--dry-run", request->dry_run, "say what is left to do, and how long it took in earlier runs");
+  command
+      ->add_option_function<std::vector<std::string>>(
+          "--difference",
+          [request](const std::vector<std::string>& texts) {
+            for (const std::string& text : texts) request->differences.push_back(wanted_difference(text));
+          },
+          "with --dry-run: say how many cases it takes to show this difference, as AMOUNT or FIGURE=AMOUNT")
+      ->expected(1)
+      ->take_all()
+      ->type_name("AMOUNT");
   command->add_flag("--quiet", request->quiet, "no progress");
   const auto cluster = std::make_shared<ClusterRequest>();
   add_cluster_options(command, *request, *cluster);

@@ -29,6 +29,12 @@ struct CallCounts {
   void add(const CallCounts& others);
 };
 
+/// A difference of which a dry run says how many cases it takes.
+struct WantedDifference {
+  std::string figure;  ///< a metric's path; empty for the first one
+  double amount = 0;   ///< in the figure's unit
+};
+
 struct CompareRequest {
   std::filesystem::path file;
   std::filesystem::path folder;  ///< empty = runs/compare/NAME
@@ -39,7 +45,8 @@ struct CompareRequest {
   std::size_t shown = 8;  ///< cases and starts with pictures in the report
   double page_mb = 20;    ///< bytes of report.html; pictures that do not fit lie beside it
   bool dry_run = false, no_cache = false, quiet = false;
-  bool gather = false;           ///< run no cell: those without a row have failed
+  std::vector<WantedDifference> differences;  ///< with dry_run
+  bool gather = false;                        ///< run no cell: those without a row have failed
   std::size_t more_cases = 0;    ///< further seeds: the largest number for `compare`, the exact one for other commands
   std::size_t made_before = 0;   ///< rows that the same command made at earlier looks
   CallCounts calls_before;       ///< for these rows
@@ -109,6 +116,13 @@ compare::Experiment largest_experiment(const CompareRequest& request, const Cata
 std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experiment,
                                               const std::vector<compare::CellRow>& rows, std::size_t most);
 
+/// Reads "0.5", of the first figure, or "FIGURE=0.5". Throws Error for anything else.
+WantedDifference wanted_difference(const std::string& text);
+/// Which differences the cases of the experiment show, and how many cases each wanted difference takes, by the cells
+/// that are done; empty without comparisons. Throws Error for a figure that the experiment does not have.
+std::string needed_cases_text(const compare::Experiment& experiment, compare::CellRunner& runner,
+                              const std::vector<WantedDifference>& wanted);
+
 /// Prints what a comparison would do. Calls no node.
 void print_plan(const compare::Experiment& experiment, const Catalogue& catalogue, const Store* store,
                 const std::filesystem::path& folder);
@@ -154,7 +168,34 @@ struct VariantSummary {
 struct Finding {
   std::size_t variant = 0, metric = 0;
   compare::Comparison comparison;
-  double p_holm = 1;
+  double p_holm = 1;  ///< over all that the experiment asks for: with 'compare_all' over all pairs
+  std::string sentence;
+};
+/// Comparison of any two variants. `reference` is the baseline, or else the one that comes first in the file.
+struct PairFinding {
+  Finding finding;
+  std::size_t reference = 0;
+};
+/// The variants in the order of a figure.
+struct Ranking {
+  struct Place {
+    std::size_t variant = 0;
+    std::size_t rank = 0;  ///< from 1; variants with the same median and as many lost runs share it
+    /// Of all runs; one without the figure counts as worse than any other. Infinite if the median itself is such a run.
+    double median = 0;
+    std::size_t lost = 0;  ///< runs without the figure
+    std::string group;     ///< letters: no test tells apart two variants that share one; empty if there are too many
+  };
+  std::vector<Place> places;  ///< best first
+  /// Variants beside the first that no test tells from it, and that a test shows to be better than it, case by case.
+  std::vector<std::size_t> like_best, better_than_best;
+  std::size_t pairs = 0, different = 0;  ///< all pairs, and those that a test tells apart
+};
+/// What one level of a factor does to a figure, against the factor's first level: each run is compared with the run of
+/// the same case, start and levels of all other factors.
+struct Effect {
+  std::size_t factor = 0, level = 0, metric = 0;
+  compare::Comparison comparison;
   std::string sentence;
 };
 /// A figure at one value of a swept option, or at the values in one bin.
@@ -177,7 +218,10 @@ struct Answer {
   std::optional<Tuning> tuning;  ///< as in CompareRequest
   std::string times;             ///< TimedCells::sentence
   std::vector<VariantSummary> variants;
-  std::vector<Finding> findings;
+  std::vector<Finding> findings;   ///< with the baseline
+  std::vector<PairFinding> pairs;  ///< all of them; only with 'compare_all'
+  std::vector<Ranking> rankings;   ///< for each metric; only with 'compare_all'
+  std::vector<Effect> effects;     ///< only where 'matrix' combines at least two factors
   std::vector<std::string> units;  ///< FigureUnits::of_metrics
   std::string initial_error_unit;
   std::vector<bool> same_runs;        ///< for each metric, whether all variants have it in the same cases and starts
@@ -202,15 +246,32 @@ std::vector<compare::Pair> cell_pairs(const RowsOfVariant& baseline, const RowsO
 
 /// `rows` are those of all cells; failed ones have no figures. Throws Error as FigureUnits::add() does.
 Answer answer_of(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
+/// Compares each variant with the baseline, or all pairs with 'compare_all', and ranks the variants then. The units are
+/// known.
+void add_findings(const compare::Experiment& experiment, const std::vector<RowsOfVariant>& rows, Answer& answer);
+/// Adds the main effects of the matrix, figure by figure. The units are known.
+void add_effects(const compare::Experiment& experiment, const std::vector<RowsOfVariant>& rows, Answer& answer);
+/// "best in mTRE: a; 7 of 15 pairs differ; not told apart from it: b, c"
+std::string ranking_sentence(const compare::Experiment& experiment, const Answer& answer, std::size_t metric);
+/// The pairs, the rankings and the effects for the terminal; empty without any.
+std::string pairs_text(const compare::Experiment& experiment, const Answer& answer);
+std::string effects_text(const compare::Experiment& experiment, const Answer& answer);
 /// The response curves of all swept options: on a grid a point for each value, else in eight bins of the range.
 std::vector<Curve> curves_of(const compare::Experiment& experiment, const std::vector<RowsOfVariant>& rows);
 nlohmann::json curves_json(const compare::Experiment& experiment, const std::vector<Curve>& curves);
 
 /// The answer as a table for the terminal.
 std::string table_text(const compare::Experiment& experiment, const Answer& answer);
+/// Null for a bound that is not finite.
+nlohmann::json bound_json(double value);
+/// The keys "comparisons", and where there are any "all_pairs", "rankings" and "effects".
+nlohmann::json findings_json(const compare::Experiment& experiment, const Answer& answer);
 /// The complete answer; docs/comparing.md lists the keys.
 nlohmann::json answer_json(const compare::Experiment& experiment, const Answer& answer);
-/// Writes cells.csv, cells.jsonl and comparison.json.
+/// A line for each pose that a cell found: whose it is, its matrix, its verdict and its predicted deviations.
+std::string poses_csv(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
+std::string poses_jsonl(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
+/// Writes cells.csv, cells.jsonl, poses.csv, poses.jsonl and comparison.json.
 void write_tables(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows,
                   const Answer& answer, const std::filesystem::path& folder);
 

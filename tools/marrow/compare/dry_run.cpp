@@ -145,8 +145,9 @@ void Plan::print() const {
   std::printf("%zu cells: %zu variants, %zu cases, %zu starts\n", experiment_.cell_count(), experiment_.variants.size(),
               cases.all, starts.all);
   if (const auto counts = compare::comparison_counts(experiment_); counts.comparisons)
-    std::printf("%s with the baseline, for which a difference takes at least %zu cases\n",
-                counted(counts.comparisons, "comparison").c_str(), counts.fewest_cases);
+    std::printf("%s %s, for which a difference takes at least %zu cases\n",
+                counted(counts.comparisons, "comparison").c_str(),
+                experiment_.compare_all ? "of all pairs" : "with the baseline", counts.fewest_cases);
   if (is_sample)
     std::printf("looked at: %zu cases and %zu starts, evenly spread; by them there are about\n", cases.taken,
                 starts.taken);

@@ -54,9 +54,10 @@ class ItemCheck {
     if (!place.empty() && !fs::exists(place)) {
       if (!makes_cases_) why_not_ = "case '" + name + "' is not made yet";
       if (!makes_cases_) return true;
-      if (!request_.quiet)
-        std::fprintf(stderr, "  making case %s, to see which items it has\n", printable(name).c_str());
     }
+    if (!request_.quiet)
+      std::fprintf(stderr, "  %s case %s, to see which items it has\n",
+                   place.empty() || fs::exists(place) ? "looking at" : "making", printable(name).c_str());
     std::vector<Job> jobs;
     std::set<Source> asked;
     for (std::size_t i = 0; i < items.size(); ++i)

@@ -9,7 +9,10 @@
 
 namespace marrow::cli {
 
-Progress::Progress(std::size_t all, bool quiet) : all_(all), quiet_(quiet), is_terminal_(isatty(STDERR_FILENO)) {}
+Progress::Progress(std::size_t all, const std::string& what, bool quiet)
+    : all_(all), quiet_(quiet), is_terminal_(isatty(STDERR_FILENO)) {
+  if (!quiet_ && all_) std::fprintf(stderr, "  0 of %zu %s%s", all_, what.c_str(), is_terminal_ ? "" : "\n");
+}
 
 void Progress::done(std::size_t number, const std::string& what) {
   number_ = number;

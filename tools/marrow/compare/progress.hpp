@@ -7,10 +7,11 @@
 namespace marrow::cli {
 
 /// Shows the progress of work with many parts on the standard error: one line that changes on a terminal, otherwise a
-/// line every five seconds and one at the end.
+/// line at the beginning, every five seconds and at the end.
 class Progress {
  public:
-  Progress(std::size_t all, bool quiet);
+  /// `what` names the parts in the first line: "0 of 240 cells".
+  Progress(std::size_t all, const std::string& what, bool quiet);
   /// One more part is done, `what`.
   void add(const std::string& what) { done(number_ + 1, what); }
   /// `number` parts are done; `what` is the last of them.

@@ -128,7 +128,7 @@ class Comparison {
     std::printf("\n%s", table_text(experiment_, answer).c_str());
     if (experiment_.timed_cells) std::printf("\n%s\n", printable(answer.times).c_str());
     print_failures(rows);
-    std::printf("\ntables in %s: cells.csv, cells.jsonl, comparison.json\nreport: %s\n",
+    std::printf("\ntables in %s: cells.csv, cells.jsonl, poses.csv, poses.jsonl, comparison.json\nreport: %s\n",
                 printable(folder_.string()).c_str(),
                 printable(fs::absolute(folder_ / "report.html").lexically_normal().string()).c_str());
     return lost_.empty() ? 0 : 1;
@@ -144,7 +144,7 @@ class Comparison {
     std::vector<std::size_t> all(experiment_.cases.size());
     std::iota(all.begin(), all.end(), std::size_t(0));
     const std::vector<Job> jobs = cells_.cases_of(all);
-    Progress progress(jobs.size(), request_.quiet);
+    Progress progress(jobs.size(), "cases", request_.quiet);
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
       if (std::string fault = cells_.fault_of_case(job, end); !fault.empty())
         case_faults_[job.number] = std::move(fault);
@@ -163,7 +163,7 @@ class Comparison {
     }
     known.say_doubts();
     if (const std::string text = doubled_cases_text(experiment_, runner_); !text.empty()) say_note(text);
-    Progress progress(jobs.size(), request_.quiet);
+    Progress progress(jobs.size(), "cells", request_.quiet);
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
       CellRow row = cells_.row_of(job, end);
       calls_.add(row);
@@ -202,7 +202,7 @@ class Comparison {
     PoolSettings alone = pool_of(request_, folder_, int(std::thread::hardware_concurrency()));
     alone.workers = 1;
     alone.time_limit_s *= 2;  // the cell runs twice
-    Progress progress(jobs.size(), request_.quiet);
+    Progress progress(jobs.size(), "timed runs", request_.quiet);
     const bool is_whole = run_jobs(jobs, alone, [&](const Job& job, const JobEnd& end) {
       CellRow& row = rows[job.number];
       if (end.answer.is_number()) row.seconds = end.answer.get<double>();
@@ -216,7 +216,7 @@ class Comparison {
     std::vector<Job> jobs;
     for (const CellIndex& cell : cells)
       jobs.push_back(cells_.job_of("draw", cells_.number_of(cell), experiment_.cases[cell.case_index].name));
-    Progress progress(jobs.size(), request_.quiet);
+    Progress progress(jobs.size(), "cells with pictures", request_.quiet);
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
       const std::string id = compare::cell_id(experiment_, cells_.cell(job.number));
       if (!end.failed.empty())

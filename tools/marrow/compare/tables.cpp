@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes cells.csv and cells.jsonl (one row per cell) and comparison.json (the complete answer).
-#include <charconv>
+// Writes cells.csv and cells.jsonl (one row per cell), poses.csv and poses.jsonl (one per pose), and comparison.json
+// (the complete answer).
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "compare/comparison.hpp"
+#include "compare/csv.hpp"
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
 
 namespace marrow::cli {
@@ -17,28 +17,6 @@ namespace {
 using compare::CellRow;
 using compare::Experiment;
 using nlohmann::json;
-
-/// A field of a CSV file (RFC 4180), quoted if necessary. A text that a spreadsheet would take for a formula, such as a
-/// reason that begins with "=", is marked as text. Control characters are written out, because a terminal would execute
-/// them. Line breaks stay.
-std::string field(const std::string& raw) {
-  std::string text;
-  for (std::size_t begin = 0, end = 0; begin <= raw.size(); begin = end + 1) {
-    end = std::min(raw.find('\n', begin), raw.size());
-    text += (begin ? "\n" : "") + printable(raw.substr(begin, end - begin));
-  }
-  if (!text.empty() && std::string("=+-@\t\r\n").find(text[0]) != std::string::npos && !parsed_number(text))
-    text = "'" + text;
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + "\"";
-}
-
-std::string number_text(const std::optional<double>& value) {
-  if (!value) return "";
-  return formatted("{:.9g}", *value);
-}
 
 /// The options that any variant changes.
 std::vector<std::string> changed_options(const Experiment& experiment) {
@@ -65,20 +43,21 @@ std::string csv(const Experiment& experiment, const std::vector<CellRow>& rows) 
   const std::vector<std::string> options = changed_options(experiment);
   const auto values_of = options_by_variant(experiment, options);
   std::string text = "cell,variant,case,start,status,reason,success,tries,verdict,failure_probability";
-  for (const std::string& option : options) text += "," + field(option);
-  for (const compare::MetricChoice& metric : experiment.metrics) text += "," + field(metric.path);
+  for (const std::string& option : options) text += "," + csv_field(option);
+  for (const compare::MetricChoice& metric : experiment.metrics) text += "," + csv_field(metric.path);
   text += ",initial_error,seconds,evaluations,key\n";
   for (const CellRow& row : rows) {
-    text += formatted("{},{},{},{},{},{},{},{},{},{}", field(row.id), field(row.variant), field(row.case_name),
-                      field(row.start), row.failed.empty() ? "done" : "failed", field(row.failed + row.absent),
-                      !experiment.defines_success() ? ""
-                      : row.is_success(experiment)  ? "1"
-                                                    : "0",
-                      row.tries, row.verdict ? name_of(*row.verdict) : "", number_text(row.failure_probability));
-    for (const std::string& value : values_of.at(row.variant)) text += "," + field(value);
-    for (const auto& value : row.values) text += "," + number_text(value);
     text +=
-        formatted(",{},{},{},{}\n", number_text(row.initial_error), number_text(row.seconds), row.evaluations, row.key);
+        formatted("{},{},{},{},{},{},{},{},{},{}", csv_field(row.id), csv_field(row.variant), csv_field(row.case_name),
+                  csv_field(row.start), row.failed.empty() ? "done" : "failed", csv_field(row.failed + row.absent),
+                  !experiment.defines_success() ? ""
+                  : row.is_success(experiment)  ? "1"
+                                                : "0",
+                  row.tries, row.verdict ? name_of(*row.verdict) : "", csv_number(row.failure_probability));
+    for (const std::string& value : values_of.at(row.variant)) text += "," + csv_field(value);
+    for (const auto& value : row.values) text += "," + csv_number(value);
+    text +=
+        formatted(",{},{},{},{}\n", csv_number(row.initial_error), csv_number(row.seconds), row.evaluations, row.key);
   }
   return text;
 }
@@ -90,6 +69,7 @@ std::string jsonl(const Experiment& experiment, const std::vector<CellRow>& rows
   for (const CellRow& row : rows) {
     json j = json::parse(compare::to_json(row));
     j.erase("digest");  // of a row without what is added here
+    j.erase("poses");   // they have a file of their own
     j["success"] = experiment.defines_success() ? json(row.is_success(experiment)) : json();
     j["options"] = json::object();
     for (std::size_t i = 0; i < options.size(); ++i) j["options"][options[i]] = values_of.at(row.variant)[i];
@@ -149,41 +129,6 @@ json of(const std::optional<compare::CaptureRange>& capture, std::size_t unknown
           {"bins", bins}};
 }
 
-/// Null for a bound that is not finite.
-json bound(double value) { return std::isfinite(value) ? json(value) : json(); }
-
-/// Who lost more runs: "variant", "baseline", or null if the median is a number.
-json who_fails_more(const compare::Comparison& comparison, bool higher_is_better) {
-  if (!comparison.compared() || std::isfinite(comparison.median_difference)) return {};
-  return (comparison.median_difference > 0) != higher_is_better ? "variant" : "baseline";
-}
-
-json of(const Finding& finding, const Experiment& experiment, const Answer& answer) {
-  const compare::Comparison& comparison = finding.comparison;
-  const compare::MetricChoice& metric = experiment.metrics[finding.metric];
-  return {{"variant", experiment.variants[finding.variant].name},
-          {"metric", metric.path},
-          {"unit", answer.units[finding.metric]},
-          {"cases", comparison.compared()},
-          {"of_cases", comparison.cases.all()},
-          {"cases_variant_lost", comparison.cases.variant_lost},
-          {"cases_baseline_lost", comparison.cases.reference_lost},
-          {"runs", comparison.runs.all()},
-          {"pairs", comparison.runs.both},
-          {"runs_variant_lost", comparison.runs.variant_lost},
-          {"runs_baseline_lost", comparison.runs.reference_lost},
-          {"runs_both_lost", comparison.runs.neither},
-          {"difference", comparison.compared() ? bound(comparison.median_difference) : json()},
-          {"fails_more", who_fails_more(comparison, metric.higher_is_better())},
-          {"difference_of_pairs", comparison.median_of_both ? json(*comparison.median_of_both) : json()},
-          {"low", bound(comparison.interval.lower)},
-          {"high", bound(comparison.interval.upper)},
-          {"p", comparison.test.p},
-          {"p_holm", finding.p_holm},
-          {"is_shown", compare::difference_shown(comparison, finding.p_holm)},
-          {"sentence", finding.sentence}};
-}
-
 json metrics_of(const Experiment& experiment, const Answer& answer) {
   json metrics = json::array();
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
@@ -209,11 +154,11 @@ json of(const compare::StopRule& rule, const compare::Look& look, const Experime
               {"figure", rule.metric ? experiment.metrics[*rule.metric].path : "success"},
               {"variant", experiment.variants[look.variant].name},
               {"level", look.level},
-              {"low", bound(look.interval.lower)},
-              {"high", bound(look.interval.upper)},
+              {"low", bound_json(look.interval.lower)},
+              {"high", bound_json(look.interval.upper)},
               {"sentence", sentence}};
   if (rule.goal == compare::StopRule::Goal::difference)
-    result.update({{"p", look.p}, {"difference", bound(look.difference)}, {"alpha", rule.alpha}});
+    result.update({{"p", look.p}, {"difference", bound_json(look.difference)}, {"alpha", rule.alpha}});
   else
     result["width"] = rule.width;
   return result;
@@ -222,7 +167,7 @@ json of(const compare::StopRule& rule, const compare::Look& look, const Experime
 }  // namespace
 
 json answer_json(const Experiment& experiment, const Answer& answer) {
-  json variants = json::array(), findings = json::array();
+  json variants = json::array();
   for (std::size_t v = 0; v < answer.variants.size(); ++v) {
     const VariantSummary& summary = answer.variants[v];
     json figures = json::object();
@@ -240,11 +185,8 @@ json answer_json(const Experiment& experiment, const Answer& answer) {
     if (summary.verdicts.cells) variants.back()["verdicts"] = of(summary.verdicts, experiment.defines_success());
     if (!experiment.initial_error.empty()) variants.back()["capture"] = of(summary.capture, summary.unknown_starts);
   }
-  for (const Finding& finding : answer.findings) findings.push_back(of(finding, experiment, answer));
-  json result{{"experiment", experiment.name},
-              {"metrics", metrics_of(experiment, answer)},
-              {"variants", variants},
-              {"comparisons", findings}};
+  json result{{"experiment", experiment.name}, {"metrics", metrics_of(experiment, answer)}, {"variants", variants}};
+  result.update(findings_json(experiment, answer));
   if (!experiment.initial_error.empty())
     result["initial_error"] = {{"name", experiment.initial_error}, {"unit", answer.initial_error_unit}};
   if (!answer.curves.empty()) result["curves"] = curves_json(experiment, answer.curves);
@@ -261,6 +203,8 @@ void write_tables(const Experiment& experiment, const std::vector<CellRow>& rows
                   const std::filesystem::path& folder) {
   write_text_file(folder / "cells.csv", csv(experiment, rows));
   write_text_file(folder / "cells.jsonl", jsonl(experiment, rows));
+  write_text_file(folder / "poses.csv", poses_csv(experiment, rows));
+  write_text_file(folder / "poses.jsonl", poses_jsonl(experiment, rows));
   write_text_file(folder / "comparison.json", json_text(answer_json(experiment, answer), 1) + "\n");
 }
 

@@ -9,7 +9,8 @@
 //   variants: [{name, is_baseline, options: {"NODE.uses": "KIND.NAME", "NODE.OPTION": value}}]
 //   figures: [{name, columns: [name], rows: [{name, unit, values: [number | null per column]}]}]     of a run
 //   passes: [{node, end, passes: [{name, status, seconds, reason}]}]     of a run whose nodes have bodies
-//   metrics, comparisons, curves, tuning, initial_error: as in comparison.json, whose keys docs/comparing.md lists; the
+//   metrics, comparisons, all_pairs, rankings, effects, curves, tuning, initial_error: as in comparison.json, whose
+//   keys docs/comparing.md lists; the
 //     first metric is the main one, and the variant of a comparison may be a name or an index
 //   summary: its "variants"
 //   cases: ["case-01", ...], starts: ["0", ...]

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Puts the page together when the browser has read it.
 import * as Cells from './cells.js';
+import * as Compared from './compared.js';
 import * as Curves from './curves.js';
 import * as Data from './data.js';
 import * as Detail from './detail.js';
@@ -80,7 +81,27 @@ function paired(data) {
       metricFigure(
           data, [['linear', 'linear'], ['signed', 'log']],
           {label: 'Show', options: [['differences', 'Differences'], ['pairs', 'Pairs']]}, draw),
-      Summary.comparisonTable(data));
+      Compared.comparisons(data));
+}
+
+function ranking(data) {
+  const found = Compared.rankings(data);
+  return found &&
+      section(
+             'ranking', 'Ranking',
+             'Best first, by the median of all runs; a lost run counts as worse than any other. ' +
+                 'No test tells apart two variants that share a letter.',
+             found);
+}
+
+function effects(data) {
+  const found = Compared.effects(data);
+  return found &&
+      section(
+             'effects', 'Effects of the factors',
+             'What each level of a factor does against the factor’s first one: for each case the mean over all ' +
+                 'combinations of the others, and of these the median. Each interval is by itself.',
+             found);
 }
 
 function capture(data) {
@@ -296,7 +317,8 @@ function build(data) {
   const add = (...parts) => main.append(...parts.flat(2).filter(Boolean));  // at once: figures need their width
   add(summary(data));
   if (many && data.metrics.length)
-    add(tuning(data), response(data), distributions(data), paired(data), capture(data), byCase(data));
+    add(ranking(data), effects(data), tuning(data), response(data), distributions(data), paired(data), capture(data),
+        byCase(data));
   add(sequence(data));
   add(closer(data));
   if (data.passes.length) add(section('passes', 'Passes', null, ...Passes.draw(data)));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The head of the page: what was compared, each result as a sentence, and the table of the variants.
 import * as Data from './data.js';
-import {button, el, number, percent, probability, select, withUnit} from './dom.js';
+import {button, el, number, percent, select} from './dom.js';
 import * as Glossary from './glossary.js';
 import * as Plots from './plots.js';
 
@@ -66,7 +66,7 @@ const lost = ({failed, incomplete}) =>
          el('small', {'data-tip': 'done, but without a figure whose node may fail'},
             ' + ' + incomplete + ' incomplete')];
 
-const countOf = (item) => (item && Number.isFinite(item.of) ? item.count + ' of ' + item.of : '–');
+export const countOf = (item) => (item && Number.isFinite(item.of) ? item.count + ' of ' + item.of : '–');
 
 function variantName(data, i) {
   const variant = data.variants[i], options = Object.entries(variant.options);
@@ -210,63 +210,6 @@ export function caseTable(data, metric) {
   ];
   return sortable(
       data.cases.map((_, i) => i), all, {}, 'Medians and successes of each case: ' + data.metrics[metric].label);
-}
-
-// The median difference. If failures decide, says who fails more often.
-function difference(item, unit) {
-  if (Number.isFinite(item.difference)) return withUnit(item.difference, unit);
-  return {variant: 'fails more often', baseline: 'the baseline fails more often'}[item.fails_more] || '–';
-}
-
-// A bound that is not a number stands for a failure of one of the two. Without both bounds, there are too few cases.
-function interval(item, metric) {
-  if (!Number.isFinite(item.low) && !Number.isFinite(item.high)) return '–';
-  const failure = (is_high) => (is_high !== Boolean(metric.higher_is_better) ? 'a failure' : 'the baseline’s failure');
-  const bound = (value, is_high) => (Number.isFinite(value) ? number(value) : failure(is_high));
-  return '[' + bound(item.low, false) + ', ' + bound(item.high, true) + ']';
-}
-
-// Every comparison with its interval and p: the numbers behind the figure of the pairs.
-export function comparisonTable(data) {
-  const metric = (item) => data.metrics.find((one) => one.name === item.metric) || {label: item.metric};
-  const label = (item) => metric(item).label;
-  const lostRuns = ({runs_variant_lost: own, runs_baseline_lost: others}) =>
-      (own || others ?
-           el('small', {'data-tip': 'lost by it alone, and by the baseline alone'}, ' lost ' + own + ' / ' + others) :
-           null);
-  const list = data.comparisons,
-        name = (item) => (data.variants[data.variantIndex(item.variant)] || {name: item.variant}).name;
-  const all = [
-    {title: 'Variant', key: (i) => name(list[i]), cell: (i) => el('strong', {}, name(list[i]))},
-    {title: 'Metric', key: (i) => label(list[i]), cell: (i) => label(list[i])},
-    {
-      title: 'Difference',
-      key: (i) => list[i].difference,
-      cell: (i) => difference(list[i], metric(list[i]).unit),
-      number: true
-    },
-    {title: '95 % interval', key: (i) => list[i].low, cell: (i) => interval(list[i], metric(list[i])), number: true},
-    {title: 'p', key: (i) => list[i].p, cell: (i) => probability(list[i].p), number: true},
-    {title: 'p (Holm)', key: (i) => list[i].p_holm, cell: (i) => probability(list[i].p_holm), number: true},
-    {
-      title: 'Cases',
-      key: (i) => list[i].cases,
-      cell: (i) => countOf({count: list[i].cases, of: list[i].of_cases}),
-      number: true
-    },
-    {
-      title: 'Pairs',
-      key: (i) => list[i].pairs,
-      cell: (i) => [countOf({count: list[i].pairs, of: list[i].runs}), lostRuns(list[i])],
-      number: true
-    },
-    {
-      title: 'In words',
-      key: (i) => list[i].sentence || '',
-      cell: (i) => el('span', {class: 'words'}, list[i].sentence || '')
-    },
-  ];
-  return list.length ? sortable(list.map((_, i) => i), all, {}, 'Comparisons with the baseline') : null;
 }
 
 export function rules(data) {

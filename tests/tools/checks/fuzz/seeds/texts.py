@@ -124,6 +124,7 @@ initial_error: errors.value
 baseline: plain+one
 pictures: [start]
 timed_cells: 1
+compare_all: true
 """
 SIMULATED = """experiment: 1
 pipeline: pipeline.yaml
