@@ -177,8 +177,9 @@ fs::path write_run_page(const fs::path& folder, fs::path file) {
 void add_show(CLI::App& app, int& code) {
   const auto run = std::make_shared<fs::path>(), file = std::make_shared<fs::path>();
   CLI::App* command = app.add_subcommand("show", "write a page that shows a run: figures, pictures, 3D view");
-  command->add_option("run", *run, "folder of the run")->required();
-  command->add_option("--out", *file, "HTML file to write; an existing one is replaced (default: RUN/report.html)");
+  command->add_option("run", *run, "folder of the run")->required()->type_name("FOLDER");
+  command->add_option("-o,--out", *file, "HTML file to write; an existing one is replaced (default: RUN/report.html)")
+      ->type_name("FILE");
   command->callback([run, file, &code] {
     std::printf("%s\n", printable(plain_path(fs::absolute(write_run_page(*run, *file))).string()).c_str());
     code = 0;
