@@ -19,6 +19,7 @@ GROUPS = {
     "Guides": [
         "case",
         "formats",
+        "command-line",
         "workbench",
         "comparing",
         "verdict",
