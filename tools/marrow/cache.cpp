@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "command_options.hpp"
@@ -11,6 +12,8 @@
 
 namespace marrow::cli {
 namespace {
+
+using nlohmann::json;
 
 struct Share {
   std::size_t entries = 0;
@@ -39,6 +42,23 @@ void print(const Store::Entry& entry) {
   for (const std::string& warning : from.warnings) std::printf("  warning: %s\n", printable_lines(warning).c_str());
 }
 
+json json_of(const Store::Entry& entry) {
+  const Provenance& from = entry.provenance;
+  json j = {{"key", entry.key.hex()},
+            {"node", from.node},
+            {"bytes", entry.bytes},
+            {"seconds", from.seconds},
+            {"build_id", from.build_id.hex()},
+            {"options", from.options},
+            {"inputs", json::object()},
+            {"outputs", json::array()},
+            {"warnings", from.warnings}};
+  for (const auto& [name, digest] : from.inputs) j["inputs"][name] = digest.hex();
+  for (const Digest& digest : entry.outputs) j["outputs"].push_back(digest.hex());
+  if (from.random) j["seed"] = from.seed;
+  return j;
+}
+
 /// The message that several keys begin with `key`, with some of them.
 std::string several(const std::string& key, const std::set<std::string>& keys) {
   constexpr std::size_t kMostShown = 5;
@@ -49,36 +69,60 @@ std::string several(const std::string& key, const std::set<std::string>& keys) {
   return keys.size() > kMostShown ? text + "\n..." : text;
 }
 
-void print_shares(const std::string& folder, const std::vector<Store::Entry>& entries) {
-  std::map<std::string, Share> shares;
+/// What is kept, by the name of the node, and all together. Damaged entries have no name.
+struct Shares {
+  std::map<std::string, Share> of_nodes;
   Share all;
-  for (const Store::Entry& entry : entries)
-    for (Share* share : {&shares[entry.provenance.node], &all}) {
-      ++share->entries;
-      share->bytes += entry.bytes;
-      share->seconds += entry.provenance.seconds;
-    }
+
+  explicit Shares(const std::vector<Store::Entry>& entries) {
+    for (const Store::Entry& entry : entries)
+      for (Share* share : {&of_nodes[entry.provenance.node], &all}) {
+        ++share->entries;
+        share->bytes += entry.bytes;
+        share->seconds += entry.provenance.seconds;
+      }
+  }
+};
+
+json json_of(const std::filesystem::path& folder, const Shares& shares) {
+  const auto told = [](const Share& share) {
+    return json{{"results", share.entries}, {"bytes", share.bytes}, {"seconds", share.seconds}};
+  };
+  json nodes = json::object();
+  for (const auto& [name, share] : shares.of_nodes) nodes[name] = told(share);
+  return {{"folder", folder.string()}, {"nodes", nodes}, {"all", told(shares.all)}};
+}
+
+void print_shares(const std::string& folder, const Shares& shares) {
   std::printf("%s\n\n%-34s %8s %12s %12s\n", printable(folder).c_str(), "node", "results", "MB", "seconds");
   const auto print = [](const std::string& name, const Share& share) {
     std::printf("%-34s %8zu %12.2f %12.2f\n", printable(name).c_str(), share.entries, megabytes(share.bytes),
                 share.seconds);
   };
-  for (const auto& [name, share] : shares) print(name.empty() ? "(damaged or of another version)" : name, share);
-  print("all", all);
+  for (const auto& [name, share] : shares.of_nodes)
+    print(name.empty() ? "(damaged or of another version)" : name, share);
+  print("all", shares.all);
 }
 
-int cache_info() {
+int cache_info(bool as_json) {
   const Store store;
   if (const int code = code_after(store.fault())) return code;
-  print_shares(store.folder().string(), store.entries());
-  if (!store.shared()) return 0;
-  if (const int code = code_after(store.shared()->fault())) return code;
-  std::printf("\n");
-  print_shares(store.shared()->folder().string() + " (shared)", store.shared()->entries());
+  const std::string fault_of_shared = store.shared() ? store.shared()->fault() : "";
+  const Shares shares(store.entries());
+  if (!as_json) print_shares(store.folder().string(), shares);
+  if (const int code = code_after(fault_of_shared)) return code;
+  json told = json_of(store.folder(), shares);
+  if (store.shared()) {
+    const Shares shared(store.shared()->entries());
+    told["shared"] = json_of(store.shared()->folder(), shared);
+    if (!as_json) std::printf("\n");
+    if (!as_json) print_shares(store.shared()->folder().string() + " (shared)", shared);
+  }
+  if (as_json) print_as_json(told);
   return 0;
 }
 
-int cache_why(const std::string& key) {
+int cache_why(const std::string& key, bool as_json) {
   const Store store;
   if (const int code = code_after(store.fault())) return code;
   std::vector<Store::Entry> meant;
@@ -101,23 +145,29 @@ int cache_why(const std::string& key) {
                       " holds no result with a key that begins with '" + key + "'");
   if (keys.size() > 1) return code_after(several(key, keys));
   int code = 0;
+  json told = json::array();
   for (const Store::Entry& entry : meant) {
-    if (!entry.provenance.node.empty())
+    if (!entry.provenance.node.empty() && as_json)
+      told.push_back(json_of(entry));
+    else if (!entry.provenance.node.empty())
       print(entry);
     else
       code = code_after("the result " + entry.key.hex() +
                         " is damaged or of another version; the next run that needs it makes it again");
   }
+  if (as_json) print_as_json(told);
   return code;
 }
 
-int cache_collect(double keep_gb, bool is_shared) {
+int cache_collect(double keep_gb, bool is_shared, bool as_json) {
   const Store store;
   if (is_shared && !store.shared())
     return code_after("there is no shared store: MARROW_SHARED_CACHE is not set; nothing is removed");
   const std::uint64_t keep_bytes = std::uint64_t(keep_gb * 1e9);
   const Store::Freed freed = is_shared ? store.shared()->collect(keep_bytes) : store.collect(keep_bytes);
-  if (freed.fault.empty() || freed.entries)
+  if (as_json)
+    print_as_json({{"removed", freed.entries}, {"bytes", freed.bytes}});
+  else if (freed.fault.empty() || freed.entries)
     std::printf("%zu results removed, %.2f MB freed\n", freed.entries, megabytes(freed.bytes));
   return code_after(freed.fault);
 }
@@ -125,28 +175,34 @@ int cache_collect(double keep_gb, bool is_shared) {
 }  // namespace
 
 void add_cache(CLI::App& app, int& code) {
-  const auto key = std::make_shared<std::string>();
-  const auto keep_gb = std::make_shared<double>(10);
+  struct Given {
+    std::string key;
+    double keep_gb = 10;
+    bool is_shared = false, as_json = false;
+  };
+  const auto given = std::make_shared<Given>();
   CLI::App* command =
       app.add_subcommand("cache",
-                         "look at the store of results (MARROW_CACHE, else marrow/store in XDG_CACHE_HOME or\n"
-                         "~/.cache) and at the shared one (MARROW_SHARED_CACHE), and tidy them up");
+                         "look at the store of results (MARROW_CACHE, else marrow/store in "
+                         "XDG_CACHE_HOME or ~/.cache) and at the shared one (MARROW_SHARED_CACHE), and tidy them up");
   command->require_subcommand(1);
-  command->add_subcommand("info", "how much is kept, and of which nodes")->callback([&code] { code = cache_info(); });
+  CLI::App* info = command->add_subcommand("info", "how much is kept, and of which nodes");
+  info->callback([given, &code] { code = cache_info(given->as_json); });
   CLI::App* why = command->add_subcommand("why", "what a kept result was made from");
-  why->add_option("key", *key, "key of a result or of one of its outputs (run.json shows those), or its first digits")
+  why->add_option("key", given->key,
+                  "key of a result or of one of its outputs (run.json shows those), or its first digits")
       ->required();
-  why->callback([key, &code] { code = cache_why(*key); });
+  why->callback([given, &code] { code = cache_why(given->key, given->as_json); });
   CLI::App* gc = command->add_subcommand("gc", "remove the least recently used results");
-  const auto take_keep_gb = [keep_gb](const std::string& text) {
-    *keep_gb = number("--keep-gb", text, 0, 1e6, "gigabytes", "; nothing is removed");
+  const auto take_keep_gb = [given](const std::string& text) {
+    given->keep_gb = number("--keep-gb", text, 0, 1e6, "gigabytes", "; nothing is removed");
   };
   show_default(gc->add_option_function<std::string>("--keep-gb", take_keep_gb, "size to keep, in gigabytes")
                    ->type_name("NUMBER"),
-               *keep_gb);
-  const auto is_shared = std::make_shared<bool>(false);
-  gc->add_flag("--shared", *is_shared, "of the shared store, instead of this host's");
-  gc->callback([keep_gb, is_shared, &code] { code = cache_collect(*keep_gb, *is_shared); });
+               given->keep_gb);
+  gc->add_flag("--shared", given->is_shared, "of the shared store, instead of this host's");
+  gc->callback([given, &code] { code = cache_collect(given->keep_gb, given->is_shared, given->as_json); });
+  for (CLI::App* one : {info, why, gc}) one->add_flag("--json", given->as_json, "as JSON");
 }
 
 }  // namespace marrow::cli

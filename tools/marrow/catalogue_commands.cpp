@@ -6,10 +6,12 @@
 #include <nlohmann/json.hpp>
 
 #include "catalogue_text.hpp"
+#include "columns.hpp"
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "marrow/base/diagnostics.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/conformance.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
@@ -24,9 +26,9 @@ void print_ports(const char* title, const std::vector<PortInfo>& ports, bool inp
   if (ports.empty()) return;
   std::printf("\n%s\n", title);
   for (const PortInfo& port : ports) {
-    std::printf("  %-14s %-28s %s%s\n", printable(port.name).c_str(), printable(port_text(port)).c_str(),
-                inputs && port.optional ? "(optional) " : "", printable(port.help).c_str());
-    if (!port.figures.empty()) std::printf("  %-14s figures: %s\n", "", printable(joined(port.figures, ", ")).c_str());
+    print_beside(formatted("  {:<14} {:<28}", printable(port.name), printable(port_text(port))),
+                 (inputs && port.optional ? "(optional) " : "") + printable(port.help), 46);
+    if (!port.figures.empty()) print_beside("", "figures: " + printable(joined(port.figures, ", ")), 17);
   }
 }
 
@@ -51,8 +53,7 @@ void print_kind(const NodeInfo& node, const KindInfo* kind) {
   if (!kind) return;
   std::printf("\nKind\n  %s: %s\n", printable(kind->name).c_str(), printable(kind->summary).c_str());
   for (const TraitInfo& trait : kind->traits)
-    if (contains(node.traits, trait.name))
-      std::printf("  %s: %s\n", printable(trait.name).c_str(), printable(trait.help).c_str());
+    if (contains(node.traits, trait.name)) print_beside(" ", printable(trait.name) + ": " + printable(trait.help), 2);
 }
 
 /// The figures that `marrow conformance` measures for a node, with their limits.
@@ -62,21 +63,24 @@ void print_checks(const NodeInfo& node, const KindInfo* kind) {
   for (const CheckInfo& check : kind->checks) {
     const std::string limit =
         check.unit.empty() ? "" : ": at most " + conformance::digits(check.limit) + " " + check.unit;
-    std::printf("  %-26s %s\n", printable(check.name).c_str(), printable(check.what + limit).c_str());
+    print_beside("  " + printable(check.name), printable(check.what + limit), 29);
   }
 }
 
 void print_node(const NodeInfo& node, const LibraryInfo& library, const KindInfo* kind) {
-  std::printf("%s\n  %s\n", printable(node.name).c_str(), printable(node.summary).c_str());
+  std::printf("%s\n", printable(node.name).c_str());
+  print_beside(" ", printable(node.summary), 2);
   print_kind(node, kind);
   print_ports("Inputs", node.inputs, true);
   print_ports("Outputs", node.outputs, false);
   if (!node.options.empty()) std::printf("\nOptions\n");
   for (const OptionInfo& option : node.options) {
-    std::printf("  %-26s %s\n", printable(option.name).c_str(), printable(option.help).c_str());
-    std::printf("  %-26s %s; %s\n", "", printable(range_text(option)).c_str(),
-                option.required ? "must be given" : printable("default " + yaml_text(option.default_value)).c_str());
-    if (!option.replaces.empty()) std::printf("  %-26s %s\n", "", printable(replaces_text(option)).c_str());
+    print_beside("  " + printable(option.name), printable(option.help), 29);
+    print_beside("",
+                 printable(range_text(option) + "; " +
+                           (option.required ? "must be given" : "default " + yaml_text(option.default_value))),
+                 29);
+    if (!option.replaces.empty()) print_beside("", printable(replaces_text(option)), 29);
   }
   if (node.random) std::printf("\nRandom: its result depends on the run's seed.\n");
   print_checks(node, kind);
@@ -136,11 +140,10 @@ int doctor(bool as_json) {
                                 {"build_id", library.build_id.hex()}});
     if (as_json) continue;
     if (library.refused.empty())
-      std::printf("  good     %s: %s\n", printable(library.file.filename().string()).c_str(), printable(text).c_str());
+      print_beside("  good", printable(library.file.filename().string() + ": " + text), 11);
     else
-      std::printf("  REFUSED  %s: it %s\n", printable(library.file.string()).c_str(),
-                  printable(library.refused).c_str());
-    if (!library.note.empty()) std::printf("           note: %s\n", printable(library.note).c_str());
+      print_beside("  REFUSED", printable(library.file.string() + ": it " + library.refused), 11);
+    if (!library.note.empty()) print_beside("", "note: " + printable(library.note), 11);
   }
   if (as_json)
     print_as_json(all);
@@ -175,7 +178,7 @@ void add_inspect(CLI::App& app, int& code) {
   };
   const auto given = std::make_shared<Given>();
   CLI::App* command = app.add_subcommand("inspect", "show a node: inputs, outputs, options");
-  command->add_option("node", given->node, "kind.name")->required();
+  command->add_option("node", given->node, "kind.name")->required()->type_name("NODE");
   command->add_flag("--yaml", given->yaml, "print a snippet to paste into a pipeline");
   command->add_flag("--json", given->as_json, "as JSON");
   command->callback([given, &code] { code = inspect(given->node, given->yaml, given->as_json); });
@@ -195,7 +198,9 @@ void add_describe(CLI::App& app, int& code) {
   const auto library = std::make_shared<std::filesystem::path>();
   const auto write = std::make_shared<bool>(false);
   CLI::App* command = app.add_subcommand("describe", "load one plugin library and print its manifest");
-  command->add_option("library", *library, "the .so file, or a .py file with @marrow.node")->required();
+  command->add_option("library", *library, "the .so file, or a .py file with @marrow.node")
+      ->required()
+      ->type_name("FILE");
   command->add_flag("--write", *write, "write the manifest beside the library instead");
   command->callback([library, write, &code] { code = describe(*library, *write); });
 }

@@ -84,11 +84,16 @@ void add_shared_cache(CLI::App* command) {
 void add_log_level(CLI::App* command, LogLevel& level) {
   const std::map<std::string, LogLevel> levels{
       {"debug", LogLevel::debug}, {"info", LogLevel::info}, {"warning", LogLevel::warning}, {"error", LogLevel::error}};
+  CLI::Option* named =
+      command
+          ->add_option("--log-level", level,
+                       "show messages of this level and above: debug, info, warning or error (default: info)")
+          ->transform(CLI::CheckedTransformer(levels).description(""))
+          ->type_name("LEVEL");
   command
-      ->add_option("--log-level", level,
-                   "show messages of this level and above: debug, info, warning or error (default: info)")
-      ->transform(CLI::CheckedTransformer(levels).description(""))
-      ->type_name("LEVEL");
+      ->add_flag_callback(
+          "-v,--verbose", [&level] { level = LogLevel::debug; }, "as --log-level debug")
+      ->excludes(named);
 }
 
 void say_that_libraries_are_described(CLI::App* command) {

@@ -44,7 +44,7 @@ void add_pipeline_arguments(CLI::App* command, PipelineRequest& request);
 void add_file_limits(CLI::App* command, FileLimits& limits, const std::string& otherwise = "by its size");
 /// --shared-cache: as the variable MARROW_SHARED_CACHE, also for the processes that the command starts.
 void add_shared_cache(CLI::App* command);
-/// --log-level.
+/// --log-level, and -v for the lowest level.
 void add_log_level(CLI::App* command, LogLevel& level);
 /// Adds a note below the help: the command may load libraries to describe them.
 void say_that_libraries_are_described(CLI::App* command);

@@ -34,6 +34,7 @@ struct RunRequest {
   std::uint64_t seed = 1;
   int threads = 0;
   bool no_cache = false;
+  bool dry_run = false;                 ///< only say what would run
   LogLevel log_level = LogLevel::info;  ///< the lowest level that is shown
   bool quiet = false;                   ///< only errors are shown
   bool json = false;
@@ -74,10 +75,16 @@ void add_doctor(CLI::App& app, int& code);
 void add_conformance(CLI::App& app, int& code);
 void add_check_worker(CLI::App& app, int& code);
 void add_describe(CLI::App& app, int& code);
+void add_completion(CLI::App& app, int& code);
+void add_manual(CLI::App& app, int& code);
+void add_version(CLI::App& app, int& code);
 
 /// Runs the command that the words of the command line name, and returns the exit code. Each of `commands` adds one,
 /// see commands.hpp. What a command throws is printed as an error.
 int run_program(int argc, char** argv, std::initializer_list<void (*)(CLI::App& app, int& code)> commands);
+
+/// "marrow 1.2.3".
+std::string version_text();
 
 /// What a command wants to be given.
 enum class Wanted { pipeline, experiment, run };
@@ -138,8 +145,11 @@ void expect_files_can_hold(const Pipeline& pipeline, const Catalogue& catalogue)
 /// Prints the verdict on each pose, with reasons and remedies; coloured on a terminal.
 void print_verdicts(const std::vector<NamedVerdict>& verdicts);
 
-/// What a run would do with a node, and why: "cached", "runs: ...".
-std::string planned_text(const PlannedNode& node);
+/// What a run would do with each node, and how often each of these things: {nodes: {ID: {state, text, seconds}},
+/// cached, to_run, may_run, seconds}. `planned` is in the order of the pipeline's nodes.
+nlohmann::json json_of(const Pipeline& pipeline, const std::vector<PlannedNode>& planned);
+/// Prints what a run would do with each node, and returns the exit code.
+int show_plan(const Pipeline& pipeline, const Catalogue& catalogue, std::uint64_t seed, bool as_json);
 
 /// Prints a value, or the items of a list, if it is a pose or figures of merit.
 void print_value(const std::string& name, const Value& value);

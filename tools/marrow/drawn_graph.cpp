@@ -17,7 +17,7 @@ class Drawing {
       if (only_needed_ && !needed[i]) continue;
       const PipelineNode& node = pipeline.nodes[i];
       const std::string id = path + node.id;
-      drawn_.nodes.push_back({id, path.empty() ? "" : path.substr(0, path.size() - 1), &node});
+      drawn_.nodes.push_back({id, path.empty() ? "" : path.substr(0, path.size() - 1), &node, needed[i]});
       if (node.repetition) {
         add_body(pipeline, node, id);
         continue;

@@ -12,6 +12,7 @@ struct DrawnNode {
   std::string id;    ///< of a node of a body: "node/node of the body"
   std::string body;  ///< the node whose body it is in; empty outside of bodies
   const PipelineNode* node = nullptr;
+  bool is_needed = true;  ///< it feeds an output
 };
 
 struct DrawnEdge {

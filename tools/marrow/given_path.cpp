@@ -61,12 +61,12 @@ std::optional<Thing> thing_in_text(const std::string& text, const std::string& n
 
 std::optional<Thing> thing_at(const fs::path& given, Wanted wanted) {
   std::error_code error;
-  if (fs::is_directory(given, error)) return thing_in_folder(given);
+  if (given != "-" && fs::is_directory(given, error)) return thing_in_folder(given);
   const fs::path folder = given.has_parent_path() ? given.parent_path() : fs::path(".");
   if (wanted == Wanted::run && fs::exists(folder / "run.json", error) && fs::exists(given, error))
     return Thing{{}, "a file of a run", "give the folder: " + printable(folder.string())};
   try {
-    return thing_in_text(read_text_file(given, kMostSourceBytes), shell_path(given));
+    return thing_in_text(read_given_text(given, kMostSourceBytes), shell_path(given));
   } catch (const Error&) {
     return std::nullopt;
   }
@@ -76,6 +76,9 @@ std::optional<Thing> thing_at(const fs::path& given, Wanted wanted) {
 
 void expect_given(const fs::path& given, Wanted wanted) {
   if (given.empty()) throw Error("the path of " + name_of(wanted) + " is empty; a variable may have no value");
+  if (given == "-" && wanted != Wanted::pipeline)
+    throw Error("- is the standard input, which holds no " + name_of(wanted).substr(name_of(wanted).find(' ') + 1) +
+                "; give its path (./- is a file of that name)");
   const std::optional<Thing> thing = thing_at(given, wanted);
   if (thing && thing->kind != wanted)
     throw Error(given.string() + ": this is " + thing->what + ", not " + name_of(wanted) + "; " + thing->advice);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "command_options.hpp"
 #include "commands.hpp"
@@ -103,11 +104,47 @@ void print_dot(const Pipeline& pipeline) {
   std::printf("}\n");
 }
 
-int graph(const PipelineRequest& request, bool dot) {
+nlohmann::json json_of(const Pipeline& pipeline) {
+  using nlohmann::json;
+  json nodes = json::array(), edges = json::array(), outputs = json::array();
+  const DrawnGraph graph = drawn_graph(pipeline, false);
+  for (const DrawnNode& drawn : graph.nodes) {
+    const PipelineNode& node = *drawn.node;
+    nodes.push_back({{"id", drawn.id},
+                     {"uses", node.info.name},
+                     {"body_of", drawn.body},
+                     {"for_each", node.mapped_axes},
+                     {"passes", node.repetition ? passes_text(*node.repetition) : ""},
+                     {"may_fail", node.may_fail},
+                     {"needed", drawn.is_needed}});
+  }
+  for (const DrawnEdge& edge : graph.edges)
+    edges.push_back({{"from", edge.from},
+                     {"to", edge.to},
+                     {"port", edge.port},
+                     {"function", edge.is_function},
+                     {"of_pass_before", edge.is_of_pass_before}});
+  for (const PipelineOutput& output : pipeline.outputs)
+    outputs.push_back({{"name", output.name},
+                       {"from", pipeline.node_of(output.source).id},
+                       {"reference", output.source.text},
+                       {"type", pipeline.output_of(output.source).type.id},
+                       {"axes", pipeline.axes_of(output.source)}});
+  return {{"name", pipeline.name}, {"nodes", nodes}, {"edges", edges}, {"outputs", outputs}};
+}
+
+struct GraphRequest {
+  PipelineRequest pipeline;
+  bool as_dot = false, as_json = false;
+};
+
+int graph(const GraphRequest& request) {
   const Catalogue catalogue;
   Pipeline pipeline;
-  if (!load(request, catalogue, pipeline, false)) return 2;
-  if (dot)
+  if (!load(request.pipeline, catalogue, pipeline, false)) return 2;
+  if (request.as_json)
+    print_as_json(json_of(pipeline));
+  else if (request.as_dot)
     print_dot(pipeline);
   else
     print_text(pipeline);
@@ -117,13 +154,13 @@ int graph(const PipelineRequest& request, bool dot) {
 }  // namespace
 
 void add_graph(CLI::App& app, int& code) {
-  const auto request = std::make_shared<PipelineRequest>();
-  const auto dot = std::make_shared<bool>(false);
+  const auto request = std::make_shared<GraphRequest>();
   CLI::App* command =
       app.add_subcommand("graph", "show a pipeline's graph, with what is called for each view or fragment");
-  add_pipeline_arguments(command, *request);
-  command->add_flag("--dot", *dot, "as a DOT file for Graphviz");
-  command->callback([request, dot, &code] { code = graph(*request, *dot); });
+  add_pipeline_arguments(command, request->pipeline);
+  CLI::Option* dot = command->add_flag("--dot", request->as_dot, "as a DOT file for Graphviz");
+  command->add_flag("--json", request->as_json, "as JSON")->excludes(dot);
+  command->callback([request, &code] { code = graph(*request); });
   say_that_libraries_are_described(command);
 }
 

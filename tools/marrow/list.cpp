@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "catalogue_text.hpp"
+#include "columns.hpp"
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "marrow/base/printable.hpp"
@@ -44,11 +45,11 @@ int list(const std::string& kind, bool as_json) {
     }
     if (node.kind() != previous) {
       const KindInfo* contract = catalogue.find_kind(node.kind());
-      std::printf("%s%s%s%s\n", previous.empty() ? "" : "\n", printable(node.kind()).c_str(), contract ? ": " : "",
-                  contract ? printable(contract->summary).c_str() : "");
+      std::printf("%s", previous.empty() ? "" : "\n");
+      print_beside("", printable(node.kind()) + (contract ? ": " + printable(contract->summary) : ""), 0);
       previous = node.kind();
     }
-    std::printf("  %-34s %s\n", printable(name).c_str(), printable(node.summary).c_str());
+    print_beside("  " + printable(name), printable(node.summary), 37);
   }
   if (as_json) print_as_json(all);
   if (!kind.empty() && shown == 0) {
@@ -70,7 +71,7 @@ int list_kinds(bool as_json) {
     kind.summary = "no library brings this kind, so its nodes have no contract";
     if (const KindInfo* known = catalogue.find_kind(name)) kind = *known;
     all.push_back(kind_json(kind));
-    if (!as_json) std::printf("  %-14s %s\n", printable(name).c_str(), printable(kind.summary).c_str());
+    if (!as_json) print_beside("  " + printable(name), printable(kind.summary), 17);
   }
   if (as_json) print_as_json(all);
   if (!as_json) note_refused(catalogue);
@@ -84,8 +85,8 @@ void print_fits(const std::vector<Fit>& fits, const Catalogue& catalogue) {
       if (!is_in(fit)) continue;
       if (is_first) std::printf("\n%s\n", title);
       is_first = false;
-      std::printf("  %-34s %s\n", printable(fit.node).c_str(), printable(catalogue.find(fit.node)->summary).c_str());
-      for (const std::string& line : fit.*lines) std::printf("    %s\n", printable(line).c_str());
+      print_beside("  " + printable(fit.node), printable(catalogue.find(fit.node)->summary), 37);
+      for (const std::string& line : fit.*lines) print_beside("   ", printable(line), 4);
     }
   };
   section(
@@ -125,7 +126,7 @@ int list_fits(const ListRequest& request) {
 void add_list(CLI::App& app, int& code) {
   const auto request = std::make_shared<ListRequest>();
   CLI::App* command = app.add_subcommand("list", "list the nodes that can be used");
-  command->add_option("kind", request->kind, "only this kind");
+  command->add_option("kind", request->kind, "only this kind")->type_name("KIND");
   command
       ->add_option("--fits", request->fits,
                    "FILE NODE: the nodes that could replace this node of a pipeline, and what they need")

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
+#include "columns.hpp"
 #include "command_options.hpp"
 #include "commands.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 
@@ -11,8 +14,7 @@ namespace {
 
 using What = PlannedNode::What;
 
-}  // namespace
-
+/// What a run would do with a node, and why: "cached", "runs: ...".
 std::string planned_text(const PlannedNode& node) {
   switch (node.what) {
     case What::not_needed:
@@ -30,12 +32,45 @@ std::string planned_text(const PlannedNode& node) {
          (node.waits_for.size() == 1 ? "' comes" : "' come") + " out unchanged";
 }
 
-namespace {
+struct PlannedWork {
+  std::size_t counts[5] = {};
+  double seconds = 0;
+  std::size_t of(What what) const { return counts[int(what)]; }
+};
 
-int plan(const PipelineRequest& request, std::uint64_t seed) {
+PlannedWork work_of(const std::vector<PlannedNode>& planned) {
+  PlannedWork work;
+  for (const PlannedNode& node : planned) {
+    ++work.counts[int(node.what)];
+    work.seconds += node.seconds;
+  }
+  return work;
+}
+
+int plan(const PipelineRequest& request, std::uint64_t seed, bool as_json) {
   const Catalogue catalogue;
   Pipeline pipeline;
   if (!load(request, catalogue, pipeline, true)) return 2;
+  return show_plan(pipeline, catalogue, seed, as_json);
+}
+
+}  // namespace
+
+nlohmann::json json_of(const Pipeline& pipeline, const std::vector<PlannedNode>& planned) {
+  static constexpr const char* kStates[] = {"not_needed", "cached", "function", "runs", "depends"};
+  nlohmann::json nodes = nlohmann::json::object();
+  for (std::size_t i = 0; i < planned.size(); ++i)
+    nodes[pipeline.nodes[i].id] = {
+        {"state", kStates[int(planned[i].what)]}, {"text", planned_text(planned[i])}, {"seconds", planned[i].seconds}};
+  const PlannedWork work = work_of(planned);
+  return {{"nodes", nodes},
+          {"cached", work.of(What::cached)},
+          {"to_run", work.of(What::runs)},
+          {"may_run", work.of(What::depends)},
+          {"seconds", work.seconds}};
+}
+
+int show_plan(const Pipeline& pipeline, const Catalogue& catalogue, std::uint64_t seed, bool as_json) {
   for (const std::string& note : pipeline.notes) say_note(note);
   const Store store;
   can_keep_results(store.fault(), false);
@@ -45,31 +80,34 @@ int plan(const PipelineRequest& request, std::uint64_t seed) {
   settings.store = &store;
   settings.remember = false;
   const std::vector<PlannedNode> planned = plan_pipeline(pipeline, catalogue, settings);
-  int counts[5] = {};
-  double seconds = 0;
-  for (std::size_t i = 0; i < planned.size(); ++i) {
-    std::printf("%-16s %-34s %s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(),
-                printable(planned_text(planned[i])).c_str());
-    ++counts[int(planned[i].what)];
-    seconds += planned[i].seconds;
+  if (as_json) {
+    print_as_json(json_of(pipeline, planned));
+    return 0;
   }
-  std::printf("\n%d cached, %d to run", counts[int(What::cached)], counts[int(What::runs)]);
-  if (counts[int(What::depends)]) std::printf(", %d that may run", counts[int(What::depends)]);
-  if (seconds > 0) std::printf("; what runs took %.1f s the last time", seconds);
+  for (std::size_t i = 0; i < planned.size(); ++i)
+    print_beside(formatted("{:<16} {:<34}", pipeline.nodes[i].id, pipeline.nodes[i].info.name),
+                 printable(planned_text(planned[i])), 52);
+  const PlannedWork work = work_of(planned);
+  std::printf("\n%zu cached, %zu to run", work.of(What::cached), work.of(What::runs));
+  if (work.of(What::depends)) std::printf(", %zu that may run", work.of(What::depends));
+  if (work.seconds > 0) std::printf("; what runs took %.1f s the last time", work.seconds);
   std::printf("\n");
   return 0;
 }
 
-}  // namespace
-
 void add_plan(CLI::App& app, int& code) {
-  const auto request = std::make_shared<PipelineRequest>();
-  const auto seed = std::make_shared<std::uint64_t>(1);
+  struct Given {
+    PipelineRequest pipeline;
+    std::uint64_t seed = 1;
+    bool as_json = false;
+  };
+  const auto given = std::make_shared<Given>();
   CLI::App* command = app.add_subcommand("plan", "show what a run would compute, what it would read back, and why");
-  add_pipeline_arguments(command, *request);
-  show_default(add_whole_number(command, "--seed", *seed, "seed of all randomness"), *seed);
+  add_pipeline_arguments(command, given->pipeline);
+  show_default(add_whole_number(command, "--seed", given->seed, "seed of all randomness"), given->seed);
   add_shared_cache(command);
-  command->callback([request, seed, &code] { code = plan(*request, *seed); });
+  command->add_flag("--json", given->as_json, "as JSON");
+  command->callback([given, &code] { code = plan(given->pipeline, given->seed, given->as_json); });
   say_that_libraries_are_described(command);
 }
 

@@ -64,8 +64,10 @@ void add_diff(CLI::App& app, int& code) {
   };
   const auto given = std::make_shared<Given>();
   CLI::App* command = app.add_subcommand("diff", "say where two runs begin to differ, by how much, and why");
-  command->add_option("first", given->first, "folder of a run, or of a cell of a comparison")->required();
-  command->add_option("second", given->second, "folder of the run to compare it with")->required();
+  command->add_option("first", given->first, "folder of a run, or of a cell of a comparison")
+      ->required()
+      ->type_name("FOLDER");
+  command->add_option("second", given->second, "folder of the run to compare it with")->required()->type_name("FOLDER");
   command->add_flag("--json", given->as_json, "as JSON");
   command->callback([given, &code] { code = diff(given->first, given->second, given->as_json); });
 }
@@ -74,12 +76,15 @@ void add_rerun(CLI::App& app, int& code) {
   const auto request = std::make_shared<RerunRequest>();
   CLI::App* command = app.add_subcommand(
       "rerun", "repeat a run from its folder without stored results, and say whether its results are the same");
-  command->add_option("run", request->run, "folder of the run, or of a cell of a comparison")->required();
-  command->add_option(
-      "--out", request->folder,
-      "folder to write; new or empty (default: runs/NAME-rerun, or runs/NAME-rerun-2 ... if that exists)");
+  command->add_option("run", request->run, "folder of the run, or of a cell of a comparison")
+      ->required()
+      ->type_name("FOLDER");
+  command
+      ->add_option("-o,--out", request->folder,
+                   "folder to write; new or empty (default: runs/NAME-rerun, or runs/NAME-rerun-2 ... if that exists)")
+      ->type_name("FOLDER");
   add_log_level(command, request->log_level);
-  command->add_flag("--quiet", request->quiet, "no progress");
+  command->add_flag("-q,--quiet", request->quiet, "no progress");
   command->add_flag("--json", request->json, "print the differences as JSON");
   add_file_limits(command, request->file_limits, "as the run had it");
   command->callback([request, &code] { code = rerun(*request); });

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "columns.hpp"
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "fruitless_run.hpp"
@@ -157,9 +158,9 @@ void print_nodes(const Pipeline& pipeline, const std::vector<NodeRecord>& record
     const bool is_told =
         record.status == NodeRecord::Status::failed || record.status == NodeRecord::Status::failed_alone;
     const std::string reason = is_told ? "" : printable_lines(record.reason);
-    std::printf("%-16s %-34s %9.3f %6d  %s%s%s\n", (path + pipeline.nodes[i].id).c_str(),
-                pipeline.nodes[i].info.name.c_str(), record.seconds, record.calls, status_text(record).c_str(),
-                reason.empty() ? "" : ": ", reason.c_str());
+    print_beside(formatted("{:<16} {:<34} {:>9.3f} {:>6} ", path + pipeline.nodes[i].id, pipeline.nodes[i].info.name,
+                           record.seconds, record.calls),
+                 status_text(record) + (reason.empty() ? "" : ": " + reason), 70);
     if (record.stopped > 0) std::printf("%-16s %s\n", "", not_run_text(record.stopped).c_str());
     if (!record.passes) continue;
     const std::size_t passes = record.passes->passes.size();
@@ -331,6 +332,7 @@ int run(const RunRequest& request) {
   }
   const Store store;
   expect_good_place(pipeline, request.folder, request.no_cache ? nullptr : &store);
+  if (request.dry_run) return show_plan(pipeline, catalogue, request.seed, request.json);
   const std::filesystem::path runs = "runs";
   FolderOfItsOwn own(runs);
   RunFolder folder = request.folder.empty() ? RunFolder::with_free_name(runs / pipeline.name, pipeline)
@@ -355,8 +357,10 @@ void add_run(CLI::App& app, int& code) {
   const auto request = std::make_shared<RunRequest>();
   CLI::App* command = app.add_subcommand("run", "run a pipeline and write a folder with its results");
   add_pipeline_arguments(command, request->pipeline);
-  command->add_option("--out", request->folder,
-                      "folder to write; new or empty (default: runs/NAME, or runs/NAME-2 ... if that exists)");
+  command
+      ->add_option("-o,--out", request->folder,
+                   "folder to write; new or empty (default: runs/NAME, or runs/NAME-2 ... if that exists)")
+      ->type_name("FOLDER");
   command
       ->add_option("--only", request->only,
                    "compute and write only this output, and the verdicts on its poses; may be given several times")
@@ -364,11 +368,12 @@ void add_run(CLI::App& app, int& code) {
       ->type_name("OUTPUT");
   show_default(add_whole_number(command, "--seed", request->seed, "seed of all randomness"), request->seed);
   add_whole_number(command, "--threads", request->threads, "threads to use (default: all)", 1, 1024);
-  command->add_flag("--no-cache", request->no_cache, "neither read nor keep results of nodes");
+  CLI::Option* no_cache = command->add_flag("--no-cache", request->no_cache, "neither read nor keep results of nodes");
+  command->add_flag("-n,--dry-run", request->dry_run, "run nothing: say what 'marrow plan' says")->excludes(no_cache);
   add_shared_cache(command);
   add_log_level(command, request->log_level);
-  command->add_flag("--quiet", request->quiet, "print only errors");
-  command->add_flag("--json", request->json, "print events as JSON, one a line");
+  command->add_flag("-q,--quiet", request->quiet, "print only errors");
+  command->add_flag("--json", request->json, "print events as JSON, one a line; with -n the plan");
   add_file_limits(command, request->file_limits);
   command->callback([request, &code] { code = run(*request); });
 }

@@ -250,7 +250,7 @@ void add_schema(CLI::App& app, int& code) {
   const auto file = std::make_shared<std::filesystem::path>();
   CLI::App* command =
       app.add_subcommand("schema", "print the JSON Schema of pipelines, with which editors complete and check them");
-  command->add_option("--out", *file, "write it to this file; an existing one is replaced");
+  command->add_option("-o,--out", *file, "write it to this file; an existing one is replaced")->type_name("FILE");
   command->callback([file, &code] { code = schema(*file); });
   say_that_libraries_are_described(command);
 }

@@ -68,7 +68,7 @@ json graph_of(const Pipeline& pipeline, const std::vector<std::pair<std::string,
   const DrawnGraph graph = drawn_graph(pipeline, true);
   std::vector<std::pair<std::string, DrawnGraph>> others;
   for (const auto& [name, other] : variants) others.emplace_back(name, drawn_graph(other, false));
-  for (const auto& [id, body, node] : graph.nodes) {
+  for (const auto& [id, body, node, is_needed] : graph.nodes) {
     json differs = json::object();
     for (const auto& [name, other] : others)
       for (const DrawnNode& same : other.nodes)

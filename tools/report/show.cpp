@@ -179,9 +179,12 @@ void add_show(CLI::App& app, int& code) {
   const auto inputs = std::make_shared<std::vector<std::string>>();
   const auto resolved = std::make_shared<bool>(false);
   CLI::App* command = app.add_subcommand("show", "write a page that shows a run: figures, pictures, 3D view");
-  command->add_option("run", *run, "folder of the run; with --resolved, a pipeline file")->required();
+  command->add_option("run", *run, "folder of the run; with --resolved, a pipeline file")
+      ->required()
+      ->type_name("FOLDER");
   command->add_option("inputs", *inputs, "with --resolved: values of the pipeline's inputs, as name=value");
-  command->add_option("--out", *file, "HTML file to write; an existing one is replaced (default: RUN/report.html)");
+  command->add_option("-o,--out", *file, "HTML file to write; an existing one is replaced (default: RUN/report.html)")
+      ->type_name("FILE");
   command->add_flag("--resolved", *resolved,
                     "print a pipeline file whole: with what it extends, its parts, and all options, and where each is "
                     "written");

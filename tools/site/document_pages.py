@@ -24,6 +24,7 @@ GROUPS = {
         "case",
         "formats",
         "choosing",
+        "command-line",
         "workbench",
         "comparing",
         "verdict",

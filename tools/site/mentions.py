@@ -121,7 +121,7 @@ def faults_of_shell(text, names):
             continue
         for word in words[count:]:
             option = word.split("=")[0]
-            if option.startswith("-") and option not in command.options():
+            if option.startswith("-") and option != "-" and option not in command.options():
                 found.append("marrow %s has no option '%s'" % (command.name, option) + near(option, command.options()))
         for place, setting in zip(words, words[1:]):
             name = setting.strip("'\"").split("=")[0].split(".")

@@ -3,4 +3,6 @@
 #include "commands.hpp"
 #include "workbench/open.hpp"
 
-int main(int argc, char** argv) { return marrow::cli::run_program(argc, argv, {marrow::workbench::add_open}); }
+int main(int argc, char** argv) {
+  return marrow::cli::run_program(argc, argv, {marrow::workbench::add_open, marrow::cli::add_manual});
+}

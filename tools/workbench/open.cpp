@@ -122,7 +122,8 @@ void add_open(CLI::App& app, int& code) {
   const auto request = std::make_shared<OpenRequest>();
   CLI::App* command = app.add_subcommand(
       "open", "open a folder in the browser: make cases, place bones, edit pipelines, look at results");
-  command->add_option("place", request->place, "folder, case.yaml or pipeline (default: this folder)");
+  command->add_option("place", request->place, "folder, case.yaml or pipeline (default: this folder)")
+      ->type_name("PATH");
   show_default(add_whole_number(command, "--port", request->port, "port at 127.0.0.1; 0: any that is free", 0, 65535),
                request->port);
   command->add_flag("--no-browser", request->no_browser, "only print the address");

@@ -55,24 +55,12 @@ std::shared_ptr<const LastRun> LastRuns::find(const std::string& file, const std
 }
 
 json plan_of(const Pipeline& pipeline, const Workbench& workbench) {
-  static constexpr const char* kStates[] = {"not_needed", "cached", "function", "runs", "depends"};
   RunSettings settings;
   settings.store = workbench.usable_store();
   if (!settings.store)
     throw Error("results cannot be kept, so it is not known what is stale: " + workbench.store.fault());
   settings.remember = false;
-  const std::vector<PlannedNode> planned = plan_pipeline(pipeline, workbench.catalogue, settings);
-  json nodes = json::object();
-  int counts[5] = {};
-  double seconds = 0;
-  for (std::size_t i = 0; i < planned.size(); ++i) {
-    nodes[pipeline.nodes[i].id] = {{"state", kStates[int(planned[i].what)]},
-                                   {"text", cli::planned_text(planned[i])},
-                                   {"seconds", planned[i].seconds}};
-    ++counts[int(planned[i].what)];
-    seconds += planned[i].seconds;
-  }
-  return {{"nodes", nodes}, {"cached", counts[1]}, {"to_run", counts[3]}, {"may_run", counts[4]}, {"seconds", seconds}};
+  return cli::json_of(pipeline, plan_pipeline(pipeline, workbench.catalogue, settings));
 }
 
 json run_into_folder(std::shared_ptr<LastRun> run, const PipelineArguments& arguments, const Workbench& workbench,

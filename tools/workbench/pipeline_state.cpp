@@ -78,9 +78,14 @@ json node_of_another_file(const PipelineNode& node, const Workbench& workbench) 
   std::error_code outside;
   const std::filesystem::path file =
       std::filesystem::relative(std::filesystem::absolute(node.place.file), workbench.folder.path(), outside);
-  return {{"line", node.place.line},   {"uses", node.info.name},     {"body", ""},
-          {"is_repeated", false},      {"may_fail", node.may_fail},  {"with", json::object()},
-          {"in", json::object()},      {"file", outside ? node.place.file : file.string()}};
+  return {{"line", node.place.line},
+          {"uses", node.info.name},
+          {"body", ""},
+          {"is_repeated", false},
+          {"may_fail", node.may_fail},
+          {"with", json::object()},
+          {"in", json::object()},
+          {"file", outside ? node.place.file : file.string()}};
 }
 
 void add_node(json& nodes, const PipelineNode& node, const Workbench& workbench) {

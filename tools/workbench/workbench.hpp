@@ -36,7 +36,7 @@ struct PipelineCall {
 
 /// A node that a page calls alone, such as a reader. What it returns is not kept in the store.
 struct NodeCall {
-  std::string name;                                              ///< as read.image
+  std::string name;                                             ///< as read.image
   std::vector<std::pair<std::string, nlohmann::json>> options;  ///< a path is absolute
 };
 

@@ -92,7 +92,7 @@ std::optional<double> StrictYaml::number(const YAML::Node& node, const Place& wh
 std::optional<std::string> read_source(const std::filesystem::path& file, const std::string& what,
                                        Diagnostics& diagnostics) {
   try {
-    std::string text = read_text_file(file, kMostSourceBytes);
+    std::string text = read_given_text(file, kMostSourceBytes);
     diagnostics.remember(file.string(), plain_text(text));
     return text;
   } catch (const Error& error) {

@@ -63,8 +63,9 @@ class StrictYaml {
   int lines_ = 0;  ///< of all texts so far
 };
 
-/// The text of a file that people write. It is remembered so that its lines can be shown. If the file cannot be read or
-/// is longer than 4 MB, reports a fault and returns nothing. `what` names the file in the fault ("the pipeline file").
+/// The text of a file that people write; "-" is the standard input. It is remembered so that its lines can be shown. If
+/// the file cannot be read or is longer than 4 MB, reports a fault and returns nothing. `what` names the file in the
+/// fault ("the pipeline file").
 std::optional<std::string> read_source(const std::filesystem::path& file, const std::string& what,
                                        Diagnostics& diagnostics);
 

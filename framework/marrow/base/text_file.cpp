@@ -18,6 +18,29 @@ namespace {
 
 namespace fs = std::filesystem;
 
+Error too_long(const fs::path& file, std::uintmax_t most_bytes) {
+  return Error(formatted("{} is longer than {} MB", file.string(), most_bytes / 1'000'000));
+}
+
+/// What stands there, up to what the longest file may have.
+struct StandardInput {
+  std::string text, fault;
+
+  StandardInput() {
+    std::string block(1 << 16, '\0');
+    while (text.size() <= kMostSourceBytes) {
+      const ssize_t count = ::read(STDIN_FILENO, block.data(), block.size());
+      if (count == 0) return;
+      if (count > 0)
+        text.append(block, 0, std::size_t(count));
+      else if (errno != EINTR) {
+        fault = std::strerror(errno);
+        return;
+      }
+    }
+  }
+};
+
 std::string reason() { return errno == ENOSPC || errno == EDQUOT ? "the disk is full" : std::strerror(errno); }
 
 }  // namespace
@@ -34,7 +57,15 @@ std::string read_text_file(const fs::path& file, std::uintmax_t most_bytes) {
   } catch (const Error& error) {
     throw Error(file.string() + " " + error.what());
   }
-  throw Error(formatted("{} is longer than {} MB", file.string(), most_bytes / 1'000'000));
+  throw too_long(file, most_bytes);
+}
+
+std::string read_given_text(const fs::path& file, std::uintmax_t most_bytes) {
+  if (file != "-") return read_text_file(file, most_bytes);
+  static const StandardInput input;
+  if (!input.fault.empty()) throw Error("- (the standard input) cannot be read: " + input.fault);
+  if (input.text.size() > most_bytes) throw too_long(file, most_bytes);
+  return input.text;
 }
 
 void write_text_file(const fs::path& file, const std::string& text, Kinds kinds, mode_t mode) {

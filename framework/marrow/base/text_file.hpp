@@ -18,6 +18,10 @@ inline constexpr std::uintmax_t kMostRecordBytes = 256'000'000;  ///< limit for 
 /// may wait for ever, and opening a device may have an effect.
 std::string read_text_file(const std::filesystem::path& file, std::uintmax_t most_bytes);
 
+/// A file that a command was given. "-" is the standard input, which is read once; as a file, "-" is given as ./-.
+/// Throws Error as read_text_file() does.
+std::string read_given_text(const std::filesystem::path& file, std::uintmax_t most_bytes);
+
 enum class Kinds { files, files_and_pipes };
 
 /// Writes a temporary file next to `file` and renames it. If the disk is full or the process is killed, the old file

@@ -6,8 +6,8 @@
 #include <set>
 
 #include "draw.hpp"
-#include "experiment_layers.hpp"
 #include "experiment_factors.hpp"
+#include "experiment_layers.hpp"
 #include "experiment_replaced.hpp"
 #include "experiment_stop.hpp"
 #include "experiment_sweep.hpp"
@@ -40,11 +40,10 @@ class Reader {
 
  private:
   void read_root(const YAML::Node& root) {
-    static const std::vector<std::string> kKeys{"extends",  "experiment",  "name",    "help",          "pipeline",
-                                                "inputs",   "set",         "cases",   "variants",      "matrix",
-                                                "starts",   "metrics",     "success", "initial_error", "baseline",
-                                                "pictures", "timed_cells", "stop",    "sweep",         "tune",
-                                                "compare_all"};
+    static const std::vector<std::string> kKeys{
+        "extends",  "experiment", "name",        "help",   "pipeline", "inputs",  "set",
+        "cases",    "variants",   "matrix",      "starts", "metrics",  "success", "initial_error",
+        "baseline", "pictures",   "timed_cells", "stop",   "sweep",    "tune",    "compare_all"};
     const Place start{experiment_.file.string(), 1, 1};
     const std::vector<YamlEntry> entries = yaml_.map(root, start, "the experiment", &kKeys);
     if (!root.IsMap()) return;

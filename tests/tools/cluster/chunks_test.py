@@ -196,6 +196,10 @@ class Chunks(Cluster):
         self.chunk("out", self.names("out")[0])
         said = self.compare("out", "--status").stdout
         self.assertIn("%d of %d cells in 1 of %d chunks" % (VARIANTS, CELLS, CASES), said)
+        status = json.loads(self.compare("out", "--status", "--json").stdout)
+        self.assertEqual(status["cells"], {"cells": CELLS, "cells_done": VARIANTS, "chunks": CASES, "chunks_done": 1})
+        self.assertEqual((status["submitted"], status["cases_to_make"]["chunks"]), (False, 0))
+        self.assertIn("requires --status", self.compare("out", "--json", code=2).stderr)
         self.assertIn("nothing was submitted from", self.compare("out", "--cancel", code=2).stderr)
 
     def test_profile(self):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A comparison on a Slurm cluster of one host, which tools/checks/cluster_test starts: the same figures as on one
 machine, also after tasks and the controller were killed."""
+import json
 import os
 import pathlib
 import shutil
@@ -99,6 +100,8 @@ class OnSlurm(Cluster):
         said = self.compare("out", "--status").stdout
         self.assertIn("{0} of {0} cells in {1} of {1} chunks".format(CASES * VARIANTS, CASES), said)
         self.assertIn("tables and report are made; submitted 1 times", said)
+        status = json.loads(self.compare("out", "--status", "--json").stdout)
+        self.assertEqual((status["gathered"], status["tries"], status["lost"]), (True, 1, ""))
         self.assertTrue((self.out / "report.html").exists())
 
     def hold_tasks(self):

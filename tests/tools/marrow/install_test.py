@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The installed program works in any folder, and knows its plugins without describing them again."""
+import gzip
 import os
 import subprocess
 
@@ -37,6 +38,22 @@ class Install(Case):
         pipelines = self.root / "share" / "marrow" / "pipelines"
         self.marrow("check", pipelines / "femur" / "femur.yaml")
         self.assertTrue((self.root / "share" / "marrow" / "schemas" / "pipeline.schema.json").is_file())
+
+    def test_manual_pages_and_completion(self):
+        share = self.root / "share"
+        pages = {path.name for path in (share / "man" / "man1").iterdir()}
+        self.assertLessEqual(
+            {"marrow.1.gz", "marrow-run.1.gz", "marrow-cache-gc.1.gz", "marrow-open.1.gz", "marrow-workbench.1.gz"},
+            pages,
+        )
+        page = gzip.decompress((share / "man" / "man1" / "marrow-plan.1.gz").read_bytes()).decode()
+        self.assertIn("marrow\\-plan \\- show what a run would compute", page)
+        for shell, file in (
+            ("bash", "bash-completion/completions/marrow"),
+            ("fish", "fish/vendor_completions.d/marrow.fish"),
+            ("zsh", "zsh/vendor-completions/_marrow"),
+        ):
+            self.assertEqual((share / file).read_text(), self.marrow("completion", shell))
 
 
 if __name__ == "__main__":

@@ -112,6 +112,23 @@ class New(Case):
                 self.assertIn("%s.mine" % kind, (folder / "ci").read_text())
                 self.assertFalse(any(path.suffix in (".cpp", ".txt") for path in folder.iterdir()))
 
+    def test_a_node_in_python_says_how_to_find_the_package(self):
+        self.assertEqual(self.new("node", "edges.mine", "--python").returncode, 0)
+        environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+        (self.scratch / "python").write_text('#!/bin/sh\nexec /usr/bin/python3 -S "$@"\n')  # without installed packages
+        (self.scratch / "python").chmod(0o755)
+        done = subprocess.run(
+            ["./ci"],
+            cwd=self.scratch / "edges_mine",
+            env={**environment, "MARROW_PYTHON": str(self.scratch / "python")},
+            capture_output=True,
+            text=True,
+        )
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("python cannot import marrow: install the Debian package python3-marrow, or name", done.stderr)
+        self.assertIn("export PYTHONPATH=MARROW/build/python  where marrow was built in MARROW", done.stderr)
+        self.assertIn("No module named 'marrow'", done.stderr)
+
     def test_a_pipeline_and_an_experiment_work_where_they_are_put(self):
         (self.scratch / "mine").mkdir()
         self.assertEqual(self.new("pipeline", "simple").returncode, 0)

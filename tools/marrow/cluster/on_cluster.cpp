@@ -2,6 +2,7 @@
 #include "cluster/on_cluster.hpp"
 
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "cluster/chunk_rows.hpp"
 #include "cluster/follow.hpp"
@@ -19,14 +20,45 @@ namespace {
 namespace fs = std::filesystem;
 using compare::Experiment;
 
-int print_status(const fs::path& folder) {
+nlohmann::json status_json(const ClusterPlan& plan, const std::optional<Submission>& submission) {
+  const std::map<std::string, bool> files = chunk_files(plan.folder);
+  const auto told = [](const Made& made, std::size_t chunks) {
+    return nlohmann::json{{"chunks", chunks}, {"chunks_done", made.chunks}};
+  };
+  const Made cells = made_of(plan.cells, files);
+  nlohmann::json j = {{"plan", plan.id},
+                      {"cells", told(cells, plan.cells.size())},
+                      {"cases_to_make", told(made_of(plan.cases, files), plan.cases.size())},
+                      {"submitted", submission.has_value()}};
+  j["cells"].update({{"cells", cells_of_plan(plan)}, {"cells_done", cells.cells}});
+  if (!submission) return j;
+  std::map<std::string, std::size_t> tasks;
+  for (const auto& [task, state] : states_of(*submission)) ++tasks[state];
+  j.update({{"tasks", tasks},
+            {"gathered", submission->is_gathered},
+            {"tries", submission->tries},
+            {"lost", submission->lost}});
+  return j;
+}
+
+/// What was submitted of this plan.
+std::optional<Submission> submission_of(const fs::path& folder, const ClusterPlan& plan) {
+  auto submission = read_submission(folder);
+  return submission && submission->plan == plan.id ? submission : std::nullopt;
+}
+
+int print_status(const fs::path& folder, bool as_json) {
   const ClusterPlan plan = latest_plan(folder);
+  const std::optional<Submission> submission = submission_of(folder, plan);
+  if (as_json) {
+    print_as_json(status_json(plan, submission));
+    return 0;
+  }
   std::printf("plan %s: %s\n", plan.id.c_str(), progress_of(plan).c_str());
   if (!plan.cases.empty())
     std::printf("cases to make first: %zu of %zu chunks\n", made_of(plan.cases, chunk_files(plan.folder)).chunks,
                 plan.cases.size());
-  const auto submission = read_submission(folder);
-  if (!submission || submission->plan != plan.id) return 0;
+  if (!submission) return 0;
   std::map<std::string, std::size_t> counts;
   for (const auto& [task, state] : states_of(*submission)) ++counts[state];
   for (const auto& [state, count] : counts) std::printf("  %zu tasks %s\n", count, printable(state).c_str());
@@ -144,19 +176,20 @@ void add_cluster_options(CLI::App* command, CompareRequest& request, ClusterRequ
   command->add_option("--emit", cluster.emit, "write what is left for another program: snakemake, parallel")
       ->check(CLI::IsMember({"snakemake", "parallel"}))
       ->excludes("--on");
-  command->add_option("--profile", cluster.profile, "settings for the cluster (YAML)");
+  command->add_option("--profile", cluster.profile, "settings for the cluster (YAML)")->type_name("FILE");
   show_default(add_amount(command, "--chunk-minutes", cluster.rule.least_minutes, "minutes",
                           "minutes that a task takes at least, as estimated from earlier runs"),
                cluster.rule.least_minutes);
   command->add_flag("--wait", cluster.wait, "follow what was submitted; Ctrl-C ends it on the cluster, too");
-  command->add_flag("--status", cluster.status, "say how many tasks are done");
+  CLI::Option* status = command->add_flag("--status", cluster.status, "say how many tasks are done");
+  command->add_flag("--json", cluster.as_json, "the status as JSON")->needs(status);
   command->add_flag("--cancel", cluster.cancel, "end what was submitted");
   command->add_flag("--gather", request.gather, "run no cell: make tables and report from the existing rows");
 }
 
 int compare_on_cluster(const CompareRequest& asked, const ClusterRequest& cluster, const Catalogue& catalogue,
                        const Experiment& experiment, const fs::path& folder) {
-  if (cluster.status) return print_status(folder);
+  if (cluster.status) return print_status(folder, cluster.as_json);
   CompareRequest request = asked;
   request.no_cache = asked.no_cache || !can_keep_results(Store().prepare(), asked.quiet);
   if (cluster.cancel) {

@@ -10,6 +10,7 @@ struct ClusterRequest {
   std::string emit;  ///< "snakemake" or "parallel", or empty
   std::filesystem::path profile;
   bool wait = false, status = false, cancel = false;
+  bool as_json = false;  ///< of the status
   ChunkRule rule;
 
   bool is_given() const { return !on.empty() || !emit.empty() || status || cancel; }

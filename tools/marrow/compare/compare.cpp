@@ -187,9 +187,11 @@ int run_cell(const CompareRequest& request, const std::string& id) {
 }  // namespace
 
 void add_experiment_arguments(CLI::App* command, CompareRequest& request) {
-  command->add_option("experiment", request.file, "experiment file (YAML)")->required();
-  command->add_option("--out", request.folder,
-                      "folder of the comparison, new or to be continued (default: runs/compare/NAME)");
+  command->add_option("experiment", request.file, "experiment file (YAML)")->required()->type_name("FILE");
+  command
+      ->add_option("-o,--out", request.folder,
+                   "folder of the comparison, new or to be continued (default: runs/compare/NAME)")
+      ->type_name("FOLDER");
   show_default(add_whole_number(command, "--threads", request.threads, "threads of each cell", 1, 1024),
                request.threads);
   command->add_flag("--no-cache", request.no_cache, "neither read nor keep results of nodes");
@@ -207,7 +209,7 @@ void add_compare(CLI::App& app, int& code) {
   CLI::App* command =
       app.add_subcommand("compare", "run an experiment: variants of a pipeline on the same cases, and which is better");
   add_experiment_arguments(command, *request);
-  add_whole_number(command, "--jobs", request->jobs, "cells at once (default: the number of cores)", 1, 1024);
+  add_whole_number(command, "-j,--jobs", request->jobs, "cells at once (default: the number of cores)", 1, 1024);
   show_default(add_amount(command, "--time-limit", request->time_limit_s, "seconds", "seconds that one cell may take"),
                request->time_limit_s);
   show_default(
@@ -219,7 +221,7 @@ void add_compare(CLI::App& app, int& code) {
   show_default(add_amount(command, "--page-mb", request->page_mb, "megabytes",
                           "megabytes that report.html may have; pictures that do not fit go to the folder report/"),
                request->page_mb);
-  command->add_flag("--dry-run", request->dry_run, "say what is left to do, and how long it took in earlier runs");
+  command->add_flag("-n,--dry-run", request->dry_run, "say what is left to do, and how long it took in earlier runs");
   command
       ->add_option_function<std::vector<std::string>>(
           "--difference",
@@ -230,7 +232,7 @@ void add_compare(CLI::App& app, int& code) {
       ->expected(1)
       ->take_all()
       ->type_name("AMOUNT");
-  command->add_flag("--quiet", request->quiet, "no progress");
+  command->add_flag("-q,--quiet", request->quiet, "no progress");
   const auto cluster = std::make_shared<ClusterRequest>();
   add_cluster_options(command, *request, *cluster);
   command->callback([request, cluster, &code] { code = compare_variants(*request, *cluster); });

@@ -243,7 +243,7 @@ int run_conformance(const ConformanceRequest& request) try {
 void add_conformance(CLI::App& app, int& code) {
   const auto request = std::make_shared<ConformanceRequest>();
   CLI::App* command = app.add_subcommand("conformance", "check that nodes do what every node of their kind must do");
-  command->add_option("subject", request->subjects, "node, kind or library (.so file)")->required();
+  command->add_option("subject", request->subjects, "node, kind or library (.so file)")->required()->type_name("NODE");
   command
       ->add_option("--check", request->checks,
                    "only this of the checks that marrow inspect NODE lists; may be given again")

@@ -46,7 +46,8 @@ NewCommand add_what(CLI::App* command, const std::string& what, const std::strin
                     Make make, int& code) {
   const NewCommand made{command->add_subcommand(what, help), std::make_shared<NewRequest>()};
   made.app->add_option("name", made.request->name, name_help)->required();
-  made.app->add_option("--out", made.request->out, "where to put it (default: here, under its name)");
+  made.app->add_option("-o,--out", made.request->out, "where to put it (default: here, under its name)")
+      ->type_name("PATH");
   made.app->callback([request = made.request, make, &code] {
     const Made done = make(*request);
     std::string next = done.next;

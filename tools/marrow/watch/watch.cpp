@@ -182,10 +182,15 @@ void add_watch(CLI::App& app, int& code) {
   CLI::App* command = app.add_subcommand(
       "watch", "run a pipeline whenever it, its data or a plugin changes, and show the result in a page that updates");
   add_pipeline_arguments(command, request->pipeline);
-  command->add_option("--build", request->builds,
-                      "a build folder of CMake: whenever its sources change, it is built, and its plugins are used");
-  command->add_option("--out", request->folder, "where page and results are put; default: runs/NAME-watch");
+  command
+      ->add_option("--build", request->builds,
+                   "a build folder of CMake: whenever its sources change, it is built, and its plugins are used")
+      ->type_name("FOLDER");
+  command->add_option("-o,--out", request->folder, "where page and results are put; default: runs/NAME-watch")
+      ->type_name("FOLDER");
   command->callback([request, &code] {
+    if (request->pipeline.file == "-")
+      throw Error("- is the standard input, which does not change; give the path of a pipeline");
     expect_given(request->pipeline.file, Wanted::pipeline);
     code = Watch(*request, stop_on_signals()).run();
   });

@@ -121,8 +121,9 @@ function elsewhere(id, node, head) {
   return el(
       'div', {}, head, el('p', {}, node.info ? node.info.summary : ''),
       el('p', {class: 'note'}, 'Written in ',
-         el('a', {href: Shell.addressOf('pipeline', node.file), 'data-do': 'file'}, node.file), ', line ' + node.line +
-             '. To change it in this file only, write  set: {' + change + '.' + (first ? first.name : 'option') + ': …}'),
+         el('a', {href: Shell.addressOf('pipeline', node.file), 'data-do': 'file'}, node.file),
+         ', line ' + node.line + '. To change it in this file only, write  set: {' + change + '.' +
+             (first ? first.name : 'option') + ': …}'),
       node.info && node.info.options.length ?
           el('table', {},
              node.info.options.map((option) => el('tr', {}, el('td', {}, option.name), el('td', {}, option.now)))) :

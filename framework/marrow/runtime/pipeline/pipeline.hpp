@@ -132,7 +132,8 @@ struct PipelineArguments {
 };
 
 /// Reads and checks a pipeline. All faults go to `diagnostics`. The result may be used only if there are none. If
-/// `inputs_required` is false, as in `marrow check`, an input without a default needs no value.
+/// `inputs_required` is false, as in `marrow check`, an input without a default needs no value. The file "-" is the
+/// standard input, whose relative paths start at the working folder.
 Pipeline read_pipeline(const std::filesystem::path& file, const PipelineArguments& arguments,
                        const Catalogue& catalogue, Diagnostics& diagnostics, bool inputs_required = true);
 

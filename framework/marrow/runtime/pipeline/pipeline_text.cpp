@@ -192,7 +192,7 @@ class PipelineReader {
   }
 
   void name_after_file(const Place& start) {
-    pipeline_.name = pipeline_.file.stem().string();
+    pipeline_.name = pipeline_.file == "-" ? "stdin" : pipeline_.file.stem().string();
     if (const std::string fault = fault_of_name(pipeline_.name); !fault.empty())
       diagnostics_.add(start,
                        "the pipeline takes its name from its file, and " + in_quotes(pipeline_.name) +
