@@ -8,7 +8,7 @@ import subprocess
 import unittest
 
 from diff_cases import Runs
-from harness import MARROW
+from harness import BUILD, MARROW
 from harness.program import IS_SANITIZED, main
 
 LETTERS = """marrow: 1
@@ -298,6 +298,30 @@ class Replay(Runs):
         self.assertIn("with the same error: ", self.replay(1, "a").stdout)
         if not IS_SANITIZED:
             self.replay(-11, "a", "--in-this-process")
+
+    def test_a_node_that_ends_the_process(self):
+        self.plugins = [*self.plugins, BUILD / "tests" / "hostile_plugins"]
+        text = (
+            "marrow: 1\nnodes:\n  c: {uses: test.constant}\n  h: {uses: test.hostile, in: {a: c}, with: {how: exit}}\n"
+        )
+        self.run_into("a", text + "outputs: {h: h}\n", code=70)
+        self.assertIn("it ended the process", self.call("a/failed/h")["reason"])
+        told = self.replay(70, "a")
+        self.assertIn("  its inputs are the same as in the run\n", told.stdout)
+
+    def test_a_cell_of_a_comparison(self):
+        (self.scratch / "cases" / "one").mkdir(parents=True)
+        text = LETTERS.replace("{uses: test.letters}", "{uses: test.constant, with: {value: 300, path: $case}}")
+        self.write("p.yaml", text.replace("nodes:", "inputs: {case: {type: path}}\nnodes:"))
+        self.write(
+            "e.yaml",
+            "experiment: 1\npipeline: p.yaml\nvariants: {b: {f.value: 500}, a: {}}\ncases: {folders: [cases/*]}\n"
+            "metrics: [f.value]\ntimed_cells: 0\n",
+        )
+        told = self.marrow("compare", "e.yaml", "--out", "compared")
+        cells = [str(file.parent) for file in (self.scratch / "compared").rglob("call.json")]
+        self.assertEqual(len(cells), 1, told.stdout + told.stderr)
+        self.assertIn("with the same error: " + TOO_LARGE, self.replay(1, cells[0]).stdout)
 
     def test_events_and_json(self):
         result = self.marrow("run", self.write("p.yaml", LETTERS), "--out", "a", "--json")

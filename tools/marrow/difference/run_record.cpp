@@ -137,6 +137,8 @@ void add_record(const json& recorded, RecordedNode& node) {
   for (const auto& [port, key] : inputs.items()) node.input_keys[port] = digest_of(key);
   for (const auto& [option, content] : files.items())
     node.files[option] = content.is_null() ? std::nullopt : std::optional(digest_of(content));
+  if (recorded.contains("program_version"))
+    node.options["version_command"] += " (printed " + in_quotes(recorded["program_version"].get<std::string>()) + ")";
 }
 
 [[noreturn]] void refuse_pipeline(const fs::path& file, const std::string& why) {

@@ -67,23 +67,8 @@ Passes::Passes(GraphRun& outer, std::size_t node, Call& call)
 Passes::~Passes() = default;
 
 void Passes::prepare() {
+  find_needed_outputs();
   const std::size_t outputs = repetition_.alone.outputs.size();
-  std::vector<bool> needed(outputs);
-  if (repetition_.until >= 0) needed[std::size_t(repetition_.until)] = true;
-  for (const Repetition::Given& given : repetition_.given)
-    if (given.carried >= 0) needed[std::size_t(given.carried)] = true;
-  const auto add_needed = [&](const Reference& source) {
-    if (source.node == int(index_)) needed[std::size_t(source.output / 2)] = true;
-  };
-  const bool is_replayed = is_replayed_inside();  // then nobody uses what the body makes
-  for (const PipelineNode& user : outer_.pipeline_.nodes)
-    if (!is_replayed && outer_.needed_[std::size_t(&user - outer_.pipeline_.nodes.data())])
-      for (const Wire& wire : user.wires)
-        for (const Reference& source : wire.sources) add_needed(source);
-  for (const PipelineOutput& output : outer_.pipeline_.outputs)
-    if (!is_replayed) add_needed(output.source);
-  for (std::size_t i = 0; i < outputs; ++i)
-    if (needed[i]) needed_outputs_.push_back(int(i));
   lists_.resize(outputs);
   last_.resize(outputs);
   for (std::size_t i = 0; i < outputs; ++i) {

@@ -25,6 +25,7 @@ class Passes {
   struct Run;
 
   void find_constant_nodes();
+  void find_needed_outputs();
   void prepare();
   bool has_next();
   std::string name_of_pass() const;
