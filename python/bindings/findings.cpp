@@ -80,8 +80,10 @@ void bind_edges(py::module_& module) {
           "A read-only numpy array [edge pixel, 5], without a copy: position u and v in pixels, direction of the "
           "gradient along u and v, and its magnitude.")
       .def("__len__", [](const EdgeMap& self) { return self.pixels.size(); })
-      .def("__repr__",
-           [](const EdgeMap& self) { return formatted("<marrow.EdgeMap of {} pixels>", self.pixels.size()); });
+      .def("__repr__", [](const EdgeMap& self) {
+        return formatted("<marrow.EdgeMap of {} pixels, {} x {} px>", self.pixels.size(), self.width_px,
+                         self.height_px);
+      });
   value_class<ShaftLines>(module, "ShaftLines", "The two outer borders of the shaft in one view.")
       .def(
           py::init(&shaft_lines_of), py::arg("left"), py::arg("right"), py::kw_only(), py::arg("width_mm"),
@@ -105,7 +107,11 @@ void bind_edges(py::module_& module) {
               pairs.append(py::make_tuple(ends_of(one.left), ends_of(one.right), one.reason));
             return pairs;
           },
-          "Pairs that were rejected, the best ones first: triples of both borders and the reason in words.");
+          "Pairs that were rejected, the best ones first: triples of both borders and the reason in words.")
+      .def("__repr__", [](const ShaftLines& self) {
+        return formatted("<marrow.ShaftLines of a shaft of {} mm, deviation {} mm>", short_number(self.width_mm, 4),
+                         short_number(self.width_deviation_mm));
+      });
 }
 
 void bind_judgements(py::module_& module) {
@@ -139,7 +145,11 @@ void bind_judgements(py::module_& module) {
       .def("__len__", [](const Metrics& self) { return self.items.size(); })
       .def("__iter__", [](const Metrics& self) { return py::iter(dict_of(self.items)); })
       .def("__repr__", [](const Metrics& self) {
-        return "<marrow.Metrics " + py::repr(dict_of(self.items)).cast<std::string>() + ">";
+        std::string text;
+        for (const Metric& one : self.items)
+          text += (text.empty() ? "" : ", ") + one.name + " = " + short_number(one.value, 6) +
+                  (one.unit.empty() ? "" : " " + one.unit);
+        return "<marrow.Metrics " + text + ">";
       });
   value_class<Verdict>(module, "Verdict", "Whether a pose can be relied on.")
       .def_property_readonly(
@@ -156,11 +166,18 @@ void bind_judgements(py::module_& module) {
       .def_readonly("remedies", &Verdict::remedies, "What would settle it, in words.")
       .def_property_readonly(
           "figures", [](const Verdict& self) { return dict_of(self.figures); }, "What the reasons rest on, by name.")
-      .def("__repr__",
-           [](const Verdict& self) { return std::string("<marrow.Verdict ") + name_of(self.judgement) + ">"; });
+      .def("__repr__", [](const Verdict& self) {
+        const bool is_known = !std::isnan(self.failure_probability);
+        return std::string("<marrow.Verdict ") + name_of(self.judgement) +
+               (is_known ? ", failure " + percent_text(self.failure_probability, 0) + " %" : "") + ">";
+      });
   value_class<Stop>(module, "Stop", "Whether a repetition ends after this pass.")
       .def_readonly("stops", &Stop::stops, "Whether it ends.")
-      .def_readonly("reason", &Stop::reason, "Why, in words.");
+      .def_readonly("reason", &Stop::reason, "Why, in words.")
+      .def("__repr__", [](const Stop& self) {
+        return std::string("<marrow.Stop ") + (self.stops ? "stops" : "goes on") +
+               (self.reason.empty() ? "" : ": " + self.reason) + ">";
+      });
 }
 
 void bind_landscape(py::module_& module) {
@@ -180,7 +197,12 @@ void bind_landscape(py::module_& module) {
             return array_of(self, buffer_of(self->costs.data(), {py::ssize_t(self->costs.size())}));
           },
           "The costs there, as a read-only numpy array.")
-      .def_readonly("truth", &Landscape::Profile::truth, "The offset of the exact pose; None if it is not known.");
+      .def_readonly("truth", &Landscape::Profile::truth, "The offset of the exact pose; None if it is not known.")
+      .def("__repr__", [](const Landscape::Profile& self) {
+        if (self.offsets.empty()) return "<marrow.Profile " + self.axis + ", empty>";
+        return formatted("<marrow.Profile {}, {} costs from {} to {} {}>", self.axis, self.costs.size(),
+                         short_number(self.offsets.front()), short_number(self.offsets.back()), self.unit);
+      });
   value_class<Landscape>(module, "Landscape", "The cost around a pose, along each of the six axes of the fragment.")
       .def_property_readonly(
           "profiles",
@@ -190,7 +212,9 @@ void bind_landscape(py::module_& module) {
               profiles.append(std::shared_ptr<Landscape::Profile>(self, &one));
             return profiles;
           },
-          "The profiles, one for each axis.");
+          "The profiles, one for each axis.")
+      .def("__repr__",
+           [](const Landscape& self) { return formatted("<marrow.Landscape of {} profiles>", self.profiles.size()); });
 }
 
 }  // namespace
@@ -213,7 +237,12 @@ void bind_findings(py::module_& module) {
           "The start poses; None if the case has none.")
       .def_property_readonly(
           "truth", [](const Case& self) { return python_of(Value::of<Truth>(self.truth, "fragment")); },
-          "The exact poses; None if the case has none.");
+          "The exact poses; None if the case has none.")
+      .def("__repr__", [](const Case& self) {
+        const auto& size = self.ct.grid.size;
+        return formatted("<marrow.Case of a CT of {} x {} x {}, {}, {}>", size[0], size[1], size[2],
+                         counted(self.views.size(), "view"), counted(self.seeds.size(), "fragment"));
+      });
 }
 
 }  // namespace marrow::python

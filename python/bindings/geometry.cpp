@@ -23,6 +23,51 @@ py::object array_of_points(const std::shared_ptr<const void>& owner, const std::
   return array_of(owner, buffer_of(reinterpret_cast<const double*>(points.data()), {py::ssize_t(points.size()), 3}));
 }
 
+/// "world_from_ct, translation (1, 2, 3) mm".
+std::string mapping_text(const RigidTransform& transform) {
+  const Eigen::Vector3d& at = transform.translation_mm;
+  return formatted("{}_from_{}, translation ({}, {}, {}) mm", transform.target, transform.source,
+                   short_number(at[0], 6), short_number(at[1], 6), short_number(at[2], 6));
+}
+
+/// Points [..., xyz] of the source, in the target. Throws Error if the last axis has not three numbers.
+py::object mapped_points(const RigidTransform& transform, const py::object& points) {
+  const py::object array = array_of_real(points, "float64", "points");
+  const auto shape = array.attr("shape").cast<py::tuple>();
+  if (shape.empty() || shape[shape.size() - 1].cast<int>() != 3)
+    throw Error("points: expected an array [..., 3] of x, y, z in mm, got the shape " +
+                py::repr(shape).cast<std::string>());
+  const py::object rotated = array.attr("__matmul__")(array_of(Eigen::MatrixXd(transform.rotation.transpose())));
+  return rotated.attr("__add__")(array_of(Eigen::MatrixXd(transform.translation_mm.transpose())).attr("ravel")());
+}
+
+void bind_transform(py::module_& module) {
+  py::class_<RigidTransform>(module, "Transform", "A rigid transform that knows the frames from and to which it maps.")
+      .def(py::init([](const py::object& matrix, const std::string& target, const std::string& source) {
+             return transform_of(matrix, target, source, "Transform");
+           }),
+           py::arg("matrix"), py::kw_only(), py::arg("target") = "world", py::arg("source") = "ct",
+           "A rigid 4 x 4 matrix that maps points of the source, in mm, to the target.")
+      .def_property_readonly(
+          "matrix", [](const RigidTransform& self) { return array_of(self); }, "The 4 x 4 matrix, in mm.")
+      .def_readonly("target", &RigidTransform::target, "The frame to which it maps.")
+      .def_readonly("source", &RigidTransform::source, "The frame from which it maps.")
+      .def(
+          "inverse", [](const RigidTransform& self) { return inverse(self); }, "From the target to the source.")
+      .def(
+          "__matmul__", [](const RigidTransform& self, const RigidTransform& first) { return self * first; },
+          py::is_operator(), "First the other transform, then this one. Their frames must fit.")
+      .def("__matmul__", &mapped_points, "Points [..., xyz] of the source, in mm, as they lie in the target.")
+      .def("__repr__", [](const RigidTransform& self) { return "<marrow.Transform " + mapping_text(self) + ">"; })
+      .def("__copy__", [](const py::object& self) { return self; })
+      .def("__deepcopy__", [](const py::object& self, const py::object&) { return self; })
+      .def(py::pickle(
+          [](const RigidTransform& self) { return py::make_tuple(array_of(self), self.target, self.source); },
+          [](const py::tuple& state) {
+            return transform_of(state[0], state[1].cast<std::string>(), state[2].cast<std::string>(), "Transform");
+          }));
+}
+
 void bind_mesh(py::module_& module) {
   value_class<Mesh>(module, "Mesh", "A surface of triangles, counter-clockwise as seen from outside.")
       .def(py::init([](const py::object& vertices_mm, const py::object& triangles, const std::string& frame) {
@@ -54,7 +99,8 @@ void bind_mesh(py::module_& module) {
       .def_property_readonly(
           "frame", [](const Mesh& self) { return self.frame; }, "The name of the frame.")
       .def("__repr__", [](const Mesh& self) {
-        return formatted("<marrow.Mesh of {} vertices, {} triangles>", self.vertices_mm.size(), self.triangles.size());
+        return formatted("<marrow.Mesh of {} vertices, {} triangles, mm, frame '{}'>", self.vertices_mm.size(),
+                         self.triangles.size(), self.frame);
       });
 }
 
@@ -80,8 +126,10 @@ void bind_views(py::module_& module) {
       .def_property_readonly(
           "camera_from_world", [](const Camera& self) { return array_of(self.camera_from_world); },
           "The transform from the world to the camera, 4 x 4, in mm.")
-      .def("__repr__",
-           [](const Camera& self) { return formatted("<marrow.Camera {} x {} px>", self.width_px, self.height_px); });
+      .def("__repr__", [](const Camera& self) {
+        return formatted("<marrow.Camera {} x {} px, focal length {} px>", self.width_px, self.height_px,
+                         short_number(self.intrinsics(0, 0), 6));
+      });
   value_class<View>(module, "View", "An X-ray image with its camera.")
       .def(
           py::init([](const py::object& image, const std::shared_ptr<Camera>& camera, const py::object& mask,
@@ -113,7 +161,7 @@ void bind_views(py::module_& module) {
           },
           "Where the image may be used: an array of uint8, or None for everywhere.")
       .def("__repr__", [](const View& self) {
-        return formatted("<marrow.View {}, {} x {}>", self.name, self.image.width(), self.image.height());
+        return "<marrow.View " + self.name + ", " + text_of(self.image) + (self.mask.empty() ? "" : ", masked") + ">";
       });
 }
 
@@ -129,6 +177,8 @@ void bind_poses(py::module_& module) {
       .def_property_readonly(
           "matrix", [](const Pose& self) { return array_of(self.world_from_model); },
           "The 4 x 4 matrix that maps points of the model, in mm, to the world.")
+      .def_property_readonly(
+          "transform", [](const Pose& self) { return self.world_from_model; }, "The same, with its frames.")
       .def_property_readonly(
           "target", [](const Pose& self) { return self.world_from_model.target; }, "The frame to which it maps.")
       .def_property_readonly(
@@ -158,18 +208,20 @@ void bind_poses(py::module_& module) {
             return steps;
           },
           "Pairs: after so many evaluations, the least cost so far.")
-      .def("__repr__", [](const Pose& self) {
-        return "<marrow.Pose " + self.world_from_model.target + "_from_" + self.world_from_model.source + ">";
-      });
+      .def("__repr__", [](const Pose& self) { return "<marrow.Pose " + mapping_text(self.world_from_model) + ">"; });
   value_class<Truth>(module, "Truth", "The exact pose of a fragment, known for simulated data.")
       .def_property_readonly(
           "matrix", [](const Truth& self) { return array_of(self.world_from_model); },
-          "The 4 x 4 matrix that maps points of the model, in mm, to the world.");
+          "The 4 x 4 matrix that maps points of the model, in mm, to the world.")
+      .def_property_readonly(
+          "transform", [](const Truth& self) { return self.world_from_model; }, "The same, with its frames.")
+      .def("__repr__", [](const Truth& self) { return "<marrow.Truth " + mapping_text(self.world_from_model) + ">"; });
 }
 
 }  // namespace
 
 void bind_geometry(py::module_& module) {
+  bind_transform(module);
   bind_mesh(module);
   bind_views(module);
   bind_poses(module);
@@ -182,7 +234,10 @@ void bind_geometry(py::module_& module) {
       .def_readonly("wanted", &Seeds::wanted, "False for a fragment that is only to be kept apart from the others.")
       .def_property_readonly(
           "points_mm", [](const std::shared_ptr<Seeds>& self) { return array_of_points(self, self->points_mm); },
-          "The points as a read-only numpy array [point, xyz], without a copy.");
+          "The points as a read-only numpy array [point, xyz], without a copy.")
+      .def("__repr__", [](const Seeds& self) {
+        return formatted("<marrow.Seeds of {}: {}, mm>", self.fragment, counted(self.points_mm.size(), "point"));
+      });
   value_class<Landmarks>(module, "Landmarks", "Named points of one fragment, and where they were seen.")
       .def(py::init([](const py::dict& points_mm, const py::dict& seen_px) {
              auto made = std::make_shared<Landmarks>();
@@ -204,7 +259,11 @@ void bind_geometry(py::module_& module) {
               points[py::str(one.name)] = array_of(Eigen::MatrixXd(one.model_mm.transpose())).attr("ravel")();
             return points;
           },
-          "The points of the model, by name.");
+          "The points of the model, by name.")
+      .def("__repr__", [](const Landmarks& self) {
+        return formatted("<marrow.Landmarks of {}, mm; seen {} times>", counted(self.points.size(), "point"),
+                         self.seen.size());
+      });
   value_class<Scene>(module, "Scene", "Models in their poses, and the views that show them.")
       .def_property_readonly(
           "models",
@@ -223,7 +282,11 @@ void bind_geometry(py::module_& module) {
               placements.append(py::make_tuple(one.model, one.name, array_of(one.world_from_model)));
             return placements;
           },
-          "Triples: the model, the name of the pose (\"result\", \"start\" or \"truth\"), and its 4 x 4 matrix.");
+          "Triples: the model, the name of the pose (\"result\", \"start\" or \"truth\"), and its 4 x 4 matrix.")
+      .def("__repr__", [](const Scene& self) {
+        return formatted("<marrow.Scene of {}, {}, {}>", counted(self.models.size(), "model"),
+                         counted(self.placements.size(), "placement"), counted(self.views.size(), "view"));
+      });
 }
 
 }  // namespace marrow::python

@@ -9,7 +9,12 @@
 namespace marrow::python {
 namespace {
 
-std::string text_of(const Grid& grid) { return formatted("{} x {} x {}", grid.size[0], grid.size[1], grid.size[2]); }
+/// The size, the spacing and the frame of a grid; `unit` is that of its samples.
+std::string text_of(const Grid& grid, const std::string& unit) {
+  const Eigen::Vector3d& spacing = grid.spacing_mm;
+  return formatted("{} x {} x {}, {}, spacing {} x {} x {} mm, frame '{}'", grid.size[0], grid.size[1], grid.size[2],
+                   unit, short_number(spacing[0]), short_number(spacing[1]), short_number(spacing[2]), grid.frame);
+}
 
 Grid grid_of(const std::vector<py::ssize_t>& shape, const py::handle& spacing_mm, const py::handle& origin_mm,
              const py::handle& direction, const std::string& frame) {
@@ -77,6 +82,14 @@ void bind_grid(py::class_<T, std::shared_ptr<T>>& made, std::vector<float> T::*v
 
 }  // namespace
 
+std::string text_of(const Image& image) {
+  const int depth = image.pixels.depth();
+  return formatted("{} x {} px, {}", image.width(), image.height(),
+                   depth == CV_8U    ? "uint8"
+                   : depth == CV_16U ? "uint16"
+                                     : "float32");
+}
+
 void bind_images(py::module_& module) {
   value_class<Image>(module, "Image", py::buffer_protocol(),
                      "An X-ray image with one channel. Air is bright. numpy.asarray(image) is its pixels.")
@@ -88,15 +101,14 @@ void bind_images(py::module_& module) {
       .def_buffer([](Image& self) { return buffer_of(self.pixels); })
       .def_property_readonly("width", &Image::width, "The number of columns.")
       .def_property_readonly("height", &Image::height, "The number of rows.")
-      .def("__repr__",
-           [](const Image& self) { return formatted("<marrow.Image {} x {}>", self.width(), self.height()); });
+      .def("__repr__", [](const Image& self) { return "<marrow.Image " + text_of(self) + ">"; });
   value_class<Picture>(module, "Picture", py::buffer_protocol(), "A coloured picture for people.")
       .def_property_readonly(
           "array", [](const std::shared_ptr<Picture>& self) { return array_of(self, buffer_of(self->pixels)); },
           "The pixels as a read-only numpy array [row, column, red green blue] of uint8, without a copy.")
       .def_buffer([](Picture& self) { return buffer_of(self.pixels); })
       .def("__repr__", [](const Picture& self) {
-        return formatted("<marrow.Picture {} x {}>", self.pixels.cols, self.pixels.rows);
+        return formatted("<marrow.Picture {} x {} px, RGB>", self.pixels.cols, self.pixels.rows);
       });
   auto volume = value_class<Volume>(module, "Volume", py::buffer_protocol(),
                                     "A CT volume in Hounsfield units. numpy.asarray(volume) is its samples [z, y, x].");
@@ -113,7 +125,7 @@ void bind_images(py::module_& module) {
            py::arg("direction") = py::none(), py::arg("frame") = "ct",
            "Copies an array [z, y, x]. spacing_mm and origin_mm are for x, y, z; the columns of direction are the axes "
            "of the grid.")
-      .def("__repr__", [](const Volume& self) { return "<marrow.Volume " + text_of(self.grid) + ">"; });
+      .def("__repr__", [](const Volume& self) { return "<marrow.Volume " + text_of(self.grid, "HU") + ">"; });
   bind_grid(volume, &Volume::values);
   auto field = value_class<SignedField>(
       module, "SignedField", py::buffer_protocol(),
@@ -128,7 +140,7 @@ void bind_images(py::module_& module) {
            }),
            py::arg("array"), py::kw_only(), py::arg("spacing_mm"), py::arg("origin_mm") = py::none(),
            py::arg("direction") = py::none(), py::arg("frame") = "ct", "Copies an array [z, y, x], as Volume does.")
-      .def("__repr__", [](const SignedField& self) { return "<marrow.SignedField " + text_of(self.grid) + ">"; });
+      .def("__repr__", [](const SignedField& self) { return "<marrow.SignedField " + text_of(self.grid, "mm") + ">"; });
   bind_grid(field, &SignedField::values_mm);
 }
 

@@ -9,6 +9,7 @@
 PYBIND11_MODULE(_core, module) {
   namespace python = marrow::python;
   namespace py = pybind11;
+  module.attr("_version") = MARROW_VERSION;
   module.doc() = "What the package marrow needs of marrow's framework.";
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
@@ -23,6 +24,7 @@ PYBIND11_MODULE(_core, module) {
   python::bind_geometry(module);
   python::bind_findings(module);
   python::bind_values(module);
+  python::bind_files(module);
   python::bind_functions(module);
   python::bind_catalogue(module);
   python::bind_pipelines(module);

@@ -16,13 +16,6 @@ std::string type_name(const py::handle& object) {
 
 bool is_array(const py::handle& object) { return py::hasattr(object, "__array_interface__"); }
 
-std::optional<Value> known_value(const py::handle& object) {
-  for (const Conversion& one : conversions())
-    if (auto value = one.from_python(object)) return value;
-  if (py::isinstance<OtherValue>(object)) return object.cast<const OtherValue&>().value;
-  return std::nullopt;
-}
-
 /// What to write for an array where a port takes another type.
 std::string advice_for_array(const std::string& type) {
   if (type == "volume" || type == "signed_field")
@@ -68,6 +61,13 @@ std::vector<FunctionClass>& function_classes() {
   return all;
 }
 
+std::optional<Value> known_value(const py::handle& object) {
+  for (const Conversion& one : conversions())
+    if (auto value = one.from_python(object)) return value;
+  if (py::isinstance<OtherValue>(object)) return object.cast<const OtherValue&>().value;
+  return std::nullopt;
+}
+
 py::object python_of(const Value& value) {
   if (value.is_list()) {
     py::list items;
@@ -111,9 +111,11 @@ Value value_of(const py::handle& object, const TypeInfo& type, const std::string
 }
 
 void bind_values(py::module_& module) {
-  py::class_<OtherValue>(module, "OtherValue",
-                         "A value without a class of its own in Python, of a type of a plugin. It can be given to "
-                         "another node.")
+  py::class_<OtherValue> other(module, "OtherValue",
+                               "A value without a class of its own in Python, of a type of a plugin. It can be given "
+                               "to another node.");
+  add_copies(other);
+  other
       .def_property_readonly(
           "type", [](const OtherValue& other) { return other.value.type.id; },
           "The name of the type, as messages show it.")

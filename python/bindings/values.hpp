@@ -33,6 +33,17 @@ struct FunctionClass {
 };
 std::vector<FunctionClass>& function_classes();
 
+/// How a value is pickled: unpickled() and its arguments. Throws Error for functions, and for types of plugins.
+py::tuple pickled(const py::object& object);
+
+/// Values do not change, so a copy is the value itself.
+template <class Class>
+void add_copies(Class& made) {
+  made.def("__copy__", [](const py::object& self) { return self; })
+      .def("__deepcopy__", [](const py::object& self, const py::object&) { return self; })
+      .def("__reduce__", &pickled);
+}
+
 /// Declares the Python class of a value type.
 template <class T, class... Extra>
 py::class_<T, std::shared_ptr<T>> value_class(py::module_& module, const char* name, const Extra&... extra) {
@@ -46,8 +57,12 @@ py::class_<T, std::shared_ptr<T>> value_class(py::module_& module, const char* n
                            }});
   py::class_<T, std::shared_ptr<T>> made(module, name, extra...);
   made.attr("type") = TypeInfo::of<T>().id;
+  add_copies(made);
   return made;
 }
+
+/// The value that an object stands for; nothing if it is no value of a type that marrow knows.
+std::optional<Value> known_value(const py::handle& object);
 
 /// None for an absent value, marrow.Items for a list.
 py::object python_of(const Value& value);
@@ -57,14 +72,19 @@ py::object python_of(const Value& value);
 /// that marrow knows. `what` names the port in the message ("input 'view'").
 Value value_of(const py::handle& object, const TypeInfo& type, const std::string& axis, const std::string& what);
 
+/// "512 x 512 px, uint16".
+std::string text_of(const Image& image);
+
 /// Image, Picture, Volume, SignedField.
 void bind_images(py::module_& module);
-/// Camera, View, Mesh, Pose, Truth, Seeds, Landmarks, Scene.
+/// Transform, Camera, View, Mesh, Pose, Truth, Seeds, Landmarks, Scene.
 void bind_geometry(py::module_& module);
 /// What nodes find: edges, shaft lines, figures, verdicts, landscapes.
 void bind_findings(py::module_& module);
 /// OtherValue.
 void bind_values(py::module_& module);
+/// What pickle, save and load need.
+void bind_files(py::module_& module);
 /// Cost, Optimizer, OutlineProjector, RadiographProjector; after bind_values().
 void bind_functions(py::module_& module);
 /// What processes of nodes written in Python need.

@@ -9,6 +9,7 @@ Each node of a plugin is also a function: marrow.edges.canny(view, noise_high=5)
 """
 from . import display as _display
 from . import nodes as _nodes
+from . import plots as _plots
 from ._core import (
     Camera,
     Case,
@@ -32,11 +33,13 @@ from ._core import (
     ShaftLines,
     SignedField,
     Stop,
+    Transform,
     Truth,
     Verdict,
     View,
     Volume,
 )
+from ._core import _version as __version__
 from ._core import forget_catalogue as find_plugins_again
 from .annotations import (
     as_many_or_none,
@@ -59,6 +62,7 @@ from .comparison import Comparison, compare
 from .context import Context
 from .declaration import cost, projector
 from .errors import Error, Fault, PipelineError, RunError
+from .files import load, save
 from .items import Items
 from .nodes import Kind, Node, node
 from .pages import show

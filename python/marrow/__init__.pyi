@@ -21,10 +21,12 @@ from ._core import Seeds as Seeds
 from ._core import ShaftLines as ShaftLines
 from ._core import SignedField as SignedField
 from ._core import Stop as Stop
+from ._core import Transform as Transform
 from ._core import Truth as Truth
 from ._core import Verdict as Verdict
 from ._core import View as View
 from ._core import Volume as Volume
+from ._core import _version as __version__
 from ._core import forget_catalogue as find_plugins_again
 from .annotations import as_many_or_none as as_many_or_none
 from .annotations import at_least as at_least
@@ -50,6 +52,8 @@ from .errors import Error as Error
 from .errors import Fault as Fault
 from .errors import PipelineError as PipelineError
 from .errors import RunError as RunError
+from .files import load as load
+from .files import save as save
 from .items import Items as Items
 from .nodes import *
 from .pages import show as show
