@@ -115,6 +115,11 @@ PipelineArguments arguments_of(const PipelineRequest& request);
 bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required,
           bool json = false);
 
+/// Prints the pipeline's inputs, one a line: name, type, default and help.
+void print_inputs(const Pipeline& pipeline);
+/// Prints what a pipeline is for, takes and gives. Returns the exit code.
+int inspect_pipeline(const std::filesystem::path& file, bool as_json);
+
 /// Prints the pipeline whole, with the place of each node and value. Returns the exit code.
 int print_resolved(const PipelineRequest& request);
 
