@@ -67,6 +67,7 @@ void add_inspect(CLI::App& app, int& code);
 void add_watch(CLI::App& app, int& code);
 void add_open(CLI::App& app, int& code);
 void add_new(CLI::App& app, int& code);
+void add_export(CLI::App& app, int& code);
 void add_graph(CLI::App& app, int& code);
 void add_schema(CLI::App& app, int& code);
 void add_doctor(CLI::App& app, int& code);
