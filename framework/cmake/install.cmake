@@ -1,8 +1,9 @@
 # What is installed beside libraries and headers, and the Debian packages that CPack makes (tools/package).
 install(DIRECTORY pipelines schemas DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow)
-install(DIRECTORY tools/templates/case DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/templates)
+install(DIRECTORY tools/templates/case tools/templates/slicer
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/templates)
 install(DIRECTORY tools/templates DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow COMPONENT marrow-dev
-  USE_SOURCE_PERMISSIONS PATTERN case EXCLUDE)
+  USE_SOURCE_PERMISSIONS PATTERN case EXCLUDE PATTERN slicer EXCLUDE)
 install(FILES docs/example-kind/kind.cpp docs/example-kind/nodes.cpp
   DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/example-kind COMPONENT marrow-dev)
 

@@ -89,6 +89,10 @@ void print_node(const NodeInfo& node, const LibraryInfo& library, const KindInfo
 }
 
 int inspect(const std::string& name, bool yaml, bool as_json) {
+  if (name.ends_with(".yaml") || name.ends_with(".yml")) {
+    if (yaml) throw Error("--yaml prints a snippet for a node, and '" + printable(name) + "' is a pipeline");
+    return inspect_pipeline(name, as_json);
+  }
   const Catalogue catalogue;
   const NodeInfo* node = catalogue.find(name);
   if (!node) {
@@ -177,8 +181,8 @@ void add_inspect(CLI::App& app, int& code) {
     bool yaml = false, as_json = false;
   };
   const auto given = std::make_shared<Given>();
-  CLI::App* command = app.add_subcommand("inspect", "show a node: inputs, outputs, options");
-  command->add_option("node", given->node, "kind.name")->required()->type_name("NODE");
+  CLI::App* command = app.add_subcommand("inspect", "show a node or a pipeline: inputs, outputs, options");
+  command->add_option("node", given->node, "kind.name, or a pipeline file (YAML)")->required()->type_name("NODE");
   command->add_flag("--yaml", given->yaml, "print a snippet to paste into a pipeline");
   command->add_flag("--json", given->as_json, "as JSON");
   command->callback([given, &code] { code = inspect(given->node, given->yaml, given->as_json); });

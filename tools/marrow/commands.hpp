@@ -69,6 +69,7 @@ void add_inspect(CLI::App& app, int& code);
 void add_watch(CLI::App& app, int& code);
 void add_open(CLI::App& app, int& code);
 void add_new(CLI::App& app, int& code);
+void add_export(CLI::App& app, int& code);
 void add_graph(CLI::App& app, int& code);
 void add_schema(CLI::App& app, int& code);
 void add_doctor(CLI::App& app, int& code);
@@ -122,6 +123,11 @@ PipelineArguments arguments_of(const PipelineRequest& request);
 /// Reads the pipeline. If it has faults, prints all of them and returns false.
 bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required,
           bool json = false);
+
+/// Prints the pipeline's inputs, one a line: name, type, default and help.
+void print_inputs(const Pipeline& pipeline);
+/// Prints what a pipeline is for, takes and gives. Returns the exit code.
+int inspect_pipeline(const std::filesystem::path& file, bool as_json);
 
 /// Prints the pipeline whole, with the place of each node and value. Returns the exit code.
 int print_resolved(const PipelineRequest& request);

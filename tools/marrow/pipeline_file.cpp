@@ -103,6 +103,7 @@ int check(const PipelineRequest& request, bool json) {
   if (json) return 0;
   std::printf("%s: good; %zu nodes, %zu outputs\n", printable(request.file.string()).c_str(), pipeline.nodes.size(),
               pipeline.outputs.size());
+  print_inputs(pipeline);
   for (const PipelineNode& node : pipeline.nodes) {
     if (!node.mapped_axes.empty())
       std::printf("  %s is called for each %s\n", node.id.c_str(), joined(node.mapped_axes, " and ").c_str());

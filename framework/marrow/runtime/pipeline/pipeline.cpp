@@ -11,6 +11,7 @@
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/pipeline/pipeline_axes.hpp"
+#include "marrow/runtime/pipeline/pipeline_inputs.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/pipeline/pipeline_options.hpp"
 #include "marrow/runtime/pipeline/pipeline_references.hpp"
@@ -42,6 +43,7 @@ class Resolver {
     pipeline_.only_inside = written_.only_inside;
     pipeline_.file = written_.file;
     pipeline_.files = written_.files;
+    pipeline_.inputs = listed_inputs(*written_.inputs);
     pipeline_.notes = written_.notes;
     for (const WrittenNode& node : written_.nodes) {
       ids_.index.emplace(node.id, ids_.all.size());

@@ -57,6 +57,18 @@ struct PipelineOutput {
   Reference source;
 };
 
+/// An input as a pipeline declares it.
+struct PipelineInput {
+  std::string name;
+  std::string type;  ///< path, text, number, integer or boolean, or the id of a type of data
+  std::string help;
+  bool has_default = false;
+  std::string default_text = {};  ///< a path is whole
+  bool is_data = false;           ///< whether only a pipeline that uses this one as a node can give it
+  std::string over = {};          ///< the axis of its data; empty: one item
+  bool is_optional = false;       ///< whether its data may be left out
+};
+
 /// A pipeline that was read and checked: every node is known, every option has a value, every wire fits.
 struct Pipeline {
   std::string name;
@@ -65,8 +77,9 @@ struct Pipeline {
   std::vector<std::filesystem::path> files;  ///< all that it was read from: the file, what it extends, parts, bodies
   std::vector<PipelineNode> nodes;           ///< sorted so that sources come before users
   std::vector<PipelineOutput> outputs;
-  bool only_inside = false;        ///< only the program itself runs it, so its outputs may be functions
-  std::vector<std::string> notes;  ///< remarks for people that are not faults
+  std::vector<PipelineInput> inputs;  ///< in the order of the file
+  bool only_inside = false;           ///< only the program itself runs it, so its outputs may be functions
+  std::vector<std::string> notes;     ///< remarks for people that are not faults
 
   /// The node that a reference names, and its output. The reference must be resolved.
   const PipelineNode& node_of(const Reference& source) const { return nodes[std::size_t(source.node)]; }

@@ -76,6 +76,11 @@ OptionInfo info_of(const DeclaredInput& input) {
 
 Place place_of(const InputValue& one) { return one.place.file.empty() ? Place{one.name + "=" + one.value} : one.place; }
 
+/// A path as a whole path, an empty one as it is. `folder`: where it starts.
+std::string whole_path(const std::string& path, const fs::path& folder) {
+  return path.empty() ? path : plain_path(folder / path).string();
+}
+
 /// The value as a text, if it is good. A path becomes a whole path.
 std::optional<std::string> checked(const DeclaredInput& input, const WrittenValue& value, Diagnostics& diagnostics) {
   const std::string who = "input " + in_quotes(input.name);
@@ -90,7 +95,7 @@ std::optional<std::string> checked(const DeclaredInput& input, const WrittenValu
   if (text.empty() && !may_be_empty)
     diagnostics.add(value.place, who + " is an empty path",
                     "name a file or a folder; the folder in which you are is  .");
-  return text.empty() ? text : plain_path(value.folder / text).string();
+  return whole_path(text, value.folder);
 }
 
 }  // namespace
@@ -115,6 +120,23 @@ void put_inputs_over(DeclaredInputs& inputs, const YamlEntry& section, const Pip
     old->place = entry.place;
     read_input(*old, entry, layer, catalogue);
   }
+}
+
+std::vector<PipelineInput> listed_inputs(const DeclaredInputs& inputs) {
+  std::vector<PipelineInput> list;
+  for (const DeclaredInput& one : inputs.all) {
+    PipelineInput input{one.name, one.type, one.help};
+    input.is_data = one.data.has_value();
+    input.over = one.over;
+    input.is_optional = one.is_optional;
+    input.has_default = one.default_value && one.default_value->value.IsScalar();
+    if (input.has_default) {
+      input.default_text = one.default_value->value.Scalar();
+      if (one.type == "path") input.default_text = whole_path(input.default_text, one.default_value->folder);
+    }
+    list.push_back(std::move(input));
+  }
+  return list;
 }
 
 void set_inputs(DeclaredInputs& inputs, const PipelineReading& reading, Diagnostics& diagnostics) {

@@ -11,6 +11,9 @@ void put_inputs_over(DeclaredInputs& inputs, const YamlEntry& section, const Pip
 /// Gives the inputs their values: given ones, else the defaults. Checks them.
 void set_inputs(DeclaredInputs& inputs, const PipelineReading& reading, Diagnostics& diagnostics);
 
+/// What the file declares, for those who use the pipeline.
+std::vector<PipelineInput> listed_inputs(const DeclaredInputs& inputs);
+
 /// Where a relative path in a value of an input or in an override starts: the folder of the file that it is written in,
 /// else the working folder.
 std::filesystem::path folder_of(const Place& written);
