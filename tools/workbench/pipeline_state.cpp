@@ -34,6 +34,24 @@ json inputs_of(const YamlText& yaml) {
   return inputs;
 }
 
+/// The inputs that the file has, its own and those of files that it extends. A default is shown as it is written.
+json inputs_of(const YamlText& yaml, const Pipeline& pipeline) {
+  const json written = inputs_of(yaml);
+  if (pipeline.inputs.empty()) return written;
+  json inputs = json::array();
+  for (const PipelineInput& input : pipeline.inputs) {
+    if (input.is_data) continue;
+    json shown = {{"name", input.name},
+                  {"type", input.type},
+                  {"help", input.help},
+                  {"default", input.has_default ? json(input.default_text) : json()}};
+    for (const json& own : written)
+      if (own["name"] == input.name && !own["default"].is_null()) shown["default"] = own["default"];
+    inputs.push_back(std::move(shown));
+  }
+  return inputs;
+}
+
 /// {name: what is written} of a map in the text. Scalars come without quotes.
 json written(const YamlText& yaml, const YAML::Node& map) {
   json all = json::object();
@@ -110,7 +128,7 @@ void describe_pipeline(json& state, const Workbench& workbench) {
   state["inputs"] = state["outputs"] = json::array();
   try {
     const YamlText yaml(state["text"].get<std::string>());
-    state["inputs"] = inputs_of(yaml);
+    state["inputs"] = inputs_of(yaml, pipeline);
     state["nodes"] = written_nodes(yaml);
   } catch (const Error&) {  // not YAML at all; the faults say so
   }
@@ -127,7 +145,9 @@ PipelineArguments arguments_of_form(const std::string& file, const json& inputs,
   PipelineArguments arguments;
   if (!inputs.is_object() || inputs.empty()) return arguments;
   const YamlText yaml(read_text_file(workbench.folder.inside(file), kMostSourceBytes));
-  for (const json& input : inputs_of(yaml)) {
+  Diagnostics faults;  // told where the pipeline is read with its inputs
+  const Pipeline pipeline = read_pipeline(workbench.folder.inside(file), {}, workbench.catalogue, faults, false);
+  for (const json& input : inputs_of(yaml, pipeline)) {
     const std::string name = input["name"], type = input["type"];
     if (!inputs.contains(name) || !inputs[name].is_string()) continue;
     std::string value = inputs[name];

@@ -87,6 +87,7 @@ class RequestTest(PipelineBench):
         )
         state = self.state()
         self.assertEqual(state["faults"], [])
+        self.assertEqual([(one["name"], one["type"]) for one in state["inputs"]], [("level", "number")])
         nodes = state["nodes"]
         self.assertEqual((nodes["bone"]["file"], nodes["bone"]["line"]), ("base.yaml", 6))
         self.assertEqual((nodes["more/edges"]["file"], nodes["more/edges"]["line"]), ("below/part.yaml", 3))
