@@ -240,8 +240,8 @@ class Plots(Case):
         import matplotlib
 
         matplotlib.use("agg")
-        pipeline = marrow.Pipeline(SOURCE / "pipelines" / "femur.yaml", case=small_case()[0])
-        pipeline.set("profiles.in.truth", "case.truth")
+        pipeline = marrow.Pipeline(SOURCE / "pipelines" / "femur" / "femur.yaml", case=small_case()[0])
+        pipeline.set("landscape.in.truth", "case.truth")
         landscape = next(iter(pipeline.run(only=["profiles"])["profiles"].values()))
         self.assertEqual(repr(landscape), "<marrow.Landscape of 6 profiles>")
         figure = landscape.plot()

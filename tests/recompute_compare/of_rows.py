@@ -43,6 +43,12 @@ def check_csv(checks, folder, experiment, rows, seconds):
             checks.close("cells.csv", what, number(got[metric.path]), as_float(value), NINE_DIGITS)
         for key, value in numbers_of(row, seconds).items():
             checks.close("cells.csv", row.id + " " + key, number(got[key]), value, NINE_DIGITS)
+        variant = next(one for one in experiment.variants if one.name == row.variant)
+        for (name, levels), level in zip(experiment.factors, variant.levels):
+            if name != "variants":
+                checks.same("cells.csv", row.id + " " + name, unquoted(got[name]), levels[level])
+        if variant.swept:
+            checks.close("cells.csv", row.id + " main.at", number(got["main.at"]), float(variant.swept[0]), NINE_DIGITS)
         has_reason = row.failed or None in row.values
         checks.same("cells.csv", row.id + " has a reason", got["reason"] != "", has_reason)
 

@@ -59,7 +59,8 @@ int inspect_pipeline(const std::filesystem::path& file, bool as_json) {
     return 0;
   }
   std::printf("%s\n", printable(pipeline.name).c_str());
-  if (!pipeline.help.empty()) std::printf("  %s\n", printable(pipeline.help).c_str());
+  const std::string help = pipeline.help.substr(0, pipeline.help.find_last_not_of('\n') + 1);
+  if (!help.empty()) std::printf("  %s\n", printable(help).c_str());
   std::printf("\n");
   print_inputs(pipeline);
   for (const PipelineOutput& output : pipeline.outputs) {

@@ -85,8 +85,10 @@ class Quoting(Cluster):
         if name == EVERYTHING:  # the program, too, has a place of this name
             self.program = self.folder / ("programs" + name) / "marrow"
             shutil.copy(MARROW, self.program)
+        # Switches of the processor's features are in a result's key, and another host has none of them.
+        usual = {name: value for name, value in os.environ.items() if not name.startswith(("OPENBLAS_", "MKL_"))}
         self.environment = {
-            **os.environ,
+            **usual,
             "HOME": str(home),
             "TMPDIR": str(self.folder / ("tmp" + name)),  # but GNU parallel refuses such a place
             "MARROW_PLUGIN_PATH": str(self.plugins()),

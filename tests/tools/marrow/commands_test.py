@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -344,6 +345,8 @@ class Commands(Case):
         )
 
     def test_no_name_of_a_node_in_framework_or_tools(self):
+        """But the workbench calls the nodes that read the files of a case."""
+        reads = re.compile(r"read\.\w+|camera\.dicom")
         names = [node["name"] for node in json.loads(marrow("list", "--json").stdout)]
         self.assertGreater(len(names), 20)
         for folder in ("framework", "tools"):
@@ -351,7 +354,8 @@ class Commands(Case):
                 if path.is_file() and "__pycache__" not in path.parts:
                     text = path.read_text()
                     for name in names:
-                        self.assertNotIn(name, text, str(path))
+                        if path.parent != SOURCE / "tools" / "workbench" or not reads.fullmatch(name):
+                            self.assertNotIn(name, text, str(path))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from harness import MARROW, SOURCE
 from harness.program import main, marrow
 from slicer_peer import KINDS, PART, Export, Module
 
-FEMUR = SOURCE / "pipelines" / "simulated-femur.yaml"
+FEMUR = SOURCE / "pipelines" / "femur" / "simulated-femur.yaml"
 
 # Stands for marrow where its code or its output matters: it keeps its words, and writes and says what the test wants.
 FAKE = """#!/bin/sh

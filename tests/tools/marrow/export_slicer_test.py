@@ -11,6 +11,7 @@ import yaml
 from harness import SOURCE
 from harness.cases import matrix_product
 from harness.program import main
+from harness.shipped import shipped
 from other_programs import needs, read_mha, vtk
 from slicer_peer import KINDS, PART, Export, progress, read_tfm
 
@@ -62,7 +63,7 @@ class Made(Export):
 
 class Simulated(Made):
     def test_the_module_gives_the_pose_of_marrow_run(self):
-        text = (SOURCE / "pipelines" / "simulated-femur.yaml").read_text()
+        text = (SOURCE / "pipelines" / "femur" / "simulated-femur.yaml").read_text()
         self.assertEqual(text.count(COARSE[0]), 1)
         module = self.export(text.replace(*COARSE), "simulated-femur.yaml")
         self.assertEqual(module.program.name, "simulated_femur")
@@ -157,7 +158,7 @@ class Kinds(Made):
         self.assertIn(b"<description>Text with &lt;tags&gt; &amp; &quot;quotes&quot;.</description>", module.xml)
 
     def test_modules_of_all_shipped_pipelines_are_valid(self):
-        files = sorted((SOURCE / "pipelines").glob("*.yaml"))
+        files = shipped()
         self.assertIn("femur-best.yaml", [file.name for file in files])
         for file in files:
             result = self.marrow("export", "slicer", file, "--out", file.stem)

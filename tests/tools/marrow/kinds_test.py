@@ -69,7 +69,7 @@ class Kinds(Case):
 
     def pipeline(self):
         """femur.yaml with less noise in its views, and an optimizer that starts another one."""
-        text = FEMUR.read_text().replace(" verdict/", " %s/verdict/" % FEMUR.parent)
+        text = FEMUR.read_text().replace("../", "%s/" % FEMUR.parents[1])
         text = text.replace("in: {view: case.views}, with: {low: 50, high: 75}}", "in: {view: quiet}}")
         text = text.replace(
             "  optimizer: {uses: optimizer.levenberg_marquardt}\n",

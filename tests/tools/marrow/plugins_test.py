@@ -235,7 +235,7 @@ class Plugins(Case):
         library, manifest = folder / "marrow_test_numbers.so", folder / "marrow_test_numbers.json"
         programs = [subprocess.Popen([MARROW, "describe", library, "--write"]) for _ in range(6)]
         self.assertEqual([program.wait(timeout=240) for program in programs], [0] * 6)
-        self.assertEqual(len(json.loads(manifest.read_text())["nodes"]), 18)
+        self.assertEqual(len(json.loads(manifest.read_text())["nodes"]), 20)
         self.assertEqual(
             sorted(path.name for path in folder.iterdir()), [manifest.name, library.name], "no temporary file is left"
         )
@@ -258,7 +258,7 @@ class Plugins(Case):
         manifest.write_text('{"marrow_manifest": 0}')  # of another version
         for _ in range(2):
             self.assertEqual(describe(library).returncode, 0)
-            self.assertEqual(len(json.loads(manifest.read_text())["nodes"]), 18)
+            self.assertEqual(len(json.loads(manifest.read_text())["nodes"]), 20)
         for name in ("library.json", "library", "library.so.1"):
             other = folder / name
             other.write_bytes(library.read_bytes())

@@ -186,7 +186,7 @@ class ExperimentSchema(SchemaCase):
         file, schema = yaml.safe_load(EXPERIMENT), self.schema["properties"]
         simulation = schema["cases"]["properties"]["simulate"]["properties"]
         for keys, known in (
-            (dict(file, tune="in the place of two others"), schema),
+            (dict(file, tune="in the place of two others", extends="another file"), schema),
             (
                 dict(file["cases"], seeds="by themselves", draw="so too", seed_input="so too"),
                 schema["cases"]["properties"],

@@ -18,6 +18,7 @@ from harness.cases import (
 )
 from harness.program import Case, main, marrow
 from harness.sample import sample
+from harness.shipped import nodes_of
 
 
 # Coarser images than usual, so that each run takes less time.
@@ -155,14 +156,10 @@ class Siblings(Case):
         self.assertEqual(poses, contents(other / "outputs" / "pose"))
 
 
-def nodes_of(pipeline):
-    return list(yaml.safe_load(pipeline.read_text())["nodes"])
-
-
 def outputs_of(pipeline, node):
-    """The names of the outputs that this node makes."""
+    """The names of the outputs that this node makes, or the part that it is in."""
     outputs = yaml.safe_load(pipeline.read_text())["outputs"]
-    return [name for name, source in outputs.items() if source.split(".")[0] == node]
+    return [name for name, source in outputs.items() if source.split(".")[0] == node.split("/")[0]]
 
 
 def fitting(pipeline, node):

@@ -113,7 +113,7 @@ class Terminal(Commands):
         )
         dot = self.expect(0, "graph", "--dot", "p.yaml").stdout
         self.assertIn('digraph "a\\"b" {', dot)
-        self.assertIn('  "c\\"; x" [label="c\\"; x\\ntest.constant"];', dot)
+        self.assertIn('  "c\\"; x" [label="c\\"; x\\ntest.constant", tooltip="p.yaml:4"];', dot)
         self.expect(0, "run", "p.yaml", "--out", "a", "--quiet")
         self.expect(0, "show", "a")
         page = (self.scratch / "a" / "report.html").read_text()

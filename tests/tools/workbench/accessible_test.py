@@ -68,7 +68,8 @@ class AccessibleTest(PageTest):
         folder = cls.made / "folder"
         shutil.copytree(simulate(cls.made / "simulated", *SMALL) / "case", folder / "case")
         shutil.copy(SOURCE / "pipelines/femur/femur.yaml", folder)
-        shutil.copytree(SOURCE / "pipelines/verdict", folder / "verdict")
+        for name in ("parts", "verdict"):  # the pipeline finds them beside its folder
+            shutil.copytree(SOURCE / "pipelines" / name, cls.made / name)
         subprocess.run(
             [MARROW, "run", "femur.yaml", "case=case", "--out", "run", "--quiet"],
             check=True,

@@ -19,14 +19,15 @@ json who_fails_more(const compare::Comparison& comparison, bool higher_is_better
 
 /// The numbers of a comparison, without p. `other` is the word for the one that the variant is compared with.
 json numbers_of(const compare::Comparison& comparison, bool higher_is_better, const std::string& other) {
+  const bool is_baseline = other == "baseline";
   return {{"cases", comparison.compared()},
           {"of_cases", comparison.cases.all()},
           {"cases_variant_lost", comparison.cases.variant_lost},
-          {"cases_" + other + "_lost", comparison.cases.reference_lost},
+          {is_baseline ? "cases_baseline_lost" : "cases_reference_lost", comparison.cases.reference_lost},
           {"runs", comparison.runs.all()},
           {"pairs", comparison.runs.both},
           {"runs_variant_lost", comparison.runs.variant_lost},
-          {"runs_" + other + "_lost", comparison.runs.reference_lost},
+          {is_baseline ? "runs_baseline_lost" : "runs_reference_lost", comparison.runs.reference_lost},
           {"runs_both_lost", comparison.runs.neither},
           {"difference", comparison.compared() ? bound_json(comparison.median_difference) : json()},
           {"fails_more", who_fails_more(comparison, higher_is_better, other)},

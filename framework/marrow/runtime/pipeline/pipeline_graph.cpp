@@ -108,6 +108,11 @@ class GraphWriter {
               out_ << YAML::Flow << YAML::BeginSeq;
               for (const auto& item : value) out_ << written(item);
               out_ << YAML::EndSeq;
+            } else if constexpr (std::is_same_v<std::decay_t<decltype(value)>, double>) {
+              if (file_)
+                out_ << exact_number(value);  // for people: 0.7, where the usual digits are 0.69999999999999996
+              else
+                out_ << value;
             } else {
               out_ << written(value);
             }

@@ -38,10 +38,7 @@ class PipelineReader {
   }
 
   WrittenPipeline read() {
-    const std::size_t before = diagnostics_.size();
     if (!read_file(pipeline_.file)) return {};
-    // Inside other files, the faults of these are no reason to stop.
-    if (pipeline_.nodes.empty() && diagnostics_.size() > before) return std::move(pipeline_);
     return finish({pipeline_.file.string(), 1, 1});
   }
 
