@@ -11,7 +11,7 @@ import yaml
 from harness import SOURCE
 from harness.cases import matrix_product
 from harness.program import main
-from harness.shipped import shipped
+from harness.shipped import inputs_of, shipped
 from other_programs import needs, read_mha, vtk
 from slicer_peer import KINDS, PART, Export, progress, read_tfm
 
@@ -158,14 +158,16 @@ class Kinds(Made):
         self.assertIn(b"<description>Text with &lt;tags&gt; &amp; &quot;quotes&quot;.</description>", module.xml)
 
     def test_modules_of_all_shipped_pipelines_are_valid(self):
-        files = shipped()
+        texts = ("path", "text", "number", "integer", "boolean")
+        files = [file for file in shipped() if all(one["type"] in texts for one in inputs_of(file).values())]
         self.assertIn("femur-best.yaml", [file.name for file in files])
         for file in files:
-            result = self.marrow("export", "slicer", file, "--out", file.stem)
+            out = self.scratch / file.parent.name / file.stem
+            result = self.marrow("export", "slicer", file, "--out", out)
             self.assertEqual((result.returncode, result.stderr), (0, ""))
             name = re.sub("[^a-z0-9]", "_", file.stem)
-            self.assert_valid((self.scratch / file.stem / (name + ".xml")).read_bytes(), name)
-            result = self.marrow("check", pathlib.Path(file.stem) / (name + ".yaml"))
+            self.assert_valid((out / (name + ".xml")).read_bytes(), name)
+            result = self.marrow("check", out / (name + ".yaml"))
             self.assertEqual((result.returncode, result.stderr), (0, ""))
 
     @needs("numpy", "vtk")

@@ -54,7 +54,7 @@ return [...document.querySelectorAll(reached)].filter(
         !one.textContent.trim() && !one.getAttribute('aria-label') && !one.getAttribute('aria-labelledby') &&
         !one.title && !(one.labels && one.labels.length)).map((one) => one.outerHTML.slice(0, 120));
 """
-PAGES = ("home", "case=case", "place=case", "pipeline=femur.yaml", "results=run")
+PAGES = ("home", "case=case", "place=case", "pipeline=femur/femur.yaml", "results=run")
 
 
 class AccessibleTest(PageTest):
@@ -67,11 +67,10 @@ class AccessibleTest(PageTest):
         cls.addClassCleanup(shutil.rmtree, cls.made, ignore_errors=True)
         folder = cls.made / "folder"
         shutil.copytree(simulate(cls.made / "simulated", *SMALL) / "case", folder / "case")
-        shutil.copy(SOURCE / "pipelines/femur/femur.yaml", folder)
-        for name in ("parts", "verdict"):  # the pipeline finds them beside its folder
-            shutil.copytree(SOURCE / "pipelines" / name, cls.made / name)
+        for name in ("femur", "parts", "verdict"):
+            shutil.copytree(SOURCE / "pipelines" / name, folder / name)
         subprocess.run(
-            [MARROW, "run", "femur.yaml", "case=case", "--out", "run", "--quiet"],
+            [MARROW, "run", "femur/femur.yaml", "case=case", "--out", "run", "--quiet"],
             check=True,
             stdout=subprocess.DEVNULL,
             env={**os.environ, "MARROW_CACHE": str(cls.made / "store")},

@@ -51,8 +51,8 @@ std::optional<Spread> spread_of(const Experiment& experiment, const std::vector<
       std::vector<compare::Pair> pairs = cell_pairs(rows[reference], rows[variant], metric);
       std::erase_if(pairs, [](const compare::Pair& pair) { return !pair.reference || !pair.variant; });
       const auto differences = compare::case_differences(pairs, experiment.metrics[metric].higher_is_better()).of_both;
-      const auto spread = compare::spread_of_differences(differences);
-      if (spread && (!widest || *spread > widest->value)) widest = {*spread, differences.size(), variant, reference};
+      const auto scatter = compare::spread_of_differences(differences);
+      if (scatter && (!widest || *scatter > widest->value)) widest = {*scatter, differences.size(), variant, reference};
     }
   }
   return widest;
@@ -86,13 +86,13 @@ class Needed {
     std::string text;
     for (std::size_t m = 0; m < spreads_.size(); ++m) {
       if (!spreads_[m]) continue;
-      const Spread& spread = *spreads_[m];
-      const auto least = compare::difference_to_show(spread.value, counts_.cases, counts_.comparisons, kProbability);
+      const Spread& scatter = *spreads_[m];
+      const auto least = compare::difference_to_show(scatter.value, counts_.cases, counts_.comparisons, kProbability);
       text += "  " + printable(experiment_.metrics[m].label) + ": " +
               (least ? amount(*least, m) : std::string("none")) + "; differences scatter by " +
-              amount(spread.value, m) + " over " + counted(spread.cases, "case") + ", " +
-              printable(experiment_.variants[spread.variant].name) + " against " +
-              printable(experiment_.variants[spread.reference].name) + "\n";
+              amount(scatter.value, m) + " over " + counted(scatter.cases, "case") + ", " +
+              printable(experiment_.variants[scatter.variant].name) + " against " +
+              printable(experiment_.variants[scatter.reference].name) + "\n";
     }
     if (text.empty())
       return "which differences these cases show is known when three cases are done with two variants\n";
