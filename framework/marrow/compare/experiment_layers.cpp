@@ -1,19 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "experiment_layers.hpp"
 
-#include <algorithm>
 #include <set>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/runtime/pipeline/nearest_file.hpp"
+#include "marrow/runtime/pipeline/extended_file.hpp"
 
 namespace marrow::compare {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::size_t kMostLayers = 8;
 
 /// The value of a key, or nothing. Unlike YAML::Node's operator, it never changes the map.
 YAML::Node value_in(const YAML::Node& map, const std::string& key) {
@@ -33,7 +29,8 @@ class LayerReader {
       layers_.push_back(made_.root);
       const YAML::Node below = value_in(made_.root, "extends");
       if (!below.IsDefined()) break;
-      made_.root.reset(read_below(below));
+      const auto file_below = extended_file(yaml_, below, made_.files);
+      made_.root.reset(file_below ? read_file(*file_below) : YAML::Node());
     }
     if (!made_.root.IsMap()) return std::move(made_);
     for (std::size_t i = layers_.size() - 1; i-- > 0;)
@@ -44,8 +41,6 @@ class LayerReader {
  private:
   /// A null node if the file cannot be read.
   YAML::Node read_file(const fs::path& file) {
-    std::error_code ignored;
-    whole_.push_back(fs::weakly_canonical(file, ignored));
     const auto text = read_source(file, "the experiment file", diagnostics_);
     if (!text) return YAML::Node();
     const std::size_t before = diagnostics_.size();
@@ -56,28 +51,6 @@ class LayerReader {
     if (diagnostics_.size() > before) return YAML::Node();
     if (!is_first) yaml_.map(root, {file.string(), 1, 1}, "the experiment");
     return root;
-  }
-
-  YAML::Node read_below(const YAML::Node& name) {
-    const Place place = yaml_.place(name);
-    const auto text = yaml_.text(name, place, "extends");
-    if (!text) return YAML::Node();
-    const fs::path file = (made_.files.back().parent_path() / *text).lexically_normal();
-    std::error_code ignored;
-    const fs::path whole = fs::weakly_canonical(file, ignored);
-    if (std::find(whole_.begin(), whole_.end(), whole) != whole_.end()) {
-      std::string circle;
-      for (const fs::path& one : whole_) circle += one.filename().string() + " extends ";
-      yaml_.fault(place, "the files extend each other in a circle: " + circle + whole.filename().string(),
-                  "one of them must stand alone");
-    } else if (whole_.size() == kMostLayers) {
-      yaml_.fault(place, formatted("more than {} files extend each other", kMostLayers));
-    } else if (text->empty() || !fs::exists(file, ignored)) {
-      yaml_.fault(place, "there is no file " + in_quotes(*text) + " to extend", nearest_file(file));
-    } else {
-      return read_file(file);
-    }
-    return YAML::Node();
   }
 
   /// What a file takes over from the one below.
@@ -119,7 +92,6 @@ class LayerReader {
   Diagnostics& diagnostics_;
   LayeredExperiment made_;
   std::vector<YAML::Node> layers_;  ///< the file itself comes first
-  std::vector<fs::path> whole_;
 };
 
 }  // namespace

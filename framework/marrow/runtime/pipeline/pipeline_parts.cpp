@@ -8,8 +8,8 @@
 
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/extended_file.hpp"
 #include "marrow/runtime/pipeline/input_texts.hpp"
-#include "marrow/runtime/pipeline/nearest_file.hpp"
 #include "marrow/runtime/pipeline/pipeline_inputs.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/pipeline/pipeline_references.hpp"

@@ -2,13 +2,12 @@
 // A pipeline file with the files that it extends: the lowest first, and each puts its own over it.
 #include "marrow/runtime/pipeline/pipeline_text.hpp"
 
-#include <algorithm>
 #include <set>
 
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/runtime/pipeline/nearest_file.hpp"
+#include "marrow/runtime/pipeline/extended_file.hpp"
 #include "marrow/runtime/pipeline/pipeline_changes.hpp"
 #include "marrow/runtime/pipeline/pipeline_inputs.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
@@ -18,8 +17,6 @@ namespace marrow {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::size_t kMostLayers = 8;
 
 class PipelineReader {
  public:
@@ -45,8 +42,7 @@ class PipelineReader {
  private:
   /// Returns whether the file could be read as YAML.
   bool read_file(const fs::path& file) {
-    std::error_code ignored;
-    layers_.push_back(fs::weakly_canonical(file, ignored));
+    layers_.push_back(file);
     pipeline_.files.push_back(file);
     StrictYaml yaml(file.string(), diagnostics_);
     const auto text = read_source(file, "the pipeline file", diagnostics_);
@@ -66,7 +62,7 @@ class PipelineReader {
     const fs::path folder = fs::absolute(file).parent_path();
     const std::vector<YamlEntry> entries = yaml.map(root, start, "the pipeline", is_body_ ? &kOfBody : &kOfFile);
     for (const YamlEntry& entry : entries)
-      if (entry.key == "extends" && !read_below(entry, folder, yaml)) return false;
+      if (entry.key == "extends" && !read_below(entry, yaml)) return false;
     if (!is_body_) pipeline_.name.clear();
     PipelineLayer layer{yaml, diagnostics_, folder, pipeline_.inputs, ++layer_};
     std::vector<WrittenEntry> changes;
@@ -109,31 +105,11 @@ class PipelineReader {
   }
 
   /// Reads the file below this one. Returns whether that could be read.
-  bool read_below(const YamlEntry& entry, const fs::path& folder, StrictYaml& yaml) {
-    const auto name = yaml.text(entry.value, entry.place, "extends");
-    if (!name) return false;
-    const Place place = yaml.place(entry.value);
-    const fs::path below = folder / *name;
-    std::error_code ignored;
-    const fs::path whole = fs::weakly_canonical(below, ignored);
-    if (contains_file(layers_, whole)) {
-      std::string circle;
-      for (const fs::path& file : layers_) circle += file.filename().string() + " extends ";
-      yaml.fault(place, "the files extend each other in a circle: " + circle + whole.filename().string(),
-                 "one of them must stand alone");
-      return false;
-    }
-    if (layers_.size() == kMostLayers) {
-      yaml.fault(place, formatted("more than {} files extend each other", kMostLayers));
-      return false;
-    }
-    if (name->empty() || !fs::exists(below, ignored)) {
-      yaml.fault(place, "there is no file " + in_quotes(*name) + " to extend", nearest_file(below));
-      return false;
-    }
-    const bool is_read = read_file(printable_path(below));
+  bool read_below(const YamlEntry& entry, StrictYaml& yaml) {
+    const auto below = extended_file(yaml, entry.value, layers_);
+    const bool is_read = below && read_file(*below);
     is_named_ = false;
-    below_ = printable_path(below);
+    if (below) below_ = *below;
     return is_read;
   }
 
@@ -144,15 +120,6 @@ class PipelineReader {
     else
       pipeline_.notes.push_back(file.string() + " has moved to " + below_.string() +
                                 "; its old name will go with the next release");
-  }
-
-  static bool contains_file(const std::vector<fs::path>& files, const fs::path& file) {
-    return std::find(files.begin(), files.end(), file) != files.end();
-  }
-
-  /// The file's name as a person would write it from the working folder.
-  fs::path printable_path(const fs::path& file) const {
-    return pipeline_.file.is_absolute() ? file.lexically_normal() : fs::proximate(file);
   }
 
   WrittenPipeline finish(const Place& start) {
@@ -218,14 +185,6 @@ WrittenPipeline read_written_body(const fs::path& file, const std::string& name,
 WrittenPipeline read_written_pipeline(const fs::path& file, const PipelineReading& reading, const Catalogue& catalogue,
                                       Diagnostics& diagnostics) {
   return PipelineReader(file, reading, catalogue, diagnostics).read();
-}
-
-std::string nearest_file(const fs::path& missing) {
-  std::vector<std::string> names;
-  std::error_code ignored;
-  for (const fs::directory_entry& entry : fs::directory_iterator(missing.parent_path(), ignored))
-    if (is_part(entry.path().filename().string())) names.push_back(entry.path().filename().string());
-  return suggestion(missing.filename().string(), names);
 }
 
 }  // namespace marrow
