@@ -9,9 +9,9 @@
 
 namespace MARROW_EXPORT marrow {
 
-/// The file that the last file of a chain extends. `name`: the value of its key `extends`; a relative path starts at the
-/// folder of that file. If there is no such file, if it is in the chain already, or if the chain is too long, reports a
-/// fault and returns nothing.
+/// The file that the last file of a chain extends. `name`: the value of its key `extends`; a relative path starts at
+/// the folder of that file. If there is no such file, if it is in the chain already, or if the chain is too long,
+/// reports a fault and returns nothing.
 std::optional<std::filesystem::path> extended_file(StrictYaml& yaml, const YAML::Node& name,
                                                    const std::vector<std::filesystem::path>& chain);
 
