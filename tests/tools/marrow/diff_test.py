@@ -66,7 +66,8 @@ class Diff(Runs):
         )
         self.assertIn("In consequence differ: sum, drawn\nThe same in both runs: 1 node\n", text)
         self.assertIn(
-            "Also changed: node 'other': option 'word' is three, was one (--set other.word=three, was the default) (with the same result)\n",
+            "Also changed: node 'other': option 'word' is three, was one (--set other.word=three, was the default) "
+            "(with the same result)\n",
             text,
         )
 

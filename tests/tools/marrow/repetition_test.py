@@ -139,7 +139,8 @@ class Repetition(Runs):
         self.run_into("b", OVER, "--set", "r.body.before.value=2")
         told = self.diff(1, "a", "b")
         self.assertIn(
-            "First difference: node 'r/before' (test.constant)\n  why: option 'value' is 2, was 1 (--set r.body.before.value=2, was sum.yaml:3)\n",
+            "First difference: node 'r/before' (test.constant)\n  why: option 'value' is 2, was 1 "
+            "(--set r.body.before.value=2, was sum.yaml:3)\n",
             told,
         )
         self.assertIn("In consequence differ: r, r/sum\n", told)
