@@ -20,7 +20,7 @@ constexpr int kSize_px = 240;
 constexpr double kPixel_mm = 0.8;
 
 Eigen::Vector3d normal(Random& random, double deviation) {
-  return deviation * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+  return deviation * Eigen::Vector3d{random.normal(), random.normal(), random.normal()};
 }
 /// A vector of random direction that is between half as long and as long as `most`.
 Eigen::Vector3d drawn(Random& random, double most) {

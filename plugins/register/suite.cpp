@@ -121,7 +121,7 @@ std::shared_ptr<const Cost> outline_in_two_views() {
   for (const double angle_deg : {0.0, 80.0}) {
     views.push_back(analytic::seen(bone(), analytic::c_arm(angle_deg, 240, 240, 0.8), truth(), kSpacing_px, kStep_px));
     for (Eigen::Vector2d& pixel : views.back().outline_px)
-      pixel += kError_px * Eigen::Vector2d(random.normal(), random.normal());
+      pixel += kError_px * Eigen::Vector2d{random.normal(), random.normal()};
   }
   return std::make_shared<const analytic::OutlineCost>(bone(), views);
 }

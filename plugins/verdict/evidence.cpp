@@ -14,7 +14,7 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/geometry/targets.hpp"
 #include "marrow/toolbox/search/compared.hpp"
-#include "spread.hpp"
+#include "marrow/verdict/spread.hpp"
 
 namespace {
 

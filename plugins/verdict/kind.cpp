@@ -2,6 +2,8 @@
 // The kind of nodes that say whether a pose can be relied on. They never see the truth.
 #include <marrow/plugin.hpp>
 
+#include "suite.hpp"
+
 MARROW_PLUGIN(plugin) {
   plugin.kind("verdict")
       .summary("whether a pose can be relied on: trusted, doubtful or wrong, with reasons")
@@ -17,5 +19,6 @@ MARROW_PLUGIN(plugin) {
       .in<marrow::Mesh>("model", "surface of the bone; it gives the axes and the targets")
       .in<marrow::Pose>("others", "poses of other fragments", marrow::over("fragment"))
       .in<marrow::SignedField>("other_bones", "the other fragments' bone", marrow::over("fragment"))
-      .out<marrow::Verdict>("verdict", "judgement of the pose, with the probability that it is off");
+      .out<marrow::Verdict>("verdict", "judgement of the pose, with the probability that it is off")
+      .suite(marrow::conformance::verdict_suite());
 }

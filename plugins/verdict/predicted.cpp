@@ -5,7 +5,7 @@
 #include <marrow/plugin.hpp>
 #include <optional>
 
-#include "spread.hpp"
+#include "marrow/verdict/spread.hpp"
 
 #include "marrow/base/number_text.hpp"
 

@@ -80,6 +80,9 @@ WRONG = {  # node: checks of which at least one must fail
     "similarity.levels": {"coarse_level"},
     "similarity.steep": {"slope"},
     "similarity.alone": {"beside_another"},
+    "verdict.trusting": {"mistakes_trusted"},
+    "verdict.doubting": {"right_not_trusted"},
+    "verdict.denying": {"right_wrong"},
 }
 KINDS = subprocess.run([MARROW, "list", "--kinds", "--json"], stdout=subprocess.PIPE, text=True, check=True).stdout
 CHECKS = {kind["name"]: {check["name"] for check in kind["checks"]} for kind in json.loads(KINDS)}
@@ -191,6 +194,7 @@ class Conformance(unittest.TestCase):
             "segment.plain",
             "shaft.plain",
             "similarity.plain",
+            "verdict.plain",
         ):
             checks = sample(sorted(CHECKS[node.split(".")[0]] - {"contract"}), 5)
             result, nodes = conformance(node, "--check=contract", *("--check=" + name for name in checks), seconds=300)

@@ -11,6 +11,7 @@ from harness.program import Case, main, marrow
 from harness.sample import sample
 
 KINDS = sorted(path.parent.parent.name for path in (SOURCE / "plugins").glob("*/template/template.yaml"))
+PYTHON_KINDS = sorted(path.parent.parent.parent.name for path in (SOURCE / "plugins").glob("*/template/python/node.py"))
 
 
 class New(Case):
@@ -48,8 +49,16 @@ class New(Case):
 
     def test_every_kind_with_a_suite_has_a_template(self):
         with_suite = sorted(path.parent.name for path in (SOURCE / "plugins").glob("*/suite.cpp"))
-        # A registration is given functions, a cost and an optimizer, which a node in Python cannot take.
-        self.assertEqual(KINDS, [kind for kind in with_suite if kind != "register"])
+        self.assertEqual(KINDS, with_suite)
+        # Python makes no verdict, and no pose with the fragment's axes.
+        self.assertEqual(sorted(set(KINDS) - set(PYTHON_KINDS)), ["initial", "register", "verdict"])
+
+    def test_a_kind_without_a_template_in_python_says_so(self):
+        self.assertEqual(
+            self.refused("node", "verdict.mine", "--python"),
+            "the kind 'verdict' has no template in Python; leave out --python for one in C++, or take one of "
+            + ", ".join(PYTHON_KINDS),
+        )
 
     def test_nodes_of_kinds_and_a_kind_are_built_against_an_installation_and_tested(self):
         prefix = self.scratch / "installed"
@@ -92,9 +101,9 @@ class New(Case):
 
     @unittest.skipUnless((BUILD / "python" / "marrow" / "nodes.pyi").exists(), "the Python package is not built")
     def test_nodes_in_python_work_without_a_build(self):
-        checked = sample(KINDS, 3)
+        checked = sample(PYTHON_KINDS, 3)
         compared = sample(checked, 1)
-        for kind in KINDS:
+        for kind in PYTHON_KINDS:
             with self.subTest(kind):
                 result = self.new("node", kind + ".mine", "--python")
                 self.assertIn("%s_mine/ci tests it, and compares it with marrow's own" % kind, result.stdout)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "spread.hpp"
+#include "marrow/verdict/spread.hpp"
 
 #include <cmath>
 #include <marrow/domain/decompositions.hpp>
