@@ -36,5 +36,5 @@ TEST(NewNode, FindsTheBottomOfABowl) {
       {{"cost", cost}, {"finer_cost", cost}, {"optimizer", optimizer}, {"start", node_test::item(start)}});
   const marrow::RigidTransform pose = found.at("pose").as<marrow::Pose>().world_from_model;
   EXPECT_NEAR((pose.translation_mm - Eigen::Vector3d(4, 0, 0)).norm(), 0, 0.05);
-  EXPECT_NEAR(marrow::degrees(geodesic_angle_rad(pose.rotation, Bowl::bottom().rotation)), 0, 0.05);
+  EXPECT_NEAR(marrow::degrees(marrow::geodesic_angle_rad(pose.rotation, Bowl::bottom().rotation)), 0, 0.05);
 }
