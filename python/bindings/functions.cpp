@@ -173,7 +173,9 @@ MinimisationResult minimise(const OptimizerValue& self, const py::object& functi
 template <class Function, class Kept>
 py::class_<Kept, OtherValue> function_class(py::module_& module, const char* name, const char* help) {
   function_classes().push_back({TypeInfo::of<Function>(), [](const Value& value) { return py::cast(Kept{{value}}); }});
-  return py::class_<Kept, OtherValue>(module, name, help);
+  py::class_<Kept, OtherValue> made(module, name, help);
+  made.attr("type") = TypeInfo::of<Function>().id;
+  return made;
 }
 
 void bind_optimizer(py::module_& module) {

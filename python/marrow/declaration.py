@@ -175,7 +175,11 @@ def _port(where: str, name: str, hint: Any, is_output: bool) -> Dict[str, Any]:
     if isinstance(kind, type) and issubclass(kind, _core.OtherValue):
         if is_output:
             raise Error("%s is a function; use @marrow.cost, @marrow.optimizer or @marrow.projector" % where)
-        raise Error("%s is a function, which a node in Python cannot take; write the node in C++" % where)
+        if kind not in (_core.Cost, _core.Optimizer):
+            raise Error(
+                "%s is a function, of which a node in Python can take costs and optimizers only; write the node in C++"
+                % where
+            )
     if not isinstance(getattr(kind, "type", None), str):
         raise Error("%s: expected one of marrow's values, as marrow.View, got %s" % (where, _shown(kind)))
     if "figures" in notes and not (is_output and getattr(kind, "type") == "metrics"):
