@@ -79,7 +79,7 @@ class Tutorials(Documents):
         self.assertRegex(
             told, r"why: it uses edges.canny, used edges.adaptive_relaxation \(--set edges.uses=edges.canny"
         )
-        self.assertIn("input 'cost' is wired to near, was wired to contour_cost", told)
+        self.assertIn("input 'cost' is wired to near (there was no node 'near'), was wired to contour_cost", told)
         table = (folder / "runs/compare/patients/poses.csv").read_text().splitlines()
         self.assertEqual([line.split(",")[1] for line in table], ["case", "1", "2", "3", "4", "5"])
         self.assertIn("trusted", table[1])
