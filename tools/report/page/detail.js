@@ -33,6 +33,13 @@ export function outcomeBadge(cell) {
   return el('span', {class: 'outcome ' + outcome, 'data-tip': Glossary.meaning(outcome)}, outcome);
 }
 
+// A link, where the page lies in the comparison's folder.
+function folder(data, cell) {
+  if (!cell.folder) return null;
+  const name = el('code', {}, cell.folder);
+  return data.is_run ? name : el('a', {href: Links.toFolder(cell.folder)}, name);
+}
+
 export function values(data, cell) {
   return rows([
     ['Outcome', outcomeBadge(cell)],
@@ -50,7 +57,7 @@ export function values(data, cell) {
     ['Nodes from the cache', Number.isFinite(cell.cached_nodes) ? String(cell.cached_nodes) : null],
     ['Tries', Number.isFinite(cell.tries) ? String(cell.tries) : null],
     ['Key of what it was made from', cell.key ? el('code', {}, cell.key) : null],
-    ['Folder', cell.folder ? el('code', {}, cell.folder) : null],
+    ['Folder', folder(data, cell)],
   ]);
 }
 
@@ -101,8 +108,12 @@ function commandOf(data, cell) {
   return 'marrow cell ' + Dom.shellPath(file || (name || 'experiment') + '.yaml') + place + rest + Dom.shellWord(id);
 }
 
+const recipeOf = (data, cell) => 'marrow recipe ' + Dom.shellPath((data.experiment.folder || '.') + '/' + cell.folder);
+
 const command = (data, cell) =>
-    (data.is_run ? null : el('div', {}, el('h3', {}, 'Run just this cell'), Dom.command(commandOf(data, cell))));
+    (data.is_run ? null :
+                   el('div', {}, el('h3', {}, 'Run just this cell'), Dom.command(commandOf(data, cell)),
+                      el('h3', {}, 'Its recipe'), Dom.command(recipeOf(data, cell))));
 
 // Why there is no picture, and how to get some.
 function noPictures(data, cell) {
