@@ -6,6 +6,7 @@
 #include "commands.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/names.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/plain_path.hpp"
 #include "marrow/base/png_text.hpp"
 #include "marrow/base/printable.hpp"
@@ -74,8 +75,8 @@ const NamedRecipe& chosen(const std::vector<NamedRecipe>& recipes, const RecipeR
   const std::string file = request.given.string();
   if (names.empty()) throw Error(file + ": this is the recipe of one run, without variants; leave out --variant");
   if (request.variant.empty())
-    throw Error(file + ": this page has the recipes of " + std::to_string(names.size()) +
-                " variants; choose one by --variant: " + cut(joined(names, ", "), 400));
+    throw Error(file + ": this page has the recipes of " + counted(names.size(), "variant") +
+                "; choose one by --variant: " + cut(joined(names, ", "), 400));
   throw Error(file + ": the comparison has no variant " + in_quotes(request.variant) + "; " +
               suggestion(request.variant, names));
 }

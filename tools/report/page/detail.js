@@ -108,12 +108,12 @@ function commandOf(data, cell) {
   return 'marrow cell ' + Dom.shellPath(file || (name || 'experiment') + '.yaml') + place + rest + Dom.shellWord(id);
 }
 
-const recipeOf = (data, cell) => 'marrow recipe ' + Dom.shellPath((data.experiment.folder || '.') + '/' + cell.folder);
-
 const command = (data, cell) =>
-    (data.is_run ? null :
-                   el('div', {}, el('h3', {}, 'Run just this cell'), Dom.command(commandOf(data, cell)),
-                      el('h3', {}, 'Its recipe'), Dom.command(recipeOf(data, cell))));
+    (data.is_run ? null : el('div', {}, el('h3', {}, 'Run just this cell'), Dom.command(commandOf(data, cell))));
+
+const recipe = (data, cell) =>
+    [el('h3', {}, 'Its recipe'),
+     Dom.command('marrow recipe ' + Dom.shellPath((data.experiment.folder || '.') + '/' + cell.folder))];
 
 // Why there is no picture, and how to get some.
 function noPictures(data, cell) {
@@ -171,7 +171,8 @@ function fillDialog(data, cell, dialog) {
       ...[reason(cell), Verdict.all(data, cell), absent(cell), values(data, cell),
           el('h3', {}, 'Options of ' + data.variants[cell.variant].name), options(data.variants[cell.variant]),
           command(data, cell), noPictures(data, cell), cell.pictures.length > 0 && el('h3', {}, 'Pictures'),
-          cell.pictures.length > 0 && Pictures.gallery(data, cell), closer, ...plots(data, cell), ...scene(data, cell)]
+          cell.pictures.length > 0 && Pictures.gallery(data, cell), closer, ...plots(data, cell), ...scene(data, cell),
+          ...recipe(data, cell)]
           .filter(Boolean));
 }
 
