@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -32,6 +33,19 @@ std::string planned_text(const PlannedNode& node) {
          (node.waits_for.size() == 1 ? "' comes" : "' come") + " out unchanged";
 }
 
+/// " (femur.yaml:17, uses: mine.yaml:4)": where a node of another file is written, and what a third place changes.
+/// Empty for a node of the pipeline's own file.
+std::string origin_text(const PipelineNode& node, const Pipeline& pipeline) {
+  std::string text = node.place.file == pipeline.file.string() ? "" : place_text(node.place, pipeline.file);
+  const auto add = [&](const std::string& what, const Place& place) {
+    if (!place.file.empty() && place.file != node.place.file)
+      text += (text.empty() ? "" : ", ") + what + ": " + place_text(place, pipeline.file);
+  };
+  add("uses", node.uses_place);
+  for (std::size_t i = 0; i < node.option_places.size(); ++i) add(node.info.options[i].name, node.option_places[i]);
+  return text.empty() ? "" : " (" + text + ")";
+}
+
 struct PlannedWork {
   std::size_t counts[5] = {};
   double seconds = 0;
@@ -60,8 +74,10 @@ nlohmann::json json_of(const Pipeline& pipeline, const std::vector<PlannedNode>&
   static constexpr const char* kStates[] = {"not_needed", "cached", "function", "runs", "depends"};
   nlohmann::json nodes = nlohmann::json::object();
   for (std::size_t i = 0; i < planned.size(); ++i)
-    nodes[pipeline.nodes[i].id] = {
-        {"state", kStates[int(planned[i].what)]}, {"text", planned_text(planned[i])}, {"seconds", planned[i].seconds}};
+    nodes[pipeline.nodes[i].id] = {{"state", kStates[int(planned[i].what)]},
+                                   {"text", planned_text(planned[i])},
+                                   {"written", place_text(pipeline.nodes[i].place, pipeline.file)},
+                                   {"seconds", planned[i].seconds}};
   const PlannedWork work = work_of(planned);
   return {{"nodes", nodes},
           {"cached", work.of(What::cached)},
@@ -84,9 +100,11 @@ int show_plan(const Pipeline& pipeline, const Catalogue& catalogue, std::uint64_
     print_as_json(json_of(pipeline, planned));
     return 0;
   }
+  std::size_t width = 16;
+  for (const PipelineNode& node : pipeline.nodes) width = std::max(width, node.id.size());
   for (std::size_t i = 0; i < planned.size(); ++i)
-    print_beside(formatted("{:<16} {:<34}", pipeline.nodes[i].id, pipeline.nodes[i].info.name),
-                 printable(planned_text(planned[i])), 52);
+    print_beside(formatted("{:<{}} {:<34}", pipeline.nodes[i].id, width, pipeline.nodes[i].info.name),
+                 printable(planned_text(planned[i]) + origin_text(pipeline.nodes[i], pipeline)), width + 36);
   const PlannedWork work = work_of(planned);
   std::printf("\n%zu cached, %zu to run", work.of(What::cached), work.of(What::runs));
   if (work.of(What::depends)) std::printf(", %zu that may run", work.of(What::depends));

@@ -81,13 +81,18 @@ json written_nodes(const YamlText& yaml) {
   return nodes;
 }
 
-/// The form of a node: what is written, and what its manifest says.
-void add_manifest(json& node, const PipelineNode& known) {
+/// The form of a node: what is written, what its manifest says, and where what another file says is written.
+void add_manifest(json& node, const PipelineNode& known, const Pipeline& pipeline) {
   node["info"] = cli::node_json(known.info);
+  const auto origin = [&](const Place& place) {
+    return place.file == known.place.file ? std::string() : place_text(place, pipeline.file);
+  };
+  node["uses_written"] = origin(known.uses_place);
   for (std::size_t i = 0; i < known.info.options.size(); ++i) {
     json& option = node["info"]["options"][i];
     option["default"] = cli::yaml_text(known.info.options[i].default_value);
     option["now"] = cli::yaml_text(known.options[i]);
+    option["written"] = origin(known.option_places[i]);
   }
 }
 
@@ -106,12 +111,12 @@ json node_of_another_file(const PipelineNode& node, const Workbench& workbench) 
           {"file", outside ? node.place.file : file.string()}};
 }
 
-void add_node(json& nodes, const PipelineNode& node, const Workbench& workbench) {
+void add_node(json& nodes, const PipelineNode& node, const Pipeline& pipeline, const Workbench& workbench) {
   if (node.stands_for_input) return;
   json& shown = nodes[node.id];
   if (shown.is_null()) shown = node_of_another_file(node, workbench);
   if (shown["uses"] == "" && !node.repetition) shown["uses"] = node.info.name;
-  add_manifest(shown, node);
+  add_manifest(shown, node, pipeline);
 }
 
 }  // namespace
@@ -136,7 +141,7 @@ void describe_pipeline(json& state, const Workbench& workbench) {
   state["name"] = pipeline.name;
   state["help"] = pipeline.help;
   state["graph"] = cli::graph_of(pipeline, {});
-  for (const PipelineNode& node : pipeline.nodes) add_node(state["nodes"], node, workbench);
+  for (const PipelineNode& node : pipeline.nodes) add_node(state["nodes"], node, pipeline, workbench);
   for (const PipelineOutput& output : pipeline.outputs)
     state["outputs"].push_back({{"name", output.name}, {"source", output.source.text}});
 }

@@ -13,6 +13,18 @@
 
 namespace marrow {
 
+namespace {
+
+/// What to do about a fault that the parser words for those who know YAML's grammar.
+std::string hint_of(const std::string& fault) {
+  if (fault.find("illegal map value") != std::string::npos)
+    return "write a text that has a colon and a blank in it in quotes, as  help: \"edges: Canny's\"";
+  if (fault.find("unknown token") != std::string::npos) return "write a text that begins with @, ` or % in quotes";
+  return "";
+}
+
+}  // namespace
+
 YAML::Node StrictYaml::parse(const std::string& text) { return parsed(plain_text(text), 0); }
 
 YAML::Node StrictYaml::parse_also(const std::string& file, const std::string& text) {
@@ -25,7 +37,7 @@ YAML::Node StrictYaml::parsed(const std::string& text, int first_line) {
   try {
     return parse_yaml(std::string(std::size_t(first_line), '\n') + text);
   } catch (const YAML::ParserException& error) {
-    fault(place_of(error.mark), "not valid YAML: " + error.msg);
+    fault(place_of(error.mark), "not valid YAML: " + error.msg, hint_of(error.msg));
     // The parser reports where the text ends or makes no sense. The mistake is where a bracket or quote was left open.
     if (const auto opened = last_unclosed(text))
       fault({place_of(error.mark).file, opened->line, opened->column},

@@ -122,12 +122,16 @@ class CaseReader {
                                     "' cannot be found: " + error.what());
     }
     bool any = false;
+    const std::size_t below = parts_below_last_wildcard(pattern);
     for (fs::path& folder : found) {
+      fs::path named = folder;
+      for (std::size_t i = 0; i < below; ++i) named = named.parent_path();
       if (folder.filename() == "case.yaml") folder = folder.parent_path();
+      if (named.filename() == "case.yaml") named = folder;
       std::error_code error;
       if (fs::is_directory(folder, error)) {
         any = true;
-        const std::string name = folder.filename().string();
+        const std::string name = named.filename().string();
         if (!add({fault_of_name(name).empty() ? name : file_name_of(name), folder}, place)) return;
       } else if (fs::is_symlink(folder, error)) {  // a broken link may have been a case; other files are ignored
         if (fs::exists(folder, error)) continue;
@@ -138,6 +142,21 @@ class CaseReader {
       }
     }
     if (!any) yaml_.fault(place, "there is no folder at '" + pattern + "'", "the path starts at the experiment's file");
+  }
+
+  /// The number of names after the last one with a wildcard: 1 for "patients/*/case", whose cases are named after the
+  /// patients. 0 if there is none, or if '..' leads elsewhere.
+  static std::size_t parts_below_last_wildcard(const fs::path& pattern) {
+    std::size_t below = 0;
+    bool has_wildcard = false;
+    for (const fs::path& part : pattern) {
+      if (part == "..") return 0;
+      if (part.empty() || part == ".") continue;
+      const bool is_wildcard = is_pattern(part.string());
+      has_wildcard |= is_wildcard;
+      below = is_wildcard ? 0 : below + 1;
+    }
+    return has_wildcard ? below : 0;
   }
 
   void read_simulation(const YamlEntry& section) {

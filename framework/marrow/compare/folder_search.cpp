@@ -10,13 +10,10 @@
 #include "marrow/base/number_text.hpp"
 
 namespace marrow::compare {
-namespace {
 
 namespace fs = std::filesystem;
 
 bool is_pattern(const std::string& name) { return name.find_first_of("*?[\\") != std::string::npos; }
-
-}  // namespace
 
 void FolderSearch::look() {
   if (++looked_at_ > kMostLookedAt)

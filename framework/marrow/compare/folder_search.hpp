@@ -7,6 +7,9 @@
 
 namespace marrow::compare {
 
+/// Whether a name of a path holds a wildcard.
+bool is_pattern(const std::string& name);
+
 /// Finds the paths that match a pattern such as data/*/ct. Unlike glob(3), it says what it could not read, and it ends
 /// even if links form a circle.
 class FolderSearch {

@@ -131,6 +131,23 @@ TEST_F(ExperimentFaults, FaultOfThePipelineIsSaidOnce) {
   EXPECT_NE(diagnostics.text().find("p.yaml:9:1: error: unknown key 'extra'"), std::string::npos) << diagnostics.text();
 }
 
+TEST_F(ExperimentFaults, CasesAreNamedByTheirLastWildcard) {
+  for (const char* one : {"by/anna/x/case", "by/bela/x/case"}) std::filesystem::create_directories(scratch.path / one);
+  scratch.write("by/anna/x/case/case.yaml", "");
+  const auto names = [&](const std::string& pattern) {
+    std::string text;
+    for (const auto& one : read(kHead + ("cases: {folders: [" + pattern + "]}\n") + kAfterCases).cases)
+      text += one.name + " ";
+    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+    return text;
+  };
+  EXPECT_EQ(names("by/*/x/case"), "anna bela ");
+  EXPECT_EQ(names("by/*/x/case/"), "anna bela ");
+  EXPECT_EQ(names("./by/*/x/case/case.yaml"), "anna ");
+  EXPECT_EQ(names("by/anna/x/case"), "case ");
+  EXPECT_EQ(names("by/a*"), "anna ");
+}
+
 TEST_F(ExperimentFaults, Cases) {
   const auto cases = [](const std::string& lines) { return kHead + ("cases: " + lines) + "\n" + kAfterCases; };
   const std::string no_cases = "name folders, as  folders: [data/*]  or a simulation";

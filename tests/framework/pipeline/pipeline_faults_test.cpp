@@ -46,6 +46,18 @@ TEST_F(PipelineTest, SyntaxErrorTellsWhatIsNotClosed) {
             std::string::npos);
   EXPECT_EQ(places("marrow: 1\n\tnodes: {}\n").find("closed"), std::string::npos);
 }
+
+TEST_F(PipelineTest, SyntaxErrorSaysWhatToQuote) {
+  const auto hint = [&](const std::string& help) {
+    read("marrow: 1\nhelp: " + help + "\nnodes: {}\n");
+    return diagnostics.sorted()[0].hint;
+  };
+  EXPECT_EQ(hint("edges: Canny's"),
+            "write a text that has a colon and a blank in it in quotes, as  help: \"edges: Canny's\"");
+  for (const char* help : {"@home", "`edges`", "%5"})
+    EXPECT_EQ(hint(help), "write a text that begins with @, ` or % in quotes");
+}
+
 TEST_F(PipelineTest, UnreadableFile) {
   marrow::read_pipeline(scratch.path / "none.yaml", {}, test_catalogue(), diagnostics);
   EXPECT_NE(diagnostics.text().find("the pipeline file cannot be read"), std::string::npos);

@@ -105,11 +105,13 @@ class Femur(Runs):
         number = r"[-+]?[0-9.e-]+"
         self.assertRegex(
             told,
-            r"First difference: node 'model' \(mesh.marching_cubes\)\n  why: option 'smoothing' is 3, was 0\n"
+            r"First difference: node 'model' \(mesh.marching_cubes\)\n  why: option 'smoothing' is 3, was 0 "
+            r"\(--set model.smoothing=3, was the default\)\n"
             r"  mesh distal  \d+ of \d+ vertices lie elsewhere, by at most %s mm\n" % number,
         )
         self.assertIn(
-            "Node 'edges' (edges.adaptive_relaxation) differs by itself, too\n  why: option 'high' is 80, was 75\n",
+            "Node 'edges' (edges.adaptive_relaxation) differs by itself, too\n  why: option 'high' is 80, was 75 (--set"
+            " edges.high=80, was %s:17)\n" % FEMUR.resolve(),
             told,
         )
         self.assertIn(

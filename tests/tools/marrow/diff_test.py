@@ -27,7 +27,7 @@ class Diff(Runs):
         self.expect(
             1,
             "First difference: node 'other' (test.constant)\n"
-            "  why: option 'value' is 4.25, was 4\n"
+            "  why: option 'value' is 4.25, was 4 (--set other.value=4.25, was p.yaml:5)\n"
             "  number  value                    4.25, was 4 (+0.25)\n"
             "In consequence differ: sum, drawn\n"
             "The same in both runs: 2 nodes\n\n"
@@ -58,13 +58,18 @@ class Diff(Runs):
         )
         self.assertIn(
             (
-                "Node 'first' (test.constant) differs by itself, too\n  why: option 'value' is 5, was 3\n  why: option"
-                " 'word' is two, was one\n"
+                "Node 'first' (test.constant) differs by itself, too\n  why: option 'value' is 5, was 3"
+                " (--set first.value=5, was p.yaml:4)\n  why: option"
+                " 'word' is two, was one (--set first.word=two, was p.yaml:4)\n"
             ),
             text,
         )
         self.assertIn("In consequence differ: sum, drawn\nThe same in both runs: 1 node\n", text)
-        self.assertIn("Also changed: node 'other': option 'word' is three, was one (with the same result)\n", text)
+        self.assertIn(
+            "Also changed: node 'other': option 'word' is three, was one (--set other.word=three, was the default) "
+            "(with the same result)\n",
+            text,
+        )
 
     def test_a_seed_that_nothing_draws_from(self):
         text = CHAIN.replace("  draw: {uses: test.draw}\n", "").replace("b: draw", "b: other")
@@ -264,12 +269,12 @@ class Diff(Runs):
         self.expect(
             1,
             "First difference: node 'draw' (test.constant)\n"
-            "  why: it uses test.constant, used test.draw\n"
+            "  why: it uses test.constant, used test.draw (--set draw.uses=test.constant, was p.yaml:3)\n"
             "  number  value                    1, was %.5g (%+.3g)\n"
             "Node 'passed' (test.fail_above) differs by itself, too\n"
             "  in the first run it was done\n"
             "  in the second run it failed: the number is too large; give a smaller one\n"
-            "  why: option 'value' is 6, was 7\n"
+            "  why: option 'value' is 6, was 7 (--set passed.value=6, was p.yaml:7)\n"
             "In consequence not run: drawn\n"
             "The same in both runs: 3 nodes\n\n"
             "Outputs that only the first run has: drawn\n"
@@ -297,7 +302,7 @@ class Diff(Runs):
                 "First difference: node 'f' (test.fail_above)\n"
                 "  in the first run it was done\n"
                 "  in the second run it failed: z: the number is too large; give a smaller one\n"
-                "  why: option 'value' is 250, was 1000\n"
+                "  why: option 'value' is 250, was 1000 (--set f.value=250, was p.yaml:4)\n"
                 "  number z  it is not there\n"
                 "In consequence not run: n\n"
                 "The same in both runs: 1 node\n\n"

@@ -73,6 +73,34 @@ class Extends(Case):
         told = self.run_marrow("show", "run", "v=8", code=2).stderr
         self.assertIn("values of inputs are for --resolved", told)
 
+    def test_plan_says_where_nodes_of_other_files_are_written(self):
+        (self.scratch / "mine.yaml").write_text(
+            "marrow: 1\nextends: whole.yaml\nset:\n  d.value: 5\n  sum.uses: test.add\n"
+        )
+        told = self.run_marrow("plan", "mine.yaml").stdout
+        self.assertRegex(told, r"(?m)^c +test\.constant +runs: it has not run before \(base\.yaml:4\)$")
+        self.assertRegex(told, r"(?m)^d +test\.constant +.* \(base\.yaml:5, value: mine\.yaml:4\)$")
+        self.assertRegex(told, r"(?m)^sum +test\.add +.* \(base\.yaml:6, uses: mine\.yaml:5\)$")
+        self.assertRegex(told, r"(?m)^plus/sum +test\.add +.* \(part\.yaml:5\)$")
+        self.assertRegex(self.run_marrow("plan", "base.yaml").stdout, r"(?m)^c +test\.constant .*before$")
+        written = json.loads(self.run_marrow("plan", "mine.yaml", "--json").stdout)["nodes"]["c"]["written"]
+        self.assertEqual(written, "base.yaml:4")
+
+    def test_diff_says_which_file_changed_an_option(self):
+        (self.scratch / "mine.yaml").write_text("marrow: 1\nextends: whole.yaml\nset: {d.value: 5}\n")
+        self.run_marrow("run", "whole.yaml", "--out", "a")
+        self.run_marrow("run", "mine.yaml", "--set", "d.count=2", "--out", "b")
+        told = self.run_marrow("diff", "a", "b", code=1).stdout
+        self.assertIn("why: option 'value' is 5, was 4 (mine.yaml:3, was base.yaml:5)", told)
+        self.assertIn("why: option 'count' is 2, was 0 (--set d.count=2, was the default)", told)
+
+    def test_a_far_file_is_named_whole(self):
+        deep = self.scratch / "one" / "two"
+        deep.mkdir(parents=True)
+        (deep / "mine.yaml").write_text("marrow: 1\nextends: ../../base.yaml\n")
+        told = self.run_marrow("plan", deep / "mine.yaml").stdout
+        self.assertIn("(%s:4)" % (self.scratch.resolve() / "base.yaml"), told)
+
     def test_graph_says_where_nodes_are_written(self):
         told = self.run_marrow("graph", "whole.yaml").stdout
         self.assertRegex(told, r"(?m)^plus/sum  \(test\.add\)  \[\S*part\.yaml:5\]$")

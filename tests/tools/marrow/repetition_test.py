@@ -138,7 +138,11 @@ class Repetition(Runs):
         self.run_into("a", OVER)
         self.run_into("b", OVER, "--set", "r.body.before.value=2")
         told = self.diff(1, "a", "b")
-        self.assertIn("First difference: node 'r/before' (test.constant)\n  why: option 'value' is 2, was 1\n", told)
+        self.assertIn(
+            "First difference: node 'r/before' (test.constant)\n  why: option 'value' is 2, was 1 "
+            "(--set r.body.before.value=2, was sum.yaml:3)\n",
+            told,
+        )
         self.assertIn("In consequence differ: r, r/sum\n", told)
         self.run_into("c", OVER)
         self.assertIn("identical: all 4 nodes came out the same", self.diff(0, "a", "c"))

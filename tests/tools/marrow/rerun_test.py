@@ -182,7 +182,10 @@ class Rerun(Runs):
         self.assertEqual(result.returncode, 0, result.stderr)
         told = self.rerun(0, "out/cells/b/0/0").stdout
         self.assertIn("identical: the only node came out the same\n", told)
-        self.assertIn("  why: option 'value' is 5, was 1\n", self.diff(1, "out/cells/a/0/0", "out/cells/b/0/0"))
+        self.assertIn(
+            "  why: option 'value' is 5, was 1 (e.yaml:7, was the default)\n",
+            self.diff(1, "out/cells/a/0/0", "out/cells/b/0/0"),
+        )
 
     def test_for_scripts(self):
         self.run_into("a", CHAIN)

@@ -33,6 +33,16 @@ std::string is_was(const std::string& what, const std::string* before, const std
   return what + " is " + *now + (before ? ", was " + *before : ", was not there");
 }
 
+/// " (mine.yaml:4, was femur.yaml:17)" if the file that says it is another one, or now the command line.
+std::string other_place(const std::string& before, const std::string& now) {
+  const auto file_of = [](const std::string& place) {
+    return place.starts_with("--set ") ? std::string("--set") : place.substr(0, place.rfind(':'));
+  };
+  if (file_of(before) == file_of(now)) return "";
+  const auto shown = [](const std::string& place) { return place.empty() ? std::string("the default") : place; };
+  return " (" + shown(now) + ", was " + shown(before) + ")";
+}
+
 template <class Map>
 std::set<std::string> names_in(const Map& a, const Map& b) {
   std::set<std::string> names;
@@ -236,7 +246,8 @@ class Comparer {
 
   std::vector<Change> own_changes(const RecordedNode& before, const RecordedNode& now, bool with_builds) const {
     if (before.uses != now.uses)
-      return {{"uses", now.id, "", before.uses, now.uses, "it uses " + now.uses + ", used " + before.uses}};
+      return {{"uses", now.id, "", before.uses, now.uses,
+               "it uses " + now.uses + ", used " + before.uses + other_place(before.uses_place, now.uses_place)}};
     std::vector<Change> changes;
     if (with_builds && before.build_id != now.build_id && !before.build_id.empty() && !now.build_id.empty())
       changes.push_back(other_build(before, now));
@@ -286,7 +297,9 @@ class Comparer {
     }
     const std::string old_short = old_text ? shortened(*old_text) : "", now_short = text ? shortened(*text) : "";
     if (old_text && text && old_short == now_short) return "";
-    return is_was(option, old_text ? &old_short : nullptr, text ? &now_short : nullptr);
+    const std::string *old_place = find_in(before.option_places, name), *place = find_in(now.option_places, name);
+    return is_was(option, old_text ? &old_short : nullptr, text ? &now_short : nullptr) +
+           other_place(old_place ? *old_place : "", place ? *place : "");
   }
 
   /// Inputs with another wire. With `by_value`, only those that got another value.

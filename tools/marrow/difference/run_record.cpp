@@ -128,6 +128,9 @@ void add_record(const json& recorded, RecordedNode& node) {
   node.library = recorded.value("library", "");
   node.build_id = build_id_of(recorded, "build_id");
   node.random = recorded.value("random", false);
+  const json written = map_in(recorded, "written"), option_places = map_in(written, "options");
+  node.uses_place = written.value("uses", "");
+  for (const auto& [option, place] : option_places.items()) node.option_places[option] = place;
   const json functions = list_in(recorded, "functions"), items = map_in(recorded, "items");
   const json inputs = map_in(recorded, "inputs"), files = map_in(recorded, "files");
   for (const auto& [name, key] : recorded.at("keys").items()) {

@@ -38,8 +38,10 @@ struct RecordedNode {
   std::string id, uses, status, reason, library, build_id;
   bool random = false;
   std::map<std::string, std::string> options;
-  std::map<std::string, RecordedWire> wires;      ///< by port
-  std::map<std::string, std::string> input_keys;  ///< by port
+  std::string uses_place;                            ///< where what it uses is written: "femur.yaml:17"
+  std::map<std::string, std::string> option_places;  ///< the same of each option that has not its default value
+  std::map<std::string, RecordedWire> wires;         ///< by port
+  std::map<std::string, std::string> input_keys;     ///< by port
   std::map<std::string, std::optional<std::string>>
       files;  ///< by option of type path: digest of the content that it names; nothing if that did not exist
   std::vector<RecordedOutput> outputs;

@@ -21,6 +21,9 @@ function field(label, control, remark, more) {
       el('div', {class: 'control'}, control, more || ''), el('p', {class: 'note', id: id + '-about'}, remark));
 }
 
+// What holds where this file does not give the option: the value of the file that it extends, or the default.
+const unwritten = (option) => option.written ? option.now + ', written in ' + option.written : option.default;
+
 function control(option, written, changed) {
   const attributes = {'data-option': option.name};
   const choices = option.type === 'true/false' ? ['true', 'false'] : option.choices;
@@ -28,13 +31,14 @@ function control(option, written, changed) {
   if (choices && !typed)
     return el(
         'select', {...attributes, onchange: (event) => changed(event.target.value || null)},
-        el('option', {value: '', selected: written === undefined}, 'default (' + option.default + ')'),
+        el('option', {value: '', selected: written === undefined},
+           option.written ? unwritten(option) : 'default (' + option.default + ')'),
         choices.map((value) => el('option', {value, selected: value === written}, value)));
   return el('input', {
     ...attributes,
     type: 'text',
     value: written === undefined ? '' : written,
-    placeholder: option.required ? 'required' : option.default,
+    placeholder: option.required && !option.written ? 'required' : unwritten(option),
     onchange: (event) => changed(event.target.value === '' ? null : event.target.value)
   });
 }
@@ -44,9 +48,10 @@ function optionField(option, written, edit) {
   const given = written !== undefined;
   const about = [
     option.help, option.range,
-    option.required ? 'required' :
-        given       ? 'default ' + option.default :
-                      'at its default'
+    option.required    ? 'required' :
+        given          ? 'default ' + option.default :
+        option.written ? 'written in ' + option.written :
+                         'at its default'
   ].filter(Boolean).join('; ');
   return field(
       option.name, control(option, written, changed), about,
@@ -121,12 +126,15 @@ function elsewhere(id, node, head) {
   return el(
       'div', {}, head, el('p', {}, node.info ? node.info.summary : ''),
       el('p', {class: 'note'}, 'Written in ',
-         el('a', {href: Shell.addressOf('pipeline', node.file), 'data-do': 'file'}, node.file),
-         ', line ' + node.line + '. To change it in this file only, write  set: {' + change + '.' +
-             (first ? first.name : 'option') + ': …}'),
+         el('a', {href: Shell.addressOf('pipeline', node.file), 'data-do': 'file'}, node.file), ', line ' + node.line,
+         node.uses_written ? '; what it uses is written in ' + node.uses_written : '',
+         '. To change it in this file only, write  set: {' + change + '.' + (first ? first.name : 'option') + ': …}'),
       node.info && node.info.options.length ?
           el('table', {},
-             node.info.options.map((option) => el('tr', {}, el('td', {}, option.name), el('td', {}, option.now)))) :
+             node.info.options.map(
+                 (option) =>
+                     el('tr', {}, el('td', {}, option.name), el('td', {}, option.now),
+                        el('td', {class: 'note'}, option.written ? 'written in ' + option.written : '')))) :
           '');
 }
 

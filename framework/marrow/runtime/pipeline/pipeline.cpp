@@ -65,6 +65,7 @@ class Resolver {
     PipelineNode node;
     node.id = written.id;
     node.place = written.place;
+    node.uses_place = written.uses_place;
     node.may_fail = written.may_fail;
     if (written.stands_for) {
       node.stands_for_input = true;

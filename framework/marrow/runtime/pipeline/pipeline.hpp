@@ -37,6 +37,7 @@ struct Repetition;
 struct PipelineNode {
   std::string id;
   Place place;
+  Place uses_place = {};  ///< where what it uses is written; another one than `place` if a change says it
   NodeInfo info;
   Apart apart = Apart::no;           ///< as its kind declares
   bool may_fail = false;             ///< if it fails, its outputs are absent, and the run continues
@@ -160,6 +161,11 @@ std::string resolved_yaml(const Pipeline& pipeline);
 /// The same, with comments that say in which file and line each node is written, and each value that is written
 /// elsewhere. Files are relative to the pipeline's folder.
 std::string resolved_yaml_with_places(const Pipeline& pipeline);
+
+/// The place as "femur.yaml:17", relative to the folder of `file` or to the one above it, so that the text is the same
+/// wherever that lies; elsewhere the whole path. The change itself for a value of the command line. Empty for a
+/// default.
+std::string place_text(const Place& place, const std::filesystem::path& file);
 
 /// Why a value of this type cannot become a file.
 std::string no_writer(const TypeInfo& type);

@@ -79,9 +79,12 @@ class GraphWriter {
  private:
   void write(const PipelineNode& node) {
     out_ << YAML::Key << node.id << YAML::Value;
-    if (file_) out_ << YAML::Comment(shown(node.place));
+    if (file_) out_ << YAML::Comment(place_text(node.place, *file_));
     out_ << YAML::BeginMap;
-    if (!node.repetition) out_ << YAML::Key << "uses" << YAML::Value << node.info.name;
+    if (!node.repetition) {
+      out_ << YAML::Key << "uses" << YAML::Value << node.info.name;
+      if (file_ && node.uses_place.file != node.place.file) write_place(node, node.uses_place);
+    }
     if (node.may_fail) out_ << YAML::Key << "may_fail" << YAML::Value << true;
     if (!node.wires.empty()) {
       out_ << YAML::Key << "in" << YAML::Value << YAML::Flow << YAML::BeginMap;
@@ -127,18 +130,8 @@ class GraphWriter {
     if (place.file.empty())
       out_ << YAML::Comment("default");
     else if (place.file != node.place.file)
-      out_ << YAML::Comment(shown(place));
+      out_ << YAML::Comment(place_text(place, *file_));
   }
-
-  /// Relative to the whole pipeline, so that the text is the same wherever that lies.
-  std::string shown(const Place& place) const {
-    if (place.line == 0) return on_one_line(place.file);
-    const std::filesystem::path folder = std::filesystem::absolute(*file_).parent_path();
-    return formatted("{}:{}", on_one_line(std::filesystem::absolute(place.file).lexically_relative(folder).string()),
-                     place.line);
-  }
-
-  static std::string on_one_line(const std::string& text) { return cut(printable(text), 200); }
 
   void write(const Repetition& repetition) {
     if (!repetition.is_loop) out_ << YAML::Key << "over" << YAML::Value << repetition.axis;
@@ -210,6 +203,15 @@ std::vector<const PipelineNode*> called_nodes(const Pipeline& pipeline) {
 std::string resolved_yaml(const Pipeline& pipeline) { return yaml_text(pipeline, nullptr); }
 
 std::string resolved_yaml_with_places(const Pipeline& pipeline) { return yaml_text(pipeline, &pipeline.file); }
+
+std::string place_text(const Place& place, const std::filesystem::path& file) {
+  const auto on_one_line = [](const std::string& text) { return cut(printable(text), 200); };
+  if (place.line == 0) return on_one_line(place.file);
+  const std::filesystem::path whole = std::filesystem::absolute(place.file).lexically_normal();
+  const std::string relative =
+      whole.lexically_relative(std::filesystem::absolute(file).lexically_normal().parent_path()).string();
+  return formatted("{}:{}", on_one_line(relative.starts_with("../..") ? whole.string() : relative), place.line);
+}
 
 std::string no_writer(const TypeInfo& type) { return "no plugin writes values of type '" + type.id + "'"; }
 

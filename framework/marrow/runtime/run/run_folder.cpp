@@ -138,9 +138,19 @@ bool took_part(const NodeRecord& record) {
   return record.status != NodeRecord::Status::not_needed || !record.outputs.empty();
 }
 
-json json_of(const NodeRecord& record, const PipelineNode& node, const Catalogue& catalogue) {
+/// Where the node is written, what it uses, and each of its options that has not its default value.
+json places_of(const PipelineNode& node, const fs::path& file) {
+  json options = json::object();
+  for (std::size_t i = 0; i < node.option_places.size(); ++i)
+    if (const std::string text = place_text(node.option_places[i], file); !text.empty())
+      options[node.info.options[i].name] = text;
+  return {{"node", place_text(node.place, file)}, {"uses", place_text(node.uses_place, file)}, {"options", options}};
+}
+
+json json_of(const NodeRecord& record, const PipelineNode& node, const fs::path& file, const Catalogue& catalogue) {
   json j = {{"id", node.id},
             {"uses", node.info.name},
+            {"written", places_of(node, file)},
             {"status", status_name(record.status)},
             {"calls", record.calls},
             {"cached", record.cached},
@@ -318,7 +328,7 @@ void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, 
   const auto inputs_of_node = [&](const PipelineNode& node) { return inputs_of(node, result); };
   for_each_node(pipeline, result.nodes, "", inputs_of_node,
                 [&](const PipelineNode& node, const NodeRecord& done, const std::string& name, const json& inputs) {
-                  json j = json_of(done, node, catalogue);
+                  json j = json_of(done, node, pipeline.file, catalogue);
                   j["id"] = name;
                   j["inputs"] = inputs;
                   record["nodes"].push_back(std::move(j));
