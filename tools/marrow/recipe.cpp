@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // `marrow recipe`: the pipeline file that a picture, a page or the folder of a run carries.
+#include <unistd.h>
+
 #include <cstdio>
+#include <sstream>
 
 #include "command_options.hpp"
 #include "commands.hpp"
@@ -101,6 +104,14 @@ void remove_recipe(const RecipeRequest& request) {
   say_written(request.out);
 }
 
+/// On a terminal, nothing in a file of somebody else may command it; elsewhere, the text stays as it is.
+void print_text(const std::string& text) {
+  const bool is_terminal = isatty(STDOUT_FILENO);
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);)
+    std::printf("%s\n", (is_terminal ? printable(line) : line).c_str());
+}
+
 void print_recipe(const RecipeRequest& request) {
   const std::vector<NamedRecipe> recipes = recipes_in(request.given);
   if (request.json && request.variant.empty()) {
@@ -110,10 +121,7 @@ void print_recipe(const RecipeRequest& request) {
   }
   const NamedRecipe& recipe = chosen(recipes, request);
   if (request.json) return print_as_json(nlohmann::json::array({{{"variant", recipe.name}, {"recipe", recipe.text}}}));
-  if (request.out.empty()) {
-    std::fputs(recipe.text.c_str(), stdout);
-    return;
-  }
+  if (request.out.empty()) return print_text(recipe.text);
   write_text_file(request.out, recipe.text, Kinds::files_and_pipes);
   say_written(request.out);
 }
@@ -129,13 +137,17 @@ void add_recipe(CLI::App& app, int& code) {
                    "a picture (PNG) of a run, a page of 'marrow show' or 'marrow compare', or the folder of a run")
       ->required()
       ->type_name("PATH");
-  command->add_option("-o,--out", request->out, "file to write instead; an existing one is replaced")
-      ->type_name("FILE");
-  command->add_option("--variant", request->variant, "of a comparison's page: the variant whose recipe it is")
-      ->type_name("NAME");
+  CLI::Option* out = command->add_option("-o,--out", request->out, "file to write instead; an existing one is replaced")
+                         ->type_name("FILE");
+  CLI::Option* variant =
+      command->add_option("--variant", request->variant, "of a comparison's page: the variant whose recipe it is")
+          ->type_name("NAME");
   CLI::Option* remove = command->add_flag(
       "--remove", request->remove, "write the picture without its recipe to --out: the same pixels, no paths of yours");
-  command->add_flag("--json", request->json, "print all recipes as JSON: [{variant, recipe}]")->excludes(remove);
+  command->add_flag("--json", request->json, "print all recipes as JSON: [{variant, recipe}]")
+      ->excludes(remove)
+      ->excludes(out);
+  remove->excludes(variant);
   command->callback([request, &code] {
     if (request->remove)
       remove_recipe(*request);

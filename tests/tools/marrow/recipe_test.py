@@ -3,8 +3,11 @@
 import html.parser
 import importlib.util
 import json
+import os
+import pty
+import subprocess
 
-from harness import skip
+from harness import MARROW, skip
 from harness.program import Case, main
 
 if not importlib.util.find_spec("PIL"):
@@ -199,6 +202,18 @@ class Recipe(Case):
         self.assertIn(
             "missing.png cannot be read: No such file or directory", self.good("recipe", "missing.png", code=2)
         )
+
+    def test_it_commands_no_terminal(self):
+        text = PngImagePlugin.PngInfo()
+        text.add_itxt(KEYWORD, "marrow: 1\n# \x1b[2J\u202e\n")
+        Image.new("L", (2, 2)).save(self.scratch / "a.png", pnginfo=text)
+        self.assertEqual(self.good("recipe", "a.png"), "marrow: 1\n# \x1b[2J\u202e\n", "elsewhere it is as it is")
+        reader, terminal = pty.openpty()
+        subprocess.run([str(MARROW), "recipe", "a.png"], cwd=self.scratch, stdout=terminal, check=True)
+        os.close(terminal)
+        told = os.read(reader, 1000)
+        os.close(reader)
+        self.assertEqual(told, b"marrow: 1\r\n# \\x1b[2J\\u202e\r\n")
 
     def test_what_is_damaged(self):
         outputs = self.run_of_case()
