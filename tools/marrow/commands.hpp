@@ -64,6 +64,7 @@ void add_show(CLI::App& app, int& code);
 void add_check(CLI::App& app, int& code);
 void add_plan(CLI::App& app, int& code);
 void add_cache(CLI::App& app, int& code);
+void add_recipe(CLI::App& app, int& code);
 void add_list(CLI::App& app, int& code);
 void add_inspect(CLI::App& app, int& code);
 void add_watch(CLI::App& app, int& code);

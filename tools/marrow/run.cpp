@@ -270,7 +270,7 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   RunOutcome outcome;
   outcome.result = run_pipeline(pipeline, catalogue, settings);
   progress.clear();
-  outcome.written = folder.write_outputs(pipeline, outcome.result, catalogue);
+  outcome.written = folder.write_outputs(pipeline, outcome.result, catalogue, recipe_of_run(pipeline, settings));
   folder.write_record(pipeline, outcome.result, settings, catalogue, arguments, outcome.written);
   const std::string untidy = settings.store ? settings.store->tidy(settings.cancelled) : "";
   if (!untidy.empty()) note("the store of results is not tidied up: " + untidy);

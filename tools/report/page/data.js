@@ -40,10 +40,12 @@
 //     poses: [{mesh: index, name: "result" | "truth" | "start", world_from_model: [16]}],
 //     views: [{name, width_px, height_px, intrinsics: [9], camera_from_world: [16], image: picture id}]}}
 //   graph: {nodes: [{id, uses, options: {}, differs: {variant name: text}}], edges: [{from, to, port}]}
+// recipes.js reads the recipes from an element of their own.
 // A camera is OpenCV's pinhole: +z to the detector, u right, v down, integer at pixel centres, origin at the X-ray
 // source. "summary" and "comparisons" are left out where kind is "run"; any of pictures, convergence, landscape, scene
 // may be missing.
 import {withUnit} from './dom.js';
+import * as Recipes from './recipes.js';
 
 const FORMAT = 1;
 
@@ -140,6 +142,7 @@ export function load() {
         'This page reads format ' + FORMAT + ' of a report\'s data, the data are in format ' + data.format +
         ': make the report again with one version of marrow.');
   }
+  data.recipes = Recipes.load();
   return index(complete(data));
 }
 

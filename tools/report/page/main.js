@@ -14,6 +14,7 @@ import * as Parts from './parts.js';
 import * as Passes from './passes.js';
 import * as Pictures from './pictures.js';
 import * as Plots from './plots.js';
+import * as Recipes from './recipes.js';
 import * as Response from './response.js';
 import {SceneView} from './scene.js';
 import * as Sequence from './sequence.js';
@@ -281,7 +282,7 @@ function repeat(data) {
       'repeat', 'Repeat it', null, experiment.command && Dom.command(experiment.command),
       el('div', {class: 'scroll'}, Dom.valueTable(lines.map(([name, value]) => [name, String(value)]))),
       file(data.is_run ? 'The run’s settings' : 'The experiment’s file', experiment.text),
-      file('The pipeline’s file', experiment.pipeline_text),
+      file('The pipeline’s file', experiment.pipeline_text), ...Recipes.all(data),
       (experiment.plugins || []).length > 0 &&
           el('details', {}, el('summary', {}, 'Plugins and their build ids'),
              el('div', {class: 'scroll'},
@@ -306,7 +307,7 @@ function summary(data) {
   return [
     el('div', {class: 'head'}, el('p', {class: 'kicker'}, data.is_run ? 'Run' : 'Comparison'),
        el('h1', {}, experiment.name || 'Unnamed'), experiment.help && el('p', {class: 'lead'}, experiment.help),
-       !data.is_run && el('p', {class: 'facts'}, Summary.facts(data))),
+       el('p', {class: 'facts'}, data.is_run ? Recipes.link(data, 0) : Summary.facts(data))),
     verdict, head
   ];
 }
