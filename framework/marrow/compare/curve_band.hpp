@@ -26,7 +26,7 @@ inline constexpr std::size_t kFewestTrials = 6;
 /// The bands suppose that trials are independent and deviate symmetrically from the true curve. The simultaneous one
 /// takes the 95 % quantile of the largest |t| over all times, in 4999 draws in which the deviation of each whole curve
 /// from the mean keeps or changes its sign and t is computed anew (the multiplier-t bootstrap with Rademacher's
-/// multipliers: Telschow and Schwartzman, J Stat Plan Inference 2022, 216:70). In 300 simulated experiments each (5 to
+/// multipliers: Telschow and Schwartzman, J Stat Plan Inference 2022, 216:70). In 300 simulated experiments each (6 to
 /// 20 trials of 60 times; short, middle and long memory; normal and heavy-tailed), it held the whole curve in 92 to
 /// 97 %. The same trials and seed give the same bytes.
 ///

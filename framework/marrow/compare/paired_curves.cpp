@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
 constexpr double kSameTime = 0.05, kEqual = 0.001;  // of a step: on one raster, and where one is interpolated
-constexpr double kFarthest = 1.5;    // steps between two neighbours
-constexpr double kSameStep = 0.001;  // relative
+constexpr double kFarthest = 1.5;                   // steps between two neighbours
+constexpr double kSameStep = 0.001;                 // relative
 
 double step_of(const Curve& curve, const char* which) {
   if (curve.at.size() != curve.values.size())
@@ -46,8 +46,7 @@ bool on_one_raster(const Curve& first, const Curve& second, double step) {
     const double steps = (at - first.at.front()) / step;
     return std::abs(steps - std::round(steps)) <= kSameTime;
   };
-  return std::all_of(first.at.begin(), first.at.end(), is_on) &&
-         std::all_of(second.at.begin(), second.at.end(), is_on);
+  return std::all_of(first.at.begin(), first.at.end(), is_on) && std::all_of(second.at.begin(), second.at.end(), is_on);
 }
 
 /// The curve's value at a time.

@@ -46,9 +46,13 @@ TEST(PairedCurves, FramesThatOnlyOneHasStay) {
 }
 
 TEST(PairedCurves, RefuseWhatCannotBePaired) {
-  EXPECT_EQ(message_of([] { pair_curves({{1, 2}, {1}}, {{1, 2}, {1, 2}}); }),
+  EXPECT_EQ(message_of([] {
+              pair_curves({{1, 2}, {1}}, {{1, 2}, {1, 2}});
+            }),
             "the first curve has 2 times and 1 values");
-  EXPECT_EQ(message_of([] { pair_curves({{1, 2}, {1, 2}}, {{1, 1}, {1, 2}}); }),
+  EXPECT_EQ(message_of([] {
+              pair_curves({{1, 2}, {1, 2}}, {{1, 1}, {1, 2}});
+            }),
             "the times of the second sequence do not rise: 1 comes after 1");
 }
 
@@ -72,7 +76,9 @@ TEST(CurveBand, IsAsWideAsTheTrialsScatterAndTheSimultaneousOneIsWider) {
 }
 
 TEST(CurveBand, RefusesTooFewTrialsAndUnlikeOnes) {
-  EXPECT_EQ(message_of([] { mean_band(std::vector<std::vector<double>>(5, {1, 2})); }),
+  EXPECT_EQ(message_of([] {
+              mean_band(std::vector<std::vector<double>>(5, {1, 2}));
+            }),
             "a band over trials needs at least 6, got 5");
   std::vector<std::vector<double>> trials(6, {1, 2});
   trials[4] = {1};

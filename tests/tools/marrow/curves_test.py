@@ -28,7 +28,9 @@ class Two(Curves):
 
 class Sequences(Two):
     def test_the_table_and_the_sentence(self):
-        files = self.two({"frame": FRAMES, "flexion_deg": WAVE}, {"frame": FRAMES, "flexion_deg": [v + 2 for v in WAVE]})
+        files = self.two(
+            {"frame": FRAMES, "flexion_deg": WAVE}, {"frame": FRAMES, "flexion_deg": [v + 2 for v in WAVE]}
+        )
         told = self.curves(*files)
         self.assertTrue(told.startswith("first: a.csv\nsecond: b.csv (differences are second - first)\n"), told)
         self.assertRegex(told, r"flexion_deg +deg +40 +40 +0 % +0 % +2 ")
@@ -108,7 +110,9 @@ class Sequences(Two):
         self.assertEqual([float(row["first"]) for row in rows], WAVE)
         self.assertEqual({(row["figure"], row["unit"], row["time_unit"]) for row in rows}, {("x_mm", "mm", "frame")})
         self.assertEqual(self.page_data()["over_time"]["sequences"][0]["figures"][0]["first"], WAVE)
-        self.assertIn("out is not a new or empty folder; choose another with --out", self.refused(*files, "--out", "out"))
+        self.assertIn(
+            "out is not a new or empty folder; choose another with --out", self.refused(*files, "--out", "out")
+        )
 
     def test_only_the_figures_that_are_wanted(self):
         files = self.two(*[{"frame": FRAMES, "x_mm": WAVE, "flexion_deg": WAVE}] * 2)

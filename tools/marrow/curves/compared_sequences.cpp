@@ -73,8 +73,7 @@ std::vector<std::string> names_of(const std::vector<FigureOverTime>& figures) {
 
 std::string listed(const std::vector<std::string>& names) {
   std::string text;
-  for (std::size_t i = 0; i < std::min<std::size_t>(names.size(), 8); ++i)
-    text += (i ? ", '" : "'") + names[i] + "'";
+  for (std::size_t i = 0; i < std::min<std::size_t>(names.size(), 8); ++i) text += (i ? ", '" : "'") + names[i] + "'";
   return text + (names.size() > 8 ? formatted(" and {} more", names.size() - 8) : "");
 }
 
@@ -96,7 +95,8 @@ std::vector<FigurePair> common_figures(const Recording& first, const Recording& 
   std::vector<FigurePair> common;
   std::vector<std::string> names;
   for (const FigureOverTime& figure : both.first)
-    if (const FigureOverTime* other = named(both.second, figure.name); other && named(both.first, figure.name) == &figure) {
+    if (const FigureOverTime* other = named(both.second, figure.name);
+        other && named(both.first, figure.name) == &figure) {
       common.push_back({&figure, other});
       names.push_back(figure.name);
     }
@@ -139,7 +139,8 @@ ComparedFigure compared(const FigurePair& given, const CurveSettings& settings, 
   figure.difference = difference_of(figure.pair);
   const bool one_knows = given.first->times.seconds.empty() != given.second->times.seconds.empty();
   if (one_knows && settings.by != TimeBase::frames)
-    note_once(notes, "only one of the two says at which second its frames are, so frames are compared by their numbers");
+    note_once(notes,
+              "only one of the two says at which second its frames are, so frames are compared by their numbers");
   if (figure.pair.interpolated != compare::PairedCurves::Interpolated::none) {
     const bool is_first = figure.pair.interpolated == compare::PairedCurves::Interpolated::first;
     note_once(notes, formatted("the times differ: the {} sequence was interpolated linearly at those of the {}",
@@ -166,7 +167,8 @@ ComparedSequences compare_sequences(const Recording& first, const Recording& sec
       result.notes.push_back("'" + pair.first->name + "' is left out: " + error.what());
     }
   }
-  if (result.figures.empty()) throw Error("no figure of " + first.name + " and " + second.name + " could be compared; " + fault);
+  if (result.figures.empty())
+    throw Error("no figure of " + first.name + " and " + second.name + " could be compared; " + fault);
   return result;
 }
 

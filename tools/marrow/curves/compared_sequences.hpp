@@ -46,10 +46,10 @@ struct TrialFigure {
   bool in_seconds = false;
   std::vector<double> at;  ///< the times at which all trials have a difference
   std::vector<std::string> trials;
-  std::vector<std::vector<double>> differences;  ///< of each trial, at these times
-  double bias = 0;                               ///< mean of the trials' mean differences
-  std::optional<compare::Interval> interval;     ///< of `bias`, by Student's t over the trials
-  std::optional<compare::CurveBand> band;        ///< nothing with fewer than compare::kFewestTrials
+  std::vector<std::vector<double>> differences;    ///< of each trial, at these times
+  double bias = 0;                                 ///< mean of the trials' mean differences
+  std::optional<compare::Interval> interval;       ///< of `bias`, by Student's t over the trials
+  std::optional<compare::CurveBand> band;          ///< nothing with fewer than compare::kFewestTrials
   std::vector<std::pair<double, double>> outside;  ///< times during which the simultaneous band is without 0
 };
 

@@ -36,20 +36,19 @@ std::string lag_text(const ComparedFigure& figure) {
   const auto& lag = figure.difference.lag;
   if (!lag) return "";
   if (std::abs(lag->lag) < 0.5 * figure.pair.step) return ", and no lag matches better";
-  const std::string by = figure.in_seconds ? with_unit(std::abs(lag->lag), "s")
-                                           : short_number(std::abs(lag->lag)) + " frames";
+  const std::string by =
+      figure.in_seconds ? with_unit(std::abs(lag->lag), "s") : short_number(std::abs(lag->lag)) + " frames";
   return formatted(", and they match best with the second {} {} (correlation {})", by,
                    lag->lag > 0 ? "later" : "earlier", short_number(lag->correlation));
 }
 
 std::string outside_text(const TrialFigure& figure) {
-  if (!figure.band)
-    return formatted("; a band takes at least {} trials", compare::kFewestTrials);
+  if (!figure.band) return formatted("; a band takes at least {} trials", compare::kFewestTrials);
   if (figure.outside.empty()) return "; the simultaneous band holds 0 at all times";
   std::string text;
   for (std::size_t i = 0; i < figure.outside.size() && i < 5; ++i)
-    text += (i ? ", " : "") + short_number(figure.outside[i].first, 6) + " to " +
-            short_number(figure.outside[i].second, 6);
+    text +=
+        (i ? ", " : "") + short_number(figure.outside[i].first, 6) + " to " + short_number(figure.outside[i].second, 6);
   return "; the simultaneous band is without 0 at " + std::string(figure.in_seconds ? "seconds " : "frames ") + text +
          (figure.outside.size() > 5 ? ", ..." : "");
 }

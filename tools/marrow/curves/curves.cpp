@@ -119,8 +119,7 @@ void add_curves(CLI::App& app, int& code) {
       ->required()
       ->type_name("PATH");
   command
-      ->add_option("--figure", request->settings.figures,
-                   "only this figure, or those of this file; may be given again")
+      ->add_option("--figure", request->settings.figures, "only this figure, or those of this file; may be given again")
       ->expected(1)
       ->take_all()
       ->type_name("NAME");
@@ -131,8 +130,7 @@ void add_curves(CLI::App& app, int& code) {
       ->add_option("--lag", request->lag,
                    "the second is later by so much (seconds or frames, as printed): it is shifted back")
       ->type_name("NUMBER");
-  command
-      ->add_option("-o,--out", request->folder, "new or empty folder for report.html, curves.csv and curves.json")
+  command->add_option("-o,--out", request->folder, "new or empty folder for report.html, curves.csv and curves.json")
       ->type_name("FOLDER");
   command->add_flag("--json", request->as_json, "print all curves and their statistics as JSON");
   command->callback([request, &code] { code = compare_curves(*request); });

@@ -43,9 +43,8 @@ std::vector<File> files_below(const fs::path& folder) {
 
 /// The number of a frame, if the name is one.
 std::optional<double> frame_of(const std::string& name) {
-  const bool is_number = !name.empty() && name.size() <= 9 && std::all_of(name.begin(), name.end(), [](char c) {
-    return c >= '0' && c <= '9';
-  });
+  const bool is_number = !name.empty() && name.size() <= 9 &&
+                         std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; });
   return is_number ? parsed_number(name) : std::nullopt;
 }
 

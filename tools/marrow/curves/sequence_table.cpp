@@ -68,8 +68,8 @@ std::vector<double> rising(const Cells& cells, std::size_t column) {
   std::vector<double> values;
   for (std::size_t i = 0; i < cells.rows.size(); ++i) {
     const auto value = parsed_number(cells.rows[i][column]);
-    const std::string place = formatted("{}, line {}, column '{}': ", cells.path.string(), cells.lines[i],
-                                        cells.header[column]);
+    const std::string place =
+        formatted("{}, line {}, column '{}': ", cells.path.string(), cells.lines[i], cells.header[column]);
     if (!value || !std::isfinite(*value)) throw Error(place + "'" + cells.rows[i][column] + "' is not a number");
     if (!values.empty() && *value <= values.back())
       throw Error(place + cells.rows[i][column] + " does not come after " + short_number(values.back(), 9) +
@@ -85,8 +85,8 @@ std::string unit_of(const std::string& title) {
   return "";
 }
 
-constexpr std::array kOfPose{"m11", "m12", "m13", "m14_mm", "m21", "m22", "m23", "m24_mm",
-                             "m31", "m32", "m33", "m34_mm"};
+constexpr std::array kOfPose{"m11", "m12",    "m13", "m14_mm", "m21", "m22",
+                             "m23", "m24_mm", "m31", "m32",    "m33", "m34_mm"};
 
 std::optional<PosesOverTime> poses_of(const Cells& cells, const std::vector<bool>& found) {
   std::vector<std::vector<double>> numbers;

@@ -13,8 +13,10 @@ const withUnitTitle = (title, unit) => title + (unit ? ' (' + unit + ')' : '');
 function pieces(at, values) {
   const all = [[]];
   at.forEach((time, i) => {
-    if (Number.isFinite(values[i])) all[all.length - 1].push([time, values[i]]);
-    else if (all[all.length - 1].length) all.push([]);
+    if (Number.isFinite(values[i]))
+      all[all.length - 1].push([time, values[i]]);
+    else if (all[all.length - 1].length)
+      all.push([]);
   });
   return all.filter((piece) => piece.length);
 }
