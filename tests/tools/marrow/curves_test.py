@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`marrow curves`: which frames are compared, what is said, and what is written. The numbers: curves_numbers_test.py."""
+"""`marrow curves`: which frames are compared, what is said and written. The numbers: curves_numbers_test.py."""
 import csv
 import math
 
