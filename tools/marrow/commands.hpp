@@ -60,6 +60,7 @@ void add_worker(CLI::App& app, int& code);
 void add_rerun(CLI::App& app, int& code);
 void add_replay(CLI::App& app, int& code);
 void add_diff(CLI::App& app, int& code);
+void add_curves(CLI::App& app, int& code);
 void add_show(CLI::App& app, int& code);
 void add_check(CLI::App& app, int& code);
 void add_plan(CLI::App& app, int& code);

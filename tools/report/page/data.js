@@ -2,7 +2,8 @@
 // The data of a report: read from <script type="application/json" id="data">, checked, completed and indexed.
 //
 // Contract, version 1. Lengths mm, angles degrees, images px, times s; matrices row-major; base64 arrays little-endian.
-//   marrow, format (1), kind: "comparison" | "run"
+//   marrow, format (1), kind: "comparison" | "run" | "over_time"
+//   over_time: {sequences, trials} as in curves.json; with it, only the experiment's name is read besides
 //   experiment: {name, help, file (path of the YAML), text (its content), pipeline_text, seed, started, finished,
 //     command (how to repeat), folder, machine: {cpu, cores, cpu_level}, plugins: [{file, build_id}],
 //     starts_protocol, success_rule, time_rule}                       sentences

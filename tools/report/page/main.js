@@ -10,6 +10,7 @@ import {el} from './dom.js';
 import * as Figures from './figures.js';
 import * as Glossary from './glossary.js';
 import * as Graph from './graph.js';
+import * as OverTime from './over_time.js';
 import * as Parts from './parts.js';
 import * as Passes from './passes.js';
 import * as Pictures from './pictures.js';
@@ -316,6 +317,10 @@ function build(data) {
   const {experiment} = data, many = !data.is_run, main = document.getElementById('top');
   document.title = (experiment.name || 'marrow report') + ' · marrow';
   const add = (...parts) => main.append(...parts.flat(2).filter(Boolean));  // at once: figures need their width
+  if (data.over_time) {
+    add(OverTime.sections(data, section));
+    return;
+  }
   add(summary(data));
   if (many && data.metrics.length)
     add(ranking(data), effects(data), tuning(data), response(data), distributions(data), paired(data), capture(data),
