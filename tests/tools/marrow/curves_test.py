@@ -37,6 +37,11 @@ class Sequences(Two):
         self.assertIn("\nflexion_deg: the second is 2 deg larger on average, ", told)
         self.assertIn("Curves as a page, CSV and JSON: add --out FOLDER\n", told)
 
+    def test_a_difference_that_is_not_shown(self):
+        again = [value + (3 if i < len(WAVE) / 2 else -2) for i, value in enumerate(WAVE)]  # one slow wave
+        told = self.curves(*self.two({"frame": FRAMES, "x_mm": WAVE}, {"frame": FRAMES, "x_mm": again}))
+        self.assertIn("\nx_mm: no difference shown on average: the second is 0.5 mm larger on average, ", told)
+
     def test_gaps_are_counted_and_not_bridged(self):
         holes = [None if 5 <= i < 9 else value for i, value in enumerate(WAVE)]
         files = self.two({"frame": FRAMES, "x_mm": holes}, {"frame": FRAMES[:-10], "x_mm": WAVE[:-10]})

@@ -2,6 +2,7 @@
 #include "curves/curve_files.hpp"
 
 #include <cmath>
+#include <set>
 
 #include "commands.hpp"
 #include "compare/csv.hpp"
@@ -9,6 +10,7 @@
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/text_file.hpp"
+#include "report/recipes.hpp"
 #include "report/report.hpp"
 
 namespace marrow::cli {
@@ -106,6 +108,19 @@ json page_of(const json& answer) {
           {"over_time", answer}};
 }
 
+/// Of the runs that were compared; a file or a folder of files has none.
+std::vector<NamedRecipe> recipes_of(const CurveAnswer& answer) {
+  std::vector<NamedRecipe> recipes;
+  std::set<std::string> known;
+  for (const ComparedSequences& one : answer.sequences)
+    for (const std::string& run : {one.first, one.second}) try {
+        if (fs::exists(fs::path(run) / "run.json") && known.insert(run).second)
+          recipes.push_back({run, recipe_of_folder(run)});
+      } catch (const Error&) {  // the record is damaged; its sequences could still be read
+      }
+  return recipes;
+}
+
 }  // namespace
 
 json json_of(const CurveAnswer& answer) {
@@ -143,7 +158,7 @@ void write_curves(const CurveAnswer& answer, const fs::path& folder) {
   const json all = json_of(answer);
   write_text_file(folder / "curves.json", json_text(all, 1) + "\n");
   write_text_file(folder / "curves.csv", csv_of(answer));
-  write_page(page_of(all), folder / "report.html");
+  write_page(page_of(all), recipes_of(answer), folder / "report.html");
 }
 
 }  // namespace marrow::cli

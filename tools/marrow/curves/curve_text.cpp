@@ -32,6 +32,11 @@ std::string bias_text(double bias, const std::string& unit) {
   return "the second is " + with_unit(std::abs(bias), unit) + (bias > 0 ? " larger" : " smaller") + " on average";
 }
 
+/// Where the interval holds 0, what stands before the mean difference.
+std::string not_shown(const Interval& interval) {
+  return interval.lower <= 0 && interval.upper >= 0 ? "no difference shown on average: " : "";
+}
+
 std::string lag_text(const ComparedFigure& figure) {
   const auto& lag = figure.difference.lag;
   if (!lag) return "";
@@ -104,7 +109,7 @@ void print_trials(const ComparedTrials& one) {
 
 std::string sentence_of(const ComparedFigure& figure) {
   const compare::CurveDifference& d = figure.difference;
-  std::string text = figure.name + ": " + bias_text(d.bias, figure.unit);
+  std::string text = figure.name + ": " + (d.mean ? not_shown(d.mean->interval) : "") + bias_text(d.bias, figure.unit);
   if (d.mean)
     text += formatted(", 95 % interval {}, as of {} independent frames", range_text(d.mean->interval),
                       short_number(d.mean->effective_frames));
@@ -117,7 +122,8 @@ std::string sentence_of(const ComparedFigure& figure) {
 }
 
 std::string sentence_of(const TrialFigure& figure) {
-  std::string text = figure.name + ": " + bias_text(figure.bias, figure.unit);
+  std::string text =
+      figure.name + ": " + (figure.interval ? not_shown(*figure.interval) : "") + bias_text(figure.bias, figure.unit);
   if (figure.interval)
     text += formatted(", 95 % interval {}, {}", range_text(figure.interval), counted(figure.trials.size(), "trial"));
   return text + outside_text(figure);
