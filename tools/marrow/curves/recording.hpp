@@ -39,7 +39,7 @@ struct Recording {
 
 /// Reads the outputs of a run (a folder with run.json), all files below another folder, or one file:
 /// - tables (CSV) with a column `frame` or `time_s`: a figure for each column of numbers. A row with 0 in the column
-///   `found` is a gap. Columns m11 ... m34_mm are the pose of track.trajectory.
+///   `found` is a gap. Columns m11 ... m34_mm are the pose as the trajectory of a tracked bone has it.
 /// - Autoscoper's .tra: a pose a line.
 /// - figures of merit (.json) and poses (.yaml) of which each frame has a file: NAME/0001.json, NAME/0001/ITEM.json.
 ///
