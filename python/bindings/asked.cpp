@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "marrow/base/error.hpp"
+#include "asked.hpp"
 #include "marrow/domain/functions.hpp"
 #include "values.hpp"
 
@@ -23,56 +23,6 @@ double number_of(const py::handle& object) {
   return object.is_none() ? std::numeric_limits<double>::quiet_NaN() : object.cast<double>();
 }
 
-/// The other process. `ask` takes a question and, for an optimizer, a function that gives values; it returns the reply.
-/// It may be called from any thread.
-class Asked {
- public:
-  Asked(py::object ask, int function) : ask_(std::make_shared<py::object>(std::move(ask))), function_(function) {}
-  ~Asked() {
-    const py::gil_scoped_acquire acquire;
-    ask_.reset();
-  }
-  Asked(const Asked& other) : function_(other.function_), levels_(other.levels_) {
-    const py::gil_scoped_acquire acquire;
-    ask_ = other.ask_;
-  }
-  Asked& operator=(const Asked&) = delete;
-
-  void add(const CostLevel& level) {
-    levels_.push_back({level.contour_spacing_px, level.reach_px, double(level.pixel_step)});
-  }
-
-  /// Fills the question in, asks, and lets `read` take the reply, all with Python's lock.
-  void ask(const std::function<void(py::dict&)>& fill, const std::function<void(const py::object&)>& read,
-           const py::object* own = nullptr) const {
-    const py::gil_scoped_acquire acquire;
-    py::dict question;
-    question["function"] = function_;
-    if (!levels_.empty()) {
-      py::list levels;
-      for (const auto& one : levels_) levels.append(py::make_tuple(one[0], one[1], int(one[2])));
-      question["levels"] = levels;
-    }
-    fill(question);
-    read(own ? (*ask_)(question, *own) : (*ask_)(question));
-  }
-
- private:
-  std::shared_ptr<py::object> ask_;
-  int function_;
-  std::vector<std::array<double, 3>> levels_;
-};
-
-void put_poses(py::dict& question, const std::vector<RigidTransform>& poses) {
-  py::list numbers;
-  for (const RigidTransform& pose : poses)
-    for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) numbers.append(pose.rotation(row, column));
-      numbers.append(pose.translation_mm[row]);
-    }
-  question["poses"] = numbers;
-}
-
 class AskedCost : public Cost {
  public:
   explicit AskedCost(Asked asked) : asked_(std::move(asked)) {}
@@ -82,9 +32,8 @@ class AskedCost : public Cost {
     return numbers("values", poses);
   }
   std::shared_ptr<const Cost> at_level(const CostLevel& level) const override {
-    Asked asked = asked_;
-    asked.add(level);
-    return std::make_shared<const AskedCost>(std::move(asked));
+    return std::make_shared<const AskedCost>(
+        asked_.changed({level.contour_spacing_px, level.reach_px, double(level.pixel_step)}));
   }
   std::vector<double> without_each_block(const RigidTransform& pose) const override {
     return numbers("without_each_block", {pose});
@@ -101,7 +50,7 @@ class AskedCost : public Cost {
         [&](py::dict& question) {
           question["do"] = "value_in_view";
           question["view"] = view;
-          put_poses(question, {pose});
+          question["poses"] = listed_transforms(std::vector{pose});
         },
         [&](const py::object& reply) { value = number_of(reply); });
     return value;
@@ -123,7 +72,7 @@ class AskedCost : public Cost {
     asked_.ask(
         [&](py::dict& question) {
           question["do"] = what;
-          put_poses(question, poses);
+          question["poses"] = listed_transforms(poses);
         },
         read);
   }
@@ -146,30 +95,14 @@ class AskedOptimizer : public Optimizer {
 
   MinimisationResult minimise(const MinimisationProblem& problem) const override {
     int evaluations = 0;
-    std::exception_ptr fault;  // of the function: it passes through, and not as Python words it
     const py::gil_scoped_acquire acquire;
     const py::object values = py::cpp_function([&](const std::vector<double>& point) {
       const py::gil_scoped_release release;
-      try {
-        const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(point.data(), Eigen::Index(point.size()));
-        const double value = problem.function(x);
-        if (problem.observer) problem.observer(++evaluations, x, value);
-        return value;
-      } catch (...) {
-        fault = std::current_exception();
-        throw;
-      }
+      const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(point.data(), Eigen::Index(point.size()));
+      const double value = problem.function(x);
+      if (problem.observer) problem.observer(++evaluations, x, value);
+      return value;
     });
-    try {
-      return asked(problem, values);
-    } catch (const py::error_already_set&) {
-      if (fault) std::rethrow_exception(fault);
-      throw;
-    }
-  }
-
- private:
-  MinimisationResult asked(const MinimisationProblem& problem, const py::object& values) const {
     MinimisationResult result;
     asked_.ask(
         [&](py::dict& question) {
@@ -192,6 +125,7 @@ class AskedOptimizer : public Optimizer {
     return result;
   }
 
+ private:
   Asked asked_;
 };
 
@@ -199,16 +133,28 @@ Value asked_value(const std::string& type, Asked asked) {
   if (type == TypeInfo::of<Cost>().id) return Value::of<Cost>(std::make_shared<const AskedCost>(std::move(asked)));
   if (type == TypeInfo::of<Optimizer>().id)
     return Value::of<Optimizer>(std::make_shared<const AskedOptimizer>(std::move(asked)));
-  throw Error("an input of type '" + type + "' cannot be asked");
+  return asked_projector(type, std::move(asked));
 }
 
 }  // namespace
 
+py::list listed_transforms(const std::vector<RigidTransform>& transforms) {
+  py::list numbers;
+  for (const RigidTransform& one : transforms)
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) numbers.append(one.rotation(row, column));
+      numbers.append(one.translation_mm[row]);
+    }
+  return numbers;
+}
+
 void bind_asked(py::module_& module) {
   module.def(
       "asked_function",
-      [](const std::string& type, int function, const py::object& ask) {
-        return python_of(asked_value(type, Asked(ask, function)));
+      [](const std::string& type, std::uint64_t function, const std::string& key, const py::object& ask) {
+        Value value = asked_value(type, Asked(ask, function));
+        value.key = digest_of_hex(key).value();
+        return python_of(value);
       },
       "A function of the process that runs the pipeline, by its number among the inputs of a call.");
 }

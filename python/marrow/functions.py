@@ -56,7 +56,7 @@ class Instead:
 
     def reply(self, question: Dict[str, Any], ask: Callable[[Dict[str, Any]], Any]) -> Any:
         """The reply to a question about a function, with this value at this pose."""
-        if question.get("function") != self.input or question["do"] != "values" or "levels" in question:
+        if question.get("function") != self.input or question["do"] != "values" or "changes" in question:
             return ask(question)
         poses = numpy.reshape(question["poses"], (-1, 12))
         here = numpy.isclose(poses, self.pose, rtol=0, atol=1e-9).all(axis=1)

@@ -211,7 +211,7 @@ class Process:
         if "axis" in given:
             return Items(given["axis"], given["names"], [self._input(one) for one in given["items"]])
         if "function" in given:
-            return _core.asked_function(given["type"], given["function"], self._ask_function)
+            return _core.asked_function(given["type"], given["function"], given["key"], self._ask_function)
         if given["number"] not in self.inputs:
             self.inputs[given["number"]] = _core.mapped_input(given["memory"], given["type"], given["samples_bytes"])
         return self.inputs[given["number"]][0]

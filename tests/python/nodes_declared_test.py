@@ -144,11 +144,6 @@ def own(view: marrow.View, *, low: Annotated[float, "low"] = 3) -> marrow.EdgeMa
                 "input 'view' of edges.own: expected one of marrow's",
             ),
             (
-                node + "def own(drr: marrow.RadiographProjector) -> marrow.EdgeMap: ...\n",
-                "input 'drr' of edges.own is a function, of which a node in Python can take costs and optimizers only; "
-                "write the node in C++",
-            ),
-            (
                 node + "def own(view: marrow.View) -> marrow.Cost: ...\n",
                 "the output of edges.own is a function; use @marrow.cost, @marrow.optimizer or @marrow.projector",
             ),

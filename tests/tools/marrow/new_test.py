@@ -48,7 +48,7 @@ class New(Case):
 
     def test_every_kind_with_a_suite_has_a_template(self):
         with_suite = sorted(path.parent.name for path in (SOURCE / "plugins").glob("*/suite.cpp"))
-        # A registration is given functions, a cost and an optimizer, which a node in Python cannot take.
+        # A registration has none yet.
         self.assertEqual(KINDS, [kind for kind in with_suite if kind != "register"])
 
     def test_nodes_of_kinds_and_a_kind_are_built_against_an_installation_and_tested(self):

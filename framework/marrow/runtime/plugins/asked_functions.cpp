@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/plugins/asked_functions.hpp"
 
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -20,7 +21,12 @@ Eigen::VectorXd vector_of(const json& numbers, double other = std::nan("")) {
   return vector;
 }
 
-CostLevel level_of(const json& numbers) { return {numbers.at(0), numbers.at(1), numbers.at(2)}; }
+std::shared_ptr<const void> changed(const Cost& cost, const json& level) {
+  return cost.at_level({level.at(0), level.at(1), level.at(2)});
+}
+std::shared_ptr<const void> changed(const RadiographProjector& projector, const json& sigma_mm) {
+  return projector.smoothed(sigma_mm.at(0));
+}
 
 /// Minimises the process's own function.
 json minimised(const Optimizer& optimizer, const json& question, const AskProcess& ask_process) {
@@ -60,43 +66,55 @@ json asked_of_cost(const Cost& cost, const json& question) {
 }  // namespace
 
 json AskedFunctions::add(const Value& function) {
-  functions_.push_back(function);
-  return {{"function", functions_.size() - 1}, {"type", function.type.id}};
+  static std::atomic<std::uint64_t> last{0};
+  const std::uint64_t number = ++last;
+  functions_[number] = function;
+  return {{"function", number}, {"type", function.type.id}, {"key", function.key.hex()}};
 }
 
-const Value& AskedFunctions::at(std::size_t number) const {
-  if (number < functions_.size()) return functions_[number];
-  throw Error(formatted("a node asked for function {} of its inputs, but there are {}", number, functions_.size()));
+const Value& AskedFunctions::at(std::uint64_t number) const {
+  if (const auto found = functions_.find(number); found != functions_.end()) return found->second;
+  throw Error("it used a function that an earlier call was given; use only the inputs of the call");
 }
 
-std::vector<std::size_t> AskedFunctions::costs() const {
-  std::vector<std::size_t> numbers;
-  for (std::size_t i = 0; i < functions_.size(); ++i)
-    if (functions_[i].type == TypeInfo::of<Cost>()) numbers.push_back(i);
+std::vector<std::uint64_t> AskedFunctions::costs() const {
+  std::vector<std::uint64_t> numbers;
+  for (const auto& [number, function] : functions_)
+    if (function.type == TypeInfo::of<Cost>()) numbers.push_back(number);
   return numbers;
 }
 
-const Cost& AskedFunctions::cost_of(const json& question) const {
-  const Cost& first = at(question.at("function").get<std::size_t>()).as<Cost>();
-  const json levels = question.value("levels", json::array());
-  if (levels.empty()) return first;
-  const std::string name = question["function"].dump() + levels.dump();
+template <class Function>
+const Function* AskedFunctions::asked(const json& question) const {
+  const Function* one = &at(question.at("function")).as<Function>();
+  std::string name = question["function"].dump();
   const std::scoped_lock lock(mutex_);
-  std::shared_ptr<const Cost>& known = at_levels_[name];
-  if (!known) {
-    for (const json& level : levels) known = (known ? *known : first).at_level(level_of(level));
-    if (!known) throw Error("a cost has none at another level");
+  for (const json& change : question.value("changes", json::array())) {
+    name += change.dump();
+    if (!changed_.contains(name)) changed_[name] = changed(*one, change);
+    one = static_cast<const Function*>(changed_[name].get());
+    if (!one) break;
   }
-  return *known;
+  return one;
 }
 
 json AskedFunctions::reply(const json& question, const AskProcess& ask_process) const {
-  const Value& function = at(question.at("function").get<std::size_t>());
+  const Value& function = at(question.at("function"));
   if (function.type == TypeInfo::of<Optimizer>()) return minimised(function.as<Optimizer>(), question, ask_process);
-  return asked_of_cost(cost_of(question), question);
+  if (function.type == TypeInfo::of<OutlineProjector>()) return asked_of(function.as<OutlineProjector>(), question);
+  if (function.type == TypeInfo::of<RadiographProjector>()) {
+    const auto* projector = asked<RadiographProjector>(question);
+    return question.at("do") == "is_there" ? json(projector != nullptr) : asked_of(*projector, question);
+  }
+  const auto* cost = asked<Cost>(question);
+  if (!cost) throw Error("a cost has none at another level");
+  return asked_of_cost(*cost, question);
 }
 
-bool can_be_asked(const TypeInfo& type) { return type == TypeInfo::of<Cost>() || type == TypeInfo::of<Optimizer>(); }
+bool can_be_asked(const TypeInfo& type) {
+  return type == TypeInfo::of<Cost>() || type == TypeInfo::of<Optimizer>() ||
+         type == TypeInfo::of<OutlineProjector>() || type == TypeInfo::of<RadiographProjector>();
+}
 
 json json_of_transform(const RigidTransform& transform) {
   json numbers = json::array();

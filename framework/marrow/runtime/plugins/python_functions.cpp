@@ -35,7 +35,7 @@ class PythonCost : public Cost {
   /// the cost has without it.
   std::vector<double> without_each_block(const RigidTransform& world_from_model) const override {
     std::vector<double> values;
-    for (const std::size_t one : numbers_of_costs_) {
+    for (const std::uint64_t one : numbers_of_costs_) {
       const std::vector<double> inner = cost(one).without_each_block(world_from_model);
       if (inner.empty()) continue;
       const std::vector<double> own = costs_of(
@@ -47,7 +47,7 @@ class PythonCost : public Cost {
   /// The images say nothing if all costs that it takes say so.
   std::string nothing_compared(const RigidTransform& world_from_model) const override {
     std::string first;
-    for (const std::size_t one : numbers_of_costs_) {
+    for (const std::uint64_t one : numbers_of_costs_) {
       const std::string reason = cost(one).nothing_compared(world_from_model);
       if (reason.empty()) return "";
       if (first.empty()) first = reason;
@@ -56,7 +56,7 @@ class PythonCost : public Cost {
   }
   std::vector<std::string> silent_views(const RigidTransform& world_from_model) const override {
     std::vector<std::string> all;
-    for (const std::size_t one : numbers_of_costs_)
+    for (const std::uint64_t one : numbers_of_costs_)
       for (std::string& text : cost(one).silent_views(world_from_model))
         if (std::find(all.begin(), all.end(), text) == all.end()) all.push_back(std::move(text));
     return all;
@@ -74,10 +74,10 @@ class PythonCost : public Cost {
     if (values.size() == count) return values;
     throw Error(formatted("{} gave {} costs, expected {}", function_.name(), values.size(), count));
   }
-  const Cost& cost(std::size_t number) const { return function_.functions().at(number).as<Cost>(); }
+  const Cost& cost(std::uint64_t number) const { return function_.functions().at(number).as<Cost>(); }
 
   PythonFunction function_;
-  std::vector<std::size_t> numbers_of_costs_;
+  std::vector<std::uint64_t> numbers_of_costs_;
 };
 
 std::vector<double> numbers_of(const Eigen::VectorXd& x) { return {x.data(), x.data() + x.size()}; }
@@ -129,7 +129,9 @@ class PythonOptimizer : public Optimizer {
 void put_at_level(Value& value, const CostLevel& level) {
   for (Value& item : value.items) put_at_level(item, level);
   if (value.is_list() || value.is_absent() || !(value.type == TypeInfo::of<Cost>())) return;
+  const Digest key = hash_of(value.key, level.contour_spacing_px, level.reach_px, level.pixel_step);
   value = Value::of<Cost>(value.as<Cost>().at_level(level));
+  value.key = key;
 }
 
 }  // namespace

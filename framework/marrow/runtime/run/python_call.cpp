@@ -36,7 +36,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr double kLoadLimit_s = 20, kStopLimit_s = 2;
+constexpr double kLoadLimit_s = 20, kStopLimit_s = 2, kReplyLimit_s = 0.3;
 
 /// The inputs as a request has them. `kept` keeps what the request names until the call has ended.
 json json_of_input(const Value& value, PythonArguments& kept) {
@@ -55,14 +55,18 @@ json json_of_input(const Value& value, PythonArguments& kept) {
           {"samples_bytes", shared->samples_bytes}};
 }
 
-/// Asks the process to end, so that it can clean up, and ends it if it does not.
-void stop(Worker& worker) {
+/// Asks the process to end, so that it can clean up, and ends it if it does not. A process that waits for a reply
+/// learns that none comes.
+void stop(PythonProcess& process) {
+  Worker& worker = process.worker;
   kill(worker.process(), SIGTERM);
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(kStopLimit_s);
-  while (!worker.is_dead() && std::chrono::steady_clock::now() < end) {
+  using Seconds = std::chrono::duration<double>;
+  const auto start = std::chrono::steady_clock::now();
+  while (!worker.is_dead() && std::chrono::steady_clock::now() - start < Seconds(kStopLimit_s)) {
     pollfd polled{worker.descriptor(), POLLIN, 0};
     poll(&polled, 1, 20);
     if (worker.take(nullptr)) break;
+    if (std::chrono::steady_clock::now() - start > Seconds(kReplyLimit_s)) process.replies.close();
   }
   worker.close();
 }
@@ -84,7 +88,7 @@ class Conversation {
     } catch (const Ended&) {
       return *end_;
     } catch (...) {
-      if (!process_.worker.is_dead()) stop(process_.worker);
+      if (!process_.worker.is_dead()) stop(process_);
       throw;
     }
   }
