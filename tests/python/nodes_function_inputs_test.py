@@ -197,7 +197,7 @@ class Others(Written):
     def test_the_program_checks_lists_and_replays_them(self):
         pipeline = self.write("fails.yaml", PIPELINE % "true")
         self.program("check", pipeline)
-        self.assertIn("similarity.times", self.program("list", "--fits", pipeline, "times"))
+        self.assertIn("similarity.times", self.program("list", "--fits", pipeline, "near"))
         self.assertIn("as told", self.program("run", pipeline, "--out", self.scratch / "out", code=1))
         said = self.program("replay", self.scratch / "out" / "failed" / "threads", code=1)
         self.assertIn("as told", said)
