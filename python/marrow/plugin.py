@@ -5,7 +5,6 @@ a time. It reads requests and writes reports and answers as marrow/runtime/proce
 import json
 import math
 import os
-import pathlib
 import re
 import signal
 import sys
@@ -20,6 +19,7 @@ from . import _core, functions
 from .context import Context
 from .declaration import Declaration, completed, nodes_of
 from .errors import Error
+from .explained import explained
 from .items import Items
 from .kept_state import KeptState
 from .modules import import_from_source, loaded_files, searched_folders
@@ -287,31 +287,6 @@ def _outputs(node: Declaration, returned: Any) -> List[Any]:
             raise Error("%s returned nothing for the output '%s'" % (node.manifest["name"], port["name"]))
         made.append((value, port["name"] or "the only one", port["type"]["id"], port["axis"]))
     return made
-
-
-def _text_of(error: BaseException) -> str:
-    try:
-        return str(error).strip() or "no message"
-    except Exception:  # the exception's own text is at fault
-        return "no message"
-
-
-def explained(error: BaseException, file: str) -> str:
-    """An exception in one sentence, with the last place in the folder of the file. An Error that the node raised on
-    purpose speaks for itself."""
-    text = _text_of(error)
-    if isinstance(error, SyntaxError) and error.filename:
-        return "%s, line %s: %s: %s" % (error.filename, error.lineno, type(error).__name__, error.msg)
-    folder = str(pathlib.Path(file).parent) + os.sep
-    frames = [one for one in traceback.extract_tb(error.__traceback__) if one.filename.startswith(folder)]
-    if not frames:
-        return text if isinstance(error, Error) else "%s: %s: %s" % (file, type(error).__name__, text)
-    last = frames[-1]
-    if isinstance(error, Error) and last.name != "<module>":
-        return text
-    kind = "" if isinstance(error, Error) else type(error).__name__ + ": "
-    line = " (%s)" % last.line if last.line and last.name != "<module>" else ""
-    return "%s, line %s, in %s: %s%s%s" % (last.filename, last.lineno, last.name, kind, text, line)
 
 
 def shortened(text: str) -> str:
