@@ -3,6 +3,7 @@
 
 #include <marrow/testing/node.hpp>
 
+#include "marrow/toolbox/track/sequence.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 
 namespace node_test = marrow::node_test;
@@ -21,7 +22,7 @@ TEST(NewNode, KeepsABoneOfConstantVelocityOnItsWay) {
     const node_test::Outputs after =
         node_test::call("track.filter", {{"state", before.at("state")}, {"pose", node_test::item(seen)}});
     state = after.at("state").as<track::TrackState>();
-    states.add(std::to_string(i), state);
+    states.add(marrow::track::frame_name(std::size_t(i) + 1), state);
   }
   const auto poses = node_test::call("track.new_node", {{"states", node_test::list(states, "frame")}})
                          .at("poses")
