@@ -31,6 +31,10 @@ foreach(template ${templates})
     file(CREATE_LINK ${folder}/python ${share}/nodes/${kind}/python SYMBOLIC)
     install(DIRECTORY ${folder}/python DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/nodes/${kind} COMPONENT marrow-dev)
   endif()
+  if(IS_DIRECTORY ${folder}/files)  # instead of those of tools/templates
+    file(CREATE_LINK ${folder}/files ${share}/nodes/${kind}/files SYMBOLIC)
+    install(DIRECTORY ${folder}/files DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/nodes/${kind} COMPONENT marrow-dev)
+  endif()
   install(FILES ${template} ${folder}/test.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/nodes/${kind}
     COMPONENT marrow-dev)
   install(FILES ${kind_folder}/${source} DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/nodes/${kind} RENAME node.cpp

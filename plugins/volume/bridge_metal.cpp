@@ -127,6 +127,7 @@ MARROW_PLUGIN(plugin) {
       .summary("Interpolates slices of a CT that show long metal, such as screws, from their neighbours")
       .in("volume", "CT in Hounsfield units; its slices lie across the third axis of its grid")
       .out("volume", "the CT with these slices interpolated; without metal, the same CT")
+      .trait("removes_metal")
       .option("metal_hu", &Options::metal_hu, "metal is above this value", marrow::unit("HU"))
       .option("times_median", &Options::times_median,
               "where metal extends over more than longest_mm, as a plate does: a slice is replaced if it shows this "

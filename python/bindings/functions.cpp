@@ -82,10 +82,23 @@ double positive(const char* name, double value) {
               py::str(py::float_(value)).cast<std::string>());
 }
 
+/// The values of single pixels.
+py::object radiograph_at(const RadiographProjector& projector, const Camera& camera, const RigidTransform& pose,
+                         const py::object& given) {
+  const std::vector<double> numbers = numbers_of(given, {-1, 2}, "pixels");
+  std::vector<Eigen::Vector2f> pixels;
+  for (std::size_t i = 0; i < numbers.size(); i += 2) pixels.emplace_back(float(numbers[i]), float(numbers[i + 1]));
+  std::atomic<bool> cancelled{false};
+  auto values = std::make_shared<std::vector<float>>();
+  do_interruptibly(cancelled, [&] { *values = projector.radiograph(camera, pose, pixels); });
+  return array_of(values, buffer_of(values->data(), {py::ssize_t(values->size())}));
+}
+
 py::object call_radiograph(const RadiographProjectorValue& self, const py::object& camera, const py::object& pose,
-                           double step_px) {
+                           double step_px, const py::object& pixels) {
   const Camera seen_by = camera_of(camera);
   const RigidTransform at = pose_of(pose, "pose");
+  if (!pixels.is_none()) return radiograph_at(self.value.as<RadiographProjector>(), seen_by, at, pixels);
   positive("step_px", step_px);
   const auto count = [&](int pixels) { return int(std::ceil(pixels / step_px)); };
   const PixelGrid grid{0, 0, step_px, count(seen_by.width_px), count(seen_by.height_px)};
@@ -147,23 +160,32 @@ class AskedFunction {
   std::optional<py::error_already_set> fault_;
 };
 
+/// What was given; otherwise what the function has, if it is a marrow.Problem.
+py::object or_of_problem(const py::object& given, const py::object& function, const char* name) {
+  if (!given.is_none()) return given;
+  const py::object problem = py::module_::import("marrow.problem").attr("Problem");
+  return py::isinstance(function, problem) ? py::object(function.attr(name)) : py::none();
+}
+
 MinimisationResult minimise(const OptimizerValue& self, const py::object& function, const py::object& start,
                             const py::object& initial_step, const py::object& lower, const py::object& upper,
-                            int max_evaluations, double step_tolerance) {
+                            const py::object& max_evaluations, const py::object& step_tolerance) {
   std::atomic<bool> cancelled{false};
   AskedFunction asked(function, cancelled);
   MinimisationProblem problem;
   problem.function = [&](const Eigen::VectorXd& x) { return asked(x); };
-  problem.start = vector_of(start, "start");
-  problem.initial_step = vector_of(initial_step, "initial_step");
-  problem.lower = vector_of(lower, "lower");
-  problem.upper = vector_of(upper, "upper");
-  problem.max_evaluations = max_evaluations;
-  problem.step_tolerance = step_tolerance;
+  problem.start = vector_of(or_of_problem(start, function, "start"), "start");
+  problem.initial_step = vector_of(or_of_problem(initial_step, function, "initial_step"), "initial_step");
+  problem.lower = vector_of(or_of_problem(lower, function, "lower"), "lower");
+  problem.upper = vector_of(or_of_problem(upper, function, "upper"), "upper");
+  const py::object most = or_of_problem(max_evaluations, function, "left"),
+                   tolerance = or_of_problem(step_tolerance, function, "step_tolerance");
+  if (!most.is_none()) problem.max_evaluations = most.cast<int>();
+  if (!tolerance.is_none()) problem.step_tolerance = tolerance.cast<double>();
   MinimisationResult result;
   try {
     do_interruptibly(cancelled, [&] { result = self.value.as<Optimizer>().minimise(problem); });
-  } catch (const Cancelled&) {
+  } catch (...) {  // Cancelled, or what another process made of it
     asked.rethrow();
     throw;
   }
@@ -173,7 +195,9 @@ MinimisationResult minimise(const OptimizerValue& self, const py::object& functi
 template <class Function, class Kept>
 py::class_<Kept, OtherValue> function_class(py::module_& module, const char* name, const char* help) {
   function_classes().push_back({TypeInfo::of<Function>(), [](const Value& value) { return py::cast(Kept{{value}}); }});
-  return py::class_<Kept, OtherValue>(module, name, help);
+  py::class_<Kept, OtherValue> made(module, name, help);
+  made.attr("type") = TypeInfo::of<Function>().id;
+  return made;
 }
 
 void bind_optimizer(py::module_& module) {
@@ -188,12 +212,14 @@ void bind_optimizer(py::module_& module) {
                          py::repr(py::float_(self.value)).cast<std::string>(), self.evaluations);
       });
   function_class<Optimizer, OptimizerValue>(module, "Optimizer", "Minimises a function of n variables.")
-      .def("minimise", &minimise, py::arg("function"), py::arg("start"), py::arg("initial_step"), py::kw_only(),
-           py::arg("lower") = py::none(), py::arg("upper") = py::none(), py::arg("max_evaluations") = 1000,
-           py::arg("step_tolerance") = 1e-4,
+      .def("minimise", &minimise, py::arg("function"), py::arg("start") = py::none(),
+           py::arg("initial_step") = py::none(), py::kw_only(), py::arg("lower") = py::none(),
+           py::arg("upper") = py::none(), py::arg("max_evaluations") = py::none(),
+           py::arg("step_tolerance") = py::none(),
            "Looks for the least value of function(x), where x is an array of n numbers. initial_step: one positive "
            "number for each of them. lower, upper: bounds for all of them, or None. It ends when steps are below "
-           "step_tolerance times initial_step, or after max_evaluations. What the function raises is raised.");
+           "step_tolerance (1e-4) times initial_step, or after max_evaluations (1000). A marrow.Problem has all of "
+           "these itself; what is given besides it replaces them. What the function raises is raised.");
 }
 
 }  // namespace
@@ -207,8 +233,10 @@ void bind_functions(py::module_& module) {
   function_class<RadiographProjector, RadiographProjectorValue>(module, "RadiographProjector",
                                                                 "Draws radiographs of a model.")
       .def("__call__", &call_radiograph, py::arg("camera"), py::arg("pose"), py::kw_only(), py::arg("step_px") = 1.0,
+           py::arg("pixels") = py::none(),
            "What a camera, or the camera of a view, would see of the model in a pose: line integrals in mm of water, "
-           "as a read-only array [row, column] with every step_px-th pixel.");
+           "as a read-only array [row, column] with every step_px-th pixel. With pixels [N, 2] (u, v): only at these, "
+           "an array [N].");
   function_class<OutlineProjector, OutlineProjectorValue>(module, "OutlineProjector", "Draws the outline of a model.")
       .def("__call__", &call_outline, py::arg("camera"), py::arg("pose"), py::kw_only(), py::arg("spacing_px") = 1.0,
            "The outline of the model in a pose as a camera, or the camera of a view, would see it: an array [point, 7] "

@@ -26,6 +26,7 @@ PYBIND11_MODULE(_core, module) {
   python::bind_values(module);
   python::bind_files(module);
   python::bind_functions(module);
+  python::bind_asked(module);
   python::bind_catalogue(module);
   python::bind_pipelines(module);
   python::bind_runs(module);

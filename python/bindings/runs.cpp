@@ -92,9 +92,15 @@ class Observer {
   std::optional<py::error_already_set> fault_;
 };
 
+/// Nothing if a program gave values: a file cannot make them again.
+std::optional<RunRecipe> recipe_of(const Run& run) {
+  if (!run.read->given.empty()) return std::nullopt;
+  return recipe_of_run(run.read->pipeline, run.settings);
+}
+
 void write_folder(Run& run, RunFolder& folder) {
   const Catalogue& known = *run.read->known;
-  run.written = folder.write_outputs(run.read->pipeline, run.result, known);
+  run.written = folder.write_outputs(run.read->pipeline, run.result, known, recipe_of(run));
   folder.write_record(run.read->pipeline, run.result, run.settings, known, run.read->arguments, run.written);
   run.folder = fs::absolute(folder.path()).string();
 }
@@ -229,6 +235,11 @@ void bind_runs(py::module_& module) {
       .def_property_readonly("failed", [](const Run& self) { return self.result.failed(); })
       .def_readonly("warnings", &Run::warnings)
       .def_readonly("folder", &Run::folder)
+      .def_property_readonly("recipe",
+                             [](const Run& self) {
+                               const std::optional<RunRecipe> recipe = recipe_of(self);
+                               return recipe ? std::optional(recipe->text()) : std::nullopt;
+                             })
       .def_property_readonly("written", &written_of);
   module.def("run", &run, py::arg("pipeline"), py::arg("observer"), py::arg("seed"), py::arg("threads"),
              py::arg("keep"), py::arg("folder"));

@@ -87,6 +87,8 @@ void bind_values(py::module_& module);
 void bind_files(py::module_& module);
 /// Cost, Optimizer, OutlineProjector, RadiographProjector; after bind_values().
 void bind_functions(py::module_& module);
+/// Functions that a node written in Python takes; after bind_functions().
+void bind_asked(py::module_& module);
 /// What processes of nodes written in Python need.
 void bind_worker(py::module_& module);
 

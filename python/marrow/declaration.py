@@ -172,10 +172,8 @@ def _port(where: str, name: str, hint: Any, is_output: bool) -> Dict[str, Any]:
         notes = {**more, **notes}
     if is_list != ("axis" in notes):
         raise Error(where + ': a list is written Annotated[marrow.Items[marrow.View], marrow.over("view")]')
-    if isinstance(kind, type) and issubclass(kind, _core.OtherValue):
-        if is_output:
-            raise Error("%s is a function; use @marrow.cost, @marrow.optimizer or @marrow.projector" % where)
-        raise Error("%s is a function, which a node in Python cannot take; write the node in C++" % where)
+    if is_output and isinstance(kind, type) and issubclass(kind, _core.OtherValue):
+        raise Error("%s is a function; use @marrow.cost, @marrow.optimizer or @marrow.projector" % where)
     if not isinstance(getattr(kind, "type", None), str):
         raise Error("%s: expected one of marrow's values, as marrow.View, got %s" % (where, _shown(kind)))
     if "figures" in notes and not (is_output and getattr(kind, "type") == "metrics"):

@@ -46,6 +46,33 @@ def said_of(node: Declaration, made: Any) -> Dict[str, Any]:
     return {} if node.makes == "cost" else {"corners_mm": made[1].ravel().tolist()}
 
 
+class Instead:
+    """The value that one of the costs among a node's inputs has at a pose without a part of the images."""
+
+    def __init__(self, request: Dict[str, Any]) -> None:
+        self.input = request["input"]
+        self.pose = numpy.array(request["poses"])
+        self.value = 0.0
+
+    def reply(self, question: Dict[str, Any], ask: Callable[[Dict[str, Any]], Any]) -> Any:
+        """The reply to a question about a function, with this value at this pose."""
+        if question.get("function") != self.input or question["do"] != "values" or "changes" in question:
+            return ask(question)
+        poses = numpy.reshape(question["poses"], (-1, 12))
+        here = numpy.isclose(poses, self.pose, rtol=0, atol=1e-9).all(axis=1)
+        if here.all():
+            return [self.value] * len(here)
+        return [self.value if at else value for at, value in zip(here, ask(question))]
+
+
+def costs_instead(node: Declaration, cost: Any, request: Dict[str, Any], instead: Instead) -> List[float]:
+    """The costs of one pose with each of the values of `request` in turn."""
+    values = []
+    for instead.value in request["instead"]:
+        values += costs(node, cost, request)
+    return values
+
+
 def costs(node: Declaration, cost: Any, request: Dict[str, Any]) -> List[float]:
     """The costs of a batch of poses."""
     name = node.manifest["name"]

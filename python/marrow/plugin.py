@@ -3,8 +3,8 @@
 a time. It reads requests and writes reports and answers as marrow/runtime/process/worker.hpp says.
 """
 import json
+import math
 import os
-import pathlib
 import re
 import signal
 import sys
@@ -19,6 +19,7 @@ from . import _core, functions
 from .context import Context
 from .declaration import Declaration, completed, nodes_of
 from .errors import Error
+from .explained import explained
 from .items import Items
 from .kept_state import KeptState
 from .modules import import_from_source, loaded_files, searched_folders
@@ -40,6 +41,8 @@ class Process:
         self.inputs: Dict[int, Any] = {}  # by the number of their memory, each with a check that it is as it was
         self.functions = functions.Functions()
         self.replies: Any = None
+        self.instead: Optional[functions.Instead] = None
+        self.asking = threading.Lock()  # held from a question to its reply, but for what marrow asks meanwhile
         self.made: Optional[Any] = None
         self.reported: Any = None  # how much was loaded and looked for when it was last reported
         self.context: Optional[Context] = None
@@ -93,7 +96,14 @@ class Process:
         return dict(functions.said_of(node, made), **self._loaded())
 
     def cost(self, request: Dict[str, Any]) -> Any:
-        values = functions.costs(*self._function(request), request)
+        node, cost = self._function(request)
+        if "instead" not in request:
+            return dict(self._loaded(), values=functions.costs(node, cost, request))
+        self.instead = functions.Instead(request)
+        try:
+            values = functions.costs_instead(node, cost, request, self.instead)
+        finally:
+            self.instead = None
         return dict(self._loaded(), values=values)
 
     def radiograph(self, request: Dict[str, Any]) -> Any:
@@ -106,7 +116,7 @@ class Process:
         node = self.load()[request["node"]]
         self.context = Context(None, self.say)
         try:
-            reason = functions.minimum(node, self._all_arguments(node, request), request, self._ask_back)
+            reason = functions.minimum(node, self._all_arguments(node, request), request, self._values)
         finally:
             self.context = None
         self._expect_same_inputs(node, request)
@@ -145,17 +155,48 @@ class Process:
             arguments[node.context] = self.context or Context(None, self.say)
         return arguments
 
-    def _ask_back(self, points: Any) -> Any:
-        """The values of a function of the process that gave the job. The time that they take does not count."""
+    def _values(self, points: Any) -> Any:
+        """The values of the function that an optimizer minimises."""
+        return numpy.array(self._ask({"points": points.ravel().tolist()}), float)  # None becomes NaN
+
+    def _ask_function(self, question: Dict[str, Any], value_at: Optional[Callable[[List[float]], float]] = None) -> Any:
+        if self.instead is not None:
+            return self.instead.reply(question, self._ask)
+        return self._ask(question, value_at)
+
+    def _ask(self, question: Dict[str, Any], value_at: Optional[Callable[[List[float]], float]] = None) -> Any:
+        """The reply of the process that gave the job. The time that it takes does not count. It may ask in turn for
+        values of `value_at`, which may ask further things. Safe to call from several threads."""
+        with self.asking:
+            self._say_while_waiting({"say": "ask", **question})
+            reply = self._reply()
+            while isinstance(reply, dict) and "ask" in reply:
+                assert value_at is not None
+                value = self._value(value_at, reply["point"])
+                self._say_while_waiting({"say": "ask", "answer": value, "to": reply["ask"]})
+                reply = self._reply()
+        return reply
+
+    def _value(self, value_at: Callable[[List[float]], float], point: List[float]) -> Optional[float]:
+        self.asking.release()
+        try:
+            value = float(value_at(point))
+        finally:
+            self.asking.acquire()
+        return value if math.isfinite(value) else None
+
+    def _say_while_waiting(self, message: Dict[str, Any]) -> None:
         self.say({"say": "waiting"})
-        self.say({"say": "ask", "points": points.ravel().tolist()})
+        self.say(message)
+
+    def _reply(self) -> Any:
         if self.replies is None:
             self.replies = open(_REPLIES, "rb", closefd=False)
         line = self.replies.readline()
         if not line:
             os._exit(1)  # nobody waits any more
         self.say({"say": "goes on"})
-        return numpy.array(json.loads(line), float)  # null, for what is not finite, becomes NaN
+        return json.loads(line)
 
     def _arguments(self, node: Declaration, request: Dict[str, Any]) -> Dict[str, Any]:
         self.inputs = {number: self.inputs[number] for number in request["kept"] if number in self.inputs}
@@ -169,6 +210,8 @@ class Process:
             return None
         if "axis" in given:
             return Items(given["axis"], given["names"], [self._input(one) for one in given["items"]])
+        if "function" in given:
+            return _core.asked_function(given["type"], given["function"], given["key"], self._ask_function)
         if given["number"] not in self.inputs:
             self.inputs[given["number"]] = _core.mapped_input(given["memory"], given["type"], given["samples_bytes"])
         return self.inputs[given["number"]][0]
@@ -203,7 +246,7 @@ def _numbers_in(given: Any) -> List[int]:
         return []
     if "axis" in given:
         return [number for one in given["items"] for number in _numbers_in(one)]
-    return [given["number"]]
+    return [given["number"]] if "number" in given else []
 
 
 def _bytes_as_json(name: str) -> Any:
@@ -244,31 +287,6 @@ def _outputs(node: Declaration, returned: Any) -> List[Any]:
             raise Error("%s returned nothing for the output '%s'" % (node.manifest["name"], port["name"]))
         made.append((value, port["name"] or "the only one", port["type"]["id"], port["axis"]))
     return made
-
-
-def _text_of(error: BaseException) -> str:
-    try:
-        return str(error).strip() or "no message"
-    except Exception:  # the exception's own text is at fault
-        return "no message"
-
-
-def explained(error: BaseException, file: str) -> str:
-    """An exception in one sentence, with the last place in the folder of the file. An Error that the node raised on
-    purpose speaks for itself."""
-    text = _text_of(error)
-    if isinstance(error, SyntaxError) and error.filename:
-        return "%s, line %s: %s: %s" % (error.filename, error.lineno, type(error).__name__, error.msg)
-    folder = str(pathlib.Path(file).parent) + os.sep
-    frames = [one for one in traceback.extract_tb(error.__traceback__) if one.filename.startswith(folder)]
-    if not frames:
-        return text if isinstance(error, Error) else "%s: %s: %s" % (file, type(error).__name__, text)
-    last = frames[-1]
-    if isinstance(error, Error) and last.name != "<module>":
-        return text
-    kind = "" if isinstance(error, Error) else type(error).__name__ + ": "
-    line = " (%s)" % last.line if last.line and last.name != "<module>" else ""
-    return "%s, line %s, in %s: %s%s%s" % (last.filename, last.lineno, last.name, kind, text, line)
 
 
 def shortened(text: str) -> str:

@@ -68,6 +68,12 @@ class Result(Mapping[str, Any]):
         return pathlib.Path(self._run.folder) if self._run.folder else None
 
     @property
+    def recipe(self) -> Optional[str]:
+        """A pipeline file that makes the run again, as `marrow recipe` prints it; None if values were given
+        (`given=`)."""
+        return self._run.recipe
+
+    @property
     def files(self) -> Dict[str, List[pathlib.Path]]:
         """The files of each output in the folder; empty without `folder=`."""
         folder = pathlib.Path(self._run.folder)

@@ -20,8 +20,9 @@ class Tutorials(Documents):
     def setUpClass(cls):
         super().setUpClass()
         pages = [page for page in cls.documents if page.startswith("docs/tutorials/")]
-        if IS_SANITIZED:  # a plugin outside the tree is built without the sanitizer, which marrow would refuse
+        if IS_SANITIZED:  # a plugin outside the tree is built without the sanitizer; there are no nodes in Python
             pages.remove("docs/tutorials/first-node")
+            pages.remove("docs/tutorials/first-hour")
         assert len(pages) > 3, pages
         pages = sample(pages, 3)
         with concurrent.futures.ThreadPoolExecutor(AT_ONCE) as pool:
@@ -70,6 +71,19 @@ class Tutorials(Documents):
         self.assertIn("edges.canny", told)
         self.assertTrue((folder / "runs" / "femur" / "report.html").exists())
         self.assertIn("First difference: node 'edges' (edges.canny)", told)
+
+    @unittest.skipIf(IS_SANITIZED, "there are no nodes in Python")
+    def test_first_hour(self):
+        folder, told = self.told("first-hour")
+        self.assertIn("edges.canny  ", told.split("In place of 'edges' in mine.yaml")[1].split("\n\n")[1])
+        self.assertRegex(
+            told, r"why: it uses edges.canny, used edges.adaptive_relaxation \(--set edges.uses=edges.canny"
+        )
+        self.assertIn("input 'cost' is wired to near (there was no node 'near'), was wired to contour_cost", told)
+        table = (folder / "runs/compare/patients/poses.csv").read_text().splitlines()
+        self.assertEqual([line.split(",")[1] for line in table], ["case", "1", "2", "3", "4", "5"])
+        self.assertIn("trusted", table[1])
+        self.assertIn("failed again, with the same error: view 'frontal': no shaft pair found", told)
 
     def test_own_data(self):
         folder, told = self.told("own-data")

@@ -144,10 +144,6 @@ def own(view: marrow.View, *, low: Annotated[float, "low"] = 3) -> marrow.EdgeMa
                 "input 'view' of edges.own: expected one of marrow's",
             ),
             (
-                node + "def own(cost: marrow.Cost) -> marrow.EdgeMap: ...\n",
-                "input 'cost' of edges.own is a function, which a node in Python cannot take; write the node in C++",
-            ),
-            (
                 node + "def own(view: marrow.View) -> marrow.Cost: ...\n",
                 "the output of edges.own is a function; use @marrow.cost, @marrow.optimizer or @marrow.projector",
             ),

@@ -81,6 +81,8 @@ class Run(Case):
         self.assertEqual(record["inputs"]["case"], str(folder))
         self.assertTrue(result.files["edges"])
         self.assertTrue(all(file.is_file() for file in result.files["edges"]))
+        for place in [self.scratch / "out", *result.files["edges"]]:
+            self.assertEqual(result.recipe, program("recipe", place))
         with self.assertRaisesRegex(marrow.Error, "not empty"):
             pipeline.run(only=["edges"], folder=self.scratch / "out")
         self.assertIsNone(pipeline.run(only=["edges"]).folder)
@@ -115,6 +117,7 @@ class Run(Case):
         result = pipeline.run(given={"case": read}, only=["pose", "edges"], keep=False)
         self.assertEqual(result["pose"]["distal"].matrix.tolist(), expected["pose"]["distal"].matrix.tolist())
         self.assertNotIn("case", result.nodes)
+        self.assertIsNone(result.recipe, "no file makes the values again")
 
         camera = read.views["lateral"].camera
         pixels = numpy.array(read.views["lateral"].image.array)

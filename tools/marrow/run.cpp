@@ -149,8 +149,19 @@ std::string status_text(const NodeRecord& record) {
                       : formatted("cached (took {:.3f} s)", record.cached_seconds);
 }
 
+/// The characters that the longest name of a node takes, with those of bodies. `path`: "", or the node and a slash.
+std::size_t width_of_names(const Pipeline& pipeline, const std::string& path) {
+  std::size_t width = 16;
+  for (const PipelineNode& node : pipeline.nodes) {
+    width = std::max(width, path.size() + node.id.size());
+    if (node.repetition) width = std::max(width, width_of_names(node.repetition->alone, path + node.id + "/"));
+  }
+  return width;
+}
+
 /// One line for each node, then those of its body. `path`: "", or the node and a slash.
-void print_nodes(const Pipeline& pipeline, const std::vector<NodeRecord>& records, const std::string& path) {
+void print_nodes(const Pipeline& pipeline, const std::vector<NodeRecord>& records, const std::string& path,
+                 std::size_t width) {
   for (std::size_t i = 0; i < pipeline.nodes.size() && i < records.size(); ++i) {
     const NodeRecord& record = records[i];
     if (record.status == NodeRecord::Status::not_needed || record.was_stopped()) continue;
@@ -158,15 +169,15 @@ void print_nodes(const Pipeline& pipeline, const std::vector<NodeRecord>& record
     const bool is_told =
         record.status == NodeRecord::Status::failed || record.status == NodeRecord::Status::failed_alone;
     const std::string reason = is_told ? "" : printable_lines(record.reason);
-    print_beside(formatted("{:<16} {:<34} {:>9.3f} {:>6} ", path + pipeline.nodes[i].id, pipeline.nodes[i].info.name,
-                           record.seconds, record.calls),
-                 status_text(record) + (reason.empty() ? "" : ": " + reason), 70);
-    if (record.stopped > 0) std::printf("%-16s %s\n", "", not_run_text(record.stopped).c_str());
+    print_beside(formatted("{:<{}} {:<34} {:>9.3f} {:>6} ", path + pipeline.nodes[i].id, width,
+                           pipeline.nodes[i].info.name, record.seconds, record.calls),
+                 status_text(record) + (reason.empty() ? "" : ": " + reason), width + 54);
+    if (record.stopped > 0) std::printf("%-*s %s\n", int(width), "", not_run_text(record.stopped).c_str());
     if (!record.passes) continue;
     const std::size_t passes = record.passes->passes.size();
-    std::printf("%-16s %zu %s%s%s\n", "", passes, passes == 1 ? "pass" : "passes",
+    std::printf("%-*s %zu %s%s%s\n", int(width), "", passes, passes == 1 ? "pass" : "passes",
                 record.passes->end.empty() ? "" : "; ", printable(record.passes->end).c_str());
-    print_nodes(pipeline.nodes[i].repetition->alone, record.passes->nodes, path + pipeline.nodes[i].id + "/");
+    print_nodes(pipeline.nodes[i].repetition->alone, record.passes->nodes, path + pipeline.nodes[i].id + "/", width);
   }
 }
 
@@ -187,9 +198,10 @@ void print_summary(const Pipeline& pipeline, const RunResult& result, const std:
                    const std::string& folder) {
   std::printf("\n");
   print_verdicts(verdicts_of(pipeline, result));
-  std::printf("%-16s %-34s %9s %6s  %s\n", "node", "uses", "seconds", "calls", "status");
-  print_nodes(pipeline, result.nodes, "");
-  std::printf("%-16s %-34s %9.3f\n\n", "all", "", result.seconds);
+  const std::size_t width = width_of_names(pipeline, "");
+  std::printf("%-*s %-34s %9s %6s  %s\n", int(width), "node", "uses", "seconds", "calls", "status");
+  print_nodes(pipeline, result.nodes, "", width);
+  std::printf("%-*s %-34s %9.3f\n\n", int(width), "all", "", result.seconds);
   print_results(pipeline, result);
   if (folder.empty())
     std::printf("nothing was made, so no folder of results is kept\n");
@@ -258,7 +270,7 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   RunOutcome outcome;
   outcome.result = run_pipeline(pipeline, catalogue, settings);
   progress.clear();
-  outcome.written = folder.write_outputs(pipeline, outcome.result, catalogue);
+  outcome.written = folder.write_outputs(pipeline, outcome.result, catalogue, recipe_of_run(pipeline, settings));
   folder.write_record(pipeline, outcome.result, settings, catalogue, arguments, outcome.written);
   const std::string untidy = settings.store ? settings.store->tidy(settings.cancelled) : "";
   if (!untidy.empty()) note("the store of results is not tidied up: " + untidy);

@@ -40,15 +40,28 @@ std::string success_sentence(const Experiment& experiment, const std::vector<std
                         : "A run is a success with " + limits + "; a failed run is not.";
 }
 
-json pipeline_graph(const Experiment& experiment, const compare::CellRunner& runner) {
-  const fs::path place = runner.case_place(0);
-  const auto of_variant = [&](std::size_t v) {
-    return runner.pipeline_of({v, 0, 0}, place, compare::CellRunner::Depth::pictures);
-  };
-  std::vector<std::pair<std::string, Pipeline>> others;
+/// The pipelines of the variants on the first case, from the first start.
+using OfVariants = std::vector<std::pair<std::string, Pipeline>>;
+
+OfVariants pipelines_of(const Experiment& experiment, const compare::CellRunner& runner) {
+  OfVariants pipelines;
   for (std::size_t v = 0; v < experiment.variants.size(); ++v)
-    if (v != experiment.baseline) others.emplace_back(experiment.variants[v].name, of_variant(v));
-  return graph_of(of_variant(experiment.baseline), others);
+    pipelines.emplace_back(experiment.variants[v].name,
+                           runner.pipeline_of({v, 0, 0}, runner.case_place(0), compare::CellRunner::Depth::pictures));
+  return pipelines;
+}
+
+std::vector<NamedRecipe> recipes_of(const OfVariants& pipelines, const compare::CellRunner& runner) {
+  std::vector<NamedRecipe> recipes;
+  for (std::size_t v = 0; v < pipelines.size(); ++v)
+    recipes.push_back({pipelines[v].first, runner.recipe_of({v, 0, 0}, pipelines[v].second).text()});
+  return recipes;
+}
+
+json pipeline_graph(const Experiment& experiment, OfVariants others) {
+  const Pipeline baseline = std::move(others[experiment.baseline].second);
+  others.erase(others.begin() + std::ptrdiff_t(experiment.baseline));
+  return graph_of(baseline, others);
 }
 
 std::string command_of(const Experiment& experiment, const CompareRequest& request) {
@@ -90,7 +103,9 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
     if (answers.contains(part)) data[part] = answers[part];
 
   data["cell_table"] = cell_table(experiment, rows);
-  data["graph"] = pipeline_graph(experiment, runner);
+  OfVariants pipelines = pipelines_of(experiment, runner);
+  const std::vector<NamedRecipe> recipes = recipes_of(pipelines, runner);
+  data["graph"] = pipeline_graph(experiment, std::move(pipelines));
   json record = json::object();
   try {
     if (!shown.empty()) record = read_record(runner.pictures_of(shown.front()));
@@ -100,8 +115,9 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
   data["experiment"]["machine"] = machine_of(record);
   data["experiment"]["finished"] = record.value("finished", "");
   data["experiment"]["plugins"] = plugins_of(record);
-  add_cell_materials(data, runner, shown, folder, std::size_t(1e6 * request.page_mb));
-  write_page(data, folder / "report.html");
+  const std::size_t most_bytes = std::size_t(1e6 * request.page_mb), taken = recipes_element(recipes).size();
+  add_cell_materials(data, runner, shown, folder, most_bytes - std::min(most_bytes, taken));
+  write_page(data, recipes, folder / "report.html");
   remove_other_parts(data, folder);
 }
 

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <thread>
 
+#include "compare/csv.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/hash.hpp"
 #include "marrow/base/json_text.hpp"
@@ -62,21 +63,6 @@ json convergence_of(const std::string& pose) {
   return steps;
 }
 
-/// The cells of a line of CSV; a quoted one may hold commas and, doubled, quotes.
-std::vector<std::string> cells_of(const std::string& line) {
-  std::vector<std::string> cells(1);
-  bool quoted = false;
-  for (const char c : line) {
-    if (c == '"')
-      quoted = !quoted;
-    else if (c == ',' && !quoted)
-      cells.emplace_back();
-    else if (c != '\r')
-      cells.back() += c;
-  }
-  return cells;
-}
-
 /// The motion of a bone from the table of a trajectory, by the names of its columns. Throws for another table.
 json trajectory_of(const std::string& text, const std::string& name) {
   static const std::vector<std::string> kAxes{"frontal_deg", "lateral_deg", "axial_deg",
@@ -84,7 +70,7 @@ json trajectory_of(const std::string& text, const std::string& name) {
   std::istringstream lines(text);
   std::string line;
   std::getline(lines, line);
-  const std::vector<std::string> header = cells_of(line);
+  const std::vector<std::string> header = csv_cells(line);
   const auto column = [&](const std::string& title) {
     const auto at = std::find(header.begin(), header.end(), title);
     if (at == header.end()) throw Error(name + ": has no column '" + title + "'");
@@ -92,7 +78,7 @@ json trajectory_of(const std::string& text, const std::string& name) {
   };
   json way = {{"name", place_of(name)}};
   while (std::getline(lines, line)) {
-    const std::vector<std::string> cells = cells_of(line);
+    const std::vector<std::string> cells = csv_cells(line);
     const auto number = [&](const std::string& title) { return parsed_number(cells.at(column(title))).value(); };
     json motion = json::array(), deviation = json::array();
     for (const std::string& axis : kAxes) {

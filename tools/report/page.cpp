@@ -26,8 +26,9 @@ std::string_view page_without_data() {
   return {marrow_report_page, std::size_t(marrow_report_page_end - marrow_report_page)};
 }
 
-/// No text in the data may end the script, so "<" is written as a JSON escape.
-std::string safe_text(const nlohmann::json& data) {
+}  // namespace
+
+std::string text_in_page(const nlohmann::json& data) {
   const std::string text = json_text(data);
   std::string safe;
   safe.reserve(text.size() + text.size() / 16);
@@ -35,17 +36,17 @@ std::string safe_text(const nlohmann::json& data) {
   return safe;
 }
 
-}  // namespace
-
 std::size_t page_bytes(const nlohmann::json& data) {
-  return page_without_data().size() - kMarker.size() + kBefore.size() + safe_text(data).size() + kAfter.size();
+  return page_without_data().size() - kMarker.size() + kBefore.size() + text_in_page(data).size() + kAfter.size();
 }
 
-void write_page(const nlohmann::json& data, const std::filesystem::path& file, Kinds kinds) {
+void write_page(const nlohmann::json& data, const std::vector<NamedRecipe>& recipes, const std::filesystem::path& file,
+                Kinds kinds) {
   const std::string_view page = page_without_data();
   const std::size_t at = page.find(kMarker);
   std::string text(page.substr(0, at));
-  text.append(kBefore).append(safe_text(data)).append(kAfter).append(page.substr(at + kMarker.size()));
+  text.append(recipes_element(recipes));  // first, so that it is found quickly
+  text.append(kBefore).append(text_in_page(data)).append(kAfter).append(page.substr(at + kMarker.size()));
   write_text_file(file, text, kinds);
 }
 

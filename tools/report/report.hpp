@@ -10,6 +10,7 @@
 
 #include "compare/comparison.hpp"
 #include "marrow/base/text_file.hpp"
+#include "report/recipes.hpp"
 
 namespace marrow::cli {
 
@@ -41,8 +42,13 @@ struct ReportMaterial {
 /// A PNG file as a data URL, converted to WebP with a longer side of at most `size_px`. Throws Error if it is no PNG.
 std::string picture_url(const std::filesystem::path& png_file, int size_px);
 
-/// Writes the page with these data.
-void write_page(const nlohmann::json& data, const std::filesystem::path& file, Kinds kinds = Kinds::files);
+/// Writes the page with these data and recipes.
+void write_page(const nlohmann::json& data, const std::vector<NamedRecipe>& recipes, const std::filesystem::path& file,
+                Kinds kinds = Kinds::files);
+
+/// The text of JSON data inside of a script element. No text in the data may end the script, so "<" is written as a
+/// JSON escape.
+std::string text_in_page(const nlohmann::json& data);
 
 /// The figures of merit that a run wrote: one table for each folder of files, one column for each file in it.
 nlohmann::json figures_of(const std::filesystem::path& folder, const nlohmann::json& record);

@@ -110,6 +110,15 @@ std::string absent_of(const json& record) {
   return text;
 }
 
+/// Nothing if the record is damaged or old: the page shows what it can.
+std::vector<NamedRecipe> recipes_of(const fs::path& folder) {
+  try {
+    return {{"", recipe_of_folder(folder)}};
+  } catch (const std::exception&) {
+    return {};
+  }
+}
+
 json page_of(const fs::path& folder, const json& record, ReportMaterial& material) {
   const std::string run_name = fs::absolute(folder / ".").parent_path().filename().string();
   json cell = {{"id", run_name},
@@ -166,7 +175,7 @@ fs::path write_run_page(const fs::path& folder, fs::path file) {
   if (file.empty()) file = folder / "report.html";
   ReportMaterial material;
   try {
-    write_page(page_of(folder, record, material), file, kinds);
+    write_page(page_of(folder, record, material), recipes_of(folder), file, kinds);
   } catch (const json::exception&) {
     refuse_record(folder, "what it should say is missing in it, or of another type");
   }

@@ -10,6 +10,7 @@ from markdown import ORPHAN, block, sections, toctree
 GROUPS = {
     "Tutorials": [
         "tutorials/first-registration",
+        "tutorials/first-hour",
         "tutorials/own-data",
         "tutorials/first-node",
         "tutorials/first-comparison",

@@ -73,10 +73,12 @@ def declared_in(path):
 
 
 def nodes_of_examples(root):
-    """Nodes that the examples in docs/ declare, in files and in blocks of C++."""
+    """Nodes that the examples in docs/ declare, in files and in blocks of C++ and Python."""
     texts = [path.read_text() for path in sorted((root / "docs").rglob("*.cpp"))]
     texts += [path.read_text() for path in sorted((root / "docs").rglob("*.md"))]
-    return {name for text in texts for name in re.findall(r'\.node\("([a-z_0-9.]+)"', text)}
+    return {
+        name for text in texts for name in re.findall(r'\.(?:node|cost|optimizer|projector)\("([a-z_0-9.]+)"', text)
+    }
 
 
 def near(name, known):

@@ -82,7 +82,8 @@ json run_into_folder(std::shared_ptr<LastRun> run, const PipelineArguments& argu
   };
   folder.keep_failed_calls(settings, workbench.catalogue);
   run->result = run_pipeline(run->pipeline, workbench.catalogue, settings);
-  const auto written = folder.write_outputs(run->pipeline, run->result, workbench.catalogue);
+  const auto written =
+      folder.write_outputs(run->pipeline, run->result, workbench.catalogue, recipe_of_run(run->pipeline, settings));
   folder.write_record(run->pipeline, run->result, settings, workbench.catalogue, arguments, written);
   if (settings.store) settings.store->tidy(settings.cancelled);
   json verdicts = json::array(), faults = json::array();

@@ -216,6 +216,10 @@ RunSettings CellRunner::settings_of(const CellIndex& cell) const {
   return settings;
 }
 
+RunRecipe CellRunner::recipe_of(const CellIndex& cell, const Pipeline& pipeline) const {
+  return recipe_of_run(pipeline, settings_of(cell));
+}
+
 CellRunner::Done CellRunner::run_into(const fs::path& folder, const Pipeline& pipeline, const CellIndex& cell,
                                       const std::function<void(const RunEvent&)>& observer) {
   remove_tree(folder);
@@ -225,7 +229,7 @@ CellRunner::Done CellRunner::run_into(const fs::path& folder, const Pipeline& pi
   settings.observer = observer;
   written.keep_failed_calls(settings, catalogue_);
   Done done{run_pipeline(pipeline, catalogue_, settings), ""};
-  const auto outputs = written.write_outputs(pipeline, done.result, catalogue_);
+  const auto outputs = written.write_outputs(pipeline, done.result, catalogue_, recipe_of(cell, pipeline));
   written.write_record(pipeline, done.result, settings, catalogue_,
                        arguments_of(experiment_, cell, case_folder(cell.case_index)), outputs);
   done.fault = reason_of(pipeline, done.result);

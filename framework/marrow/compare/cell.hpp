@@ -13,6 +13,7 @@
 #include "marrow/compare/experiment.hpp"
 #include "marrow/domain/verdict.hpp"
 #include "marrow/runtime/run/executor.hpp"
+#include "marrow/runtime/run/run_recipe.hpp"
 
 namespace MARROW_EXPORT marrow {
 namespace compare {
@@ -132,6 +133,8 @@ class CellRunner {
   /// The pipeline of a cell. It keeps the outputs that are poses or verdicts or that the experiment's metrics need;
   /// with Depth::pictures, also those that people look at.
   Pipeline pipeline_of(const CellIndex& cell, const std::filesystem::path& case_folder, Depth depth) const;
+  /// What makes a run of this pipeline of the cell again.
+  RunRecipe recipe_of(const CellIndex& cell, const Pipeline& pipeline) const;
 
  private:
   enum class Look { may_be_kept, anew };

@@ -92,7 +92,7 @@ void CellRunner::simulate(std::size_t index, const fs::path& folder) const {
                 "' cannot be simulated: what it is made from was changed meanwhile; run it again");
   const TemporaryFolder temporary(new_folder_beside(folder));
   RunFolder written(temporary.path(), pipeline);
-  for (const RunFolder::Written& output : written.write_outputs(pipeline, result, catalogue_))
+  for (const RunFolder::Written& output : written.write_outputs(pipeline, result, catalogue_, std::nullopt))
     if (const std::string fault = output.fault + output.absent; !fault.empty())
       throw Error("case '" + one.name + "' cannot be written: " + fault);
   const fs::path outputs = fs::path("outputs") / experiment_.simulation.output;

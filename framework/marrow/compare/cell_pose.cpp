@@ -7,6 +7,7 @@
 #include "cell_parts.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/runtime/node/types.hpp"
+#include "marrow/runtime/run/output_items.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -40,12 +41,6 @@ CellPose cell_pose(const Pose& pose, const std::string& output, const std::strin
   return made;
 }
 
-void add_poses(const Value& value, const std::string& output, const std::string& item, std::vector<CellPose>& poses) {
-  for (std::size_t i = 0; i < value.items.size(); ++i)
-    add_poses(value.items[i], output, (item.empty() ? "" : item + "/") + value.names[i], poses);
-  if (!value.is_list() && !value.is_absent()) poses.push_back(cell_pose(value.as<Pose>(), output, item));
-}
-
 json number_or_null(const std::optional<double>& value) { return value ? json(*value) : json(); }
 
 double finite_number(const json& j) {
@@ -62,13 +57,10 @@ std::optional<double> finite_or_null(const json& j) {
 std::vector<CellPose> poses_of(const Pipeline& pipeline, const RunResult& result,
                                const std::vector<NamedVerdict>& verdicts) {
   std::vector<CellPose> poses;
-  for (const PipelineOutput& output : pipeline.outputs) {
-    if (pipeline.output_of(output.source).type != TypeInfo::of<Pose>()) continue;
-    try {
-      add_poses(value_of(result, output.source), output.name, "", poses);
-    } catch (const Error&) {  // the list does not have this item: the output's own fault says so
-    }
-  }
+  for_each_item(pipeline, result, TypeInfo::of<Pose>(),
+                [&](const std::string& output, const std::string& item, const Value& value) {
+                  poses.push_back(cell_pose(value.as<Pose>(), output, item));
+                });
   for (CellPose& pose : poses) judge(pose, verdicts);
   return poses;
 }

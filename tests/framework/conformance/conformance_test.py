@@ -80,9 +80,28 @@ WRONG = {  # node: checks of which at least one must fail
     "similarity.levels": {"coarse_level"},
     "similarity.steep": {"slope"},
     "similarity.alone": {"beside_another"},
+    "track.lagging": {"no_worse"},
+    "track.drifting": {"still"},
+    "track.shaking": {"still_no_worse", "still"},
+    "track.renamed": {"contract"},
+    "track.careless": {"nan_pose", "not_rigid"},
+    "track.changing": {"determinism", "threads"},
+    "track.averaging": {"outlier"},
+    "track.rounding": {"moved_world"},
+    "track.one_sided": {"reversed"},
     "verdict.trusting": {"mistakes_trusted"},
     "verdict.doubting": {"right_not_trusted"},
     "verdict.denying": {"right_wrong"},
+    "volume.another_grid": {"contract"},
+    "volume.brighter": {"inside", "outside"},
+    "volume.by_place": {"moved_inside"},
+    "volume.blurred": {"inside"},
+    "volume.careless": {"nan_voxel"},
+    "volume.changing": {"determinism", "threads"},
+    "volume.metal": {"metal"},
+    "volume.larger": {"surface_volume"},
+    "volume.shifted": {"surface_place"},
+    "volume.other_frame": {"contract"},
 }
 KINDS = subprocess.run([MARROW, "list", "--kinds", "--json"], stdout=subprocess.PIPE, text=True, check=True).stdout
 CHECKS = {kind["name"]: {check["name"] for check in kind["checks"]} for kind in json.loads(KINDS)}
@@ -194,7 +213,10 @@ class Conformance(unittest.TestCase):
             "segment.plain",
             "shaft.plain",
             "similarity.plain",
+            "track.plain",
             "verdict.plain",
+            "volume.plain_ct",
+            "volume.plain_surface",
         ):
             checks = sample(sorted(CHECKS[node.split(".")[0]] - {"contract"}), 5)
             result, nodes = conformance(node, "--check=contract", *("--check=" + name for name in checks), seconds=300)

@@ -192,7 +192,8 @@ TEST_F(RunFolderTest, EachItemHasAFileOfItsOwn) {
       "o: s.both");
   const marrow::RunResult result = marrow::run_pipeline(pipeline, writing_catalogue(), {});
   RunFolder folder(scratch.path / "out", pipeline);
-  const std::vector<RunFolder::Written> written = folder.write_outputs(pipeline, result, writing_catalogue());
+  const std::vector<RunFolder::Written> written =
+      folder.write_outputs(pipeline, result, writing_catalogue(), std::nullopt);
   ASSERT_EQ(written.size(), 1u);
   EXPECT_EQ(written[0].fault, "");
   ASSERT_EQ(written[0].files.size(), 10u);
@@ -249,7 +250,7 @@ TEST_F(RunFolderTest, RecordTellsAFailureThatMayBeFromOneThatMayNot) {
       "f: f, g: g, s: s.left");
   const marrow::RunResult result = marrow::run_pipeline(pipeline, writing_catalogue(), {});
   RunFolder folder(scratch.path / "out", pipeline);
-  const auto written = folder.write_outputs(pipeline, result, writing_catalogue());
+  const auto written = folder.write_outputs(pipeline, result, writing_catalogue(), std::nullopt);
   EXPECT_EQ(written[0].files, std::vector<std::string>{"outputs/f/a.json"});
   EXPECT_EQ(written[0].absent, "node 'f' failed");
   EXPECT_TRUE(written[1].files.empty());
@@ -272,7 +273,7 @@ TEST_F(RunFolderTest, OneOutputDoesNotReplaceAnother) {
       pipeline_of("  c: {uses: test.constant}\n  s: {uses: test.sides}\n", "x: c, x.json: s.both");
   const marrow::RunResult result = marrow::run_pipeline(pipeline, writing_catalogue(), {});
   RunFolder folder(scratch.path / "out", pipeline);
-  const auto written = folder.write_outputs(pipeline, result, writing_catalogue());
+  const auto written = folder.write_outputs(pipeline, result, writing_catalogue(), std::nullopt);
   EXPECT_EQ(written[0].files, std::vector<std::string>{"outputs/x.json"});
   EXPECT_TRUE(written[1].files.empty());
   EXPECT_FALSE(written[1].fault.empty());

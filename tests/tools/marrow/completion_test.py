@@ -108,6 +108,15 @@ class Completion(Case):
         self.assertEqual(self.words("run", "p.yaml", "--set", "first.uses=test.const"), ["first.uses=test.constant"])
         self.assertEqual(self.words("run", "p.yaml", "--set=first.may_fail=t"), ["--set=first.may_fail=true"])
         self.assertEqual(self.words("run", "none.yaml", "x"), [])
+        self.write(
+            "mine.yaml", "marrow: 1\nextends: p.yaml\nnodes: {part: {uses: p.yaml, with: {number: a, case: b}}}\n"
+        )
+        self.assertEqual(self.lines("run", "mine.yaml", "n"), ["number=\ta file with a number"])
+        self.assertEqual(self.words("run", "mine.yaml", "--set", "part.s"), ["part.sum."])
+        self.assertIn("part.first.value=", self.words("run", "mine.yaml", "--set", "part.first."))
+        self.assertEqual(
+            self.words("run", "mine.yaml", "--set", "part.first.may_fail=f"), ["part.first.may_fail=false"]
+        )
         self.write("p.yaml", "nodes: [")
         self.assertEqual(self.words("run", "p.yaml", "x"), [])
         self.assertEqual(self.words("run", "p.yaml", "--set", "x"), [])

@@ -37,7 +37,8 @@ class PartsTest(BrowserTest):
 
     def check_cell(self):
         self.eventually(lambda: self.browser.js(SOURCES), [256] * 4)
-        self.assertEqual(self.texts("#cell h3")[-4:], ["Pictures", "Convergence", "Cost about the result", "3D"])
+        headings = ["Pictures", "Convergence", "Cost about the result", "3D", "Its recipe"]
+        self.assertEqual(self.texts("#cell h3")[-5:], headings)
 
     def test_nothing_is_loaded_before_it_is_asked_for(self):
         self.browser.open(self.page)

@@ -100,6 +100,15 @@ class Program(unittest.TestCase):
         )
         self.assertEqual(headings[:5], ["Figure", "start", "axial", "final", "Unit"])
         self.check_scene()
+        self.check_recipe(0, self.marrow("recipe", run))
+
+    def check_recipe(self, variant, recipe):
+        """The link opens it."""
+        shown = "const shown = document.getElementById('recipe-%d');" % variant
+        self.assertFalse(self.browser.js(shown + "return shown.open"))
+        self.browser.js("document.querySelectorAll('a.recipe')[%d].click()" % variant)
+        self.assertTrue(self.browser.js(shown + "return shown.open"))
+        self.assertEqual(self.browser.js(shown + "return shown.querySelector('pre').textContent"), recipe)
 
     def test_a_comparison(self):
         experiment = self.folder / "small.yaml"
@@ -133,6 +142,11 @@ class Program(unittest.TestCase):
             ["edges"],
         )
         self.check_scene()
+        self.check_recipe(1, self.marrow("recipe", page, "--variant", "canny"))
+        self.browser.js("document.querySelector('[data-id^=canny]').click()")
+        folder = "return document.querySelector('#cell a[href^=cells]').href"
+        cell = (self.folder / "out" / "cells" / "canny").resolve()
+        self.assertEqual(pathlib.Path(self.browser.js(folder).replace("file://", "")).resolve().parents[1], cell)
 
 
 if __name__ == "__main__":

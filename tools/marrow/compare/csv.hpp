@@ -2,6 +2,7 @@
 #pragma once
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace marrow::cli {
 
@@ -11,5 +12,8 @@ namespace marrow::cli {
 std::string csv_field(const std::string& raw);
 /// With nine digits; empty for nothing.
 std::string csv_number(const std::optional<double>& value);
+
+/// The cells of a line; a quoted one may hold commas and, doubled, quotes.
+std::vector<std::string> csv_cells(const std::string& line);
 
 }  // namespace marrow::cli

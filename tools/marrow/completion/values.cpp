@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Values of options and positionals. What a value is, its type in the help says; of a pipeline, the pipeline itself.
-#include <yaml-cpp/yaml.h>
 #include <CLI/CLI.hpp>
+#include <algorithm>
 
 #include "commands.hpp"
-#include "marrow/base/text_file.hpp"
-#include "marrow/base/yaml.hpp"
 #include "wishes.hpp"
 
 namespace marrow::cli {
@@ -53,30 +51,30 @@ Pipeline pipeline_at(const std::string& file, const Catalogue& catalogue) {
   return read_pipeline(file, {}, catalogue, diagnostics, false);
 }
 
-void add_node_ids(Beginning& beginning, const std::string& file, const std::string& after) {
-  for (const PipelineNode& node : pipeline_at(file, Catalogue()).nodes) beginning.add(node.id + after, node.info.name);
+/// The node's name in a change: PART.NODE for the node PART/NODE.
+std::string name_in_changes(const PipelineNode& node) {
+  std::string name = node.id;
+  std::replace(name.begin(), name.end(), '/', '.');
+  return name;
 }
 
-/// The pipeline's inputs, as NAME=.
+/// The pipeline's inputs, also those of files that it extends, as NAME=.
 void add_inputs(Beginning& beginning, const std::string& file) {
-  const YAML::Node inputs = parse_yaml(read_text_file(file, kMostSourceBytes))["inputs"];
-  if (!inputs.IsMap()) return;
-  for (const auto& input : inputs) {
-    const YAML::Node help = input.second.IsMap() ? input.second["help"] : YAML::Node();
-    beginning.add(input.first.as<std::string>() + "=", help && help.IsScalar() ? help.as<std::string>() : "");
-  }
+  for (const PipelineInput& input : pipeline_at(file, Catalogue()).inputs)
+    if (!input.is_data) beginning.add(input.name + "=", input.help);
 }
 
 /// What changes one node: its options, and what all nodes have.
 void add_changes(Beginning& beginning, const PipelineNode& node) {
-  beginning.add(node.id + ".uses=", "another node in its place");
-  beginning.add(node.id + ".may_fail=", "whether the run goes on without it");
-  for (const OptionInfo& option : node.info.options) beginning.add(node.id + "." + option.name + "=", option.help);
+  const std::string before = name_in_changes(node) + ".";
+  beginning.add(before + "uses=", "another node in its place");
+  beginning.add(before + "may_fail=", "whether the run goes on without it");
+  for (const OptionInfo& option : node.info.options) beginning.add(before + option.name + "=", option.help);
 }
 
 void add_values_of_change(Beginning& beginning, const PipelineNode& node, const std::string& name,
                           const Catalogue& catalogue) {
-  const std::string before = node.id + "." + name + "=";
+  const std::string before = name_in_changes(node) + "." + name + "=";
   if (name == "uses") add_nodes(beginning, catalogue, before, node.info.kind());
   std::vector<std::string> values;
   if (name == "may_fail") values = {"true", "false"};
@@ -90,16 +88,16 @@ void add_values_of_change(Beginning& beginning, const PipelineNode& node, const 
 
 /// node.option=value: one part after the other.
 void add_overrides(Beginning& beginning, const std::string& typed, const std::string& file) {
-  const std::size_t dot = typed.find('.');
-  if (dot == std::string::npos) return add_node_ids(beginning, file, ".");
   const Catalogue catalogue;
-  const std::size_t equals = typed.find('=', dot);
+  const std::size_t equals = typed.find('=');
   for (const PipelineNode& node : pipeline_at(file, catalogue).nodes) {
-    if (node.id != typed.substr(0, dot) || node.repetition) continue;
-    if (equals == std::string::npos)
+    const std::string before = name_in_changes(node) + ".";
+    if (!typed.starts_with(before))
+      beginning.add(before, node.info.name);
+    else if (!node.repetition && equals == std::string::npos)
       add_changes(beginning, node);
-    else
-      add_values_of_change(beginning, node, typed.substr(dot + 1, equals - dot - 1), catalogue);
+    else if (!node.repetition)
+      add_values_of_change(beginning, node, typed.substr(before.size(), equals - before.size()), catalogue);
   }
 }
 
@@ -131,7 +129,9 @@ Wishes values_for(const Typed& typed) {
   if (typed.command == "new node" && typed.place == "name") add_kinds(beginning, Catalogue(), ".");
   try {
     if (is("FILE NODE") && typed.before.empty()) return {{}, true, false};
-    if (is("FILE NODE")) add_node_ids(beginning, typed.before[0], "");
+    if (is("FILE NODE"))
+      for (const PipelineNode& node : pipeline_at(typed.before[0], Catalogue()).nodes)
+        beginning.add(node.id, node.info.name);
     add_of_pipeline(beginning, typed);
   } catch (const std::exception&) {  // there is no such pipeline, so nothing is known of it
   }

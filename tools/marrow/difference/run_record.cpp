@@ -239,6 +239,7 @@ bool holds(const fs::path& file, const std::string& content) {
 RunRecord from_json(const fs::path& folder, const YAML::Node& pipeline, const json& record) {
   RunRecord run;
   run.folder = folder;
+  run.version = record.value("marrow", "");
   run.pipeline = record.at("pipeline");
   run.status = status_of(record);
   run.framework = build_id_of(record, "framework");

@@ -66,6 +66,7 @@ struct RecordedResult {
 
 struct RunRecord {
   std::filesystem::path folder;
+  std::string version;  ///< of marrow
   std::string pipeline, status, framework, cpu_level;
   std::uint64_t seed = 1;
   int threads = 0;

@@ -99,8 +99,8 @@ fs::path new_case(const std::string& name, const fs::path& folder) {
 }
 
 Made make_node(const NewRequest& r) {
-  if (r.in_python) return {new_python_node(r.name, r.out), "{}/ci tests it, and compares it with marrow's own"};
-  return {new_node(r.name, r.out), "{}/ci builds it, tests it, and compares it with marrow's own"};
+  if (r.in_python) return {new_python_node(r.name, r.out), "{}/ci tests it, and tries it in a pipeline"};
+  return {new_node(r.name, r.out), "{}/ci builds it, tests it, and tries it in a pipeline"};
 }
 Made make_kind(const NewRequest& r) {
   return {new_kind(r.name, r.out), "{}/ci builds it, tests it, and compares variants"};

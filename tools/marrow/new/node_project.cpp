@@ -53,8 +53,10 @@ std::size_t line_of_node(const std::string& pipeline, const std::string& place) 
   return at + 1;
 }
 
-std::string whole_pipeline() {
-  return read_text_file(shared_files("pipelines/femur/simulated-femur.yaml"), kMostSourceBytes);
+constexpr const char* kPipeline = "femur/simulated-femur.yaml";
+
+std::string shared_pipeline(const std::string& name) {
+  return read_text_file(shared_files(fs::path("pipelines") / name), kMostSourceBytes);
 }
 
 /// The name of the node that the pipeline uses at `place`.
@@ -64,9 +66,23 @@ std::string node_at(const std::string& pipeline, const std::string& place) {
   return pipeline.substr(begin, pipeline.find_first_of(",}\n", begin) - begin);
 }
 
+/// What `ci` does at last, and how the README says it.
+struct LastStep {
+  std::string command, text, row;
+};
+
+/// A comparison, or where there are no figures to compare, a run.
+LastStep last_step(bool is_compared, const std::string& replaced) {
+  if (!is_compared) return {"marrow run pipeline.yaml", "runs it in a pipeline", ""};
+  return {"marrow compare compare.yaml", "compares it with " + replaced,
+          "| `compare.yaml` | the node beside " + replaced + ", case by case |\n"};
+}
+
 /// A node to be made: its names, and the node that it replaces in the pipeline.
 struct NewNode {
-  std::string name, kind, own, file, origin, place, before, link;
+  std::string name, kind, own, file, origin, place, pipeline, before, link;
+  bool brings_pipeline = false;  ///< whether the templates of its kind have a file pipeline.yaml
+  LastStep last;
   fs::path from;  ///< the templates of its kind
 
   explicit NewNode(const std::string& wanted) : name(wanted) {
@@ -82,23 +98,41 @@ struct NewNode {
     const YAML::Node about = parse_yaml(read_text_file(from / "template.yaml", kMostSourceBytes));
     origin = about["node"].as<std::string>(), place = about["place"].as<std::string>();
     for (const YAML::Node& library : about["link"]) link += (link.empty() ? " LINK " : " ") + library.as<std::string>();
-    before = node_at(whole_pipeline(), place);
+    pipeline = about["pipeline"] ? about["pipeline"].as<std::string>() : kPipeline;
+    brings_pipeline = bool(about["replaces"]);
+    before = brings_pipeline ? about["replaces"].as<std::string>() : node_at(shared_pipeline(pipeline), place);
+    last = last_step(!about["compare"] || about["compare"].as<bool>(), before);
   }
 
-  /// The files of a folder of templates, and a pipeline with the new node in it.
+  /// The files of a folder of templates, and a pipeline with the new node in it. Files that the kind's templates bring
+  /// take the place of these.
   Files files_from(const fs::path& templates) const {
-    Files files = filled_templates(templates, {{"@node@", name},
-                                               {"@name@", own},
-                                               {"@kind@", kind},
-                                               {"@folder@", file},
-                                               {"@link@", link},
-                                               {"@place@", place},
-                                               {"@replaced@", before},
-                                               {"@origin@", origin}});
-    std::string pipeline = whole_pipeline();
-    const std::size_t at = pipeline.find("uses: " + before, line_of_node(pipeline, place));
-    files["pipeline.yaml"] = pipeline.replace(at, 6 + before.size(), "uses: " + name);
+    const Replacements names{{"@node@", name},
+                             {"@name@", own},
+                             {"@kind@", kind},
+                             {"@folder@", file},
+                             {"@link@", link},
+                             {"@place@", place},
+                             {"@pipeline@", shared_files(fs::path("pipelines") / pipeline).string()},
+                             {"@replaced@", before},
+                             {"@origin@", origin},
+                             {"@last_command@", last.command},
+                             {"@last_step@", last.text},
+                             {"@row_of_compare@\n", last.row}};
+    Files files = filled_templates(templates, names);
+    if (last.row.empty()) files.erase("compare.yaml");
+    if (!brings_pipeline) files["pipeline.yaml"] = pipeline_with_node();
+    for (const fs::path& own_files :
+         {from / "files", templates.filename() == "python-node" ? from / "python/files" : ""})
+      if (fs::is_directory(own_files))
+        for (auto& [file_name, text] : filled_templates(own_files, names)) files[file_name] = text;
     return files;
+  }
+
+  std::string pipeline_with_node() const {
+    std::string text = shared_pipeline(pipeline);
+    const std::size_t at = text.find("uses: " + before, line_of_node(text, place));
+    return text.replace(at, 6 + before.size(), "uses: " + name);
   }
 };
 
@@ -139,7 +173,7 @@ fs::path new_kind(const std::string& name, const fs::path& folder) {
     files[source] =
         replaced(read_text_file(shared_files("example-kind") / source, kMostSourceBytes), {{"denoise", name}});
   // The views go through the new node before their edges are looked for.
-  std::string pipeline = whole_pipeline();
+  std::string pipeline = shared_pipeline(kPipeline);
   const std::size_t edges = line_of_node(pipeline, "edges");
   const std::string wire = "view: case.views";
   pipeline.replace(pipeline.find(wire, edges), wire.size(), "view: filtered");

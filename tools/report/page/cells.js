@@ -75,12 +75,6 @@ function csv(data, cells) {
   return [head, ...rows].map((row) => row.map(quoted).join(',')).join('\n') + '\n';
 }
 
-function save(text, name) {
-  const link = el('a', {href: URL.createObjectURL(new Blob([text], {type: 'text/csv'})), download: name});
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-}
-
 export class Table {
   constructor(data) {
     Object.assign(this, {
@@ -101,7 +95,7 @@ export class Table {
     this.element =
         el('div', {}, this.filters(), this.table.element,
            el('div', {class: 'toolbar pager'}, this.count,
-              Dom.button('Save these rows as CSV', () => save(csv(data, this.rows()), 'cells.csv'))));
+              Dom.button('Save these rows as CSV', () => Dom.save(csv(data, this.rows()), 'cells.csv', 'text/csv'))));
     document.addEventListener('keydown', (event) => this.find(event));
     this.show();
   }

@@ -2,7 +2,8 @@
 // The data of a report: read from <script type="application/json" id="data">, checked, completed and indexed.
 //
 // Contract, version 1. Lengths mm, angles degrees, images px, times s; matrices row-major; base64 arrays little-endian.
-//   marrow, format (1), kind: "comparison" | "run"
+//   marrow, format (1), kind: "comparison" | "run" | "over_time"
+//   over_time: {sequences, trials} as in curves.json; with it, only the experiment's name is read besides
 //   experiment: {name, help, file (path of the YAML), text (its content), pipeline_text, seed, started, finished,
 //     command (how to repeat), folder, machine: {cpu, cores, cpu_level}, plugins: [{file, build_id}],
 //     starts_protocol, success_rule, time_rule}                       sentences
@@ -40,10 +41,12 @@
 //     poses: [{mesh: index, name: "result" | "truth" | "start", world_from_model: [16]}],
 //     views: [{name, width_px, height_px, intrinsics: [9], camera_from_world: [16], image: picture id}]}}
 //   graph: {nodes: [{id, uses, options: {}, differs: {variant name: text}}], edges: [{from, to, port}]}
+// recipes.js reads the recipes from an element of their own.
 // A camera is OpenCV's pinhole: +z to the detector, u right, v down, integer at pixel centres, origin at the X-ray
 // source. "summary" and "comparisons" are left out where kind is "run"; any of pictures, convergence, landscape, scene
 // may be missing.
 import {withUnit} from './dom.js';
+import * as Recipes from './recipes.js';
 
 const FORMAT = 1;
 
@@ -140,6 +143,7 @@ export function load() {
         'This page reads format ' + FORMAT + ' of a report\'s data, the data are in format ' + data.format +
         ': make the report again with one version of marrow.');
   }
+  data.recipes = Recipes.load();
   return index(complete(data));
 }
 

@@ -33,6 +33,13 @@ export function outcomeBadge(cell) {
   return el('span', {class: 'outcome ' + outcome, 'data-tip': Glossary.meaning(outcome)}, outcome);
 }
 
+// A link, where the page lies in the comparison's folder.
+function folder(data, cell) {
+  if (!cell.folder) return null;
+  const name = el('code', {}, cell.folder);
+  return data.is_run ? name : el('a', {href: Links.toFolder(cell.folder)}, name);
+}
+
 export function values(data, cell) {
   return rows([
     ['Outcome', outcomeBadge(cell)],
@@ -50,7 +57,7 @@ export function values(data, cell) {
     ['Nodes from the cache', Number.isFinite(cell.cached_nodes) ? String(cell.cached_nodes) : null],
     ['Tries', Number.isFinite(cell.tries) ? String(cell.tries) : null],
     ['Key of what it was made from', cell.key ? el('code', {}, cell.key) : null],
-    ['Folder', cell.folder ? el('code', {}, cell.folder) : null],
+    ['Folder', folder(data, cell)],
   ]);
 }
 
@@ -103,6 +110,10 @@ function commandOf(data, cell) {
 
 const command = (data, cell) =>
     (data.is_run ? null : el('div', {}, el('h3', {}, 'Run just this cell'), Dom.command(commandOf(data, cell))));
+
+const recipe = (data, cell) =>
+    [el('h3', {}, 'Its recipe'),
+     Dom.command('marrow recipe ' + Dom.shellPath((data.experiment.folder || '.') + '/' + cell.folder))];
 
 // Why there is no picture, and how to get some.
 function noPictures(data, cell) {
@@ -160,7 +171,8 @@ function fillDialog(data, cell, dialog) {
       ...[reason(cell), Verdict.all(data, cell), absent(cell), values(data, cell),
           el('h3', {}, 'Options of ' + data.variants[cell.variant].name), options(data.variants[cell.variant]),
           command(data, cell), noPictures(data, cell), cell.pictures.length > 0 && el('h3', {}, 'Pictures'),
-          cell.pictures.length > 0 && Pictures.gallery(data, cell), closer, ...plots(data, cell), ...scene(data, cell)]
+          cell.pictures.length > 0 && Pictures.gallery(data, cell), closer, ...plots(data, cell), ...scene(data, cell),
+          ...recipe(data, cell)]
           .filter(Boolean));
 }
 

@@ -112,6 +112,13 @@ export function command(text) {
   return el('div', {class: 'command'}, el('pre', {tabindex: 0}, code), copy);
 }
 
+// Saves a text as a file in the browser's folder for downloads.
+export function save(text, name, type) {
+  const link = el('a', {href: URL.createObjectURL(new Blob([text], {type})), download: name});
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
 // One word of a POSIX shell's command line; a path is never taken for an option.
 export const shellWord = (text) =>
     (/^[\w@%+:,.\/-]+$/.test(text) ? text : '\'' + String(text).replaceAll('\'', '\'\\\'\'') + '\'');

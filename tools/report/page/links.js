@@ -3,6 +3,9 @@
 
 export const to = (cell) => '#cell=' + String(cell.id).split('/').map(encodeURIComponent).join('/');
 
+// The folder of a cell, beside the page.
+export const toFolder = (folder) => folder.split('/').map(encodeURIComponent).join('/') + '/';
+
 // What an address asks for: {cell}, {unknown: text} if the report has no such cell, or null if it names none.
 export function asked(data, hash) {
   const text = (/^#cell=(.+)$/.exec(hash) || [])[1];

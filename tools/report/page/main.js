@@ -10,10 +10,12 @@ import {el} from './dom.js';
 import * as Figures from './figures.js';
 import * as Glossary from './glossary.js';
 import * as Graph from './graph.js';
+import * as OverTime from './over_time.js';
 import * as Parts from './parts.js';
 import * as Passes from './passes.js';
 import * as Pictures from './pictures.js';
 import * as Plots from './plots.js';
+import * as Recipes from './recipes.js';
 import * as Response from './response.js';
 import {SceneView} from './scene.js';
 import * as Sequence from './sequence.js';
@@ -281,7 +283,7 @@ function repeat(data) {
       'repeat', 'Repeat it', null, experiment.command && Dom.command(experiment.command),
       el('div', {class: 'scroll'}, Dom.valueTable(lines.map(([name, value]) => [name, String(value)]))),
       file(data.is_run ? 'The run’s settings' : 'The experiment’s file', experiment.text),
-      file('The pipeline’s file', experiment.pipeline_text),
+      file('The pipeline’s file', experiment.pipeline_text), ...Recipes.all(data),
       (experiment.plugins || []).length > 0 &&
           el('details', {}, el('summary', {}, 'Plugins and their build ids'),
              el('div', {class: 'scroll'},
@@ -306,7 +308,7 @@ function summary(data) {
   return [
     el('div', {class: 'head'}, el('p', {class: 'kicker'}, data.is_run ? 'Run' : 'Comparison'),
        el('h1', {}, experiment.name || 'Unnamed'), experiment.help && el('p', {class: 'lead'}, experiment.help),
-       !data.is_run && el('p', {class: 'facts'}, Summary.facts(data))),
+       el('p', {class: 'facts'}, data.is_run ? Recipes.link(data, 0) : Summary.facts(data))),
     verdict, head
   ];
 }
@@ -315,6 +317,10 @@ function build(data) {
   const {experiment} = data, many = !data.is_run, main = document.getElementById('top');
   document.title = (experiment.name || 'marrow report') + ' · marrow';
   const add = (...parts) => main.append(...parts.flat(2).filter(Boolean));  // at once: figures need their width
+  if (data.over_time) {
+    add(OverTime.sections(data, section));
+    return;
+  }
   add(summary(data));
   if (many && data.metrics.length)
     add(ranking(data), effects(data), tuning(data), response(data), distributions(data), paired(data), capture(data),

@@ -4,6 +4,7 @@ import * as Data from './data.js';
 import {button, el, number, percent, select} from './dom.js';
 import * as Glossary from './glossary.js';
 import * as Plots from './plots.js';
+import * as Recipes from './recipes.js';
 
 const OTHER_RUNS =
     'The variants have this figure in different runs, so these numbers are not of the same cases and starts.';
@@ -76,7 +77,8 @@ function variantName(data, i) {
          options.map(
              ([name, value]) =>
                  el('code', {class: 'option'},
-                    name + ' = ' + (typeof value === 'string' ? value : JSON.stringify(value))))));
+                    name + ' = ' + (typeof value === 'string' ? value : JSON.stringify(value)))),
+         Recipes.link(data, i)));
 }
 
 function columns(data, metric) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/plugins/python_functions.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -14,28 +15,69 @@ using nlohmann::json;
 
 namespace {
 
-/// A process makes the cost once, and gets the poses in batches.
+/// A process makes the cost once, and gets the poses in batches. If the node takes other costs, it is a decorator: what
+/// they say of a level, a block or a view that says nothing, it says too.
 class PythonCost : public Cost {
  public:
-  explicit PythonCost(PythonFunction function) : function_(std::move(function)) {}
+  explicit PythonCost(PythonFunction function)
+      : function_(std::move(function)), numbers_of_costs_(function_.functions().costs()) {}
 
   double value(const RigidTransform& world_from_model) const override { return values({world_from_model}).at(0); }
   std::vector<double> values(const std::vector<RigidTransform>& world_from_model) const override {
     if (world_from_model.empty()) return {};
+    return costs_of({{"do", "cost"}, {"poses", poses_of(world_from_model)}}, world_from_model.size());
+  }
+  /// Without other costs it has one resolution only.
+  std::shared_ptr<const Cost> at_level(const CostLevel& level) const override {
+    return std::make_shared<PythonCost>(numbers_of_costs_.empty() ? function_ : function_.at_level(level));
+  }
+  /// The blocks of all costs that it takes, one after the other. Leaves out a block by giving the node the value that
+  /// the cost has without it.
+  std::vector<double> without_each_block(const RigidTransform& world_from_model) const override {
+    std::vector<double> values;
+    for (const std::uint64_t one : numbers_of_costs_) {
+      const std::vector<double> inner = cost(one).without_each_block(world_from_model);
+      if (inner.empty()) continue;
+      const std::vector<double> own = costs_of(
+          {{"do", "cost"}, {"poses", poses_of({world_from_model})}, {"input", one}, {"instead", inner}}, inner.size());
+      values.insert(values.end(), own.begin(), own.end());
+    }
+    return values;
+  }
+  /// The images say nothing if all costs that it takes say so.
+  std::string nothing_compared(const RigidTransform& world_from_model) const override {
+    std::string first;
+    for (const std::uint64_t one : numbers_of_costs_) {
+      const std::string reason = cost(one).nothing_compared(world_from_model);
+      if (reason.empty()) return "";
+      if (first.empty()) first = reason;
+    }
+    return first;
+  }
+  std::vector<std::string> silent_views(const RigidTransform& world_from_model) const override {
+    std::vector<std::string> all;
+    for (const std::uint64_t one : numbers_of_costs_)
+      for (std::string& text : cost(one).silent_views(world_from_model))
+        if (std::find(all.begin(), all.end(), text) == all.end()) all.push_back(std::move(text));
+    return all;
+  }
+
+ private:
+  static json poses_of(const std::vector<RigidTransform>& world_from_model) {
     json poses = json::array();
     for (const RigidTransform& pose : world_from_model)
       for (const json& number : json_of_transform(pose)) poses.push_back(number);
-    const json answer = function_.ask({{"do", "cost"}, {"poses", poses}});
-    auto values = answer.at("values").get<std::vector<double>>();
-    if (values.size() != world_from_model.size())
-      throw Error(formatted("{} gave {} costs for {} poses", function_.name(), values.size(), world_from_model.size()));
-    return values;
+    return poses;
   }
-  /// It has one resolution only.
-  std::shared_ptr<const Cost> at_level(const CostLevel&) const override { return std::make_shared<PythonCost>(*this); }
+  std::vector<double> costs_of(json request, std::size_t count) const {
+    auto values = function_.ask(std::move(request)).at("values").get<std::vector<double>>();
+    if (values.size() == count) return values;
+    throw Error(formatted("{} gave {} costs, expected {}", function_.name(), values.size(), count));
+  }
+  const Cost& cost(std::uint64_t number) const { return function_.functions().at(number).as<Cost>(); }
 
- private:
   PythonFunction function_;
+  std::vector<std::uint64_t> numbers_of_costs_;
 };
 
 std::vector<double> numbers_of(const Eigen::VectorXd& x) { return {x.data(), x.data() + x.size()}; }
@@ -83,13 +125,34 @@ class PythonOptimizer : public Optimizer {
   PythonFunction function_;
 };
 
+/// Puts all costs of a value at a level.
+void put_at_level(Value& value, const CostLevel& level) {
+  for (Value& item : value.items) put_at_level(item, level);
+  if (value.is_list() || value.is_absent() || !(value.type == TypeInfo::of<Cost>())) return;
+  const Digest key = hash_of(value.key, level.contour_spacing_px, level.reach_px, level.pixel_step);
+  value = Value::of<Cost>(value.as<Cost>().at_level(level));
+  value.key = key;
+}
+
 }  // namespace
 
 PythonFunction::PythonFunction(std::shared_ptr<PythonNodes> nodes, NodeInfo node, std::vector<Value> inputs,
                                const std::vector<OptionValue>& options)
-    : nodes_(std::move(nodes)), node_(std::move(node)), inputs_(std::move(inputs)), arguments_(inputs_, options) {
+    : nodes_(std::move(nodes)),
+      node_(std::move(node)),
+      inputs_(std::move(inputs)),
+      options_(options),
+      arguments_(inputs_, options) {
   static std::atomic<std::uint64_t> made{0};
   number_ = ++made;
+}
+
+PythonFunction PythonFunction::at_level(const CostLevel& level) const {
+  std::vector<Value> inputs = inputs_;
+  for (Value& input : inputs) put_at_level(input, level);
+  PythonFunction made(nodes_, node_, std::move(inputs), options_);
+  made.origin_ = std::make_shared<const PythonFunction>(*this);
+  return made;
 }
 
 json PythonFunction::make(Context& context) const {
@@ -100,15 +163,6 @@ json PythonFunction::ask(json request, std::vector<Value>* outputs, const Python
   Context context;
   request["function"] = number_;
   return nodes_->ask(node_, std::move(request), arguments_, context, outputs, reply);
-}
-
-json json_of_transform(const RigidTransform& transform) {
-  json numbers = json::array();
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) numbers.push_back(transform.rotation(row, column));
-    numbers.push_back(transform.translation_mm[row]);
-  }
-  return numbers;
 }
 
 bool makes_function(const NodeInfo& node) { return node.outputs.size() == 1 && node.outputs[0].type.is_function; }

@@ -18,16 +18,20 @@ class PythonFunction {
   nlohmann::json ask(nlohmann::json request, std::vector<Value>* outputs = nullptr,
                      const PythonNodes::Reply& reply = nullptr) const;
 
+  /// The functions among its inputs.
+  const AskedFunctions& functions() const { return *arguments_.functions; }
+  /// The same function, made of costs at a level. Another one, so a process makes it anew.
+  PythonFunction at_level(const CostLevel& level) const;
+
  private:
   std::shared_ptr<PythonNodes> nodes_;
   NodeInfo node_;
   std::vector<Value> inputs_;
+  std::vector<OptionValue> options_;
+  std::shared_ptr<const PythonFunction> origin_;  ///< costs at a level may refer to its inputs
   PythonArguments arguments_;
   std::uint64_t number_ = 0;
 };
-
-/// A transform as 12 numbers: the first three rows of its matrix.
-nlohmann::json json_of_transform(const RigidTransform& transform);
 
 std::shared_ptr<const RadiographProjector> python_projector(PythonFunction function, Context& context);
 

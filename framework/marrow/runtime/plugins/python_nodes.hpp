@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "marrow/runtime/node/context.hpp"
+#include "marrow/runtime/plugins/asked_functions.hpp"
 #include "marrow/runtime/plugins/library.hpp"
 #include "marrow/runtime/plugins/python_file.hpp"
 #include "marrow/runtime/process/shared_inputs.hpp"
@@ -17,10 +18,11 @@ namespace marrow {
 
 struct PythonProcess;
 
-/// The inputs and options of a call as JSON, and the memory that the JSON names.
+/// The inputs and options of a call as JSON, and the memory and the functions that the JSON names.
 struct PythonArguments {
   nlohmann::json inputs = nlohmann::json::array(), options = nlohmann::json::array();
   std::vector<std::shared_ptr<const SharedInput>> memory;
+  std::shared_ptr<AskedFunctions> functions = std::make_shared<AskedFunctions>();
 
   PythonArguments(const std::vector<Value>& inputs, const std::vector<OptionValue>& options);
 };
@@ -29,7 +31,8 @@ struct PythonArguments {
 /// uses its own process.
 class PythonNodes {
  public:
-  /// Answers what a process asks back during a request: {"say": "ask", ...}. What it throws ends the request.
+  /// Answers what a process asks back during a request: {"say": "ask", ...}. What it throws ends the request. Questions
+  /// about functions among the inputs are answered without it.
   using Reply = std::function<nlohmann::json(const nlohmann::json& question)>;
 
   explicit PythonNodes(LibraryInfo described);

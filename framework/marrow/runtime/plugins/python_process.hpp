@@ -42,6 +42,8 @@ class ReplyPipe {
   void close_read_end() { pipe_.read_end.close(); }
   /// Does nothing if the process has ended.
   void send(const nlohmann::json& reply);
+  /// No more replies come.
+  void close() { pipe_.write_end.close(); }
 
  private:
   Pipe pipe_;

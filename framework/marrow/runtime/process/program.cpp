@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -22,6 +21,7 @@
 #include "marrow/base/process_state.hpp"
 #include "marrow/base/process_tree.hpp"
 #include "marrow/base/stopwatch.hpp"
+#include "spawn.hpp"
 
 namespace marrow {
 namespace {
@@ -62,22 +62,14 @@ class Child {
     posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
     posix_spawn_file_actions_adddup2(&actions, output, STDERR_FILENO);
     posix_spawn_file_actions_addchdir_np(&actions, call.folder.c_str());
-    posix_spawnattr_t attributes;
-    posix_spawnattr_init(&attributes);
-    sigset_t none, all;
-    sigemptyset(&none);
-    sigfillset(&all);
-    posix_spawnattr_setsigmask(&attributes, &none);
-    posix_spawnattr_setsigdefault(&attributes, &all);
-    posix_spawnattr_setpgroup(&attributes, 0);  // so that Ctrl-C reaches only this process, which then kills it
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+    const SpawnAttributes attributes;
     int fault = 0;
     ProcessState::of_runs()->keep_for_process([&] {
       end();
-      fault = posix_spawn(&process_, program.c_str(), &actions, &attributes, words_of(call.command).data(), environ);
+      fault =
+          posix_spawn(&process_, program.c_str(), &actions, attributes.get(), words_of(call.command).data(), environ);
       if (fault) process_ = -1;
     });
-    posix_spawnattr_destroy(&attributes);
     posix_spawn_file_actions_destroy(&actions);
     if (fault == EAGAIN || fault == ENOMEM)
       throw NoProcess(std::string("cannot start a process: ") + std::strerror(fault));

@@ -5,7 +5,6 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -25,6 +24,7 @@
 #include "marrow/base/process_state.hpp"
 #include "marrow/base/process_tree.hpp"
 #include "marrow/base/stopwatch.hpp"
+#include "spawn.hpp"
 
 namespace marrow {
 namespace {
@@ -78,7 +78,6 @@ std::vector<char*> pointers_to(const std::vector<std::string>& texts) {
   return pointers;
 }
 
-/// Starts the program with default signals, in its own process group, so that Ctrl-C reaches only this process.
 pid_t start(const WorkerSettings& settings, int input, int output) {
   std::vector<Descriptor> shared;
   for (const int original : settings.shared) shared.push_back(above_those_of_worker(original));
@@ -88,20 +87,11 @@ pid_t start(const WorkerSettings& settings, int input, int output) {
   posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
   if (settings.quiet) posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
   for (std::size_t i = 0; i < shared.size(); ++i) posix_spawn_file_actions_adddup2(&actions, shared[i], 3 + int(i));
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  sigset_t none, all;
-  sigemptyset(&none);
-  sigfillset(&all);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setsigdefault(&attributes, &all);
-  posix_spawnattr_setpgroup(&attributes, 0);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+  const SpawnAttributes attributes;
   const std::vector<std::string> environment = environment_of_worker();
   pid_t process = -1;
-  const int fault = posix_spawn(&process, settings.command.at(0).c_str(), &actions, &attributes,
+  const int fault = posix_spawn(&process, settings.command.at(0).c_str(), &actions, attributes.get(),
                                 pointers_to(settings.command).data(), pointers_to(environment).data());
-  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   if (fault) {
     if (fault == ENOENT || fault == EACCES)

@@ -36,67 +36,117 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr double kLoadLimit_s = 20, kStopLimit_s = 2;
+constexpr double kLoadLimit_s = 20, kStopLimit_s = 2, kReplyLimit_s = 0.3;
 
-/// The inputs as a request has them. `kept` keeps the memory that the request names until the call has ended.
-json json_of_input(const Value& value, std::vector<std::shared_ptr<const SharedInput>>& kept) {
+/// The inputs as a request has them. `kept` keeps what the request names until the call has ended.
+json json_of_input(const Value& value, PythonArguments& kept) {
   if (value.is_list()) {
     json items = json::array();
     for (const Value& item : value.items) items.push_back(json_of_input(item, kept));
     return {{"axis", value.axis}, {"names", value.names}, {"items", items}};
   }
   if (value.is_absent()) return nullptr;
+  if (value.type.is_function) return kept.functions->add(value);
   const std::shared_ptr<const SharedInput> shared = SharedInputs::all().share(value);
-  kept.push_back(shared);
+  kept.memory.push_back(shared);
   return {{"type", value.type.id},
           {"memory", formatted("/proc/{}/fd/{}", getpid(), shared->memory.descriptor())},
           {"number", shared->number},
           {"samples_bytes", shared->samples_bytes}};
 }
 
-/// Asks the process to end, so that it can clean up, and ends it if it does not.
-void stop(Worker& worker) {
+/// Asks the process to end, so that it can clean up, and ends it if it does not. A process that waits for a reply
+/// learns that none comes.
+void stop(PythonProcess& process) {
+  Worker& worker = process.worker;
   kill(worker.process(), SIGTERM);
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(kStopLimit_s);
-  while (!worker.is_dead() && std::chrono::steady_clock::now() < end) {
+  using Seconds = std::chrono::duration<double>;
+  const auto start = std::chrono::steady_clock::now();
+  while (!worker.is_dead() && std::chrono::steady_clock::now() - start < Seconds(kStopLimit_s)) {
     pollfd polled{worker.descriptor(), POLLIN, 0};
     poll(&polled, 1, 20);
     if (worker.take(nullptr)) break;
+    if (std::chrono::steady_clock::now() - start > Seconds(kReplyLimit_s)) process.replies.close();
   }
   worker.close();
 }
 
-/// Waits for the end of the job, and replies to what the process asks meanwhile.
-WorkerEnd wait_for(PythonProcess& process, const WorkerLimits& limits, Context& context,
-                   const PythonNodes::Reply& reply) {
-  Worker& worker = process.worker;
-  std::exception_ptr fault;
-  const auto said = [&](const json& report) {
-    if (report.value("say", json()) != "ask" || !reply) return pass_on(report, context);
+/// A job of a process, and what it asks meanwhile. While it waits for a reply, it can be asked something itself: an
+/// optimizer among its inputs asks for values of the node's function.
+class Conversation {
+ public:
+  using Answer = std::function<json(const json& question, const AskProcess& ask_process)>;
+
+  Conversation(PythonProcess& process, const WorkerLimits& limits, Context& context, Answer answer)
+      : process_(process), limits_(limits), context_(context), answer_(std::move(answer)) {}
+
+  /// Waits for the end of the job, and replies to all questions. Ends the process if a reply cannot be given, or if the
+  /// call is cancelled, and throws why.
+  WorkerEnd wait() {
     try {
-      process.replies.send(reply(report));
+      for (;;) reply_to(question());
+    } catch (const Ended&) {
+      return *end_;
     } catch (...) {
-      fault = std::current_exception();
-    }
-  };
-  for (;;) {
-    try {
-      context.check_cancelled();
-      if (fault) std::rethrow_exception(fault);
-    } catch (...) {
-      stop(worker);
+      if (!process_.worker.is_dead()) stop(process_);
       throw;
     }
-    pollfd polled{worker.descriptor(), POLLIN, 0};
-    poll(&polled, 1, 20);
-    if (auto end = worker.take(said)) {
-      if (fault) std::rethrow_exception(fault);  // the process has ended, too
-      return *end;
-    }
-    if (fault) continue;
-    if (auto end = worker.check(limits)) return *end;
   }
-}
+
+ private:
+  struct Ended {};
+
+  /// The next question of the process. Throws Ended at the end of the job.
+  json question() {
+    Worker& worker = process_.worker;
+    while (!end_) {
+      context_.check_cancelled();
+      std::optional<json> asked;
+      pollfd polled{worker.descriptor(), POLLIN, 0};
+      poll(&polled, 1, 20);
+      end_ = worker.take([&](const json& report) {
+        if (report.value("say", json()) == "ask")
+          asked = report;  // it says nothing further before it has the reply
+        else
+          pass_on(report, context_);
+      });
+      if (!end_ && asked) return *asked;
+      if (!end_) end_ = worker.check(limits_);
+    }
+    throw Ended();
+  }
+
+  void reply_to(const json& question) {
+    process_.replies.send(answer_(question, [this](const json& own) { return ask(own); }));
+  }
+
+  /// Asks the process something in place of a reply. It may ask further things before it answers.
+  json ask(json own) {
+    const std::scoped_lock lock(asking_);
+    const int number = own["ask"] = ++asked_;
+    process_.replies.send(own);
+    for (;;) {
+      const json next = question();
+      if (!next.contains("answer")) {
+        reply_to(next);
+      } else if (next.value("to", 0) != number) {
+        throw Error("it ran two minimisations at the same time; run one after the other");
+      } else {
+        return next["answer"];
+      }
+    }
+  }
+
+  PythonProcess& process_;
+  const WorkerLimits limits_;
+  Context& context_;
+  const Answer answer_;
+  std::optional<WorkerEnd> end_;
+  std::recursive_mutex asking_;
+  int asked_ = 0;
+};
+
+[[noreturn]] json answer_nothing(const json&, const AskProcess&) { throw Error("it asked for something unexpectedly"); }
 
 /// How the node is declared in its file.
 std::string decorator_of(const NodeInfo& node) {
@@ -128,6 +178,7 @@ NodeInfo with_contents(NodeInfo node) {
   for (std::vector<PortInfo>* ports : {&node.inputs, &node.outputs})
     for (PortInfo& port : *ports) {
       if (ports == &node.outputs && makes_function(node)) continue;
+      if (ports == &node.inputs && can_be_asked(port.type)) continue;
       port.type.content = content_of_own(port.type);
       if (!port.type.content) throw Error("has a port of type '" + port.type.id + "', which Python does not know");
     }
@@ -137,7 +188,7 @@ NodeInfo with_contents(NodeInfo node) {
 }  // namespace
 
 PythonArguments::PythonArguments(const std::vector<Value>& given, const std::vector<OptionValue>& values) {
-  for (const Value& input : given) inputs.push_back(json_of_input(input, memory));
+  for (const Value& input : given) inputs.push_back(json_of_input(input, *this));
   for (const OptionValue& value : values) options.push_back(json_of_option(value));
 }
 
@@ -160,7 +211,11 @@ json PythonNodes::ask(const NodeInfo& node, json request, const PythonArguments&
   request["options"] = arguments.options;
   request["kept"] = kept;
   process->worker.ask(std::move(request));
-  const WorkerEnd end = wait_for(*process, limits, context, reply);
+  const auto answer = [&](const json& question, const AskProcess& ask_process) {
+    if (question.contains("function")) return arguments.functions->reply(question, ask_process);
+    return reply ? reply(question) : answer_nothing(question, ask_process);
+  };
+  const WorkerEnd end = Conversation(*process, limits, context, answer).wait();
   if (!end.failed.empty()) {
     if (!end.died) give_back(std::move(process));
     throw Error(failure_of_call(described_.file, node, end, limits));
@@ -185,7 +240,7 @@ std::unique_ptr<PythonProcess> PythonNodes::take(Context& context) {
   }
   auto process = std::make_unique<PythonProcess>(trusted_path(described_.file));
   process->worker.ask({{"do", "load"}});
-  const WorkerEnd end = wait_for(*process, {kLoadLimit_s}, context, nullptr);
+  const WorkerEnd end = Conversation(*process, {kLoadLimit_s}, context, answer_nothing).wait();
   if (!end.failed.empty()) throw Error(described_.file.string() + " cannot be loaded: " + end.failed);
   process->limits = end.answer.at("limits");
   for (const NodeInfo& node : described_.nodes)

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <ctime>
 #include <fstream>
+#include <limits>
 #include <set>
 #include <thread>
 
@@ -19,6 +20,7 @@
 #include "marrow/base/framework_file.hpp"
 #include "marrow/base/machine.hpp"
 #include "marrow/base/number_text.hpp"
+#include "marrow/base/png_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/regular_file.hpp"
 #include "marrow/base/text_file.hpp"
@@ -122,6 +124,13 @@ json digests_of(const fs::path& folder, const std::vector<std::string>& files) {
       digests.push_back(json());
     }
   return digests;
+}
+
+/// To a file that is a PNG; others stay as they are.
+void add_recipe(const fs::path& file, const std::string& text) {
+  if (file.extension() != ".png") return;
+  const std::string png = read_text_file(file, std::numeric_limits<std::uintmax_t>::max());
+  if (is_png(png)) write_text_file(file, with_png_text(png, kRecipeKeyword, text));
 }
 
 bool took_part(const NodeRecord& record) {
@@ -275,12 +284,16 @@ bool RunFolder::take(const Pipeline& pipeline) {
 }
 
 std::vector<RunFolder::Written> RunFolder::write_outputs(const Pipeline& pipeline, const RunResult& result,
-                                                         const Catalogue& catalogue) {
+                                                         const Catalogue& catalogue,
+                                                         const std::optional<RunRecipe>& recipe) {
   std::vector<Written> all;
+  const std::string text = recipe ? recipe->text() : "";
   for (const PipelineOutput& output : pipeline.outputs) {
     Written written{output.name, {}, "", ""};
     try {
       write_value(value_of(result, output.source), folder_ / "outputs" / output.name, folder_, catalogue, written);
+      if (recipe)
+        for (const std::string& file : written.files) add_recipe(folder_ / file, text);
     } catch (const std::exception& error) {
       written.fault = error.what();
     }

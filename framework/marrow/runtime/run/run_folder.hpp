@@ -2,12 +2,14 @@
 #pragma once
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "marrow/base/export.hpp"
 #include "marrow/runtime/run/executor.hpp"
 #include "marrow/runtime/run/run_log.hpp"
+#include "marrow/runtime/run/run_recipe.hpp"
 
 namespace MARROW_EXPORT marrow {
 
@@ -39,8 +41,10 @@ class RunFolder {
     std::string fault;               ///< why it was not written; empty if it was
     std::string absent;              ///< "node 'x' failed", which may fail: why it is not there, or not as a whole
   };
-  /// Writes those outputs of the pipeline that were made.
-  std::vector<Written> write_outputs(const Pipeline& pipeline, const RunResult& result, const Catalogue& catalogue);
+  /// Writes those outputs of the pipeline that were made. Each PNG file among them carries the recipe
+  /// (run_recipe.hpp). Without a recipe, outputs have the same bytes wherever their data lie.
+  std::vector<Written> write_outputs(const Pipeline& pipeline, const RunResult& result, const Catalogue& catalogue,
+                                     const std::optional<RunRecipe>& recipe);
   RunLog& log() { return *log_; }
   void write_record(const Pipeline& pipeline, const RunResult& result, const RunSettings& settings,
                     const Catalogue& catalogue, const PipelineArguments& arguments,

@@ -4,31 +4,18 @@
 #include <algorithm>
 #include <cmath>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/runtime/node/types.hpp"
+#include "marrow/runtime/run/output_items.hpp"
 
 namespace marrow {
-namespace {
-
-void add_verdicts(const Value& value, const std::string& output, const std::string& item,
-                  std::vector<NamedVerdict>& verdicts) {
-  for (std::size_t i = 0; i < value.items.size(); ++i)
-    add_verdicts(value.items[i], output, (item.empty() ? "" : item + "/") + value.names[i], verdicts);
-  if (!value.is_list() && !value.is_absent()) verdicts.push_back({output, item, value.as<Verdict>()});
-}
-
-}  // namespace
 
 std::vector<NamedVerdict> verdicts_of(const Pipeline& pipeline, const RunResult& result) {
   std::vector<NamedVerdict> verdicts;
-  for (const PipelineOutput& output : pipeline.outputs) {
-    if (pipeline.output_of(output.source).type != TypeInfo::of<Verdict>()) continue;
-    try {
-      add_verdicts(value_of(result, output.source), output.name, "", verdicts);
-    } catch (const Error&) {  // the list does not have this item: the output's own fault says so
-    }
-  }
+  for_each_item(pipeline, result, TypeInfo::of<Verdict>(),
+                [&](const std::string& output, const std::string& item, const Value& value) {
+                  verdicts.push_back({output, item, value.as<Verdict>()});
+                });
   return verdicts;
 }
 
