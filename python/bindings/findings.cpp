@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
@@ -40,6 +41,15 @@ ShaftLines shaft_lines_of(const py::object& left, const py::object& right, doubl
                               line_of(parts[1], "right of a rejected pair"), py::str(parts[2])});
   }
   return lines;
+}
+
+Verdict verdict_of(const std::string& judgement, std::optional<double> failure_probability,
+                   std::vector<std::string> reasons, std::vector<std::string> remedies, const Metrics& figures) {
+  const std::optional<Judgement> known = judgement_named(judgement);
+  if (!known) throw Error("Verdict: expected 'trusted', 'doubtful' or 'wrong', got '" + judgement + "'");
+  if (failure_probability && !(*failure_probability >= 0 && *failure_probability <= 1))
+    throw Error(formatted("Verdict: expected a failure_probability from 0 to 1, got {:g}", *failure_probability));
+  return {*known, failure_probability.value_or(std::nan("")), std::move(reasons), std::move(remedies), figures.items};
 }
 
 EdgeMap edge_map_of(const py::handle& pixels, int width_px, int height_px) {
@@ -152,6 +162,11 @@ void bind_judgements(py::module_& module) {
         return "<marrow.Metrics " + text + ">";
       });
   value_class<Verdict>(module, "Verdict", "Whether a pose can be relied on.")
+      .def(py::init(&verdict_of), py::arg("judgement"), py::kw_only(), py::arg("failure_probability") = py::none(),
+           py::arg("reasons") = std::vector<std::string>(), py::arg("remedies") = std::vector<std::string>(),
+           py::arg("figures") = Metrics(),
+           "judgement: \"trusted\", \"doubtful\" or \"wrong\". failure_probability: None if it is not known. reasons, "
+           "the weightiest first, and remedies, which say what would settle it: in words.")
       .def_property_readonly(
           "judgement", [](const Verdict& self) { return name_of(self.judgement); },
           "\"trusted\", \"doubtful\" or \"wrong\".")

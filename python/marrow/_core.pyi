@@ -220,6 +220,15 @@ class Metrics:
 
 class Verdict:
     type: str
+    def __init__(
+        self,
+        judgement: str,
+        *,
+        failure_probability: Optional[float] = None,
+        reasons: List[str] = ...,
+        remedies: List[str] = ...,
+        figures: Metrics = ...,
+    ) -> None: ...
     @property
     def judgement(self) -> str: ...
     @property

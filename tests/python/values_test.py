@@ -48,6 +48,9 @@ def values():
         "<marrow.Metrics mtre_mm = 0.512 mm, share = 2>": marrow.Metrics(
             {"mtre_mm": 0.512, "share": 2}, {"mtre_mm": "mm"}
         ),
+        "<marrow.Verdict doubtful, failure 25 %>": marrow.Verdict(
+            "doubtful", failure_probability=0.25, reasons=["one view"], figures=marrow.Metrics({"mtre_mm": 3})
+        ),
     }
 
 
@@ -102,6 +105,19 @@ class Values(Case):
         own = marrow.write.obj(values()["<marrow.Mesh of 4 vertices, 4 triangles, mm, frame 'ct'>"])
         with self.assertRaisesRegex(marrow.Error, "its type is a plugin's own; marrow.save writes it to a file"):
             pickle.dumps(own)
+
+    def test_a_verdict_that_cannot_be(self):
+        self.assertIsNone(marrow.Verdict("wrong").failure_probability)
+        for arguments, said in (
+            ({"judgement": "good"}, "Verdict: expected 'trusted', 'doubtful' or 'wrong', got 'good'"),
+            (
+                {"judgement": "wrong", "failure_probability": 1.5},
+                "Verdict: expected a failure_probability from 0 to 1, got 1.5",
+            ),
+        ):
+            with self.assertRaises(marrow.Error) as raised:
+                marrow.Verdict(**arguments)
+            self.assertEqual(str(raised.exception), said)
 
     def test_damaged_pickles_are_refused(self):
         function, (name, version, size, packed) = marrow.Pose(TURN).__reduce__()

@@ -50,13 +50,12 @@ class New(Case):
     def test_every_kind_with_a_suite_has_a_template(self):
         with_suite = sorted(path.parent.name for path in (SOURCE / "plugins").glob("*/suite.cpp"))
         self.assertEqual(KINDS, with_suite)
-        # Python makes no verdict, and no pose with the fragment's axes.
-        self.assertEqual(sorted(set(KINDS) - set(PYTHON_KINDS)), ["initial", "register", "verdict"])
+        self.assertEqual(set(KINDS) - set(PYTHON_KINDS), {"register"})
 
     def test_a_kind_without_a_template_in_python_says_so(self):
         self.assertEqual(
-            self.refused("node", "verdict.mine", "--python"),
-            "the kind 'verdict' has no template in Python; leave out --python for one in C++, or take one of "
+            self.refused("node", "register.mine", "--python"),
+            "the kind 'register' has no template in Python; leave out --python for one in C++, or take one of "
             + ", ".join(PYTHON_KINDS),
         )
 
