@@ -57,7 +57,8 @@ class Names:
                 if path.is_file() and path.suffix in (".hpp", ".cpp", ".cmake", "", ".js"):
                     self.words |= set(declared_in(path))
         for path in [*self.root.glob("framework/marrow/runtime/**/*.*"), *self.root.glob("framework/cmake/*")]:
-            self.words |= set(re.findall(r"\w+", path.read_text()))  # it knows no node, so no option either
+            # It knows no node, so no option either. Members of other structs may be called as one: level.pixel_step.
+            self.words |= set(re.findall(r"(?<![.\w])\w+", path.read_text()))
         for part in ("docs", "framework", "pipelines", "plugins", "schemas", "tests", "tools"):
             for path in (self.root / part).rglob("*"):
                 self.words |= {path.name, path.stem}

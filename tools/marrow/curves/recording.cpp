@@ -173,10 +173,11 @@ Recording read_recording(const fs::path& path) {
 
 void expect_sequence(const Recording& recording) {
   if (!recording.is_empty()) return;
-  throw Error(recording.name +
-              " holds no sequence: no table (CSV) with a column 'frame' or 'time_s', no .tra, and no figures or poses "
-              "of which each frame has a file (joint/0001.json); name track.trajectory, track.autoscoper or "
-              "track.joint among the outputs of its pipeline");
+  throw Error(
+      recording.name +
+      " holds no sequence: no table (CSV) with a column 'frame' or 'time_s', no .tra, and no figures or poses "
+      "of which each frame has a file (joint/0001.json); have the pipeline give one among its outputs, by a node "
+      "that 'marrow list track' shows");
 }
 
 }  // namespace marrow::cli
