@@ -167,13 +167,17 @@ void bind_views(py::module_& module) {
 
 void bind_poses(py::module_& module) {
   value_class<Pose>(module, "Pose", "Where a fragment is.")
-      .def(py::init([](const py::object& matrix, const std::string& target, const std::string& source) {
-             auto pose = std::make_shared<Pose>();
-             pose->world_from_model = transform_of(matrix, target, source, "Pose");
-             return pose;
-           }),
+      .def(py::init(
+               [](const py::object& matrix, const std::string& target, const std::string& source, const Pose* axes_of) {
+                 auto pose = std::make_shared<Pose>();
+                 pose->world_from_model = transform_of(matrix, target, source, "Pose");
+                 if (axes_of) pose->frame = axes_of->frame;
+                 return pose;
+               }),
            py::arg("matrix"), py::kw_only(), py::arg("target") = "world", py::arg("source") = "ct",
-           "A rigid 4 x 4 matrix that maps points of the model, in mm, to the world.")
+           py::arg("axes_of") = py::none(),
+           "A rigid 4 x 4 matrix that maps points of the model, in mm, to the world. axes_of: another pose of the same "
+           "model, whose axes and origin it gets; without it, it has none of the bone.")
       .def_property_readonly(
           "matrix", [](const Pose& self) { return array_of(self.world_from_model); },
           "The 4 x 4 matrix that maps points of the model, in mm, to the world.")

@@ -117,7 +117,9 @@ class View:
 
 class Pose:
     type: str
-    def __init__(self, matrix: ArrayLike, *, target: str = "world", source: str = "ct") -> None: ...
+    def __init__(
+        self, matrix: ArrayLike, *, target: str = "world", source: str = "ct", axes_of: Optional["Pose"] = None
+    ) -> None: ...
     @property
     def matrix(self) -> Array: ...
     @property

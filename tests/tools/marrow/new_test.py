@@ -50,14 +50,7 @@ class New(Case):
     def test_every_kind_with_a_suite_has_a_template(self):
         with_suite = sorted(path.parent.name for path in (SOURCE / "plugins").glob("*/suite.cpp"))
         self.assertEqual(KINDS, with_suite)
-        self.assertEqual(set(KINDS) - set(PYTHON_KINDS), {"register"})
-
-    def test_a_kind_without_a_template_in_python_says_so(self):
-        self.assertEqual(
-            self.refused("node", "register.mine", "--python"),
-            "the kind 'register' has no template in Python; leave out --python for one in C++, or take one of "
-            + ", ".join(PYTHON_KINDS),
-        )
+        self.assertEqual(PYTHON_KINDS, KINDS)
 
     def test_nodes_of_kinds_and_a_kind_are_built_against_an_installation_and_tested(self):
         prefix = self.scratch / "installed"

@@ -26,11 +26,10 @@ std::string capitalised(const std::string& name) {
   return result;
 }
 
-/// The kinds whose folder of templates has `below`; all of them if that is empty.
-std::vector<std::string> kinds_with_templates(const fs::path& below = {}) {
+std::vector<std::string> kinds_with_templates() {
   std::vector<std::string> kinds;
   for (const fs::directory_entry& entry : fs::directory_iterator(shared_files("nodes")))
-    if (fs::exists(entry.path() / below)) kinds.push_back(entry.path().filename().string());
+    kinds.push_back(entry.path().filename().string());
   std::sort(kinds.begin(), kinds.end());
   return kinds;
 }
@@ -149,10 +148,6 @@ fs::path new_node(const std::string& name, const fs::path& folder) {
 
 fs::path new_python_node(const std::string& name, const fs::path& folder) {
   const NewNode node(name);
-  if (!fs::exists(node.from / "python"))
-    throw Error("the kind '" + node.kind +
-                "' has no template in Python; leave out --python for one in C++, or take one of " +
-                joined(kinds_with_templates("python"), ", "));
   Files files = node.files_from(shared_files("templates/python-node"));
   const Replacements names{{"new_node_file", node.file},  // the longest is replaced first
                            {node.kind + ".new_node", name},
