@@ -2,4 +2,11 @@
 // The kind of nodes that read files. These nodes choose their ports freely.
 #include <marrow/plugin.hpp>
 
-MARROW_PLUGIN(plugin) { plugin.kind("read").summary("reads values from files").runs_apart(marrow::Apart::parses); }
+#include "suite.hpp"
+
+MARROW_PLUGIN(plugin) {
+  plugin.kind("read")
+      .summary("reads values from files")
+      .runs_apart(marrow::Apart::parses)
+      .suite(marrow::conformance::read_suite());
+}

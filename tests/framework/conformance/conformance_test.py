@@ -82,6 +82,9 @@ WRONG = {  # node: checks of which at least one must fail
     "similarity.alone": {"beside_another"},
     "track.lagging": {"no_worse"},
     "track.drifting": {"still"},
+    "read.taking_anything": {"damaged"},
+    "read.nameless": {"damaged"},
+    "read.shifted": {"pose"},
     "track.shaking": {"still_no_worse", "still"},
     "track.renamed": {"contract"},
     "track.careless": {"nan_pose", "not_rigid"},
@@ -222,6 +225,12 @@ class Conformance(unittest.TestCase):
             result, nodes = conformance(node, "--check=contract", *("--check=" + name for name in checks), seconds=300)
             self.assertEqual(result.returncode, 0, result.stdout)
             self.assertEqual(set(nodes[node]), {"contract", *checks})
+
+    def test_a_node_without_inputs_passes_what_applies_to_it(self):
+        result, nodes = conformance("read.plain")
+        self.assertEqual(result.returncode, 0, result.stdout)
+        self.assertEqual(set(nodes["read.plain"]), {"damaged", "image", "mesh", "pose", "volume"})
+        self.assertIn("it gives no mesh", nodes["read.plain"]["mesh"][1])
 
     def test_unknown(self):
         result, _ = conformance("edges.cany")

@@ -14,8 +14,9 @@ class NewNode(unittest.TestCase):
 
     def test_it_finds_the_pose_that_two_views_show(self):
         """A ball of water with a smaller one at its side, from a start that is 2 mm and 4 degrees off."""
-        cameras = marrow.camera.carm(names=["frontal", "lateral"], alpha_deg=[0, 0], beta_deg=[0, 90], width_px=128,
-                                     height_px=128, pixel_mm=1.2)
+        cameras = marrow.camera.carm(
+            names=["frontal", "lateral"], alpha_deg=[0, 0], beta_deg=[0, 90], width_px=128, height_px=128, pixel_mm=1.2
+        )
         z, y, x = np.mgrid[-30:31, -30:31, -30:31]
         bone = np.maximum(20 - np.hypot(np.hypot(x, y), z), 8 - np.hypot(np.hypot(x - 18, y - 6), z - 4))
         volume = marrow.Volume(np.clip(bone, -1, 1) * 500 - 500, spacing_mm=(1, 1, 1), origin_mm=(-30, -30, -30))

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// A plain node of the kind read, and others that are wrong in one way each: the suite must catch each of them.
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <marrow/plugin.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace {
+
+enum class Fault { none, takes_anything, nameless, shifted };
+
+struct Options {
+  std::filesystem::path path;
+};
+
+/// The numbers of the matrix in a file of marrow's; none for another file.
+std::vector<double> numbers_in(std::string text) {
+  std::vector<double> numbers;
+  const std::size_t begin = text.find("matrix:");
+  if (!text.starts_with("marrow-pose: 1\n") || begin == std::string::npos) return numbers;
+  std::replace_if(text.begin(), text.end(), [](char c) { return c == '[' || c == ']' || c == ','; }, ' ');
+  std::istringstream words(text.substr(begin + 7));
+  for (std::string word; words >> word;)
+    if (word != "-") numbers.push_back(std::stod(word));
+  return numbers;
+}
+
+template <Fault kFault>
+marrow::Pose pose(const Options& options) {
+  std::string text;
+  if (std::filesystem::is_regular_file(options.path)) {
+    std::ifstream stream(options.path);
+    text.assign(std::istreambuf_iterator<char>(stream), {});
+  }
+  const std::vector<double> numbers = numbers_in(text);
+  marrow::Pose found;
+  if (numbers.size() != 16) {
+    if (kFault == Fault::takes_anything) return found;
+    throw marrow::Error((kFault == Fault::nameless ? "the file" : options.path.string()) + " holds no pose of marrow");
+  }
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column)
+      found.world_from_model.rotation(row, column) = numbers[std::size_t(4 * row + column)];
+    found.world_from_model.translation_mm[row] = numbers[std::size_t(4 * row + 3)];
+  }
+  if (kFault == Fault::shifted) found.world_from_model.translation_mm.x() += 0.01;
+  return found;
+}
+
+template <Fault kFault>
+void declare(marrow::Plugin& plugin, const char* name) {
+  plugin.node(name, pose<kFault>)
+      .summary("a pose from a file of marrow's")
+      .out("pose", "the pose")
+      .option("path", &Options::path, "the file", marrow::required());
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  declare<Fault::none>(plugin, "read.plain");
+  declare<Fault::takes_anything>(plugin, "read.taking_anything");
+  declare<Fault::nameless>(plugin, "read.nameless");
+  declare<Fault::shifted>(plugin, "read.shifted");
+}
