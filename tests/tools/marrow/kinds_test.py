@@ -160,9 +160,9 @@ class Kinds(Case):
         result = marrow("conformance", "denoise.median", plugins=[alone])
         self.assertEqual(result.returncode, 1)
         self.assertIn("nothing was checked: no library brings the kind 'denoise'", result.stdout)
-        result = marrow("conformance", "read.image")
+        result = marrow("conformance", "write.tfm")
         self.assertEqual(result.returncode, 1)
-        self.assertIn("nothing was checked: the kind 'read' has no suite", result.stdout)
+        self.assertIn("nothing was checked: the kind 'write' has no suite", result.stdout)
 
     def test_in_a_comparison(self):
         case = simulate(self.scratch / "simulated", *SMALL)
