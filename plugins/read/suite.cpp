@@ -83,9 +83,8 @@ double not_refused(const Subject& subject) {
 template <class T>
 T read_back(const Subject& subject, const fs::path& file) {
   const std::vector<PortInfo>& ports = subject.info().outputs;
-  const auto port = std::find_if(ports.begin(), ports.end(), [](const PortInfo& one) {
-    return one.type == TypeInfo::of<T>() && one.axis.empty();
-  });
+  const auto port = std::find_if(ports.begin(), ports.end(),
+                                 [](const PortInfo& one) { return one.type == TypeInfo::of<T>() && one.axis.empty(); });
   if (port == ports.end()) throw NotApplicable("it gives no " + TypeInfo::of<T>().id);
   const Result result = reading(subject, file).call({});
   if (result.refusal) throw NotApplicable("it reads another format: " + *result.refusal);
@@ -126,8 +125,9 @@ double pose_off_mm(const Subject& subject) {
 
 double image_off(const Subject& subject) {
   cv::Mat_<std::uint16_t> truth(24, 40);
-  std::string mha = "ObjectType = Image\nNDims = 2\nDimSize = 40 24\nElementType = MET_USHORT\nElementSpacing = 1 1\n"
-                    "ElementByteOrderMSB = False\nElementDataFile = LOCAL\n";
+  std::string mha =
+      "ObjectType = Image\nNDims = 2\nDimSize = 40 24\nElementType = MET_USHORT\nElementSpacing = 1 1\n"
+      "ElementByteOrderMSB = False\nElementDataFile = LOCAL\n";
   for (int v = 0; v < truth.rows; ++v)
     for (int u = 0; u < truth.cols; ++u) {
       truth(v, u) = std::uint16_t(1000 + 700 * v + 13 * u);

@@ -38,7 +38,7 @@ std::string planned_text(const PlannedNode& node) {
 std::string origin_text(const PipelineNode& node, const Pipeline& pipeline) {
   std::string text = node.place.file == pipeline.file.string() ? "" : place_text(node.place, pipeline.file);
   const auto add = [&](const std::string& what, const Place& place) {
-    if (!place.file.empty() && place.file != node.place.file)
+    if (place.line > 0 && place.file != node.place.file)  // the command line is at hand
       text += (text.empty() ? "" : ", ") + what + ": " + place_text(place, pipeline.file);
   };
   add("uses", node.uses_place);

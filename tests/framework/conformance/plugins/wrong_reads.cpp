@@ -21,7 +21,8 @@ std::vector<double> numbers_in(std::string text) {
   std::vector<double> numbers;
   const std::size_t begin = text.find("matrix:");
   if (!text.starts_with("marrow-pose: 1\n") || begin == std::string::npos) return numbers;
-  std::replace_if(text.begin(), text.end(), [](char c) { return c == '[' || c == ']' || c == ','; }, ' ');
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == '[' || c == ']' || c == ','; }, ' ');
   std::istringstream words(text.substr(begin + 7));
   for (std::string word; words >> word;)
     if (word != "-") numbers.push_back(std::stod(word));
