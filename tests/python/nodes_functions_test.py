@@ -22,7 +22,7 @@ def bowl(*, place_mm: Annotated[float, "where the least is"] = 3, sleep_s: Annot
     return costs
 
 
-@marrow.cost("similarity.line", summary="another cost, times a factor, and an offset", seconds=2)
+@marrow.cost("similarity.line", summary="another cost, times a factor, and an offset", seconds=4)
 def line(cost: marrow.Cost, other: Optional[marrow.Cost] = None, *,
          factor: Annotated[float, "factor"] = 1, offset: Annotated[float, "offset"] = 0):
     def costs(poses):
@@ -176,7 +176,7 @@ class Functions(Written):
             cost(POSES)
 
     def test_the_time_of_the_function_inside_does_not_count(self):
-        cost = marrow.similarity.line(marrow.similarity.bowl(sleep_s=2.5))
+        cost = marrow.similarity.line(marrow.similarity.bowl(sleep_s=5))
         self.assertEqual(cost(POSES[0]), 27)
 
     def test_a_process_that_ends_while_it_is_asked(self):
