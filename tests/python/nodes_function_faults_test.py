@@ -14,7 +14,7 @@ def inner(*, does: Annotated[str, "what it does"] = "zeros"):
         if does == "crash":
             os.abort()
         if does == "slow":
-            time.sleep(2.5)
+            time.sleep(5)
         if does == "tenth":
             time.sleep(0.1)
         return numpy.zeros(len(poses))
@@ -24,7 +24,7 @@ OUTER = """
 import time
 kept = []
 
-@marrow.cost("similarity.outer", summary="uses another cost", seconds=2)
+@marrow.cost("similarity.outer", summary="uses another cost", seconds=4)
 def outer(cost: marrow.Cost, *, does: Annotated[str, "what it does"] = "asks"):
     kept.append(cost)
     def costs(poses):
@@ -75,7 +75,7 @@ class Faults(Written):
             ("crash", "asks", r"^inner.py crashed its process \(Aborted\)"),
             ("zeros", "flat", "^pose: expected 4 x 4 numbers, got 2 x 3"),
             ("zeros", "few", "^similarity.outer: expected 2 costs, got 1"),
-            ("zeros", "sleep", r"^outer.py took longer than 2 s, and .* give it more in @marrow.cost\(..., seconds"),
+            ("zeros", "sleep", r"^outer.py took longer than 4 s, and .* give it more in @marrow.cost\(..., seconds"),
         ):
             with self.subTest(inner=inner, outer=outer), self.assertRaisesRegex(marrow.Error, text):
                 self.value(inner, outer)
