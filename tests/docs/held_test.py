@@ -13,9 +13,10 @@ import yaml
 
 try:
     import h5py
-    from PIL import Image
+    import scipy
+    from harness import public_data
 except ImportError:
-    h5py = None
+    public_data = None
 
 from documents import BUILD, IS_SANITIZED, SOURCE, Documents, blocks
 from harness.cases import SMALL, copy_case, simulate
@@ -52,55 +53,6 @@ def labels_of(path, to):
     head = re.sub(r"CompressedData = True\nCompressedDataSize = \d+\n", "", head).replace("MET_FLOAT", "MET_UCHAR")
     to.write_bytes(head.encode() + (values < 0).astype(np.uint8).tobytes())
     return to
-
-
-def values_of(path):
-    """The values of a compressed MetaImage, [z, y, x], and its spacing and origin."""
-    data = path.read_bytes()
-    head = re.match(rb"(?s)(.*?ElementDataFile = LOCAL\n)", data).group(1).decode()
-    told = dict(line.split(" = ") for line in head.splitlines())
-    numbers = lambda name: np.array(told[name].split(), float)
-    kind = {"MET_SHORT": "<i2", "MET_FLOAT": "<f4"}[told["ElementType"]]
-    values = np.frombuffer(zlib.decompress(data[len(head) :]), kind)
-    return values.reshape(numbers("DimSize").astype(int)[::-1]), numbers("ElementSpacing"), numbers("Offset")
-
-
-def deepfluoro_file(case, path):
-    """A case as a file of DeepFluoro: images are seen from the detector, the camera looks along -z, and poses map from
-    the camera's world, which is turned, to the bone. Gives the landmarks."""
-    told = yaml.safe_load((case / "case.yaml").read_text())
-    (bone,) = told["fragments"].values()
-    ct, spacing, origin = values_of(case / "ct.mha")
-    labels, seeds = np.zeros(ct.shape, "u1"), (np.array(bone["seeds"]) - origin) / spacing
-    for x, y, z in np.rint(seeds).astype(int):
-        labels[z - 2 : z + 3, y - 2 : y + 3, x - 2 : x + 3] = 5
-    extrinsic = np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], float)
-    landmarks = {"L%d" % i: np.array(point) for i, point in enumerate(bone["seeds"][:6])}
-    with h5py.File(path, "w") as file:
-        specimen = file.create_group("17-1882")
-        for name, value in (("pixels", ct), ("spacing", spacing[:, None]), ("origin", origin), ("dir-mat", np.eye(3))):
-            specimen["vol/" + name] = value
-        specimen["vol-seg/image/pixels"] = labels
-        specimen["vol-seg/labels-def/5"], specimen["vol-seg/labels-def/6"] = "Left Femur", "Right Femur"
-        for name, point in landmarks.items():
-            specimen["vol-landmarks/" + name] = point[:, None]
-        for number, view in zip(("000", "010"), told["views"]):
-            camera = yaml.safe_load((case / view["camera"]).read_text())
-            k = np.array(camera["intrinsics"])
-            seen = (
-                np.diag([-1, 1, -1, 1])
-                @ np.array(camera["camera_from_world"]["matrix"])
-                @ np.array(bone["truth"]["matrix"])
-            )
-            image = np.asarray(Image.open(case / view["image"])).astype("f4")
-            group = specimen.create_group("projections/" + number)
-            group["image/pixels"] = image[:, ::-1]
-            group["gt-poses/cam-to-left-femur-vol"] = np.linalg.inv(seen) @ extrinsic
-            k_file = np.array([[-k[0, 0], 0, image.shape[1] - 1 - k[0, 2]], [0, -k[1, 1], k[1, 2]], [0, 0, 1]])
-            for name, point in landmarks.items():
-                pixel = k_file @ moved(seen, point)
-                group["gt-landmarks/" + name] = (pixel[:2] / pixel[2])[:, None]
-        file["proj-params/extrinsic"], file["proj-params/intrinsic"] = extrinsic, k_file
 
 
 @unittest.skipIf(IS_SANITIZED, "it would take minutes")
@@ -228,21 +180,11 @@ class Held(Documents):
         pose = np.array(yaml.safe_load((out / "pose.yaml").read_text())["matrix"])
         np.testing.assert_allclose(pose[:3, 3], shift, atol=0.3)
 
-    @unittest.skipIf(h5py is None, "needs the Debian packages python3-h5py and python3-pil")
+    @unittest.skipIf(public_data is None, "needs the Debian packages python3-h5py, python3-pil and python3-scipy")
     def test_deepfluoro(self):
         case = simulate(self.folder / "whole", pipeline="simulate-vertebra.yaml")
-        deepfluoro_file(case, self.folder / "FILE")
+        self.give(FILE=public_data.deepfluoro_file([case], self.folder / "FILE.h5"))
         self.run_section("A file of DeepFluoro")
-        made = yaml.safe_load((self.folder / "femur" / "case.yaml").read_text())
-        for view, (name, given) in zip(made["views"], (("000", "frontal"), ("010", "lateral"))):
-            camera = yaml.safe_load((case / (given + ".camera.yaml")).read_text())
-            self.assertEqual(view["name"], name)
-            np.testing.assert_allclose(view["camera"]["intrinsics"], camera["intrinsics"], atol=1e-6)
-            image, spacing, origin = values_of(self.folder / "femur" / (name + ".mha"))
-            np.testing.assert_array_equal(image, np.asarray(Image.open(case / (given + ".png"))))
-        errors = json.loads((self.folder / "A-file-of-DeepFluoro/outputs/errors/left-femur/final.json").read_text())
-        figures = {one["name"]: one["value"] for one in errors["metrics"]}
-        self.assertLess(figures["mtre_mm"], 0.5)
 
     def test_nothing(self):
         out = self.run_section("Nothing yet")

@@ -61,6 +61,7 @@ void add_rerun(CLI::App& app, int& code);
 void add_replay(CLI::App& app, int& code);
 void add_diff(CLI::App& app, int& code);
 void add_curves(CLI::App& app, int& code);
+void add_data(CLI::App& app, int& code);
 void add_show(CLI::App& app, int& code);
 void add_check(CLI::App& app, int& code);
 void add_plan(CLI::App& app, int& code);

@@ -8,5 +8,5 @@ int main(int argc, char** argv) {
       {add_run,        add_compare, add_cell,    add_chunk,       add_worker,       add_rerun,    add_replay,  add_diff,
        add_show,       add_recipe,  add_check,   add_plan,        add_cache,        add_list,     add_inspect, add_new,
        add_graph,      add_schema,  add_doctor,  add_conformance, add_check_worker, add_describe, add_watch,   add_open,
-       add_completion, add_manual,  add_version, add_export,      add_curves});
+       add_completion, add_manual,  add_version, add_export,      add_curves,       add_data});
 }

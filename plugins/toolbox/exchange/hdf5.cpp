@@ -48,6 +48,7 @@ void Hdf5Reader::refuse(const std::string& key, const std::string& what) const {
 }
 
 bool Hdf5Reader::has(const std::string& key) const {
+  if (key == "/") return true;
   // Asks for each group on the way, because HDF5 reports an error if one is missing. A link may lead to another file.
   for (std::size_t at = key.find('/', 1);; at = key.find('/', at + 1)) {
     const std::string part = key.substr(0, at);
@@ -82,8 +83,8 @@ std::vector<std::string> Hdf5Reader::names_in(const std::string& key) const {
   return names;
 }
 
-std::vector<double> Hdf5Reader::numbers(const std::string& key, std::size_t count) const {
-  if (!has(key)) refuse(key, "is missing; the file is cut off, or not of xReg: write it again");
+void Hdf5Reader::read(const std::string& key, hid_t memory, std::size_t count, void* values) const {
+  if (!has(key)) refuse(key, "is missing; the file is cut off, or of another kind: write it again");
   const Hdf5Id data(H5Dopen2(file_, key.c_str(), H5P_DEFAULT), H5Dclose);
   const Hdf5Id space(data.is_open() ? H5Dget_space(data) : -1, H5Sclose),
       type(data.is_open() ? H5Dget_type(data) : -1, H5Tclose);
@@ -93,16 +94,42 @@ std::vector<double> Hdf5Reader::numbers(const std::string& key, std::size_t coun
   if (kind != H5T_FLOAT && kind != H5T_INTEGER) refuse(key, "expected numbers, got another type");
   const hssize_t found = H5Sget_simple_extent_npoints(space);
   if (found != hssize_t(count)) refuse(key, formatted("expected {}, got {}", counted(count, "number"), found));
-  std::vector<double> values(count);
-  if (H5Dread(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0)
+  if (H5Dread(data, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0)
     refuse(key, "cannot be read; the file is damaged");
+}
+
+std::vector<double> Hdf5Reader::numbers(const std::string& key, std::size_t count) const {
+  std::vector<double> values(count);
+  read(key, H5T_NATIVE_DOUBLE, count, values.data());
   for (const double value : values)
     if (!std::isfinite(value)) refuse(key, formatted("expected finite numbers, got {:f}", value));
   return values;
 }
 
+std::vector<std::size_t> Hdf5Reader::shape(const std::string& key) const {
+  if (!has(key)) refuse(key, "is missing; the file is cut off, or of another kind: write it again");
+  const Hdf5Id data(H5Dopen2(file_, key.c_str(), H5P_DEFAULT), H5Dclose);
+  const Hdf5Id space(data.is_open() ? H5Dget_space(data) : -1, H5Sclose);
+  std::array<hsize_t, H5S_MAX_RANK> lengths{};
+  const int rank = space.is_open() ? H5Sget_simple_extent_dims(space, lengths.data(), nullptr) : -1;
+  if (rank < 0) refuse(key, "expected numbers; the file is damaged");
+  return {lengths.begin(), lengths.begin() + rank};
+}
+
+std::vector<float> Hdf5Reader::floats(const std::string& key, std::size_t count) const {
+  // The shape is compared before memory for it is taken.
+  std::size_t found = 1;
+  for (const std::size_t length : shape(key)) found *= length;
+  if (found != count) refuse(key, formatted("expected {}, got {}", counted(count, "number"), found));
+  std::vector<float> values(count);
+  read(key, H5T_NATIVE_FLOAT, count, values.data());
+  for (const float value : values)
+    if (!std::isfinite(value)) refuse(key, "expected finite numbers, got " + formatted("{:f}", double(value)));
+  return values;
+}
+
 std::string Hdf5Reader::text(const std::string& key) const {
-  if (!has(key)) refuse(key, "is missing; the file is cut off, or not of xReg: write it again");
+  if (!has(key)) refuse(key, "is missing; the file is cut off, or of another kind: write it again");
   const Hdf5Id data(H5Dopen2(file_, key.c_str(), H5P_DEFAULT), H5Dclose);
   const Hdf5Id space(data.is_open() ? H5Dget_space(data) : -1, H5Sclose),
       type(data.is_open() ? H5Dget_type(data) : -1, H5Tclose);

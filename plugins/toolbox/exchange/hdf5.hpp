@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// HDF5 files: numbers, texts and groups by their keys. Only small values are read, so neither images nor damage in a
-// file cost much memory. Files to be written are made in memory.
+// HDF5 files: numbers, texts, groups and arrays by their keys. Only arrays that are asked for with their shape cost
+// much memory. Files to be written are made in memory.
 #include <hdf5.h>
 
 #include <filesystem>
@@ -41,9 +41,16 @@ class Hdf5Reader {
   std::vector<double> numbers(const std::string& key, std::size_t count) const;
   double number(const std::string& key) const { return numbers(key, 1)[0]; }
   std::string text(const std::string& key) const;
+  /// The lengths of a dataset, the slowest axis first. Throws Error if there is no such dataset.
+  std::vector<std::size_t> shape(const std::string& key) const;
+  /// All values of a dataset of numbers, converted to float; the last axis runs fastest. Throws Error if there is no
+  /// such dataset, if it does not have `count` values, or if one is not finite.
+  std::vector<float> floats(const std::string& key, std::size_t count) const;
   [[noreturn]] void refuse(const std::string& key, const std::string& what) const;
 
  private:
+  /// Reads `count` values of a dataset as `memory`. Throws Error as numbers() does.
+  void read(const std::string& key, hid_t memory, std::size_t count, void* values) const;
   void check_is_inside(hid_t data, const std::string& key) const;
   std::string path_;
   Hdf5Id file_;

@@ -197,7 +197,7 @@ class Xreg(Formats):
     def test_values_of_another_kind_are_refused_by_their_keys(self):
         cam, mark = "proj-000/cam/", "proj-000/landmarks/"
         for name, key, value, said in (
-            ("missing", cam + "num-rows", None, "is missing; the file is cut off, or not of xReg: write it again"),
+            ("missing", cam + "num-rows", None, "is missing; the file is cut off, or of another kind: write it again"),
             ("text", cam + "num-rows", "many", "expected numbers, got another type"),
             ("group", cam + "num-rows", {}, "expected numbers; the file is damaged"),
             ("shape", cam + "intrinsic", numpy.eye(4), "expected 9 numbers, got 16"),

@@ -105,6 +105,8 @@ void say_what_is_tuned(const Experiment& experiment) {
 int compare_variants(const CompareRequest& asked, const ClusterRequest& cluster) {
   CompareRequest request = asked;
   stop_on_signals();
+  expect_given(request.file, Wanted::experiment);
+  request.file = experiment_with_inputs(request);
   const Catalogue catalogue;
   Experiment experiment;
   if (!load_experiment(request, catalogue, experiment, 0)) return 2;
@@ -209,6 +211,8 @@ void add_compare(CLI::App& app, int& code) {
   CLI::App* command =
       app.add_subcommand("compare", "run an experiment: variants of a pipeline on the same cases, and which is better");
   add_experiment_arguments(command, *request);
+  command->add_option("inputs", request->inputs, "values of the pipeline's inputs, as name=value")
+      ->type_name("NAME=VALUE");
   add_whole_number(command, "-j,--jobs", request->jobs, "cells at once (default: the number of cores)", 1, 1024);
   show_default(add_amount(command, "--time-limit", request->time_limit_s, "seconds", "seconds that one cell may take"),
                request->time_limit_s);

@@ -37,9 +37,10 @@ struct WantedDifference {
 
 struct CompareRequest {
   std::filesystem::path file;
-  std::filesystem::path folder;  ///< empty = runs/compare/NAME
-  int jobs = 0;                  ///< number of cells at once; 0 = the number of the machine's cores
-  int threads = 1;               ///< threads of each cell
+  std::vector<std::string> inputs = {};  ///< name=value, for the pipeline's inputs
+  std::filesystem::path folder;          ///< empty = runs/compare/NAME
+  int jobs = 0;                          ///< number of cells at once; 0 = the number of the machine's cores
+  int threads = 1;                       ///< threads of each cell
   double time_limit_s = 600;
   double memory_limit_mb = 4000;
   std::size_t shown = 8;  ///< cases and starts with pictures in the report
@@ -56,6 +57,9 @@ struct CompareRequest {
   FileLimits file_limits;
 };
 
+/// The experiment file of the request; with inputs a new one, runs/compare/NAME.yaml, which extends it. Throws Error if
+/// there is no such experiment, or if another file has this name.
+std::filesystem::path experiment_with_inputs(const CompareRequest& request);
 /// Adds the arguments that all commands with an experiment share.
 void add_experiment_arguments(CLI::App* command, CompareRequest& request);
 /// Runs all cells that are not done yet, here or by tasks of a cluster. Then writes times, tables, pictures and the

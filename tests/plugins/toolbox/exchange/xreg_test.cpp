@@ -193,7 +193,7 @@ TEST(Xreg, DiagnosesFaults) {
   const std::string bytes = bytes_of(kFile);
   put(folder / "a.h5", with(bytes, "num-projs", "num-proja"));
   EXPECT_REFUSED(read(folder / "a.h5", 0, "none"), "a.h5",
-                 "num-projs: is missing; the file is cut off, or not of xReg");
+                 "num-projs: is missing; the file is cut off, or of another kind");
   put(folder / "a.h5", bytes.substr(0, bytes.size() / 2));
   EXPECT_REFUSED(read(folder / "a.h5", 0, "none"), "a.h5", "is no HDF5 file that can be opened");
 }
