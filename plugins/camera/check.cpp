@@ -183,6 +183,38 @@ void add_metrics(const View& view, const InView& points, double error, Metrics& 
     metrics.items.push_back({name + "error_with_free_pose", refit->error_px, "px"});
 }
 
+/// The distance of a point seen in one view from the line on which another view says that it lies: the image of the ray
+/// through the other view's pixel.
+double epipolar_distance_px(const Camera& other, const Eigen::Vector2d& in_other, const Camera& camera,
+                            const Eigen::Vector2d& pixel) {
+  const auto shown = [&](const Eigen::Vector3d& world) {
+    return Eigen::Vector3d(camera.intrinsics * (camera.camera_from_world * world));
+  };
+  const Eigen::Vector3d source = source_position_mm(other);
+  Eigen::Vector3d line = shown(source).cross(shown(source + 1000 * ray_direction(other, in_other)));
+  line /= line.head<2>().norm();
+  return std::abs(line.dot(pixel.homogeneous()));
+}
+
+/// For each pair of views the root mean square epipolar distance of the points that both show, in both images. It needs
+/// no places in the world, so it tells how well the cameras agree, not whether both are off together.
+void add_epipolar_metrics(const List<View>& views, const std::vector<KnownPoint>& points, Metrics& metrics) {
+  for (std::size_t i = 0; i < views.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k) {
+      const Camera &a = views[k].camera, &b = views[i].camera;
+      double squares = 0, count = 0;
+      for (const KnownPoint& point : points) {
+        const auto in_a = point.seen_px.find(views[k].name), in_b = point.seen_px.find(views[i].name);
+        if (in_a == point.seen_px.end() || in_b == point.seen_px.end()) continue;
+        squares += std::pow(epipolar_distance_px(a, in_a->second, b, in_b->second), 2) +
+                   std::pow(epipolar_distance_px(b, in_b->second, a, in_a->second), 2);
+        count += 2;
+      }
+      if (count > 0)
+        metrics.items.push_back({views[k].name + "-" + views[i].name + ".epipolar", std::sqrt(squares / count), "px"});
+    }
+}
+
 /// Two views along nearly the same direction do not determine the depth of a point.
 void check_directions(const List<View>& views, Context& context, int& warnings) {
   for (std::size_t i = 0; i < views.size(); ++i)
@@ -231,6 +263,7 @@ Checked check(const List<View>& views, const Mesh* mesh, const Options& options,
     checked.pictures.add(view.name,
                          draw(view, seen.all, mesh, verdict + (sentences.empty() ? "" : ", see warnings"), options));
   }
+  add_epipolar_metrics(views, points, checked.metrics);
   check_directions(views, context, warnings);
   if (count > 0)
     checked.metrics.items.insert(checked.metrics.items.begin(), {"error", std::sqrt(squares / count), "px"});
@@ -247,8 +280,10 @@ MARROW_PLUGIN(plugin) {
           "with a camera")
       .in("views", "images with the cameras to check", over("view"))
       .in("mesh", "surface of a known object in world coordinates; it is drawn into the images")
-      .out("metrics", &Checked::metrics, "reprojection errors, and the number of warnings")
-      .figures({"error", "warnings", "*.points", "*.error", "*.worst", "*.mean_at_object", "*.error_with_free_pose"})
+      .out("metrics", &Checked::metrics,
+           "reprojection errors, the epipolar distances of points that two views show, and the number of warnings")
+      .figures({"error", "warnings", "*.points", "*.error", "*.worst", "*.mean_at_object", "*.error_with_free_pose",
+                "*.epipolar"})
       .out("picture", &Checked::pictures, "each image with the seen and the expected positions of the points",
            over("view"))
       .option("known_points", &Options::known_points,

@@ -44,17 +44,38 @@ void check_inputs(const List<View>& views, const List<Cost>& costs, const List<P
   }
 }
 
-Metrics metrics_of(const Vector6d& motion, const Vector6d& deviation) {
-  const std::array<const char*, 6> names{"rotation_u_deg", "rotation_v_deg", "rotation_depth_deg",
-                                         "shift_u_mm",     "shift_v_mm",     "shift_depth_mm"};
+constexpr std::array<const char*, 6> kMotions{"rotation_u", "rotation_v", "rotation_depth",
+                                              "shift_u",    "shift_v",    "shift_depth"};
+
+/// How much of what was expected the images took away: 0 if a motion is as uncertain after the registration as the
+/// options say, 1 if it is known.
+Vector6d determined(const Vector6d& deviation, const Vector6d& expected) {
+  const Vector6d left = deviation.cwiseQuotient(expected);
+  return (Vector6d::Ones() - left.cwiseProduct(left)).cwiseMax(0);
+}
+
+Metrics metrics_of(const Vector6d& motion, const Vector6d& deviation, const Vector6d& expected) {
   Metrics metrics;
   for (const bool predicted : {false, true})
     for (int i = 0; i < 6; ++i) {
-      const std::string name = names[std::size_t(i)];
+      const std::string name = kMotions[std::size_t(i)] + std::string(i < 3 ? "_deg" : "_mm");
       metrics.items.push_back(
           {(predicted ? "predicted_" : "") + name, (predicted ? deviation : motion)[i], i < 3 ? "deg" : "mm"});
     }
+  const Vector6d share = determined(deviation, expected);
+  for (int i = 0; i < 6; ++i)
+    metrics.items.push_back({std::string("determined_") + kMotions[std::size_t(i)], 100 * share[i], "%"});
   return metrics;
+}
+
+/// Says which motions of a camera the images leave nearly as uncertain as they were.
+void say_undetermined(const std::string& view, const Vector6d& share, const Context& context) {
+  std::string names;
+  for (int i = 0; i < 6; ++i)
+    if (share[i] < 0.5) names += (names.empty() ? "" : ", ") + std::string(kMotions[std::size_t(i)]);
+  if (!names.empty())
+    context.info("view '" + view + "': the images do not determine its camera's " + names +
+                 "; what the options expect of them counts in the poses' deviations");
 }
 
 void warn_of_large(const std::string& view, const Vector6d& in_deviations, Context& context) {
@@ -96,7 +117,9 @@ Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose
     view.camera.camera_from_world = view.camera.camera_from_world * refinement.sight(v).motion(motion);
     view.camera.camera_from_world.rotation = nearest_rotation(view.camera.camera_from_world.rotation);
     result.views.add(views.name(v), view);
-    result.motions.add(views.name(v), metrics_of(motion, refinement.deviation_of_motion(v)));
+    const Vector6d deviation = refinement.deviation_of_motion(v), &expected = refinement.sight(v).deviation;
+    result.motions.add(views.name(v), metrics_of(motion, deviation, expected));
+    say_undetermined(views.name(v), determined(deviation, expected), context);
     warn_of_large(views.name(v), motion.cwiseQuotient(refinement.sight(v).deviation), context);
   }
   for (std::size_t f = 0; f < poses.size(); ++f) {
@@ -131,19 +154,24 @@ MARROW_PLUGIN(plugin) {
            "share do not count",
            over("fragment"))
       .out("motions", &Result::motions,
-           "motion of each camera, about and along the axes of its image (u, v, depth), and its predicted deviations",
+           "motion of each camera, about and along the axes of its image (u, v, depth), its predicted deviations, and "
+           "how much of what the options expect the images determine: 0 % if it is as uncertain as before",
            over("view"))
       .figures({"rotation_u_deg", "rotation_v_deg", "rotation_depth_deg", "shift_u_mm", "shift_v_mm", "shift_depth_mm",
                 "predicted_rotation_u_deg", "predicted_rotation_v_deg", "predicted_rotation_depth_deg",
-                "predicted_shift_u_mm", "predicted_shift_v_mm", "predicted_shift_depth_mm"})
+                "predicted_shift_u_mm", "predicted_shift_v_mm", "predicted_shift_depth_mm", "determined_rotation_u",
+                "determined_rotation_v", "determined_rotation_depth", "determined_shift_u", "determined_shift_v",
+                "determined_shift_depth"})
       .option("turn_deg", &Options::turn_deg, "root mean square of the cameras' rotations", at_least(1e-6))
       .option("shift_mm", &Options::shift_mm, "root mean square of the cameras' shifts", at_least(1e-6))
-      .option("focal_percent", &Options::focal_percent,
-              "root mean square error of the focal lengths; it is corrected by a shift along the depth, which shows "
-              "the bone in the same size",
-              at_least(0))
+      .option(
+          "focal_percent", &Options::focal_percent,
+          "root mean square error of the focal lengths, such as 10 if the header gives no distance; it is corrected "
+          "by a shift along the depth, which shows the bone in the same size",
+          at_least(0))
       .option("centre_px", &Options::centre_px,
-              "root mean square error of the principal points; it is corrected by a shift across the depth",
+              "root mean square error of the principal points, such as 100 for a crop whose place is not known; it is "
+              "corrected by a shift across the depth",
               at_least(0))
       .option("contour_spacing_px", &Options::contour_spacing_px,
               "for costs of contours: distance between two points of the outline", at_least(0.1),

@@ -297,6 +297,32 @@ class Explanations {
   std::vector<std::vector<double>> left_px_;  ///< of each view, without each mistake
 };
 
+/// The pose of a camera that shows the points best; from the camera's own, or from none.
+std::optional<RigidTransform> solved_pose(const Camera& camera, const SeenPoints& points, bool from_its_own) {
+  std::vector<cv::Point3d> objects;
+  std::vector<cv::Point2d> pixels;
+  for (const auto& p : points.world_mm) objects.emplace_back(p.x(), p.y(), p.z());
+  for (const auto& p : points.pixels) pixels.emplace_back(p.x(), p.y());
+  cv::Mat matrix(3, 3, CV_64F);
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) matrix.at<double>(r, c) = camera.intrinsics(r, c);
+  const Eigen::Vector3d turn = vector_from_rotation(camera.camera_from_world.rotation);
+  const Eigen::Vector3d& shift = camera.camera_from_world.translation_mm;
+  cv::Mat rotation = (cv::Mat_<double>(3, 1) << turn.x(), turn.y(), turn.z());
+  cv::Mat translation = (cv::Mat_<double>(3, 1) << shift.x(), shift.y(), shift.z());
+  try {
+    if (!cv::solvePnP(objects, pixels, matrix, cv::noArray(), rotation, translation, from_its_own,
+                      from_its_own ? cv::SOLVEPNP_ITERATIVE : cv::SOLVEPNP_SQPNP))
+      return std::nullopt;
+  } catch (const cv::Exception&) {
+    return std::nullopt;
+  }
+  RigidTransform pose = camera.camera_from_world;
+  pose.rotation = rotation_from_vector({rotation.at<double>(0), rotation.at<double>(1), rotation.at<double>(2)});
+  pose.translation_mm = {translation.at<double>(0), translation.at<double>(1), translation.at<double>(2)};
+  return pose;
+}
+
 }  // namespace
 
 std::vector<std::string> implausible_numbers(const Camera& camera, const Device& device,
@@ -322,29 +348,17 @@ std::vector<std::optional<std::string>> explanations(const std::vector<Camera>& 
   return Explanations(cameras, points).sentences();
 }
 
+std::optional<RigidTransform> pose_of_points(const Camera& camera, const SeenPoints& points) {
+  if (points.world_mm.size() < 4) return std::nullopt;
+  return solved_pose(camera, points, false);
+}
+
 std::optional<Refit> refit_pose(const Camera& camera, const SeenPoints& points) {
   if (points.world_mm.size() < 6) return std::nullopt;
-  std::vector<cv::Point3d> objects;
-  std::vector<cv::Point2d> pixels;
-  for (const auto& p : points.world_mm) objects.emplace_back(p.x(), p.y(), p.z());
-  for (const auto& p : points.pixels) pixels.emplace_back(p.x(), p.y());
-  cv::Mat matrix(3, 3, CV_64F);
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c) matrix.at<double>(r, c) = camera.intrinsics(r, c);
-  const Eigen::Vector3d turn = vector_from_rotation(camera.camera_from_world.rotation);
-  const Eigen::Vector3d& shift = camera.camera_from_world.translation_mm;
-  cv::Mat rotation = (cv::Mat_<double>(3, 1) << turn.x(), turn.y(), turn.z());
-  cv::Mat translation = (cv::Mat_<double>(3, 1) << shift.x(), shift.y(), shift.z());
-  try {
-    cv::solvePnP(objects, pixels, matrix, cv::noArray(), rotation, translation, true, cv::SOLVEPNP_ITERATIVE);
-  } catch (const cv::Exception&) {
-    return std::nullopt;
-  }
+  const auto pose = solved_pose(camera, points, true);
+  if (!pose) return std::nullopt;
   Camera moved = camera;
-  moved.camera_from_world.rotation =
-      rotation_from_vector({rotation.at<double>(0), rotation.at<double>(1), rotation.at<double>(2)});
-  moved.camera_from_world.translation_mm = {translation.at<double>(0), translation.at<double>(1),
-                                            translation.at<double>(2)};
+  moved.camera_from_world = *pose;
   const double error = reprojection_error_px(moved, points);
   if (!std::isfinite(error) || error > reprojection_error_px(camera, points)) return std::nullopt;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();

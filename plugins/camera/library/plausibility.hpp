@@ -44,6 +44,10 @@ std::vector<std::optional<std::string>> explanations(const std::vector<Camera>& 
 struct Refit {
   double error_px = 0, turn_deg = 0, shift_mm = 0;
 };
+/// The pose of a camera with these inner parameters that shows the points best, by SQPnP (Terzakis and Lourakis, ECCV
+/// 2020); no start is needed. std::nullopt if there are fewer than four points, or if they do not determine a pose.
+std::optional<RigidTransform> pose_of_points(const Camera& camera, const SeenPoints& points);
+
 /// Fits only the pose to the points, from the camera's pose. std::nullopt if there are fewer than six points, if they
 /// do not determine a pose, or if no better pose is found.
 std::optional<Refit> refit_pose(const Camera& camera, const SeenPoints& points);

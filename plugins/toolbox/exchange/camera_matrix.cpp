@@ -7,6 +7,7 @@
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/domain/decompositions.hpp"
+#include "marrow/toolbox/files/projection_camera.hpp"
 
 namespace marrow::exchange {
 namespace {
@@ -75,37 +76,16 @@ std::optional<Eigen::Matrix3d> rotation_near(const Eigen::Matrix3d& matrix) {
 
 Camera camera_of(const Eigen::Matrix<double, 3, 4>& pixel_from_world, const Eigen::Vector2i& size_px, Mirror mirror,
                  const std::string& what) {
-  const double scale = pixel_from_world.row(2).head<3>().norm();
-  if (!pixel_from_world.allFinite() || !(scale > 1e-12))
+  const auto found = files::camera_of_projection(turning(mirror, size_px.x(), size_px.y()) * pixel_from_world, size_px);
+  if (!found)
     throw Error(what + ": its matrix does not project along rays from a source; it is damaged, or of parallel rays");
-  const Eigen::Matrix<double, 3, 4> p = turning(mirror, size_px.x(), size_px.y()) * pixel_from_world / scale;
-  const Eigen::RowVector3d z = p.row(2).head<3>();
-  // Decomposes P row by row: what the axes found so far leave of a row is along the next axis.
-  const double v0 = p.row(1).head<3>().dot(z);
-  const Eigen::RowVector3d y_scaled = p.row(1).head<3>() - v0 * z;
-  const double f_v = y_scaled.norm();
-  const Eigen::RowVector3d y = y_scaled / f_v, x = y.cross(z);
-  const double u0 = p.row(0).head<3>().dot(z), skew = p.row(0).head<3>().dot(y), f_u = p.row(0).head<3>().dot(x);
-  if (!(f_v > 1e-9) || !(std::abs(f_u) > 1e-9))
-    throw Error(what + ": its matrix does not project along rays from a source; it is damaged, or of parallel rays");
-  if (f_u < 0 && mirror == Mirror::none)
+  if (found->is_mirrored && mirror == Mirror::none)
     throw Error(what +
                 ": its images are seen from the detector, or have their rows from below; turn them over by mirror: "
                 "left_right or upside_down when they are read, and give the same mirror here");
-  if (f_u < 0) throw Error(what + ": its images are seen from the source as marrow's are; leave mirror out");
-  Camera camera;
-  camera.width_px = size_px.x();
-  camera.height_px = size_px.y();
-  camera.intrinsics << f_u, skew, u0, 0, f_v, v0, 0, 0, 1;
-  Eigen::Matrix3d axes;
-  axes << x, y, z;
-  camera.camera_from_world.rotation = nearest_orthogonal(axes);
-  Eigen::Vector3d& t = camera.camera_from_world.translation_mm;
-  t.z() = p(2, 3);
-  t.y() = (p(1, 3) - v0 * t.z()) / f_v;
-  t.x() = (p(0, 3) - u0 * t.z() - skew * t.y()) / f_u;
-  check_camera(camera, what);
-  return camera;
+  if (found->is_mirrored) throw Error(what + ": its images are seen from the source as marrow's are; leave mirror out");
+  check_camera(found->camera, what);
+  return found->camera;
 }
 
 }  // namespace marrow::exchange

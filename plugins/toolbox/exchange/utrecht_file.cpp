@@ -139,45 +139,6 @@ std::vector<UtrechtStart> read_starts(const fs::path& path) {
   return starts;
 }
 
-/// The camera of a source and a detector in the world. The first pixel's centre is `corner`.
-struct Detector {
-  Eigen::Vector3d source_mm, corner_mm, columns, rows;
-  Eigen::Vector2d pixel_mm;
-};
-
-std::optional<Detector> detector_of(const YamlMap& map, const std::vector<int>& size) {
-  const auto source = map.vector3("source_mm"), columns = map.vector3("columns"), rows = map.vector3("rows");
-  const auto pixel = map.numbers("pixel_mm", 2);
-  const bool has_corner = map.has("corner_mm");
-  const auto place = map.vector3(has_corner ? "corner_mm" : "centre_mm");
-  if (!source || !columns || !rows || !pixel || !place || size.size() != 2) return std::nullopt;
-  if (!(columns->norm() > 0 && rows->norm() > 0) ||
-      std::abs(columns->normalized().dot(rows->normalized())) > files::kRoundedDirection) {
-    map.fault("rows", "rows: expected a direction at a right angle to 'columns'");
-    return std::nullopt;
-  }
-  if (!((*pixel)[0] > 0 && (*pixel)[1] > 0)) {
-    map.fault("pixel_mm", "pixel_mm: expected the width and the height of a pixel");
-    return std::nullopt;
-  }
-  Detector detector{*source, *place, columns->normalized(), rows->normalized(), {(*pixel)[0], (*pixel)[1]}};
-  if (!has_corner)
-    detector.corner_mm -=
-        0.5 * (size[0] - 1) * (*pixel)[0] * detector.columns + 0.5 * (size[1] - 1) * (*pixel)[1] * detector.rows;
-  return detector;
-}
-
-/// pixel ~ P (x, 1): the ray from the source through x meets the detector at corner + u columns + v rows.
-Eigen::Matrix<double, 3, 4> pixel_from_world(const Detector& detector) {
-  Eigen::Matrix3d axes;
-  axes << detector.pixel_mm.x() * detector.columns, detector.pixel_mm.y() * detector.rows,
-      detector.corner_mm - detector.source_mm;
-  Eigen::Matrix<double, 3, 4> p;
-  p.leftCols<3>() = axes.inverse();
-  p.col(3) = -p.leftCols<3>() * detector.source_mm;
-  return p;
-}
-
 cv::Mat turned(cv::Mat pixels, Mirror mirror) {
   if (mirror == Mirror::left_right) cv::flip(pixels, pixels, 1);
   return pixels;
@@ -192,9 +153,9 @@ void read_projection(const YamlMap& map, const std::string& name, const std::opt
   const auto raw = raw_file(map);
   std::vector<int> size;
   const bool has_size = whole_sizes(map, "size_px", 2, size);
-  const auto detector = detector_of(map, size);
-  if (!raw || !has_size || !detector) return;
-  const Eigen::Matrix<double, 3, 4> p = pixel_from_world(*detector);
+  const auto detector = has_size ? files::detector_from(map, size[0], size[1]) : std::nullopt;
+  if (!raw || !detector) return;
+  const files::Projection p = files::projection_of(*detector);
   const Mirror mirror = p.leftCols<3>().determinant() < 0 ? Mirror::left_right : Mirror::none;
   UtrechtView seen;
   seen.view.name = name;

@@ -18,6 +18,9 @@ constexpr DicomTag kDistanceSourceToPatient{0x0018, 0x1111, "DistanceSourceToPat
 constexpr DicomTag kDistanceSourceToIsocenter{0x0018, 0x9402, "DistanceSourceToIsocenter", DicomTag::Kind::fl};
 constexpr DicomTag kMagnification{0x0018, 0x1114, "EstimatedRadiographicMagnificationFactor"};
 constexpr DicomTag kImagerPixelSpacing{0x0018, 0x1164, "ImagerPixelSpacing"};
+constexpr DicomTag kFieldShape{0x0018, 0x1147, "FieldOfViewShape"};
+constexpr DicomTag kFieldDimensions{0x0018, 0x1149, "FieldOfViewDimensions"};
+constexpr DicomTag kIntensifierSize{0x0018, 0x1162, "IntensifierSize"};
 constexpr DicomTag kSpacingCalibration{0x0028, 0x0a02, "PixelSpacingCalibrationType"};
 constexpr DicomTag kPrimaryIncrement{0x0018, 0x1520, "PositionerPrimaryAngleIncrement"};
 constexpr DicomTag kSecondaryIncrement{0x0018, 0x1521, "PositionerSecondaryAngleIncrement"};
@@ -66,6 +69,40 @@ double source_to_isocentre(const DicomHeader& header, double source_to_detector_
   return 0;
 }
 
+/// The size of a pixel on the detector by the field that the image shows: the field of view, which a zoom makes
+/// smaller, or else the whole intensifier. The image is taken to show the field from border to border. std::nullopt if
+/// the header has neither.
+std::optional<Eigen::Vector2d> pixel_of_field_mm(const DicomHeader& header, std::vector<std::string>& warnings) {
+  const double columns = header.number(kColumns).value_or(0), rows = header.number(kRows).value_or(0);
+  if (!(columns >= 1 && rows >= 1)) return std::nullopt;
+  std::vector<double> field_mm = header.numbers(kFieldDimensions, 0).value_or(std::vector<double>{});
+  const bool has_field = field_mm.size() == 1 || field_mm.size() == 2;
+  if (!has_field) {
+    const auto size = header.number(kIntensifierSize);
+    if (!size) return std::nullopt;
+    field_mm = {*size};
+  }
+  const std::string tag = (has_field ? kFieldDimensions : kIntensifierSize).text();
+  for (const double side : field_mm)
+    if (!(side > 0)) throw Error(header.path().string() + formatted(": {} is {:f} mm; give pixel_mm", tag, side));
+  const double wide = std::max(columns, rows), narrow = std::min(columns, rows);
+  Eigen::Vector2d pixel = Eigen::Vector2d::Constant(field_mm[0] / wide);
+  if (field_mm.size() == 2 && header.text(kFieldShape).value_or("RECTANGLE") == "RECTANGLE") {
+    // Devices do not agree on which of the two comes first, so the longer one is taken along the longer side.
+    const auto [low, high] = std::minmax(field_mm[0], field_mm[1]);
+    const Eigen::Vector2d long_and_short(high / wide, low / narrow);
+    pixel = columns >= rows ? long_and_short : Eigen::Vector2d(long_and_short.reverse());
+  }
+  warnings.push_back(header.path().string() +
+                     formatted(": {} and {} are missing; a pixel is taken as {:.4g} x {:.4g} mm, because the image of "
+                               "{:g} x {:g} px shows a field of {:g}{} mm ({}); {}check the camera with known points, "
+                               "or give pixel_mm",
+                               kImagerPixelSpacing.text(), kPixelSpacing.text(), pixel.x(), pixel.y(), columns, rows,
+                               field_mm[0], field_mm.size() == 2 ? formatted(" x {:g}", field_mm[1]) : std::string(),
+                               tag, has_field ? "" : "with a zoom the field, and so the pixel, is smaller; "));
+  return pixel;
+}
+
 /// Width and height of a pixel on the detector. Both DICOM elements give the distance of rows first, the pixel's
 /// height.
 Eigen::Vector2d detector_pixel_mm(const DicomHeader& header, double magnification, double given_mm, Wanted& wanted,
@@ -74,6 +111,7 @@ Eigen::Vector2d detector_pixel_mm(const DicomHeader& header, double magnificatio
   if (const auto spacing = header.numbers(kImagerPixelSpacing, 2)) return {(*spacing)[1], (*spacing)[0]};
   const auto spacing = header.numbers(kPixelSpacing, 2);
   if (!spacing) {
+    if (const auto pixel = pixel_of_field_mm(header, warnings)) return *pixel;
     wanted.missing(kImagerPixelSpacing.text(), "or give pixel_mm");
     return {1, 1};
   }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/files/yaml_values.hpp"
 
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <cmath>
 
 #include "marrow/base/error.hpp"
@@ -76,6 +78,8 @@ std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTran
 
 namespace {
 
+constexpr double kSquare = 5e-4;  // directions of few digits are at right angles to this
+
 /// A number within limits, which the fault names.
 std::optional<double> number_within(const YamlMap& map, const std::string& key, double least, double most) {
   const auto value = map.number(key);
@@ -117,18 +121,83 @@ std::optional<Camera> camera_by_matrices(const YamlMap& map, int width_px, int h
 
 }  // namespace
 
+std::optional<Detector> detector_from(const YamlMap& map, int width_px, int height_px) {
+  const bool has_corner = map.has("corner_mm");
+  if (has_corner && map.has("centre_mm"))
+    map.fault("centre_mm", "centre_mm: 'corner_mm' already says where the detector is; keep one of the two");
+  const auto source = map.vector3("source_mm"), place = map.vector3(has_corner ? "corner_mm" : "centre_mm"),
+             columns = map.vector3("columns"), rows = map.vector3("rows");
+  const auto pixel = map.numbers("pixel_mm", 2);
+  if (!source || !place || !columns || !rows || !pixel) return std::nullopt;
+  if (!(columns->norm() > 0 && rows->norm() > 0) || std::abs(columns->normalized().dot(rows->normalized())) > kSquare) {
+    map.fault("rows", "rows: expected a direction at a right angle to 'columns'");
+    return std::nullopt;
+  }
+  if (!((*pixel)[0] > 0 && (*pixel)[1] > 0)) {
+    map.fault("pixel_mm", "pixel_mm: expected the width and the height of a pixel, more than 0");
+    return std::nullopt;
+  }
+  Detector detector{*source, *place, columns->normalized(), rows->normalized(), {(*pixel)[0], (*pixel)[1]}};
+  if (!has_corner)
+    detector.corner_mm -=
+        0.5 * (width_px - 1) * (*pixel)[0] * detector.columns + 0.5 * (height_px - 1) * (*pixel)[1] * detector.rows;
+  const double away_mm = (detector.corner_mm - *source).dot(detector.columns.cross(detector.rows));
+  if (std::abs(away_mm) > 1) return detector;
+  map.fault("source_mm", "source_mm: the source lies in the detector's plane");
+  return std::nullopt;
+}
+
+namespace {
+
+/// The camera from a matrix of any scale and sign. Of the two signs, that one is taken with which the image is seen
+/// from the source, as marrow takes images. For an image that is seen from the detector, the object then lies behind
+/// the camera, which the nodes that use it say.
+std::optional<Camera> camera_by_matrix(const YamlMap& map, int width_px, int height_px) {
+  const auto matrix = map.matrix("projection_matrix", 3, 4);
+  if (!matrix) return std::nullopt;
+  const double sign = matrix->leftCols<3>().determinant() < 0 ? -1 : 1;
+  const auto found = camera_of_projection(sign * *matrix, {width_px, height_px});
+  if (found) return found->camera;
+  map.fault("projection_matrix", "projection_matrix: does not project along rays from a source");
+  return std::nullopt;
+}
+
+std::optional<Camera> camera_by_detector(const YamlMap& map, int width_px, int height_px) {
+  const YamlMap keys(map.file(), map.node("detector"), "detector",
+                     {"source_mm", "corner_mm", "centre_mm", "columns", "rows", "pixel_mm"});
+  const auto detector = detector_from(keys, width_px, height_px);
+  if (!detector) return std::nullopt;
+  const auto found = camera_of_projection(projection_of(*detector), {width_px, height_px});
+  if (found && !found->is_mirrored) return found->camera;
+  map.fault("detector",
+            "detector: the image is seen from the detector, and marrow takes images that are seen from the source: "
+            "mirror it left to right, change the sign of 'columns', and give the corner that is the first then");
+  return std::nullopt;
+}
+
+}  // namespace
+
 std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& file) {
-  const YamlMap map(
-      file, node, "camera",
-      {"marrow-camera", "width_px", "height_px", "intrinsics", "radial_distortion", "camera_from_world", "c_arm"});
+  const YamlMap map(file, node, "camera",
+                    {"marrow-camera", "width_px", "height_px", "intrinsics", "radial_distortion", "camera_from_world",
+                     "c_arm", "projection_matrix", "detector"});
   if (map.has("marrow-camera")) check_version(map, "marrow-camera");
   const auto width = map.integer("width_px"), height = map.integer("height_px");
   const int width_px = width.value_or(0), height_px = height.value_or(0);
-  if (map.has("c_arm"))
+  // Three keys say all by themselves.
+  std::string whole;
+  for (const std::string key : {"c_arm", "projection_matrix", "detector"}) {
+    if (!map.has(key)) continue;
+    if (!whole.empty()) map.fault(key, key + ": '" + whole + "' already gives the camera; keep one of the two");
+    if (whole.empty()) whole = key;
+  }
+  if (!whole.empty())
     for (const char* key : {"intrinsics", "camera_from_world"})
-      if (map.has(key)) map.fault(key, std::string(key) + ": 'c_arm' already gives it; keep one of the two");
-  const std::optional<Camera> camera = map.has("c_arm") ? camera_by_c_arm(map.node("c_arm"), width_px, height_px, file)
-                                                        : camera_by_matrices(map, width_px, height_px, file);
+      if (map.has(key)) map.fault(key, std::string(key) + ": '" + whole + "' already gives it; keep one of the two");
+  const std::optional<Camera> camera = whole == "c_arm" ? camera_by_c_arm(map.node("c_arm"), width_px, height_px, file)
+                                       : whole == "projection_matrix" ? camera_by_matrix(map, width_px, height_px)
+                                       : whole == "detector"          ? camera_by_detector(map, width_px, height_px)
+                                                             : camera_by_matrices(map, width_px, height_px, file);
   if (!camera || !width || !height) return std::nullopt;
   DistortedCamera result{*camera, {}};
   if (map.has("radial_distortion")) {

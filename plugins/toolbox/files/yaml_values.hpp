@@ -7,6 +7,7 @@
 #include "marrow/domain/pose.hpp"
 #include "marrow/domain/verdict.hpp"
 #include "marrow/domain/volume.hpp"
+#include "marrow/toolbox/files/projection_camera.hpp"
 #include "marrow/toolbox/files/strict_yaml.hpp"
 
 namespace marrow::files {
@@ -17,8 +18,12 @@ std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTran
 /// The keys that transform_from() reads.
 const std::vector<std::string>& transform_keys();
 
-/// A camera from the keys width_px, height_px, then either intrinsics and camera_from_world or c_arm and, for distorted
-/// images, radial_distortion. Faults are noted in `file`.
+/// A detector from the keys source_mm, corner_mm (of the first pixel's centre) or centre_mm (of the image), columns,
+/// rows and pixel_mm. Faults are noted in the map's file.
+std::optional<Detector> detector_from(const YamlMap& map, int width_px, int height_px);
+
+/// A camera from the keys width_px, height_px, then intrinsics with camera_from_world, or one of c_arm,
+/// projection_matrix and detector; and, for distorted images, radial_distortion. Faults are noted in `file`.
 std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& file);
 
 /// Seeds of one fragment from the map's keys `seeds` and `register`.

@@ -116,6 +116,33 @@ TEST(DicomCamera, ImagerPixelSpacingComesFirst) {
             std::string::npos);
 }
 
+// An image of 6 x 4 pixels. A field of 30 mm across 6 pixels: 5 mm each.
+TEST(DicomCamera, PixelsFromTheFieldOfView) {
+  const Elements none = without(fluoroscopy(), {0x00181164, 0x00280030});
+  const auto focal = [](const Read& found) {
+    return Vector2d(found.camera.intrinsics(0, 0), found.camera.intrinsics(1, 1));
+  };
+  const Read round = read(with(with(none, 0x00181147, "CS:ROUND"), 0x00181149, "IS:30"));
+  EXPECT_LT((focal(round) - Vector2d(200, 200)).norm(), 1e-9);
+  EXPECT_NE(round.warnings.at(0).find(
+                "ImagerPixelSpacing (0018,1164) and PixelSpacing (0028,0030) are missing; a pixel is taken as 5 x 5 "
+                "mm, because the image of 6 x 4 px shows a field of 30 mm (FieldOfViewDimensions (0018,1149)); check"),
+            std::string::npos)
+      << round.warnings.at(0);
+  // 6 pixels over 24 mm and 4 over 20 mm, in either order.
+  for (const char* dimensions : {"IS:24\\20", "IS:20\\24"}) {
+    const Read rectangle = read(with(with(none, 0x00181147, "CS:RECTANGLE"), 0x00181149, dimensions));
+    EXPECT_LT((focal(rectangle) - Vector2d(250, 200)).norm(), 1e-9) << focal(rectangle);
+  }
+  const Read intensifier = read(with(none, 0x00181162, "DS:54"));
+  EXPECT_LT((focal(intensifier) - Vector2d(1000 / 9.0, 1000 / 9.0)).norm(), 1e-9);
+  EXPECT_NE(intensifier.warnings.at(0).find("with a zoom the field, and so the pixel, is smaller"), std::string::npos);
+  // The field of view counts more: a zoom makes it smaller than the intensifier.
+  const Read zoomed = read(with(with(none, 0x00181162, "DS:54"), 0x00181149, "IS:30"));
+  EXPECT_LT((focal(zoomed) - Vector2d(200, 200)).norm(), 1e-9);
+  EXPECT_SAYS(read(with(none, 0x00181162, "DS:-3")), "IntensifierSize (0018,1162) is -3.000000 mm; give pixel_mm");
+}
+
 TEST(DicomCamera, IsocentreDistanceFromTheMagnification) {
   const Elements header = with(without(fluoroscopy(), {0x00181111}), 0x00181114, "DS:1.6");
   EXPECT_NEAR((read(header).camera.camera_from_world * Vector3d::Zero()).z(), 1000 / 1.6, 1e-9);

@@ -35,6 +35,7 @@ TEST(RefineCameras, HalfOfAnErrorGoesToEachOfTwoViews) {
   EXPECT_NEAR(pose.world_from_model.translation_mm.y(), 41, 0.02);
   // The deviation of what the images do not show: that of each camera, divided by the root of two.
   EXPECT_NEAR(figure(motions(outputs, 0), "predicted_rotation_u_deg"), 0.5 / std::sqrt(3) / std::sqrt(2), 0.005);
+  EXPECT_NEAR(figure(motions(outputs, 0), "determined_rotation_u"), 50, 2) << "half of the variance is left";
   EXPECT_GT((*pose.covariance)(3, 3), 0.01) << "the pose is not known better than the cameras";
 }
 
@@ -84,6 +85,27 @@ TEST(RefineCameras, WhereImagesHardlyTellHowFarTheCamerasAreOffTheDeviationsSayS
   EXPECT_NEAR(deviation_mm(1e4), expected_mm / 100, 0.1 * expected_mm / 100) << "they are right";
   EXPECT_GT(deviation_mm(10), expected_mm / 20) << "they are most probably right";
   EXPECT_LT(deviation_mm(10), expected_mm / 2);
+}
+
+TEST(RefineCameras, SaysWhatTheImagesDoNotDetermine) {
+  const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
+  std::vector<std::string> said;
+  marrow::Context::Hooks hooks;
+  hooks.log = [&](std::string_view text, marrow::LogLevel) { said.emplace_back(text); };
+  const auto is_said = [&] {
+    return std::any_of(said.begin(), said.end(), [](const std::string& line) {
+      return line.starts_with("view 'frontal': the images do not determine its camera's rotation_u, ") &&
+             line.ends_with("; what the options expect of them counts in the poses' deviations");
+    });
+  };
+  shipped::call("refine.cameras", inputs({Bone({none, none}, 1e-4)}), {}, marrow::Context(hooks));
+  EXPECT_TRUE(is_said());
+  said.clear();
+  const auto outputs = shipped::call("refine.cameras", inputs({Bone({none, none}, 1e6)}),
+                                     {{"reference_view", std::string("lateral")}}, marrow::Context(hooks));
+  EXPECT_FALSE(is_said());
+  for (const char* name : {"determined_rotation_u", "determined_shift_v", "determined_shift_depth"})
+    EXPECT_GT(figure(motions(outputs, 0), name), 99) << name;
 }
 
 TEST(RefineCameras, TwoBonesShareTheCameras) {
