@@ -3,9 +3,9 @@
 #include <map>
 #include <marrow/plugin.hpp>
 
+#include "case_fragments.hpp"
 #include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
-#include "case_fragments.hpp"
 #include "marrow/read/camera_file.hpp"
 #include "marrow/toolbox/files/escaped_name.hpp"
 #include "marrow/toolbox/files/image_doubts.hpp"
@@ -236,8 +236,7 @@ MARROW_PLUGIN(plugin) {
       .out("seeds", &CaseFiles::seeds, "points inside each fragment, if the case gives them", marrow::over("fragment"))
       .out("label", &CaseFiles::label, "mask of each fragment, if the case gives labels: 1 inside, 0 outside",
            marrow::over("fragment"))
-      .out("surface", &CaseFiles::surface, "surface of each fragment, if the case gives them",
-           marrow::over("fragment"))
+      .out("surface", &CaseFiles::surface, "surface of each fragment, if the case gives them", marrow::over("fragment"))
       .out("views", &CaseFiles::views, "X-ray views with cameras", marrow::over("view"))
       .out("start", &CaseFiles::start, "pose to start from, if the case gives one", marrow::over("fragment"))
       .out("truth", &CaseFiles::truth, "exact pose, if the case gives one (simulated cases)", marrow::over("fragment"))

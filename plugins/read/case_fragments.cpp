@@ -74,7 +74,8 @@ void read_surface(const fs::path& folder, const YamlMap& fragment, const std::st
     file = file_in(folder, fragment, "surface");
   }
   if (!file) return;
-  if (auto mesh = read_or_fault(fragment, "surface", [&] { return exchange::read_surface_file(*file, scale, context); }))
+  if (auto mesh =
+          read_or_fault(fragment, "surface", [&] { return exchange::read_surface_file(*file, scale, context); }))
     result.surface.add(name, std::move(*mesh));
 }
 

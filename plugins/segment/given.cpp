@@ -75,21 +75,21 @@ void check_meets(const SignedField& field, const std::string& fragment) {
 List<SignedField> given(const Volume* volume, const List<SignedField>* segmented, const List<Volume>* label,
                         const List<Mesh>* surface, const Options& options) {
   if (volume) check_volume(*volume, "volume");
-  const int ways = (segmented != nullptr) + (label != nullptr) + (surface != nullptr);
-  if (ways != 1)
-    throw Error(
-        formatted("segment.given: expected the fragments in one way, got {}: wire a segmentation of seeds, "
-                  "labels or surfaces, of which the case has one",
-                  ways));
-  if (segmented) return *segmented;
-  List<SignedField> fields;
-  const std::size_t count = label ? label->size() : surface->size();
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::string& name = label ? label->name(i) : surface->name(i);
-    fields.add(name, label ? field_of_label((*label)[i], volume, options.band_mm)
-                           : field_of_surface((*surface)[i], name, volume, options.band_mm));
-    check_meets(fields[i], name);
+  const auto has = [](const auto* list) { return list && !list->empty(); };
+  if (has(label) && has(surface)) throw Error("a fragment is given by a label or by a surface; got both");
+  if (!has(label) && !has(surface)) {
+    if (has(segmented)) return *segmented;
+    throw Error("nothing gives the fragments: neither a segmentation from seeds nor labels nor surfaces");
   }
+  List<SignedField> fields;
+  const auto add = [&](const std::string& name, SignedField field) {
+    check_meets(field, name);
+    fields.add(name, std::move(field));
+  };
+  for (std::size_t i = 0; has(label) && i < label->size(); ++i)
+    add(label->name(i), field_of_label((*label)[i], volume, options.band_mm));
+  for (std::size_t i = 0; has(surface) && i < surface->size(); ++i)
+    add(surface->name(i), field_of_surface((*surface)[i], surface->name(i), volume, options.band_mm));
   return fields;
 }
 
@@ -99,7 +99,8 @@ MARROW_PLUGIN(plugin) {
   plugin.node("segment.given", given)
       .summary("The fragments as a case gives them: segmented from seeds, by labels of another program, or as surfaces")
       .in("volume", "CT in Hounsfield units; without it, each field lies on a grid of its own")
-      .in("segmented", "fields of another segmentation, which are passed on as they are", over("fragment"))
+      .in("segmented", "fields of another segmentation, passed on as they are if there is neither label nor surface",
+          over("fragment"))
       .in("label", "mask of each fragment: 1 inside, 0 outside; its surface is smooth and lies between the voxels",
           over("fragment"))
       .in("surface", "closed surface of each fragment, in mm", over("fragment"))

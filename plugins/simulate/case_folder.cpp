@@ -38,8 +38,8 @@ Grid label_grid(const List<Mesh>& models, const std::vector<double>& voxel_mm) {
     count *= grid.size[std::size_t(k)];
   }
   if (count > kMostVoxels)
-    throw Error(formatted("label_voxel_mm: the labels would have {:.0f} million voxels, at most 200 are allowed",
-                          count / 1e6));
+    throw Error(
+        formatted("label_voxel_mm: the labels would have {:.0f} million voxels, at most 200 are allowed", count / 1e6));
   grid.origin_mm = box.min().array() - kBorder_mm;
   return grid;
 }

@@ -213,8 +213,8 @@ const Pose* other_pose(const Pose* contour_pose, const List<Pose>* stages) {
 }
 
 Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stages, const Cost* grey_cost,
-              const Cost* given_contour_cost, const Optimizer& optimizer, const List<View>& views, const List<EdgeMap>* edges,
-              const OutlineProjector* projector, const Mesh& mesh, const List<Pose>* others,
+              const Cost* given_contour_cost, const Optimizer& optimizer, const List<View>& views,
+              const List<EdgeMap>* edges, const OutlineProjector* projector, const Mesh& mesh, const List<Pose>* others,
               const List<SignedField>* other_bones, const Options& options, Context& context) {
   constexpr int kTargets = 100;
   check_pose(pose, "pose");

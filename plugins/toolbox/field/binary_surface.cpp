@@ -9,16 +9,16 @@
 #include <cstdint>
 
 #include "marrow/base/error.hpp"
-#include "marrow/toolbox/field/interior.hpp"
 
 namespace marrow::field {
 namespace {
 
 using Index = std::uint32_t;
 
-constexpr int kMore = 3;            // voxels that are added on each side
-constexpr float kBand = 3;          // voxels farther than this from the surface stay as they are
+constexpr int kMore = 7;            // voxels that are added on each side, so that the band ends before the grid does
+constexpr float kBand = 5;          // voxels farther than this from the surface stay as they are
 constexpr int kSteps = 120;         // no test surface moved by 0.002 voxels after the first 100
+constexpr float kLeast = 0.01f;     // from a voxel's centre to the surface, so that each keeps its side
 constexpr float kStep = 1 / 144.f;  // the inverse of the greatest curvature of the energy: 12 squared
 
 /// The mask with kMore voxels more on each side, which repeat those at its ends.
@@ -98,7 +98,10 @@ class Bending {
       for (int y = 0; y < grid_.size[1]; ++y)
         for (int x = 0; x < grid_.size[0]; ++x) {
           const std::size_t at = grid_.offset(x, y, z);
-          if (std::abs(function_[at]) <= kBand) free_.push_back({Index(at), Index(x), Index(y), Index(z)});
+          const Voxel voxel{Index(at), Index(x), Index(y), Index(z)};
+          if (std::abs(function_[at]) <= kBand) free_.push_back(voxel);
+          // What bends beside the band counts, too, or the surface would shrink.
+          if (std::abs(function_[at]) <= kBand + 1.5f) bent_.push_back(voxel);
         }
   }
 
@@ -109,7 +112,7 @@ class Bending {
     double weight = 1;
     for (int step = 0; step < kSteps; ++step) {
       bend(ahead, bent);
-      parallel([&](std::size_t k) {
+      parallel(free_, [&](std::size_t k) {
         const std::size_t at = free_[k].at;
         next[k] = within(bounds[at], ahead[at] - kStep * laplacian(bent, free_[k]));
       });
@@ -120,7 +123,7 @@ class Bending {
       }
       const double grown = uphill > 0 ? 1 : (1 + std::sqrt(1 + 4 * weight * weight)) / 2;
       const float lead = uphill > 0 ? 0 : float((weight - 1) / grown);
-      parallel([&](std::size_t k) {
+      parallel(free_, [&](std::size_t k) {
         const std::size_t at = free_[k].at;
         ahead[at] = next[k] + lead * (next[k] - function_[at]);
         function_[at] = next[k];
@@ -136,9 +139,9 @@ class Bending {
   };
 
   template <class Visit>
-  void parallel(const Visit& visit) const {
-    tbb::parallel_for(std::size_t(0), (free_.size() + 4095) / 4096, [&](std::size_t part) {
-      const std::size_t end = std::min(free_.size(), (part + 1) * 4096);
+  static void parallel(const std::vector<Voxel>& voxels, const Visit& visit) {
+    tbb::parallel_for(std::size_t(0), (voxels.size() + 4095) / 4096, [&](std::size_t part) {
+      const std::size_t end = std::min(voxels.size(), (part + 1) * 4096);
       for (std::size_t k = part * 4096; k < end; ++k) visit(k);
     });
   }
@@ -147,7 +150,7 @@ class Bending {
   /// side has its surface at a distance of d - 1 to d. `start` is half a voxel less than d, with the side's sign.
   static float within(float start, float value) {
     const float distance = std::abs(start) + 0.5f;
-    const float least = std::max(0.0f, distance - 1);
+    const float least = std::max(kLeast, distance - 1);
     return start < 0 ? -std::clamp(-value, least, distance) : std::clamp(value, least, distance);
   }
 
@@ -165,35 +168,37 @@ class Bending {
     return sum;
   }
 
-  /// How the function bends in the band; 0 elsewhere, where nothing may change.
+  /// How the function bends in the band and beside it; elsewhere it stays 0, because no free voxel feels it.
   void bend(const std::vector<float>& values, std::vector<float>& bent) const {
-    parallel([&](std::size_t k) { bent[free_[k].at] = laplacian(values, free_[k]); });
+    parallel(bent_, [&](std::size_t k) { bent[bent_[k].at] = laplacian(values, bent_[k]); });
   }
 
   Grid grid_;
   std::vector<float> function_;
-  std::vector<Voxel> free_;
+  std::vector<Voxel> free_, bent_;
 };
 
-/// Makes distances in mm of the function's values beside its level 0: divided by how fast it grows there.
+/// Makes distances in mm of the function's values, which count voxels, beside its level 0. Only the direction of its
+/// slope counts: its size differs on both sides of the surface, which would move it.
 std::vector<float> distances_mm(const Grid& grid, const std::vector<float>& function) {
   std::vector<float> distances(function.size());
   tbb::parallel_for(0, grid.size[2], [&](int z) {
     for (int y = 0; y < grid.size[1]; ++y)
       for (int x = 0; x < grid.size[0]; ++x) {
         const std::array<int, 3> at{x, y, z};
-        double squared = 0;
+        double squared = 0, squared_mm = 0;
         for (std::size_t k = 0; k < 3; ++k) {
           std::array<int, 3> low = at, high = at;
           low[k] = std::max(0, at[k] - 1), high[k] = std::min(grid.size[k] - 1, at[k] + 1);
           const double rise = double(function[grid.offset(high[0], high[1], high[2])]) -
                               double(function[grid.offset(low[0], low[1], low[2])]);
-          const double slope = rise / (double(std::max(1, high[k] - low[k])) * grid.spacing_mm[int(k)]);
+          const double slope = rise / double(std::max(1, high[k] - low[k]));
           squared += slope * slope;
+          squared_mm += slope * slope / (grid.spacing_mm[int(k)] * grid.spacing_mm[int(k)]);
         }
         const std::size_t i = grid.offset(x, y, z);
-        const double slope = std::max(std::sqrt(squared), 0.2 / grid.spacing_mm.maxCoeff());
-        distances[i] = float(double(function[i]) / slope);
+        const double voxel_mm = squared > 0 ? std::sqrt(squared / squared_mm) : grid.spacing_mm.minCoeff();
+        distances[i] = float(double(function[i]) * voxel_mm);
       }
   });
   return distances;
@@ -224,9 +229,7 @@ SignedField field_of_mask(const Volume& mask, double band_mm) {
   const Volume wide = widened(mask);
   SignedField field{wide.grid, distances_mm(wide.grid, Bending(wide).found())};
   cut_at_ends(field.grid, field.values_mm);
-  for (float& value : field.values_mm)
-    if (std::abs(value) < 1e-5f) value = value < 0 ? -1e-5f : 1e-5f;
-  march_distances(field.grid, field.values_mm, band_mm);
+  for (float& value : field.values_mm) value = std::clamp(value, -float(band_mm), float(band_mm));
   return field;
 }
 
