@@ -3,10 +3,10 @@
 #include <map>
 #include <marrow/plugin.hpp>
 
-#include "case_fragments.hpp"
 #include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/read/camera_file.hpp"
+#include "marrow/read/case_fragments.hpp"
 #include "marrow/toolbox/files/escaped_name.hpp"
 #include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/image_sides.hpp"

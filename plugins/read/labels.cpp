@@ -12,6 +12,9 @@ using marrow::Volume;
 using marrow::files::LabelMap;
 using marrow::files::Segment;
 
+/// More labels than any program finds in a body: each would become a volume.
+constexpr std::size_t kMostUnnamed = 1000;
+
 struct Options {
   std::filesystem::path path;
   std::vector<std::string> labels;
@@ -31,6 +34,9 @@ List<Volume> labels(const Options& options, marrow::Context& context) {
                           "'; say which by `labels`, with a name for each in `fragments`");
     masks.add(name, marrow::files::mask_of(map, segment));
   };
+  if (options.labels.empty() && map.segments.size() > kMostUnnamed)
+    throw marrow::Error(marrow::formatted("{}: has {} labels; say which to read by `labels`", options.path.string(),
+                                          map.segments.size()));
   if (options.labels.empty())
     for (const Segment& segment : map.segments) add(name_of(segment), segment);
   for (std::size_t i = 0; i < options.labels.size(); ++i) {

@@ -327,6 +327,13 @@ class Faults(Labels):
             "a TIFF does not say where its voxels lie", self.refused("read.labels", self.put("a.tif", b"II*\0"))
         )
 
+    def test_too_many_labels(self):
+        values = numpy.arange(1200, dtype=numpy.uint16).reshape(12, 10, 10, order="F")
+        data = nrrd(values, AFFINE).replace(b"unsigned char", b"unsigned short\nendian: little", 1)
+        file = self.put("a.nrrd", data)
+        self.assertIn("has 1199 labels; say which to read by `labels`", self.refused("read.labels", file))
+        self.assertIn("label 7", self.masks(file, ", labels: ['7']")[0])
+
     def test_more_fragments_than_labels(self):
         file = self.put("a.nrrd", nrrd(labels(), AFFINE))
         pipeline = "marrow: 1\nnodes: {it: {uses: read.labels, with: {path: %s, fragments: [a]}}}\noutputs: {it: it}\n"

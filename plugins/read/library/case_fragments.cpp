@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "case_fragments.hpp"
+#include "marrow/read/case_fragments.hpp"
 
 #include <algorithm>
 
