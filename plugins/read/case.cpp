@@ -6,6 +6,7 @@
 #include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/read/camera_file.hpp"
+#include "marrow/read/case_fragments.hpp"
 #include "marrow/toolbox/files/escaped_name.hpp"
 #include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/image_sides.hpp"
@@ -21,53 +22,17 @@ using marrow::files::YamlMap;
 
 constexpr std::size_t kMostViews = 1000;
 
+using marrow::read::CaseFiles;
+using marrow::read::file_in;
+using marrow::read::read_or_fault;
+
 struct Options {
   fs::path path;
   fs::path starts;
 };
 
-/// The file that a key names. The key of this node's result covers only the content of the case's folder, so no file
-/// outside the folder may be opened.
-std::optional<fs::path> file_in(const fs::path& folder, const YamlMap& map, const std::string& key) {
-  const auto text = map.text(key);
-  if (!text) return std::nullopt;
-  const fs::path inside = fs::path(*text).lexically_normal();
-  if (inside.is_absolute() || *inside.begin() == "..") {
-    map.fault(key, key + ": '" + *text + "' lies outside the case's folder; copy it into the folder");
-    return std::nullopt;
-  }
-  std::error_code failure;
-  const fs::path file = fs::canonical(folder / inside, failure);
-  if (failure) {
-    map.fault(key, key + ": there is no '" + *text + "' in the case's folder");
-    return std::nullopt;
-  }
-  const fs::path from_folder = file.lexically_relative(fs::canonical(folder));
-  if (from_folder.empty() || *from_folder.begin() == "..") {
-    map.fault(key, key + ": '" + *text + "' is a link to a place outside the case's folder; copy it into the folder");
-    return std::nullopt;
-  }
-  // A link to a folder could later point to other files although no file of the case has changed.
-  for (fs::path part = inside; !part.empty(); part = part.parent_path())
-    if (fs::is_symlink(folder / part, failure) && fs::is_directory(folder / part, failure)) {
-      map.fault(key, key + ": '" + part.string() + "' is a link to a folder; move the folder itself there");
-      return std::nullopt;
-    }
-  return folder / inside;
-}
-
-/// Calls a reader. An Error that it throws becomes a fault at the key.
-template <class Read>
-auto read_or_fault(const YamlMap& map, const std::string& key, Read read) -> std::optional<decltype(read())> {
-  try {
-    return read();
-  } catch (const marrow::Error& error) {
-    map.fault(key, key + ": " + error.what());
-    return std::nullopt;
-  }
-}
-
-void read_ct(const fs::path& folder, const YamlMap& map, marrow::Case& result, marrow::Context& context) {
+void read_ct(const fs::path& folder, const YamlMap& map, CaseFiles& result, marrow::Context& context) {
+  if (!map.has("ct") && result.can_lack_ct()) return;
   const auto node = map.required("ct");
   if (!node) return;
   marrow::files::VolumeReading reading;
@@ -177,7 +142,7 @@ void warn_of_image(const fs::path& folder, const YamlMap& map, const marrow::Cam
   marrow::files::warn_of_pixels(image, context);
 }
 
-void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result, marrow::Context& context) {
+void read_view(const fs::path& folder, const YamlMap& map, CaseFiles& result, marrow::Context& context) {
   const auto name = map.text("name");
   if (name)
     if (const std::string fault = marrow::fault_of_item_name(*name); !fault.empty())
@@ -205,7 +170,7 @@ void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result,
   result.views.add(*name, std::move(view));
 }
 
-void read_views(const fs::path& folder, const YamlMap& map, marrow::Case& result, marrow::Context& context) {
+void read_views(const fs::path& folder, const YamlMap& map, CaseFiles& result, marrow::Context& context) {
   const auto views = map.required("views");
   if (!views) return;
   if (!views->IsSequence() || views->size() == 0)
@@ -218,50 +183,8 @@ void read_views(const fs::path& folder, const YamlMap& map, marrow::Case& result
   }
 }
 
-std::optional<marrow::RigidTransform> read_transform(const YamlMap& fragment, const std::string& key) {
-  const YamlMap map(fragment.file(), fragment.node(key), key, marrow::files::transform_keys());
-  return marrow::files::transform_from(map, marrow::Pose{}.world_from_model);
-}
-
-void read_fragments(const YamlMap& map, marrow::Case& result) {
-  const auto fragments = map.required("fragments");
-  if (!fragments) return;
-  if (!fragments->IsMap() || fragments->size() == 0)
-    return map.fault("fragments", "fragments: expected at least one fragment by name, with its seeds");
-  std::vector<std::string> registered, with_start, with_truth;
-  const YamlMap by_name(map.file(), *fragments, "fragments", marrow::files::FreeKeys{});
-  for (const std::string& name : by_name.keys()) {
-    const YamlMap fragment(map.file(), by_name.node(name), "fragment '" + name + "'",
-                           {"seeds", "register", "start", "truth"});
-    if (!fragment.valid()) continue;
-    marrow::Seeds seeds = marrow::files::seeds_from(fragment, name);
-    const bool wanted = seeds.wanted;
-    result.seeds.add(name, std::move(seeds));
-    if (wanted) registered.push_back(name);
-    // Lists on one axis must have the same items, so only fragments to register get a start and a truth.
-    if (fragment.has("start"))
-      if (const auto start = read_transform(fragment, "start"); start && wanted) {
-        marrow::Pose pose;
-        pose.world_from_model = *start;
-        result.start.add(name, pose);
-      }
-    if (fragment.has("truth"))
-      if (const auto truth = read_transform(fragment, "truth"); truth && wanted) result.truth.add(name, {*truth});
-    if (fragment.has("start") && wanted) with_start.push_back(name);
-    if (fragment.has("truth") && wanted) with_truth.push_back(name);
-  }
-  if (registered.empty())
-    map.fault("fragments", "fragments: every fragment has register: false; register at least one");
-  if (!with_start.empty() && with_start != registered)
-    map.fault("fragments",
-              "fragments: some of the fragments to register have a start; give it for all of them or for none");
-  if (!with_truth.empty() && with_truth != registered)
-    map.fault("fragments",
-              "fragments: some of the fragments to register have a truth; give it for all of them or for none");
-}
-
 /// The poses in a folder that holds a file FRAGMENT.yaml for each fragment to register.
-marrow::List<marrow::Pose> read_starts(const fs::path& folder, const marrow::List<marrow::Seeds>& fragments) {
+marrow::List<marrow::Pose> read_starts(const fs::path& folder, const std::vector<std::string>& fragments) {
   std::error_code failure;
   if (!fs::is_directory(folder, failure))
     throw marrow::Error(folder.string() +
@@ -271,20 +194,19 @@ marrow::List<marrow::Pose> read_starts(const fs::path& folder, const marrow::Lis
     if (entry.path().extension() == ".yaml")
       files[marrow::files::unescaped_name(entry.path().stem().string())] = entry.path();
   marrow::List<marrow::Pose> starts;
-  for (std::size_t i = 0; i < fragments.size(); ++i) {
-    if (!fragments[i].wanted) continue;
-    const auto file = files.find(fragments.name(i));
+  for (const std::string& fragment : fragments) {
+    const auto file = files.find(fragment);
     if (file == files.end())
-      throw marrow::Error(folder.string() + ": there is no pose of the fragment '" + fragments.name(i) +
+      throw marrow::Error(folder.string() + ": there is no pose of the fragment '" + fragment +
                           "'; a pose file is named after its fragment, such as distal.yaml");
     marrow::Pose start;
     start.world_from_model = marrow::files::read_pose_file(file->second).world_from_model;
-    starts.add(fragments.name(i), start);
+    starts.add(fragment, start);
   }
   return starts;
 }
 
-marrow::Case read_case(const Options& options, marrow::Context& context) {
+CaseFiles read_case(const Options& options, marrow::Context& context) {
   std::error_code failure;
   if (!fs::is_directory(options.path, failure))
     throw marrow::Error(
@@ -292,30 +214,32 @@ marrow::Case read_case(const Options& options, marrow::Context& context) {
         (fs::exists(options.path, failure) ? " (name the folder, not a file in it)" : "; there is no such folder"));
   marrow::files::check_stays_inside(options.path, options.path / "case.yaml");
   YamlFile file(options.path / "case.yaml");
-  const YamlMap map(file, file.root(), "case", {"marrow-case", "ct", "views", "fragments"});
+  const YamlMap map(file, file.root(), "case", {"marrow-case", "ct", "labels", "views", "fragments"});
   marrow::files::check_version(map, "marrow-case");
-  marrow::Case result;
-  read_fragments(map, result);
+  CaseFiles result;
+  read_fragments(options.path, map, result, context);
   read_views(options.path, map, result, context);
   read_ct(options.path, map, result, context);
   file.finish();
-  if (!options.starts.empty()) result.start = read_starts(options.starts, result.seeds);
+  if (!options.starts.empty()) result.start = read_starts(options.starts, result.registered);
   return result;
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  using marrow::Case;
   plugin.node("read.case", read_case)
       .summary(
-          "Reads the case of one patient: CT, views with cameras, seeds of each fragment, and start and truth if they "
-          "are given")
-      .out("ct", &Case::ct, "CT in Hounsfield units")
-      .out("seeds", &Case::seeds, "points inside each fragment", marrow::over("fragment"))
-      .out("views", &Case::views, "X-ray views with cameras", marrow::over("view"))
-      .out("start", &Case::start, "pose to start from, if the case gives one", marrow::over("fragment"))
-      .out("truth", &Case::truth, "exact pose, if the case gives one (simulated cases)", marrow::over("fragment"))
+          "Reads the case of one patient: CT, views with cameras, each fragment by seeds, a label or a surface, and "
+          "start and truth if they are given")
+      .out("ct", &CaseFiles::ct, "CT in Hounsfield units; it may be missing where the case gives labels or surfaces")
+      .out("seeds", &CaseFiles::seeds, "points inside each fragment, if the case gives them", marrow::over("fragment"))
+      .out("label", &CaseFiles::label, "mask of each fragment, if the case gives labels: 1 inside, 0 outside",
+           marrow::over("fragment"))
+      .out("surface", &CaseFiles::surface, "surface of each fragment, if the case gives them", marrow::over("fragment"))
+      .out("views", &CaseFiles::views, "X-ray views with cameras", marrow::over("view"))
+      .out("start", &CaseFiles::start, "pose to start from, if the case gives one", marrow::over("fragment"))
+      .out("truth", &CaseFiles::truth, "exact pose, if the case gives one (simulated cases)", marrow::over("fragment"))
       .option("path", &Options::path, "folder of the case, with case.yaml", marrow::required())
       .option("starts", &Options::starts,
               "folder with a pose file for each fragment, such as the output 'pose' of a run; these poses take the "

@@ -8,7 +8,7 @@
 #include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/exchange/deepfluoro_file.hpp"
-#include "marrow/toolbox/field/mask_field.hpp"
+#include "marrow/toolbox/field/binary_surface.hpp"
 
 namespace {
 
@@ -147,7 +147,8 @@ Read deepfluoro(const Options& options, Context& context) {
   if (std::find(inside.begin(), inside.end(), 1) == inside.end())
     throw Error("no voxel of specimen " + specimen + " has a label of the " + options.bone);
   crop(read.ct, inside, options.margin_mm);
-  read.fields.add(options.bone, field::field_of_mask(read.ct.grid, inside, kBand_mm));
+  const Volume mask{read.ct.grid, {inside.begin(), inside.end()}};
+  read.fields.add(options.bone, field::field_of_mask(mask, kBand_mm));
   read.landmarks.add(options.bone, std::move(landmarks));
   read.start.add(options.bone, {});
   read.truth.add(options.bone, {});

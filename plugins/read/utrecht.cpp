@@ -6,7 +6,7 @@
 #include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/exchange/utrecht_file.hpp"
-#include "marrow/toolbox/field/mask_field.hpp"
+#include "marrow/toolbox/field/binary_surface.hpp"
 
 namespace {
 
@@ -77,7 +77,8 @@ Read utrecht(const Options& options, Context& context) {
     throw Error("object '" + name + "' has no mask in 3D, from which its surface is made; name it as 'mask'");
   Read read;
   read.views = views_of(options, name);
-  read.fields.add(kFragment, field::field_of_mask(data.volume.grid, object.inside, kBand_mm));
+  const Volume mask{data.volume.grid, {object.inside.begin(), object.inside.end()}};
+  read.fields.add(kFragment, field::field_of_mask(mask, kBand_mm));
   Pose start;
   start.world_from_model = number == 0
                                ? data.world_from_volume

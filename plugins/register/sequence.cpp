@@ -56,7 +56,26 @@ std::string disagreement(const marrow::Pose& first, const marrow::Pose& second, 
       apart_deg, apart_mm);
 }
 
-Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const marrow::Optimizer& optimizer,
+/// The second search, from the result of the first one.
+marrow::Pose refined(const marrow::Pose& first, const marrow::Cost& finer_cost, const marrow::Optimizer& optimizer,
+                     const Options& options, marrow::Context& context) {
+  Search search(optimizer, first, options, context);
+  std::shared_ptr<const marrow::Cost> level;
+  const double share = 1.0 / double(options.finer_pixel_step.size());
+  marrow::search::Steps steps;
+  for (std::size_t i = 0; i < options.finer_pixel_step.size(); ++i) {
+    steps = {options.finer_step_deg.at(i), options.finer_step_axial_deg.at(i), options.finer_step_mm.at(i),
+             options.finer_step_tolerance.at(i)};
+    level = finer_cost.at_level(
+        {options.contour_spacing_px.back(), options.reach_px.back(), int(options.finer_pixel_step[i])});
+    search.refine(*level, marrow::search::kAllAxes, steps, double(i) * share, share);
+  }
+  marrow::Pose pose = final_pose_of(search, first, *level, steps, options, context);
+  pose.evaluations += first.evaluations;
+  return pose;
+}
+
+Result sequence(const marrow::Cost& cost, const marrow::Cost* finer_cost, const marrow::Optimizer& optimizer,
                 const marrow::Optimizer* finer_optimizer, const marrow::Pose& start, const marrow::Mesh* model,
                 const Options& options, marrow::Context& context) {
   marrow::search::check_options(options);
@@ -71,19 +90,10 @@ Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const 
   const marrow::Pose first =
       final_pose_of(coarse, initial, *levels.back(), coarse.steps_of(levels.size() - 1), options, context);
   result.stages.add("first", first);
-  Search search(finer_optimizer ? *finer_optimizer : optimizer, first, options, context);
-  std::shared_ptr<const marrow::Cost> level;
-  const double share = 1.0 / double(options.finer_pixel_step.size());
-  marrow::search::Steps steps;
-  for (std::size_t i = 0; i < options.finer_pixel_step.size(); ++i) {
-    steps = {options.finer_step_deg.at(i), options.finer_step_axial_deg.at(i), options.finer_step_mm.at(i),
-             options.finer_step_tolerance.at(i)};
-    level = finer_cost.at_level(
-        {options.contour_spacing_px.back(), options.reach_px.back(), int(options.finer_pixel_step[i])});
-    search.refine(*level, marrow::search::kAllAxes, steps, double(i) * share, share);
-  }
-  result.pose = final_pose_of(search, first, *level, steps, options, context);
-  result.pose.evaluations += first.evaluations;
+  if (!finer_cost) context.info("there is no finer_cost, so the first search ends the registration");
+  result.pose = finer_cost
+                    ? refined(first, *finer_cost, finer_optimizer ? *finer_optimizer : optimizer, options, context)
+                    : first;
   if (!disagreement(first, result.pose, options).empty()) {
     const marrow::Pose back = led_back(result.pose, *levels.back(), optimizer, options, context);
     if (const std::string warning = disagreement(back, result.pose, options); !warning.empty()) {
@@ -103,7 +113,9 @@ MARROW_PLUGIN(plugin) {
           "Registration by two costs: first one cost from coarse to fine, then another from its result (for example "
           "contour, then grey values)")
       .in("cost", "cost of a pose for the first search")
-      .in("finer_cost", "cost of a pose for a second search, near the result of the first")
+      .in("finer_cost",
+          "cost of a pose for a second search, near the result of the first; if there is none, as without a CT, the "
+          "first search ends it")
       .in("optimizer", "minimiser")
       .in("finer_optimizer", "minimiser of finer_cost; none: the same as for cost")
       .in("start", "pose to start from, and the fragment's axes")

@@ -9,6 +9,7 @@ MARROW_PLUGIN(plugin) {
       .in<marrow::Volume>("volume", "CT in Hounsfield units")
       .in<marrow::Seeds>("seeds", "points inside each fragment", marrow::over("fragment"))
       .in<marrow::Mesh>("template", "closed surface of a whole bone of this kind, in mm; it may lie anywhere")
+      .in<marrow::Volume>("label", "mask of each fragment: 1 inside, 0 outside", marrow::over("fragment"))
       .out<marrow::SignedField>("field", "signed distance to the outer surface of each wanted fragment",
                                 marrow::over("fragment"))
       .suite(marrow::conformance::segment_suite());

@@ -102,8 +102,27 @@ Mesh template_of(const Tube& tube) {
   return mesh;
 }
 
+/// The voxels of each fragment, as another program would mark them.
+Value labels_of(const Tube& tube) {
+  List<Volume> masks;
+  for (const auto& [name, side] : {std::pair<std::string, double>{"proximal", 1}, {"distal", -1}}) {
+    Volume mask{tube.grid, {}};
+    for (int z = 0; z < tube.grid.size[2]; ++z)
+      for (int y = 0; y < tube.grid.size[1]; ++y)
+        for (int x = 0; x < tube.grid.size[0]; ++x) {
+          const Eigen::Vector3d p = tube.in_tube({double(x), double(y), double(z)});
+          mask.values.push_back(p.head<2>().norm() < kOuter_mm && side * over_cut_mm(p) > 0.5 * kGap_mm);
+        }
+    masks.add(name, mask);
+  }
+  return Value::of<Volume>(masks, "fragment");
+}
+
 Inputs inputs_of(const Tube& tube) {
-  return {{"volume", item(volume_of(tube))}, {"seeds", seeds_of(tube)}, {"template", item(template_of(tube))}};
+  return {{"volume", item(volume_of(tube))},
+          {"seeds", seeds_of(tube)},
+          {"template", item(template_of(tube))},
+          {"label", labels_of(tube)}};
 }
 
 /// Throws NotApplicable for nodes that need a template. A template is an unbroken bone, so they cannot find the

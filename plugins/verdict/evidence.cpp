@@ -23,6 +23,7 @@ using verdict::Evidence, verdict::FailureModel, verdict::Judged;
 
 struct Options {
   std::filesystem::path failure_model;
+  std::filesystem::path contour_failure_model;
   int pixel_step = 4;
   double max_intersection_mm = 2;
 };
@@ -211,17 +212,22 @@ const Pose* other_pose(const Pose* contour_pose, const List<Pose>* stages) {
   return contour_pose ? contour_pose : stages ? stages->find("first") : nullptr;
 }
 
-Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stages, const Cost& cost,
-              const Cost* contour_cost, const Optimizer& optimizer, const List<View>& views, const List<EdgeMap>* edges,
-              const OutlineProjector* projector, const Mesh& mesh, const List<Pose>* others,
+Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stages, const Cost* grey_cost,
+              const Cost* given_contour_cost, const Optimizer& optimizer, const List<View>& views,
+              const List<EdgeMap>* edges, const OutlineProjector* projector, const Mesh& mesh, const List<Pose>* others,
               const List<SignedField>* other_bones, const Options& options, Context& context) {
   constexpr int kTargets = 100;
   check_pose(pose, "pose");
   if (!others != !other_bones) throw Error("others and other_bones belong together; wire both or none");
+  if (!grey_cost && !given_contour_cost) throw Error("there is neither `cost` nor `contour_cost`; wire one of them");
+  // Without grey values, the contour's cost is the one to judge by.
+  const Cost& cost = grey_cost ? *grey_cost : *given_contour_cost;
+  const Cost* contour_cost = grey_cost ? given_contour_cost : nullptr;
+  const std::filesystem::path& file = grey_cost ? options.failure_model : options.contour_failure_model;
   FailureModel model;
-  if (!options.failure_model.empty()) {
-    model = verdict::read_failure_model(options.failure_model);
-    check_figures(model, options.failure_model);
+  if (!file.empty()) {
+    model = verdict::read_failure_model(file);
+    check_figures(model, file);
   }
   Judged judged{pose, fragment_frame(mesh), geometry::targets_mm(pose.world_from_model, &mesh, nullptr, kTargets),
                 &optimizer, &context};
@@ -273,7 +279,7 @@ MARROW_PLUGIN(plugin) {
           "poses of the search: the last one has the predicted deviations of the search, without those that come from "
           "the cameras (refine.cameras); 'first' takes the place of contour_pose",
           over("stage"))
-      .in("cost", "cost whose minimum the pose is")
+      .in("cost", "cost whose minimum the pose is; if there is none, as without a CT, contour_cost is judged by alone")
       .in("contour_cost",
           "another cost of the same bone, such as that of the contour: where it leads from the pose, and how it "
           "changes")
@@ -287,6 +293,8 @@ MARROW_PLUGIN(plugin) {
       .out("verdict", "the judgement, the probability that the pose is off, and all figures of the evidence")
       .option("failure_model", &Options::failure_model,
               "file of tools/studies/fit_verdict; none: the figures alone, to fit one, and the pose is doubtful")
+      .option("contour_failure_model", &Options::contour_failure_model,
+              "takes the place of failure_model where there is no cost, only contour_cost")
       .option("pixel_step", &Options::pixel_step,
               "for costs of grey values: only every n-th pixel is compared, and half as many pixels far from the pose",
               at_least(1), at_most(32), replaces({"cost.pixel_step"}))

@@ -8,14 +8,17 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/number_text.hpp"
+#include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/header_lines.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
+#include "marrow/toolbox/phantom/case_folder.hpp"
 #include "marrow/write/picture_out.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
+using marrow::phantom::CaseFolder;
 using YAML::BeginMap, YAML::EndMap, YAML::BeginSeq, YAML::EndSeq, YAML::Key, YAML::Value;
 
 /// PNG for images of 8 and 16 bits, TIFF for float images.
@@ -85,12 +88,31 @@ void put_placement(YAML::Emitter& out, const std::string& key, const marrow::Rig
   out << EndMap;
 }
 
-void put_fragments(YAML::Emitter& out, const marrow::Case& value) {
+/// Puts the key that says what a fragment is made from, and `register`.
+void put_fragment(YAML::Emitter& out, const CaseFolder& folder, std::size_t index, const std::string& surface_file) {
+  const marrow::Seeds& seeds = folder.parts.seeds[index];
+  if (folder.labels.values.empty() && surface_file.empty()) return marrow::files::put_seeds(out, seeds);
+  if (surface_file.empty())
+    out << Key << "label" << Value << index + 1;
+  else
+    out << Key << "surface" << Value << surface_file;
+  out << Key << "register" << Value << seeds.wanted;
+}
+
+/// Writes the surfaces, if there are any, and puts the map of fragments.
+void put_fragments(YAML::Emitter& out, const CaseFolder& whole, const fs::path& folder) {
+  const marrow::Case& value = whole.parts;
   out << Key << "fragments" << Value << BeginMap;
+  const std::vector<std::string> stems = file_stems(value.seeds.names());
   for (std::size_t i = 0; i < value.seeds.size(); ++i) {
     const std::string& name = value.seeds.name(i);
     out << Key << YAML::DoubleQuoted << name << Value << BeginMap;
-    marrow::files::put_seeds(out, value.seeds[i]);
+    std::string file;
+    if (const marrow::Mesh* surface = whole.surfaces.find(name)) {
+      file = stems[i] + ".vtp";
+      marrow::files::write_plainly(folder / file, {marrow::exchange::vtp_bytes(*surface)});
+    }
+    put_fragment(out, whole, i, file);
     if (const marrow::Pose* start = value.start.find(name)) put_placement(out, "start", start->world_from_model);
     if (const marrow::Truth* truth = value.truth.find(name)) put_placement(out, "truth", truth->world_from_model);
     out << EndMap;
@@ -128,19 +150,26 @@ void check_case(const marrow::Case& value, const std::string& path) {
   marrow::check_volume(value.ct, path + ": ct");
 }
 
-void write_case(const marrow::Case& value, const std::string& path) {
+void write_folder(const CaseFolder& whole, const std::string& path) {
+  const marrow::Case& value = whole.parts;
   check_case(value, path);
+  const bool has_ct = whole.surfaces.empty(), has_labels = !whole.labels.values.empty();
   marrow::files::write_atomically(path, [&](const fs::path& folder) {
     fs::create_directory(folder);
-    marrow::write::write_grid(folder / "ct.mha", value.ct.grid, value.ct.values);
     YAML::Emitter out;
-    out << BeginMap << Key << "marrow-case" << Value << 1 << Key << "ct" << Value << "ct.mha";
+    out << BeginMap << Key << "marrow-case" << Value << 1;
+    if (has_ct) marrow::write::write_grid(folder / "ct.mha", value.ct.grid, value.ct.values);
+    if (has_ct) out << Key << "ct" << Value << "ct.mha";
+    if (has_labels) marrow::write::write_grid(folder / "labels.mha", whole.labels.grid, whole.labels.values);
+    if (has_labels) out << Key << "labels" << Value << "labels.mha";
     put_views(out, value, folder);
-    put_fragments(out, value);
+    put_fragments(out, whole, folder);
     out << EndMap;
     marrow::files::write_plainly(folder / "case.yaml", {marrow::files::text_of(out)});
   });
 }
+
+void write_case(const marrow::Case& value, const std::string& path) { write_folder({value, {}, {}}, path); }
 
 }  // namespace
 
@@ -149,4 +178,7 @@ MARROW_PLUGIN(plugin) {
       "", view, "folder with image.png (image.tif for float), camera.yaml and, if the view has a mask, mask.png");
   plugin.writer<marrow::Case>("", write_case,
                               "folder with case.yaml, ct.mha, images and cameras, to be read by read.case");
+  plugin.writer<CaseFolder>("", write_folder,
+                            "the same; with labels.mha, or with surfaces (.vtp) and without CT, if the case gives its "
+                            "fragments so");
 }

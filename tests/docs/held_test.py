@@ -132,6 +132,17 @@ class Held(Documents):
         out = self.run_section("One X-ray image", CASE=one)
         self.expect_pose(out / "pose" / "distal.yaml", 6)
 
+    def test_a_segmentation(self):
+        def change(told):
+            told["labels"], told["fragments"] = "labels.mha", {"distal": told["fragments"]["distal"]}
+            del told["fragments"]["distal"]["seeds"]
+            told["fragments"]["distal"]["label"] = 1
+
+        case = copy_case(self.given["CASE"], self.folder / "labelled", change)
+        labels_of(self.bone() / "bone" / "distal.mha", case / "labels.mha")
+        out = self.run_section("A segmentation of TotalSegmentator or 3D Slicer", CASE=case)
+        self.expect_pose(out / "pose" / "distal.yaml", 2)
+
     def test_a_label_map(self):
         labels = labels_of(self.bone() / "bone" / "distal.mha", self.folder / "labels.mha")
         only = copy_case(self.given["CASE"], self.folder / "distal", lambda told: told["fragments"].pop("proximal"))

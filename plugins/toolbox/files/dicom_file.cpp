@@ -62,6 +62,8 @@ constexpr std::uint32_t kGroupsOfValues[] = {
     0x00289110,  // PixelMeasuresSequence
     0x00289145,  // PixelValueTransformationSequence
     0x00289443,  // FramePixelDataPropertiesSequence
+    0x00620002,  // SegmentSequence
+    0x0062000A,  // SegmentIdentificationSequence
 };
 
 bool is_long(const std::string& kind) {

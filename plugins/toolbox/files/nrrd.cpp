@@ -14,6 +14,8 @@
 namespace marrow::files {
 namespace {
 
+constexpr long long kMostLayers = 100;
+
 /// Whether the format defines a field of this name.
 bool is_field(const std::string& name) {
   constexpr std::string_view kFields =
@@ -26,6 +28,7 @@ bool is_field(const std::string& name) {
 struct NrrdHeader {
   HeaderFields fields;
   std::uint64_t end = 0;  ///< offset of samples in the same file
+  std::map<std::string, std::string> notes{};
 };
 
 NrrdHeader read_nrrd_header(const InputFile& file) {
@@ -46,7 +49,10 @@ NrrdHeader read_nrrd_header(const InputFile& file) {
     header.end = lines.at();
     if (!line || line->empty()) return header;  // if the file ends here, the samples are in another file
     const std::size_t colon = line->find(':');
-    if (colon != std::string::npos && line->compare(colon, 2, ":=") == 0) continue;  // a key/value note of its writer
+    if (colon != std::string::npos && line->compare(colon, 2, ":=") == 0) {
+      header.notes[line->substr(0, colon)] = line->substr(colon + 2);
+      continue;
+    }
     std::string key = in_small_letters(trimmed(line->substr(0, colon)));
     if (const auto same = kSame.find(key); same != kSame.end()) key = same->second;
     if (colon == std::string::npos || line->find('\0') != std::string::npos || !is_field(key))
@@ -242,12 +248,10 @@ StoredSamples stored_in(const HeaderFields& fields, const InputFile& data, std::
   return stored;
 }
 
-}  // namespace
-
-VolumeSamples read_nrrd(const std::filesystem::path& path, bool folder_is_named) {
-  const InputFile file(path);
-  const auto [all_fields, end] = read_nrrd_header(file);
-  const HeaderFields fields = without_single_samples(all_fields);
+/// The samples of one volume, or of several `layers` with the same grid, as they follow each other in the file.
+VolumeSamples read_samples(const InputFile& file, const NrrdHeader& header, const HeaderFields& fields,
+                           std::size_t layers, bool folder_is_named) {
+  const std::filesystem::path& path = file.path();
   const long long dimensions = fields.whole_number_or("dimension", 0);
   if (dimensions < 1 || dimensions > 16) fields.refuse("dimension", "3");
   const bool is_detached = fields.has("data file");
@@ -258,10 +262,43 @@ VolumeSamples read_nrrd(const std::filesystem::path& path, bool folder_is_named)
   volume.geometry.dimensions = int(dimensions);
   for (std::size_t k = 0; k < 3; ++k) volume.geometry.size[k] = int(size[k]);
   if (dimensions == 3) read_grid(fields, volume.geometry);
-  const StoredSamples stored = stored_in(fields, data, is_detached ? 0 : end, volume.geometry.count());
+  const StoredSamples stored = stored_in(fields, data, is_detached ? 0 : header.end, layers * volume.geometry.count());
   volume.geometry.type = stored.type_of_values();
   volume.values = read_floats(data, stored);
   return volume;
+}
+
+}  // namespace
+
+VolumeSamples read_nrrd(const std::filesystem::path& path, bool folder_is_named) {
+  const InputFile file(path);
+  const NrrdHeader header = read_nrrd_header(file);
+  return read_samples(file, header, without_single_samples(header.fields), 1, folder_is_named);
+}
+
+NrrdLayers read_nrrd_layers(const std::filesystem::path& path, bool folder_is_named) {
+  const InputFile file(path);
+  const NrrdHeader header = read_nrrd_header(file);
+  HeaderFields fields = without_single_samples(header.fields);
+  NrrdLayers layers{{}, {}, header.notes};
+  const auto axis = axis_of_layers(fields);
+  if (!axis) {
+    layers.samples = read_samples(file, header, fields, 1, folder_is_named);
+    layers.values.push_back(std::move(layers.samples.values));
+    return layers;
+  }
+  const auto count = (long long)fields.numbers("sizes", 4)[*axis];
+  if ((*axis != 0 && *axis != 3) || count < 1 || count > kMostLayers)
+    fields.refuse("sizes", formatted("1 to {} layers of a segmentation, as the first or the last axis", kMostLayers));
+  layers.samples = read_samples(file, header, without_axis(fields, *axis), std::size_t(count), folder_is_named);
+  const std::vector<float> all = std::move(layers.samples.values);
+  const std::size_t voxels = layers.samples.geometry.count(), step = *axis == 0 ? std::size_t(count) : 1;
+  for (std::size_t layer = 0; layer < std::size_t(count); ++layer) {
+    layers.values.emplace_back(voxels);
+    const float* first = all.data() + (*axis == 0 ? layer : layer * voxels);
+    for (std::size_t i = 0; i < voxels; ++i) layers.values.back()[i] = first[i * step];
+  }
+  return layers;
 }
 
 }  // namespace marrow::files

@@ -58,4 +58,17 @@ HeaderFields without_single_samples(HeaderFields fields) {
   return fields;
 }
 
+std::optional<std::size_t> axis_of_layers(const HeaderFields& fields) {
+  constexpr std::size_t kAxes = 4;
+  if (fields.text_or("dimension", "") != "4" || items_of(fields.text_or("sizes", "")).size() != kAxes) return {};
+  for (std::size_t axis = 0; axis < kAxes; ++axis)
+    if (holds_values(fields, axis, kAxes)) return axis;
+  return {};
+}
+
+HeaderFields without_axis(HeaderFields fields, std::size_t axis) {
+  remove_axis(fields, axis, items_of(fields.text_or("sizes", "")).size());
+  return fields;
+}
+
 }  // namespace marrow::files

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,16 @@ struct VolumeSamples {
 
 VolumeSamples read_meta_image(const std::filesystem::path& path, bool folder_is_named);
 VolumeSamples read_nrrd(const std::filesystem::path& path, bool folder_is_named);
+
+/// A segmentation of 3D Slicer (.seg.nrrd): layers of labels on one grid, and the notes (key:=value) that name them.
+/// Any other NRRD of one volume is one layer.
+struct NrrdLayers {
+  VolumeSamples samples;  ///< without values
+  std::vector<std::vector<float>> values;
+  std::map<std::string, std::string> notes;
+};
+NrrdLayers read_nrrd_layers(const std::filesystem::path& path, bool folder_is_named);
+
 /// `is_placed`: the header must say where the volume lies. If false, the file may hold one image, and the grid is not
 /// read.
 VolumeSamples read_nifti(const std::filesystem::path& path, bool is_placed = true);

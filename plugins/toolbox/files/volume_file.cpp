@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/files/volume_file.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -9,8 +8,8 @@
 #include "header_lines.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/domain/decompositions.hpp"
 #include "samples.hpp"
+#include "volume_grid.hpp"
 
 namespace marrow::files {
 namespace {
@@ -71,46 +70,11 @@ fs::path detached_header_in(const fs::path& folder) {
   return headers[0];
 }
 
-Grid grid_of(const Samples& samples) {
-  Grid grid;
-  grid.size = samples.size;
-  grid.spacing_mm = Eigen::Map<const Eigen::Vector3d>(samples.spacing_mm.data());
-  grid.origin_mm = Eigen::Map<const Eigen::Vector3d>(samples.origin_mm.data());
-  grid.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(samples.direction.data());
-  const Eigen::Matrix3d defect = grid.direction.transpose() * grid.direction - Eigen::Matrix3d::Identity();
-  if (grid.direction.allFinite() && defect.cwiseAbs().maxCoeff() < kRoundedDirection &&
-      defect.cwiseAbs().maxCoeff() > 1e-12) {
-    grid.direction = nearest_orthogonal(grid.direction);
-  }
-  return grid;
-}
-
 int axis_of(const std::string& name) {
   static const std::string kAxes = "xyz";
   if (name.size() != 1 || kAxes.find(name) == std::string::npos)
     throw Error("flip: expected axes x, y or z, got '" + name + "'");
   return int(kAxes.find(name));
-}
-
-void flip(Volume& volume, int axis) {
-  const auto [nx, ny, nz] = volume.grid.size;
-  const std::array<int, 3> half{axis == 0 ? nx / 2 : nx, axis == 1 ? ny / 2 : ny, axis == 2 ? nz / 2 : nz};
-  for (int z = 0; z < half[2]; ++z)
-    for (int y = 0; y < half[1]; ++y)
-      for (int x = 0; x < half[0]; ++x)
-        std::swap(volume.values[volume.grid.offset(x, y, z)],
-                  volume.values[volume.grid.offset(axis == 0 ? nx - 1 - x : x, axis == 1 ? ny - 1 - y : y,
-                                                   axis == 2 ? nz - 1 - z : z)]);
-}
-
-/// Reverses the last axis of a left-handed grid. Then it is right-handed, and each voxel keeps its value and its
-/// position.
-void make_right_handed(Volume& volume) {
-  Grid& grid = volume.grid;
-  if (!(grid.direction.determinant() < 0)) return;
-  flip(volume, 2);
-  grid.origin_mm += grid.direction.col(2) * (grid.spacing_mm[2] * (grid.size[2] - 1));
-  grid.direction.col(2) *= -1;
 }
 
 void check_reading(const VolumeReading& reading) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Volumes: MetaImage, NRRD, NIfTI and TIFF, also headers with their samples in a separate file.
+// Volumes and label maps: MetaImage, NRRD, NIfTI and TIFF, also headers with their samples in a separate file.
 #include <zlib.h>
 
+#include "marrow/toolbox/files/label_file.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "target.hpp"
 
@@ -61,5 +62,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   marrow::files::VolumeReading reading;
   if (path.extension() == ".tif") reading.voxel_size_mm = {1, 1, 1};
   marrow::fuzz::expect_value_or_error([&] { marrow::files::read_volume_file(path, reading); });
+  marrow::fuzz::expect_value_or_error([&] {
+    const marrow::files::LabelMap map = marrow::files::read_label_file(path);
+    marrow::files::mask_of(map, map.segments[0]);
+  });
   return 0;
 }
