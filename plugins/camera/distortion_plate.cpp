@@ -83,7 +83,7 @@ Result distortion_plate(const Image& image, const Options& options, Context& con
   context.check_cancelled();
   const StraightPlate straight = straight_plate(plate, straight_of(options.straight), image.width(), image.height());
   FitOptions fit_options = camera::fit_options(options);
-  fit_options.area_margin_px = 0.5 * straight.pixels_per_spacing;
+  fit_options.area_margin_px = 0.5 * plate.dot_px;
   const Fit fit = fit_distortion(straight.points, fit_options);
   const Coverage coverage = coverage_of(image, fit, straight.pixels_per_spacing);
   camera::warn_of_fit(fit, context);

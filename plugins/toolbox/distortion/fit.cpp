@@ -125,12 +125,13 @@ void check_count(std::size_t count, int degree) {
                   degree, least));
 }
 
-/// The lowest degree that is nearly as good as the best one.
-int chosen_degree(const std::vector<std::pair<int, double>>& validated_by_degree) {
+/// The lowest degree that is nearly as good as the best one, as far as this number of points tells.
+int chosen_degree(const std::vector<std::pair<int, double>>& validated_by_degree, std::size_t count) {
+  const double tolerance = std::max(0.01, 1 / std::sqrt(double(count)));
   double least = std::numeric_limits<double>::infinity();
   for (const auto& [degree, residual] : validated_by_degree) least = std::min(least, residual);
   for (const auto& [degree, residual] : validated_by_degree)
-    if (residual <= 1.01 * least) return degree;
+    if (residual <= (1 + tolerance) * least) return degree;
   return validated_by_degree.back().first;
 }
 
@@ -162,7 +163,7 @@ Fit fit_distortion(const PlatePoints& points, const FitOptions& options) {
   Distortion& distortion = fit.distortion;
   distortion.width_px = points.width_px;
   distortion.height_px = points.height_px;
-  distortion.degree = chosen_degree(fit.validated_by_degree_px);
+  distortion.degree = chosen_degree(fit.validated_by_degree_px, samples.ideal.size());
   const Polynomial polynomial = samples.fitted(distortion.degree);
   distortion.terms_px = polynomial.terms;
   distortion.validated_px = fit.validated_by_degree_px[std::size_t(distortion.degree - options.lowest_degree)].second;

@@ -28,10 +28,11 @@ struct Fit {
   bool is_local = false;
 };
 
-/// Fits a distortion to the used points. The degree is the lowest whose validated residual is within 1 % of the least.
-/// For that residual, five fits each leave out another fifth of the points (five-fold cross-validation). Points farther
-/// from the fit than `outlier_deviations` standard deviations are not used. Residuals are root mean squares of
-/// distances. Throws Error if there are fewer than three points for each term of the lowest degree.
+/// Fits a distortion to the used points. The degree is the lowest whose validated residual is as good as the least, as
+/// far as n points tell: within 1 / sqrt(n) of it, but at least 1 %. For that residual, five fits each leave out
+/// another fifth of the points (five-fold cross-validation). Points farther from the fit than `outlier_deviations`
+/// standard deviations are not used. Residuals are root mean squares of distances. Throws Error if there are fewer than
+/// three points for each term of the lowest degree.
 Fit fit_distortion(const PlatePoints& points, const FitOptions& options);
 
 /// How the distortion bends the image: what a person compares between poses of the arm.

@@ -17,7 +17,9 @@
 namespace marrow::distortion {
 namespace {
 
-constexpr double kSizeStep = 1.3;  ///< ratio of the diameters that are tried
+constexpr double kSizeStep = 1.3;        ///< ratio of the diameters that are tried
+constexpr double kLeastRoundness = 0.5;  ///< of a dot that the border of the field does not cut
+constexpr double kNearlyAsMany = 0.92;   ///< of the most dots
 
 cv::Mat1f grey_of(const Image& image) {
   if (image.pixels.empty() || image.pixels.channels() != 1)
@@ -103,7 +105,7 @@ PlateImage find_plate(const Image& image, const PlateSearch& search, std::size_t
   const PlateImage* best = nullptr;
   double least_unevenness = 0;
   for (const PlateImage& one : all) {
-    if (most == 0 || double(one.dots.size()) < 0.97 * double(most)) continue;
+    if (most == 0 || double(one.dots.size()) < kNearlyAsMany * double(most)) continue;
     const double unevenness = unevenness_px(one.spots, one.dots, one.grid);
     if (best && unevenness >= least_unevenness) continue;
     best = &one;
@@ -145,7 +147,8 @@ StraightPlate straight_plate(const PlateImage& plate, Straight straight, int wid
   result.points.width_px = width_px;
   result.points.height_px = height_px;
   for (std::size_t i = 0; i < places.size(); ++i)
-    result.points.add(anchor + image_from_plate * (places[i] - origin), seen[i]);
+    result.points.add(anchor + image_from_plate * (places[i] - origin), seen[i],
+                      plate.spots[std::size_t(plate.dots[i].spot)].roundness > kLeastRoundness);
   result.pixels_per_spacing =
       straight == Straight::homography ? spacing : std::sqrt(std::abs(image_from_plate.determinant()));
   return result;

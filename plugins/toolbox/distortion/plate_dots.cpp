@@ -50,8 +50,8 @@ bool is_largest(const cv::Mat1f& contrast, int v, int u, int reach) {
 }
 
 /// The maximum of the parabola through the logarithms of 3 x 3 values, which is exact for a Gaussian; of the values
-/// themselves if one of them is not positive. `at` itself if the parabola has no maximum nearby.
-Eigen::Vector2d refined(const cv::Mat1f& contrast, int v, int u) {
+/// themselves if one of them is not positive. The pixel itself, not round, if the parabola has no maximum nearby.
+Spot refined(const cv::Mat1f& contrast, int v, int u) {
   double values[3][3];
   bool is_positive = true;
   for (int y = 0; y < 3; ++y)
@@ -74,10 +74,12 @@ Eigen::Vector2d refined(const cv::Mat1f& contrast, int v, int u) {
       e += value * x * y / 4;
     }
   const Eigen::Vector2d at(u, v);
-  const double determinant = 4 * d * f - e * e;
-  if (!(determinant > 0) || !(d < 0)) return at;
+  const double strength = double(contrast(v, u)), determinant = 4 * d * f - e * e;
+  if (!(determinant > 0) || !(d < 0)) return {at, strength, 0};
   const Eigen::Vector2d off((e * c - 2 * f * b) / determinant, (e * b - 2 * d * c) / determinant);
-  return off.cwiseAbs().maxCoeff() <= 1 ? Eigen::Vector2d(at + off) : at;
+  if (off.cwiseAbs().maxCoeff() > 1) return {at, strength, 0};
+  const double mean = -0.5 * (d + f), half_difference = 0.5 * std::hypot(d - f, e);
+  return {at + off, strength, (mean - half_difference) / (mean + half_difference)};
 }
 
 }  // namespace
@@ -89,7 +91,7 @@ std::vector<Spot> find_spots(const cv::Mat1f& grey, double radius_px, bool is_br
   for (int v = reach; v < grey.rows - reach; ++v)
     for (int u = reach; u < grey.cols - reach; ++u)
       if (contrast(v, u) > kUsualFactor * usual(v, u) && is_largest(contrast, v, u, reach))
-        spots.push_back({refined(contrast, v, u), double(contrast(v, u))});
+        spots.push_back(refined(contrast, v, u));
   if (spots.size() > kMostSpots) {
     std::stable_sort(spots.begin(), spots.end(), [](const Spot& a, const Spot& b) { return a.strength > b.strength; });
     spots.resize(kMostSpots);

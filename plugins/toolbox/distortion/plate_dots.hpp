@@ -7,10 +7,11 @@
 
 namespace marrow::distortion {
 
-/// A spot, and how much it stands out from its surroundings, in grey values.
+/// A spot, and how much it stands out from its surroundings, in grey values. `roundness` is the smaller curvature of
+/// its peak divided by the larger one; a dot that the border of the field cuts is not round.
 struct Spot {
   Eigen::Vector2d at_px = Eigen::Vector2d::Zero();
-  double strength = 0;
+  double strength = 0, roundness = 1;
 };
 
 /// All spots whose radius is about `radius_px`, the most central first. A spot is a maximum of the difference of two

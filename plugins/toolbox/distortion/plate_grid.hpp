@@ -21,9 +21,10 @@ struct GridDot {
 Eigen::Vector2d place_on_plate(Pattern grid, int column, int row);
 
 /// The largest part of the spots that is a grid. It grows from a dot to its neighbours, over single missing dots, and
-/// at last to dots where a polynomial through all others expects them, so also beyond what covers the plate. A plate
-/// may be turned, mirrored and somewhat oblique: its neighbours' distances may differ by a third. Empty if fewer than
-/// nine spots are a grid. The result has no order that depends on threads.
+/// then to dots beside known ones where a polynomial through all others expects them. Parts that an instrument
+/// separates are joined where a polynomial through both tells how their rows continue, and left out elsewhere. A plate
+/// may be turned, mirrored and tilted by up to 45 degrees. Empty if fewer than nine spots are a grid, or if neighbours
+/// do not confirm it.
 std::vector<GridDot> find_grid(const std::vector<Spot>& spots, Pattern grid);
 
 /// The distance between neighbours: the median over the dots.

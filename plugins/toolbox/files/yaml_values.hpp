@@ -7,6 +7,7 @@
 #include "marrow/domain/pose.hpp"
 #include "marrow/domain/verdict.hpp"
 #include "marrow/domain/volume.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
 #include "marrow/toolbox/files/strict_yaml.hpp"
 
 namespace marrow::files {
@@ -18,8 +19,8 @@ std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTran
 const std::vector<std::string>& transform_keys();
 
 /// A camera from the keys width_px, height_px, then either intrinsics and camera_from_world or c_arm and, for distorted
-/// images, radial_distortion. Faults are noted in `file`.
-std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& file);
+/// images, radial_distortion or distortion. Faults are noted in `file`.
+std::optional<CameraInFile> camera_from(const YAML::Node& node, YamlFile& file);
 
 /// Seeds of one fragment from the map's keys `seeds` and `register`.
 Seeds seeds_from(const YamlMap& map, const std::string& fragment);
