@@ -118,7 +118,7 @@ MARROW_PLUGIN(plugin) {
                 "pincushion", "rim", "coverage", "field_coverage", "area_coverage", "stretch", "spacing", "dot",
                 "pixel"})
       .out("picture", &Result::picture, "the image with the dots, their residuals and the measured area")
-      .option("spacing_mm", &Options::spacing_mm,
+      .option("dot_spacing_mm", &Options::spacing_mm,
               "distance between neighbouring dots on the plate, for the size of a pixel there; 0: not known",
               at_least(0))
       .option("grid", &Options::grid, "grid of the plate; automatic: the one of which more dots are found",

@@ -11,7 +11,7 @@ using namespace marrow;
 using namespace marrow::distortion;
 
 struct Options : camera::DistortionOptions {
-  double margin_px = 0;
+  double area_margin_px = 0;
 };
 
 struct Result {
@@ -23,7 +23,7 @@ struct Result {
 
 Result distortion_points(const PlatePoints& points, const Image* image, const Options& options, Context& context) {
   FitOptions fit_options = camera::fit_options(options);
-  fit_options.area_margin_px = options.margin_px;
+  fit_options.area_margin_px = options.area_margin_px;
   const Fit fit = fit_distortion(points, fit_options);
   camera::warn_of_fit(fit, context);
   return {fit.distortion, fit.points, camera::figures_of(fit),
@@ -43,6 +43,7 @@ MARROW_PLUGIN(plugin) {
       .figures({"points", "outliers", "degree", "local", "residual", "validated", "validated_degree_*", "turn",
                 "pincushion", "rim"})
       .out("picture", &Result::picture, "the points, their residuals and the measured area")
-      .option("margin_px", &Options::margin_px, "the measured area reaches this far beyond the points", at_least(0));
+      .option("area_margin_px", &Options::area_margin_px, "the measured area reaches this far beyond the points",
+              at_least(0));
   camera::declare_fit_options<Options>(node);
 }

@@ -95,7 +95,7 @@ MARROW_PLUGIN(plugin) {
       .relation(distinct("angles_deg"))
       .option("grid", &Options::grid, "grid of the plate", one_of({"square", "hexagonal"}))
       .option("dots", &Options::dots, "bright holes or dark dots", one_of({"bright", "dark"}))
-      .option("spacing_mm", &Options::spacing_mm, "distance between neighbours on the plate", at_least(0.1))
+      .option("dot_spacing_mm", &Options::spacing_mm, "distance between neighbours on the plate", at_least(0.1))
       .option("dot_mm", &Options::dot_mm, "diameter of a hole or dot", at_least(0.05))
       .option("plate_transmission", &Options::plate_transmission,
               "share of the beam that passes the plate, or a dark dot", at_least(0), at_most(1), unit("1"))
@@ -123,7 +123,7 @@ MARROW_PLUGIN(plugin) {
               at_least(0), at_most(0.95), unit("1"))
       .option("unevenness", &Options::unevenness, "by which share the lower side is darker than the upper", at_least(0),
               at_most(0.95), unit("1"))
-      .option("photons", &Options::photons, "photons per pixel in open air; 0: no noise", at_least(0), unit("1"))
+      .option("photons", &Options::photons, "photons per pixel in open air; 0: no noise", at_least(0), unit("1/px"))
       .option("blur_px", &Options::blur_px, "standard deviation of the blur", at_least(0))
       .option("truth_points", &Options::truth_points, "number of random points of each image", at_least(10),
               at_most(100000));

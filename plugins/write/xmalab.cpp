@@ -12,13 +12,13 @@ using namespace marrow;
 using exchange::XmalabCameraFile, exchange::XmalabGridFile;
 
 struct Result {
-  std::optional<XmalabCameraFile> camera;
+  std::optional<XmalabCameraFile> camera_file;
   std::optional<XmalabGridFile> distorted, references, inlier;
 };
 
 Result xmalab(const Camera* camera, const View* view, const distortion::PlatePoints* points) {
   Result result;
-  if (camera || view) result.camera = XmalabCameraFile{exchange::xmalab_camera(camera ? *camera : view->camera)};
+  if (camera || view) result.camera_file = XmalabCameraFile{exchange::xmalab_camera(camera ? *camera : view->camera)};
   if (points) {
     result.distorted = XmalabGridFile{exchange::xmalab_distorted(*points)};
     result.references = XmalabGridFile{exchange::xmalab_references(*points)};
@@ -35,7 +35,7 @@ MARROW_PLUGIN(plugin) {
       .in("camera", "the camera, of images without distortion")
       .in("view", "the view whose camera it is")
       .in("points", "the dots of camera.distortion_plate")
-      .out("camera", &Result::camera, "image size, camera matrix, rotation and translation (MayaCam 2.0)")
+      .out("camera_file", &Result::camera_file, "image size, camera matrix, rotation and translation (MayaCam 2.0)")
       .out("distorted", &Result::distorted, "where each dot was seen: NAME_GridPointsDistorted.csv")
       .out("references", &Result::references, "where a straight image shows it: NAME_GridPointsReferences.csv")
       .out("inlier", &Result::inlier, "1 for a dot that is used, 0 for another: NAME_GridPointsInlier.csv")

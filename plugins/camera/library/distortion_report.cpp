@@ -12,9 +12,9 @@ using namespace distortion;
 
 FitOptions fit_options(const DistortionOptions& options) {
   FitOptions result;
-  result.model = options.model == "polynomial" ? Model::polynomial
-                 : options.model == "local"    ? Model::local
-                                               : Model::automatic;
+  result.model = options.fit == "polynomial" ? Model::polynomial
+                 : options.fit == "local"    ? Model::local
+                                             : Model::automatic;
   result.lowest_degree = options.lowest_degree;
   result.highest_degree = options.highest_degree;
   result.outlier_deviations = options.outlier_deviations;

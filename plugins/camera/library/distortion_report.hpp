@@ -11,7 +11,7 @@
 namespace marrow::camera {
 
 struct DistortionOptions {
-  std::string model = "automatic";
+  std::string fit = "automatic";
   int lowest_degree = 3, highest_degree = 7;
   double outlier_deviations = 5;
   double residual_scale = 50;
@@ -33,7 +33,7 @@ Picture picture_of(const Image& image, const distortion::Fit& fit, const Distort
 /// Declares these options.
 template <class Options, class Node>
 void declare_fit_options(Node& node) {
-  node.option("model", &Options::model,
+  node.option("fit", &Options::fit,
               "polynomial, or local: a polynomial and what remains near each place; automatic: local if it lowers the "
               "residual of points that the fit did not see by more than 5 %",
               one_of({"automatic", "polynomial", "local"}))

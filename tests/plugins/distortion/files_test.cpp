@@ -242,7 +242,7 @@ TEST(XmalabGrid, ACameraIsReadBackAsItWasWritten) {
   const Camera camera = files::read_camera_file(folder / "camera.txt").camera;
   const auto written = call("write.xmalab", {{"camera", item(camera)}});
   EXPECT_TRUE(written.at("distorted").is_absent());
-  EXPECT_EQ(written.at("camera").as<exchange::XmalabCameraFile>().bytes, kXmalabCamera);
+  EXPECT_EQ(written.at("camera_file").as<exchange::XmalabCameraFile>().bytes, kXmalabCamera);
 }
 
 }  // namespace distortion_files_test

@@ -82,7 +82,7 @@ INSTANTIATE_TEST_SUITE_P(Plates, DistortionPlate, testing::ValuesIn(kCases),
 
 TEST(DistortionPlates, SayTheTurnThePincushionAndTheCoverage) {
   const Simulated device = simulated(2);
-  const auto found = call("camera.distortion_plate", {{"image", item(device.images[0])}}, {{"spacing_mm", 4.4}});
+  const auto found = call("camera.distortion_plate", {{"image", item(device.images[0])}}, {{"dot_spacing_mm", 4.4}});
   const Value& metrics = found.at("metrics");
   EXPECT_NEAR(figure(metrics, "turn"), -0.6, 0.1);
   EXPECT_NEAR(figure(metrics, "pixel"), 0.3, 0.002);
