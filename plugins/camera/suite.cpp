@@ -12,6 +12,7 @@
 #include "camera_files.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/runtime/node/types.hpp"
+#include "plate_samples.hpp"
 
 namespace marrow::conformance {
 namespace {
@@ -137,6 +138,12 @@ Value chessboards() {
   return kPictures;
 }
 
+Camera plate_camera() {
+  Camera camera = device(0);
+  camera.width_px = camera.height_px = plate_distortion().width_px;
+  return camera;
+}
+
 Inputs sample() {
   List<Picture> photographs;
   List<Camera> cameras;
@@ -153,14 +160,22 @@ Inputs sample() {
           {"boards", chessboards()},
           {"photographs", Value::of<Picture>(photographs, "view")},
           {"cameras", Value::of<Camera>(cameras, "view")},
-          {"calibration", Value::of<Calibration>(std::make_shared<const Calibration>(calibration))}};
+          {"calibration", Value::of<Calibration>(std::make_shared<const Calibration>(calibration))},
+          {"image", item(plate_image())},
+          {"points", item(plate_points())},
+          {"view", item(View{"a", plate_image(), plate_camera(), {}})},
+          {"distortion", item(plate_distortion())},
+          {"distortions", plate_distortions()}};
 }
 
 std::map<std::string, OptionValue> options() {
   return {
       {"board", board_file().string()},
       {"points", points_file(device(0), second(), false).string()},
-      {"paths", std::vector<std::string>{xray_file("frontal", 0, 0).string(), xray_file("oblique", -30, 20).string()}}};
+      {"paths", std::vector<std::string>{xray_file("frontal", 0, 0).string(), xray_file("oblique", -30, 20).string()}},
+      {"names", std::vector<std::string>{"frontal", "oblique"}},
+      {"measured_at", std::vector<double>{0, 40}},
+      {"wanted_at", std::vector<double>{10, 40}}};
 }
 
 void validate(const Inputs&, const std::vector<PortInfo>& ports, const std::vector<Value>& outputs) {
@@ -270,6 +285,14 @@ Check wrong_camera(const std::string& name, const std::string& what,
           }};
 }
 
+double plate_error(const Subject& subject) {
+  const auto outputs = subject.info().outputs;
+  if (std::none_of(outputs.begin(), outputs.end(), [](const PortInfo& port) { return port.name == "distortion"; }) ||
+      has_input(subject, "distortions"))
+    throw NotApplicable("it does not measure a distortion");
+  return plate_distance_px(subject.output(sample(), "distortion").as<distortion::Distortion>());
+}
+
 std::vector<Trial> trials() {
   const auto even = [](int count, int width, int height, double value) {
     return [=] {
@@ -315,6 +338,21 @@ std::vector<Trial> trials() {
          return pixels;
        })},
       {"nan_camera", with_camera([](Camera& camera) { camera.camera_from_world.translation_mm.x() = std::nan(""); })},
+      {"plate_without_dots",
+       [] {
+         return Inputs{{"image", item(Image{cv::Mat(200, 300, CV_16U, cv::Scalar(9))})}};
+       }},
+      {"plate_of_colours",
+       [] {
+         return Inputs{{"image", item(Image{cv::Mat(200, 300, CV_8UC3, cv::Scalar(9))})}};
+       }},
+      {"view_of_another_size",
+       [] {
+         View view{"a", {cv::Mat(200, 300, CV_16U, cv::Scalar(9))}, plate_camera(), {}};
+         view.camera.width_px = 300;
+         view.camera.height_px = 200;
+         return Inputs{{"view", item(view)}};
+       }},
       {"camera_without_focal_length", with_camera([](Camera& camera) { camera.intrinsics(0, 0) = 0; })}};
 }
 
@@ -344,6 +382,10 @@ Suite camera_suite() {
       wrong_camera("mirrored", check + "seen positions mirrored left to right", [](const Subject& subject) {
         return warnings(subject.with("points", points_file(device(0), second(), true).string()), device(0), second());
       }));
+  suite.accuracy.push_back(
+      {{"plate", "a plate with 6 px of pincushion and 2 px of turn: largest distance from the exact distortion", 0.3,
+        "px"},
+       plate_error});
   const auto changed = [&](const std::string& name, const std::string& what, void (*change)(Camera&)) {
     suite.accuracy.push_back(wrong_camera(name, check + what, [change](const Subject& subject) {
       Camera camera = device(0);

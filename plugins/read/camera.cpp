@@ -30,8 +30,8 @@ Camera camera(const Image* image, const Options& options, Context& context) {
   if (reading.projection == 0 && (is_alone || format == read::CameraFormat::plastimatch))
     reading.projection = -1;  // the default
   if (image) reading.size.size_px = {double(image->width()), double(image->height())};
-  const DistortedCamera read = read::read_camera(options.path, reading);
-  if (!read.distortion.is_none())
+  const files::CameraInFile read = read::read_camera(options.path, reading);
+  if (read.is_distorted())
     context.warn(
         options.path.string() +
         ": the images of this camera are distorted; only read.view, read.views and read.case remove the distortion, if "

@@ -76,9 +76,9 @@ marrow::read::CameraReading camera_reading(const YamlMap& map) {
 }
 
 /// The camera of the view with this image.
-std::optional<marrow::DistortedCamera> read_camera(const fs::path& folder, const YamlMap& map,
-                                                   const std::optional<marrow::Image>& image,
-                                                   marrow::Context& context) {
+std::optional<marrow::files::CameraInFile> read_camera(const fs::path& folder, const YamlMap& map,
+                                                       const std::optional<marrow::Image>& image,
+                                                       marrow::Context& context) {
   const auto node = map.required("camera");
   if (!node) return std::nullopt;
   const bool is_map = node->IsMap(), names_file = is_map && (*node)["file"];
@@ -163,7 +163,7 @@ void read_view(const fs::path& folder, const YamlMap& map, CaseFiles& result, ma
   warn_of_image(folder, map, view.camera, context);
   try {
     check_view(view);
-    if (!camera->distortion.is_none()) remove_distortion(view, camera->distortion);
+    marrow::files::straighten(view, *camera);
   } catch (const marrow::Error& error) {
     return map.fault("image", error.what());
   }

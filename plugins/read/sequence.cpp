@@ -24,6 +24,7 @@ struct Options : files::FrameRange {
   std::vector<std::string> patterns;
   std::vector<fs::path> cameras;
   fs::path calibration;
+  std::vector<fs::path> distortions;
   double scale = 1;
 };
 
@@ -70,7 +71,8 @@ List<SequenceFrame> sequence(const List<Camera>* cameras, const Options& options
                             {},
                             cameras ? &read::camera_of_view(name, *cameras) : nullptr,
                             cameras ? fs::path() : options.cameras.at(i),
-                            options.calibration};
+                            options.calibration,
+                            options.distortions.empty() ? fs::path() : options.distortions.at(i)};
     source.scale = options.scale;
     const read::ViewCamera camera = read::read_view_camera(source, images.front(), context);
     for (std::size_t k = 0; k < images.size(); ++k) {
@@ -113,6 +115,11 @@ MARROW_PLUGIN(plugin) {
       .option("calibration", &Options::calibration,
               "calibration file of the device that took all views; its camera matrix replaces those of the cameras, "
               "and its distortion is removed from the images")
+      .option(
+          "distortions", &Options::distortions,
+          "one distortion file of camera.distortion_plate per view; the frames are straightened by it and masked out "
+          "where it was not measured")
+      .relation(as_many_or_none("distortions", "names"))
       .option(
           "scale", &Options::scale,
           "factor that converts the unit of the camera files to mm: 10 for cm, 1000 for metres; not for marrow's YAML",

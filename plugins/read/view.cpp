@@ -11,7 +11,7 @@ struct Options {
   std::string name = "view";
   std::filesystem::path image;
   std::filesystem::path camera;
-  std::filesystem::path calibration;
+  std::filesystem::path calibration, distortion;
   int frame = 0;
   std::string mirror = "none";
   int projection = -1;
@@ -23,8 +23,8 @@ marrow::View view(const marrow::Camera* camera, const Options& options, marrow::
   if (!camera && options.camera.empty())
     throw marrow::Error("view '" + options.name + "': the node that is wired to 'camera' gave none");
   marrow::View view = marrow::read::read_view_files(
-      {options.name, options.image, camera, options.camera, options.calibration, options.frame, options.mirror,
-       options.projection, options.pixel_mm, options.corner_mm, options.scale},
+      {options.name, options.image, camera, options.camera, options.calibration, options.distortion, options.frame,
+       options.mirror, options.projection, options.pixel_mm, options.corner_mm, options.scale},
       context);
   for (const std::string& doubt : marrow::files::doubts_about_sides(options.image, options.frame)) context.warn(doubt);
   marrow::files::warn_of_pixels(options.image, context);
@@ -45,6 +45,9 @@ MARROW_PLUGIN(plugin) {
       .option("calibration", &Options::calibration,
               "calibration file; its camera matrix replaces that of the camera, and its distortion is removed from the "
               "image")
+      .option("distortion", &Options::distortion,
+              "distortion file of camera.distortion_plate; the image is straightened by it and masked out where it was "
+              "not measured")
       .option("frame", &Options::frame, "frame of a multi-frame file, counted from 1; 0: the file has only one frame",
               marrow::at_least(0))
       .option("mirror", &Options::mirror,

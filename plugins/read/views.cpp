@@ -13,6 +13,7 @@ struct Options {
   std::vector<std::filesystem::path> images;
   std::vector<std::filesystem::path> cameras;
   std::filesystem::path calibration;
+  std::vector<std::filesystem::path> distortions;
   int frame = 0;
   std::string mirror = "none";
   std::vector<double> projections, pixel_mm, corner_mm;
@@ -31,11 +32,13 @@ marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, co
   marrow::List<marrow::View> views;
   for (std::size_t i = 0; i < options.names.size(); ++i) {
     const std::string& name = options.names[i];
-    views.add(name, marrow::read::read_view_files(
-                        {name, options.images.at(i), cameras ? &marrow::read::camera_of_view(name, *cameras) : nullptr,
-                         cameras ? std::filesystem::path() : options.cameras.at(i), options.calibration, options.frame,
-                         options.mirror, projection_of(options, i), options.pixel_mm, options.corner_mm, options.scale},
-                        context));
+    views.add(name,
+              marrow::read::read_view_files(
+                  {name, options.images.at(i), cameras ? &marrow::read::camera_of_view(name, *cameras) : nullptr,
+                   cameras ? std::filesystem::path() : options.cameras.at(i), options.calibration,
+                   options.distortions.empty() ? std::filesystem::path() : options.distortions.at(i), options.frame,
+                   options.mirror, projection_of(options, i), options.pixel_mm, options.corner_mm, options.scale},
+                  context));
     for (const std::string& doubt : marrow::files::doubts_about_sides(options.images.at(i), options.frame))
       context.warn(doubt);
     marrow::files::warn_of_pixels(options.images.at(i), context);
@@ -62,6 +65,11 @@ MARROW_PLUGIN(plugin) {
       .option("calibration", &Options::calibration,
               "calibration file of the device that took all views; its camera matrix replaces those of the cameras, "
               "and its distortion is removed from the images")
+      .option(
+          "distortions", &Options::distortions,
+          "one distortion file of camera.distortion_plate per view; the images are straightened by it and masked out "
+          "where it was not measured")
+      .relation(marrow::as_many_or_none("distortions", "names"))
       .option("frame", &Options::frame, "frame of a multi-frame file, counted from 1; 0: the file has only one frame",
               marrow::at_least(0))
       .option("mirror", &Options::mirror,

@@ -15,7 +15,8 @@ ROOMS = """
 TOPICS = {
     "calibration": {"files"},
     "draw": {"image"},
-    "exchange": {"files", "vtk"},
+    "exchange": {"distortion", "files", "vtk"},
+    "files": {"distortion"},
     "match": {"image"},
     "phantom": {"calibration", "files"},
     "track": {"files"},

@@ -49,9 +49,10 @@ fs::path camera_file(const Workbench& workbench, const json& camera, const std::
   return working_file(workbench.folder, "camera", ".yaml", written.dump(1) + "\n");
 }
 
-DistortedCamera distorted_camera(const Workbench& workbench, const json& camera, const std::string& image) {
+files::CameraInFile distorted_camera(const Workbench& workbench, const json& camera, const std::string& image) {
   const fs::path file = camera_file(workbench, camera, image);
-  return file.extension() == ".yaml" || file.extension() == ".yml" ? files::read_camera_file(file) : DistortedCamera();
+  return file.extension() == ".yaml" || file.extension() == ".yml" ? files::read_camera_file(file)
+                                                                   : files::CameraInFile();
 }
 
 std::vector<Override> overrides_of(const Workbench& workbench, const json& views) {

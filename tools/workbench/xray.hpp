@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "marrow/domain/calibration.hpp"
 #include "marrow/domain/camera.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
 #include "workbench/value_json.hpp"
 #include "workbench/workbench.hpp"
 #include "workbench/working_files.hpp"
@@ -19,7 +19,8 @@ std::filesystem::path camera_file(const Workbench& workbench, const nlohmann::js
 
 /// The camera of a view, with the distortion that is still in its image. Only marrow's own files hold one; for others
 /// the result is empty. Throws Error if it cannot be read.
-DistortedCamera distorted_camera(const Workbench& workbench, const nlohmann::json& camera, const std::string& image);
+files::CameraInFile distorted_camera(const Workbench& workbench, const nlohmann::json& camera,
+                                     const std::string& image);
 
 /// A camera as a draft's document has it.
 nlohmann::json camera_json(const Camera& camera);

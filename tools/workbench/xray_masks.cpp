@@ -7,7 +7,6 @@
 
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/domain/calibration.hpp"
 #include "marrow/toolbox/files/samples_out.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "workbench/xray.hpp"
@@ -22,7 +21,7 @@ using nlohmann::json;
 /// How the shown image differs from its file.
 struct Shown {
   bool is_mirrored = false;
-  DistortedCamera camera;  ///< without distortion if the image is not straightened
+  files::CameraInFile camera;  ///< without distortion if the image is not straightened
 };
 
 /// From the request's {image, camera}; `camera` is null if the image is shown without it.
@@ -48,8 +47,8 @@ Answer shown_mask(const Workbench& workbench, const Request& request) {
   cv::Mat1b mask = mirrored_if(shown.is_mirrored != files::is_mirrored_as_read(file),
                                ran.outputs.at("image").as<Image>().pixels != 0);
   const Camera& camera = shown.camera.camera;
-  if (!shown.camera.distortion.is_none() && mask.cols == camera.width_px && mask.rows == camera.height_px)
-    mask = straightened_mask(mask, camera.intrinsics, shown.camera.distortion);
+  if (shown.camera.is_distorted() && mask.cols == camera.width_px && mask.rows == camera.height_px)
+    mask = files::straightened_mask(mask, shown.camera);
   return bytes_answer(bytes_of_pixels(mask), {{"width_px", mask.cols}, {"height_px", mask.rows}});
 }
 
@@ -88,8 +87,7 @@ void add_xray_masks(Server& server, Workbench& workbench) {
     std::string bytes = mask_of(width_px, height_px, request.body.value("runs", json()));
     const Shown shown = shown_in(workbench, request);
     cv::Mat1b mask(height_px, width_px, reinterpret_cast<std::uint8_t*>(bytes.data()));
-    if (!shown.camera.distortion.is_none())
-      mask = original_mask(mask, shown.camera.camera.intrinsics, shown.camera.distortion);
+    if (shown.camera.is_distorted()) mask = files::original_mask(mask, shown.camera);
     mask = mirrored_if(shown.is_mirrored, mask);
     if (cv::countNonZero(mask) == width_px * height_px) return json_answer({{"mask", nullptr}});
     const auto* pixels = reinterpret_cast<const char*>(mask.ptr());

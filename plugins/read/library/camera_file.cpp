@@ -5,7 +5,6 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/read/projections.hpp"
 #include "marrow/toolbox/exchange/plastimatch_camera.hpp"
-#include "marrow/toolbox/files/camera_file.hpp"
 #include "marrow/toolbox/files/header_lines.hpp"
 #include "marrow/toolbox/files/length_units.hpp"
 
@@ -44,16 +43,16 @@ CameraFormat camera_format(const std::filesystem::path& path) {
   return exchange::is_plastimatch_camera(path) ? CameraFormat::plastimatch : CameraFormat::xmalab;
 }
 
-DistortedCamera read_camera(const std::filesystem::path& path, const CameraReading& reading) {
+files::CameraInFile read_camera(const std::filesystem::path& path, const CameraReading& reading) {
   const CameraFormat format = camera_format(path);
   check_needed(path, reading, format);
-  DistortedCamera found;
+  files::CameraInFile found;
   if (format == CameraFormat::rtk || format == CameraFormat::xreg) {
     const int number = reading.projection >= 0 ? reading.projection : only_projection(path);
     found.camera = read_projections(path, {number}, reading.size, reading.mirror, reading.scale)[0];
   } else {
     found = format == CameraFormat::plastimatch
-                ? DistortedCamera{exchange::read_plastimatch_camera(path, reading.size), {}}
+                ? files::CameraInFile{{exchange::read_plastimatch_camera(path, reading.size), {}}, {}}
                 : files::read_camera_file(path);
     found.camera.camera_from_world.translation_mm *= reading.scale;
   }

@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <string>
 
-#include "marrow/domain/calibration.hpp"
 #include "marrow/toolbox/exchange/camera_matrix.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
 
 namespace marrow::read {
 
@@ -27,7 +27,7 @@ struct CameraReading {
 /// The camera in a file of any format. Only marrow's own YAML holds a distortion. `size.size_px` may be given for any
 /// format. Throws Error for any other value that the format does not need, if the camera's images have another size
 /// than `size_px`, if the file holds several projections and none is chosen, and as the format's reader does.
-DistortedCamera read_camera(const std::filesystem::path& path, const CameraReading& reading);
+files::CameraInFile read_camera(const std::filesystem::path& path, const CameraReading& reading);
 
 /// files::doubt_about_distance() of a camera from this file, with the file's name; empty for marrow's own format, which
 /// is always in mm.

@@ -5,23 +5,30 @@
 #include "marrow/base/names.hpp"
 #include "marrow/read/calibration_file.hpp"
 #include "marrow/read/camera_file.hpp"
+#include "marrow/toolbox/files/distortion_file.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 
 namespace marrow::read {
 namespace {
 
 /// Some formats do not give the size of the images: then it is taken from the image.
-DistortedCamera camera_in_file(const ViewSource& source, const Image& image, const Context& context) {
+files::CameraInFile camera_in_file(const ViewSource& source, const Image& image, const Context& context) {
   CameraReading reading{
       source.projection, {{}, source.pixel_mm, source.corner_mm}, exchange::Mirror::none, source.scale};
   const CameraFormat format = camera_format(source.camera_file);
   if (format == CameraFormat::rtk || format == CameraFormat::xreg) reading.mirror = exchange::mirror_of(source.mirror);
   if (format == CameraFormat::rtk || format == CameraFormat::plastimatch)
     reading.size.size_px = {double(image.width()), double(image.height())};
-  const DistortedCamera found = read_camera(source.camera_file, reading);
+  const files::CameraInFile found = read_camera(source.camera_file, reading);
   if (const std::string doubt = doubt_about_unit(source.camera_file, found.camera, source.scale); !doubt.empty())
     context.warn("view '" + source.name + "': " + doubt);
   return found;
+}
+
+[[noreturn]] void throw_two_distortions(const std::string& view, const std::filesystem::path& first,
+                                        const std::filesystem::path& second) {
+  throw Error("view '" + view + "': both " + first.string() + " and " + second.string() +
+              " give a distortion, which can be removed only once; delete it from one of them");
 }
 
 }  // namespace
@@ -44,12 +51,14 @@ ViewCamera read_view_camera(const ViewSource& source, const Image& image, const 
     camera.camera.camera = *source.camera;
   else
     camera.camera = camera_in_file(source, image, context);
-  if (source.calibration.empty()) return camera;
-  if (!camera.camera.distortion.is_none())
-    throw Error("view '" + source.name + "': both " + source.camera_file.string() + " and " +
-                source.calibration.string() +
-                " give a distortion, which can be removed only once; delete it from one of them");
-  camera.calibration = read::read_calibration_file(source.calibration);
+  if (!source.calibration.empty()) camera.calibration = read::read_calibration_file(source.calibration);
+  const bool in_calibration = camera.calibration && !camera.calibration->distortion.is_none();
+  if (camera.camera.is_distorted() && camera.calibration)
+    throw_two_distortions(source.name, source.camera_file, source.calibration);
+  if (source.distortion.empty()) return camera;
+  if (camera.camera.is_distorted()) throw_two_distortions(source.name, source.camera_file, source.distortion);
+  if (in_calibration) throw_two_distortions(source.name, source.calibration, source.distortion);
+  camera.camera.measured = files::read_distortion_file(source.distortion);
   return camera;
 }
 
@@ -59,10 +68,8 @@ View view_of(const std::string& name, Image image, const ViewCamera& camera) {
   view.image = std::move(image);
   view.camera = camera.camera.camera;
   check_view(view);
-  if (camera.calibration)
-    apply_calibration(view, *camera.calibration);
-  else if (!camera.camera.distortion.is_none())
-    remove_distortion(view, camera.camera.distortion);
+  if (camera.calibration) apply_calibration(view, *camera.calibration);
+  files::straighten(view, camera.camera);
   return view;
 }
 

@@ -9,6 +9,7 @@
 #include "marrow/domain/camera.hpp"
 #include "marrow/domain/list.hpp"
 #include "marrow/runtime/node/context.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
 
 namespace marrow::read {
 
@@ -19,6 +20,7 @@ struct ViewSource {
   const Camera* camera = nullptr;
   std::filesystem::path camera_file;
   std::filesystem::path calibration;  ///< may be empty
+  std::filesystem::path distortion;   ///< may be empty
   int frame = 0;                      ///< of the image file, from 1; 0: the file must have only one
   std::string mirror = "none";        ///< as files::turned_over() takes it; the camera is that of the image afterwards
   int projection = -1;                ///< as CameraReading has it
@@ -31,12 +33,12 @@ const Camera& camera_of_view(const std::string& view, const List<Camera>& camera
 
 /// How the images of a view were taken.
 struct ViewCamera {
-  DistortedCamera camera;
+  files::CameraInFile camera;
   std::optional<Calibration> calibration;  ///< its camera matrix replaces the camera's
 };
 
-/// Reads the camera of a view whose image is `image`, and its calibration. Warns as doubt_about_unit() does. Throws
-/// Error if a file cannot be read, or does not fit the image, or if both describe a distortion.
+/// Reads the camera of a view whose image is `image`, its calibration and its distortion. Warns as doubt_about_unit()
+/// does. Throws Error if a file cannot be read, or does not fit the image, or if two of them describe a distortion.
 ViewCamera read_view_camera(const ViewSource& source, const Image& image, const Context& context);
 
 /// A view with a plain pinhole camera: a distortion is removed from the image. Throws Error if sizes do not match.

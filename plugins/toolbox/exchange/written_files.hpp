@@ -24,6 +24,8 @@ using VtpFile = FileOf<struct Vtp>;
 using PlastimatchFile = FileOf<struct Plastimatch>;
 using RtkFile = FileOf<struct Rtk>;
 using XregFile = FileOf<struct Xreg>;
+using XmalabCameraFile = FileOf<struct XmalabCamera>;
+using XmalabGridFile = FileOf<struct XmalabGrid>;
 
 /// The writer of such a type.
 template <class Format>
@@ -41,3 +43,5 @@ MARROW_VALUE_TYPE(marrow::exchange::VtpFile, "vtp_file", 1)
 MARROW_VALUE_TYPE(marrow::exchange::PlastimatchFile, "plastimatch_file", 1)
 MARROW_VALUE_TYPE(marrow::exchange::RtkFile, "rtk_file", 1)
 MARROW_VALUE_TYPE(marrow::exchange::XregFile, "xreg_file", 1)
+MARROW_VALUE_TYPE(marrow::exchange::XmalabCameraFile, "xmalab_camera_file", 1)
+MARROW_VALUE_TYPE(marrow::exchange::XmalabGridFile, "xmalab_grid_file", 1)

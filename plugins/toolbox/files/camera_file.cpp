@@ -9,6 +9,7 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/plain_text.hpp"
 #include "marrow/domain/decompositions.hpp"
+#include "marrow/toolbox/distortion/straighten.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 
@@ -115,8 +116,25 @@ Camera read_xmalab(const std::filesystem::path& path) {
 
 }  // namespace
 
-DistortedCamera read_camera_file(const std::filesystem::path& path) {
-  if (path.extension() != ".yaml" && path.extension() != ".yml") return {read_xmalab(path), {}};
+void straighten(View& view, const CameraInFile& camera) {
+  if (!camera.measured.is_none())
+    distortion::straighten(view, camera.measured);
+  else if (!camera.distortion.is_none())
+    remove_distortion(view, camera.distortion);
+}
+
+cv::Mat1b straightened_mask(const cv::Mat1b& original, const CameraInFile& camera) {
+  return camera.measured.is_none() ? marrow::straightened_mask(original, camera.camera.intrinsics, camera.distortion)
+                                   : distortion::straightened_mask(original, camera.measured);
+}
+
+cv::Mat1b original_mask(const cv::Mat1b& straight, const CameraInFile& camera) {
+  return camera.measured.is_none() ? marrow::original_mask(straight, camera.camera.intrinsics, camera.distortion)
+                                   : distortion::original_mask(straight, camera.measured);
+}
+
+CameraInFile read_camera_file(const std::filesystem::path& path) {
+  if (path.extension() != ".yaml" && path.extension() != ".yml") return {{read_xmalab(path), {}}, {}};
   YamlFile file(path);
   const auto camera = camera_from(file.root(), file);
   if (!file.root()["marrow-camera"]) file.fault(file.root().Mark(), "camera: key 'marrow-camera' is missing");

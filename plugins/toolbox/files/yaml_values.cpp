@@ -8,6 +8,7 @@
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/domain/c_arm.hpp"
+#include "marrow/toolbox/files/distortion_file.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 
 namespace marrow::files {
@@ -119,6 +120,24 @@ std::optional<Camera> camera_by_matrices(const YamlMap& map, int width_px, int h
   return Camera{width_px, height_px, *intrinsics, *transform};
 }
 
+/// Whether the key `distortion` could be read.
+bool take_measured(const YamlMap& map, CameraInFile& camera) {
+  if (map.has("radial_distortion")) {
+    map.fault("distortion", "distortion: 'radial_distortion' is given, too; keep one of the two");
+    return false;
+  }
+  const auto measured = distortion_from(map.node("distortion"), map.file());
+  if (!measured) return false;
+  if (measured->width_px != camera.camera.width_px || measured->height_px != camera.camera.height_px) {
+    map.fault("distortion",
+              formatted("distortion: it is of images of {} x {} pixels, the camera of {} x {}", measured->width_px,
+                        measured->height_px, camera.camera.width_px, camera.camera.height_px));
+    return false;
+  }
+  camera.measured = *measured;
+  return true;
+}
+
 }  // namespace
 
 std::optional<Detector> detector_from(const YamlMap& map, int width_px, int height_px) {
@@ -177,10 +196,10 @@ std::optional<Camera> camera_by_detector(const YamlMap& map, int width_px, int h
 
 }  // namespace
 
-std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& file) {
+std::optional<CameraInFile> camera_from(const YAML::Node& node, YamlFile& file) {
   const YamlMap map(file, node, "camera",
                     {"marrow-camera", "width_px", "height_px", "intrinsics", "radial_distortion", "camera_from_world",
-                     "c_arm", "projection_matrix", "detector"});
+                     "c_arm", "projection_matrix", "detector", "distortion"});
   if (map.has("marrow-camera")) check_version(map, "marrow-camera");
   const auto width = map.integer("width_px"), height = map.integer("height_px");
   const int width_px = width.value_or(0), height_px = height.value_or(0);
@@ -199,7 +218,8 @@ std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& fil
                                        : whole == "detector"          ? camera_by_detector(map, width_px, height_px)
                                                              : camera_by_matrices(map, width_px, height_px, file);
   if (!camera || !width || !height) return std::nullopt;
-  DistortedCamera result{*camera, {}};
+  CameraInFile result{{*camera, {}}, {}};
+  if (map.has("distortion") && !take_measured(map, result)) return std::nullopt;
   if (map.has("radial_distortion")) {
     const auto terms = map.vector3("radial_distortion");
     if (!terms) return std::nullopt;

@@ -7,6 +7,7 @@
 #include "marrow/domain/pose.hpp"
 #include "marrow/domain/verdict.hpp"
 #include "marrow/domain/volume.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
 #include "marrow/toolbox/files/projection_camera.hpp"
 #include "marrow/toolbox/files/strict_yaml.hpp"
 
@@ -23,8 +24,9 @@ const std::vector<std::string>& transform_keys();
 std::optional<Detector> detector_from(const YamlMap& map, int width_px, int height_px);
 
 /// A camera from the keys width_px, height_px, then intrinsics with camera_from_world, or one of c_arm,
-/// projection_matrix and detector; and, for distorted images, radial_distortion. Faults are noted in `file`.
-std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& file);
+/// projection_matrix and detector; and, for distorted images, radial_distortion or distortion. Faults are noted in
+/// `file`.
+std::optional<CameraInFile> camera_from(const YAML::Node& node, YamlFile& file);
 
 /// Seeds of one fragment from the map's keys `seeds` and `register`.
 Seeds seeds_from(const YamlMap& map, const std::string& fragment);

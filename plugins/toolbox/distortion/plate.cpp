@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/distortion/plate.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "marrow/base/error.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/domain/decompositions.hpp"
+#include "marrow/domain/quantile.hpp"
+#include "marrow/toolbox/distortion/polynomial.hpp"
+
+namespace marrow::distortion {
+namespace {
+
+constexpr double kSizeStep = 1.3;        ///< ratio of the diameters that are tried
+constexpr double kLeastRoundness = 0.5;  ///< of a dot that the border of the field does not cut
+constexpr double kNearlyAsMany = 0.92;   ///< of the most dots
+
+cv::Mat1f grey_of(const Image& image) {
+  if (image.pixels.empty() || image.pixels.channels() != 1)
+    throw Error("the image of the plate is empty or has colours; an X-ray has one channel");
+  cv::Mat1f grey;
+  image.pixels.convertTo(grey, CV_32F);
+  if (!cv::checkRange(grey, true)) throw Error("the image of the plate has a pixel that is not a finite number");
+  return grey;
+}
+
+std::vector<double> diameters_of(const PlateSearch& search, const cv::Size& size) {
+  if (search.dot_px > 0) return {search.dot_px};
+  std::vector<double> diameters;
+  const double largest = std::max(2.0, std::min(size.width, size.height) / 24.0);
+  for (double diameter = 2; diameter <= largest; diameter *= kSizeStep) diameters.push_back(diameter);
+  return diameters;
+}
+
+std::vector<PlateImage> candidates(const cv::Mat1f& grey, const PlateSearch& search) {
+  std::vector<PlateImage> all;
+  for (const double diameter : diameters_of(search, grey.size()))
+    for (const bool is_bright : {true, false}) {
+      if (search.is_bright && *search.is_bright != is_bright) continue;
+      const std::vector<Spot> spots = find_spots(grey, 0.5 * diameter, is_bright);
+      for (const Pattern grid : {Pattern::square, Pattern::hexagonal}) {
+        if (search.grid && *search.grid != grid) continue;
+        all.push_back({grid, is_bright, diameter, spots, find_grid(spots, grid)});
+      }
+    }
+  return all;
+}
+
+/// A homography from the plate to the image by least squares, as a map of the plate onto itself: its derivative at the
+/// plate's middle is the identity.
+std::vector<Eigen::Vector2d> with_perspective(const std::vector<Eigen::Vector2d>& plate,
+                                              const std::vector<Eigen::Vector2d>& seen) {
+  std::vector<cv::Point2d> from, to;
+  for (std::size_t i = 0; i < plate.size(); ++i) {
+    from.emplace_back(plate[i].x(), plate[i].y());
+    to.emplace_back(seen[i].x(), seen[i].y());
+  }
+  const cv::Mat1d h = cv::findHomography(from, to, 0);
+  if (h.empty()) throw Error("the dots of the plate do not determine its perspective; they may lie on one line");
+  std::vector<Eigen::Vector2d> places;
+  for (const Eigen::Vector2d& at : plate) {
+    const Eigen::Vector3d ray(h(0, 0) * at.x() + h(0, 1) * at.y() + h(0, 2),
+                              h(1, 0) * at.x() + h(1, 1) * at.y() + h(1, 2),
+                              h(2, 0) * at.x() + h(2, 1) * at.y() + h(2, 2));
+    places.push_back(ray.head<2>() / ray.z());
+  }
+  return places;
+}
+
+/// The similarity nearest to a map's derivative that keeps its handedness.
+Eigen::Matrix2d nearest_similarity(const Eigen::Matrix2d& map) {
+  const double sign = map.determinant() < 0 ? -1 : 1;
+  const double a = 0.5 * (map(0, 0) + sign * map(1, 1)), b = 0.5 * (map(1, 0) - sign * map(0, 1));
+  Eigen::Matrix2d result;
+  result << a, -sign * b, b, sign * a;
+  return result;
+}
+
+double stretch_of(const Eigen::Matrix2d& map) {
+  const Eigen::Vector2d squares = eigen_of_symmetric<2>(map.transpose() * map).values;
+  return std::sqrt(squares[1] / squares[0]);
+}
+
+/// The point of the plate that is seen at a pixel, by Newton's method from `plate_place`.
+Eigen::Vector2d place_seen_at(const Polynomial& seen_from_plate, Eigen::Vector2d plate_place,
+                              const Eigen::Vector2d& pixel) {
+  for (int round = 0; round < 20; ++round)
+    plate_place += seen_from_plate.derivative_at(plate_place).inverse() * (pixel - seen_from_plate.at(plate_place));
+  return plate_place;
+}
+
+}  // namespace
+
+PlateImage find_plate(const Image& image, const PlateSearch& search, std::size_t least_dots) {
+  const cv::Mat1f grey = grey_of(image);
+  const std::vector<PlateImage> all = candidates(grey, search);
+  std::size_t most = 0;
+  for (const PlateImage& one : all) most = std::max(most, one.dots.size());
+  const PlateImage* best = nullptr;
+  double least_unevenness = 0;
+  for (const PlateImage& one : all) {
+    if (most == 0 || double(one.dots.size()) < kNearlyAsMany * double(most)) continue;
+    const double unevenness = unevenness_px(one.spots, one.dots, one.grid);
+    if (best && unevenness >= least_unevenness) continue;
+    best = &one;
+    least_unevenness = unevenness;
+  }
+  if (!best || most < least_dots)
+    throw Error(
+        formatted("{} dots or holes of a regular grid were found; at least {} are needed. Check that the image shows "
+                  "the plate alone, and give grid, dots and dot_px if they are known",
+                  most, least_dots));
+  return *best;
+}
+
+StraightPlate straight_plate(const PlateImage& plate, Straight straight, int width_px, int height_px) {
+  std::vector<Eigen::Vector2d> places, seen;
+  for (const GridDot& dot : plate.dots) {
+    places.push_back(place_on_plate(plate.grid, dot.column, dot.row));
+    seen.push_back(plate.spots[std::size_t(dot.spot)].at_px);
+  }
+  if (straight == Straight::homography) places = with_perspective(places, seen);
+  const Eigen::Vector2d middle(0.5 * (width_px - 1), 0.5 * (height_px - 1));
+  std::size_t central = 0;
+  for (std::size_t i = 0; i < seen.size(); ++i)
+    if ((seen[i] - middle).squaredNorm() < (seen[central] - middle).squaredNorm()) central = i;
+  const double spacing = spacing_px(plate.spots, plate.dots, plate.grid);
+  const Eigen::Vector2d anchor = (seen[central] - middle).norm() < spacing ? middle : seen[central];
+  std::vector<bool> is_used(places.size(), true);
+  const auto [centre, half] = square_around(places);
+  const int degree = places.size() >= 120 ? 5 : 3;
+  const Polynomial seen_from_plate = fit_robustly(degree, centre, half, places, seen, 5, is_used);
+  const Eigen::Vector2d origin = place_seen_at(seen_from_plate, places[central], anchor);
+  const Eigen::Matrix2d derivative = seen_from_plate.derivative_at(origin);
+  if (!derivative.allFinite() || !(std::abs(derivative.determinant()) > 0) || !origin.allFinite())
+    throw Error("the dots of the plate do not determine where its middle is; they may lie on one line");
+  const Eigen::Matrix2d image_from_plate =
+      straight == Straight::similarity ? nearest_similarity(derivative) : derivative;
+  StraightPlate result;
+  result.stretch = stretch_of(derivative);
+  result.points.width_px = width_px;
+  result.points.height_px = height_px;
+  for (std::size_t i = 0; i < places.size(); ++i)
+    result.points.add(anchor + image_from_plate * (places[i] - origin), seen[i],
+                      plate.spots[std::size_t(plate.dots[i].spot)].roundness > kLeastRoundness);
+  result.pixels_per_spacing =
+      straight == Straight::homography ? spacing : std::sqrt(std::abs(image_from_plate.determinant()));
+  return result;
+}
+
+double covered_share(const std::vector<Eigen::Vector2d>& points, double reach_px, const cv::Mat1b& area) {
+  cv::Mat1b near(area.size(), std::uint8_t(0));
+  for (const Eigen::Vector2d& at : points)
+    cv::circle(near, {int(std::lround(at.x())), int(std::lround(at.y()))}, int(std::ceil(reach_px)), cv::Scalar(255),
+               cv::FILLED);
+  const int total = cv::countNonZero(area);
+  return total == 0 ? 0 : double(cv::countNonZero(near & area)) / total;
+}
+
+cv::Mat1b field_of(const Image& image, double width_px) {
+  const cv::Mat1f grey = grey_of(image);
+  const int width = 2 * int(std::ceil(0.5 * width_px)) + 1;
+  cv::Mat1f closed;
+  cv::morphologyEx(grey, closed, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_RECT, {width, width}));
+  std::vector<float> sorted(closed.begin(), closed.end());
+  const double bright = quantile_in_place(sorted, 0.95), dark = sorted.empty() ? 0 : quantile_in_place(sorted, 0.0);
+  return closed > dark + 0.25 * (bright - dark);
+}
+
+}  // namespace marrow::distortion

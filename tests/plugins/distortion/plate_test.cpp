@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+// From simulated images of plates to the distortion. The truth is no polynomial, and its points are no dots.
+#include <gtest/gtest.h>
+
+#include <marrow/testing/node.hpp>
+
+#include "marrow/toolbox/distortion/arm.hpp"
+#include "marrow/toolbox/distortion/plate.hpp"
+#include "tests/plugins/read/files.hpp"
+
+namespace plate_test {
+
+using namespace marrow;
+using distortion::Distortion, distortion::PlatePoints;
+using node_test::call, node_test::item, node_test::list;
+
+struct Simulated {
+  List<Image> images;
+  List<PlatePoints> truth;
+};
+
+/// A device half as large as a real one: 512 pixels, a field of 235 px, neighbours 14.7 px apart.
+Simulated simulated(std::uint64_t seed, node_test::Options options = {}) {
+  options.insert({{"width_px", std::int64_t(512)},
+                  {"height_px", std::int64_t(512)},
+                  {"field_px", 235.0},
+                  {"pincushion_px", 12.0},
+                  {"turn_deg", -0.6}});
+  const auto outputs = call("simulate.distortion_plate", {}, options, Context(seed));
+  return {outputs.at("images").as_list<Image>(), outputs.at("true_points").as_list<PlatePoints>()};
+}
+
+double figure(const Value& metrics, const std::string& name) {
+  for (const Metric& metric : metrics.as<Metrics>().items)
+    if (metric.name == name) return metric.value;
+  throw Error("there is no figure " + name);
+}
+
+struct Errors {
+  double usual_px = 0, worst_px = 0, share = 0;
+};
+
+Errors errors_of(const Value& distortion, const PlatePoints& truth) {
+  const auto outputs = call("evaluate.distortion", {{"distortion", distortion}, {"true_points", item(truth)}});
+  const Value& metrics = outputs.at("metrics");
+  return {figure(metrics, "error"), figure(metrics, "worst_error"), figure(metrics, "measured_share")};
+}
+
+struct Case {
+  std::string name;
+  node_test::Options options;
+  double limit_px;
+  double share = 90;  ///< of the true points that must be measured
+};
+
+class DistortionPlate : public testing::TestWithParam<Case> {};
+
+TEST_P(DistortionPlate, StraightensPointsThatItDidNotSee) {
+  const Simulated device = simulated(5, GetParam().options);
+  const auto found = call("camera.distortion_plate", {{"image", item(device.images[0])}});
+  const Errors errors = errors_of(found.at("distortion"), device.truth[0]);
+  EXPECT_LT(errors.usual_px, GetParam().limit_px);
+  EXPECT_LT(errors.worst_px, 6 * GetParam().limit_px);
+  EXPECT_GT(errors.share, GetParam().share);
+}
+
+const std::vector<Case> kCases{
+    {"usual", {}, 0.1},
+    {"hexagonal_dark", {{"grid", std::string("hexagonal")}, {"dots", std::string("dark")}}, 0.1},
+    {"turned", {{"plate_turn_deg", 41.0}}, 0.1},
+    {"missing", {{"missing_share", 0.2}}, 0.1},
+    {"rod_apart", {{"instrument_px", 90.0}}, 0.15},
+    {"half_covered", {{"covered_share", 0.4}}, 0.2, 45},
+    {"uneven", {{"vignetting", 0.7}, {"unevenness", 0.6}}, 0.15},
+    {"few_photons", {{"photons", 60.0}}, 0.25},
+    {"blurred", {{"blur_px", 2.0}}, 0.15},
+    {"barrel", {{"pincushion_px", -12.0}}, 0.1},
+    {"iron", {{"iron_shift_px", 2.0}}, 0.15},
+};
+INSTANTIATE_TEST_SUITE_P(Plates, DistortionPlate, testing::ValuesIn(kCases),
+                         [](const auto& info) { return info.param.name; });
+
+TEST(DistortionPlates, SayTheTurnThePincushionAndTheCoverage) {
+  const Simulated device = simulated(2);
+  const auto found = call("camera.distortion_plate", {{"image", item(device.images[0])}}, {{"dot_spacing_mm", 4.4}});
+  const Value& metrics = found.at("metrics");
+  EXPECT_NEAR(figure(metrics, "turn"), -0.6, 0.1);
+  EXPECT_NEAR(figure(metrics, "pixel"), 0.3, 0.002);
+  EXPECT_GT(figure(metrics, "field_coverage"), 95);
+  EXPECT_NEAR(figure(metrics, "coverage"), 100 * 3.14159 * 235 * 235 / (512.0 * 512.0), 3);
+  EXPECT_LT(figure(metrics, "residual"), 0.15);
+  EXPECT_GE(figure(metrics, "validated"), figure(metrics, "residual"));
+}
+
+TEST(DistortionPlates, AMirroredImageHasTheMirroredDistortion) {
+  const Simulated device = simulated(3);
+  cv::Mat mirrored;
+  cv::flip(device.images[0].pixels, mirrored, 1);
+  const auto one = call("camera.distortion_plate", {{"image", item(device.images[0])}}),
+             other = call("camera.distortion_plate", {{"image", item(Image{mirrored})}});
+  EXPECT_NEAR(figure(one.at("metrics"), "turn"), -figure(other.at("metrics"), "turn"), 0.01);
+  EXPECT_NEAR(figure(one.at("metrics"), "pincushion"), figure(other.at("metrics"), "pincushion"), 0.05);
+  PlatePoints truth = device.truth[0];
+  for (auto* places : {&truth.ideal_px, &truth.seen_px})
+    for (Eigen::Vector2d& place : *places) place.x() = 511 - place.x();
+  EXPECT_LT(errors_of(other.at("distortion"), truth).usual_px, 0.1);
+}
+
+TEST(DistortionPlates, ATiltedPlateNeedsItsPerspective) {
+  const Simulated device = simulated(4, {{"tilt_deg", 15.0}});
+  const auto error = [&](const std::string& straight) {
+    const auto found = call("camera.distortion_plate", {{"image", item(device.images[0])}}, {{"straight", straight}});
+    return errors_of(found.at("distortion"), device.truth[0]).usual_px;
+  };
+  EXPECT_LT(error("homography"), 0.5);
+  EXPECT_GT(error("similarity"), 1);
+}
+
+TEST(DistortionPlates, RefuseAnImageWithoutAPlate) {
+  cv::Mat noise(256, 256, CV_16U);
+  cv::theRNG().state = 7;
+  cv::randu(noise, 20000, 30000);
+  EXPECT_SAYS(call("camera.distortion_plate", {{"image", item(Image{noise})}}),
+              "0 dots or holes of a regular grid were found; at least 30 are needed");
+  EXPECT_SAYS(call("camera.distortion_plate", {{"image", item(Image{cv::Mat()})}}), "the image of the plate is empty");
+  cv::Mat1f broken(100, 100, 5.f);
+  broken(3, 3) = std::nanf("");
+  EXPECT_SAYS(call("camera.distortion_plate", {{"image", item(Image{broken})}}), "a pixel that is not a finite number");
+}
+
+/// The indices of a 12 x 9 grid, turned by 20 degrees, of which some dots are missing.
+TEST(FindGrid, IndexesAKnownGrid) {
+  using namespace marrow::distortion;
+  for (const Pattern pattern : {Pattern::square, Pattern::hexagonal}) {
+    std::vector<Spot> spots;
+    std::vector<std::pair<int, int>> known;
+    for (int row = 0; row < 9; ++row)
+      for (int column = 0; column < 12; ++column) {
+        if (row == 4 && column % 5 == 2) continue;
+        const Eigen::Vector2d at = 17 * place_on_plate(pattern, column, row);
+        spots.push_back({{60 + std::cos(0.35) * at.x() - std::sin(0.35) * at.y(),
+                          200 + std::sin(0.35) * at.x() + std::cos(0.35) * at.y()},
+                         100});
+        known.emplace_back(column, row);
+      }
+    spots.push_back({{90, 207}, 100});  // a scratch
+    const std::vector<GridDot> dots = find_grid(spots, pattern);
+    EXPECT_GE(dots.size(), known.size() - 4);
+    EXPECT_NEAR(spacing_px(spots, dots, pattern), 17, 1e-6);
+    // Distances on the plate are those of the known grid, wherever the counting began and however it is turned.
+    for (std::size_t i = 1; i < dots.size(); ++i) {
+      const auto& [column, row] = known.at(std::size_t(dots[i].spot));
+      const auto& [first_column, first_row] = known.at(std::size_t(dots[0].spot));
+      EXPECT_NEAR(
+          (place_on_plate(pattern, dots[i].column, dots[i].row) - place_on_plate(pattern, dots[0].column, dots[0].row))
+              .norm(),
+          (place_on_plate(pattern, column, row) - place_on_plate(pattern, first_column, first_row)).norm(), 1e-9);
+    }
+    EXPECT_TRUE(find_grid(spots, pattern == Pattern::square ? Pattern::hexagonal : Pattern::square).empty());
+  }
+}
+
+TEST(DistortionBetween, FindsAPoseThatWasHeldOut) {
+  const Simulated device = simulated(6, {{"angles_deg", std::vector<double>{-60, -30, 0, 30, 60, 15}}});
+  List<Distortion> measured;
+  for (std::size_t i = 0; i < 5; ++i)
+    measured.add(
+        device.images.name(i),
+        call("camera.distortion_plate", {{"image", item(device.images[i])}}).at("distortion").as<Distortion>());
+  const node_test::Options options{{"measured_at", std::vector<double>{-60, -30, 0, 30, 60}},
+                                   {"names", std::vector<std::string>{"frontal"}},
+                                   {"wanted_at", std::vector<double>{15}}};
+  const auto found = call("camera.distortion_between", {{"distortions", list(measured, "view")}}, options);
+  const auto& between = found.at("distortion").as_list<Distortion>();
+  EXPECT_LT(errors_of(item(between[0]), device.truth[5]).usual_px, 0.15);
+  // The calibration of one pose does not serve the other.
+  EXPECT_GT(errors_of(item(measured[0]), device.truth[2]).usual_px, 0.2);
+}
+
+TEST(DistortionBetween, SaysWhatDoesNotFit) {
+  List<Distortion> measured;
+  const Simulated device = simulated(7);
+  measured.add("a",
+               call("camera.distortion_plate", {{"image", item(device.images[0])}}).at("distortion").as<Distortion>());
+  measured.add("b", measured[0]);
+  node_test::Options options{{"measured_at", std::vector<double>{0}},
+                             {"names", std::vector<std::string>{"v"}},
+                             {"wanted_at", std::vector<double>{50}}};
+  const node_test::Inputs inputs{{"distortions", list(measured, "view")}};
+  EXPECT_SAYS(call("camera.distortion_between", inputs, options),
+              "2 distortions are wired, but measured_at has 1 poses; give one for each");
+  options["measured_at"] = std::vector<double>{10, 10};
+  EXPECT_SAYS(call("camera.distortion_between", inputs, options), "'a' and 'b' were both measured at 10");
+  options["measured_at"] = std::vector<double>{0, 30};
+  std::string warned;
+  Context::Hooks hooks;
+  hooks.log = [&](std::string_view text, LogLevel) { warned += text; };
+  call("camera.distortion_between", inputs, options, Context(hooks));
+  EXPECT_NE(warned.find("'v' at 50 lies beyond the poses that were measured"), std::string::npos) << warned;
+}
+
+}  // namespace plate_test
