@@ -1,61 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "contact.hpp"
 
-#include <algorithm>
-#include <cmath>
+#include "marrow/toolbox/field/bones_apart.hpp"
 
 namespace marrow::similarity {
-namespace {
-
-/// The signed distances of points that lie in the field's grid. Outside of it nothing is known but that the bone is
-/// far away.
-std::vector<double> distances_mm(const std::vector<Eigen::Vector3d>& points_mm, const SignedField& bone,
-                                 const RigidTransform& bone_from_points) {
-  const Eigen::Vector3d last = Eigen::Vector3i(bone.grid.size.data()).cast<double>().array() - 1;
-  std::vector<double> distances;
-  for (const Eigen::Vector3d& point : points_mm) {
-    const Eigen::Vector3d index = bone.grid.index_from_point(bone_from_points * point);
-    if ((index.array() >= 0).all() && (index.array() <= last.array()).all())
-      distances.push_back(double(sample_trilinear(bone.grid, bone.values_mm, index)));
-  }
-  return distances;
-}
-
-}  // namespace
-
-double penetration_mm(const std::vector<Eigen::Vector3d>& points_mm, const SignedField& bone,
-                      const RigidTransform& bone_from_points) {
-  double squares = 0, fourths = 0;
-  for (const double distance : distances_mm(points_mm, bone, bone_from_points)) {
-    if (!(distance < 0)) continue;
-    squares += distance * distance;
-    fourths += std::pow(distance, 4);
-  }
-  return squares > 0 ? std::sqrt(fourths / squares) : 0;
-}
-
-double gap_mm(const std::vector<Eigen::Vector3d>& points_mm, const SignedField& bone,
-              const RigidTransform& bone_from_points) {
-  constexpr double kFall_mm = 0.5;
-  const std::vector<double> distances = distances_mm(points_mm, bone, bone_from_points);
-  if (distances.empty()) return double(*std::max_element(bone.values_mm.begin(), bone.values_mm.end()));
-  const double nearest = *std::min_element(distances.begin(), distances.end());
-  double sum = 0, weights = 0;
-  for (const double distance : distances) {
-    const double weight = std::exp((nearest - distance) / kFall_mm);
-    sum += weight * distance;
-    weights += weight;
-  }
-  return sum / weights;
-}
-
 std::vector<double> Contact::residuals(const RigidTransform& world_from_model) const {
   std::vector<double> residuals;
   for (const Neighbour& one : neighbours_) {
     const RigidTransform bone_from_model = inverse(one.world_from_bone) * world_from_model;
-    residuals.push_back(penetration_mm(*surface_mm_, *one.bone, bone_from_model) / options_.penetration_deviation_mm);
+    residuals.push_back(field::penetration_mm(*surface_mm_, *one.bone, bone_from_model) /
+                        options_.penetration_deviation_mm);
     if (one.is_joined)
-      residuals.push_back((gap_mm(*surface_mm_, *one.bone, bone_from_model) - options_.joint_width_mm) /
+      residuals.push_back((field::gap_mm(*surface_mm_, *one.bone, bone_from_model) - options_.joint_width_mm) /
                           options_.joint_deviation_mm);
   }
   return residuals;

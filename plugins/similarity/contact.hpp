@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Bones beside each other: how deep one lies in another, and how wide the gap between two is.
+// What is known about a bone beside others: it does not lie in them, and the gap of a joint may be known.
 #include <memory>
 #include <string>
 #include <vector>
@@ -25,17 +25,6 @@ struct Neighbour {
   RigidTransform world_from_bone;
   bool is_joined = false;  ///< whether the gap to it is known
 };
-
-/// How deep the points lie inside a bone, in mm: the square root of the mean squared depth, in which each point counts
-/// by its squared depth. So it is nearly the largest depth, but all deep points pull. 0 if none lies inside.
-double penetration_mm(const std::vector<Eigen::Vector3d>& points_mm, const SignedField& bone,
-                      const RigidTransform& bone_from_points);
-
-/// The mean distance of the nearest points from a bone's surface, in mm, negative inside. The weight of a point falls
-/// by a factor e with each half millimetre that it is farther away than the nearest. Distances are clamped as the
-/// field's are.
-double gap_mm(const std::vector<Eigen::Vector3d>& points_mm, const SignedField& bone,
-              const RigidTransform& bone_from_points);
 
 /// A bone's surface among its neighbours.
 class Contact {

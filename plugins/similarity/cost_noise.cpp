@@ -44,8 +44,11 @@ void check_known(const Pose& pose, const std::string& name, const std::string& r
 }
 
 void check_found(const Pose& found) {
-  check_known(found, "the pose found by the images",
-              "take it from a registration by a cost of the kind similarity, which predicts one");
+  const std::string what = "the pose found by the images",
+                    remedy = "; take it from a registration by a cost of the kind similarity, which predicts one";
+  check_pose(found, what);
+  if (!found.covariance) throw Error(what + " has no covariance" + remedy);
+  if (!found.covariance->allFinite()) throw Error(what + " has a covariance that is not finite" + remedy);
 }
 
 }  // namespace marrow::similarity

@@ -14,7 +14,7 @@ double noise_of(const Cost& cost, const Pose& found);
 /// Throws Error if check_pose() refuses the pose, or if its covariance is absent or not positive definite. The message
 /// begins with `name` and ends with `remedy`.
 void check_known(const Pose& pose, const std::string& name, const std::string& remedy);
-/// The same for a pose that a registration has found by a cost.
+/// Throws Error unless a pose that a registration has found by a cost has a finite covariance.
 void check_found(const Pose& found);
 
 }  // namespace marrow::similarity
