@@ -19,7 +19,8 @@ const T& of_bone(const List<T>& list, const std::string& name, const std::string
 
 Metrics contact(const List<Pose>& poses, const List<Mesh>& models, const List<SignedField>& fields) {
   constexpr std::size_t kPoints = 5000;
-  if (poses.size() < 2) throw Error("there are fewer than two bones, so nothing can touch; give the poses of two at least");
+  if (poses.size() < 2)
+    throw Error("there are fewer than two bones, so nothing can touch; give the poses of two at least");
   std::vector<std::vector<Eigen::Vector3d>> surfaces_mm;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     check_pose(poses[i], "the pose of '" + poses.name(i) + "'");
@@ -51,7 +52,8 @@ Metrics contact(const List<Pose>& poses, const List<Mesh>& models, const List<Si
 
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.contact", contact)
-      .summary("How deep each two bones lie in one another, and how wide the gap between them is where they are nearest")
+      .summary(
+          "How deep each two bones lie in one another, and how wide the gap between them is where they are nearest")
       .in("poses", "poses of the bones", over("fragment"))
       .in("models", "surfaces of the bones", over("fragment"))
       .in("fields", "signed fields of the bones; a gap wider than their band counts as the band", over("fragment"))

@@ -33,8 +33,7 @@ Steps steps_of(std::size_t bone, const Matrix6d& covariance) {
 
 class Curvature {
  public:
-  Curvature(const std::vector<Pose>& poses, const std::function<double(const std::vector<RigidTransform>&)>& cost)
-      : poses_(poses), cost_(cost) {
+  Curvature(const std::vector<Pose>& poses, const JointCost& cost) : poses_(poses), cost_(cost) {
     for (const Pose& pose : poses) at_.push_back(pose.world_from_model);
     here_ = cost(at_);
   }
@@ -59,52 +58,65 @@ class Curvature {
  private:
   double at(const std::vector<std::pair<std::size_t, Vector6d>>& motions) const {
     std::vector<RigidTransform> poses = at_;
-    for (const auto& [bone, motion] : motions) poses[bone] = moved(poses[bone], poses_[bone].frame, motion);
+    for (const auto& [bone, motion] : motions) poses[bone] = marrow::moved(poses[bone], poses_[bone].frame, motion);
     return cost_(poses);
   }
 
   const std::vector<Pose>& poses_;
-  const std::function<double(const std::vector<RigidTransform>&)>& cost_;
+  const JointCost& cost_;
   std::vector<RigidTransform> at_;
   double here_ = 0;
 };
 
-/// The inverse of a symmetric matrix with ones on its diagonal. Rough costs may give correlations that no information
-/// has, so its eigenvalues count as this at least.
-Eigen::MatrixXd inverse_of_correlations(const Eigen::MatrixXd& matrix) {
+/// A root of the inverse of a symmetric matrix with ones on its diagonal. Rough costs may give correlations that no
+/// information has, so its eigenvalues count as this at least.
+Eigen::MatrixXd root_of_inverse(const Eigen::MatrixXd& matrix) {
   constexpr double kLeast = 0.04;  // so no deviation grows more than five times
   const auto eigen = eigen_of_symmetric<Eigen::Dynamic>(matrix);
-  return eigen.vectors * eigen.values.cwiseMax(kLeast).cwiseInverse().asDiagonal() * eigen.vectors.transpose();
+  return eigen.vectors * eigen.values.cwiseMax(kLeast).cwiseSqrt().cwiseInverse().asDiagonal();
+}
+
+/// The correlations of the curvatures of two bones along their steps.
+Matrix6d correlations(const Matrix6d& mixed, const Vector6d& first, const Vector6d& second) {
+  Matrix6d correlations = Matrix6d::Zero();
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j)
+      if (first[i] > 0 && second[j] > 0)
+        correlations(i, j) = std::clamp(mixed(i, j) / std::sqrt(first[i] * second[j]), -1.0, 1.0);
+  return correlations;
 }
 
 }  // namespace
 
-void add_neighbours(std::vector<Pose>& poses, const std::function<double(const std::vector<RigidTransform>&)>& cost) {
-  std::vector<Steps> steps;
+std::vector<RigidTransform> moved(const std::vector<Pose>& poses, const Eigen::VectorXd& motions) {
+  std::vector<RigidTransform> result;
   for (std::size_t b = 0; b < poses.size(); ++b)
-    if (poses[b].covariance && poses[b].covariance->allFinite()) steps.push_back(steps_of(b, *poses[b].covariance));
-  if (steps.size() < 2) return;
+    result.push_back(marrow::moved(poses[b].world_from_model, poses[b].frame, motions.segment<6>(6 * Eigen::Index(b))));
+  return result;
+}
+
+Eigen::MatrixXd root_of_covariance(const std::vector<Pose>& poses, const JointCost& cost) {
+  std::vector<Steps> steps;
+  for (std::size_t b = 0; b < poses.size(); ++b) {
+    if (!poses[b].covariance || !poses[b].covariance->allFinite()) return {};
+    steps.push_back(steps_of(b, *poses[b].covariance));
+  }
   const Curvature curvature(poses, cost);
   std::vector<Vector6d> own;
   for (const Steps& one : steps) own.push_back(curvature.of(one));
-  Eigen::MatrixXd information =
-      Eigen::MatrixXd::Identity(6 * Eigen::Index(steps.size()), 6 * Eigen::Index(steps.size()));
-  for (std::size_t a = 0; a < steps.size(); ++a)
-    for (std::size_t b = 0; b < a; ++b) {
-      const Matrix6d mixed = curvature.of(steps[a], steps[b]);
-      for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) {
-          const double product = own[a][i] * own[b][j];
-          const Eigen::Index row = 6 * Eigen::Index(a) + i, column = 6 * Eigen::Index(b) + j;
-          information(row, column) = information(column, row) =
-              own[a][i] > 0 && own[b][j] > 0 ? std::clamp(mixed(i, j) / std::sqrt(product), -1.0, 1.0) : 0;
-        }
-    }
-  const Eigen::MatrixXd covariance = inverse_of_correlations(information);
+  const auto n = 6 * Eigen::Index(steps.size());
+  Eigen::MatrixXd information = Eigen::MatrixXd::Identity(n, n), deviations = Eigen::MatrixXd::Zero(n, n);
   for (std::size_t a = 0; a < steps.size(); ++a) {
-    const Matrix6d in_deviations = covariance.block<6, 6>(6 * Eigen::Index(a), 6 * Eigen::Index(a));
-    poses[steps[a].bone].covariance = steps[a].root * in_deviations * steps[a].root.transpose();
+    const Eigen::Index row = 6 * Eigen::Index(a);
+    deviations.block<6, 6>(row, row) = steps[a].root;
+    for (std::size_t b = 0; b < a; ++b) {
+      const Eigen::Index column = 6 * Eigen::Index(b);
+      const Matrix6d between = correlations(curvature.of(steps[a], steps[b]), own[a], own[b]);
+      information.block<6, 6>(row, column) = between;
+      information.block<6, 6>(column, row) = between.transpose();
+    }
   }
+  return deviations * root_of_inverse(information);
 }
 
 }  // namespace marrow::together

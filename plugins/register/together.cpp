@@ -72,7 +72,6 @@ class Together {
     for (std::size_t level = 0; level < level_count(); ++level) {
       for (int round = 0; round < options_.max_rounds; ++round)
         if (!in_turn(level, round)) break;
-      if (at_.size() > 1) at_once(level);
     }
     return finished();
   }
@@ -118,42 +117,8 @@ class Together {
     return has_moved && at_.size() > 1;
   }
 
-  std::vector<RigidTransform> moved_by(const Eigen::VectorXd& deg_and_mm) const {
-    std::vector<RigidTransform> poses = at_;
-    for (std::size_t b = 0; b < poses.size(); ++b) {
-      Vector6d motion = deg_and_mm.segment<6>(6 * Eigen::Index(b));
-      motion.head<3>() *= radians(1);
-      poses[b] = moved(poses[b], starts_[b].frame, motion);
-    }
-    return poses;
-  }
-
-  /// Minimises the mean cost over the poses of all bones. Rounds in turn are slow where two bones give way to each
-  /// other.
-  void at_once(std::size_t level) {
-    constexpr double kShorter = 0.3;  // the rounds in turn end near the minimum
-    const auto n = 6 * Eigen::Index(at_.size());
-    MinimisationProblem problem;
-    problem.start = Eigen::VectorXd::Zero(n);
-    problem.initial_step.resize(n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const bool is_axial = i % 6 == 2 && starts_[std::size_t(i / 6)].frame.is_anatomical;
-      problem.initial_step[i] = kShorter * (i % 6 >= 3 ? options_.step_mm[level]
-                                            : is_axial ? options_.step_axial_deg[level]
-                                                       : options_.step_deg[level]);
-    }
-    problem.max_evaluations = options_.max_evaluations * int(at_.size());
-    problem.step_tolerance = options_.step_tolerance / kShorter;
-    problem.function = [&](const Eigen::VectorXd& x) {
-      context_.check_cancelled();
-      return mean_cost(level, moved_by(x));
-    };
-    const MinimisationResult result = optimizer_.minimise(problem);
-    at_ = moved_by(result.x);
-    for (int& evaluations : evaluations_) evaluations += result.evaluations;
-  }
-
-  /// Each bone's pose with the covariance that it has among the others, and with what theirs add.
+  /// Each bone's pose with the covariance that it has among the others; then all of them at once, with what the others
+  /// add.
   std::vector<Pose> finished() {
     const std::size_t level = level_count() - 1;
     std::vector<Pose> poses;
@@ -165,8 +130,37 @@ class Together {
       at_[b] = search.pose();
       poses[b].evaluations += evaluations_[b];
     }
-    together::add_neighbours(poses, [&](const std::vector<RigidTransform>& at) { return mean_cost(level, at); });
+    if (poses.size() > 1) at_once(poses);
     return poses;
+  }
+
+  /// Minimises the mean cost over the poses of all bones. Rounds in turn are slow where two bones give way to each
+  /// other. Along the principal axes of all poses together, in units of their deviations, the search is not. Without
+  /// deviations, the rounds in turn are all that there is.
+  void at_once(std::vector<Pose>& poses) {
+    constexpr double kStep = 1, kTolerance = 0.02;  // deviations
+    const std::size_t level = level_count() - 1;
+    const together::JointCost cost = [&](const std::vector<RigidTransform>& at) {
+      context_.check_cancelled();
+      return mean_cost(level, at);
+    };
+    const Eigen::MatrixXd root = together::root_of_covariance(poses, cost);
+    if (root.size() == 0) return;
+    MinimisationProblem problem;
+    problem.start = Eigen::VectorXd::Zero(root.cols());
+    problem.initial_step = Eigen::VectorXd::Constant(root.cols(), kStep);
+    problem.max_evaluations = options_.max_evaluations * int(poses.size());
+    problem.step_tolerance = kTolerance;
+    problem.function = [&](const Eigen::VectorXd& x) { return cost(together::moved(poses, root * x)); };
+    const MinimisationResult result = optimizer_.minimise(problem);
+    const std::vector<RigidTransform> best = together::moved(poses, root * result.x);
+    for (std::size_t b = 0; b < poses.size(); ++b) {
+      const Eigen::MatrixXd of_bone = root.middleRows<6>(6 * Eigen::Index(b));
+      poses[b].world_from_model = best[b];
+      poses[b].covariance = Matrix6d(of_bone * of_bone.transpose());
+      poses[b].cost = among(b, level, best)->value(best[b]);
+      poses[b].evaluations += result.evaluations;
+    }
   }
 
   const List<Pose>& starts_;
