@@ -26,8 +26,17 @@ Inputs inputs_of(Volume volume, SignedField field, Mesh mesh) {
           {"views", Value::of(views, "view")}};
 }
 Inputs inputs_of(const analytic::Body& body) {
-  return inputs_of(volume_of(body, fine_grid(), 1000 * kDensity - 1000, -1000), field_of(body, fine_grid(), 6),
-                   mesh_of(body));
+  Inputs inputs = inputs_of(volume_of(body, fine_grid(), 1000 * kDensity - 1000, -1000), field_of(body, fine_grid(), 6),
+                            mesh_of(body));
+  const auto projector = std::make_shared<const analytic::BodyProjector>(body, kDensity);
+  List<RadiographProjector> projectors;
+  projectors.add_shared("bone", projector);
+  List<Pose> poses;
+  poses.add("bone", Pose());
+  inputs.set("projector", Value::of<RadiographProjector>(projector));
+  inputs.set("other_projectors", Value::of(projectors, "fragment"));
+  inputs.set("others", Value::of(poses, "fragment"));
+  return inputs;
 }
 
 }  // namespace marrow::conformance

@@ -69,6 +69,18 @@ class Constant : public Cost {
   double value_;
 };
 
+/// A registration of several bones gets one.
+template <class T>
+Value list_of_one(const T& value) {
+  List<T> list;
+  list.add("bone", value);
+  return Value::of(list, "fragment");
+}
+void set_start(Inputs& inputs, const Pose& start) {
+  inputs.set("start", item(start));
+  inputs.set("starts", list_of_one(start));
+}
+
 Inputs inputs_of(const std::shared_ptr<const Cost>& cost, const Mesh& target) {
   Vector6d off;
   off << radians(1), radians(-1), radians(2), 1, -1, 2;
@@ -76,10 +88,14 @@ Inputs inputs_of(const std::shared_ptr<const Cost>& cost, const Mesh& target) {
   initial.frame = frame();
   initial.world_from_model = moved(truth(), initial.frame, off);
   const Value optimizer = Value::of<Optimizer>(std::make_shared<const analytic::Compass>());
-  return {{"cost", Value::of<Cost>(cost)}, {"finer_cost", Value::of<Cost>(cost)},
-          {"optimizer", optimizer},        {"finer_optimizer", optimizer},
-          {"start", item(initial)},        {"model", item(mesh_of(bone()))},
-          {"target", item(target)}};
+  List<Cost> costs;
+  costs.add_shared("bone", cost);
+  Inputs inputs{{"cost", Value::of<Cost>(cost)},          {"finer_cost", Value::of<Cost>(cost)},
+                {"costs", Value::of(costs, "fragment")},  {"optimizer", optimizer},
+                {"finer_optimizer", optimizer},           {"model", item(mesh_of(bone()))},
+                {"models", list_of_one(mesh_of(bone()))}, {"target", item(target)}};
+  set_start(inputs, initial);
+  return inputs;
 }
 
 /// The bone's surface at its true pose, and shifted along x.
@@ -144,7 +160,7 @@ std::vector<double> offs_from_drawn_starts_mm(const Subject& subject) {
     motion.tail<3>() = drawn();
     Pose start = inputs.at("start").as<Pose>();
     start.world_from_model = moved(truth(), frame(), motion);
-    inputs.set("start", item(start));
+    set_start(inputs, start);
     offs_mm.push_back(off_mm(subject, inputs));
   }
   return offs_mm;
@@ -154,7 +170,7 @@ bool takes(const Subject& subject, const std::string& input) {
   const auto& ports = subject.info().inputs;
   return std::any_of(ports.begin(), ports.end(), [&](const PortInfo& one) { return one.name == input; });
 }
-bool takes_a_cost(const Subject& subject) { return takes(subject, "cost"); }
+bool takes_a_cost(const Subject& subject) { return takes(subject, "cost") || takes(subject, "costs"); }
 
 /// The number of inputs without anything to compare that lead to a pose.
 double poses_of_nothing(const Subject& subject) {
@@ -185,11 +201,11 @@ double views_not_named(const Subject& subject) {
 
 /// The angle between the model's long axis and that of the pose, from a start that has no axes of its own.
 double long_axis_off_deg(const Subject& subject) {
-  if (!takes(subject, "model")) throw NotApplicable("it takes no model");
+  if (!takes(subject, "model") && !takes(subject, "models")) throw NotApplicable("it takes no model");
   Inputs inputs = sample();
   Pose initial = inputs.at("start").as<Pose>();
   initial.frame = {};
-  inputs.set("start", item(initial));
+  set_start(inputs, initial);
   const FragmentFrame found = subject.output(inputs, "pose").as<Pose>().frame;
   return degrees(found.axes.col(2).cross(frame().axes.col(2)).norm());
 }
@@ -200,7 +216,7 @@ std::vector<Trial> trials() {
       Inputs inputs = sample();
       Pose initial = inputs.at("start").as<Pose>();
       change(initial);
-      inputs.set("start", item(initial));
+      set_start(inputs, initial);
       return inputs;
     };
   };
@@ -212,6 +228,7 @@ std::vector<Trial> trials() {
       {"no_surface", [] {
          Inputs inputs = sample();
          inputs.set("model", item(Mesh()));
+         inputs.set("models", list_of_one(Mesh()));
          inputs.set("target", item(Mesh()));
          return inputs;
        }}};

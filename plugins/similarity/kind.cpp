@@ -24,6 +24,9 @@ MARROW_PLUGIN(plugin) {
       .in<marrow::OutlineProjector>("other_outlines",
                                     "outline projectors of other bodies that are known only as surfaces",
                                     marrow::over("fragment"))
+      .in<marrow::Pose>("poses", "poses of all bones, which cannot lie in one another", marrow::over("fragment"))
+      .in<marrow::SignedField>("other_bones", "signed fields of these bones; this bone's own may be among them",
+                               marrow::over("fragment"))
       .out<marrow::Cost>("cost", "cost of a pose: how badly it explains the images; smaller is better")
       .trait("derivatives", "its costs have derivatives")
       .trait("unmoved_by_gain", "gain and offset of the line integrals do not change its costs")

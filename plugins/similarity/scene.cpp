@@ -105,12 +105,19 @@ Inputs inputs_of(const Scene& scene, const std::function<void(View&, EdgeMap&)>&
     edges.add(name, std::move(map));
   }
   const Grid grid = grid_of({68, 56, 100}, {1, 1, 1});
+  const auto field = std::make_shared<const SignedField>(field_of(bone(), grid, 6));
+  List<SignedField> fields;
+  fields.add_shared("bone", field);
+  List<Pose> poses;
+  poses.add("bone", known_pose());
   return {{"projector", Value::of<OutlineProjector>(bone_projector())},
           {"projector", Value::of<RadiographProjector>(bone_projector())},
           {"outline", Value::of<OutlineProjector>(bone_projector())},
           {"model", item(mesh_of(bone()))},
           {"volume", item(volume_of(bone(), grid, 700, 0))},
-          {"field", item(field_of(bone(), grid, 6))},
+          {"field", Value::of<SignedField>(field)},
+          {"other_bones", Value::of(fields, "fragment")},
+          {"poses", Value::of(poses, "fragment")},
           {"views", Value::of(views, "view")},
           {"edges", Value::of(edges, "view")},
           {"cost", Value::of<Cost>(std::make_shared<const DistanceCost>(truth(), known_pose().frame))},

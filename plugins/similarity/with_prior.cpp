@@ -9,8 +9,9 @@
 #include <marrow/domain/decompositions.hpp>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/quantile.hpp"
+#include "cost_noise.hpp"
 #include "marrow/toolbox/geometry/rigid_fit.hpp"
+#include "marrow/toolbox/match/among_others.hpp"
 
 namespace {
 
@@ -74,35 +75,8 @@ class Prior {
   Matrix6d information_, root_;
 };
 
-/// The value in a cost of one unit of the negative log-likelihood: twice the rise of the cost if the pose moves by one
-/// standard deviation. The median over six directions.
-double noise_of(const Cost& cost, const Pose& found) {
-  constexpr double kDeviations = 2, kMostStep = 4;  // a step in degrees or mm
-  Vector6d unit = Vector6d::Ones();
-  unit.head<3>() *= degrees(1);
-  const auto eigen = eigen_of_symmetric<6>(unit.asDiagonal() * *found.covariance * unit.asDiagonal());
-  std::vector<RigidTransform> poses{found.world_from_model};
-  std::array<double, 6> steps{};
-  for (int i = 0; i < 6; ++i) {
-    const double deviation = std::sqrt(std::max(eigen.values[i], 1e-12)),
-                 step = std::min(kDeviations * deviation, kMostStep);
-    steps[std::size_t(i)] = step / deviation;
-    for (const double sense : {1.0, -1.0}) {
-      const Vector6d motion = sense * step * eigen.vectors.col(i);
-      poses.push_back(moved(found.world_from_model, found.frame, motion.cwiseQuotient(unit)));
-    }
-  }
-  const std::vector<double> values = cost.values(poses);
-  std::vector<double> noise(6);
-  for (std::size_t i = 0; i < 6; ++i) {
-    const double rise = 0.5 * (values[2 * i + 1] + values[2 * i + 2]) - values[0];
-    noise[i] = 2 * rise / (steps[i] * steps[i]);
-  }
-  return std::max(1e-12, quantile_in_place(noise, 0.5));
-}
-
 /// The prior counts the same at each level of the cost. A coarse level is too rough to estimate its own noise.
-class WithPrior : public Cost {
+class WithPrior : public Cost, public match::CostAmongOthers {
  public:
   /// `noise`: the weight of a unit of the prior. `noise_times`: how many times larger the images' noise is than their
   /// blocks show. `owner`, or the runtime, keeps `images`.
@@ -119,6 +93,11 @@ class WithPrior : public Cost {
   std::shared_ptr<const Cost> at_level(const CostLevel& level) const override {
     const std::shared_ptr<const Cost> images = images_.at_level(level);
     return std::make_shared<WithPrior>(prior_, noise_, noise_times_, *images, images);
+  }
+
+  std::shared_ptr<const Cost> with_others(const List<RigidTransform>& world_from_others) const override {
+    const std::shared_ptr<const Cost> images = match::among_others(images_, world_from_others);
+    return images ? std::make_shared<WithPrior>(prior_, noise_, noise_times_, *images, images) : nullptr;
   }
 
   std::optional<Expansion> expansion(const RigidTransform& pose, const FragmentFrame& frame) const override {
@@ -188,24 +167,17 @@ class WithPrior : public Cost {
   std::shared_ptr<const Cost> owner_;
 };
 
-void check_pose(const Pose& pose, const std::string& name, const std::string& remedy) {
-  marrow::check_pose(pose, name);
-  if (!pose.covariance) throw Error(name + " has no covariance; " + remedy);
-  if (!pose.covariance->allFinite() || !(eigen_of_symmetric<6>(*pose.covariance).values[0] > 0))
-    throw Error(name + " has a covariance that is not positive definite; " + remedy);
-}
-
 std::shared_ptr<const Cost> with_prior(const Cost& cost, const Pose& prior, const Pose& found, const Options& options) {
-  check_pose(prior, "the prior", "take it from a node that predicts one, such as a fit of markers");
-  check_pose(found, "the pose found by the images",
-             "take it from a registration by a cost of the kind similarity, which predicts one");
+  similarity::check_known(prior, "the prior", "take it from a node that predicts one, such as a fit of markers");
+  similarity::check_found(found);
   if (prior.world_from_model.source != found.world_from_model.source ||
       prior.world_from_model.target != found.world_from_model.target)
     throw Error("the prior leads from '" + prior.world_from_model.source + "' to '" + prior.world_from_model.target +
                 "', but the pose found by the images from '" + found.world_from_model.source + "' to '" +
                 found.world_from_model.target + "'; give poses of the same model");
   return std::make_shared<WithPrior>(std::make_shared<const Prior>(prior, options.degrees_of_freedom),
-                                     options.noise_times * noise_of(cost, found), options.noise_times, cost, nullptr);
+                                     options.noise_times * similarity::noise_of(cost, found), options.noise_times, cost,
+                                     nullptr);
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 #include "marrow/base/error.hpp"
 #include "marrow/domain/camera.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
+#include "marrow/toolbox/match/among_others.hpp"
+#include "marrow/toolbox/match/bones_together.hpp"
 #include "moments.hpp"
 #include "smoothed_at_bone.hpp"
 
@@ -20,27 +22,34 @@ std::shared_ptr<const RadiographProjector> as_smooth_as_images(const RadiographP
                                                                const List<View>& views, double sigma_px) {
   if (!(sigma_px > 0)) return nullptr;
   const std::optional<Eigen::Vector3d> middle_mm = meeting_point_mm(views);
-  if (!middle_mm) return smoothed_at_bone(projector, sigma_px);
+  if (!middle_mm) {
+    // Each bone at its own depth.
+    const auto one = [sigma_px](const RadiographProjector& bone) { return smoothed_at_bone(bone, sigma_px); };
+    const auto* bones = dynamic_cast<const BonesTogether*>(&projector);
+    return bones ? std::shared_ptr<const RadiographProjector>(bones->with_each(one)) : one(projector);
+  }
   double sum = 0;
   for (const View& view : views) sum += sigma_px * pixel_size_at_mm(view.camera, *middle_mm);
   return projector.smoothed(sum / double(views.size()));
 }
 
-class IntensityCost : public ViewsCost {
+class IntensityCost : public ViewsCost, public CostAmongOthers {
  public:
-  IntensityCost(const RadiographProjector& projector, const List<View>& views, const IntensityOptions& options,
-                double worst, MeasureOf measure_of)
+  IntensityCost(std::shared_ptr<const RadiographProjector> projector, const List<View>& views,
+                const IntensityOptions& options, double worst, MeasureOf measure_of)
       : ViewsCost(views.size(), options.weights),
-        projector_(projector),
+        projector_(std::move(projector)),
         views_(views),
         options_(options),
         worst_(worst),
         measure_of_(std::move(measure_of)) {
-    smoothed_ = as_smooth_as_images(projector, views, options.sigma_steps * options.pixel_step);
+    smoothed_ = as_smooth_as_images(*projector_, views, options.sigma_steps * options.pixel_step);
+    auto seen = std::make_shared<Seen>();
     for (const View& view : views) {
-      images_.push_back(image_of(view));
-      measures_.push_back(measure_of_(images_.back()));
+      seen->images.push_back(image_of(view));
+      seen->measures.push_back(measure_of_(seen->images.back()));
     }
+    seen_ = std::move(seen);
   }
 
   double value_in_view(std::size_t view, const RigidTransform& world_from_model) const override {
@@ -55,7 +64,23 @@ class IntensityCost : public ViewsCost {
     return std::make_shared<IntensityCost>(projector_, views_, options, worst_, measure_of_);
   }
 
+  std::shared_ptr<const Cost> with_others(const List<RigidTransform>& world_from_others) const override {
+    const auto* bones = dynamic_cast<const BonesTogether*>(projector_.get());
+    if (!bones) return nullptr;
+    auto cost = std::make_shared<IntensityCost>(*this);
+    cost->projector_ = bones->with_others(world_from_others);
+    if (const auto* smoothed = dynamic_cast<const BonesTogether*>(smoothed_.get()))
+      cost->smoothed_ = smoothed->with_others(world_from_others);
+    return cost;
+  }
+
  private:
+  /// What the images show, at every pixel_step-th pixel. Costs that differ in their projector share it.
+  struct Seen {
+    std::vector<Patch> images;
+    std::vector<Measure> measures;
+  };
+
   std::string silence(std::size_t view, const RigidTransform& world_from_model) const override {
     return in_view(views_, view, silence_of(view, patch_of(view, world_from_model)));
   }
@@ -92,8 +117,9 @@ class IntensityCost : public ViewsCost {
     const Blocks blocks = Blocks::of(views_[view].camera);
     const Patch patch = patch_of(view, world_from_model);
     if (patch.rendered.empty()) return {worst_, std::vector<double>(std::size_t(blocks.count()), worst_)};
-    if (const auto* whole = std::get_if<WholeMeasure>(&measures_[view])) return split_by_masks(*whole, patch, blocks);
-    const auto& measure = std::get<SumMeasure>(measures_[view]);
+    if (const auto* whole = std::get_if<WholeMeasure>(&seen_->measures[view]))
+      return split_by_masks(*whole, patch, blocks);
+    const auto& measure = std::get<SumMeasure>(seen_->measures[view]);
     BlockSums sums(blocks);
     Tally tally(patch, options_.pixel_step, &sums);
     measure.add(patch, tally);
@@ -124,8 +150,8 @@ class IntensityCost : public ViewsCost {
   }
 
   double measured(std::size_t view, const Patch& patch) const {
-    if (const auto* whole = std::get_if<WholeMeasure>(&measures_[view])) return finite((*whole)(patch));
-    const auto& measure = std::get<SumMeasure>(measures_[view]);
+    if (const auto* whole = std::get_if<WholeMeasure>(&seen_->measures[view])) return finite((*whole)(patch));
+    const auto& measure = std::get<SumMeasure>(seen_->measures[view]);
     Tally tally(patch, options_.pixel_step, nullptr);
     measure.add(patch, tally);
     return finite(measure.value(tally.sums()));
@@ -135,8 +161,8 @@ class IntensityCost : public ViewsCost {
   /// The pixels of a view to compare. Empty if there are too few.
   Patch patch_of(std::size_t view, const RigidTransform& world_from_model) const {
     const Camera& camera = views_[view].camera;
-    const Patch& image = images_[view];
-    const RadiographProjector& projector = smoothed_ ? *smoothed_ : projector_;
+    const Patch& image = seen_->images[view];
+    const RadiographProjector& projector = smoothed_ ? *smoothed_ : *projector_;
     const PixelGrid region = projector.region(camera, world_from_model);
     if (region.count() == 0) return {};
     const int step = options_.pixel_step, margin = std::max(options_.margin_px, options_.least_margin_steps * step);
@@ -159,14 +185,13 @@ class IntensityCost : public ViewsCost {
     return patch;
   }
 
-  const RadiographProjector& projector_;
+  std::shared_ptr<const RadiographProjector> projector_;
   std::shared_ptr<const RadiographProjector> smoothed_;  ///< as much as the image; null if projector_ cannot
   const List<View> views_;
   const IntensityOptions options_;
   const double worst_;
   const MeasureOf measure_of_;
-  std::vector<Patch> images_;
-  std::vector<Measure> measures_;
+  std::shared_ptr<const Seen> seen_;
 };
 
 }  // namespace
@@ -178,7 +203,8 @@ std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector,
   check_views(views);
   check_weights(options.weights, views.size());
   const List<View> own = without_shadows(views, shadows_of(&projector, others, other_projectors, other_outlines));
-  return std::make_shared<IntensityCost>(projector, own, options, worst, std::move(measure_of));
+  const std::shared_ptr<const RadiographProjector> kept_elsewhere(std::shared_ptr<void>(), &projector);
+  return std::make_shared<IntensityCost>(kept_elsewhere, own, options, worst, std::move(measure_of));
 }
 
 namespace {
