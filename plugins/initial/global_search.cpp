@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
+#include "marrow/initial/free_scan.hpp"
+#include "marrow/toolbox/match/inputs.hpp"
 #include "marrow/toolbox/search/compared.hpp"
 #include "marrow/toolbox/search/search.hpp"
 
@@ -47,8 +49,42 @@ marrow::search::SearchOptions search_options(const Options& options) {
   return search;
 }
 
+/// What shows the bone in the images, for a search without a start.
+struct Images {
+  const marrow::OutlineProjector* projector;
+  const marrow::List<marrow::View>* views;
+  const marrow::List<marrow::EdgeMap>* edges;
+
+  bool are_there() const { return projector || views || edges; }
+  void check() const {
+    if (!projector || !views || !edges)
+      throw marrow::Error(
+          std::string("a search without a start needs projector, views and edges, but nothing is wired to ") +
+          (!projector ? "projector"
+           : !views   ? "views"
+                      : "edges") +
+          "; wire it, or give a start");
+    marrow::match::check_views(*views);
+    marrow::match::check_edges(*views, *edges);
+  }
+};
+
+/// The best pose of all orientations at all places that the views show.
+marrow::RigidTransform anywhere(const marrow::Mesh& model, const Images& images, const marrow::FragmentFrame& frame,
+                                const marrow::search::Levels& levels, const Options& options,
+                                marrow::search::Search& search, marrow::Context& context) {
+  constexpr std::size_t kScanned = 8;  // poses of the scan for each candidate; the scan orders poses only roughly
+  images.check();
+  const auto candidates = std::size_t(options.candidates);
+  const std::vector<marrow::RigidTransform> scanned = marrow::initial::free_scan(
+      {model, *images.projector, *images.views, *images.edges}, frame, options.poses, kScanned * candidates, context);
+  return search.best_of(search.best_by_cost(scanned, *levels.front(), candidates), levels).pose;
+}
+
 marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, const marrow::Optimizer& optimizer,
-                           const marrow::Pose* start, const Options& options, marrow::Context& context) {
+                           const marrow::Pose* start, const marrow::OutlineProjector* projector,
+                           const marrow::List<marrow::View>* views, const marrow::List<marrow::EdgeMap>* edges,
+                           const Options& options, marrow::Context& context) {
   if (options.poses == 0)
     throw marrow::Error("it has no poses to try; give their number, such as 4000, and the ranges to search");
   if (!start && options.needs_start)
@@ -58,15 +94,21 @@ marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, 
   marrow::check_mesh(model, "model");
   const marrow::search::SearchOptions settings = search_options(options);
   marrow::search::check_options(settings);
+  const Images images{projector, views, edges};
   marrow::Pose middle;
   middle.world_from_model = start ? start->world_from_model : marrow::RigidTransform{"world", model.frame};
   marrow::check_pose(middle, "start");
-  if (!start)
-    context.info("there is no start, so the search is around the place at which CT coordinates are world coordinates");
   middle.frame = marrow::fragment_frame(model);
   const marrow::search::Levels levels = levels_of(cost, settings);
   marrow::search::Search search(optimizer, middle, settings, context);
-  search.go_to(search.find(levels).pose);
+  if (!start && images.are_there()) {
+    search.go_to(anywhere(model, images, middle.frame, levels, options, search, context));
+  } else {
+    if (!start)
+      context.info(
+          "there is no start, so the search is around the place at which CT coordinates are world coordinates");
+    search.go_to(search.find(levels).pose);
+  }
   marrow::search::check_compared(*levels.back(), search.pose(), middle.frame);
   return pose_of(search, middle, *levels.back());
 }
@@ -75,11 +117,19 @@ marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, 
 
 MARROW_PLUGIN(plugin) {
   plugin.node("initial.global_search", global_search)
-      .summary("The pose of least cost within wide ranges, searched from many poses at once; no start is needed")
+      .summary(
+          "The pose of least cost within wide ranges, or in any orientation anywhere in view, searched from many poses "
+          "at "
+          "once; no start is needed")
       .in("model", "surface of the fragment")
       .in("cost", "cost of a pose")
       .in("optimizer", "minimiser that refines the best poses")
-      .in("start", "middle of the ranges; none: CT coordinates are taken as world coordinates")
+      .in("start",
+          "middle of the ranges; none: any orientation is searched, anywhere that all views show; without "
+          "projector, views and edges: CT coordinates are taken as world coordinates")
+      .in("projector", "outline of the model, for a search without a start")
+      .in("views", "X-ray views, for the same", marrow::over("view"))
+      .in("edges", "edge pixels of each view, for the same", marrow::over("view"))
       .out("pose", "pose of least cost")
       .option("rotation_side_deg", &Options::rotation_side_deg,
               "range of the rotations about the frontal and lateral axes, to either side", marrow::at_least(0),
@@ -90,10 +140,11 @@ MARROW_PLUGIN(plugin) {
               "range of the shifts along the frontal and lateral axes, to either side", marrow::at_least(0))
       .option("translation_axial_mm", &Options::translation_axial_mm,
               "range of the shift along the long axis, to either side", marrow::at_least(0))
-      .option("poses", &Options::poses,
-              "number of poses to try, spread evenly over these ranges; 0: the node fails, for pipelines with other "
-              "ways to a start",
-              marrow::at_least(0))
+      .option(
+          "poses", &Options::poses,
+          "number of poses to try, spread evenly over these ranges; without a start, of orientations to try, spread "
+          "evenly over all; 0: the node fails, for pipelines with other ways to a start",
+          marrow::at_least(0))
       .option("candidates", &Options::candidates, "number of best poses to refine; no two of them are neighbours",
               marrow::at_least(1))
       .option("finalists", &Options::finalists,

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "marrow/domain/camera.hpp"
+#include "marrow/domain/features.hpp"
+
+namespace marrow::initial {
+
+/// How much each cell of a coarse image speaks for an outline that passes there in a direction. The scores of a whole
+/// outline add up to the logarithm of a likelihood ratio: that its points meet edges as a bone's outline does (three of
+/// four), against as a random outline does. Cells outside the mask say nothing.
+class EdgeScores {
+ public:
+  static constexpr int kSectors = 16;
+  static constexpr int kMost = 127;
+
+  /// `cell_px`: the side of a cell. A point matches an edge up to `reach_cells` away, the less the farther.
+  EdgeScores(const View& view, const EdgeMap& edges, double cell_px, double reach_cells);
+
+  int columns() const { return columns_; }
+  int rows() const { return rows_; }
+  double cell_px() const { return cell_px_; }
+  /// The sector of an outline's normal.
+  static int sector_of(double normal_u, double normal_v);
+  /// The scores of a sector, row by row.
+  const std::int8_t* of(int sector) const {
+    return scores_.data() + std::size_t(sector) * std::size_t(columns_) * std::size_t(rows_);
+  }
+
+ private:
+  int columns_, rows_;
+  double cell_px_;
+  std::vector<std::int8_t> scores_;
+};
+
+}  // namespace marrow::initial
