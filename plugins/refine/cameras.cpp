@@ -112,7 +112,9 @@ Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose
   context.info(text);
   Result result;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    const Vector6d& motion = refinement.state().motions[v];
+    // What the reference moves by is not its camera's: it is how much larger or smaller the bones look in it.
+    const bool is_reference = views.name(v) == options.reference_view;
+    const Vector6d motion = is_reference ? Vector6d(Vector6d::Zero()) : refinement.state().motions[v];
     View view = views[v];
     view.camera.camera_from_world = view.camera.camera_from_world * refinement.sight(v).motion(motion);
     view.camera.camera_from_world.rotation = nearest_rotation(view.camera.camera_from_world.rotation);

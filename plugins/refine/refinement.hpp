@@ -103,8 +103,10 @@ class Refinement {
   Vector6d deviation_of_motion(std::size_t view) const { return root_.middleRows<6>(at_motion(view)).rowwise().norm(); }
 
  private:
-  static constexpr double kOfReference =
-      1e-3;  ///< how far the reference may move, as a fraction of what is expected of the others
+  /// How far the reference may move, as a fraction of what is expected of the others.
+  static constexpr double kOfReference = 1e-3;
+  /// How far a model's outline may be off the image's edges on both sides of a bone, which no scatter of blocks tells.
+  static constexpr double kOutline_px = 0.2;
 
   /// The most probable state for a scale.
   struct Found {
@@ -133,9 +135,11 @@ class Refinement {
   /// are. The other states count in the covariance by their likelihood, because the images may hardly tell how far the
   /// cameras are off.
   void choose_scale(Context& context) {
+    expand(true);
+    doubt_depth_of_reference();
     const State given = state_;
     std::vector<Found> all;
-    std::vector<Model> at_given;
+    std::vector<Model> at_given = models_;
     for (const double scale : {1.0, 0.1, 0.01}) {
       scale_ = scale;
       if (scale < 1) state_ = given, models_ = at_given;
@@ -164,6 +168,27 @@ class Refinement {
     }
     weight_ = 1 / sum;
     root_of_other_scales_ /= std::sqrt(sum);
+  }
+
+  /// A bone whose outline is off by kOutline_px on both sides looks larger or smaller, so it seems to lie at another
+  /// depth: for a shaft by millimetres. If the reference were taken at its word, another camera, which is right, would
+  /// be moved to agree. So the reference may move along its depth by as much. How many mm this is follows from the
+  /// cost: a shift along the depth changes it as much less than one across as the bone is smaller than its distance.
+  void doubt_depth_of_reference() {
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+      if (views_.name(v) != options_.reference_view) continue;
+      Eigen::Matrix3d curvature = Eigen::Matrix3d::Zero();  // along u, v and the depth
+      for (std::size_t f = 0; f < poses_.size(); ++f) {
+        const Eigen::Matrix3d to_bone = (state_.poses[f].rotation * poses_[f].frame.axes).transpose() * sights_[v].axes;
+        curvature += to_bone.transpose() * models_[f * views_.size() + v].curvature.bottomRightCorner<3, 3>() * to_bone;
+      }
+      const double across = std::max(curvature(0, 0), curvature(1, 1)),
+                   along = std::max(curvature(2, 2), 1e-6 * across);
+      const double outline_mm = kOutline_px * pixel_size_at_mm(views_[v].camera, sights_[v].centre_mm);
+      double& depth_mm = sights_[v].deviation[5];
+      if (across > 0) depth_mm = std::max(depth_mm, outline_mm * std::sqrt(across / along));
+    }
+    prior_.emplace(sights_);
   }
 
   /// From the state to another one, in degrees and mm.

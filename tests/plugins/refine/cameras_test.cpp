@@ -53,7 +53,59 @@ TEST(RefineCameras, TheReferenceStaysAndTheOthersGoByIt) {
   EXPECT_TRUE(is_near(found(outputs, 1), off)) << "the whole error goes to the other camera";
   const marrow::Pose pose = outputs.at("poses").as_list<marrow::Pose>()[0];
   EXPECT_LT(well::way(right, pose.world_from_model, pose.frame).norm(), 0.02);
-  EXPECT_LT(std::sqrt(pose.covariance->diagonal().maxCoeff()), 0.05) << "the cameras add nothing";
+  EXPECT_LT(std::sqrt(pose.covariance->diagonal().maxCoeff()), 0.075)
+      << "the cameras add nothing but what the outline may be off: 0.2 px, which are 0.07 mm at the bone";
+}
+
+/// A thin shaft: a shift along a view's depth changes its cost a thousand times less than one across. Each view likes
+/// one pose best, with the noise of Split.
+class Shaft : public marrow::Cost {
+ public:
+  Shaft(std::vector<RigidTransform> best, marrow::FragmentFrame frame) : best_(std::move(best)), frame_(frame) {}
+  double value(const RigidTransform& pose) const override {
+    return 0.5 * (value_in_view(0, pose) + value_in_view(1, pose));
+  }
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
+    return std::make_shared<Shaft>(*this);
+  }
+  std::size_t view_count() const override { return 2; }
+  double value_in_view(std::size_t view, const RigidTransform& pose) const override {
+    return 0.5 * off(view, pose).squaredNorm();
+  }
+  std::vector<double> without_each_block(const RigidTransform& pose) const override {
+    std::vector<double> values;
+    for (std::size_t v = 0; v < 2; ++v)
+      for (int block = 0; block < 64; ++block)
+        values.push_back(value(pose) + (block < 6 ? 0.5e-3 * off(v, pose)[block] : 0));
+    return values;
+  }
+
+ private:
+  /// How far a pose is off, in degrees and mm along the view's u, v and depth, the depth 30 times less.
+  Vector6d off(std::size_t view, const RigidTransform& pose) const {
+    Vector6d way = well::way(best_[view], pose, frame_);
+    const Eigen::Matrix3d to_camera =
+        views()[view].camera.camera_from_world.rotation * best_[view].rotation * frame_.axes;
+    way.tail<3>() = (to_camera * way.tail<3>()).cwiseProduct(Vector3d(1, 1, 1 / 30.0));
+    return way;
+  }
+  std::vector<RigidTransform> best_;
+  marrow::FragmentFrame frame_;
+};
+
+// A shaft looks 2 mm too far away in the reference, because its outline is 0.2 px too narrow there. The other camera is
+// right, and stays. Without a doubt about the outline it would be moved by the whole 2 mm.
+TEST(RefineCameras, HowLargeABoneLooksInTheReferenceMovesNoOtherCamera) {
+  const RigidTransform none = motion({0, 0, 0}, {0, 0, 0}), deeper = motion({0, 0, 0}, {0, 0, 2});
+  Bone bone({none, none});
+  const RigidTransform right = bone.pose.world_from_model;
+  bone.cost = std::make_shared<Shaft>(std::vector{deeper * right, right}, bone.pose.frame);
+  const auto outputs = shipped::call("refine.cameras", inputs({bone}), {{"reference_view", std::string("frontal")}});
+  EXPECT_LT((found(outputs, 0).translation_mm - none.translation_mm).norm(), 1e-9) << "the reference stays";
+  EXPECT_LT((found(outputs, 1).translation_mm - none.translation_mm).norm(), 0.6);
+  const marrow::Pose pose = outputs.at("poses").as_list<marrow::Pose>()[0];
+  EXPECT_LT(well::way(right, pose.world_from_model, pose.frame).norm(), 0.6);
+  EXPECT_GT(std::sqrt(pose.covariance->bottomRightCorner<3, 3>().trace()), 0.3) << "and the pose is that uncertain";
 }
 
 TEST(RefineCameras, CamerasThatAreRightStay) {
@@ -82,7 +134,9 @@ TEST(RefineCameras, WhereImagesHardlyTellHowFarTheCamerasAreOffTheDeviationsSayS
     return figure(motions(outputs, 0), "predicted_shift_u_mm");
   };
   const double expected_mm = std::sqrt(1 / 3.0 + 25 / 2.0 * std::pow(600 / 1700.0, 2));
-  EXPECT_NEAR(deviation_mm(1e4), expected_mm / 100, 0.1 * expected_mm / 100) << "they are right";
+  // The lateral's depth lies across the frontal image, and may be off by 0.2 px of the outline.
+  const double outline_mm = 0.2 * 600 / 1700;
+  EXPECT_NEAR(deviation_mm(1e4), std::hypot(expected_mm / 100, outline_mm), 0.003) << "they are right";
   EXPECT_GT(deviation_mm(10), expected_mm / 20) << "they are most probably right";
   EXPECT_LT(deviation_mm(10), expected_mm / 2);
 }

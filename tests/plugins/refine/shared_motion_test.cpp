@@ -47,7 +47,7 @@ TEST(RefineCameras, WhatIsSharedGoesByTheReference) {
   const Outcome found = outcome(Bone({off, off}, 1e6), {{"reference_view", std::string("frontal")}});
   // The reference counts as right, so the bone follows it. It would be very unlikely that the other camera is off as
   // much.
-  EXPECT_LT(std::sqrt(found.covariance.diagonal().maxCoeff()), 0.05);
+  EXPECT_LT(std::sqrt(found.covariance.diagonal().maxCoeff()), 0.075);  // 0.2 px of the outline are 0.07 mm
 }
 
 TEST(RefineCameras, ErrorsOfCamerasDrawnAsTheOptionsSayAreAsLargeAsPredicted) {
