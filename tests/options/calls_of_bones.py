@@ -65,6 +65,7 @@ def calls(s):
         {
             "mesh.simplify": lambda: ({"mesh": s.mesh}, {"triangles": 900}),
             "mesh.smooth": lambda: ({"mesh": s.closed_mesh}, {}),
+            "segment.given": lambda: ({"volume": s.volume, "surface": {"bone": s.closed_mesh}}, {}),
             "segment.atlas": lambda: (segment(template=s.mesh), {"iterations": 4}),
             "project.siddon_jacobs": lambda: ({"volume": s.volume, "field": s.field}, {}),
             "project.lightfield": lambda: (

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the nodes are called that read files: (inputs, options) by the node's name."""
-from files_of_scene import surface_of, written
+from files_of_scene import labels_of, surface_of, written
 
 
 def calls(s):
@@ -21,6 +21,7 @@ def calls(s):
         "read.image": lambda: ({}, {"path": case("frontal.png")}),
         "read.images": lambda: ({}, {"paths": [case("frontal.png"), case("lateral.png")]}),
         "read.implant": lambda: ({}, {"holes": at("nail/holes.yaml"), "surface": at("nail/surface.stl")}),
+        "read.labels": lambda: ({}, {"path": labels_of(1, 2)}),
         "read.landmarks": lambda: ({}, {"path": at("landmarks.yaml")}),
         "read.mesh": lambda: ({}, {"path": at("model.ply")}),
         "read.pose": lambda: ({}, {"path": at("transform.tfm")}),

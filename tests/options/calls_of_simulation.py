@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the nodes are called that simulate, guide, follow, draw and measure: (inputs, options) by the node's name."""
+from harness.package import marrow
 
 
 def calls(s):
@@ -73,6 +74,13 @@ def calls(s):
         "simulate.camera_arm": lambda: ({}, {}),
         "simulate.camera_faults": lambda: ({"views": s.views}, {}),
         "simulate.case": lambda: ({"volume": s.volume, "views": s.views, "phantom": s.phantom}, {}),
+        "simulate.case_folder": lambda: (
+            {
+                "case": marrow.simulate.case(volume=s.volume, views=s.views, phantom=s.phantom),
+                "models": {name: s.closed_mesh for name in ("proximal", "distal")},
+            },
+            {},
+        ),
         "simulate.chessboard": lambda: ({"arm": s.arm}, {"photographs": 3}),
         "simulate.clutter": lambda: ({"phantom": s.phantom}, {"fat": "mild", "plate": "mild"}),
         "simulate.cluttered_ct": lambda: ({"phantom": s.plated}, {"spacing_mm": [3, 3, 4], "range_mm": [60, 260]}),

@@ -2,6 +2,7 @@
 """Files for the nodes that read some, written by a pipeline."""
 import pathlib
 
+from harness.formats import mha, straight
 from harness.package import SCRATCH, SOURCE, marrow
 
 PIPELINE = """marrow: 1
@@ -49,3 +50,12 @@ def surface_of(mesh, name, scale=1.0):
     lines += ["f %d %d %d" % tuple(triangle + 1) for triangle in mesh.triangles]
     path.write_text("\n".join(lines) + "\n")
     return path
+
+
+def labels_of(first, second):
+    """A label map in which one voxel has each of the two labels."""
+    path = pathlib.Path(SCRATCH / ("labels-%d-%d.mha" % (first, second)))
+    values = [0] * 125
+    values[62], values[63] = first, second
+    path.write_bytes(mha(straight((5, 5, 5)), values))
+    return str(path)

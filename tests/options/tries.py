@@ -3,7 +3,7 @@
 scene that gives sets of options. A key "in.NAME" is an input."""
 from calls_of_bones import GREY_VALUES
 from calls_of_programs import FORMATS
-from files_of_scene import surface_of, written
+from files_of_scene import labels_of, surface_of, written
 
 
 def files(*names):
@@ -51,6 +51,9 @@ TRIES = {
     "read.images.names": one(to=["left", "right"]),
     "read.implant.holes": files("nothing.yaml"),
     "read.implant.surface": files("model.ply"),
+    "read.labels.path": one(to=lambda s: labels_of(1, 3)),
+    "read.labels.labels": one(to=["2"]),
+    "read.labels.fragments": one(labels=["1"], to=["bone"]),
     "read.landmarks.path": files("points.fcsv"),
     "read.landmarks.fragment": one(path=lambda s: str(written() / "points.fcsv"), to="other"),
     "read.landmarks.seen": one(
@@ -128,6 +131,7 @@ TRIES = {
     "simulate.camera_arm.names": one(to=["a", "b"]),
     "simulate.camera_faults.only": one(to=["frontal"]),
     "simulate.case.register": one(to=["proximal"]),
+    "simulate.case_folder.label_voxel_mm": one(given_by="labels", to=[4, 4, 4]),
     "simulate.sweeps.axes": one(to=["x"]),
 }
 for _node, _format in FORMATS.items():

@@ -58,6 +58,7 @@ UNTRIED = [
     "track.predict.keyframe_mm",
     "track.predict.keyframe_speed_deg_s",
     "track.predict.keyframe_speed_mm_s",
+    "verdict.evidence.contour_failure_model",
     "verdict.evidence.max_intersection_mm",
     "verdict.predicted.doubtful_above",
     "verdict.predicted.wrong_above",

@@ -23,6 +23,7 @@ const std::map<std::string, std::string>& apart() {
       {"simulate.camera_arm", "a camera beside a platform"},
       {"simulate.camera_faults", "draws its faults, and a draw has no mirror image"},
       {"simulate.case", "puts its inputs together"},
+      {"simulate.case_folder", "fills surfaces that are given with labels"},
       {"simulate.case_parts", "takes them apart"},
       {"simulate.chessboard", "images of a board"},
       {"simulate.export", "changes the grey values of an image"},
