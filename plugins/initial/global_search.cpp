@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <marrow/plugin.hpp>
+#include <numeric>
 
 #include "marrow/initial/free_scan.hpp"
 #include "marrow/toolbox/match/inputs.hpp"
@@ -69,16 +71,79 @@ struct Images {
   }
 };
 
-/// The best pose of all orientations at all places that the views show.
+/// Two poses that a registration may well lead to the same end are neighbours.
+struct Neighbourhood {
+  Eigen::Vector3d model_middle_mm;
+  double reach_mm;
+
+  bool near(const marrow::RigidTransform& a, const marrow::RigidTransform& b) const {
+    return (a * model_middle_mm - b * model_middle_mm).norm() < reach_mm &&
+           marrow::geodesic_angle_rad(a.rotation, b.rotation) < marrow::radians(8);
+  }
+};
+
+/// The poses, that of the least cost first.
+std::vector<marrow::RigidTransform> in_order_of(const marrow::Cost& cost,
+                                                const std::vector<marrow::RigidTransform>& poses) {
+  const std::vector<double> values = cost.values(poses);
+  std::vector<std::size_t> order(poses.size());
+  std::iota(order.begin(), order.end(), std::size_t(0));
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
+  std::vector<marrow::RigidTransform> sorted;
+  for (const std::size_t i : order) sorted.push_back(poses[i]);
+  return sorted;
+}
+
+/// Poses that are not neighbours, in turns the next one by evidence and by cost. Evidence alone prefers long outlines,
+/// of which half lie on an edge; a mean distance prefers those of which little is in view.
+std::vector<marrow::RigidTransform> finalists_of(const std::vector<marrow::RigidTransform>& poses,
+                                                 const marrow::initial::Evidence& evidence, const marrow::Cost& cost,
+                                                 const Neighbourhood& neighbourhood, std::size_t count) {
+  const std::vector<marrow::RigidTransform> orders[] = {evidence.best(poses, poses.size()), in_order_of(cost, poses)};
+  std::vector<marrow::RigidTransform> chosen;
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    for (const auto& order : orders) {
+      const bool is_new = std::none_of(chosen.begin(), chosen.end(),
+                                       [&](const auto& other) { return neighbourhood.near(order[i], other); });
+      if (is_new && chosen.size() < count) chosen.push_back(order[i]);
+    }
+  return chosen;
+}
+
+/// The best pose of all orientations at all places that the views show. The best of a scan are moved to more evidence,
+/// then refined by the cost through all levels.
 marrow::RigidTransform anywhere(const marrow::Mesh& model, const Images& images, const marrow::FragmentFrame& frame,
                                 const marrow::search::Levels& levels, const Options& options,
                                 marrow::search::Search& search, marrow::Context& context) {
-  constexpr std::size_t kScanned = 8;  // poses of the scan for each candidate; the scan orders poses only roughly
+  constexpr std::size_t kScanned = 4;  // poses of the scan for each candidate; the scan orders poses only roughly
   images.check();
+  const marrow::initial::Seen seen{model, *images.projector, *images.views, *images.edges};
   const auto candidates = std::size_t(options.candidates);
-  const std::vector<marrow::RigidTransform> scanned = marrow::initial::free_scan(
-      {model, *images.projector, *images.views, *images.edges}, frame, options.poses, kScanned * candidates, context);
-  return search.best_of(search.best_by_cost(scanned, *levels.front(), candidates), levels).pose;
+  const auto [scanned, middle_mm, cell_mm] =
+      marrow::initial::free_scan(seen, frame, options.poses, kScanned * candidates, context);
+  const marrow::initial::Evidence coarse(seen, middle_mm, cell_mm);
+  std::vector<marrow::RigidTransform> poses = scanned;
+  double step = 1;
+  for (const std::size_t kept : {2 * candidates, candidates, candidates}) {
+    coarse.climb(poses, frame.origin_mm, 8 * step, 2 * cell_mm * step);
+    poses = coarse.best(poses, kept);
+    step /= 2;
+  }
+  double done = 0;
+  const auto refine = [&](std::size_t level, double share_of_all) {
+    const double share = share_of_all / double(poses.size());
+    for (marrow::RigidTransform& pose : poses) {
+      search.go_to(pose);
+      search.refine(*levels[level], marrow::search::kAllAxes, search.steps_of(level), done, share);
+      pose = search.pose();
+      done += share;
+    }
+  };
+  refine(0, 0.6);
+  poses = finalists_of(poses, {seen, middle_mm, cell_mm / 2}, *levels.front(), {frame.origin_mm, 3 * cell_mm},
+                       std::size_t(options.finalists));
+  for (std::size_t level = 1; level < levels.size(); ++level) refine(level, 0.4 / double(levels.size() - 1));
+  return in_order_of(*levels.back(), poses).front();
 }
 
 marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, const marrow::Optimizer& optimizer,

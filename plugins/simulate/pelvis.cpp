@@ -20,7 +20,7 @@ using phantom::capsule, phantom::cut, phantom::ellipsoid, phantom::join;
 struct PelvisOptions {
   int shape_seed = 1;
   double variation = 0;
-  double width_mm = 276;
+  double width_mm = 256;
   double height_mm = 210;
   double depth_mm = 150;
   double socket_diameter_mm = 50;
@@ -40,7 +40,7 @@ struct PelvisShape {
 };
 
 PelvisShape drawn(const PelvisOptions& options) {
-  constexpr double kMeanWidth_mm = 276, kMeanDepth_mm = 150, kMeanHeight_mm = 210;
+  constexpr double kMeanWidth_mm = 256, kMeanDepth_mm = 150, kMeanHeight_mm = 210;
   Random random(std::uint64_t(options.shape_seed), 5);
   const auto draw = [&](double mean, double part) {
     return mean * (1 + options.variation * part * std::clamp(random.normal(), -2.0, 2.0));
@@ -53,10 +53,10 @@ PelvisShape drawn(const PelvisOptions& options) {
   return shape;
 }
 
-/// The wing of the ilium: a thin ellipsoid that leans outwards and turns its front towards the middle.
+/// The wing of the ilium: a thin ellipsoid that leans outwards; its back reaches the sacrum.
 double wing(const Vector3d& p, double flare_rad) {
   const Eigen::Matrix3d turn =
-      (Eigen::AngleAxisd(-0.5, Vector3d::UnitZ()) * Eigen::AngleAxisd(flare_rad, Vector3d::UnitY())).toRotationMatrix();
+      (Eigen::AngleAxisd(0.5, Vector3d::UnitZ()) * Eigen::AngleAxisd(flare_rad, Vector3d::UnitY())).toRotationMatrix();
   return ellipsoid(turn.transpose() * (p - Vector3d(88, 8, 62)), {8, 62, 66});
 }
 

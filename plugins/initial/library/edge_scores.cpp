@@ -29,11 +29,11 @@ int EdgeScores::sector_of(double normal_u, double normal_v) {
   return int(std::lround(turns * kSectors) + kSectors) % kSectors;
 }
 
-EdgeScores::EdgeScores(const View& view, const EdgeMap& edges, double cell_px, double reach_cells)
+EdgeScores::EdgeScores(const View& view, const EdgeMap& edges, double cell_px)
     : columns_(int(std::ceil(view.camera.width_px / cell_px))),
       rows_(int(std::ceil(view.camera.height_px / cell_px))),
       cell_px_(cell_px) {
-  constexpr double kMatchedOfBone = 0.75;
+  constexpr double kMatchedOfBone = 0.95, kReach_cells = 4;
   cv::Mat usable(rows_, columns_, CV_8U, cv::Scalar(255));
   if (!view.mask.empty()) cv::resize(view.mask, usable, usable.size(), 0, 0, cv::INTER_NEAREST);
   std::vector<cv::Mat> matched(kSectors);  // 1 at an edge, 0 from the reach on
@@ -42,13 +42,13 @@ EdgeScores::EdgeScores(const View& view, const EdgeMap& edges, double cell_px, d
     cv::Mat distance;
     cv::distanceTransform(cells_without(edges, usable, cell_px, 2 * kPi * sector / kSectors), distance, cv::DIST_L2,
                           cv::DIST_MASK_PRECISE);
-    matched[std::size_t(sector)] = cv::max(1 - distance / reach_cells, 0);
+    matched[std::size_t(sector)] = cv::max(1 - distance / kReach_cells, 0);
     sum += cv::mean(matched[std::size_t(sector)], usable)[0] / kSectors;
   }
-  const double by_chance = std::clamp(sum, 0.02, 0.6);
+  const double by_chance = std::clamp(sum, 0.05, 0.6);
   const double of_hit = std::log(kMatchedOfBone / by_chance),
                of_miss = std::log((1 - kMatchedOfBone) / (1 - by_chance)),
-               unit = kMost / std::log(kMatchedOfBone / 0.02);
+               unit = kMost / std::log(kMatchedOfBone / 0.05);
   scores_.assign(std::size_t(kSectors) * std::size_t(columns_) * std::size_t(rows_), 0);
   auto score = scores_.begin();
   for (const cv::Mat& of_sector : matched)

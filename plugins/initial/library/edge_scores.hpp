@@ -5,6 +5,7 @@
 
 #include "marrow/domain/camera.hpp"
 #include "marrow/domain/features.hpp"
+#include "marrow/domain/functions.hpp"
 
 namespace marrow::initial {
 
@@ -16,14 +17,19 @@ class EdgeScores {
   static constexpr int kSectors = 16;
   static constexpr int kMost = 127;
 
-  /// `cell_px`: the side of a cell. A point matches an edge up to `reach_cells` away, the less the farther.
-  EdgeScores(const View& view, const EdgeMap& edges, double cell_px, double reach_cells);
+  /// `cell_px`: the side of a cell. A point matches an edge up to four cells away, the less the farther.
+  EdgeScores(const View& view, const EdgeMap& edges, double cell_px);
 
   int columns() const { return columns_; }
   int rows() const { return rows_; }
   double cell_px() const { return cell_px_; }
   /// The sector of an outline's normal.
   static int sector_of(double normal_u, double normal_v);
+  /// The score of a point of an outline inside the image.
+  int at(const OutlinePoint& point) const {
+    const int column = int(point.u_px / cell_px_), row = int(point.v_px / cell_px_);
+    return of(sector_of(point.normal_u, point.normal_v))[row * columns_ + column];
+  }
   /// The scores of a sector, row by row.
   const std::int8_t* of(int sector) const {
     return scores_.data() + std::size_t(sector) * std::size_t(columns_) * std::size_t(rows_);

@@ -6,16 +6,14 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <limits>
 
 #include "marrow/base/dispatch.hpp"
-#include "marrow/initial/edge_scores.hpp"
 #include "marrow/initial/seen_space.hpp"
 
 namespace marrow::initial {
 namespace {
 
-constexpr double kReach_cells = 4;
 constexpr double kDepthRatio = 1.15;  ///< of neighbouring depths for which an outline is scaled
 
 /// Adds the scores that one point of the outline meets, for a row of places.
@@ -56,7 +54,7 @@ std::vector<Eigen::Vector3d> aims_of(const Mesh& model, const FragmentFrame& fra
 /// A view, with what an outline is drawn and slid with.
 struct Slide {
   Slide(const View& view, const EdgeMap& edges, const Eigen::Vector3d& middle, double cell_mm, double radius_mm)
-      : scores(view, edges, cell_mm / pixel_size_at_mm(view.camera, middle), kReach_cells),
+      : scores(view, edges, cell_mm / pixel_size_at_mm(view.camera, middle)),
         camera(view.camera),
         middle_depth_mm((view.camera.camera_from_world * middle).z()) {
     const double scale = kFine / scores.cell_px();
@@ -162,6 +160,8 @@ class Scan {
     return all;
   }
 
+  const Eigen::Vector3d& middle_mm() const { return space_.middle_mm; }
+  double cell_mm() const { return cell_mm_; }
   /// Neighbours: a registration from one may well end where one from the other does.
   bool near(const Placed& a, const Placed& b) const {
     constexpr double kNear_rad = 15 * kPi / 180;
@@ -209,21 +209,20 @@ class Scan {
 
 }  // namespace
 
-std::vector<RigidTransform> free_scan(const Seen& seen, const FragmentFrame& frame, int rotations, std::size_t poses,
-                                      Context& context) {
+Scanned free_scan(const Seen& seen, const FragmentFrame& frame, int rotations, std::size_t poses, Context& context) {
   const Scan scan(seen, frame, rotations);
   std::vector<Placed> all = scan.run(context);
   std::stable_sort(all.begin(), all.end(), [](const Placed& a, const Placed& b) { return a.score > b.score; });
   std::vector<Placed> chosen;
-  std::vector<RigidTransform> found;
+  Scanned scanned{{}, scan.middle_mm(), scan.cell_mm()};
   for (const Placed& placed : all) {
     if (chosen.size() == poses) break;
     if (std::any_of(chosen.begin(), chosen.end(), [&](const Placed& other) { return scan.near(placed, other); }))
       continue;
     chosen.push_back(placed);
-    found.push_back(placed.world_from_model);
+    scanned.poses.push_back(placed.world_from_model);
   }
-  return found;
+  return scanned;
 }
 
 }  // namespace marrow::initial

@@ -2,18 +2,16 @@
 #pragma once
 #include <vector>
 
-#include "marrow/domain/features.hpp"
-#include "marrow/domain/functions.hpp"
+#include "marrow/initial/evidence.hpp"
 #include "marrow/runtime/node/context.hpp"
 
 namespace marrow::initial {
 
-/// What a scan without a start looks at.
-struct Seen {
-  const Mesh& model;
-  const OutlineProjector& projector;
-  const List<View>& views;
-  const List<EdgeMap>& edges;
+/// Where a bone may be, the most likely pose first.
+struct Scanned {
+  std::vector<RigidTransform> poses;
+  Eigen::Vector3d middle_mm = Eigen::Vector3d::Zero();  ///< of what all views show
+  double cell_mm = 1;                                   ///< width there of the cells in which edges were compared
 };
 
 /// The most likely poses of a bone about which nothing is known but that all views show it, the best first. No two of
@@ -24,7 +22,6 @@ struct Seen {
 ///
 /// A bone longer than the images are wide is tried with several of its points along its longest axis in view.
 /// Throws Error if no place is seen by all views. The result is the same at any number of threads.
-std::vector<RigidTransform> free_scan(const Seen& seen, const FragmentFrame& frame, int rotations, std::size_t poses,
-                                      Context& context);
+Scanned free_scan(const Seen& seen, const FragmentFrame& frame, int rotations, std::size_t poses, Context& context);
 
 }  // namespace marrow::initial

@@ -52,7 +52,7 @@ SeenSpace SeenSpace::of(const List<View>& views) {
   if (weights == 0)
     throw Error(
         "no place between 250 and 2000 mm in front of the sources is seen by all views, so the bone cannot be either; "
-        "see whether the cameras belong to these images and state their world in mm (marrow run with camera.check)");
+        "see whether the cameras belong to these images and state their world in mm");
   space.middle_mm = sum / weights;
   space.width_mm = kFarthest_mm;
   for (const View& view : views)

@@ -54,33 +54,21 @@ std::vector<Pose::Progress> Search::convergence(const Cost& cost) const {
   return steps;
 }
 
-std::vector<int> Search::order_by_cost(const std::vector<RigidTransform>& poses, const Cost& cost) {
-  std::vector<double> values = cost.values(poses);
-  for (double& value : values)
-    if (std::isnan(value)) value = std::numeric_limits<double>::infinity();  // nothing can be sorted among NaN
-  evaluations_ += int(poses.size());
-  std::vector<int> order(poses.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](int a, int b) { return values[std::size_t(a)] < values[std::size_t(b)]; });
-  return order;
-}
-
-std::vector<RigidTransform> Search::best_by_cost(const std::vector<RigidTransform>& poses, const Cost& cost,
-                                                 std::size_t count) {
-  std::vector<RigidTransform> best;
-  for (const int i : order_by_cost(poses, cost))
-    if (best.size() < count) best.push_back(poses[std::size_t(i)]);
-  return best;
-}
-
 std::vector<RigidTransform> Search::scan(const Cost& cost) {
   const Scan scan = options_.scan_poses > 0 ? scattered_scan(options_) : axial_scan(options_);
   std::vector<RigidTransform> poses;
   for (const Vector6d& motion : scan.motions) poses.push_back(moved_by_units(pose_, frame_, motion));
-  std::vector<int> chosen;
+  std::vector<double> values = cost.values(poses);
+  for (double& value : values)
+    if (std::isnan(value)) value = std::numeric_limits<double>::infinity();  // nothing can be sorted among NaN
+  evaluations_ += int(poses.size());
+  std::vector<int> order(poses.size()), chosen;
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) {
+    return values[std::size_t(a)] != values[std::size_t(b)] ? values[std::size_t(a)] < values[std::size_t(b)] : a < b;
+  });
   std::vector<RigidTransform> candidates;
-  for (const int i : order_by_cost(poses, cost)) {
+  for (const int i : order) {
     if (int(candidates.size()) == options_.candidates) break;
     if (std::any_of(chosen.begin(), chosen.end(), [&](int other) { return scan.near(i, other); })) continue;
     chosen.push_back(i);

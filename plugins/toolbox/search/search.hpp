@@ -73,15 +73,6 @@ class Search {
   /// the last level.
   Found find(const Levels& levels) { return best_of(scan(*levels.front()), levels); }
 
-  /// Refines the candidates. They are compared only after a search over all six axes, because errors of the start in
-  /// the four other axes hide which candidate is right. The finalists are compared at the last level: a coarse cost
-  /// hardly distinguishes a good pose from one whose outline lies on other structures in the image.
-  Found best_of(const std::vector<RigidTransform>& candidates, const Levels& levels);
-
-  /// The `count` poses of least cost, the best first.
-  std::vector<RigidTransform> best_by_cost(const std::vector<RigidTransform>& poses, const Cost& cost,
-                                           std::size_t count);
-
   /// Minimises over the given axes (0 to 2 rotations, 3 to 5 translations) from the current pose. Goes to the result
   /// and returns its cost. For the progress: `done` is the part of the whole search before this call, `share` that of
   /// this call. Throws when the context is cancelled.
@@ -92,8 +83,11 @@ class Search {
   /// Evaluates poses around the current one and returns the best. None of them is a neighbour of a better one, because
   /// the cost may have several minima in this range.
   std::vector<RigidTransform> scan(const Cost& cost);
-  /// Numbers of the poses, that of the least cost first.
-  std::vector<int> order_by_cost(const std::vector<RigidTransform>& poses, const Cost& cost);
+
+  /// Refines the candidates. They are compared only after a search over all six axes, because errors of the start in
+  /// the four other axes hide which candidate is right. The finalists are compared at the last level: a coarse cost
+  /// hardly distinguishes a good pose from one whose outline lies on other structures in the image.
+  Found best_of(const std::vector<RigidTransform>& candidates, const Levels& levels);
 
   void note(int evaluations, const RigidTransform& pose);
 
