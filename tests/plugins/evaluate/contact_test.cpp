@@ -12,8 +12,8 @@ analytic::Body ball() { return {{{0, 0, 0}, {10, 10, 10}}}; }
 
 /// Balls of 10 mm radius, one at the origin, the other with its middle at x.
 shipped::Inputs balls(double x_mm) {
-  const auto field = std::make_shared<const SignedField>(
-      field_of(ball(), analytic::grid_of({61, 61, 61}, {0.5, 0.5, 0.5}), 4));
+  const auto field =
+      std::make_shared<const SignedField>(field_of(ball(), analytic::grid_of({61, 61, 61}, {0.5, 0.5, 0.5}), 4));
   const auto model = std::make_shared<const Mesh>(mesh_of(ball()));
   List<Pose> poses;
   List<Mesh> models;

@@ -68,8 +68,8 @@ TEST(Together, TheRegionHoldsAllBones) {
   double outside = 0, inside = 0;
   for (int v = 0; v < 160; ++v)
     for (int u = 0; u < 160; ++u) {
-      const bool is_in = u >= region.u_px && v >= region.v_px && u < region.u_px + region.columns &&
-                         v < region.v_px + region.rows;
+      const bool is_in =
+          u >= region.u_px && v >= region.v_px && u < region.u_px + region.columns && v < region.v_px + region.rows;
       (is_in ? inside : outside) += double(values[std::size_t(v) * 160 + std::size_t(u)]);
     }
   EXPECT_EQ(outside, 0);

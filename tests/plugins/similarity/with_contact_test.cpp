@@ -17,8 +17,8 @@ constexpr double kUnit = 2 / kInformation;  // noise_times is 2
 
 analytic::Body ball() { return {{{0, 0, 0}, Eigen::Vector3d::Constant(kRadius_mm)}}; }
 std::shared_ptr<const SignedField> field() {
-  static const auto kField = std::make_shared<const SignedField>(
-      field_of(ball(), analytic::grid_of({61, 61, 61}, {0.5, 0.5, 0.5}), kBand_mm));
+  static const auto kField =
+      std::make_shared<const SignedField>(field_of(ball(), analytic::grid_of({61, 61, 61}, {0.5, 0.5, 0.5}), kBand_mm));
   return kField;
 }
 RigidTransform at(double x_mm) { return analytic::moved_by({0, 0, 0}, {x_mm, 0, 0}); }
@@ -84,9 +84,8 @@ TEST(WithContact, CostsNothingApartAndTheSquareOfTheDepthWithin) {
 
 TEST(WithContact, AJointCostsTheSquareOfWhatItsGapIsOff) {
   const Trial trial;
-  const Value cost =
-      trial.cost({{"joint", std::vector<std::string>{"own", "other"}}, {"joint_width_mm", 2.0},
-                  {"joint_deviation_mm", 0.5}});
+  const Value cost = trial.cost(
+      {{"joint", std::vector<std::string>{"own", "other"}}, {"joint_width_mm", 2.0}, {"joint_deviation_mm", 0.5}});
   // The gap counts as about 0.2 mm wider, because not only the nearest point counts.
   EXPECT_LT(trial.term(cost, 21.8), 0.1);
   EXPECT_NEAR(trial.term(cost, 20.8), 0.5 * 4, 0.4) << "two deviations too narrow";
@@ -133,8 +132,7 @@ TEST(WithContact, RefusesWhatItCannotUse) {
   List<Pose> poses;
   poses.add("own", pose_at(20));
   lost.inputs["poses"] = shipped::list(poses, "fragment");
-  EXPECT_EQ(refusal(lost),
-            "other_bones has 'other', but poses has none of it; give the poses of the same fragments");
+  EXPECT_EQ(refusal(lost), "other_bones has 'other', but poses has none of it; give the poses of the same fragments");
   Trial foreign;
   Pose elsewhere = pose_at(0);
   elsewhere.world_from_model.source = "bone";
