@@ -40,6 +40,7 @@ TRIES = {
     "register.together.pixel_step": one(
         in__costs=lambda s: {"distal": s.grey}, in__starts=lambda s: {"distal": s.start}, to=[8, 4, 2]
     ),
+    "register.together.reach_px": one(to=[4, 2, 1]),
     # The gap of a joint
     "similarity.with_contact.joint": one(to=["distal", "other"]),
     "similarity.with_contact.joint_width_mm": one(joint=["distal", "other"], to=2),
