@@ -102,6 +102,25 @@ def calls(s):
                 {},
             ),
             "similarity.with_prior": lambda: ({"cost": s.grey, "prior": s.known, "found": s.found.pose}, {}),
+            "similarity.with_contact": lambda: (
+                {
+                    "cost": s.grey,
+                    "found": s.found.pose,
+                    "model": s.mesh,
+                    "field": s.field,
+                    "poses": {"distal": s.start, "other": s.start},
+                    "other_bones": {"distal": s.field, "other": s.other_field},
+                },
+                {},
+            ),
+            "register.together": lambda: (
+                {
+                    "costs": {"distal": s.contour, "other": s.contour},
+                    "optimizer": s.optimizer,
+                    "starts": {"distal": s.start, "other": s.found.pose},
+                },
+                {},
+            ),
             "register.icp": lambda: ({"start": s.start, "model": s.mesh, "target": s.placed}, {"points": 300}),
             "register.multiresolution": lambda: (
                 {"cost": s.contour, "optimizer": s.optimizer, "start": s.start},

@@ -67,6 +67,11 @@ class Scene:
         return self.fields["distal"]
 
     @functools.cached_property
+    def other_field(self):
+        """Another bone in the same place."""
+        return marrow.segment.threshold(volume=self.volume, seeds=self.case.seeds, threshold_hu=300)["distal"]
+
+    @functools.cached_property
     def fields(self):
         return marrow.segment.threshold(volume=self.volume, seeds=self.case.seeds)
 

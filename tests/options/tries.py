@@ -37,6 +37,14 @@ TRIES = {
     "register.multiresolution.scan_side_mm": one(scan_poses=30, to=6),
     "register.sequence.scan_side_deg": one(scan_poses=30, to=6),
     "register.sequence.scan_side_mm": one(scan_poses=30, to=6),
+    "register.together.pixel_step": one(
+        in__costs=lambda s: {"distal": s.grey}, in__starts=lambda s: {"distal": s.start}, to=[8, 4, 2]
+    ),
+    "register.together.reach_px": one(to=[4, 2, 1]),
+    # The gap of a joint
+    "similarity.with_contact.joint": one(to=["distal", "other"]),
+    "similarity.with_contact.joint_width_mm": one(joint=["distal", "other"], to=2),
+    "similarity.with_contact.joint_deviation_mm": one(joint=["distal", "other"], to=2),
     # Files
     "camera.bead_board.board": one(to=lambda s: str(written() / "nothing.yaml")),
     "camera.check.known_points": one(to=""),

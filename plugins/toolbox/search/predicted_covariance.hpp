@@ -24,8 +24,9 @@ RigidTransform moved_by_units(const RigidTransform& pose, const FragmentFrame& f
 /// standard deviations long: enough that the roughness of the cost does not matter. The mean over the blocks stands for
 /// the whole cost there, so each pose is computed once.
 ///
-/// Along the least certain direction the cost may have other minima, or be flatter than its curvature says. So the
-/// variance in this direction becomes that of the density exp(-cost / noise) along it, if this is twice as large.
+/// Along the least certain direction, and for turns about the long axis, the cost may have other minima, or be
+/// flatter than its curvature says. So the variance there becomes that of the density exp(-cost / noise) along the
+/// line, if this is twice as large.
 ///
 /// If only one or two blocks say anything, or the cost hardly changes along any axis, nothing is known: all deviations
 /// are huge. No deviation is 0: if no block moves the minimum, all are the least step. The cost must have compared
@@ -41,8 +42,8 @@ class PredictedCovariance {
   int evaluations() const { return evaluations_; }
   /// The cost at the pose.
   double value() const { return value_; }
-  /// Poses near other minima along the least certain direction whose cost is about that of the pose. The best come
-  /// first; there are two at most.
+  /// Poses near other minima along these two lines whose cost is about that of the pose: two of each at most, the best
+  /// first.
   const std::vector<RigidTransform>& other_minima() const { return other_minima_; }
 
   /// A sentence for each axis that the images hardly determine. If the axes are not anatomical, also for a direction of
@@ -72,6 +73,7 @@ class PredictedCovariance {
   void move_without_each_block(const Eigen::MatrixXd& at_diagonals, double flat);
   void turn_steps(const Matrix6d& hessian);
   void widen();
+  void widen_along(const Vector6d& direction, double variance);
   void look_around();
   std::vector<RigidTransform> line(const Vector6d& direction, double step, int side) const;
   double variance_of_density(const std::vector<double>& values, double step) const;

@@ -10,26 +10,36 @@
 namespace marrow::search {
 namespace {
 
-constexpr double kMattersBelow = 12;  // rise of a cost along the least certain direction, in units of its noise
+constexpr int kLong = 2;              // the rotation about the long axis
+constexpr double kMattersBelow = 12;  // rise of a cost along a line, in units of its noise
 
 }  // namespace
 
-/// Widens the covariance by the density exp(-cost / noise) along the eigenvector of the largest eigenvalue, out to
-/// twelve standard deviations.
+/// Widens the covariance along the eigenvector of the largest eigenvalue, and for turns about the long axis. A short
+/// bone is nearly round. So there may be another minimum some deviations beside this one about the long axis, even
+/// where another direction is less certain. Where the cost has derivatives, look_around() sees to that.
 void PredictedCovariance::widen() {
+  constexpr double kSameWay = 0.9;  // cosine
+  const SymmetricEigen<6> eigen = eigen_of_symmetric(in_units_);
+  widen_along(eigen.vectors.col(5), eigen.values[5]);
+  if (!is_by_derivatives_ && std::abs(eigen.vectors(kLong, 5)) < kSameWay)
+    widen_along(Vector6d::Unit(kLong), in_units_(kLong, kLong));
+}
+
+/// Widens the covariance by the density exp(-cost / noise) along a direction in which it has this variance, out to
+/// twelve standard deviations.
+void PredictedCovariance::widen_along(const Vector6d& direction, double variance) {
   constexpr int kSide = 12;
   constexpr double kReach = 12;
   constexpr double kLeastRatio = 2;  // of the variances; less is the roughness of the cost
-  const SymmetricEigen<6> eigen = eigen_of_symmetric(in_units_);
-  const double variance = eigen.values[5];
   if (!(variance > 0) || !(noise_ > 0)) return;
   const double step = std::min(kReach * std::sqrt(variance), kMostStep) / kSide;
-  const std::vector<RigidTransform> poses = line(eigen.vectors.col(5), step, kSide);
+  const std::vector<RigidTransform> poses = line(direction, step, kSide);
   const std::vector<double> values = values_along(poses);
   find_other_minima(poses, values);
   const double of_density = variance_of_density(values, step);
   if (of_density < kLeastRatio * variance) return;
-  Vector6d unit = eigen.vectors.col(5);
+  Vector6d unit = direction;
   unit.head<3>() *= radians(1);
   *covariance_ += (of_density - variance) * unit * unit.transpose();
 }
@@ -37,7 +47,6 @@ void PredictedCovariance::widen() {
 /// The same for turns about the long axis, out to the longest step. Derivatives describe one place only, but for a body
 /// of revolution only the facets make the minimum, and there are others all around.
 void PredictedCovariance::look_around() {
-  constexpr int kLong = 2;
   constexpr double kLeastStep_deg = 0.25, kLeastRatio = 2;
   if (!(noise_ > 0)) return;
   const int side = int(kMostStep / std::max(std::sqrt(in_units_(kLong, kLong)), kLeastStep_deg)) / 2 * 2;
