@@ -33,7 +33,7 @@ std::vector<std::byte> as_allocated(const CodedImage& image, std::vector<std::by
 std::vector<std::byte> decode_rle(const CodedImage& image);
 /// The process that the transfer syntax names. Of an extended one, which may have 12 bits, the baseline is a part.
 enum class JpegProcess { baseline, extended, lossless };
-std::vector<std::byte> decode_jpeg(const CodedImage& image, JpegProcess process);
+std::vector<std::byte> decode_jpeg(CodedImage image, JpegProcess process);
 /// `is_lossless`: as the transfer syntax says.
 std::vector<std::byte> decode_jpeg_ls(const CodedImage& image, bool is_lossless);
 std::vector<std::byte> decode_jpeg_2000(const CodedImage& image);

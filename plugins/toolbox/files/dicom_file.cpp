@@ -162,6 +162,7 @@ class DicomWalk {
   /// All elements of a deflated file are packed. Of a header no more is unpacked than headers have.
   void unpack() {
     constexpr std::uint64_t kHeader = 4 << 20, kPart = 1 << 20, kFew = 16 << 20, kMostEach = 100;
+    constexpr std::uint64_t kMostBehind = 8;  // filling, or the end of a gzip file that some writers leave
     const std::uint64_t most = is_header_ ? kHeader : std::max(kFew, kMostEach * (into_.file_.size() - at_));
     auto all = std::make_shared<std::string>(into_.file_.text(0, std::size_t(at_)));
     const auto stream = bare_unpacked_bytes(into_.file_, at_, into_.file_.size());
@@ -172,7 +173,7 @@ class DicomWalk {
       all->resize(before + got);
     }
     if (!is_header_ && all->size() - at_ > most) damaged("it unpacks to more than 100 times its size");
-    if (!is_header_ && stream->bytes_behind() > 1) damaged("bytes follow the end of its packed elements");
+    if (!is_header_ && stream->bytes_behind() > kMostBehind) damaged("bytes follow the end of its packed elements");
     into_.unpacked_ = all;
     window_ = FileWindow(into_.file_, *all);
     size_ = all->size();

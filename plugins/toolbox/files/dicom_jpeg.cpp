@@ -56,10 +56,21 @@ int checked_precision(const CodedImage& image, JpegProcess process) {
   return precision;
 }
 
+/// Some writers say in the scan header that no coefficients follow the first one (Se is 0), which is meant for the
+/// progressive process. DCMTK warns of it and reads all, which is right.
+void say_all_coefficients(CodedImage& image) {
+  JpegSegments segments(image.bytes);
+  while (segments.next() != kScan) continue;
+  constexpr std::size_t kLast = 4;
+  if (segments.segment.size() == 6 && segments.byte(kLast) == 0)
+    image.bytes[std::size_t(segments.segment.data() - image.bytes.data()) + kLast] = 63;
+}
+
 }  // namespace
 
-std::vector<std::byte> decode_jpeg(const CodedImage& image, JpegProcess process) {
+std::vector<std::byte> decode_jpeg(CodedImage image, JpegProcess process) {
   const int precision = checked_precision(image, process);
+  if (process != JpegProcess::lossless) say_all_coefficients(image);
   if (precision <= 8) return decoded<DJDecompressIJG8Bit>(image, precision);
   if (precision <= 12) return decoded<DJDecompressIJG12Bit>(image, precision);
   return decoded<DJDecompressIJG16Bit>(image, precision);
