@@ -16,6 +16,7 @@ namespace {
 // far off.
 constexpr double kFarthestOff_mm = 0.1 + 1e-6;
 constexpr double kMostTilt_deg = 45;  // gantries tilt by 30
+constexpr double kWidest = 10;
 constexpr float kAir_hu = -1000;
 
 Eigen::Vector3d axis(const Samples& samples, int k) {
@@ -101,6 +102,11 @@ void straighten(const std::string& what, const Eigen::Vector2d& step_mm, SliceGr
   for (int k = 0; k < 2; ++k) {
     grid.step_px[k] = step_mm[k] / geometry.spacing_mm[k];
     const double whole = grid.step_px[k] * (geometry.size[2] - 1);
+    if (std::abs(whole) > kWidest * geometry.size[k])
+      throw Error(
+          formatted("{}: the last slice lies {:.4g} mm beside the first one, more than {:g} times its width; "
+                    "export the series again",
+                    what, std::abs(whole) * geometry.spacing_mm[k], kWidest));
     // A shift that is a whole number up to rounding needs no further pixel.
     grid.first_px[k] = std::min(0, int(std::floor(whole + 1e-3)));
     geometry.size[k] += int(std::ceil(std::abs(whole) - 1e-3));
@@ -133,10 +139,6 @@ SliceGrid grid_of_slices(const std::string& what, const std::vector<DicomSlice>&
 void put_slice(const SliceGrid& grid, const std::vector<float>& slice, const std::array<int, 3>& slice_size, int k,
                float* volume) {
   float* to = volume + std::size_t(k) * grid.slice_pixels();
-  if (grid.tilt_deg == 0) {
-    std::copy(slice.begin(), slice.end(), to);
-    return;
-  }
   // Where the grid's first pixel lies in the slice: whole pixels and the rest, which is the same for all pixels.
   std::array<int, 2> whole;
   std::array<float, 2> rest;

@@ -110,13 +110,15 @@ VolumeSamples volume_of(const std::string& what, std::vector<DicomSlice> slices,
     series.note +=
         formatted("{}the gantry was tilted by {:.1f} degrees, so the slices were resampled to a straight grid",
                   note.empty() ? "" : "; ", grid.tilt_deg);
-  std::vector<float> values(slices[0].samples.count());
+  const bool is_tilted = grid.tilt_deg > 0;
+  std::vector<float> values(is_tilted ? slices[0].samples.count() : 0);
   for (std::size_t k = 0; k < slices.size(); ++k) {
     const Samples slice = read_dicom_frame(slices[k].pixels, slices[k].frame);
     if (series.values.empty()) resize_large(series.values, grid.slice_pixels() * slices.size());
-    scaled_values(slices[k].pixels, slice, values.data());
-    make_padding_air(slices[k].pixels, values.data(), values.size());
-    put_slice(grid, values, slices[k].samples.size, int(k), series.values.data());
+    float* const to = is_tilted ? values.data() : series.values.data() + k * grid.slice_pixels();
+    scaled_values(slices[k].pixels, slice, to);
+    make_padding_air(slices[k].pixels, to, slice.count());
+    if (is_tilted) put_slice(grid, values, slice.size, int(k), series.values.data());
   }
   return series;
 }

@@ -22,6 +22,9 @@ void place(const DicomHeader& header, DicomSlice& slice) {
   if (!spacing)
     throw Error(slice.path().string() + ": does not say how large its pixels are; " + kPixelSpacing.text() +
                 " is missing");
+  if (!((*spacing)[0] > 0 && (*spacing)[1] > 0))
+    throw Error(formatted("{}: {} is {:f} x {:f} mm; its header is wrong: export it again", slice.path().string(),
+                          kPixelSpacing.text(), (*spacing)[0], (*spacing)[1]));
   slice.samples.spacing_mm = {(*spacing)[1], (*spacing)[0], 1};  // DICOM gives the distance of rows (y) first
   std::copy(position->begin(), position->end(), slice.samples.origin_mm.begin());
   const Eigen::Vector3d row(orientation->data()), down(orientation->data() + 3);
