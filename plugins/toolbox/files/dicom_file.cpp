@@ -26,25 +26,25 @@ struct KnownSyntax {
   bool is_read;
 };
 
-// JPEG 2000 is not read, because its decoder writes beyond its memory if data are damaged. Of the lossy ones only JPEG
-// baseline is read, because every decoder has it.
 constexpr KnownSyntax kSyntaxes[] = {{"1.2.840.10008.1.2", "implicit little endian", true},
                                      {"1.2.840.10008.1.2.1", "explicit little endian", true},
+                                     {kDeflated, "deflated", true},
                                      {"1.2.840.10008.1.2.2", "explicit big endian", true},
                                      {"1.2.840.10008.1.2.5", "RLE", true},
                                      {"1.2.840.10008.1.2.4.50", "JPEG baseline", true},
+                                     {"1.2.840.10008.1.2.4.51", "JPEG extended", true},
                                      {"1.2.840.10008.1.2.4.57", "JPEG lossless", true},
                                      {"1.2.840.10008.1.2.4.70", "JPEG lossless, first order", true},
                                      {"1.2.840.10008.1.2.4.80", "JPEG-LS lossless", true},
-                                     {"1.2.840.10008.1.2.1.99", "deflated", false},
-                                     {"1.2.840.10008.1.2.4.51", "JPEG extended", false},
-                                     {"1.2.840.10008.1.2.4.81", "JPEG-LS near-lossless", false},
-                                     {"1.2.840.10008.1.2.4.90", "JPEG 2000 lossless", false},
-                                     {"1.2.840.10008.1.2.4.91", "JPEG 2000", false},
+                                     {"1.2.840.10008.1.2.4.81", "JPEG-LS near-lossless", true},
+                                     {"1.2.840.10008.1.2.4.90", "JPEG 2000 lossless", true},
+                                     {"1.2.840.10008.1.2.4.91", "JPEG 2000", true},
                                      {"1.2.840.10008.1.2.4.92", "JPEG 2000 part 2 lossless", false},
                                      {"1.2.840.10008.1.2.4.93", "JPEG 2000 part 2", false},
                                      {"1.2.840.10008.1.2.4.100", "MPEG-2", false},
-                                     {"1.2.840.10008.1.2.4.102", "MPEG-4", false}};
+                                     {"1.2.840.10008.1.2.4.102", "MPEG-4", false},
+                                     {"1.2.840.10008.1.2.4.201", "high-throughput JPEG 2000 lossless", false},
+                                     {"1.2.840.10008.1.2.4.203", "high-throughput JPEG 2000", false}};
 
 constexpr std::uint32_t kGroupsOfValues[] = {
     0x52009229,  // SharedFunctionalGroupsSequence
@@ -59,6 +59,7 @@ constexpr std::uint32_t kGroupsOfValues[] = {
     0x00209113,  // PlanePositionSequence
     0x00209116,  // PlaneOrientationSequence
     0x00209450,  // PatientOrientationInFrameSequence
+    0x00283000,  // ModalityLUTSequence
     0x00289110,  // PixelMeasuresSequence
     0x00289145,  // PixelValueTransformationSequence
     0x00289443,  // FramePixelDataPropertiesSequence
@@ -105,6 +106,7 @@ class DicomWalk {
   void all() {
     start();
     check_syntax();
+    if (into_.transfer_syntax_ == kDeflated) unpack();
     elements(syntax(), size_, 0, false, into_.elements_);
   }
 
@@ -159,14 +161,24 @@ class DicomWalk {
             into_.big_endian_};
   }
 
-  /// All elements of a deflated file are packed. A header is not longer than what is unpacked here.
+  /// All elements of a deflated file are packed. Of a header no more is unpacked than headers have.
   void unpack() {
-    constexpr std::size_t kMost = 4 << 20;
-    std::string& all = into_.unpacked_ = into_.file_.text(0, std::size_t(at_));
-    all.resize(std::size_t(at_) + kMost);
-    all.resize(std::size_t(at_) + bare_unpacked_bytes(into_.file_, at_, size_)->take(all.data() + at_, kMost));
-    window_ = FileWindow(into_.file_, all);
-    size_ = all.size();
+    constexpr std::uint64_t kHeader = 4 << 20, kPart = 1 << 20, kFew = 16 << 20, kMostEach = 100;
+    constexpr std::uint64_t kMostBehind = 8;  // filling, or the end of a gzip file that some writers leave
+    const std::uint64_t most = is_header_ ? kHeader : std::max(kFew, kMostEach * (into_.file_.size() - at_));
+    auto all = std::make_shared<std::string>(into_.file_.text(0, std::size_t(at_)));
+    const auto stream = bare_unpacked_bytes(into_.file_, at_, into_.file_.size());
+    for (std::size_t got = kPart; got == kPart && all->size() - at_ <= most;) {
+      const std::size_t before = all->size();
+      all->resize(before + kPart);
+      got = stream->take(all->data() + before, kPart);
+      all->resize(before + got);
+    }
+    if (!is_header_ && all->size() - at_ > most) damaged("it unpacks to more than 100 times its size");
+    if (!is_header_ && stream->bytes_behind() > kMostBehind) damaged("bytes follow the end of its packed elements");
+    into_.unpacked_ = all;
+    window_ = FileWindow(into_.file_, *all);
+    size_ = all->size();
   }
 
   Next next(const Syntax& syntax) {
@@ -331,8 +343,8 @@ DicomFile::DicomFile(const std::filesystem::path& path, Part part) : file_(path)
 }
 
 std::string DicomFile::text(const DicomSpan& span) const {
-  if (unpacked_.empty()) return file_.text(span.begin, std::size_t(span.bytes));
-  return unpacked_.substr(std::size_t(span.begin), std::size_t(span.bytes));
+  if (!unpacked_) return file_.text(span.begin, std::size_t(span.bytes));
+  return unpacked_->substr(std::size_t(span.begin), std::size_t(span.bytes));
 }
 
 bool is_group_of_values(std::uint32_t tag) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The elements of a DICOM file. Each length is checked against the rest of the file. GDCM is not used: it reserves as
-// much memory as a damaged length claims, and it aborts the program at some contradictions.
+// The elements of a DICOM file. Each length is checked against the rest of the file. No library is used: GDCM reserves
+// as much memory as a damaged length claims, and aborts the program at some contradictions; DCMTK takes the first of
+// two contradicting elements, and only logs it.
 #include <array>
 #include <memory>
 
@@ -46,8 +47,10 @@ class DicomFile {
   const std::string& media_class() const { return media_class_; }
   /// Why not all of the header could be read; empty if it could.
   const std::string& fault() const { return fault_; }
-  /// The bytes of an element.
+  /// The bytes of an element, or of pixels.
   std::string text(const DicomSpan& span) const;
+  /// The unpacked content of a deflated file, at the offsets that elements() gives; null for other files.
+  const std::shared_ptr<const std::string>& unpacked() const { return unpacked_; }
   bool is_big_endian() const { return big_endian_; }
   const DicomElements& elements() const { return elements_; }
   bool has_pixels() const { return has_pixels_; }
@@ -62,7 +65,7 @@ class DicomFile {
   friend class DicomWalk;
   InputFile file_;
   std::string transfer_syntax_, media_class_, fault_;
-  std::string unpacked_;  ///< of a deflated file: its header, at the offsets that elements() gives
+  std::shared_ptr<const std::string> unpacked_;
   bool big_endian_ = false, has_pixels_ = false, is_compressed_ = false, pixels_are_words_ = false;
   DicomElements elements_;
   std::vector<DicomSpan> pixel_parts_;

@@ -23,13 +23,6 @@ DicomTag::Kind kind_of(const DicomElement& element, const DicomTag& tag) {
   return tag.kind;
 }
 
-std::string without_padding(std::string value) {
-  const auto is_padding = [](char c) { return c == ' ' || c == '\0'; };
-  while (!value.empty() && is_padding(value.back())) value.pop_back();
-  value.erase(0, std::min(value.find_first_not_of(std::string(" \0", 2)), value.size()));
-  return value;
-}
-
 /// Numbers separated by backslashes. std::nullopt if the text holds anything else.
 std::optional<std::vector<double>> numbers_in_text(const std::string& value) {
   std::vector<double> numbers;
@@ -65,6 +58,13 @@ std::optional<std::vector<double>> binary_numbers(const std::string& bytes, Dico
 }
 
 }  // namespace
+
+std::string without_padding(std::string value) {
+  const auto is_padding = [](char c) { return c == ' ' || c == '\0'; };
+  while (!value.empty() && is_padding(value.back())) value.pop_back();
+  value.erase(0, std::min(value.find_first_not_of(std::string(" \0", 2)), value.size()));
+  return value;
+}
 
 std::string DicomTag::text() const { return formatted("{} ({:04x},{:04x})", name, group, element); }
 

@@ -34,8 +34,12 @@ inline constexpr DicomTag kSamplesPerPixel{0x0028, 0x0002, "SamplesPerPixel", Di
 inline constexpr DicomTag kPhotometric{0x0028, 0x0004, "PhotometricInterpretation"};
 inline constexpr DicomTag kRows{0x0028, 0x0010, "Rows", DicomTag::Kind::us};
 inline constexpr DicomTag kColumns{0x0028, 0x0011, "Columns", DicomTag::Kind::us};
+inline constexpr DicomTag kPixelRepresentation{0x0028, 0x0103, "PixelRepresentation", DicomTag::Kind::us};
 inline constexpr DicomTag kPixelSpacing{0x0028, 0x0030, "PixelSpacing"};
 inline constexpr DicomTag kRescaleSlope{0x0028, 0x1053, "RescaleSlope"};
+
+/// The value of an element of text without the blanks and zeros around it.
+std::string without_padding(std::string value);
 
 class DicomHeader {
  public:
@@ -51,6 +55,11 @@ class DicomHeader {
   std::optional<double> number(const DicomTag& tag) const;
   /// Whether the file has the element and it is not empty.
   bool has(const DicomTag& tag) const { return find(tag) != nullptr; }
+  /// The items of a sequence; nullptr if the file does not have it.
+  const std::vector<DicomElements>* items(const DicomTag& tag) const {
+    const DicomElement* sequence = find(tag);
+    return sequence ? &sequence->items : nullptr;
+  }
 
  private:
   const DicomElement* find(const DicomTag& tag) const;

@@ -3,13 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
-#include "codecs.hpp"
 #include "header_lines.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
-#include "packbits.hpp"
 
 namespace marrow::files {
 namespace {
@@ -20,9 +17,7 @@ constexpr DicomTag kFrames{0x0028, 0x0008, "NumberOfFrames"};
 constexpr DicomTag kAllocated{0x0028, 0x0100, "BitsAllocated", Kind::us};
 constexpr DicomTag kStored{0x0028, 0x0101, "BitsStored", Kind::us};
 constexpr DicomTag kHighBit{0x0028, 0x0102, "HighBit", Kind::us};
-constexpr DicomTag kRepresentation{0x0028, 0x0103, "PixelRepresentation", Kind::us};
 constexpr DicomTag kIntercept{0x0028, 0x1052, "RescaleIntercept"};
-constexpr DicomTag kTable{0x0028, 0x3000, "ModalityLUTSequence"};
 
 [[noreturn]] void damaged(const std::filesystem::path& path, const std::string& fault) {
   throw Error(path.string() + ": is cut off or damaged: " + fault + "; copy or export it again");
@@ -49,7 +44,9 @@ void read_size(const DicomHeader& header, DicomPixels& pixels) {
   if (pixels.channels < 1 || pixels.channels > 4)
     damaged(pixels.path, formatted("its header tells of {} values per pixel", pixels.channels));
   const std::string photometric = header.text(kPhotometric).value_or("");
-  if (photometric.rfind("PALETTE", 0) == 0) pixels.channels = 3;  // one number that stands for three
+  if (photometric.rfind("PALETTE", 0) == 0)
+    throw Error(pixels.path.string() + ": its pixels are numbers of colours in a table (" + kPhotometric.text() +
+                " is PALETTE COLOR), not grey levels; export it as MONOCHROME2");
   if (pixels.channels == 1 && photometric != "MONOCHROME1" && photometric != "MONOCHROME2")
     throw Error(pixels.path.string() + ": " + kPhotometric.text() +
                 (photometric.empty() ? " is missing" : " is '" + shown(photometric) + "'") +
@@ -77,20 +74,20 @@ void read_bits(const DicomHeader& header, DicomPixels& pixels) {
   pixels.bits_allocated = whole(header, kAllocated);
   pixels.bits_stored = whole(header, kStored);
   const int allocated = pixels.bits_allocated, stored = pixels.bits_stored, high = whole(header, kHighBit);
-  const int representation = whole(header, kRepresentation);
+  const int representation = whole(header, kPixelRepresentation);
   if ((allocated != 8 && allocated != 16 && allocated != 32) || stored < 1 || stored > allocated || high != stored - 1)
     throw Error(
         formatted("{}: its pixels have {} of {} bits, the highest being {}, which is not read; expected 8, 16 or 32 "
                   "bits, the highest being the last that is stored: export it with 16",
                   pixels.path.string(), stored, allocated, high));
-  if (representation != 0 && representation != 1) damaged(pixels.path, kRepresentation.text() + " is neither 0 nor 1");
+  if (representation != 0 && representation != 1)
+    damaged(pixels.path, kPixelRepresentation.text() + " is neither 0 nor 1");
   pixels.is_signed = representation == 1;
   const auto slope = header.number(kRescaleSlope), intercept = header.number(kIntercept);
   pixels.slope = slope.value_or(1);
   pixels.intercept = intercept.value_or(0);
   pixels.gives_slope = slope.has_value();
   pixels.gives_intercept = intercept.has_value();
-  pixels.has_table = header.has(kTable);
   if (pixels.slope == 0) damaged(pixels.path, kRescaleSlope.text() + " is 0");
 }
 
@@ -113,20 +110,6 @@ void read_padding(const DicomHeader& header, DicomPixels& pixels) {
     pixels.padding = {std::min(*from, *to), std::max(*from, *to)};
   else
     pixels.padding_beyond_bits = std::uint16_t(int(*value));
-}
-
-/// When the other bits are removed, such padding would become another value, possibly that of bone.
-void check_padding(const DicomPixels& pixels, const std::vector<std::byte>& bytes) {
-  if (!pixels.padding_beyond_bits || pixels.bits_allocated != 16) return;
-  for (std::size_t at = 0; at < bytes.size(); at += 2) {
-    std::uint16_t word;
-    std::memcpy(&word, bytes.data() + at, 2);
-    if (word == *pixels.padding_beyond_bits)
-      throw Error(
-          formatted("{}: has pixels of the value {} (PixelPaddingValue), which the {} bits that its pixels have cannot "
-                    "hold; export it again",
-                    pixels.path.string(), word, pixels.bits_stored));
-  }
 }
 
 /// The first part of each frame by the table of offsets. The offsets count from the first part's item.
@@ -185,7 +168,7 @@ bool is_filled(const DicomFile& file, std::uint64_t pixel_bytes) {
   const DicomSpan& part = file.pixel_parts()[0];
   const std::uint64_t more = part.bytes - pixel_bytes;
   if (more == 1 && pixel_bytes % 2 == 1) return true;
-  return more <= 512 && file.file().text(part.begin + pixel_bytes, std::size_t(more)) == std::string(more, '\0');
+  return more <= 512 && file.text({part.begin + pixel_bytes, more}) == std::string(more, '\0');
 }
 
 void check_plain(const DicomFile& file, const DicomPixels& pixels) {
@@ -199,92 +182,7 @@ void check_plain(const DicomFile& file, const DicomPixels& pixels) {
                                    std::int64_t(held)));
 }
 
-CodedImage coded_frame(const DicomPixels& pixels, const InputFile& file, int frame) {
-  CodedImage image{{}, pixels.columns, pixels.rows, pixels.bits_stored, pixels.bits_allocated};
-  for (std::size_t i = pixels.first_part_of_frame[std::size_t(frame - 1)];
-       i < pixels.first_part_of_frame[std::size_t(frame)]; ++i)
-    image.bytes += file.text(pixels.frame_parts[i].begin, std::size_t(pixels.frame_parts[i].bytes));
-  check_size(pixels.path.string(), {pixels.columns, pixels.rows, 1}, image.bytes.size(), 100);
-  return image;
-}
-
-std::vector<std::byte> decoded(const DicomPixels& pixels, const CodedImage& image) {
-  try {
-    if (pixels.transfer_syntax == "1.2.840.10008.1.2.5") return decode_rle(image);
-    if (pixels.transfer_syntax == "1.2.840.10008.1.2.4.50") return decode_jpeg_baseline(image);
-    if (pixels.transfer_syntax == "1.2.840.10008.1.2.4.80") return decode_jpeg_ls(image);
-    return decode_jpeg_lossless(image);
-  } catch (const CodecNotRead& error) {
-    throw Error(pixels.path.string() + ": " + error.what() + "; convert it: gdcmconv --raw IN OUT");
-  } catch (const CodecError& error) {
-    damaged(pixels.path, error.what());
-  }
-}
-
-std::vector<std::byte> plain_frame(const DicomPixels& pixels, const InputFile& file, int frame) {
-  const std::size_t width = std::size_t(pixels.bits_allocated / 8);
-  std::vector<std::byte> bytes(std::size_t(pixels.columns) * std::size_t(pixels.rows) * width *
-                               std::size_t(pixels.channels));
-  file.read(pixels.frame_parts[0].begin + std::uint64_t(frame - 1) * bytes.size(), bytes.data(), bytes.size());
-  if (pixels.big_endian && width > 1)
-    for (std::size_t at = 0; at < bytes.size(); at += width) std::reverse(bytes.data() + at, bytes.data() + at + width);
-  return bytes;
-}
-
-/// Puts red, green and blue of a pixel side by side.
-std::vector<std::byte> side_by_side(const std::vector<std::byte>& planes, std::size_t width) {
-  std::vector<std::byte> pixels(planes.size());
-  const std::size_t count = planes.size() / (3 * width);
-  for (std::size_t i = 0; i < count; ++i)
-    for (std::size_t k = 0; k < 3; ++k)
-      std::memcpy(pixels.data() + (3 * i + k) * width, planes.data() + (k * count + i) * width, width);
-  return pixels;
-}
-
-/// Keeps only the stored bits. The bits above them may hold overlays.
-template <class T>
-void keep_stored(const DicomPixels& pixels, std::vector<std::byte>& bytes) {
-  const T mask = T((std::uint64_t(1) << pixels.bits_stored) - 1),
-          sign = T(std::uint64_t(1) << (pixels.bits_stored - 1));
-  for (std::size_t at = 0; at < bytes.size(); at += sizeof(T)) {
-    T value;
-    std::memcpy(&value, bytes.data() + at, sizeof(T));
-    value &= mask;
-    if (pixels.is_signed && (value & sign)) value = T(value | T(~mask));
-    std::memcpy(bytes.data() + at, &value, sizeof(T));
-  }
-}
-
-template <class T>
-void scale(const DicomPixels& pixels, const std::vector<std::byte>& bytes, float* values) {
-  for (std::size_t i = 0; i < bytes.size() / sizeof(T); ++i) {
-    T value;
-    std::memcpy(&value, bytes.data() + i * sizeof(T), sizeof(T));
-    values[i] = float(pixels.slope * double(value) + pixels.intercept);
-  }
-}
-
 }  // namespace
-
-std::vector<std::byte> decode_rle(const CodedImage& image) {
-  const std::size_t count = std::size_t(image.columns) * std::size_t(image.rows),
-                    width = std::size_t(image.bits_allocated / 8);
-  const auto word = [&](std::size_t at) {
-    return std::size_t(number_in_bytes(std::string_view(image.bytes).substr(at, 4), false));
-  };
-  if (image.bytes.size() < 64 || word(0) != width)
-    throw CodecError("the compressed pixels are not of as many parts as a pixel has bytes");
-  std::vector<std::byte> bytes(count * width), part(count);
-  for (std::size_t k = 0; k < width; ++k) {  // the high bytes of all pixels come first
-    const std::size_t begin = word(4 + 4 * k), end = k + 1 < width ? word(8 + 4 * k) : image.bytes.size();
-    if (begin < 64 || begin > end || end > image.bytes.size())
-      throw CodecError("the compressed pixels are damaged at their start");
-    if (unpack_packbits(std::string_view(image.bytes).substr(begin, end - begin), part.data(), count) != count)
-      throw CodecError("the compressed pixels are too few");
-    for (std::size_t i = 0; i < count; ++i) bytes[i * width + width - 1 - k] = part[i];
-  }
-  return bytes;
-}
 
 DicomPixels read_dicom_pixels(const DicomFile& file, int frame) {
   const DicomHeader header(file, frame);
@@ -300,17 +198,16 @@ DicomPixels read_dicom_pixels(const DicomFile& file, int frame) {
   read_bits(header, pixels);
   check_groups(file, pixels);
   if (pixels.channels == 1) read_padding(header, pixels);
+  pixels.table = read_dicom_table(file, header);
   const bool should_be_compressed =
       pixels.transfer_syntax.rfind("1.2.840.10008.1.2.4", 0) == 0 || pixels.transfer_syntax == "1.2.840.10008.1.2.5";
   if (file.is_compressed() != should_be_compressed)
     damaged(pixels.path, "its pixels are not written as its transfer syntax says");
-  if (pixels.big_endian && pixels.bits_allocated == 8 && file.pixels_are_words())
-    throw Error(pixels.path.string() +
-                ": its pixels of 8 bits are written in pairs, the second one first (OW, big-endian), which is not "
-                "read; convert it: gdcmconv --raw IN OUT");
+  pixels.bytes_are_swapped = pixels.big_endian && pixels.bits_allocated == 8 && file.pixels_are_words();
   pixels.is_plain_rgb = pixels.channels == 3 && header.text(kPhotometric).value_or("") == "RGB" &&
                         !file.is_compressed() && !pixels.is_signed;
   pixels.planes_are_apart = pixels.is_plain_rgb && header.number(kPlanes).value_or(0) == 1;
+  pixels.unpacked = file.unpacked();
   pixels.frame_parts = file.pixel_parts();
   file.is_compressed() ? find_frames(file, pixels) : check_plain(file, pixels);
   return pixels;
@@ -318,65 +215,6 @@ DicomPixels read_dicom_pixels(const DicomFile& file, int frame) {
 
 DicomPixels read_dicom_pixels(const std::filesystem::path& path, int frame) {
   return read_dicom_pixels(DicomFile(path), frame);
-}
-
-Samples read_dicom_frame(const DicomPixels& pixels, int frame) {
-  const InputFile file(pixels.path);
-  if (file.size() != pixels.file_bytes)
-    throw Error(pixels.path.string() + ": was changed while it was read; try again when nothing writes it");
-  Samples samples;
-  samples.dimensions = 2;
-  samples.size = {pixels.columns, pixels.rows, 1};
-  using Type = Samples::Type;
-  samples.type = pixels.bits_allocated == 8    ? (pixels.is_signed ? Type::i8 : Type::u8)
-                 : pixels.bits_allocated == 16 ? (pixels.is_signed ? Type::i16 : Type::u16)
-                                               : (pixels.is_signed ? Type::i32 : Type::u32);
-  samples.components = pixels.channels;
-  if (pixels.first_part_of_frame.empty())
-    samples.bytes = plain_frame(pixels, file, frame);
-  else if (pixels.bits_allocated == 32 && pixels.transfer_syntax != "1.2.840.10008.1.2.5")
-    damaged(pixels.path, "JPEG has no pixels of 32 bits");
-  else
-    samples.bytes = decoded(pixels, coded_frame(pixels, file, frame));
-  if (pixels.planes_are_apart) samples.bytes = side_by_side(samples.bytes, bytes_each(samples.type));
-  if (pixels.bits_stored == pixels.bits_allocated) return samples;
-  check_padding(pixels, samples.bytes);
-  if (pixels.bits_allocated == 8) keep_stored<std::uint8_t>(pixels, samples.bytes);
-  if (pixels.bits_allocated == 16) keep_stored<std::uint16_t>(pixels, samples.bytes);
-  if (pixels.bits_allocated == 32) keep_stored<std::uint32_t>(pixels, samples.bytes);
-  return samples;
-}
-
-void make_padding_air(const DicomPixels& pixels, float* values, std::size_t count) {
-  constexpr float kAir_hu = -1000;
-  if (!pixels.padding) return;
-  const auto scaled = [&](double stored) { return float(pixels.slope * stored + pixels.intercept); };
-  const auto [lowest, highest] = std::minmax({scaled((*pixels.padding)[0]), scaled((*pixels.padding)[1])});
-  for (std::size_t i = 0; i < count; ++i)
-    if (values[i] >= lowest && values[i] <= highest) values[i] = std::min(values[i], kAir_hu);
-}
-
-double sum_of_limits(const DicomPixels& pixels) {
-  const double sum = pixels.is_signed ? -1 : std::ldexp(1, pixels.bits_stored) - 1;  // signed: -2048 to 2047
-  return pixels.slope * sum + 2 * pixels.intercept;
-}
-
-void scaled_values(const DicomPixels& pixels, const Samples& samples, float* values) {
-  using Type = Samples::Type;
-  switch (samples.type) {
-    case Type::u8:
-      return scale<std::uint8_t>(pixels, samples.bytes, values);
-    case Type::i8:
-      return scale<std::int8_t>(pixels, samples.bytes, values);
-    case Type::u16:
-      return scale<std::uint16_t>(pixels, samples.bytes, values);
-    case Type::i16:
-      return scale<std::int16_t>(pixels, samples.bytes, values);
-    case Type::u32:
-      return scale<std::uint32_t>(pixels, samples.bytes, values);
-    default:
-      return scale<std::int32_t>(pixels, samples.bytes, values);
-  }
 }
 
 }  // namespace marrow::files

@@ -6,6 +6,16 @@
 
 namespace marrow::files {
 
+/// A table from stored numbers to values (ModalityLUTSequence, PS3.3 C.11.1.1).
+struct DicomTable {
+  double first = 0;                    ///< the stored number of the first entry; entries follow in steps of 1
+  std::vector<std::uint16_t> entries;  ///< numbers before the first or behind the last have its value
+  int bits = 16;
+  std::string type;  ///< of the values: HU, OD, US (unspecified), or as the maker says
+  double value_of(double stored) const;
+  bool descends() const { return entries.front() > entries.back(); }
+};
+
 /// All that decoding needs, without an open file: a series has more files than may be open at once.
 struct DicomPixels {
   std::filesystem::path path;
@@ -23,8 +33,10 @@ struct DicomPixels {
   /// Lowest and highest stored value of pixels that were not measured (PixelPaddingValue).
   std::optional<std::array<double, 2>> padding;
   std::optional<std::uint16_t> padding_beyond_bits;  ///< PixelPaddingValue, if the stored bits cannot hold it
-  bool has_table = false;                        ///< values need a table (ModalityLUTSequence), which is not supported
-  std::vector<DicomSpan> frame_parts;            ///< plain pixels: one part with all frames
+  std::optional<DicomTable> table;                   ///< in place of slope and intercept
+  std::shared_ptr<const std::string> unpacked;       ///< the content of a deflated file; else null
+  bool bytes_are_swapped = false;                    ///< pixels of one byte, written in pairs with the second one first
+  std::vector<DicomSpan> frame_parts;                ///< plain pixels: one part with all frames
   std::vector<std::size_t> first_part_of_frame;  ///< for compressed pixels; has one entry more than there are frames
 };
 
@@ -44,7 +56,10 @@ void make_padding_air(const DicomPixels& pixels, float* values, std::size_t coun
 /// 4095 that is 4095.
 double sum_of_limits(const DicomPixels& pixels);
 
-/// The values for the stored numbers (RescaleSlope, RescaleIntercept).
+/// The table in the header; std::nullopt if there is none. Throws Error if it contradicts itself.
+std::optional<DicomTable> read_dicom_table(const DicomFile& file, const DicomHeader& header);
+
+/// The values for the stored numbers, by the table or by RescaleSlope and RescaleIntercept.
 void scaled_values(const DicomPixels& pixels, const Samples& samples, float* values);
 
 }  // namespace marrow::files

@@ -14,7 +14,7 @@ constexpr DicomTag kLossy{0x0028, 0x2110, "LossyImageCompression"};
 /// Headers of copies forget that their pixels were compressed, so the way they are written now counts too.
 bool is_lossy_dicom(const std::filesystem::path& path) {
   constexpr const char* kLossySyntaxes[] = {"1.2.840.10008.1.2.4.50", "1.2.840.10008.1.2.4.51",
-                                            "1.2.840.10008.1.2.4.81"};
+                                            "1.2.840.10008.1.2.4.81", "1.2.840.10008.1.2.4.91"};
   const DicomFile file(path);
   return std::find(std::begin(kLossySyntaxes), std::end(kLossySyntaxes), file.transfer_syntax()) !=
              std::end(kLossySyntaxes) ||

@@ -60,13 +60,10 @@ Image read_dicom_image(const fs::path& path, int frame) {
   const DicomPixels pixels = read_dicom_pixels(path, std::max(1, frame));
   check_frame(frame, pixels.frames, path, " frames; name one with frame (from 1)");
   if (!pixels.is_plain_rgb) check_one_channel(pixels.channels, path);
-  if (pixels.has_table)
-    throw Error(path.string() +
-                ": its values go through a table (ModalityLUTSequence), which is not read; export it without one");
   Samples samples = read_dicom_frame(pixels, std::max(1, frame));
   make_grey(path.string(), samples);
   const bool is_signed = samples.type != Samples::Type::u8 && samples.type != Samples::Type::u16;
-  if (!is_signed && pixels.slope == 1 && pixels.intercept == 0) return image_of(samples, 1, path);
+  if (!is_signed && !pixels.table && pixels.slope == 1 && pixels.intercept == 0) return image_of(samples, 1, path);
   Image image{cv::Mat(pixels.rows, pixels.columns, CV_32F)};
   scaled_values(pixels, samples, image.pixels.ptr<float>());
   check_finite(image, path);

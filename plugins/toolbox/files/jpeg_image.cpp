@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // JPEG files, as cameras and archives export them: 8 bits, grey or in colours.
 #include "exif.hpp"
-#include "jpeg_stream.hpp"
+#include "jpeg_segments.hpp"
 #include "libjpeg.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"

@@ -61,6 +61,8 @@ VolumeSamples read_nifti(const std::filesystem::path& path, bool is_placed = tru
 /// selects the series; empty: the folder must hold only one CT. Other files of the folder are passed over. Throws Error
 /// if slices are missing, damaged or do not fit together.
 VolumeSamples read_dicom_series(const std::filesystem::path& folder, const std::string& series_uid);
+/// The same of the frames of one enhanced CT file.
+VolumeSamples read_dicom_frames(const std::filesystem::path& path);
 /// Whether a file has DICOM's mark at byte 128 or, as some programs write it, begins with DICOM elements at once.
 bool looks_like_dicom(const std::filesystem::path& path);
 

@@ -30,8 +30,6 @@ VolumeSamples read_tiff_volume(const fs::path& path) {
 }
 
 [[noreturn]] void refuse_as_volume(const fs::path& path, FileFormat format) {
-  if (format == FileFormat::dicom)
-    throw Error(path.string() + ": is one DICOM file; a volume is a folder of DICOM slices (name the folder)");
   const std::string other = format == FileFormat::unknown ? name_of_other_format(path) : "a picture (PNG, JPEG or BMP)";
   throw Error(path.string() + ": " + (other.empty() ? "" : "is " + other + ", ") +
               "not a volume that can be read; known are .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .tif and a "
@@ -44,6 +42,7 @@ VolumeSamples read_single(const fs::path& path, FileFormat format, bool folder_i
   if (format == FileFormat::nrrd) return read_nrrd(path, folder_is_named);
   if (format == FileFormat::nifti) return read_nifti(path);
   if (format == FileFormat::tiff) return read_tiff_volume(path);
+  if (format == FileFormat::dicom) return read_dicom_frames(path);
   refuse_as_volume(path, format);
 }
 

@@ -207,22 +207,25 @@ void check_lengths(const DicomHeader& header, const CArm& arm) {
                           arm.pixel_mm.y()));
 }
 
-/// Whether higher scaled values mean less radiation. The header's sign refers to stored values; a negative slope
-/// reverses it. Without a sign the image is taken as a viewer shows it: MONOCHROME1 shows its lowest value white.
-bool is_inverted(const DicomHeader& header) {
+/// Whether higher values mean less radiation. The header's sign refers to stored values; a negative slope or a table
+/// that descends reverses it. Without a sign the image is taken as a viewer shows it: MONOCHROME1 shows its lowest
+/// value white.
+bool is_inverted(const DicomHeader& header, const DicomPixels& stored) {
   const auto sign = header.number(kIntensitySign);
   if (!sign) return header.text(kPhotometric).value_or("") == "MONOCHROME1";
   if (*sign != 1 && *sign != -1)
     throw Error(formatted("{}: {} is {}, expected 1 or -1", header.path().string(), kIntensitySign.text(), int(*sign)));
-  return (*sign < 0) != (header.number(kRescaleSlope).value_or(1) < 0);
+  return (*sign < 0) != (stored.table ? stored.table->descends() : stored.slope < 0);
 }
 
-/// Values must be linear in the radiation, because their logarithm is taken later.
-void check_linear(const DicomHeader& header) {
-  if (header.text(kIntensity).value_or("") == "LOG")
+/// Values must be linear in the radiation, because their logarithm is taken later. A table makes logarithms linear
+/// (PS3.3 C.8.7.1.1.2).
+void check_linear(const DicomHeader& header, const DicomPixels& stored) {
+  if (header.text(kIntensity).value_or("") == "LOG" && !stored.table)
     throw Error(
         header.path().string() + ": its values are logarithms (" + kIntensity.text() +
-        " is LOG), but those of an X-ray image must rise linearly with the radiation; export it as linear (LIN), "
+        " is LOG) without the table that makes them linear (ModalityLUTSequence), but those of an X-ray image must "
+        "rise linearly with the radiation; export it as linear (LIN), "
         "or, where only contours are looked for, save it as PNG or TIFF with bright air");
 }
 
@@ -318,9 +321,9 @@ XrayPixels read_xray_pixels(const std::filesystem::path& path, int frame) {
   const DicomFile file(path);
   const DicomHeader header(file, frame);
   XrayPixels pixels;
-  check_linear(header);
-  if (is_inverted(header)) {
-    const DicomPixels stored = read_dicom_pixels(file, frame);
+  const DicomPixels stored = read_dicom_pixels(file, frame);
+  check_linear(header, stored);
+  if (is_inverted(header, stored)) {
     constexpr int kMostBits = 24;  // which a float holds
     if (!stored.is_signed && stored.bits_stored > kMostBits)
       throw Error(

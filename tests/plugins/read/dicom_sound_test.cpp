@@ -67,7 +67,10 @@ TEST_F(DicomSound, ColoursFromATableAreOnlyCalledColours) {
                          {0x00280101, "US:8"},
                          {0x00280102, "US:7"},
                          {0x7FE00010, "OB:" + std::string(24, '\1')}};
-  expect_refused(dicom_file(but(fluoroscopy(), palette)), "x.dcm: has 3 channels; an X-ray image has one");
+  expect_refused(
+      dicom_file(but(fluoroscopy(), palette)),
+      "x.dcm: its pixels are numbers of colours in a table (PhotometricInterpretation (0028,0004) is PALETTE COLOR), "
+      "not grey levels; export it as MONOCHROME2");
 }
 
 // Four pixels share a colour, so a pixel has 1.5 values on average.

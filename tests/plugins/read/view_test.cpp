@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include "shipped.hpp"
-#include "tests/plugins/read/dicom_text.hpp"
 #include "tests/plugins/read/files.hpp"
 #include "tests/plugins/read/itk_files.hpp"
 #include "tests/plugins/read/reading.hpp"
@@ -43,16 +42,6 @@ TEST(ReadView, TheImageIsTurnedOverAndItsCameraStays) {
                                 .as<marrow::View>();
   EXPECT_EQ(view.image.pixels.at<std::uint8_t>(0, 2), 3 * 6 + 2);
   EXPECT_EQ(marrow::hash_of(view.camera), marrow::hash_of(camera));
-}
-
-TEST(ReadView, ValuesThatGoThroughATableAreRefused) {
-  const marrow::test::TemporaryFolder folder;
-  auto elements = marrow::test::fluoroscopy();
-  elements[0x00283000] = marrow::test::dicom_item({{0x00283002, "US:4"}});
-  marrow::test::put(folder / "x.dcm", marrow::test::dicom_file(elements));
-  const marrow::Camera camera;
-  EXPECT_SAYS(view_from(&camera, {"frontal", folder / "x.dcm"}),
-              "x.dcm: its values go through a table (ModalityLUTSequence), which is not read; export it without one");
 }
 
 }  // namespace view_test

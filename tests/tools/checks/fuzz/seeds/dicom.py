@@ -2,6 +2,8 @@
 """DICOM files element by element, for the target `dicom`: the way of reading, then the file."""
 import struct
 
+import codestreams
+
 LONG = {"OB", "OW", "SQ", "UN", "UT", "OF"}
 
 
@@ -112,6 +114,18 @@ def frames():
     return dicom(elements, extra=shared + each)
 
 
+def enhanced_ct():
+    """Two slices of a tilted gantry in one file."""
+    places = b"".join(
+        item(element(0x00209113, "SQ", item(element(0x00200032, "DS", place)))) for place in ("0\\0\\0", "0\\1\\2")
+    )
+    elements = slice_(0)
+    del elements[0x00200032]
+    elements[0x00280008] = ("IS", "2")
+    elements[0x7FE00010] = ("OW", bytes(range(64)))
+    return dicom(elements, extra=element(0x52009230, "SQ", places))
+
+
 def seeds():
     xa, ct = dicom(fluoroscopy()), dicom(slice_(0))
     nested = delimited_sequence(
@@ -158,6 +172,25 @@ def seeds():
         "unknown": "1.2.3.4",
     }.items():
         result["i_" + name] = b"i" + dicom(headless, syntax) + fragments
+    bits_12 = {**headless, 0x00280101: ("US", 12), 0x00280102: ("US", 11)}
+    for name, syntax, coded in (
+        ("jpeg_12", "1.2.840.10008.1.2.4.51", codestreams.JPEG_EXTENDED),
+        ("jpeg_lossless", "1.2.840.10008.1.2.4.57", codestreams.JPEG_LOSSLESS),
+        ("jpeg_ls", "1.2.840.10008.1.2.4.80", codestreams.JPEG_LS),
+        ("jpeg_2000", "1.2.840.10008.1.2.4.90", codestreams.JPEG_2000),
+    ):
+        whole = coded + b"\0" * (len(coded) % 2)
+        result["i_whole_" + name] = (
+            b"i"
+            + dicom(bits_12, syntax)
+            + struct.pack("<HH2sHI", 0x7FE0, 0x10, b"OB", 0, 0xFFFFFFFF)
+            + item(b"")
+            + item(whole)
+            + struct.pack("<HHI", 0xFFFE, 0xE0DD, 0)
+        )
+    table = element(0x00283002, "US", struct.pack("<3H", 4, 1, 16)) + element(0x00283006, "OW", bytes(range(8)))
+    result["i_table"] = b"i" + dicom(fluoroscopy(), extra=element(0x00283000, "SQ", item(table)))
+    result["s_frames"] = b"s" + enhanced_ct()
     result["i_delimited"] = b"i" + dicom(headless, extra=nested) + element(0x7FE00010, "OW", bytes(48))
     result["f_frames"] = b"f" + frames()
     result["x_frames"] = b"x" + frames()

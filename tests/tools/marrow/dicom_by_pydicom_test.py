@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: Apache-2.0
+"""DICOM files that pydicom wrote in ways that libraries decode or few programs know: marrow's values are pydicom's."""
+import io
+import shutil
+import subprocess
+import unittest
+
+from harness.program import main
+from other_programs import Reading, needs, numpy, pydicom
+
+try:
+    from PIL import Image, features
+    from pydicom.dataset import Dataset, FileMetaDataset
+    from pydicom.encaps import encapsulate
+    from pydicom.pixel_data_handlers.util import apply_modality_lut
+    from pydicom.sequence import Sequence
+
+    HAS_JPEG_2000 = bool(features.check("jpg_2000"))
+except ImportError:
+    HAS_JPEG_2000 = False
+
+EXPLICIT, DEFLATED, JPEG_2000 = "1.2.840.10008.1.2.1", "1.2.840.10008.1.2.1.99", "1.2.840.10008.1.2.4.90"
+CT, ENHANCED_CT, XA = "1.2.840.10008.5.1.4.1.1.2", "1.2.840.10008.5.1.4.1.1.2.1", "1.2.840.10008.5.1.4.1.1.12.1"
+
+
+def grey_levels(shape, seed, bits=12):
+    return numpy.random.default_rng(seed).integers(0, 2**bits, shape).astype("u2")
+
+
+def jpeg_2000(frame):
+    """A codestream without a box around it. Pillow writes 16 bits."""
+    out = io.BytesIO()
+    Image.fromarray(frame).save(out, "JPEG2000", irreversible=False, no_jp2=True)
+    return out.getvalue()
+
+
+def dicom(class_uid, modality, pixels, syntax=EXPLICIT, bits=16):
+    """`pixels`: rows and columns, or frames before them."""
+    data = Dataset()
+    data.file_meta = FileMetaDataset()
+    data.file_meta.TransferSyntaxUID = syntax
+    data.file_meta.MediaStorageSOPClassUID = data.SOPClassUID = class_uid
+    data.file_meta.MediaStorageSOPInstanceUID = data.SOPInstanceUID = "1.2.3.4"
+    data.is_little_endian, data.is_implicit_VR = True, False
+    data.Modality, data.SeriesInstanceUID = modality, "1.2.9"
+    data.SamplesPerPixel, data.PhotometricInterpretation = 1, "MONOCHROME2"
+    data.Rows, data.Columns = pixels.shape[-2:]
+    data.BitsAllocated, data.BitsStored, data.HighBit, data.PixelRepresentation = 16, bits, bits - 1, 0
+    if pixels.ndim == 3:
+        data.NumberOfFrames = len(pixels)
+    if syntax == JPEG_2000:
+        data.PixelData = encapsulate([jpeg_2000(frame) for frame in (pixels if pixels.ndim == 3 else [pixels])])
+        data["PixelData"].is_undefined_length = True
+    else:
+        data.PixelData = pixels.tobytes()
+    return data
+
+
+def item(**values):
+    part = Dataset()
+    for name, value in values.items():
+        setattr(part, name, value)
+    return part
+
+
+def table(first, entries, kind, bits=16):
+    part = item(ModalityLUTType=kind)
+    part.add_new(0x00283002, "US", [len(entries), first, bits])
+    part.add_new(0x00283006, "OW", numpy.array(entries, "<u2").tobytes())
+    return Sequence([part])
+
+
+@needs("pydicom", "numpy")
+class Dicom(Reading):
+    def written(self, data, name="x.dcm"):
+        path = self.scratch / name
+        path.parent.mkdir(exist_ok=True)
+        data.save_as(path, write_like_original=False)
+        return path
+
+    def assert_image(self, data):
+        """Values of a table are floats, which a PNG holds scaled."""
+        path = self.written(data)
+        read = pydicom.dcmread(path)
+        if "ModalityLUTSequence" in read:
+            return self.assert_scaled(self.image(path), apply_modality_lut(read.pixel_array, read))
+        self.assertTrue((self.image(path) == read.pixel_array).all())
+
+    @unittest.skipIf(not HAS_JPEG_2000, "not installed here: Pillow with JPEG 2000")
+    def test_jpeg_2000(self):
+        self.assert_image(dicom(XA, "XA", grey_levels((37, 53), 1, 16), JPEG_2000))
+
+    def test_deflated(self):
+        self.assert_image(dicom(XA, "XA", grey_levels((37, 53), 2), DEFLATED))
+
+    def test_a_table_of_values(self):
+        for first, count in ((0, 4096), (100, 512), (-5, 300)):
+            with self.subTest(first=first, count=count):
+                data = dicom(XA, "XA", grey_levels((37, 53), 3), bits=12 if first >= 0 else 16)
+                entries = numpy.round(60000 * numpy.linspace(0, 1, count) ** 2)
+                data.ModalityLUTSequence = table(max(first, 0), entries, "US")
+                if first < 0:
+                    data.PixelRepresentation = 1
+                    data.ModalityLUTSequence[0].add_new(0x00283002, "SS", [count, first, 16])
+                self.assert_image(data)
+
+    def test_logarithms_with_the_table_that_makes_them_linear(self):
+        data = dicom(XA, "XA", grey_levels((37, 53), 4), bits=12)
+        data.PixelIntensityRelationship, data.PixelIntensityRelationshipSign = "LOG", 1
+        data.ModalityLUTSequence = table(0, numpy.exp(numpy.arange(4096) / 4096 * 11).astype("u2"), "US")
+        self.assert_image(data)
+
+    def enhanced(self, pixels, syntax):
+        data = dicom(ENHANCED_CT, "CT", pixels, syntax)
+        data.SharedFunctionalGroupsSequence = Sequence(
+            [
+                item(
+                    PixelMeasuresSequence=Sequence([item(PixelSpacing=[0.75, 0.5], SliceThickness=1.5)]),
+                    PlaneOrientationSequence=Sequence([item(ImageOrientationPatient=[1, 0, 0, 0, 1, 0])]),
+                )
+            ]
+        )
+        # From above to below, and each frame with a slope of its own.
+        data.PerFrameFunctionalGroupsSequence = Sequence(
+            [
+                item(
+                    PlanePositionSequence=Sequence([item(ImagePositionPatient=[10, -20, 100 - 1.5 * k])]),
+                    PixelValueTransformationSequence=Sequence(
+                        [item(RescaleIntercept=-1024 - k, RescaleSlope=1 + k / 8, RescaleType="HU")]
+                    ),
+                )
+                for k in range(len(pixels))
+            ]
+        )
+        return data
+
+    def test_an_enhanced_ct(self):
+        pixels = grey_levels((5, 11, 9), 5)
+        expected = [frame * (1 + k / 8) - 1024 - k for k, frame in enumerate(pixels.astype(float))][::-1]
+        for syntax in (EXPLICIT, DEFLATED) + ((JPEG_2000,) if HAS_JPEG_2000 else ()):
+            file = self.written(self.enhanced(pixels, syntax), "ct/x.dcm")
+            self.assertTrue((pydicom.dcmread(file).pixel_array == pixels).all())
+            for path in (file, file.parent):
+                with self.subTest(syntax=syntax, path=path.name):
+                    values, keys = self.volume(path)
+                    self.assertLess(float(numpy.abs(values - expected).max()), 1e-3)
+                    self.assertEqual(keys["ElementSpacing"].split(), ["0.5", "0.75", "1.5"])
+                    self.assertEqual([float(x) for x in keys["Offset"].split()], [10, -20, 94])
+
+    def test_frames_without_places_are_refused(self):
+        data = dicom(ENHANCED_CT, "CT", grey_levels((5, 11, 9), 6))
+        said = self.refused("read.volume", self.written(data, "ct/x.dcm").parent / "x.dcm")
+        self.assertIn("does not say where its frames lie (PerFrameFunctionalGroupsSequence is missing)", said)
+
+    def slices(self, pixels, places, **values):
+        for k, (frame, place) in enumerate(zip(pixels, places)):
+            data = dicom(CT, "CT", frame)
+            data.ImagePositionPatient, data.ImageOrientationPatient = [float(x) for x in place], [1, 0, 0, 0, 1, 0]
+            data.PixelSpacing = [0.5, 0.5]
+            data.RescaleSlope, data.RescaleIntercept = 1, -1024
+            for name, value in values.items():
+                setattr(data, name, value)
+            path = self.written(data, "ct/%d.dcm" % k)
+        return path.parent
+
+    def test_a_table_of_hounsfield_units(self):
+        pixels = grey_levels((3, 11, 9), 7)
+        entries = (numpy.arange(4096) // 2).tolist()
+        folder = self.slices(pixels, [(0, 0, k) for k in range(3)], ModalityLUTSequence=table(0, entries, "HU"))
+        self.assertTrue((self.volume(folder)[0] == pixels // 2).all())
+        self.slices(pixels, [(0, 0, k) for k in range(3)], ModalityLUTSequence=table(0, entries, "OD"))
+        said = self.refused("read.volume", folder)
+        self.assertIn("no Hounsfield units: ModalityLUTType (0028,3004) is 'OD', expected HU", said)
+
+    def test_a_tilted_gantry_is_straightened(self):
+        """Whole pixels are exact. Others lie between their neighbours as numpy interpolates them."""
+        pixels = grey_levels((6, 11, 9), 8)
+        for step_mm in (1.0, -1.0, 0.3, -0.3):  # 2 or 0.6 pixels a slice
+            with self.subTest(step_mm=step_mm):
+                folder = self.slices(pixels, [(0, step_mm * k, 2 * k) for k in range(6)])
+                values, keys = self.volume(folder)
+                rows = numpy.arange(values.shape[1]) * 0.5 + float(keys["Offset"].split()[1])
+                self.assertEqual(values.shape[2], 9)
+                for k, frame in enumerate(pixels.astype(float) - 1024):
+                    padded = numpy.vstack([[-1000] * 9, frame, [-1000] * 9])
+                    own = step_mm * k + 0.5 * numpy.arange(-1, 12)
+                    expected = numpy.stack(
+                        [numpy.interp(rows, own, padded[:, u], left=-1000, right=-1000) for u in range(9)], axis=1
+                    )
+                    self.assertLess(float(numpy.abs(values[k] - expected).max()), 0.01)
+                    inside = (rows >= own[1]) & (rows <= own[-2])
+                    self.assertGreaterEqual(int(inside.sum()), 10, "no row is lost")
+
+    @unittest.skipIf(not shutil.which("dcmcjpls"), "not installed here: dcmcjpls and dcmcjpeg (dcmtk)")
+    def test_what_dcmtk_compresses_is_what_dcmtk_decompresses(self):
+        data = dicom(XA, "XA", grey_levels((37, 53), 9), bits=12)
+        data.PatientID, data.StudyInstanceUID = "1", "1.2.8"
+        plain, packed, raw = self.written(data), self.scratch / "packed.dcm", self.scratch / "raw.dcm"
+        for compress, decompress in (
+            (["dcmcjpls", "+en", "+md", "3"], "dcmdjpls"),
+            (["dcmcjpls"], "dcmdjpls"),
+            (["dcmcjpeg", "+ee"], "dcmdjpeg"),
+            (["dcmcjpeg", "+el", "+sv", "5"], "dcmdjpeg"),
+            (["dcmcrle"], "dcmdrle"),
+        ):
+            with self.subTest(compress=compress):
+                subprocess.run(compress + [str(plain), str(packed)], check=True, capture_output=True)
+                subprocess.run([decompress, str(packed), str(raw)], check=True, capture_output=True)
+                self.assertTrue((self.image(packed) == pydicom.dcmread(raw).pixel_array).all())
+
+
+if __name__ == "__main__":
+    main()
