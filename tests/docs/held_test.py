@@ -171,6 +171,19 @@ class Held(Documents):
         rows = (out / "way" / "distal.csv").read_text().splitlines()
         self.assertEqual(len(rows), 4, rows)
 
+    def test_a_plate(self):
+        v, u = np.mgrid[0:320, 0:320]
+        bent = [at - 159.5 for at in (u, v)]
+        off = [at * (1 - 0.03 * (bent[0] ** 2 + bent[1] ** 2) / 160**2) for at in bent]
+        grey = 9000 + 8000 * np.prod([0.5 + 0.5 * np.cos(2 * np.pi * at / 14) for at in off], axis=0) ** 2
+        plate = self.folder / "plate.png"
+        Image.fromarray(grey.astype("u2")).save(plate)
+        out = self.run_section("Images of an intensifier that are bent", PLATE=plate)
+        told = {one["name"]: one["value"] for one in json.loads((out / "report.json").read_text())["metrics"]}
+        self.assertLess(told["validated"], 0.1)
+        self.assertGreater(told["points"], 300)
+        self.assertEqual(yaml.safe_load((out / "distortion.yaml").read_text())["width_px"], 320)
+
     def test_five_patients(self):
         out = self.run_section("Five patients")
         self.assertEqual(len((out / "cells.csv").read_text().splitlines()), 6)

@@ -43,8 +43,9 @@ Eigen::VectorXd shares_at(const std::vector<ArmPose>& measured, const ArmPose& p
   // Coordinates from the mean, so that the trend that is chosen if several fit has no favourite pose.
   ArmPose mean = ArmPose::Zero(pose.size());
   for (const ArmPose& one : measured) mean += one / double(count);
-  double scale = 1e-12;
+  double scale = 0;
   for (const ArmPose& one : measured) scale = std::max(scale, (one - mean).cwiseAbs().maxCoeff());
+  if (scale == 0) scale = 1;
   const auto terms = [&](const ArmPose& at) {
     Eigen::VectorXd row(trend);
     row << 1, (at - mean) / scale;

@@ -3,9 +3,9 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <array>
 #include <cmath>
 
+#include "catmull_rom.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 
@@ -14,18 +14,12 @@ namespace {
 
 double longer_side(int width_px, int height_px) { return std::max(width_px, height_px); }
 
-/// Weights of Catmull and Rom's splines of four nodes, at `t` after the second one.
-std::array<double, 4> spline_weights(double t) {
-  return {t * (-0.5 + t * (1 - 0.5 * t)), 1 + t * t * (-2.5 + 1.5 * t), t * (0.5 + t * (2 - 1.5 * t)),
-          t * t * (-0.5 + 0.5 * t)};
-}
-
 /// The displacement by the lattice. Beyond its border, the border's nodes are repeated.
 Eigen::Vector2d lattice_at(const Distortion& d, const Eigen::Vector2d& ideal_px) {
   const int columns = lattice_columns(d), rows = lattice_rows(d);
   const Eigen::Vector2d at = (ideal_px / d.step_px).cwiseMax(0).cwiseMin(Eigen::Vector2d(columns - 1, rows - 1));
   const int column = int(at.x()), row = int(at.y());
-  const auto across = spline_weights(at.x() - column), down = spline_weights(at.y() - row);
+  const auto across = catmull_rom(at.x() - column), down = catmull_rom(at.y() - row);
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   for (int j = 0; j < 4; ++j)
     for (int i = 0; i < 4; ++i) {

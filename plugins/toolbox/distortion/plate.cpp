@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -19,6 +20,7 @@ namespace {
 
 constexpr double kSizeStep = 1.3;        ///< ratio of the diameters that are tried
 constexpr double kLeastRoundness = 0.5;  ///< of a dot that the border of the field does not cut
+constexpr double kLeastStrength = 0.8;   ///< of the median of a dot and its neighbours
 constexpr double kNearlyAsMany = 0.92;   ///< of the most dots
 
 cv::Mat1f grey_of(const Image& image) {
@@ -87,6 +89,23 @@ double stretch_of(const Eigen::Matrix2d& map) {
   return std::sqrt(squares[1] / squares[0]);
 }
 
+/// Which dots are round, and stand out nearly as much as their neighbours in the grid do.
+std::vector<bool> which_are_whole(const PlateImage& plate) {
+  std::map<std::pair<int, int>, double> strengths;
+  for (const GridDot& dot : plate.dots) strengths[{dot.column, dot.row}] = plate.spots[std::size_t(dot.spot)].strength;
+  std::vector<bool> whole;
+  for (const GridDot& dot : plate.dots) {
+    std::vector<double> near;
+    for (int row = -1; row <= 1; ++row)
+      for (int column = -1; column <= 1; ++column)
+        if (const auto one = strengths.find({dot.column + column, dot.row + row}); one != strengths.end())
+          near.push_back(one->second);
+    const Spot& spot = plate.spots[std::size_t(dot.spot)];
+    whole.push_back(spot.roundness > kLeastRoundness && spot.strength > kLeastStrength * quantile_in_place(near, 0.5));
+  }
+  return whole;
+}
+
 /// The point of the plate that is seen at a pixel, by Newton's method from `plate_place`.
 Eigen::Vector2d place_seen_at(const Polynomial& seen_from_plate, Eigen::Vector2d plate_place,
                               const Eigen::Vector2d& pixel) {
@@ -142,13 +161,13 @@ StraightPlate straight_plate(const PlateImage& plate, Straight straight, int wid
     throw Error("the dots of the plate do not determine where its middle is; they may lie on one line");
   const Eigen::Matrix2d image_from_plate =
       straight == Straight::similarity ? nearest_similarity(derivative) : derivative;
+  const std::vector<bool> whole = which_are_whole(plate);
   StraightPlate result;
   result.stretch = stretch_of(derivative);
   result.points.width_px = width_px;
   result.points.height_px = height_px;
   for (std::size_t i = 0; i < places.size(); ++i)
-    result.points.add(anchor + image_from_plate * (places[i] - origin), seen[i],
-                      plate.spots[std::size_t(plate.dots[i].spot)].roundness > kLeastRoundness);
+    result.points.add(anchor + image_from_plate * (places[i] - origin), seen[i], whole[i]);
   result.pixels_per_spacing =
       straight == Straight::homography ? spacing : std::sqrt(std::abs(image_from_plate.determinant()));
   return result;

@@ -49,7 +49,8 @@ struct StraightPlate {
 
 /// The straight image shows the point at the image's middle where the original does, and around it the plate as the
 /// original does, as far as `straight` says. If the plate does not reach the middle, its dot nearest to the middle
-/// counts. Dots that are not round are not used. `width_px` and `height_px` are of the image.
+/// counts. Dots that something cuts, which are not round or
+/// fainter than their neighbours, are not used. `width_px` and `height_px` are of the image.
 StraightPlate straight_plate(const PlateImage& plate, Straight straight, int width_px, int height_px);
 
 /// The share of an area that lies within `reach_px` of a point. `area` is CV_8U, non-zero inside.

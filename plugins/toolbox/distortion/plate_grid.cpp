@@ -8,6 +8,7 @@
 #include <list>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "grid_growth.hpp"
 #include "marrow/domain/decompositions.hpp"
@@ -20,8 +21,9 @@ namespace {
 constexpr std::size_t kSeeds = 80;  ///< so many spots are tried as beginnings
 constexpr std::size_t kLeastDots = 9;
 constexpr std::size_t kLeastPart = 25;
-constexpr double kMostUneven = 0.07;  ///< spacings; where neighbours differ by more, noise was taken for dots
-constexpr double kMostStretch = 1.5;  ///< of a plate that is tilted by 48 degrees
+constexpr double kLeastNeighbours = 0.5;  ///< share of all neighbours; where fewer are known, it is a finer grid
+constexpr double kMostUneven = 0.07;      ///< spacings; where neighbours differ by more, noise was taken for dots
+constexpr double kMostStretch = 1.5;      ///< of a plate that is tilted by 48 degrees
 
 /// The distance from a spot to its nearest neighbour, as the median over the most central spots.
 double usual_distance(const std::vector<Spot>& spots) {
@@ -189,6 +191,27 @@ double stretch_of(const std::vector<Spot>& spots, const std::vector<GridDot>& do
   return squares[0] > 0 ? std::sqrt(squares[1] / squares[0]) : std::numeric_limits<double>::infinity();
 }
 
+/// Whether most dots have their neighbours, at places that fit and none nearer, and the pattern is not stretched.
+bool is_grid(const std::vector<Spot>& spots, const NearbySpots& nearby, const std::vector<GridDot>& dots,
+             Pattern grid) {
+  std::set<Index> known;
+  for (const GridDot& dot : dots) known.insert({dot.column, dot.row});
+  std::size_t neighbours = 0, between = 0;
+  const double spacing = spacing_px(spots, dots, grid);
+  for (const GridDot& dot : dots) {
+    for (const Index& step : steps(grid)) neighbours += known.count({dot.column + step.first, dot.row + step.second});
+    const Spot& own = spots[std::size_t(dot.spot)];
+    const std::vector<int> near = nearby.within(own.at_px, 0.7 * spacing);
+    between += std::any_of(near.begin(), near.end(), [&](int i) {
+      const Spot& spot = spots[std::size_t(i)];
+      return i != dot.spot && spot.strength > own.strength / kLikeness;
+    });
+  }
+  return double(neighbours) > kLeastNeighbours * double(steps(grid).size() * dots.size()) &&
+         2 * between < dots.size() && stretch_of(spots, dots, grid) < kMostStretch &&
+         unevenness_px(spots, dots, grid) < kMostUneven * spacing;
+}
+
 }  // namespace
 
 Eigen::Vector2d place_on_plate(Pattern grid, int column, int row) {
@@ -243,11 +266,9 @@ std::vector<GridDot> find_grid(const std::vector<Spot>& spots, Pattern grid) {
     if (!best || growth.size() > best->size()) best.emplace(growth);
     if (2 * best->size() > spots.size()) break;
   }
-  if (!best || best->size() < kLeastDots || stretch_of(spots, best->dots(), grid) > kMostStretch) return {};
+  if (!best || best->size() < kLeastDots || !is_grid(spots, nearby, best->dots(), grid)) return {};
   best->leave_out_doubtful();
   if (best->size() < kLeastDots) return {};
-  const std::vector<GridDot> dots = best->dots();
-  if (!(unevenness_px(spots, dots, grid) < kMostUneven * spacing_px(spots, dots, grid))) return {};
   join_parts(*best, spots, nearby, grid);
   extend(*best, spots, grid);
   best->leave_out_doubtful();

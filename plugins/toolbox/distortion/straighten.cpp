@@ -3,9 +3,10 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
+#include "catmull_rom.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 
@@ -34,6 +35,19 @@ cv::Mat2f places(const Distortion& distortion) {
   return map;
 }
 
+/// Grey value at a place between pixels. Outside the image, the border pixels are repeated.
+float sample(const cv::Mat1f& image, const cv::Vec2f& place) {
+  const int u = int(place[0]), v = int(place[1]);
+  const auto across = catmull_rom(double(place[0]) - u), down = catmull_rom(double(place[1]) - v);
+  double sum = 0;
+  for (int j = 0; j < 4; ++j) {
+    const float* row = image[std::clamp(v - 1 + j, 0, image.rows - 1)];
+    for (int i = 0; i < 4; ++i)
+      sum += down[std::size_t(j)] * across[std::size_t(i)] * double(row[std::clamp(u - 1 + i, 0, image.cols - 1)]);
+  }
+  return float(sum);
+}
+
 /// The pixel to which a place belongs, or nullptr if there is none.
 template <class Mask>
 auto* pixel_at(Mask& mask, const cv::Vec2f& place) {
@@ -56,13 +70,16 @@ void straighten(View& view, const Distortion& distortion) {
   check_distortion(distortion, what);
   check_size(view.image.pixels, distortion, what);
   const cv::Mat2f map = places(distortion);
+  cv::Mat1f taken, grey(map.size(), 0.f);
+  view.image.pixels.convertTo(taken, CV_32F);
+  tbb::parallel_for(0, map.rows, [&](int v) {
+    for (int u = 0; u < map.cols; ++u)
+      if (map(v, u)[0] >= 0) grey(v, u) = sample(taken, map(v, u));
+  });
   cv::Mat straight;
-  cv::remap(view.image.pixels, straight, map, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+  grey.convertTo(straight, view.image.pixels.type());  // rounds and saturates
   const cv::Mat1b mask =
       mask_at(map, view.mask.empty() ? cv::Mat1b(map.size(), std::uint8_t(255)) : cv::Mat1b(view.mask));
-  for (int v = 0; v < map.rows; ++v)
-    for (int u = 0; u < map.cols; ++u)
-      if (map(v, u)[0] < 0) straight(cv::Rect(u, v, 1, 1)).setTo(0);
   view.image.pixels = straight;
   view.mask = mask;
 }

@@ -7,8 +7,8 @@
 namespace marrow::distortion {
 
 /// Resamples image and mask to the straight image. Its camera stays as it is. Pixels whose place lies outside the
-/// original image or the measured area are masked out. OpenCV's cubic convolution rounds places to 1/32 pixel. Throws
-/// Error as check_view() and check_distortion() do, and if the image has another size than the distortion's.
+/// original image or the measured area are masked out. Throws Error as check_view() and check_distortion() do, and if
+/// the image has another size than the distortion's.
 void straighten(View& view, const Distortion& distortion);
 
 /// The mask of the straight image. Each pixel gets the value of the pixel of `original` that is nearest to its place

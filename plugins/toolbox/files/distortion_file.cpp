@@ -69,8 +69,8 @@ std::optional<distortion::Distortion> distortion_from(const YAML::Node& node, Ya
   take_terms(map, d);
   if (map.has("lattice")) take_lattice(map, d);
   take_area(map, d);
-  if (map.has("residual_px")) d.residual_px = map.number("residual_px").value_or(0);
-  if (map.has("validated_px")) d.validated_px = map.number("validated_px").value_or(0);
+  d.residual_px = map.number("residual_px").value_or(0);
+  d.validated_px = map.number("validated_px").value_or(0);
   if (d.terms_px.empty() || d.area_px.empty()) return std::nullopt;  // said above
   try {
     check_distortion(d, "distortion");

@@ -10,7 +10,8 @@
 
 namespace marrow::files {
 
-/// A distortion from the keys width_px, height_px, degree, terms_px, lattice and area_px. Faults are noted in `file`.
+/// A distortion from the keys width_px, height_px, degree, terms_px, lattice, area_px, residual_px and validated_px.
+/// All but the lattice are required. Faults are noted in `file`.
 std::optional<distortion::Distortion> distortion_from(const YAML::Node& node, YamlFile& file);
 
 /// Reads a distortion file in the format that marrow writes. Throws Error with all faults.

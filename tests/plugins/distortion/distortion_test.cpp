@@ -128,8 +128,10 @@ TEST(Distortion, MasksAreCarriedToTheStraightImageAndBack) {
   const cv::Mat1b again = straightened_mask(original_mask(drawn, d), d);
   for (int v = 6; v < 74; ++v)
     for (int u = 6; u < 94; ++u) {
-      if (drawn(v, u) == 0) EXPECT_EQ(again(v, u), 0) << u << ", " << v;
-      if (u < 38 || u > 50 || v < 28 || v > 38) EXPECT_EQ(again(v, u), 255) << u << ", " << v;
+      const bool is_far = u < 38 || u > 50 || v < 28 || v > 38;
+      if (drawn(v, u) == 0 || is_far) {
+        EXPECT_EQ(again(v, u), drawn(v, u)) << u << ", " << v;
+      }
     }
 }
 

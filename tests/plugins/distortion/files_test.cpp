@@ -54,7 +54,7 @@ std::string below_key(const std::string& text) {
 }
 
 TEST(DistortionFile, IsReadBackAsItWasWritten) {
-  const TemporaryFolder folder("distortion");
+  const TemporaryFolder folder;
   Distortion local = example();
   local.step_px = 16;
   for (int i = 0; i < distortion::lattice_columns(local) * distortion::lattice_rows(local); ++i)
@@ -68,7 +68,7 @@ TEST(DistortionFile, IsReadBackAsItWasWritten) {
 }
 
 TEST(DistortionFile, SaysWhereItIsWrong) {
-  const TemporaryFolder folder("distortion");
+  const TemporaryFolder folder;
   const std::string good = files::distortion_text(example());
   const auto says = [&](const std::string& text, const std::string& said) {
     put(folder / "d.yaml", text);
@@ -84,7 +84,7 @@ TEST(DistortionFile, SaysWhereItIsWrong) {
 }
 
 TEST(DistortionFile, ACameraFileHoldsOne) {
-  const TemporaryFolder folder("distortion");
+  const TemporaryFolder folder;
   const std::string key = below_key(files::distortion_text(example()));
   put(folder / "c.yaml", kCamera + key);
   const files::CameraInFile camera = files::read_camera_file(folder / "c.yaml");
@@ -112,7 +112,7 @@ void expect_straight(const View& view) {
 }
 
 TEST(DistortionFile, AViewIsStraightenedWhenItIsRead) {
-  const TemporaryFolder folder("distortion");
+  const TemporaryFolder folder;
   writing::write(Image{ramp()}, folder / "v.png");
   put(folder / "c.yaml", kCamera);
   writing::write(example(), folder / "d.yaml");
@@ -164,7 +164,7 @@ translation
 )";
 
 struct XmalabFolder : TemporaryFolder {
-  XmalabFolder() : TemporaryFolder("xmalab") {
+  XmalabFolder() {
     const auto written = call("write.xmalab", {{"points", item(grid_points())}});
     for (const std::string name : {"distorted", "references", "inlier"})
       put(*this / (name + ".csv"), written.at(name).as<exchange::XmalabGridFile>().bytes);
