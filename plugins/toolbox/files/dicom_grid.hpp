@@ -23,8 +23,8 @@ struct SliceGrid {
 /// twice, unevenly spaced, or shifted otherwise than a tilted gantry shifts it.
 SliceGrid grid_of_slices(const std::string& what, const std::vector<DicomSlice>& slices);
 
-/// Puts the values of slice `k` of a tilted gantry into the volume. Between pixels they are interpolated linearly; beside the slice is
-/// air.
+/// Puts the values of slice `k` of a tilted gantry into the volume. Between pixels they are interpolated linearly;
+/// beside the slice is air.
 void put_slice(const SliceGrid& grid, const std::vector<float>& slice, const std::array<int, 3>& slice_size, int k,
                float* volume);
 
