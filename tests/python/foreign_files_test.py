@@ -44,6 +44,7 @@ REFUSED = (
     ("pydicom", "SC_rgb_small_odd.dcm", "has colours: the pixel at"),
     ("pydicom", "SC_rgb_jpeg_dcmd.dcm", "has colours: the pixel at"),
     ("pydicom", "SC_*", "has 3 channels; an X-ray image has one: save it as grey levels"),
+    ("pydicom", "GDCMJ2K_TextGBR.dcm", "has 3 channels; an X-ray image has one: save it as grey levels"),
     ("pydicom", "ExplVR_BigEnd.dcm", "has colours: the pixel at"),
     ("pydicom", "*rtdose*", "holds a dose of radiotherapy" + NO_IMAGE),
     ("pydicom", "badVR.dcm", "holds a dose of radiotherapy" + NO_IMAGE),

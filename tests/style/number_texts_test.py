@@ -8,7 +8,6 @@ from harness import SOURCE
 OWN_WAYS = re.compile(r"std::to_string\(|snprintf\(|\bostringstream\b|std::to_chars\(|std::setprecision\(")
 MAY = {
     "framework/marrow/base/number_text.cpp": "the one place",
-    "plugins/toolbox/files/jpeg_baseline.cpp": "no text with a destructor may live between setjmp and longjmp",
 }
 
 

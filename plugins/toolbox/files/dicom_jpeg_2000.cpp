@@ -26,11 +26,13 @@ void check_size_segment(const CodedImage& image) {
   const std::uint64_t right = number(8, 4), bottom = number(12, 4), left = number(16, 4), top = number(20, 4),
                       tile_columns = number(24, 4), tile_rows = number(28, 4);
   const int bits = (std::uint8_t(bytes[42]) & 0x7F) + 1;
+  const bool is_signed = std::uint8_t(bytes[42]) >> 7 == 1;
+  // Fewer bits than the header says are right where no sign depends on them.
+  const int enough = is_signed == image.is_signed ? std::max(bits, image.bits_stored) : bits;
   check_coded(image, (long long)(right) - (long long)(left), (long long)(bottom) - (long long)(top), int(number(40, 2)),
-              bits);
+              enough);
   if (bytes[43] != 1 || bytes[44] != 1) throw CodecError("the compressed pixels have only a part of their samples");
-  if (std::uint8_t(bytes[42]) >> 7 == 1 && !image.is_signed)
-    throw CodecError("the compressed pixels have a sign, the header says none");
+  if (is_signed && !image.is_signed) throw CodecError("the compressed pixels have a sign, the header says none");
   if (tile_columns == 0 || tile_rows == 0 || (right / tile_columns + 1) * (bottom / tile_rows + 1) > kMostTiles)
     throw CodecError("the compressed pixels tell of more than 4096 tiles");
 }
