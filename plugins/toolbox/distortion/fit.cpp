@@ -127,7 +127,7 @@ void check_count(std::size_t count, int degree) {
 
 /// The lowest degree that is nearly as good as the best one, as far as this number of points tells.
 int chosen_degree(const std::vector<std::pair<int, double>>& validated_by_degree, std::size_t count) {
-  const double tolerance = std::max(0.01, 2 / std::sqrt(double(count)));
+  const double tolerance = std::max(0.01, 1 / std::sqrt(double(count)));
   double least = std::numeric_limits<double>::infinity();
   for (const auto& [degree, residual] : validated_by_degree) least = std::min(least, residual);
   for (const auto& [degree, residual] : validated_by_degree)

@@ -29,7 +29,7 @@ struct Fit {
 };
 
 /// Fits a distortion to the used points. The degree is the lowest whose validated residual is as good as the least, as
-/// far as n points tell: within 2 / sqrt(n) of it, but at least 1 %. For that residual, five fits each leave out
+/// far as n points tell: within 1 / sqrt(n) of it, but at least 1 %. For that residual, five fits each leave out
 /// another fifth of the points (five-fold cross-validation). Points farther from the fit than `outlier_deviations`
 /// standard deviations are not used. Residuals are root mean squares of distances. Throws Error if there are fewer than
 /// three points for each term of the lowest degree.
