@@ -34,19 +34,10 @@ MARROW_PLUGIN(plugin) {
 
 def faults_in(told):
     """Errors that are about the block, and not about files or a node that the reader has."""
-    of_the_reader = [
-        "no such file",
-        "which is not there",
-        "matches no",
-        "nothing matches",
-        "steepest",
-        "strongest",
-        "denoise",
-        "there is no folder",
-        "is no folder",
-    ]
-    is_of_the_block = lambda line: "error:" in line and not any(words in line for words in of_the_reader)
-    return [line for line in told.splitlines() if is_of_the_block(line)]
+    of_the_reader = (
+        r"no such file|matches no|nothing matches|steepest|strongest|denoise|there is no folder|is no folder"
+    )
+    return [line for line in told.splitlines() if "error:" in line and not re.search(of_the_reader, line)]
 
 
 class Yaml(Documents):
@@ -83,9 +74,8 @@ class Yaml(Documents):
         if "marrow" in content:
             if "repeat: pipelines/" in text:
                 folder = folder.parent
-            _, told = self.checked(["check"], text, folder)
-            self.assertRegex(told, r": good; \d+ node|which is not there")
-            self.assertEqual(faults_in(told), [], told)
+            code, told = self.checked(["check"], text, folder)
+            self.assertEqual(code, 0, told)
             return "pipeline"
         if "experiment" in content:
             if "pipelines/" in content["pipeline"]:

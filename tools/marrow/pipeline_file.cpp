@@ -110,11 +110,18 @@ bool has_inputs(const PipelineRequest& request, const Pipeline& pipeline) {
   });
 }
 
+void print_missing_files(const Diagnostics& missing) {
+  for (const Diagnostic& one : missing.sorted()) {
+    const std::string text = formatted("{}:{}: ", one.place.file, one.place.line) + one.message;
+    const std::string hint = one.hint.empty() ? "" : "; " + one.hint;
+    std::printf("  missing: %s\n", printable_lines(text + hint).c_str());
+  }
+}
+
 int check(const PipelineRequest& request, bool json) {
   const Catalogue catalogue;
   Pipeline pipeline;
-  Diagnostics faults = read_requested(request, catalogue, pipeline, false);
-  if (faults.empty()) faults = faults_of_files(pipeline, catalogue, has_inputs(request, pipeline));
+  const Diagnostics faults = read_requested(request, catalogue, pipeline, false);
   if (json) print_as_json(faults_json(faults));
   if (!faults.empty() && !json) print_faults(faults);
   if (!faults.empty() || json) return faults.empty() ? 0 : 2;
@@ -134,6 +141,7 @@ int check(const PipelineRequest& request, bool json) {
   if (pipeline.only_inside)
     std::printf("  note: no command runs it, but the program itself (only_inside): no file need hold its outputs\n");
   for (const std::string& note : pipeline.notes) std::printf("  note: %s\n", printable(note).c_str());
+  print_missing_files(faults_of_files(pipeline, catalogue, has_inputs(request, pipeline)));
   return 0;
 }
 
