@@ -8,6 +8,7 @@ import yaml
 from harness import SOURCE
 from harness.formats import tiff
 from harness.program import Case, main, marrow
+from harness.shipped import PIPELINES, inputs_of, shipped
 from harness.wrist import POSES, radius_inputs, real_trial
 
 WRIST = SOURCE / "pipelines" / "wrist"
@@ -115,6 +116,15 @@ class MissingFiles(Case):
             result = marrow("run", self.scratch / "p.yaml", trial, "-q", "--out", out, extra_environment=cache)
             self.assertEqual((result.returncode, result.stderr), (0, ""))
             self.assertEqual(planned(), "cached")
+
+
+class Shipped(Case):
+    def test_no_default_leads_out_of_the_pipelines(self):
+        for file in shipped():
+            for name, one in inputs_of(file).items():
+                if one.get("type") == "path" and one.get("default"):
+                    place = (file.parent / one["default"]).resolve()
+                    self.assertTrue(place.is_relative_to(PIPELINES), "%s: %s" % (file, name))
 
 
 class RealWrist(Case):
