@@ -19,7 +19,8 @@ struct Options {
 /// If the file gives the size of its images, a wired image must have this size, and image_size_px is refused.
 Camera camera(const Image* image, const Options& options, Context& context) {
   const read::CameraFormat format = read::camera_format(options.path);
-  const bool is_alone = format == read::CameraFormat::own || format == read::CameraFormat::xmalab,
+  const bool is_alone = format == read::CameraFormat::own || format == read::CameraFormat::xmalab ||
+                        format == read::CameraFormat::maya,
              has_size = is_alone || format == read::CameraFormat::xreg;
   if (has_size && !options.image_size_px.empty())
     throw Error(options.path.string() + ": image_size_px is not for this format of cameras; leave it out");
@@ -45,12 +46,12 @@ Camera camera(const Image* image, const Options& options, Context& context) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.camera", camera)
-      .summary("Reads a camera from marrow's YAML, or from a file of XMALab, plastimatch, RTK or xReg")
+      .summary("Reads a camera from marrow's YAML, or from a file of XMALab, MayaCam, plastimatch, RTK or xReg")
       .in("image", "the image: plastimatch and RTK take its size, and others compare theirs with it")
       .out("camera", "the camera")
       .option("path", &Options::path,
               "camera file; .yaml: marrow's own format, .xml: RTK's geometry, .h5: xReg's projection data, any other "
-              "end: the text of plastimatch or XMALab",
+              "end: the text of plastimatch, XMALab or a MayaCam of version 1",
               required())
       .option("projection", &Options::projection, "RTK and xReg: number of the projection, counted from 0", at_least(0))
       .option("image_size_px", &Options::image_size_px,

@@ -11,6 +11,7 @@
 #include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/image_sides.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
+#include "marrow/toolbox/files/volume_doubts.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 
@@ -50,8 +51,10 @@ void read_ct(const fs::path& folder, const YamlMap& map, CaseFiles& result, marr
   }
   if (!file) return;
   const auto tell = [&](const std::string& line) { context.info(line); };
-  if (auto volume = read_or_fault(map, "ct", [&] { return marrow::files::read_volume_file(*file, reading, tell); }))
-    result.ct = std::move(*volume);
+  auto volume = read_or_fault(map, "ct", [&] { return marrow::files::read_volume_file(*file, reading, tell); });
+  if (!volume) return;
+  marrow::files::warn_of_offset(*volume, *file, reading.value_offset_hu, context);
+  result.ct = std::move(*volume);
 }
 
 /// What a map says about the camera file of another program.

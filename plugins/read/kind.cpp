@@ -8,5 +8,8 @@ MARROW_PLUGIN(plugin) {
   plugin.kind("read")
       .summary("reads values from files")
       .runs_apart(marrow::Apart::parses)
+      .trait("names_files",
+             "the file of its option 'path' names further ones in its folder or below: all of these count in the "
+             "key, and 'marrow check' calls the node to say which are missing")
       .suite(marrow::conformance::read_suite());
 }

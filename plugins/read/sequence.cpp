@@ -109,7 +109,7 @@ MARROW_PLUGIN(plugin) {
               "any characters, ? for one. Empty: all images of the folder")
       .relation(as_many_or_none("patterns", "names"))
       .option("cameras", &Options::cameras,
-              "one camera file (marrow's YAML, or a file of XMALab, plastimatch or xReg) per view")
+              "one camera file (marrow's YAML, or a file of XMALab, MayaCam, plastimatch or xReg) per view")
       .relation(exactly_one({"in.camera", "cameras"}))
       .relation(as_many_or_none("cameras", "names"))
       .option("calibration", &Options::calibration,

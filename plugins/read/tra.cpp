@@ -2,6 +2,7 @@
 // Reads a bone's poses from Autoscoper's format (.tra).
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/track/autoscoper_frame.hpp"
 #include "marrow/toolbox/track/sequence.hpp"
 #include "marrow/toolbox/track/tra_file.hpp"
 
@@ -19,8 +20,11 @@ struct Tra {
   List<Pose> poses;
 };
 
-Tra read_tra(const Options& options) {
+Tra read_tra(const Volume* volume, const Options& options) {
   Tra result{track::read_tra_file(options.path), {}};
+  if (volume)
+    for (auto& pose : result.track.world_from_bone)
+      if (pose) pose = track::world_from_volume(*pose, volume->grid);
   for (std::size_t i = 0; i < result.track.world_from_bone.size(); ++i) {
     if (!result.track.world_from_bone[i]) continue;
     Pose found;
@@ -36,6 +40,10 @@ Tra read_tra(const Options& options) {
 MARROW_PLUGIN(plugin) {
   plugin.node("read.tra", read_tra)
       .summary("Reads a bone's poses from a file of Autoscoper (.tra)")
+      .in("volume",
+          "the bone's volume as Autoscoper has it (its VolumeFile, with its flips): the poses are converted from "
+          "Autoscoper's own coordinates of the bone to the volume's; none: they are kept, as track.autoscoper writes "
+          "them without a volume")
       .out("track", &Tra::track, "the poses of all frames")
       .out("poses", &Tra::poses, "poses of the frames in which the bone was tracked, named by their number",
            over("frame"))

@@ -40,7 +40,8 @@ MARROW_PLUGIN(plugin) {
       .out("view", "the view")
       .option("name", &Options::name, "name of the view")
       .option("image", &Options::image, "image file, as read.image reads it", marrow::required())
-      .option("camera", &Options::camera, "camera file (marrow's YAML, or a file of XMALab, plastimatch, RTK or xReg)")
+      .option("camera", &Options::camera,
+              "camera file (marrow's YAML, or a file of XMALab, MayaCam, plastimatch, RTK or xReg)")
       .relation(marrow::exactly_one({"in.camera", "camera"}))
       .option("calibration", &Options::calibration,
               "calibration file; its camera matrix replaces that of the camera, and its distortion is removed from the "

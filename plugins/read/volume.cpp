@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/files/volume_doubts.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 
 namespace {
@@ -14,9 +15,11 @@ struct Options {
 };
 
 marrow::Volume volume(const Options& options, marrow::Context& context) {
-  return marrow::files::read_volume_file(
+  marrow::Volume volume = marrow::files::read_volume_file(
       options.path, {options.voxel_size_mm, options.flip, options.value_offset_hu, options.series_uid},
       [&](const std::string& line) { context.info(line); });
+  marrow::files::warn_of_offset(volume, options.path, options.value_offset_hu, context);
+  return volume;
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/files/atomic_write.hpp"
+#include "marrow/toolbox/track/autoscoper_frame.hpp"
 #include "marrow/toolbox/track/tra_file.hpp"
 
 namespace {
@@ -11,10 +12,14 @@ using namespace marrow;
 using track::AutoscoperTrack;
 using track::TrackState;
 
-AutoscoperTrack autoscoper(const List<TrackState>& states) {
+AutoscoperTrack autoscoper(const List<TrackState>& states, const Volume* volume) {
   AutoscoperTrack result;
-  for (const TrackState& state : states)
-    result.world_from_bone.push_back(state.is_found() ? std::optional(state.now.world_from_model) : std::nullopt);
+  for (const TrackState& state : states) {
+    auto& pose = result.world_from_bone.emplace_back();
+    if (!state.is_found()) continue;
+    pose = state.now.world_from_model;
+    if (volume) pose = track::world_from_autoscoper(*pose, volume->grid);
+  }
   return result;
 }
 
@@ -28,6 +33,9 @@ MARROW_PLUGIN(plugin) {
   plugin.node("track.autoscoper", autoscoper)
       .summary("A bone's poses in the format of Autoscoper (.tra)")
       .in("states", "what is known after each frame", over("frame"))
+      .in("volume",
+          "the bone's volume as Autoscoper has it (its VolumeFile, with its flips): the poses are then those of "
+          "Autoscoper's own coordinates of the bone; none: of the model's")
       .out("track", "poses of the frames in which the bone was found");
   plugin.writer<AutoscoperTrack>(".tra", write_tra,
                                  "Autoscoper's format: one line per frame, with a 4x4 matrix in mm, row by row");

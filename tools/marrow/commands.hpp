@@ -124,8 +124,7 @@ void print_faults(const Diagnostics& diagnostics);
 /// with settings.
 PipelineArguments arguments_of(const PipelineRequest& request);
 /// Reads the pipeline. If it has faults, prints all of them and returns false.
-bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required,
-          bool json = false);
+bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required);
 
 /// Prints the pipeline's inputs, one a line: name, type, default and help.
 void print_inputs(const Pipeline& pipeline);

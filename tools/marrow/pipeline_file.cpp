@@ -12,6 +12,7 @@
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/pipeline/settings.hpp"
 #include "marrow/runtime/run/run_folder.hpp"
+#include "missing_files.hpp"
 
 namespace marrow::cli {
 
@@ -78,29 +79,52 @@ std::vector<std::string> notes_on_repeated(const std::vector<Override>& override
   return notes;
 }
 
-}  // namespace
-
-bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required,
-          bool json) {
+/// Reads the pipeline that a command names. Returns its faults.
+Diagnostics read_requested(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline,
+                           bool inputs_required) {
   expect_given(request.file, Wanted::pipeline);
   Diagnostics diagnostics;
   const PipelineArguments arguments = arguments_of(request);
   pipeline = read_pipeline(request.file, arguments, catalogue, diagnostics, inputs_required);
   for (std::string& note : notes_on_repeated(arguments.overrides)) pipeline.notes.push_back(std::move(note));
   check_writers(pipeline, catalogue, diagnostics);
-  if (json) print_as_json(faults_json(diagnostics));
-  if (diagnostics.empty()) return true;
-  if (!json) print_faults(diagnostics);
-  return false;
+  return diagnostics;
+}
+
+}  // namespace
+
+bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required) {
+  const Diagnostics faults = read_requested(request, catalogue, pipeline, inputs_required);
+  if (!faults.empty()) print_faults(faults);
+  return faults.empty();
 }
 
 namespace {
 
+/// Whether each input of the pipeline has a value.
+bool has_inputs(const PipelineRequest& request, const Pipeline& pipeline) {
+  const PipelineArguments arguments = arguments_of(request);
+  const std::vector<PipelineInput>& inputs = pipeline.inputs;
+  return std::all_of(inputs.begin(), inputs.end(), [&](const PipelineInput& input) {
+    return !input.is_data && (input.has_default || find_named(arguments.inputs, input.name));
+  });
+}
+
+void print_missing_files(const Diagnostics& missing) {
+  for (const Diagnostic& one : missing.sorted()) {
+    const std::string text = formatted("{}:{}: ", one.place.file, one.place.line) + one.message;
+    const std::string hint = one.hint.empty() ? "" : "; " + one.hint;
+    std::printf("  missing: %s\n", printable_lines(text + hint).c_str());
+  }
+}
+
 int check(const PipelineRequest& request, bool json) {
   const Catalogue catalogue;
   Pipeline pipeline;
-  if (!load(request, catalogue, pipeline, false, json)) return 2;
-  if (json) return 0;
+  const Diagnostics faults = read_requested(request, catalogue, pipeline, false);
+  if (json) print_as_json(faults_json(faults));
+  if (!faults.empty() && !json) print_faults(faults);
+  if (!faults.empty() || json) return faults.empty() ? 0 : 2;
   std::printf("%s: good; %zu nodes, %zu outputs\n", printable(request.file.string()).c_str(), pipeline.nodes.size(),
               pipeline.outputs.size());
   print_inputs(pipeline);
@@ -117,6 +141,7 @@ int check(const PipelineRequest& request, bool json) {
   if (pipeline.only_inside)
     std::printf("  note: no command runs it, but the program itself (only_inside): no file need hold its outputs\n");
   for (const std::string& note : pipeline.notes) std::printf("  note: %s\n", printable(note).c_str());
+  print_missing_files(faults_of_files(pipeline, catalogue, has_inputs(request, pipeline)));
   return 0;
 }
 
@@ -133,7 +158,8 @@ int print_resolved(const PipelineRequest& request) {
 void add_check(CLI::App& app, int& code) {
   const auto request = std::make_shared<PipelineRequest>();
   const auto as_json = std::make_shared<bool>(false);
-  CLI::App* command = app.add_subcommand("check", "check a pipeline and show every fault; runs nothing");
+  CLI::App* command =
+      app.add_subcommand("check", "check a pipeline and show every fault, and each file that it would miss");
   add_pipeline_arguments(command, *request);
   command->add_flag("--json", *as_json, "print the faults as JSON");
   command->callback([request, as_json, &code] { code = check(*request, *as_json); });

@@ -4,6 +4,7 @@
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/read/projections.hpp"
+#include "marrow/toolbox/exchange/maya_camera.hpp"
 #include "marrow/toolbox/exchange/plastimatch_camera.hpp"
 #include "marrow/toolbox/files/header_lines.hpp"
 #include "marrow/toolbox/files/length_units.hpp"
@@ -40,6 +41,7 @@ CameraFormat camera_format(const std::filesystem::path& path) {
   const Projections projections = projections_in(path);
   if (projections == Projections::rtk) return CameraFormat::rtk;
   if (projections == Projections::xreg) return CameraFormat::xreg;
+  if (exchange::is_maya_camera(path)) return CameraFormat::maya;
   return exchange::is_plastimatch_camera(path) ? CameraFormat::plastimatch : CameraFormat::xmalab;
 }
 
@@ -51,9 +53,12 @@ files::CameraInFile read_camera(const std::filesystem::path& path, const CameraR
     const int number = reading.projection >= 0 ? reading.projection : only_projection(path);
     found.camera = read_projections(path, {number}, reading.size, reading.mirror, reading.scale)[0];
   } else {
-    found = format == CameraFormat::plastimatch
-                ? files::CameraInFile{{exchange::read_plastimatch_camera(path, reading.size), {}}, {}}
-                : files::read_camera_file(path);
+    if (format == CameraFormat::plastimatch)
+      found.camera = exchange::read_plastimatch_camera(path, reading.size);
+    else if (format == CameraFormat::maya)
+      found.camera = exchange::read_maya_camera(path);
+    else
+      found = files::read_camera_file(path);
     found.camera.camera_from_world.translation_mm *= reading.scale;
   }
   if (reading.size.size_px.empty()) return found;

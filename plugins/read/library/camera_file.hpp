@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The camera of any file that marrow reads: its own YAML, and the files of XMALab, plastimatch, RTK and xReg.
+// The camera of any file that marrow reads: its own YAML, and the files of XMALab, MayaCam,
+// plastimatch, RTK and xReg.
 #include <filesystem>
 #include <string>
 
@@ -10,10 +11,10 @@
 namespace marrow::read {
 
 /// `own` is marrow's YAML.
-enum class CameraFormat { own, xmalab, plastimatch, rtk, xreg };
+enum class CameraFormat { own, xmalab, maya, plastimatch, rtk, xreg };
 
 /// By the end of the name: .yaml and .yml are marrow's, .xml RTK's, .h5 and .hdf5 xReg's. Any other file is a text: of
-/// plastimatch if it begins as its files do, else of XMALab.
+/// plastimatch or a MayaCam if it begins as their files do, else of XMALab.
 CameraFormat camera_format(const std::filesystem::path& path);
 
 /// What a file of another program leaves open.

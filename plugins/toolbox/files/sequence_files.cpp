@@ -97,8 +97,9 @@ struct Numbered {
   std::string name;
 };
 
+constexpr std::size_t kMostDigits = 15;
+
 std::vector<Numbered> numbered(const fs::path& folder, const std::vector<std::string>& names) {
-  constexpr std::size_t kMostDigits = 15;
   const Part part = differing_part(names);
   std::vector<Numbered> files;
   for (const std::string& name : names) {
@@ -116,14 +117,19 @@ std::vector<Numbered> numbered(const fs::path& folder, const std::vector<std::st
   return files;
 }
 
+void check_distinct(const fs::path& folder, const std::vector<Numbered>& files) {
+  for (std::size_t i = 1; i < files.size(); ++i)
+    if (files[i].number == files[i - 1].number)
+      throw Error(folder.string() + ": two images have the same number: '" + files[i - 1].name + "' and '" +
+                  files[i].name + "'; remove one of them");
+}
+
 /// Numbers may rise by steps of any size, but all steps must be equal.
 void check_steps(const fs::path& folder, const std::vector<Numbered>& files) {
+  check_distinct(folder, files);
   long long step = 0;
   for (std::size_t i = 1; i < files.size(); ++i) {
     const long long gap = files[i].number - files[i - 1].number;
-    if (gap == 0)
-      throw Error(folder.string() + ": two images have the same number: '" + files[i - 1].name + "' and '" +
-                  files[i].name + "'; remove one of them");
     if (step == 0 || gap < step) step = gap;
   }
   for (std::size_t i = 1; i < files.size(); ++i)
@@ -132,6 +138,31 @@ void check_steps(const fs::path& folder, const std::vector<Numbered>& files) {
           formatted("{}: image {} is missing between '{}' and '{}'; a bone is followed in even steps of time: put a "
                     "blank image of the same size there, or move the images behind the gap to a folder of their own",
                     folder.string(), files[i - 1].number + step, files[i - 1].name, files[i].name));
+}
+
+/// The last number in a name; 0 if it has none.
+long long last_number(const std::string& name) {
+  const std::size_t end = name.find_last_of("0123456789");
+  if (end == std::string::npos) return 0;
+  const std::size_t before = name.find_last_not_of("0123456789", end);
+  const std::size_t begin = before == std::string::npos ? 0 : before + 1;
+  return std::stoll(name.substr(begin, std::min(end + 1 - begin, kMostDigits)));
+}
+
+/// "1 to 4, 9": the numbers of files in their order.
+std::string numbers_text(const std::vector<Numbered>& files) {
+  constexpr int kMostParts = 8;
+  std::string text;
+  int parts = 0;
+  for (std::size_t i = 0; i < files.size(); ++parts) {
+    if (parts == kMostParts) return text + formatted(", ... and {}", files.back().number);
+    std::size_t last = i;
+    while (last + 1 < files.size() && files[last + 1].number == files[last].number + 1) ++last;
+    text += (parts > 0 ? ", " : "") + formatted("{}", files[i].number);
+    if (last > i) text += formatted(" to {}", files[last].number);
+    i = last + 1;
+  }
+  return text;
 }
 
 }  // namespace
@@ -162,6 +193,22 @@ std::vector<fs::path> frame_files(const fs::path& folder, const std::string& pat
   // The key of a result covers only the content of the folder.
   for (const fs::path& path : paths) check_stays_inside(folder, path);
   return paths;
+}
+
+NumberedFile numbered_file(const fs::path& folder, long long number) {
+  const std::vector<std::string> all = files_in(folder, 0);
+  const std::vector<std::string> names = images_in(folder, all);
+  if (names.empty()) refuse_no_file(folder, "", all);
+  const std::vector<Numbered> files =
+      names.size() == 1 ? std::vector<Numbered>{{last_number(names[0]), names[0]}} : numbered(folder, names);
+  check_distinct(folder, files);
+  const auto found =
+      std::find_if(files.begin(), files.end(), [&](const Numbered& file) { return file.number == number; });
+  if (found == files.end())
+    throw Error(formatted("{}: there is no image {}; the numbers in their names are {}", folder.string(), number,
+                          numbers_text(files)));
+  check_stays_inside(folder, folder / found->name);
+  return {folder / found->name, number, std::size_t(found - files.begin())};
 }
 
 }  // namespace marrow::files

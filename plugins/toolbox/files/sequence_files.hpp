@@ -25,6 +25,18 @@ std::vector<int> frames_of(const FrameRange& range, int count, const std::string
 /// may be missing. Throws Error otherwise.
 std::vector<std::filesystem::path> frame_files(const std::filesystem::path& folder, const std::string& pattern);
 
+/// An image of a folder.
+struct NumberedFile {
+  std::filesystem::path file;
+  long long number = 0;      ///< in its name
+  std::size_t position = 0;  ///< among all images of the folder, in the order of their numbers, from 0
+};
+
+/// The image with this number in its name, of those that frame_files() takes without a pattern. Here numbers may be
+/// missing between the others. The number of an only image is the last one in its name. Throws Error if there is no
+/// such image, with the numbers that there are, if two have the same number, or if the names differ in more than it.
+NumberedFile numbered_file(const std::filesystem::path& folder, long long number);
+
 /// Frames of one file, each as read_image_file() returns it: pages of a TIFF, frames of a DICOM file, slices of a file
 /// for volumes.
 std::vector<Image> read_image_frames(const std::filesystem::path& path, const FrameRange& range);

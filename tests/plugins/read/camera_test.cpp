@@ -99,6 +99,43 @@ TEST(ReadCamera, AnglesAndDistancesThatCannotBe) {
          "cam.yaml:10:13: camera: intrinsics: 'c_arm' already gives it; keep one of the two");
 }
 
+const std::string kMaya = "0,0,600\n0,0,0\n3.9,4.1,-632.5\n321,201,-1000\n0.1,640,480\n";
+
+// Version 1 of MayaCam looks along its -z, has y up, and counts pixels from 1 at the lower left. Its principal point
+// (321, 201) is (320, 279) here: 480 - 201.
+TEST(ReadCamera, AMayaCam) {
+  const TemporaryFolder folder;
+  put(folder / "cam.csv", kMaya);
+  const marrow::Camera camera = read(folder / "cam.csv");
+  EXPECT_EQ(camera.width_px, 640);
+  EXPECT_EQ(camera.height_px, 480);
+  EXPECT_LT((project(camera, {0, 0, 0}) - Eigen::Vector2d(320, 279)).norm(), 1e-9);
+  EXPECT_LT((project(camera, {6, 12, 0}) - Eigen::Vector2d(330, 259)).norm(), 1e-9);
+  // Turned about x by 90 degrees it looks along y, and z is up in the image.
+  put(folder / "cam.csv", with(with(kMaya, "0,0,600\n0,0,0", "0,-600,0\n90,0,0"), "640,480", "0,0"));
+  const marrow::Camera turned = read(folder / "cam.csv");
+  EXPECT_EQ(turned.height_px, 1024);
+  EXPECT_LT((project(turned, {6, 0, 12}) - Eigen::Vector2d(330, 1024 - 201 - 20)).norm(), 1e-9);
+  // First about z, then about the axes that were turned: x right is the world's y, and up is z.
+  put(folder / "cam.csv", with(kMaya, "0,0,600\n0,0,0", "600,0,0\n90,0,90"));
+  EXPECT_LT((project(read(folder / "cam.csv"), {0, 6, 12}) - Eigen::Vector2d(330, 259)).norm(), 1e-9);
+}
+
+TEST(ReadCamera, DiagnosesFaultsOfAMayaCamAtTheirLine) {
+  const TemporaryFolder folder;
+  const auto expect = [&](const std::string& text, const std::string& said) {
+    put(folder / "cam.csv", text);
+    EXPECT_SAYS(read(folder / "cam.csv"), said);
+  };
+  expect(with(kMaya, "321,201,-1000", "321,201"),
+         "cam.csv:4: expected the principal point and minus the focal length, 3 numbers with commas between them, got "
+         "'321,201'; a MayaCam has 5 such lines");
+  expect(with(kMaya, "-1000", "1000"),
+         "cam.csv:4: expected minus the focal length in pixels as its third number, got 1000");
+  expect(with(kMaya, "640,480", "640,-480"), "cam.csv:5: expected the image's width and height in pixels, got -480");
+  expect(kMaya + "1,2,3\n", "cam.csv:6: expected the end of the file after its 5 lines, got '1,2,3'");
+}
+
 TEST(ReadCamera, DiagnosesXmalabFaultsAtTheirLine) {
   const TemporaryFolder folder;
   const auto expect = [&](const std::string& text, const std::string& said) {

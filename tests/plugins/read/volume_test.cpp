@@ -57,6 +57,56 @@ INSTANTIATE_TEST_SUITE_P(All, VolumeFormats,
                                          std::tuple{".nrrd", false}, std::tuple{".nrrd", true},
                                          std::tuple{".nii", false}, std::tuple{".nii.gz", true}));
 
+/// Samples of 10 x 10 x 10 voxels: `count` of each value, then zeros.
+ItkGrid<std::int16_t> grid_with(const std::vector<std::pair<int, std::int16_t>>& parts) {
+  ItkGrid<std::int16_t> grid{.size = {10, 10, 10}};
+  for (const auto& [count, value] : parts) grid.samples.insert(grid.samples.end(), std::size_t(count), value);
+  grid.samples.resize(1000);
+  return grid;
+}
+
+struct Offset {
+  const char* what;
+  std::vector<std::pair<int, std::int16_t>> parts;
+  bool is_doubtful;
+};
+
+class ForgottenOffset : public testing::TestWithParam<Offset> {};
+
+TEST_P(ForgottenOffset, IsSaidInWords) {
+  const TemporaryFolder folder;
+  write_itk(folder / "ct.mha", grid_with(GetParam().parts));
+  std::string said;
+  marrow::Context::Hooks hooks;
+  hooks.log = [&](std::string_view text, marrow::LogLevel level) {
+    if (level == marrow::LogLevel::warning) said += text;
+  };
+  const auto warned = [&](double offset) {
+    said.clear();
+    marrow::test::read_by<marrow::Volume>("read.volume", folder / "ct.mha", {{"value_offset_hu", offset}},
+                                          marrow::Context(hooks));
+    return said;
+  };
+  EXPECT_EQ(marrow::test::without_folder(warned(0), folder.path()),
+            GetParam().is_doubtful
+                ? "/ct.mha: the CT seems to hold HU + 1024, not Hounsfield units: no value is below 0, and soft tissue "
+                  "and bone lie about 1024 too high. If so, give value_offset_hu: -1024 (-1000 if 1000 was added); "
+                  "without it, thresholds and simulated X-ray images are wrong"
+                : "")
+      << GetParam().what;
+  EXPECT_EQ(warned(-1024), "");
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, ForgottenOffset,
+    testing::Values(
+        Offset{"a bone alone, + 1024", {{100, 950}, {100, 1300}, {100, 2500}}, true},
+        Offset{"a patient, + 1024", {{300, 20}, {20, 500}, {300, 1060}, {50, 900}, {50, 2300}}, true},
+        Offset{"a patient", {{400, -1000}, {400, 40}, {100, 1300}}, false},
+        Offset{"a bone alone", {{40, 100}, {60, 300}, {100, 700}, {100, 1500}}, false},
+        Offset{"a bone cut out of a patient, cut off at 0", {{500, 40}, {60, 400}, {60, 1000}, {60, 1500}}, false},
+        Offset{"labels", {{300, 1}, {200, 117}}, false}));
+
 TEST(ReadVolume, FlipVoxelSizeAndOffset) {
   const TemporaryFolder folder;
   write_itk(folder / "a.mha", turned_grid());

@@ -30,6 +30,12 @@ NamedFile linked_file(const fs::path& root, const fs::directory_entry& entry) {
   return file;
 }
 
+/// Whether the option names a file that names further ones, which lie in its folder or below it (the trait of read).
+bool names_files(const PipelineNode& node, const OptionInfo& option) {
+  const std::vector<std::string>& traits = node.info.traits;
+  return option.name == "path" && std::find(traits.begin(), traits.end(), "names_files") != traits.end();
+}
+
 void add_folder(const fs::path& root, const fs::path& folder, std::vector<NamedFile>& files) {
   std::error_code error;
   const auto fail = [&](const fs::path& path) {
@@ -71,6 +77,9 @@ std::vector<std::string> paths_of(const PipelineNode& node, std::size_t option) 
   const OptionType type = node.info.options[option].type;
   if (type == OptionType::path) paths = {std::get<std::string>(node.options[option])};
   if (type == OptionType::paths) paths = std::get<std::vector<std::string>>(node.options[option]);
+  std::error_code error;
+  if (type == OptionType::path && names_files(node, node.info.options[option]) && fs::is_regular_file(paths[0], error))
+    paths.push_back(fs::path(paths[0]).parent_path().string());
   return paths;
 }
 

@@ -12,7 +12,7 @@ namespace {
 using marrow::fuzz::put;
 
 void read_sequence(char format, const marrow::files::FrameRange& range, std::string_view bytes) {
-  if (format == 't') read_tra({put("a.tra", bytes)});
+  if (format == 't') read_tra(nullptr, {put("a.tra", bytes)});
   if (format == 'p') marrow::files::read_image_frames(put("a.tif", bytes), range);
   if (format == 'd') marrow::files::read_image_frames(put("a.dcm", bytes), range);
   if (format != 'v') return;

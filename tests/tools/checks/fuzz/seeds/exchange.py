@@ -35,6 +35,21 @@ Intrinsic
 0 0.8 0 0
 0 0 0.0006666666666666666 0
 """
+MAYA = "0,0,600\n90,-2.5,0\n3.9,4.1,-632.5\n321,201,-1000\n0.1,640,480\n"
+TRIAL = """# two bones
+Version 1.2
+mayaCam_csv Calibration/one.txt
+CameraRootDir Frames\\one/
+VolumeFile Volumes/rad_cropped.tif
+VolumeFlip 0 1 0
+VoxelSize 0.5 0.75 2
+MeshFile Models/rad.stl
+VolumeFile Volumes/mc3 cropped.tif
+VolumeFlip 0 0 0
+VoxelSize 1 1 1
+MeshFile Models/mc3.stl
+OptimizationOffsets 0.1 0.1 0.1 0.1 0.1 0.1
+"""
 RTK = """<?xml version="1.0"?>
 <!DOCTYPE RTKGEOMETRY>
 <RTKThreeDCircularGeometry version="3">
@@ -58,5 +73,7 @@ def seeds():
         "obj": "o" + OBJ,
         "plastimatch": "p" + PLASTIMATCH,
         "rtk": "r" + RTK,
+        "maya": "m" + MAYA,
+        "trial": "a" + TRIAL,
     }
     return {name: text.encode() for name, text in texts.items()}
