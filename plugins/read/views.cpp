@@ -56,7 +56,7 @@ MARROW_PLUGIN(plugin) {
       .option("images", &Options::images, "one image file per view, as read.image reads it", marrow::required())
       .relation(marrow::same_length({"names", "images"}))
       .option("cameras", &Options::cameras,
-              "one camera file (marrow's YAML, or a file of XMALab, plastimatch, RTK or xReg) per view")
+              "one camera file (marrow's YAML, or a file of XMALab, plastimatch, RTK, xReg or JointTrack) per view")
       .relation(marrow::exactly_one({"in.camera", "cameras"}))
       .relation(marrow::as_many_or_none("cameras", "names"))
       .option("calibration", &Options::calibration,

@@ -4,6 +4,7 @@
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/read/projections.hpp"
+#include "marrow/toolbox/exchange/jointtrack_camera.hpp"
 #include "marrow/toolbox/exchange/plastimatch_camera.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
 #include "marrow/toolbox/files/header_lines.hpp"
@@ -41,6 +42,7 @@ CameraFormat camera_format(const std::filesystem::path& path) {
   const Projections projections = projections_in(path);
   if (projections == Projections::rtk) return CameraFormat::rtk;
   if (projections == Projections::xreg) return CameraFormat::xreg;
+  if (exchange::is_jointtrack_camera(path)) return CameraFormat::jointtrack;
   return exchange::is_plastimatch_camera(path) ? CameraFormat::plastimatch : CameraFormat::xmalab;
 }
 
@@ -52,9 +54,12 @@ DistortedCamera read_camera(const std::filesystem::path& path, const CameraReadi
     const int number = reading.projection >= 0 ? reading.projection : only_projection(path);
     found.camera = read_projections(path, {number}, reading.size, reading.mirror, reading.scale)[0];
   } else {
-    found = format == CameraFormat::plastimatch
-                ? DistortedCamera{exchange::read_plastimatch_camera(path, reading.size), {}}
-                : files::read_camera_file(path);
+    if (format == CameraFormat::plastimatch)
+      found.camera = exchange::read_plastimatch_camera(path, reading.size);
+    else if (format == CameraFormat::jointtrack)
+      found.camera = exchange::read_jointtrack_camera(path, reading.size);
+    else
+      found = files::read_camera_file(path);
     found.camera.camera_from_world.translation_mm *= reading.scale;
   }
   if (reading.size.size_px.empty()) return found;

@@ -24,6 +24,9 @@ using VtpFile = FileOf<struct Vtp>;
 using PlastimatchFile = FileOf<struct Plastimatch>;
 using RtkFile = FileOf<struct Rtk>;
 using XregFile = FileOf<struct Xreg>;
+using JtsFile = FileOf<struct Jts>;
+using JtakFile = FileOf<struct Jtak>;
+using JointTrackCameraFile = FileOf<struct JointTrackCamera>;
 
 /// The writer of such a type.
 template <class Format>
@@ -41,3 +44,6 @@ MARROW_VALUE_TYPE(marrow::exchange::VtpFile, "vtp_file", 1)
 MARROW_VALUE_TYPE(marrow::exchange::PlastimatchFile, "plastimatch_file", 1)
 MARROW_VALUE_TYPE(marrow::exchange::RtkFile, "rtk_file", 1)
 MARROW_VALUE_TYPE(marrow::exchange::XregFile, "xreg_file", 1)
+MARROW_VALUE_TYPE(marrow::exchange::JtsFile, "jts_file", 1)
+MARROW_VALUE_TYPE(marrow::exchange::JtakFile, "jtak_file", 1)
+MARROW_VALUE_TYPE(marrow::exchange::JointTrackCameraFile, "jointtrack_camera_file", 1)
