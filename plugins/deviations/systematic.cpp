@@ -134,10 +134,11 @@ MARROW_PLUGIN(plugin) {
       .in("views", "X-ray views; only their cameras are used", over("view"))
       .out("pose", &Result::pose, "the last pose; a covariance that is absent or not finite stays as it is")
       .out("stages", &Result::stages, "all poses", over("stage"))
-      .option("offset_px", &Options::offset_px,
-              "standard deviation of the offset of the edges in a view from the offset that all views share, and of its "
-              "change with the border's direction",
-              at_least(0), at_most(50))
+      .option(
+          "offset_px", &Options::offset_px,
+          "standard deviation of the offset of the edges in a view from the offset that all views share, and of its "
+          "change with the border's direction",
+          at_least(0), at_most(50))
       .option("camera_px", &Options::camera_px,
               "standard deviation of the place of a camera's whole image, along each of its sides: the residual of its "
               "calibration where the bone lies",

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The mirror pose of a nearly symmetric part. In one view, the outline hardly changes if space is reflected at the
-// plane across the line of sight, and the outline of a part with a plane of symmetry is that of its own reflection. Both
-// together are a rotation: R' = (I - 2 d d^T) R (I - 2 n n^T), with the line of sight d and the plane's normal n. It
-// turns the sign of the angles out of the image's plane, about the part's middle, which stays where it is.
+// plane across the line of sight, and the outline of a part with a plane of symmetry is that of its own reflection.
+// Both together are a rotation: R' = (I - 2 d d^T) R (I - 2 n n^T), with the line of sight d and the plane's normal n.
+// It turns the sign of the angles out of the image's plane, about the part's middle, which stays where it is.
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -22,6 +22,7 @@ struct Options {
   double scan_deg = 6;
   double scan_mm = 6;
   int poses = 150;
+  double least_apart_deg = 5;
 };
 
 struct Result {
@@ -29,20 +30,21 @@ struct Result {
   Metrics metrics;
 };
 
-/// The plane through the middle of a surface in which its reflection is most like itself.
+/// A plane through the middle of a surface, and how little the surface's reflection in it is like the surface.
 struct Symmetry {
   Vector3d middle_mm, normal;
-  double rest_mm = std::numeric_limits<double>::max();  ///< mean distance of the reflection from the surface
+  double rest_mm = 0;  ///< mean distance of the reflection from the surface
 };
 
-Symmetry symmetry_of(const Mesh& mesh) {
+/// The planes across the three axes of inertia: a plane of symmetry is one of them.
+std::array<Symmetry, 3> symmetries_of(const Mesh& mesh) {
   const std::vector<Vector3d> points = sample_surface(mesh, 1500);
   Vector3d middle = Vector3d::Zero();
   for (const Vector3d& point : points) middle += point / double(points.size());
   Matrix3d spread = Matrix3d::Zero();
   for (const Vector3d& point : points) spread += (point - middle) * (point - middle).transpose();
   const auto axes = eigen_of_symmetric<3>(spread).vectors;
-  Symmetry best;
+  std::array<Symmetry, 3> planes;
   for (int k = 0; k < 3; ++k) {
     const Vector3d normal = axes.col(k);
     double sum = 0;
@@ -53,9 +55,9 @@ Symmetry symmetry_of(const Mesh& mesh) {
       for (const Vector3d& point : points) nearest = std::min(nearest, (point - reflected).squaredNorm());
       sum += std::sqrt(nearest);
     }
-    if (sum / count < best.rest_mm) best = {middle, normal, sum / count};
+    planes[std::size_t(k)] = {middle, normal, sum / count};
   }
-  return best;
+  return planes;
 }
 
 /// The mirror pose in a view.
@@ -67,6 +69,10 @@ RigidTransform mirrored(const RigidTransform& pose, const Symmetry& symmetry, co
       (Matrix3d::Identity() - 2 * d * d.transpose()) * pose.rotation * (Matrix3d::Identity() - 2 * n * n.transpose());
   mirror.translation_mm = middle - mirror.rotation * symmetry.middle_mm;
   return mirror;
+}
+
+double apart_deg(const Pose& one, const Pose& other) {
+  return degrees(geodesic_angle_rad(one.world_from_model.rotation, other.world_from_model.rotation));
 }
 
 search::SearchOptions settings(const Options& options) {
@@ -83,7 +89,6 @@ Result mirror_pose(const Pose& pose, const Cost& cost, const Optimizer& optimize
   check_pose(pose, "pose");
   check_mesh(model, "model");
   if (views.empty()) throw Error("evaluate.mirror_pose: there are no views");
-  const Symmetry symmetry = symmetry_of(model);
   const search::SearchOptions search_options = settings(options);
   const search::Levels levels = search::levels_of(cost, search_options);
   Pose own = pose;
@@ -91,24 +96,33 @@ Result mirror_pose(const Pose& pose, const Cost& cost, const Optimizer& optimize
   own.covariance.reset(), own.warnings.clear(), own.convergence.clear();
   own.cost = levels.back()->value(pose.world_from_model);
   Result result{own, {}};
-  result.pose.cost = std::numeric_limits<double>::max();
-  for (const View& view : views) {
-    Pose start = own;
-    start.world_from_model = mirrored(pose.world_from_model, symmetry, view.camera);
-    search::Search search(optimizer, start, search_options, context);
-    search.go_to(search.find(levels).pose);
-    if (const Pose found = pose_of(search, start, *levels.back()); found.cost < result.pose.cost) result.pose = found;
-  }
-  const double apart_deg =
-      degrees(geodesic_angle_rad(result.pose.world_from_model.rotation, pose.world_from_model.rotation));
+  double rest_mm = 0;
+  bool is_found = false;
+  for (const Symmetry& symmetry : symmetries_of(model))
+    for (const View& view : views) {
+      Pose start = own;
+      start.world_from_model = mirrored(pose.world_from_model, symmetry, view.camera);
+      if (apart_deg(start, own) < options.least_apart_deg) continue;  // seen along the plane: they are the same
+      search::Search search(optimizer, start, search_options, context);
+      search.go_to(search.find(levels).pose);
+      const Pose found = pose_of(search, start, *levels.back());
+      if (apart_deg(found, own) < options.least_apart_deg || (is_found && found.cost >= result.pose.cost)) continue;
+      result.pose = found, rest_mm = symmetry.rest_mm, is_found = true;
+    }
+  const double apart = apart_deg(result.pose, own);
   result.metrics.items = {{"cost", own.cost, ""},
                           {"mirror_cost", result.pose.cost, ""},
                           {"mirror_times", own.cost > 0 ? result.pose.cost / own.cost : 1e3, ""},
-                          {"mirror_apart_deg", apart_deg, "deg"},
-                          {"asymmetry_mm", symmetry.rest_mm, "mm"}};
-  context.info(formatted("the mirror pose is {:.1f} degrees away; its cost is {:.4g}, that of the pose {:.4g}; the part "
-                         "differs from its reflection by {:.2f} mm",
-                         apart_deg, result.pose.cost, own.cost, symmetry.rest_mm));
+                          {"mirror_apart_deg", apart, "deg"},
+                          {"asymmetry_mm", rest_mm, "mm"}};
+  if (!is_found) {
+    context.info("the part is seen along its planes of symmetry, so it has no mirror pose in these views");
+    return result;
+  }
+  context.info(
+      formatted("the mirror pose is {:.1f} degrees away; its cost is {:.4g}, that of the pose {:.4g}; the part "
+                "differs from its reflection by {:.2f} mm",
+                apart, result.pose.cost, own.cost, rest_mm));
   return result;
 }
 
@@ -117,12 +131,13 @@ Result mirror_pose(const Pose& pose, const Cost& cost, const Optimizer& optimize
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.mirror_pose", mirror_pose)
       .summary(
-          "The mirror pose of a nearly symmetric part, such as a tibial tray: the other pose whose outline is nearly the "
+          "The mirror pose of a nearly symmetric part, such as a tibial tray: the other pose whose outline is nearly "
+          "the "
           "same in one view; it is searched for, and both costs are given")
       .in("pose", "pose found")
       .in("cost", "cost of a pose")
       .in("optimizer", "minimiser that refines the mirror pose")
-      .in("model", "surface of the part; its plane of symmetry is found")
+      .in("model", "surface of the part; the planes across its axes of inertia are tried")
       .in("views", "the views; the mirror pose of each is tried", over("view"))
       .out("pose", &Result::pose, "the mirror pose, refined; the pose itself where the two are the same")
       .out("metrics", &Result::metrics,
@@ -131,5 +146,8 @@ MARROW_PLUGIN(plugin) {
       .option("scan_deg", &Options::scan_deg, "range of the rotations tried around the mirror pose, to either side",
               at_least(0), at_most(90))
       .option("scan_mm", &Options::scan_mm, "the same for the shifts", at_least(0))
-      .option("poses", &Options::poses, "number of poses tried in these ranges", at_least(1));
+      .option("poses", &Options::poses, "number of poses tried in these ranges", at_least(1))
+      .option("least_apart_deg", &Options::least_apart_deg,
+              "a search that ends nearer to the pose than this has come back to it, and is no mirror pose", at_least(0),
+              at_most(180));
 }

@@ -27,8 +27,8 @@ Camera camera(const Image* image, const Options& options, Context& context) {
                               {options.image_size_px, options.pixel_mm, options.corner_mm},
                               exchange::mirror_of(options.mirror),
                               options.scale};
-  if (reading.projection == 0 && (is_alone || format == read::CameraFormat::plastimatch ||
-                                  format == read::CameraFormat::jointtrack))
+  if (reading.projection == 0 &&
+      (is_alone || format == read::CameraFormat::plastimatch || format == read::CameraFormat::jointtrack))
     reading.projection = -1;  // the default
   if (image) reading.size.size_px = {double(image->width()), double(image->height())};
   const DistortedCamera read = read::read_camera(options.path, reading);

@@ -33,8 +33,8 @@ Result jointtrack(const Camera* camera, const Mesh* model, const Options& option
   for (const std::string& name : options.radians)
     if (!std::count(exchange::kJointTrackRotations.begin(), exchange::kJointTrackRotations.end(), name))
       throw Error("radians: expected names of z_rot, x_rot and y_rot, got '" + name + "'");
-  const exchange::JointTrackPoses read = exchange::read_jointtrack_poses(
-      options.path, {options.radians, options.rotation_axes == "y_down"});
+  const exchange::JointTrackPoses read =
+      exchange::read_jointtrack_poses(options.path, {options.radians, options.rotation_axes == "y_down"});
   context.info("rotations were taken as " + units_of(options));
   for (const std::string& doubt : read.doubts) context.warn(doubt);
   Result result;
@@ -75,10 +75,11 @@ MARROW_PLUGIN(plugin) {
       .option("radians", &Options::radians,
               "which of z_rot, x_rot and y_rot are in radians; the others are in degrees. The file does not say its "
               "unit; numbers that look like the other one give a warning")
-      .option("rotation_axes", &Options::rotation_axes,
-              "axes of the camera to which the rotations refer: y_up, as JointTrack writes them (z towards the source); "
-              "or y_down, OpenCV's, as in the poses of JTML's biplane study; the shifts are y_up in both",
-              one_of({"y_up", "y_down"}))
+      .option(
+          "rotation_axes", &Options::rotation_axes,
+          "axes of the camera to which the rotations refer: y_up, as JointTrack writes them (z towards the source); "
+          "or y_down, OpenCV's, as in the poses of JTML's biplane study; the shifts are y_up in both",
+          one_of({"y_up", "y_down"}))
       .option("frame", &Options::frame, "number of the frame whose pose is wanted, counted from 1; 0: none alone",
               at_least(0));
 }

@@ -56,7 +56,9 @@ MARROW_PLUGIN(plugin) {
       .option("names", &Options::names, "one name per view", marrow::required())
       .relation(marrow::at_least_one({"names"}))
       .relation(marrow::distinct("names"))
-      .option("images", &Options::images, "one image file per view, as read.image reads it; a view whose image is empty is left out", marrow::required())
+      .option("images", &Options::images,
+              "one image file per view, as read.image reads it; a view whose image is empty is left out",
+              marrow::required())
       .relation(marrow::same_length({"names", "images"}))
       .option("cameras", &Options::cameras,
               "one camera file (marrow's YAML, or a file of XMALab, plastimatch, RTK, xReg or JointTrack) per view")

@@ -37,8 +37,10 @@ double femoral_part(const Vector3d& p, double asymmetry) {
                right = disc(p - Vector3d(-20, 1, 0), 25, 12, rims);
   const double flange = box(p - Vector3d(-60 * asymmetry, -21, 12), {17, 4.5, 22}, 4);
   const double whole = join(join(left, right, 4), flange, 6);
-  const double bone = box(p - Vector3d(0, 1.5, 22), {60, 18, 37}, 2), notch = box(p - Vector3d(0, 14, -8), {7, 20, 25}, 3);
-  const double pegs = std::min(capsule(p, {20, 1, -14}, {20, 1, 0}, 3, 2.5), capsule(p, {-20, 1, -14}, {-20, 1, 0}, 3, 2.5));
+  const double bone = box(p - Vector3d(0, 1.5, 22), {60, 18, 37}, 2),
+               notch = box(p - Vector3d(0, 14, -8), {7, 20, 25}, 3);
+  const double pegs =
+      std::min(capsule(p, {20, 1, -14}, {20, 1, 0}, 3, 2.5), capsule(p, {-20, 1, -14}, {-20, 1, 0}, 3, 2.5));
   return join(cut(cut(whole, -bone, 1), -notch, 2), pegs, 1);
 }
 
@@ -49,7 +51,8 @@ double tray(const Vector3d& p, double asymmetry) {
   const double across = std::hypot(flat.x(), flat.y()) - 24, beside = std::abs(p.z()) - 2.2;
   const double plate = cut(across, beside, 1), notch = std::hypot(p.x(), p.y() - 27) - 9;
   const double stem = capsule(p, {0, -2, 0}, {0, 1, -34}, 6.5, 5),
-               wings = std::min(capsule(p, {0, 0, -26}, {24, 3, -2}, 2.2, 2.2), capsule(p, {0, 0, -26}, {-24, 3, -2}, 2.2, 2.2));
+               wings = std::min(capsule(p, {0, 0, -26}, {24, 3, -2}, 2.2, 2.2),
+                                capsule(p, {0, 0, -26}, {-24, 3, -2}, 2.2, 2.2));
   return join(join(cut(plate, -notch, 1), stem, 2), wings, 1.5);
 }
 
@@ -77,9 +80,10 @@ MARROW_PLUGIN(plugin) {
       .out("mesh", "the surface, in mm")
       .option("part", &Options::part, "which part", one_of({"femoral", "tray"}))
       .option("width_mm", &Options::width_mm, "width of the knee for which it is made", at_least(40), at_most(100))
-      .option("asymmetry", &Options::asymmetry,
-              "by which part of their size left and right differ; 0: a symmetric part, which has a mirror pose in one view",
-              at_least(0), at_most(0.2))
+      .option(
+          "asymmetry", &Options::asymmetry,
+          "by which part of their size left and right differ; 0: a symmetric part, which has a mirror pose in one view",
+          at_least(0), at_most(0.2))
       .option("variation", &Options::variation,
               "0: this size and shape; 1: random ones around them, with about the steps between sizes on the market",
               at_least(0), at_most(2))

@@ -23,7 +23,8 @@ struct Result {
   std::optional<JointTrackCameraFile> calibration;
 };
 
-/// The line of each pose. Where all names are numbers from 1, as read.jointtrack gives them, they count; else the order.
+/// The line of each pose. Where all names are numbers from 1, as read.jointtrack gives them, they count; else the
+/// order.
 std::vector<std::size_t> lines_of(const List<Pose>& poses) {
   constexpr double kMostFrames = 1e6;
   std::vector<std::size_t> by_name, by_order;
@@ -60,7 +61,8 @@ Result jointtrack(const List<Pose>& poses, const Camera* camera, const Options& 
 
 MARROW_PLUGIN(plugin) {
   plugin.node("write.jointtrack", jointtrack)
-      .summary("Gives an implant's poses and its camera for JointTrack (.jts, .jtak, calibration), rotations in degrees")
+      .summary(
+          "Gives an implant's poses and its camera for JointTrack (.jts, .jtak, calibration), rotations in degrees")
       .in("poses", "poses of the implant; names that are numbers say the frames, counted from 1", over("frame"))
       .in("camera", "camera to which JointTrack's poses refer; none: the source is the world's origin")
       .out("jts", &Result::jts, "the poses as JT_EULER_312; a frame without one is NOT_OPTIMIZED")

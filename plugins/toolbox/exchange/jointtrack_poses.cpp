@@ -24,7 +24,8 @@ const Eigen::DiagonalMatrix<double, 3> kTurned(1, -1, -1);
 
 /// The words of a line between commas, tabs and blanks.
 std::vector<std::string> words_of(std::string line) {
-  std::replace_if(line.begin(), line.end(), [](char c) { return c == ',' || c == '\t' || c == '\r'; }, ' ');
+  std::replace_if(
+      line.begin(), line.end(), [](char c) { return c == ',' || c == '\t' || c == '\r'; }, ' ');
   std::istringstream stream(line);
   std::vector<std::string> words;
   for (std::string word; stream >> word;) words.push_back(word);
@@ -52,8 +53,7 @@ Eigen::Matrix3d about(double angle_rad, int axis) {
 
 RigidTransform pose_of(const Row& row, const std::array<double, 3>& unit_rad, bool y_down) {
   RigidTransform pose{"camera", "ct"};
-  pose.rotation =
-      about(row[3] * unit_rad[0], 2) * about(row[4] * unit_rad[1], 0) * about(row[5] * unit_rad[2], 1);
+  pose.rotation = about(row[3] * unit_rad[0], 2) * about(row[4] * unit_rad[1], 0) * about(row[5] * unit_rad[2], 1);
   if (!y_down) pose.rotation = kTurned * pose.rotation;
   pose.translation_mm = kTurned * Eigen::Vector3d(row[0], row[1], row[2]);
   return pose;
@@ -88,7 +88,8 @@ JointTrackPoses read_jointtrack_poses(const std::filesystem::path& path, const J
                 in_quotes(printable(line.substr(0, 60))) + "; save the kinematics as .jts or .jtak in JointTrack");
   std::array<double, 3> unit_rad;
   for (std::size_t i = 0; i < 3; ++i)
-    unit_rad[i] = std::count(convention.radians.begin(), convention.radians.end(), kJointTrackRotations[i]) ? 1 : kPi / 180;
+    unit_rad[i] =
+        std::count(convention.radians.begin(), convention.radians.end(), kJointTrackRotations[i]) ? 1 : kPi / 180;
   JointTrackPoses poses;
   std::vector<Row> rows;
   for (std::size_t number = 2; std::getline(lines, line); ++number) {
@@ -118,7 +119,8 @@ std::string jointtrack_poses(const std::vector<std::optional<RigidTransform>>& c
     }
     const Eigen::Matrix3d r = kTurned * pose->rotation;
     const Eigen::Vector3d t = kTurned * pose->translation_mm;
-    // R = Rz Rx Ry: its last row is (-cos x sin y, sin x, cos x cos y), its middle column (-sin z cos x, cos z cos x, .).
+    // R = Rz Rx Ry: its last row is (-cos x sin y, sin x, cos x cos y), its middle column (-sin z cos x, cos z cos x,
+    // .).
     const double x = std::asin(std::clamp(r(2, 1), -1.0, 1.0));
     const bool is_locked = std::abs(r(2, 1)) > 1 - 1e-12;  // only z + y or z - y is known: y is taken as 0
     const double z = is_locked ? std::atan2(r(1, 0), r(0, 0)) : std::atan2(-r(0, 1), r(1, 1)),

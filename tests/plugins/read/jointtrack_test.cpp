@@ -2,6 +2,7 @@
 // JointTrack's poses and calibration, against rotations that are known by hand.
 #include <gtest/gtest.h>
 
+#include "marrow/toolbox/exchange/jointtrack_poses.hpp"
 #include "shipped.hpp"
 #include "tests/plugins/read/files.hpp"
 
@@ -14,7 +15,8 @@ const std::string kHeader = "JT_EULER_312\n x_tran, y_tran, z_tran, z_rot, x_rot
 
 class ReadJointTrack : public testing::Test {
  protected:
-  shipped::Outputs read(const std::string& text, std::vector<std::string> radians = {}, const std::string& axes = "y_up") {
+  shipped::Outputs read(const std::string& text, std::vector<std::string> radians = {},
+                        const std::string& axes = "y_up") {
     put(folder / "a.jts", text);
     return shipped::call("read.jointtrack", {},
                          {{"path", (folder / "a.jts").string()}, {"radians", radians}, {"rotation_axes", axes}});
@@ -58,10 +60,12 @@ TEST_F(ReadJointTrack, ColumnsMayBeInRadiansAndTheRotationsAboutOpenCvsAxes) {
 }
 
 TEST_F(ReadJointTrack, AFrameNotOptimizedHasNoPoseAndMovesNoOther) {
-  const auto poses = read("JTA_EULER_KINEMATICS\nX_TRAN\tY_TRAN\n1,\t2,\t-300,\t40,\t50,\t60,\nNOT_OPTIMIZED,\t0,\t0,\t0,\t0,\t0,\n"
-                          "3,\t2,\t-300,\t40,\t50,\t60,\n")
-                         .at("poses")
-                         .as_list<marrow::Pose>();
+  const auto poses =
+      read(
+          "JTA_EULER_KINEMATICS\nX_TRAN\tY_TRAN\n1,\t2,\t-300,\t40,\t50,\t60,\nNOT_OPTIMIZED,\t0,\t0,\t0,\t0,\t0,\n"
+          "3,\t2,\t-300,\t40,\t50,\t60,\n")
+          .at("poses")
+          .as_list<marrow::Pose>();
   EXPECT_EQ(poses.names(), (std::vector<std::string>{"0001", "0003"}));
   EXPECT_EQ(poses[1].world_from_model.translation_mm.x(), 3);
 }
@@ -87,20 +91,41 @@ TEST_F(ReadJointTrack, WhatIsWrittenIsReadBack) {
 
 TEST_F(ReadJointTrack, ACalibrationIsACameraAndOffsetsAreMmWithYUp) {
   put(folder / "calibration.txt", "JT_INTCALIB\n1000\n2\n3\n0.5\n");
-  const auto camera = shipped::call("read.camera", {},
-                                    {{"path", (folder / "calibration.txt").string()},
-                                     {"image_size_px", std::vector<double>{101, 201}}})
-                          .at("camera")
-                          .as<marrow::Camera>();
+  const auto camera =
+      shipped::call("read.camera", {},
+                    {{"path", (folder / "calibration.txt").string()}, {"image_size_px", std::vector<double>{101, 201}}})
+          .at("camera")
+          .as<marrow::Camera>();
   Eigen::Matrix3d expected;
   expected << 2000, 0, 54, 0, 2000, 94, 0, 0, 1;
   EXPECT_LT((camera.intrinsics - expected).norm(), 1e-12);
 }
 
+TEST_F(ReadJointTrack, NumbersThatLookLikeTheOtherUnitAreDoubted) {
+  const auto doubts = [&](const std::string& text, const std::vector<std::string>& radians) {
+    put(folder / "a.jts", text);
+    std::vector<std::string> said = marrow::exchange::read_jointtrack_poses(folder / "a.jts", {radians}).doubts;
+    for (std::string& one : said) one = one.substr((folder / "a.jts").string().size() + 2);
+    return said;
+  };
+  const std::string in_degrees = kHeader + "0, 0, -300, 45, -20, 90\n",
+                    in_radians = kHeader + "0, 0, -300, 1.5, -20, 90\n0, 0, -300, -2.5, -20, 90\n";
+  EXPECT_EQ(doubts(in_degrees, {}), std::vector<std::string>{});
+  EXPECT_EQ(doubts(in_radians, {"z_rot"}), std::vector<std::string>{});
+  EXPECT_EQ(doubts(in_radians, {}),
+            std::vector<std::string>{"z_rot was taken in degrees, but is never more than 2.5: either the implant is "
+                                     "hardly turned about this axis, or these are radians; then give radians=[z_rot]"});
+  EXPECT_EQ(
+      doubts(in_degrees, {"x_rot"}),
+      std::vector<std::string>{"x_rot was taken in radians, but reaches 20: these look like degrees; leave it out "
+                               "of 'radians'"});
+}
+
 TEST_F(ReadJointTrack, SaysWhatIsWrong) {
-  EXPECT_EQ(refusal("JT_EULER_321\n"),
-            ":1: expected JT_EULER_312 or JTA_EULER_KINEMATICS, got 'JT_EULER_321'; save the kinematics as .jts or .jtak "
-            "in JointTrack");
+  EXPECT_EQ(
+      refusal("JT_EULER_321\n"),
+      ":1: expected JT_EULER_312 or JTA_EULER_KINEMATICS, got 'JT_EULER_321'; save the kinematics as .jts or .jtak "
+      "in JointTrack");
   EXPECT_EQ(refusal(kHeader + "1, 2, 3\n"),
             ":3: expected 6 numbers (x, y, z in mm; rotations about z, x, y), got 3 words");
   EXPECT_EQ(refusal(kHeader + "1, 2, 3, 4, 5, nan\n"), ":3: expected numbers of at most 1e6, got 'nan'");
