@@ -13,7 +13,7 @@ using namespace marrow;
 using phantom::ClutteredPhantom;
 
 struct Options {
-  std::string name = "implant";
+  std::string body = "implant";
   std::string material = "steel";
   std::array<double, 3> rotation_deg{0, 0, 0};
   std::array<double, 3> translation_mm{0, 0, 0};
@@ -54,7 +54,7 @@ Result implant(const ClutteredPhantom& given, const Mesh& mesh, const Options& o
   result.start.world_from_model = result.truth.world_from_model;
   result.start.frame = fragment_frame(mesh);
   phantom::Body body;
-  body.name = options.name;
+  body.name = options.body;
   body.material = options.material;
   body.surface = mesh;
   body.surface.frame = "world";
@@ -73,7 +73,7 @@ MARROW_PLUGIN(plugin) {
       .out("phantom", &Result::phantom, "the same with the implant")
       .out("truth", &Result::truth, "exact pose in the images")
       .out("start", &Result::start, "the same pose, as a start for experiments that displace it")
-      .option("name", &Options::name, "name of the body")
+      .option("body", &Options::body, "name of the body in the phantom")
       .option("material", &Options::material, "what it is made of: titanium, steel, copper, plastic, ...")
       .option("rotation_deg", &Options::rotation_deg, "rotation vector about x, y and z of the world")
       .option("translation_mm", &Options::translation_mm, "where the middle of its box lies, from the isocentre")

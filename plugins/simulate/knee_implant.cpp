@@ -18,7 +18,7 @@ using phantom::capsule, phantom::cut, phantom::disc, phantom::join;
 
 struct Options {
   std::string part = "femoral";
-  double width_mm = 66;
+  double knee_width_mm = 66;
   double asymmetry = 0.06;
   double variation = 0;
   double resolution_mm = 0.8;
@@ -59,7 +59,7 @@ double tray(const Vector3d& p, double asymmetry) {
 Mesh knee_implant(const Options& options) {
   Random random(std::uint64_t(options.implant_seed), 21);
   const auto draw = [&](double part) { return 1 + options.variation * part * std::clamp(random.normal(), -2.0, 2.0); };
-  const double size = options.width_mm / 66 * draw(0.08), asymmetry = options.asymmetry * draw(0.3);
+  const double size = options.knee_width_mm / 66 * draw(0.08), asymmetry = options.asymmetry * draw(0.3);
   const bool is_femoral = options.part == "femoral";
   const auto field = [&](const Vector3d& at) {
     const Vector3d p = at / size;
@@ -79,7 +79,8 @@ MARROW_PLUGIN(plugin) {
       .summary("Makes a part of a knee implant as a closed surface: a femoral part, or a tibial tray with a keel")
       .out("mesh", "the surface, in mm")
       .option("part", &Options::part, "which part", one_of({"femoral", "tray"}))
-      .option("width_mm", &Options::width_mm, "width of the knee for which it is made", at_least(40), at_most(100))
+      .option("knee_width_mm", &Options::knee_width_mm, "width of the knee for which it is made", at_least(40),
+              at_most(100))
       .option(
           "asymmetry", &Options::asymmetry,
           "by which part of their size left and right differ; 0: a symmetric part, which has a mirror pose in one view",

@@ -20,7 +20,7 @@ struct Options {
 struct Result {
   JtsFile jts;
   JtakFile jtak;
-  std::optional<JointTrackCameraFile> calibration;
+  std::optional<JointTrackCameraFile> camera_file;
 };
 
 /// The line of each pose. Where all names are numbers from 1, as read.jointtrack gives them, they count; else the
@@ -53,7 +53,7 @@ Result jointtrack(const List<Pose>& poses, const Camera* camera, const Options& 
                 {exchange::jointtrack_poses(camera_from_model, "JTA_EULER_KINEMATICS")},
                 std::nullopt};
   if (camera && options.pixel_mm > 0)
-    result.calibration = JointTrackCameraFile{exchange::jointtrack_camera(*camera, options.pixel_mm)};
+    result.camera_file = JointTrackCameraFile{exchange::jointtrack_camera(*camera, options.pixel_mm)};
   return result;
 }
 
@@ -67,7 +67,7 @@ MARROW_PLUGIN(plugin) {
       .in("camera", "camera to which JointTrack's poses refer; none: the source is the world's origin")
       .out("jts", &Result::jts, "the poses as JT_EULER_312; a frame without one is NOT_OPTIMIZED")
       .out("jtak", &Result::jtak, "the poses as JTA_EULER_KINEMATICS")
-      .out("calibration", &Result::calibration, "the camera as JT_INTCALIB; only with a camera and pixel_mm")
+      .out("camera_file", &Result::camera_file, "the camera as JT_INTCALIB; only with a camera and pixel_mm")
       .option("pixel_mm", &Options::pixel_mm, "side of a pixel on the detector; 0: no calibration is given",
               at_least(0));
   plugin.writer<JtsFile>(".jts", exchange::write_file, "poses of JointTrack, in degrees");
