@@ -28,7 +28,8 @@ Camera camera(const Image* image, const Options& options, Context& context) {
                               {options.image_size_px, options.pixel_mm, options.corner_mm},
                               exchange::mirror_of(options.mirror),
                               options.scale};
-  if (reading.projection == 0 && (is_alone || format == read::CameraFormat::plastimatch))
+  if (reading.projection == 0 &&
+      (is_alone || format == read::CameraFormat::plastimatch || format == read::CameraFormat::jointtrack))
     reading.projection = -1;  // the default
   if (image) reading.size.size_px = {double(image->width()), double(image->height())};
   const files::CameraInFile read = read::read_camera(options.path, reading);
@@ -46,16 +47,17 @@ Camera camera(const Image* image, const Options& options, Context& context) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.camera", camera)
-      .summary("Reads a camera from marrow's YAML, or from a file of XMALab, MayaCam, plastimatch, RTK or xReg")
-      .in("image", "the image: plastimatch and RTK take its size, and others compare theirs with it")
+      .summary(
+          "Reads a camera from marrow's YAML, or from a file of XMALab, MayaCam, plastimatch, RTK, xReg or JointTrack")
+      .in("image", "the image: plastimatch, RTK and JointTrack take its size, and others compare theirs with it")
       .out("camera", "the camera")
       .option("path", &Options::path,
               "camera file; .yaml: marrow's own format, .xml: RTK's geometry, .h5: xReg's projection data, any other "
-              "end: the text of plastimatch, XMALab or a MayaCam of version 1",
+              "end: the text of plastimatch, XMALab, JointTrack or a MayaCam of version 1",
               required())
       .option("projection", &Options::projection, "RTK and xReg: number of the projection, counted from 0", at_least(0))
       .option("image_size_px", &Options::image_size_px,
-              "plastimatch and RTK: width and height of the image; or wire the image")
+              "plastimatch, RTK and JointTrack: width and height of the image; or wire the image")
       .option("pixel_mm", &Options::pixel_mm,
               "RTK: width and height of a pixel on the detector; one number for square pixels")
       .option("corner_mm", &Options::corner_mm,

@@ -32,6 +32,8 @@ marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, co
   marrow::List<marrow::View> views;
   for (std::size_t i = 0; i < options.names.size(); ++i) {
     const std::string& name = options.names[i];
+    if (options.images.at(i).empty()) continue;
+    if (!cameras && options.cameras.at(i).empty()) throw marrow::Error("view '" + name + "': its camera is not given");
     views.add(name,
               marrow::read::read_view_files(
                   {name, options.images.at(i), cameras ? &marrow::read::camera_of_view(name, *cameras) : nullptr,
@@ -43,6 +45,7 @@ marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, co
       context.warn(doubt);
     marrow::files::warn_of_pixels(options.images.at(i), context);
   }
+  if (views.empty()) throw marrow::Error("all images are empty, so there is no view; give at least one image");
   return views;
 }
 
@@ -56,10 +59,13 @@ MARROW_PLUGIN(plugin) {
       .option("names", &Options::names, "one name per view", marrow::required())
       .relation(marrow::at_least_one({"names"}))
       .relation(marrow::distinct("names"))
-      .option("images", &Options::images, "one image file per view, as read.image reads it", marrow::required())
+      .option("images", &Options::images,
+              "one image file per view, as read.image reads it; a view whose image is empty is left out",
+              marrow::required())
       .relation(marrow::same_length({"names", "images"}))
       .option("cameras", &Options::cameras,
-              "one camera file (marrow's YAML, or a file of XMALab, MayaCam, plastimatch, RTK or xReg) per view")
+              "one camera file (marrow's YAML, or a file of XMALab, MayaCam, plastimatch, RTK, xReg or JointTrack) per "
+              "view")
       .relation(marrow::exactly_one({"in.camera", "cameras"}))
       .relation(marrow::as_many_or_none("cameras", "names"))
       .option("calibration", &Options::calibration,

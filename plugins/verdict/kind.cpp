@@ -18,6 +18,7 @@ MARROW_PLUGIN(plugin) {
       .in<marrow::OutlineProjector>("projector", "draws the bone's outline for any camera and pose")
       .in<marrow::Mesh>("model", "surface of the bone; it gives the axes and the targets")
       .in<marrow::Pose>("others", "poses of other fragments", marrow::over("fragment"))
+      .in<marrow::Pose>("other", "another pose of the same bone, with its cost")
       .in<marrow::SignedField>("other_bones", "the other fragments' bone", marrow::over("fragment"))
       .out<marrow::Verdict>("verdict", "judgement of the pose, with the probability that it is off")
       .suite(marrow::conformance::verdict_suite());

@@ -20,6 +20,7 @@ struct Options {
   double doubtful_above = 0.05;
   double wrong_above = 0.5;
   double contradicts_above = 1.8;
+  double clear_times = 1.2;
 };
 
 /// Adds the reasons why the pose is uncertain, the more important first, each with what would settle it.
@@ -115,14 +116,34 @@ void judge_by_prior(const marrow::Pose& pose, const marrow::Pose& prior, const O
   context.warn(verdict.reasons.front());
 }
 
-Verdict predicted(const marrow::Pose& pose, const marrow::Mesh& mesh, const marrow::Pose* prior, const Options& options,
-                  marrow::Context& context) {
+/// A pose is doubtful at best if another one, which is farther off than a failure, has nearly its cost.
+void judge_by_other(const marrow::Pose& pose, const marrow::Pose& other, const Options& options, Verdict& verdict) {
+  constexpr double kSame_deg = 5;
+  marrow::check_pose(other, "the other pose");
+  const double apart_deg =
+      marrow::degrees(marrow::geodesic_angle_rad(pose.world_from_model.rotation, other.world_from_model.rotation));
+  const double times = pose.cost > 0 ? other.cost / pose.cost : 1;
+  verdict.figures.push_back({"other_apart_deg", apart_deg, "deg"});
+  verdict.figures.push_back({"other_cost_times", times, ""});
+  if (apart_deg < kSame_deg || times >= options.clear_times) return;
+  verdict.judgement = std::max(verdict.judgement, Judgement::doubtful);
+  verdict.reasons.insert(verdict.reasons.begin(),
+                         formatted("another pose, {:.1f} degrees away, explains the images nearly as well: its cost is "
+                                   "{:.2f} times that of this one",
+                                   apart_deg, times));
+  verdict.remedies.emplace_back(
+      "another view, or a look at both overlays: which of the two can be, beside the other bones and parts?");
+}
+
+Verdict predicted(const marrow::Pose& pose, const marrow::Mesh& mesh, const marrow::Pose* prior,
+                  const marrow::Pose* other, const Options& options, marrow::Context& context) {
   marrow::check_pose(pose, "pose");
   Verdict verdict;
   judge_by_deviations(pose, mesh, options, verdict);
   judge_by_warnings(pose, verdict);
   if (prior)
     judge_by_prior(about_the_bones_axes(pose, mesh), about_the_bones_axes(*prior, mesh), options, verdict, context);
+  if (other) judge_by_other(pose, *other, options, verdict);
   return verdict;
 }
 
@@ -136,6 +157,9 @@ MARROW_PLUGIN(plugin) {
       .in("prior",
           "pose known from elsewhere, which the registration took into account: whether its rotation about the long "
           "axis agrees with the images")
+      .in("other",
+          "another pose with its cost, from the same cost, such as the mirror pose of an implant: a pose that this one "
+          "nearly equals is doubtful")
       .out("verdict",
            "probability that the mTRE is above 2 mm or the rotation about the long axis off by more than 5 degrees, "
            "from 10000 errors drawn with the predicted covariance; not known for a pose without one")
@@ -147,5 +171,8 @@ MARROW_PLUGIN(plugin) {
       .option("contradicts_above", &Options::contradicts_above,
               "a prior whose rotation about the long axis is farther off than this many standard deviations "
               "contradicts the images: the pose is doubtful at best",
-              marrow::at_least(0));
+              marrow::at_least(0))
+      .option("clear_times", &Options::clear_times,
+              "the other pose must cost at least this many times what the pose costs; else the pose is doubtful",
+              marrow::at_least(1));
 }

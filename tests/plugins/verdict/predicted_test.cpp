@@ -115,6 +115,30 @@ TEST(VerdictPredicted, IsTheSameEachTime) {
   EXPECT_EQ(marrow::hash_of(verdict_of(pose)), marrow::hash_of(verdict_of(pose)));
 }
 
+/// The verdict on a pose with a cost of 1, beside another pose.
+Verdict beside(double apart_deg, double cost, const shipped::Options& options = {}) {
+  marrow::Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1}), other = pose;
+  pose.cost = 1, other.cost = cost;
+  other.world_from_model.rotation =
+      marrow::rotation_from_vector({0, marrow::radians(apart_deg), 0}) * pose.world_from_model.rotation;
+  return shipped::call(
+             "verdict.predicted",
+             {{"pose", shipped::item(pose)}, {"model", shipped::item(box())}, {"other", shipped::item(other)}}, options)
+      .at("verdict")
+      .as<Verdict>();
+}
+
+TEST(VerdictPredicted, AnotherPoseThatFitsNearlyAsWellMakesItDoubtful) {
+  const Verdict verdict = beside(18, 1.1);
+  EXPECT_EQ(verdict.judgement, Judgement::doubtful);
+  EXPECT_EQ(verdict.reasons[0],
+            "another pose, 18.0 degrees away, explains the images nearly as well: its cost is 1.10 times that of this "
+            "one");
+  EXPECT_EQ(beside(18, 1.3).judgement, Judgement::trusted) << "it costs clearly more";
+  EXPECT_EQ(beside(18, 1.3, {{"clear_times", 1.5}}).judgement, Judgement::doubtful);
+  EXPECT_EQ(beside(3, 1.0).judgement, Judgement::trusted) << "it is the same pose";
+}
+
 TEST(VerdictPredicted, RefusesAnotherBonesSurface) {
   marrow::Mesh mesh = box();
   mesh.frame = "elsewhere";
