@@ -6,9 +6,7 @@ import unittest
 from harness import SOURCE
 
 OWN_WAYS = re.compile(r"std::to_string\(|snprintf\(|\bostringstream\b|std::to_chars\(|std::setprecision\(")
-MAY = {
-    "framework/marrow/base/number_text.cpp": "the one place",
-}
+MAY = {"framework/marrow/base/number_text.cpp": "the one place"}
 
 
 class NumberTexts(unittest.TestCase):

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/named_files.hpp"
 #include "marrow/runtime/run/executor.hpp"
 
