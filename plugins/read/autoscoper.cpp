@@ -81,7 +81,7 @@ void check_files(const Options& options, const AutoscoperTrial& trial, const Tri
 
 View read_view(const std::string& name, const fs::path& image, const fs::path& camera, const Options& options,
                Context& context) {
-  read::ViewSource source{name, image, nullptr, camera, {}};
+  read::ViewSource source{name, image, nullptr, camera, {}, {}};
   source.scale = options.scale;
   files::warn_of_pixels(image, context);
   return read::read_view_files(source, context);
