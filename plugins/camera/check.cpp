@@ -9,8 +9,8 @@
 
 #include <marrow/domain/decompositions.hpp>
 #include "marrow/base/number_text.hpp"
-#include "marrow/camera/plausibility.hpp"
 #include "marrow/camera/points_file.hpp"
+#include "marrow/toolbox/calibration/plausibility.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"
 
 namespace {

@@ -10,8 +10,8 @@
 
 #include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/camera/plausibility.hpp"
 #include "marrow/camera/points_file.hpp"
+#include "marrow/toolbox/calibration/plausibility.hpp"
 #include "marrow/toolbox/files/projection_camera.hpp"
 
 namespace {
@@ -22,7 +22,7 @@ using calibration::SeenPoints;
 struct Options {
   std::filesystem::path points;
   std::string view;
-  int width_px = 0, height_px = 0;
+  int width_px = 512, height_px = 512;
   std::string unknown = "all";
 };
 
@@ -148,10 +148,11 @@ Camera fitted(Camera camera, const SeenPoints& points, Eigen::Index count) {
   return camera;
 }
 
-SeenPoints points_in(const Options& options, const std::string& view) {
+SeenPoints points_in(const Options& options, std::string view) {
   SeenPoints points;
   std::vector<std::string> names;
   for (const files::KnownPoint& point : files::read_points_file(options.points)) {
+    if (view.empty() && !point.seen_px.empty()) view = point.seen_px.begin()->first;
     for (const auto& [name, pixel] : point.seen_px)
       if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
     const auto seen = point.seen_px.find(view);
@@ -214,8 +215,6 @@ Found points(const Camera* known, const Options& options, Context& context) {
   const SeenPoints points = points_in(options, options.view);
   check_points(points, count);
   const int width = known ? known->width_px : options.width_px, height = known ? known->height_px : options.height_px;
-  if (width < 1 || height < 1)
-    throw Error("the size of the image is not known; give width_px and height_px, or wire a camera");
   if (count == 6 && !known)
     throw Error("with unknown: pose the inner parameters must be known; wire a camera that has them");
   Camera camera;
@@ -268,10 +267,10 @@ MARROW_PLUGIN(plugin) {
                 "predicted_centre_v_px"})
       .option("points", &Options::points, "file with the points and the pixels where they are seen (docs/case.md)",
               required())
-      .option("view", &Options::view, "name under which the file gives the pixels", required())
-      .option("width_px", &Options::width_px, "width of the image; not needed with a camera", at_least(0),
+      .option("view", &Options::view, "name under which the file gives the pixels; empty: the first one")
+      .option("width_px", &Options::width_px, "width of the image; not needed with a camera", at_least(1),
               at_most(65536))
-      .option("height_px", &Options::height_px, "height of the image; not needed with a camera", at_least(0),
+      .option("height_px", &Options::height_px, "height of the image; not needed with a camera", at_least(1),
               at_most(65536))
       .option("unknown", &Options::unknown,
               "all: pose, focal length and principal point, of square pixels; focal_length: the principal point is "

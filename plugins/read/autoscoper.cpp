@@ -152,7 +152,8 @@ MARROW_PLUGIN(plugin) {
       .option(
           "bone", &Options::bone,
           "name of the bone's VolumeFile without its ending, or a part of it that no other has; empty: the only one")
-      .option("frame", &Options::frame, "number in the names of the frame's images, such as 0158 or 158", required())
+      .option("frame_name", &Options::frame, "number in the names of the frame's images, such as 0158 or 158",
+              required())
       .option("start", &Options::start,
               "about where the bone is. .tra: Autoscoper's track of this bone, of which the line of this frame counts; "
               "any other: a pose file of marrow, in the coordinates of the volume")

@@ -8,14 +8,11 @@
 #include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/exchange/deepfluoro_file.hpp"
-#include "marrow/toolbox/field/binary_surface.hpp"
 
 namespace {
 
 using namespace marrow;
 using exchange::DeepfluoroFile, exchange::DeepfluoroImage, exchange::DeepfluoroView;
-
-constexpr double kBand_mm = 4;
 
 struct Options {
   std::filesystem::path path;
@@ -30,7 +27,7 @@ struct Options {
 
 struct Read {
   Volume ct;
-  List<SignedField> fields;
+  List<Volume> label;
   List<View> views;
   List<Landmarks> landmarks;
   List<Pose> start;
@@ -147,8 +144,7 @@ Read deepfluoro(const Options& options, Context& context) {
   if (std::find(inside.begin(), inside.end(), 1) == inside.end())
     throw Error("no voxel of specimen " + specimen + " has a label of the " + options.bone);
   crop(read.ct, inside, options.margin_mm);
-  const Volume mask{read.ct.grid, {inside.begin(), inside.end()}};
-  read.fields.add(options.bone, field::field_of_mask(mask, kBand_mm));
+  read.label.add(options.bone, {read.ct.grid, {inside.begin(), inside.end()}});
   read.landmarks.add(options.bone, std::move(landmarks));
   read.start.add(options.bone, {});
   read.truth.add(options.bone, {});
@@ -165,7 +161,7 @@ MARROW_PLUGIN(plugin) {
           "Reads a bone and X-ray images of a specimen from the file of the DeepFluoro data set (Grupp et al., IJCARS "
           "2020); the world is the bone's place in the CT")
       .out("ct", &Read::ct, "CT in Hounsfield units, of the bone and its surroundings")
-      .out("bone", &Read::fields, "the bone's surface, from the file's labels", over("fragment"))
+      .out("label", &Read::label, "mask of the bone, from the file's labels: 1 inside, 0 outside", over("fragment"))
       .out("views", &Read::views, "images with cameras, seen from the source; bright = air", over("view"))
       .out("landmarks", &Read::landmarks, "landmarks in the CT and in the images", over("fragment"))
       .out("start", &Read::start, "the true pose, for experiments that displace it", over("fragment"))

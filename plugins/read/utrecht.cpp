@@ -6,13 +6,11 @@
 #include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/exchange/utrecht_file.hpp"
-#include "marrow/toolbox/field/binary_surface.hpp"
 
 namespace {
 
 using namespace marrow;
 
-constexpr double kBand_mm = 4;
 const std::string kFragment = "object";  // the same for all objects, so that one figure compares them
 
 struct Options {
@@ -25,7 +23,7 @@ struct Options {
 
 struct Read {
   Volume ct;
-  List<SignedField> fields;
+  List<Volume> label;
   List<View> views;
   List<Pose> start;
   List<Truth> truth;
@@ -77,8 +75,7 @@ Read utrecht(const Options& options, Context& context) {
     throw Error("object '" + name + "' has no mask in 3D, from which its surface is made; name it as 'mask'");
   Read read;
   read.views = views_of(options, name);
-  const Volume mask{data.volume.grid, {object.inside.begin(), object.inside.end()}};
-  read.fields.add(kFragment, field::field_of_mask(mask, kBand_mm));
+  read.label.add(kFragment, {data.volume.grid, {object.inside.begin(), object.inside.end()}});
   Pose start;
   start.world_from_model = number == 0
                                ? data.world_from_volume
@@ -98,7 +95,7 @@ MARROW_PLUGIN(plugin) {
           "Reads an object, its projections and one of its starts from data in the manner of Utrecht's gold standard "
           "for 2D/3D registration (van de Kraats et al., IEEE TMI 2005)")
       .out("ct", &Read::ct, "the volume, in the units of its file plus value_offset_hu")
-      .out("bone", &Read::fields, "the object's surface, from its mask in 3D", over("fragment"))
+      .out("label", &Read::label, "the object's mask in 3D: 1 inside, 0 outside", over("fragment"))
       .out("views", &Read::views, "projections with cameras, seen from the source", over("view"))
       .out("start", &Read::start, "the start that was asked for", over("fragment"))
       .out("truth", &Read::truth, "the gold standard", over("fragment"))

@@ -14,12 +14,14 @@ import yaml
 try:
     import h5py
     import scipy
+    from PIL import Image
     from harness import public_data
 except ImportError:
     public_data = None
 
 from documents import BUILD, IS_SANITIZED, SOURCE, Documents, blocks
 from harness.cases import SMALL, copy_case, simulate
+from harness.wrist import real_trial
 
 PAGE = "docs/i-have"
 LANDMARKS = [0, 400, 900, 1500, 2500]  # vertices of the surface
@@ -209,6 +211,19 @@ class Held(Documents):
         case = simulate(self.folder / "whole", pipeline="simulate-vertebra.yaml")
         public_data.deepfluoro_file([case], self.folder / "data.h5")
         self.run_section("A file of DeepFluoro")
+
+    def test_a_trial(self):
+        trial = real_trial(self.folder / "wrist")
+        if not trial:
+            self.skipTest("the data of the wrist are not on this machine")
+        start = SOURCE / "pipelines/wrist/radius-0158.pose.yaml"
+        out = self.run_section("A trial of Autoscoper", TRIAL=trial, START=start)
+        self.assertTrue((out / "pose/bone.yaml").exists())
+
+    def test_bones_that_overlap(self):
+        case = simulate(self.folder / "both", *SMALL, "start=exact", "--set", "case.register=[proximal, distal]")
+        out = self.run_section("Bones that overlap in the images", CASE=case)
+        self.expect_pose(out / "pose/distal.yaml", 1)
 
     def test_nothing(self):
         out = self.run_section("Nothing yet")

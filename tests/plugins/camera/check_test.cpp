@@ -7,9 +7,9 @@
 #include <map>
 #include <random>
 
-#include "marrow/camera/plausibility.hpp"
 #include "marrow/camera/points_file.hpp"
 #include "marrow/domain/c_arm.hpp"
+#include "marrow/toolbox/calibration/plausibility.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "shipped.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Each limit of what is said about a camera, just within it and just beyond.
-#include "marrow/camera/plausibility.hpp"
+#include "marrow/toolbox/calibration/plausibility.hpp"
 
 #include <gtest/gtest.h>
 

@@ -49,7 +49,7 @@ class ReadAutoscoper : public testing::Test {
     write_itk(folder / "Volumes/rad_cropped.tif", volume_of(0));
     write_itk(folder / "Volumes/mc3 cropped.tif", volume_of(100));
     put(folder / "trial.cfg", kTrial);
-    options = {{"path", (folder / "trial.cfg").string()}, {"bone", "rad"}, {"frame", "0158"}};
+    options = {{"path", (folder / "trial.cfg").string()}, {"bone", "rad"}, {"frame_name", "0158"}};
   }
   shipped::Outputs read(const marrow::Context& context = marrow::Context()) {
     return shipped::call("read.autoscoper", {}, options, context);
@@ -80,11 +80,11 @@ TEST_F(ReadAutoscoper, AFrameByTheNumberInItsNames) {
   EXPECT_EQ(views[0].image.pixels.at<std::uint8_t>(1, 2), 158);
   EXPECT_EQ(views[0].camera.camera_from_world.translation_mm.z(), 600);
   EXPECT_EQ(views[1].camera.camera_from_world.translation_mm.z(), 700);
-  options["frame"] = "3";
+  options["frame_name"] = "3";
   EXPECT_EQ(read().at("views").as_list<marrow::View>()[1].image.pixels.at<std::uint8_t>(0, 0), 3);
-  options["frame"] = "4";
+  options["frame_name"] = "4";
   EXPECT_EQ(refusal(kTrial), "/Frames/one: there is no image 4; the numbers in their names are 2 to 3, 158");
-  options["frame"] = "first";
+  options["frame_name"] = "first";
   EXPECT_EQ(refusal(kTrial), "frame: expected the number in the names of its images, such as 0158 or 158, got 'first'");
 }
 
@@ -203,7 +203,7 @@ TEST_F(ReadAutoscoper, TheStartFromAutoscopersOwnTrack) {
                quarter(in_autoscoper(voxel.x(), voxel.y(), voxel.z(), {0.5, 0.75, 2})))
                   .norm(),
               1e-12);
-  options["frame"] = "2";
+  options["frame_name"] = "2";
   EXPECT_EQ(refusal(kTrial), "/rad.tra: has no pose in line 1, which is that of frame 2; track the bone there first");
 }
 

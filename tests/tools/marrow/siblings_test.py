@@ -29,7 +29,11 @@ COARSE_IMAGES = [
 ]
 # It runs, but at this case's coarse voxels it takes part of the other fragment, as the chapter says: the shaft of that
 # model is not where the images show it, and the start is refused.
-WRONG_HERE = {"segment.region_growing", "initial.best_of"}  # the latter takes other ways to a pose, none is wired
+WRONG_HERE = {
+    "segment.region_growing",
+    "initial.best_of",  # it takes other ways to a pose, none is wired
+    "simulate.knee_implant",  # it gives one mesh, and not that of each fragment
+}
 # They run, but end elsewhere here.
 NOT_AS_EXACT = {
     "evaluate.mtre",  # it has other figures

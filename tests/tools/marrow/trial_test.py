@@ -41,7 +41,7 @@ NEAREST = "the last folder on the way that there is: "
 READING = """marrow: 1
 inputs: {trial: {type: path}}
 nodes:
-  bone: {uses: read.autoscoper, with: {path: $trial, frame: 7}}
+  bone: {uses: read.autoscoper, with: {path: $trial, frame_name: 7}}
 outputs: {ct: bone.ct}
 """
 

@@ -117,7 +117,7 @@ Metrics utrecht(const Options& options, Context& context) {
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.node("camera.utrecht", utrecht)
+  plugin.node("evaluate.utrecht", utrecht)
       .summary(
           "Projects the objects of Utrecht's gold standard with its cameras, and says whether all signs fit: whether "
           "the masks of the projections show them; if not, what would make them fit")

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/camera/plausibility.hpp"
+#include "marrow/toolbox/calibration/plausibility.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

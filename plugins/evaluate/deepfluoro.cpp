@@ -7,7 +7,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/number_text.hpp"
-#include "marrow/camera/plausibility.hpp"
+#include "marrow/toolbox/calibration/plausibility.hpp"
 #include "marrow/toolbox/exchange/deepfluoro_file.hpp"
 
 namespace {
@@ -108,7 +108,7 @@ Metrics deepfluoro(const Options& options, Context& context) {
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.node("camera.deepfluoro", deepfluoro)
+  plugin.node("evaluate.deepfluoro", deepfluoro)
       .summary(
           "Projects the landmarks of each CT of a DeepFluoro file with the cameras of its images, and says whether all "
           "signs fit; if not, what would make them fit")
