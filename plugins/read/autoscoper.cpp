@@ -43,7 +43,7 @@ struct Trial {
 long long number_of_frame(const std::string& frame) {
   const std::optional<double> number = parsed_number(frame);
   if (!number || *number < 0 || *number != std::floor(*number) || *number > 1e15)
-    throw Error("frame: expected the number in the names of its images, such as 0158 or 158, got '" + frame + "'");
+    throw Error("frame_name: expected the number in the names of its images, such as 0158 or 158, got '" + frame + "'");
   return (long long)*number;
 }
 

@@ -85,7 +85,7 @@ TEST_F(ReadAutoscoper, AFrameByTheNumberInItsNames) {
   options["frame_name"] = "4";
   EXPECT_EQ(refusal(kTrial), "/Frames/one: there is no image 4; the numbers in their names are 2 to 3, 158");
   options["frame_name"] = "first";
-  EXPECT_EQ(refusal(kTrial), "frame: expected the number in the names of its images, such as 0158 or 158, got 'first'");
+  EXPECT_EQ(refusal(kTrial), "frame_name: expected the number in the names of its images, such as 0158 or 158, got 'first'");
 }
 
 TEST_F(ReadAutoscoper, AVolumeWithVoxelSizeFlipsAndOffset) {
