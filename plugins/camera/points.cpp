@@ -265,8 +265,8 @@ MARROW_PLUGIN(plugin) {
                 "predicted_rotation_depth_deg", "predicted_shift_u_mm", "predicted_shift_v_mm",
                 "predicted_shift_depth_mm", "predicted_focal_length_px", "predicted_centre_u_px",
                 "predicted_centre_v_px"})
-      .option("points", &Options::points, "file with the points and the pixels where they are seen (docs/case.md)",
-              required())
+      .option("known_points", &Options::points,
+              "file with the points and the pixels where they are seen (docs/case.md)", required())
       .option("view", &Options::view, "name under which the file gives the pixels; empty: the first one")
       .option("width_px", &Options::width_px, "width of the image; not needed with a camera", at_least(1),
               at_most(65536))

@@ -172,6 +172,7 @@ std::map<std::string, OptionValue> options() {
   return {
       {"board", board_file().string()},
       {"points", points_file(device(0), second(), false).string()},
+      {"known_points", points_file(device(0), second(), false).string()},
       {"paths", std::vector<std::string>{xray_file("frontal", 0, 0).string(), xray_file("oblique", -30, 20).string()}},
       {"names", std::vector<std::string>{"frontal", "oblique"}},
       {"measured_at", std::vector<double>{0, 40}},

@@ -154,7 +154,7 @@ MARROW_PLUGIN(plugin) {
           "name of the bone's VolumeFile without its ending, or a part of it that no other has; empty: the only one")
       .option("frame_name", &Options::frame, "number in the names of the frame's images, such as 0158 or 158",
               required())
-      .option("start", &Options::start,
+      .option("start_file", &Options::start,
               "about where the bone is. .tra: Autoscoper's track of this bone, of which the line of this frame counts; "
               "any other: a pose file of marrow, in the coordinates of the volume")
       .option("value_offset_hu", &Options::value_offset_hu,

@@ -57,7 +57,7 @@ struct Answer {
 };
 
 shipped::Options options_of(const TemporaryFolder& folder, const std::string& unknown) {
-  return {{"points", (folder / "p.yaml").string()},
+  return {{"known_points", (folder / "p.yaml").string()},
           {"view", std::string("a")},
           {"width_px", 1000},
           {"height_px", 900},

@@ -85,7 +85,8 @@ TEST_F(ReadAutoscoper, AFrameByTheNumberInItsNames) {
   options["frame_name"] = "4";
   EXPECT_EQ(refusal(kTrial), "/Frames/one: there is no image 4; the numbers in their names are 2 to 3, 158");
   options["frame_name"] = "first";
-  EXPECT_EQ(refusal(kTrial), "frame_name: expected the number in the names of its images, such as 0158 or 158, got 'first'");
+  EXPECT_EQ(refusal(kTrial),
+            "frame_name: expected the number in the names of its images, such as 0158 or 158, got 'first'");
 }
 
 TEST_F(ReadAutoscoper, AVolumeWithVoxelSizeFlipsAndOffset) {
@@ -193,7 +194,7 @@ Vector3d quarter(const Vector3d& x) { return {-x.y() + 1, x.x() - 2.5, x.z() + 3
 
 TEST_F(ReadAutoscoper, TheStartFromAutoscopersOwnTrack) {
   put(folder / "rad.tra", std::string(15, ',') + "\n" + std::string(15, ',') + "\n" + kQuarter);
-  options["start"] = (folder / "rad.tra").string();
+  options["start_file"] = (folder / "rad.tra").string();
   const shipped::Outputs out = read();  // frame 158 is the third one
   const auto start = out.at("start").as_list<marrow::Pose>();
   EXPECT_EQ(start.names(), std::vector<std::string>{"bone"});
@@ -212,7 +213,7 @@ TEST_F(ReadAutoscoper, TheStartFromAPoseFile) {
       "marrow-pose: 1\ntarget: world\nsource: ct\nrotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n"
       "translation_mm: [1, 2, 3]\n");
   EXPECT_TRUE(read().at("start").as_list<marrow::Pose>().empty());
-  options["start"] = (folder / "start.yaml").string();
+  options["start_file"] = (folder / "start.yaml").string();
   EXPECT_EQ(read().at("start").as_list<marrow::Pose>()[0].world_from_model.translation_mm, Vector3d(1, 2, 3));
 }
 
