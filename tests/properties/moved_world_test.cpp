@@ -22,11 +22,13 @@ const std::map<std::string, std::string>& apart() {
       {"evaluate.calibration", "compares two camera matrices of one device, which have no place"},
       {"evaluate.contact", "needs several bones; tests/plugins/evaluate moves them together"},
       {"evaluate.deepfluoro", "reads a file"},
+      {"evaluate.distortion", "compares two distortions of one device, which have no place"},
       {"evaluate.frames", "sums up figures"},
       {"evaluate.locking", "a plan of plan.locking; tests/plugins/plan moves its world"},
       {"evaluate.utrecht", "reads files"},
       {"register.together", "needs the costs of several bones; tests/plugins/register has wells for each"},
       {"similarity.with_contact", "needs several bones; its penalty is that of evaluate.contact"},
+      {"track.autoscoper", "with a volume, its poses are of the volume's corner; tests/plugins/read checks both ways"},
       {"track.keyframes", "reads files; their poses are those of the world they were placed in"}};
   return nodes;
 }

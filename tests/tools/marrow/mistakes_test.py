@@ -53,7 +53,9 @@ class Mistakes(Comparison):
             "dashes, as  thread=3",
         )
         self.assertEqual(
-            self.said("compare", "e.yaml", "--dryrun"), "'compare' has no option '--dryrun'; did you mean '--dry-run'?"
+            self.said("compare", "e.yaml", "--dryrun"),
+            "'compare' has no option '--dryrun'; did you mean '--dry-run'? An input of the pipeline is given without "
+            "dashes, as  dryrun=VALUE",
         )
         self.assertEqual(self.said("cache", "gc", "--keep=3"), "'gc' has no option '--keep'; did you mean '--keep-gb'?")
         self.assertEqual(

@@ -6,7 +6,7 @@ from harness.program import main
 from harness.shipped import nodes_of, shipped
 
 # The inputs by which poses go from one node to the next.
-WAYS = ("initial", "pose", "poses", "stages", "start", "first", "second", "third", "fourth")
+WAYS = ("starts", "initial", "pose", "poses", "stages", "start", "first", "second", "third", "fourth")
 
 
 def node_of(reference):
