@@ -32,6 +32,8 @@ UNTRIED = [
     "read.sequence",
     "read.tra",
     "read.utrecht",
+    "read.view.distortion",
+    "read.views.distortions",
     "read.volume.series_uid",
     "read.volume.voxel_size_mm",
     "read.xmalab_grid",

@@ -47,7 +47,8 @@ bool is_of_whole_image(const std::string& node) {
 double allowed(const std::string& node, const Change& change) {
   constexpr double kInfinite = std::numeric_limits<double>::infinity();
   const std::string kind = node.substr(0, node.find('.'));
-  const bool is_search = kind == "register" || node == "initial.best_of" || node == "initial.global_search";
+  const bool is_search = kind == "register" || node == "initial.best_of" || node == "initial.global_search" ||
+                         node == "evaluate.mirror_pose";
   const bool is_cut = change.cut_px != Eigen::Vector2i::Zero();
   if (change.is_mirrored) {
     if (node == "similarity.ray_to_surface") return kInfinite;  // every second edge pixel, counted from the left
