@@ -10,6 +10,7 @@
 #include <random>
 
 #include "camera_files.hpp"
+#include "chessboard_sample.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "plate_samples.hpp"
@@ -105,34 +106,11 @@ Camera second() {
   return camera;
 }
 
-/// A chessboard with 9 x 6 inner corners and squares of 20 mm, with 2 x 2 samples per pixel and without distortion.
-Picture chessboard_picture(int number) {
-  constexpr double kSquare_mm = 20;
-  const RigidTransform pose = device(number).camera_from_world;
-  Eigen::Matrix3d pixel_from_board;
-  pixel_from_board << pose.rotation.leftCols<2>(),
-      Eigen::Vector3d(2.0 * number, 5.0 - number, 1000) - pose.rotation * Eigen::Vector3d(80, 50, 0);
-  const Eigen::Matrix3d board_from_pixel = (device(number).intrinsics * pixel_from_board).inverse();
-  cv::Mat pixels(kSize_px, kSize_px, CV_8UC3);
-  for (int v = 0; v < kSize_px; ++v)
-    for (int u = 0; u < kSize_px; ++u) {
-      int dark = 0;
-      for (int k = 0; k < 4; ++k) {
-        const Eigen::Vector2d at =
-            (board_from_pixel * Eigen::Vector3d(u - 0.25 + 0.5 * (k & 1), v - 0.25 + 0.5 * (k >> 1), 1)).hnormalized() /
-            kSquare_mm;
-        const int column = int(std::floor(at.x())), row = int(std::floor(at.y()));
-        dark += column >= -1 && column <= 8 && row >= -1 && row <= 5 && (column + row) % 2 == 0;
-      }
-      pixels.at<cv::Vec3b>(v, u) = cv::Vec3b::all(std::uint8_t(230 - 50 * dark));
-    }
-  return {pixels};
-}
-
 Value chessboards() {
   static const Value kPictures = [] {
     List<Picture> list;
-    for (int i = 0; i < 5; ++i) list.add(formatted("{}", i), chessboard_picture(i));
+    for (int i = 0; i < 5; ++i)
+      list.add(formatted("{}", i), chessboard_picture(device(i), Eigen::Vector3d(2.0 * i, 5.0 - i, 1000)));
     return Value::of<Picture>(list, "photograph");
   }();
   return kPictures;
