@@ -67,11 +67,6 @@ std::string group_of(const DeepfluoroImage& image) { return image.specimen + "/p
 
 }  // namespace
 
-const std::vector<std::string>& deepfluoro_bones() {
-  static const std::vector<std::string> bones{"pelvis", "left-femur", "right-femur"};
-  return bones;
-}
-
 DeepfluoroFile::DeepfluoroFile(const std::filesystem::path& path) : file_(new Hdf5Reader(path)) {
   for (const std::string& specimen : file_->names_in("/"))
     for (const std::string& name : file_->names_in(specimen + "/projections")) images_.push_back({specimen, name});

@@ -36,9 +36,6 @@ struct DeepfluoroReading {
   bool rows_first = false;  ///< the marks in the images are (row, column)
 };
 
-/// The bones whose poses the file gives.
-const std::vector<std::string>& deepfluoro_bones();
-
 class DeepfluoroFile {
  public:
   /// Throws Error if the file cannot be read, or has no specimen.

@@ -2,7 +2,6 @@
 #include "marrow/toolbox/exchange/utrecht_file.hpp"
 
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <cmath>
 #include <optional>
 #include <sstream>
