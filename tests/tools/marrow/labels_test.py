@@ -245,7 +245,7 @@ class DicomSegmentation(Labels):
         return self.scratch / name
 
     def label_map(self, name, bits=8, change=lambda data: None):
-        """The type LABELMAP of DICOM 2024: a frame a slice, whose pixels are the numbers of segments; 0 is background."""
+        """The type LABELMAP: a frame a slice, whose pixels are the numbers of segments; 0 is background."""
         from pydicom.dataset import Dataset
 
         def as_label_map(data):
