@@ -23,6 +23,9 @@ void check_size_segment(const CodedImage& image) {
   if (bytes.substr(0, 4) != "\xFF\x4F\xFF\x51") throw CodecError("the pixels do not begin as JPEG 2000");
   if (bytes.size() < kBytes) throw CodecError("the compressed pixels end too early");
   const auto number = [&](std::size_t at, std::size_t width) { return number_in_bytes(bytes.substr(at, width), true); };
+  const std::uint64_t capabilities = number(6, 2);  // Rsiz
+  if (capabilities & 0x4000) throw CodecNotRead("its pixels are compressed by high-throughput JPEG 2000 (part 15)");
+  if (capabilities & 0x8000) throw CodecNotRead("its pixels are compressed by JPEG 2000 with extensions (part 2)");
   const std::uint64_t right = number(8, 4), bottom = number(12, 4), left = number(16, 4), top = number(20, 4),
                       tile_columns = number(24, 4), tile_rows = number(28, 4);
   const int bits = (std::uint8_t(bytes[42]) & 0x7F) + 1;
@@ -35,6 +38,25 @@ void check_size_segment(const CodedImage& image) {
   if (is_signed && !image.is_signed) throw CodecError("the compressed pixels have a sign, the header says none");
   if (tile_columns == 0 || tile_rows == 0 || (right / tile_columns + 1) * (bottom / tile_rows + 1) > kMostTiles)
     throw CodecError("the compressed pixels tell of more than 4096 tiles");
+}
+
+/// Takes away the boxes of a JP2 file (ITU T.800, annex I), in which some programs put the codestream.
+void unbox(CodedImage& image) {
+  if (image.bytes.compare(4, 8, "jP  \r\n\x87\n") != 0) return;
+  const std::string_view bytes = image.bytes;
+  for (std::size_t at = 0; at + 8 <= bytes.size();) {
+    const std::string_view type = bytes.substr(at + 4, 4);
+    const std::size_t length = std::size_t(number_in_bytes(bytes.substr(at, 4), true));
+    if (type == "jp2h" && bytes.substr(at + 8, length).find("pclr") != std::string_view::npos)
+      throw CodecNotRead("its pixels are compressed numbers of colours in a table (JP2 with a palette)");
+    if (type == "jp2c" && length != 1) {  // 1: a length of 8 bytes follows
+      image.bytes = bytes.substr(at + 8, length == 0 ? std::string_view::npos : std::max<std::size_t>(length, 8) - 8);
+      return;
+    }
+    if (length < 8) break;
+    at += length;
+  }
+  throw CodecError("no JPEG 2000 lies in the boxes of a JP2 file around the pixels");
 }
 
 /// Bytes that OpenJPEG reads one after the other.
@@ -102,7 +124,8 @@ Owned<opj_image_t> decoded_picture(const CodedImage& image) {
 
 }  // namespace
 
-std::vector<std::byte> decode_jpeg_2000(const CodedImage& image) {
+std::vector<std::byte> decode_jpeg_2000(CodedImage image) {
+  unbox(image);
   check_size_segment(image);
   const Owned<opj_image_t> picture = decoded_picture(image);
   const opj_image_comp_t& only = picture->comps[0];
