@@ -44,8 +44,11 @@ TEST_F(Hostile, TiffOfImageJWhosePagesAreNoSlices) {
   EXPECT_EQ(volume_at(folder / "a.tif").grid.size, (std::array<int, 3>{2, 2, 2}));
   expect("a.tif", stack("ImageJ=1.54f\nimages=2\nchannels=2\n"), "is an ImageJ stack of 2 channels");
   expect("a.tif", stack("ImageJ=1.54f\nimages=2\nframes=2\n"), "is an ImageJ stack of 2 frames");
-  expect("a.tif", stack("<?xml?><OME><Image><Pixels SizeX=\"2\" SizeZ=\"1\" SizeC=\"2\" SizeT=\"1\"/></Image></OME>"),
-         "is an OME stack of 2 channels, whose pages are not slices of one volume");
+  expect(
+      "a.tif",
+      stack(
+          "<?xml version=\"1.0\"?><OME><Image><Pixels SizeX=\"2\" SizeZ=\"1\" SizeC=\"2\" SizeT=\"1\"/></Image></OME>"),
+      "is an OME stack of 2 channels, whose pages are not slices of one volume");
   expect("a.tif", stack("<OME><Pixels SizeC=\"1\" SizeT=\"2\"/></OME>"), "is an OME stack of 2 times");
   expect("a.tif", stack("{\"shape\": [2, 1, 2, 2, 2]}"), "is an array of 4 dimensions, [2, 1, 2, 2, 2]");
   expect("a.tif", stack("{\"axes\": \"TZYX\", \"shape\": [2, 2, 2, 2]}"), "is an array of 4 dimensions, [2, 2, 2, 2]");
