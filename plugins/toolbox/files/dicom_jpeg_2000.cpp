@@ -23,9 +23,6 @@ void check_size_segment(const CodedImage& image) {
   if (bytes.substr(0, 4) != "\xFF\x4F\xFF\x51") throw CodecError("the pixels do not begin as JPEG 2000");
   if (bytes.size() < kBytes) throw CodecError("the compressed pixels end too early");
   const auto number = [&](std::size_t at, std::size_t width) { return number_in_bytes(bytes.substr(at, width), true); };
-  const std::uint64_t capabilities = number(6, 2);  // Rsiz
-  if (capabilities & 0x4000) throw CodecNotRead("its pixels are compressed by high-throughput JPEG 2000 (part 15)");
-  if (capabilities & 0x8000) throw CodecNotRead("its pixels are compressed by JPEG 2000 with extensions (part 2)");
   const std::uint64_t right = number(8, 4), bottom = number(12, 4), left = number(16, 4), top = number(20, 4),
                       tile_columns = number(24, 4), tile_rows = number(28, 4);
   const int bits = (std::uint8_t(bytes[42]) & 0x7F) + 1;
@@ -34,6 +31,9 @@ void check_size_segment(const CodedImage& image) {
   const int enough = is_signed == image.is_signed ? std::max(bits, image.bits_stored) : bits;
   check_coded(image, (long long)(right) - (long long)(left), (long long)(bottom) - (long long)(top), int(number(40, 2)),
               enough);
+  const std::uint64_t capabilities = number(6, 2);  // Rsiz
+  if (capabilities & 0x4000) throw CodecNotRead("its pixels are compressed by high-throughput JPEG 2000 (part 15)");
+  if (capabilities & 0x8000) throw CodecNotRead("its pixels are compressed by JPEG 2000 with extensions (part 2)");
   if (bytes[43] != 1 || bytes[44] != 1) throw CodecError("the compressed pixels have only a part of their samples");
   if (is_signed && !image.is_signed) throw CodecError("the compressed pixels have a sign, the header says none");
   if (tile_columns == 0 || tile_rows == 0 || (right / tile_columns + 1) * (bottom / tile_rows + 1) > kMostTiles)
