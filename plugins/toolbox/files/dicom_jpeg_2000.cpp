@@ -42,15 +42,15 @@ void check_size_segment(const CodedImage& image) {
 
 /// Takes away the boxes of a JP2 file (ITU T.800, annex I), in which some programs put the codestream.
 void unbox(CodedImage& image) {
-  if (image.bytes.compare(4, 8, "jP  \r\n\x87\n") != 0) return;
   const std::string_view bytes = image.bytes;
+  if (bytes.substr(0, 12) != std::string_view("\0\0\0\x0CjP  \r\n\x87\n", 12)) return;
   for (std::size_t at = 0; at + 8 <= bytes.size();) {
     const std::string_view type = bytes.substr(at + 4, 4);
     const std::size_t length = std::size_t(number_in_bytes(bytes.substr(at, 4), true));
     if (type == "jp2h" && bytes.substr(at + 8, length).find("pclr") != std::string_view::npos)
       throw CodecNotRead("its pixels are compressed numbers of colours in a table (JP2 with a palette)");
     if (type == "jp2c" && length != 1) {  // 1: a length of 8 bytes follows
-      image.bytes = bytes.substr(at + 8, length == 0 ? std::string_view::npos : std::max<std::size_t>(length, 8) - 8);
+      image.bytes = std::string(bytes.substr(at + 8, length == 0 ? bytes.npos : std::max<std::size_t>(length, 8) - 8));
       return;
     }
     if (length < 8) break;
