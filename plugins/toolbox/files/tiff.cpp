@@ -33,6 +33,7 @@ Samples::Type type_of(const std::string& what, const TiffPage& page) {
   if (page.bits == 32 && page.format == 1) return Type::u32;
   if (page.bits == 32 && page.format == 2) return Type::i32;
   if (page.bits == 32 && page.format == 3) return Type::f32;
+  if (page.bits == 64 && page.format == 3) return Type::f64;
   throw Error(
       formatted("{}: its pixels have {} bits in a format that is not read; save it with 8 or 16 bits, or as float",
                 what, page.bits));
