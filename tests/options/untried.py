@@ -17,8 +17,6 @@ UNTRIED = [
     "guide.closed_loop",
     "guide.open_loop",
     "guide.target",
-    "initial.global_search.needs_start",
-    "initial.global_search.pixel_step",
     "plan.locking.max_angle_deg",
     "plan.locking.max_cost",
     "plan.locking.max_offset_mm",
