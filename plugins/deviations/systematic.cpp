@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Adds to a predicted covariance what the residuals of one frame cannot show, because it is alike all along an outline:
 // the edges of an image lie beside the model's outline by an offset that differs from view to view and with the
-// direction of the border, and the cameras are a little off. Each such error moves the outline's points along their
-// normals by delta; the pose that fits them best then moves by (J^T J)^-1 J^T delta (least squares, J: the points'
-// motion by the pose). The costs estimate one offset common to all views, so this is one more unknown here.
+// direction of the border, the model's surface is a little off, and so are the cameras. Each such error moves the
+// outline's points along their normals by delta; the pose that fits them best then moves by (J^T J)^-1 J^T delta (least
+// squares, J: the points' motion by the pose). The costs estimate one offset common to all views, so this is one more
+// unknown here.
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <cmath>
@@ -22,6 +23,8 @@ struct Options {
   double offset_px = 0.3;
   double camera_px = 0.5;
   double camera_depth_percent = 0;
+  double surface_mm = 0;
+  double surface_reach_mm = 10;
 };
 
 struct Result {
@@ -32,6 +35,8 @@ struct Result {
 /// A point of an outline, and how far a small motion in the pose's frame and a common offset move its residual.
 struct Row {
   Vector7d by_unknowns;
+  Eigen::Vector3d on_bone_mm;
+  double px_per_mm;  ///< how far it moves along its normal if the surface grows there
   double normal_u, normal_v, from_middle_u, from_middle_v;
 };
 
@@ -48,6 +53,7 @@ std::vector<Row> rows_of(const View& view, const OutlineProjector& projector, co
     Row row;
     row.by_unknowns << pose.frame.axes.transpose() * (point - pose.frame.origin_mm).cross(by_point),
         pose.frame.axes.transpose() * by_point, 1;
+    row.on_bone_mm = point, row.px_per_mm = by_point.norm();
     row.normal_u = double(p.normal_u), row.normal_v = double(p.normal_v);
     row.from_middle_u = double(p.u_px) - k(0, 2), row.from_middle_v = double(p.v_px) - k(1, 2);
     rows.push_back(row);
@@ -75,6 +81,22 @@ std::vector<SystematicError> errors_of(const Options& options) {
            [](const Row& r) { return r.normal_u * r.from_middle_u + r.normal_v * r.from_middle_v; }}};
 }
 
+/// The covariance of the pose that errors of the surface make. They belong to the bone, so all views see the same ones,
+/// and they are alike where points are near each other: a Gaussian process over the surface (Rasmussen and Williams
+/// 2006) with the squared exponential kernel. `motions`: how the pose moves by an offset of each point, in a column.
+Matrix6d covariance_of_surface(const std::vector<Row>& rows, const Eigen::Matrix<double, 6, Eigen::Dynamic>& motions,
+                               const Options& options) {
+  const Eigen::Index count = Eigen::Index(rows.size());
+  Eigen::MatrixXd alike(count, count);
+  for (Eigen::Index i = 0; i < count; ++i)
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      const Row &a = rows[std::size_t(i)], &b = rows[std::size_t(j)];
+      const double apart = (a.on_bone_mm - b.on_bone_mm).norm() / options.surface_reach_mm;
+      alike(i, j) = alike(j, i) = a.px_per_mm * b.px_per_mm * std::exp(-0.5 * apart * apart);
+    }
+  return options.surface_mm * options.surface_mm * (motions * alike * motions.transpose());
+}
+
 /// The covariance of the pose that the errors of all views make, each independent of the others. Nothing if the outline
 /// does not determine the pose.
 std::optional<Matrix6d> covariance_of(const List<View>& views, const OutlineProjector& projector, const Pose& pose,
@@ -89,13 +111,21 @@ std::optional<Matrix6d> covariance_of(const List<View>& views, const OutlineProj
   const Eigen::LDLT<Matrix7d> solver(normal);
   if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 0)) return std::nullopt;
   Matrix6d covariance = Matrix6d::Zero();
-  for (const std::vector<Row>& rows : of_views)
+  std::vector<Row> all;
+  for (const std::vector<Row>& rows : of_views) all.insert(all.end(), rows.begin(), rows.end());
+  Eigen::Matrix<double, 6, Eigen::Dynamic> motions(6, Eigen::Index(all.size()));
+  Eigen::Index column = 0;
+  for (const std::vector<Row>& rows : of_views) {
+    const Eigen::Index first = column;
+    for (const Row& row : rows) motions.col(column++) = solver.solve(row.by_unknowns).head<6>() / double(rows.size());
     for (const SystematicError& error : errors_of(options)) {
-      Vector7d pulled = Vector7d::Zero();
-      for (const Row& row : rows) pulled += row.by_unknowns * error.moved_px(row) / double(rows.size());
-      const Vector6d motion = error.deviation * solver.solve(pulled).head<6>();
+      Vector6d motion = Vector6d::Zero();
+      for (std::size_t i = 0; i < rows.size(); ++i)
+        motion += error.deviation * error.moved_px(rows[i]) * motions.col(first + Eigen::Index(i));
       covariance += motion * motion.transpose();
     }
+  }
+  if (options.surface_mm > 0) covariance += covariance_of_surface(all, motions, options);
   if (!covariance.allFinite()) return std::nullopt;
   return covariance;
 }
@@ -127,7 +157,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("deviations.systematic", systematic)
       .summary(
           "Adds to predicted deviations what all of an outline has in common: an offset between edges and outline that "
-          "differs from view to view, and errors of the cameras")
+          "differs from view to view, errors of the surface, and errors of the cameras")
       .in("stages", "poses of a search", over("stage"))
       .in("model", "surface of the bone or implant")
       .in("projector", "draws its outline")
@@ -145,5 +175,13 @@ MARROW_PLUGIN(plugin) {
               at_least(0), at_most(100))
       .option("camera_depth_percent", &Options::camera_depth_percent,
               "standard deviation of a camera's magnification; in one view it is that of the depth", at_least(0),
-              at_most(50), unit("%"));
+              at_most(50), unit("%"))
+      .option("surface_mm", &Options::surface_mm,
+              "standard deviation of the distance between the model's surface and what the edges in the images show of "
+              "it, which is the same in all views and frames: a part of the CT's voxel and of the images' blur",
+              at_least(0), at_most(20))
+      .option("surface_reach_mm", &Options::surface_reach_mm,
+              "how far from each other on the surface such errors are alike: where this far apart, their correlation "
+              "is 0.61",
+              at_least(0.1), at_most(1000));
 }
