@@ -1,22 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Adds to a predicted covariance what the residuals of one frame cannot show, because it is alike all along an outline:
 // the edges of an image lie beside the model's outline by an offset that differs from view to view and with the
-// direction of the border, and the cameras are a little off. Each such error moves the outline's points along their
-// normals by delta; the pose that fits them best then moves by (J^T J)^-1 J^T delta (least squares, J: the points'
-// motion by the pose). The costs estimate one offset common to all views, so this is one more unknown here.
-#include <Eigen/Cholesky>
-#include <Eigen/Geometry>
+// direction of the border, and the cameras are a little off.
 #include <cmath>
-#include <functional>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
+#include "marrow/deviations/outline_errors.hpp"
 
 namespace {
 
 using namespace marrow;
-using Vector7d = Eigen::Matrix<double, 7, 1>;
-using Matrix7d = Eigen::Matrix<double, 7, 7>;
+using deviations::OutlineError, deviations::OutlineRow;
 
 struct Options {
   double offset_px = 0.3;
@@ -29,87 +23,31 @@ struct Result {
   List<Pose> stages;
 };
 
-/// A point of an outline, and how far a small motion in the pose's frame and a common offset move its residual.
-struct Row {
-  Vector7d by_unknowns;
-  double normal_u, normal_v, from_middle_u, from_middle_v;
-};
-
-std::vector<Row> rows_of(const View& view, const OutlineProjector& projector, const Pose& pose) {
-  const RigidTransform camera_from_model = view.camera.camera_from_world * pose.world_from_model;
-  const Eigen::Matrix3d& k = view.camera.intrinsics;
-  std::vector<Row> rows;
-  for (const OutlinePoint& p : projector.outline(view.camera, pose.world_from_model, 4)) {
-    const Eigen::Vector3d point = p.model_mm.cast<double>(), seen = camera_from_model * point;
-    const Eigen::RowVector3d by_camera = (double(p.normal_u) * (k.row(0) - double(p.u_px) * k.row(2)) +
-                                          double(p.normal_v) * (k.row(1) - double(p.v_px) * k.row(2))) /
-                                         seen.z();
-    const Eigen::Vector3d by_point = (by_camera * camera_from_model.rotation).transpose();
-    Row row;
-    row.by_unknowns << pose.frame.axes.transpose() * (point - pose.frame.origin_mm).cross(by_point),
-        pose.frame.axes.transpose() * by_point, 1;
-    row.normal_u = double(p.normal_u), row.normal_v = double(p.normal_v);
-    row.from_middle_u = double(p.u_px) - k(0, 2), row.from_middle_v = double(p.v_px) - k(1, 2);
-    rows.push_back(row);
-  }
-  return rows;
-}
-
-/// An error that moves the edges of a view along the outline's normals.
-struct SystematicError {
-  double deviation;
-  std::function<double(const Row&)> moved_px;
-};
-
 /// The offset of the edges has a constant part and two that change with the border's direction, as those of upright and
 /// level borders differ. A camera shifts and scales the whole image.
-std::vector<SystematicError> errors_of(const Options& options) {
+std::vector<OutlineError> errors_of(const Options& options) {
   const double of_direction_px = options.offset_px / std::sqrt(2.0);
-  const auto cos2 = [](const Row& r) { return r.normal_u * r.normal_u - r.normal_v * r.normal_v; };
-  return {{options.offset_px, [](const Row&) { return 1.0; }},
+  const auto cos2 = [](const OutlineRow& r) { return r.normal_u * r.normal_u - r.normal_v * r.normal_v; };
+  return {{options.offset_px, [](const OutlineRow&) { return 1.0; }},
           {of_direction_px, cos2},
-          {of_direction_px, [](const Row& r) { return 2 * r.normal_u * r.normal_v; }},
-          {options.camera_px, [](const Row& r) { return r.normal_u; }},
-          {options.camera_px, [](const Row& r) { return r.normal_v; }},
+          {of_direction_px, [](const OutlineRow& r) { return 2 * r.normal_u * r.normal_v; }},
+          {options.camera_px, [](const OutlineRow& r) { return r.normal_u; }},
+          {options.camera_px, [](const OutlineRow& r) { return r.normal_v; }},
           {0.01 * options.camera_depth_percent,
-           [](const Row& r) { return r.normal_u * r.from_middle_u + r.normal_v * r.from_middle_v; }}};
-}
-
-/// The covariance of the pose that the errors of all views make, each independent of the others. Nothing if the outline
-/// does not determine the pose.
-std::optional<Matrix6d> covariance_of(const List<View>& views, const OutlineProjector& projector, const Pose& pose,
-                                      const Options& options) {
-  std::vector<std::vector<Row>> of_views;
-  Matrix7d normal = Matrix7d::Zero();
-  for (const View& view : views) {
-    of_views.push_back(rows_of(view, projector, pose));
-    for (const Row& row : of_views.back())
-      normal += row.by_unknowns * row.by_unknowns.transpose() / double(of_views.back().size());
-  }
-  const Eigen::LDLT<Matrix7d> solver(normal);
-  if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 0)) return std::nullopt;
-  Matrix6d covariance = Matrix6d::Zero();
-  for (const std::vector<Row>& rows : of_views)
-    for (const SystematicError& error : errors_of(options)) {
-      Vector7d pulled = Vector7d::Zero();
-      for (const Row& row : rows) pulled += row.by_unknowns * error.moved_px(row) / double(rows.size());
-      const Vector6d motion = error.deviation * solver.solve(pulled).head<6>();
-      covariance += motion * motion.transpose();
-    }
-  if (!covariance.allFinite()) return std::nullopt;
-  return covariance;
+           [](const OutlineRow& r) { return r.normal_u * r.from_middle_u + r.normal_v * r.from_middle_v; }}};
 }
 
 Result systematic(const List<Pose>& stages, const Mesh& model, const OutlineProjector& projector,
                   const List<View>& views, const Options& options, Context& context) {
   if (stages.empty()) throw Error("there is no pose; wire the stages of a registration");
   check_mesh(model, "model");
+  const auto errors = [&](std::size_t) { return errors_of(options); };
   Result result;
   for (std::size_t i = 0; i < stages.size(); ++i) {
     check_pose(stages[i], "the pose of stage '" + stages.name(i) + "'");
     Pose pose = stages[i];
     if (pose.covariance && pose.covariance->allFinite()) {
-      if (const auto more = covariance_of(views, projector, pose, options))
+      if (const auto more = deviations::covariance_by_errors(views, projector, pose, errors))
         *pose.covariance += *more;
       else
         context.warn("the outline of stage '" + stages.name(i) +
