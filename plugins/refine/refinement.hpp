@@ -112,8 +112,9 @@ class Refinement {
   /// The cost of a bone, as the mean over the views with their cameras corrected.
   double cost(std::size_t bone) const {
     double sum = 0;
-    for (std::size_t v = 0; v < views_.size(); ++v) sum += models_[bone * views_.size() + v].value;
-    return sum / double(views_.size());
+    for (std::size_t v = 0; v < views_.size(); ++v)
+      sum += models_[bone * views_.size() + v].value / double(views_.size());
+    return sum;
   }
   Matrix6d covariance_of_pose(std::size_t bone) const {
     const Eigen::MatrixXd root = root_.middleRows<6>(at_pose(bone));
