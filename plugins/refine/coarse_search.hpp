@@ -18,9 +18,13 @@
 
 namespace marrow::refine {
 
-/// How far in the image a camera may show the bones from their place, as a standard deviation along u or v.
-inline double may_be_off_px(const Camera& camera, const Sight& sight) {
-  return sight.deviation().segment<2>(3).maxCoeff() / pixel_size_at_mm(camera, sight.centre_mm);
+/// Whether a camera may show the bones farther from their place than this, by one standard deviation along u or v.
+inline bool may_be_farther_off(const List<View>& views, const std::vector<Sight>& sights, double reach_px) {
+  for (std::size_t v = 0; v < views.size(); ++v)
+    if (sights[v].deviation().segment<2>(3).maxCoeff() >
+        reach_px * pixel_size_at_mm(views[v].camera, sights[v].centre_mm))
+      return true;
+  return false;
 }
 
 /// Searches one view. Refers to all that it is given.

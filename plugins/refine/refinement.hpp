@@ -63,10 +63,7 @@ class Refinement {
 
   /// If a camera may be off by more than an outline's reach, looks for the bones in each view first, by these costs.
   void search(const List<Cost>& coarse_costs, Context& context) {
-    double most_px = 0;
-    for (std::size_t v = 0; v < views_.size(); ++v)
-      most_px = std::max(most_px, may_be_off_px(views_[v].camera, sights_[v]));
-    if (most_px <= options_.reach_px) return;
+    if (!may_be_farther_off(views_, sights_, options_.reach_px)) return;
     given_ = state_;
     for (std::size_t v = 0; v < views_.size(); ++v)
       state_.motions[v] =
