@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Adds to a predicted covariance what the residuals of one frame cannot show, because it is alike all along an outline:
 // the edges of an image lie beside the model's outline by an offset that differs from view to view and with the
-// direction of the border, and the cameras are a little off. Each such error moves the outline's points along their
-// normals by delta; the pose that fits them best then moves by (J^T J)^-1 J^T delta (least squares, J: the points'
-// motion by the pose). The costs estimate one offset common to all views, so this is one more unknown here.
+// direction of the border, they lie inside where metal is thin, and the cameras are a little off. Each such error moves
+// the outline's points along their normals by delta; the pose that fits them best then moves by (J^T J)^-1 J^T delta
+// (least squares, J: the points' motion by the pose). The costs estimate one offset common to all views, so this is one
+// more unknown here.
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <functional>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
+#include "metal_rims.hpp"
 
 namespace {
 
@@ -22,6 +23,8 @@ struct Options {
   double offset_px = 0.3;
   double camera_px = 0.5;
   double camera_depth_percent = 0;
+  double opaque_mm = 0;
+  double blur_px = 2;
 };
 
 struct Result {
@@ -33,9 +36,13 @@ struct Result {
 struct Row {
   Vector7d by_unknowns;
   double normal_u, normal_v, from_middle_u, from_middle_v;
+  double rim_px = 0;  ///< how far inside the outline metal of the given opacity shows its edge
 };
 
-std::vector<Row> rows_of(const View& view, const OutlineProjector& projector, const Pose& pose) {
+std::vector<Row> rows_of(const View& view, const OutlineProjector& projector, const Mesh& model, const Pose& pose,
+                         const Options& options) {
+  std::optional<deviations::PathLengths> paths;
+  if (options.opaque_mm > 0) paths.emplace(model, view.camera, pose.world_from_model);
   const RigidTransform camera_from_model = view.camera.camera_from_world * pose.world_from_model;
   const Eigen::Matrix3d& k = view.camera.intrinsics;
   std::vector<Row> rows;
@@ -50,6 +57,7 @@ std::vector<Row> rows_of(const View& view, const OutlineProjector& projector, co
         pose.frame.axes.transpose() * by_point, 1;
     row.normal_u = double(p.normal_u), row.normal_v = double(p.normal_v);
     row.from_middle_u = double(p.u_px) - k(0, 2), row.from_middle_v = double(p.v_px) - k(1, 2);
+    if (paths) row.rim_px = deviations::edge_inside_px(*paths, p, {options.opaque_mm, options.blur_px});
     rows.push_back(row);
   }
   return rows;
@@ -59,16 +67,19 @@ std::vector<Row> rows_of(const View& view, const OutlineProjector& projector, co
 struct SystematicError {
   double deviation;
   std::function<double(const Row&)> moved_px;
+  bool is_of_body = false;  ///< the same in all views; else each view has its own
 };
 
 /// The offset of the edges has a constant part and two that change with the border's direction, as those of upright and
-/// level borders differ. A camera shifts and scales the whole image.
+/// level borders differ. Where the metal's opacity is unknown, its rims may be anything from opaque to as thin as
+/// given. A camera shifts and scales the whole image.
 std::vector<SystematicError> errors_of(const Options& options) {
   const double of_direction_px = options.offset_px / std::sqrt(2.0);
   const auto cos2 = [](const Row& r) { return r.normal_u * r.normal_u - r.normal_v * r.normal_v; };
   return {{options.offset_px, [](const Row&) { return 1.0; }},
           {of_direction_px, cos2},
           {of_direction_px, [](const Row& r) { return 2 * r.normal_u * r.normal_v; }},
+          {1, [](const Row& r) { return r.rim_px; }, true},
           {options.camera_px, [](const Row& r) { return r.normal_u; }},
           {options.camera_px, [](const Row& r) { return r.normal_v; }},
           {0.01 * options.camera_depth_percent,
@@ -78,24 +89,33 @@ std::vector<SystematicError> errors_of(const Options& options) {
 /// The covariance of the pose that the errors of all views make, each independent of the others. Nothing if the outline
 /// does not determine the pose.
 std::optional<Matrix6d> covariance_of(const List<View>& views, const OutlineProjector& projector, const Pose& pose,
-                                      const Options& options) {
+                                      const Mesh& model, const Options& options) {
   std::vector<std::vector<Row>> of_views;
   Matrix7d normal = Matrix7d::Zero();
   for (const View& view : views) {
-    of_views.push_back(rows_of(view, projector, pose));
+    of_views.push_back(rows_of(view, projector, model, pose, options));
     for (const Row& row : of_views.back())
       normal += row.by_unknowns * row.by_unknowns.transpose() / double(of_views.back().size());
   }
   const Eigen::LDLT<Matrix7d> solver(normal);
   if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 0)) return std::nullopt;
   Matrix6d covariance = Matrix6d::Zero();
-  for (const std::vector<Row>& rows : of_views)
-    for (const SystematicError& error : errors_of(options)) {
-      Vector7d pulled = Vector7d::Zero();
-      for (const Row& row : rows) pulled += row.by_unknowns * error.moved_px(row) / double(rows.size());
+  for (const SystematicError& error : errors_of(options)) {
+    Vector7d of_body = Vector7d::Zero();
+    const auto add = [&](const Vector7d& pulled) {
       const Vector6d motion = error.deviation * solver.solve(pulled).head<6>();
       covariance += motion * motion.transpose();
+    };
+    for (const std::vector<Row>& rows : of_views) {
+      Vector7d pulled = Vector7d::Zero();
+      for (const Row& row : rows) pulled += row.by_unknowns * error.moved_px(row) / double(rows.size());
+      if (error.is_of_body)
+        of_body += pulled;
+      else
+        add(pulled);
     }
+    add(of_body);
+  }
   if (!covariance.allFinite()) return std::nullopt;
   return covariance;
 }
@@ -109,7 +129,7 @@ Result systematic(const List<Pose>& stages, const Mesh& model, const OutlineProj
     check_pose(stages[i], "the pose of stage '" + stages.name(i) + "'");
     Pose pose = stages[i];
     if (pose.covariance && pose.covariance->allFinite()) {
-      if (const auto more = covariance_of(views, projector, pose, options))
+      if (const auto more = covariance_of(views, projector, pose, model, options))
         *pose.covariance += *more;
       else
         context.warn("the outline of stage '" + stages.name(i) +
@@ -127,7 +147,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("deviations.systematic", systematic)
       .summary(
           "Adds to predicted deviations what all of an outline has in common: an offset between edges and outline that "
-          "differs from view to view, and errors of the cameras")
+          "differs from view to view, rims of metal that let radiation pass, and errors of the cameras")
       .in("stages", "poses of a search", over("stage"))
       .in("model", "surface of the bone or implant")
       .in("projector", "draws its outline")
@@ -145,5 +165,14 @@ MARROW_PLUGIN(plugin) {
               at_least(0), at_most(100))
       .option("camera_depth_percent", &Options::camera_depth_percent,
               "standard deviation of a camera's magnification; in one view it is that of the depth", at_least(0),
-              at_most(50), unit("%"));
+              at_most(50), unit("%"))
+      .option(
+          "opaque_mm", &Options::opaque_mm,
+          "for metal of unknown opacity: the path through it behind which 1 / e of the radiation may arrive, such as "
+          "1.5 for steel and 5 for titanium. Edges then lie inside the outline where the path is short; a standard "
+          "deviation. 0: it is opaque, or no metal",
+          at_least(0), at_most(50))
+      .option("blur_px", &Options::blur_px,
+              "with opaque_mm: standard deviation of the blur by the X-ray device and the edge extractor together",
+              at_least(0.2), at_most(20));
 }

@@ -36,7 +36,7 @@ class Square : public OutlineProjector {
   }
 };
 
-Pose added(double offset_px, double camera_px, double depth_percent) {
+Pose added(double offset_px, double camera_px, double depth_percent, double opaque_mm = 0) {
   Camera camera;
   camera.width_px = camera.height_px = 512;
   camera.intrinsics << 3000, 0, 255.5, 0, 3000, 255.5, 0, 0, 1;
@@ -54,7 +54,10 @@ Pose added(double offset_px, double camera_px, double depth_percent) {
                         {"model", shipped::item(model)},
                         {"projector", Value::of<OutlineProjector>(std::make_shared<const Square>())},
                         {"views", shipped::list(views, "view")}},
-                       {{"offset_px", offset_px}, {"camera_px", camera_px}, {"camera_depth_percent", depth_percent}})
+                       {{"offset_px", offset_px},
+                        {"camera_px", camera_px},
+                        {"camera_depth_percent", depth_percent},
+                        {"opaque_mm", opaque_mm}})
       .at("pose")
       .as<Pose>();
 }
@@ -70,5 +73,12 @@ TEST(Systematic, AnImageThatIsShiftedShiftsTheBodyAcrossTheBeam) {
 TEST(Systematic, AMagnificationIsADepth) { EXPECT_NEAR(std::sqrt((*added(0, 0, 1).covariance)(5, 5)), 10, 0.3); }
 
 TEST(Systematic, NoErrorsAddNothing) { EXPECT_EQ(added(0, 0, 0).covariance->norm(), 0); }
+
+// The less opaque the metal may be, the farther inside its edges may lie, and the farther off the pose.
+TEST(Systematic, MetalThatLetsRadiationPassIsOneMoreError) {
+  const double of_steel = added(0, 0, 0, 1.5).covariance->norm(), of_titanium = added(0, 0, 0, 5).covariance->norm();
+  EXPECT_GT(of_steel, 0);
+  EXPECT_GT(of_titanium, of_steel);
+}
 
 }  // namespace systematic_test
