@@ -79,7 +79,7 @@ std::optional<Offset> offset_of(const std::vector<Residual>& residuals) {
     }
     // An outline with all normals to one side does not tell an offset across it from a shift.
     const Eigen::LDLT<Eigen::Matrix3d> solver(normal);
-    if (!(solver.vectorD().minCoeff() > 1e-3 * solver.vectorD().maxCoeff())) return std::nullopt;
+    if (!(solver.vectorD().minCoeff() > 1e-2 * solver.vectorD().maxCoeff())) return std::nullopt;
     offset.px = solver.solve(right);
   }
   return offset;
