@@ -17,8 +17,8 @@ namespace {
 using namespace marrow;
 
 struct Options {
-  int pixel_step = 2;
-  double band_px = 16;
+  int pixel_step = 1;
+  double band_px = 8;
   std::string polarity = "dark";
   std::vector<double> weights;
 };

@@ -63,9 +63,9 @@ shipped::Inputs inputs(const EdgeMap& edges, double to_deg = 360) {
 class OutlineOffset : public testing::TestWithParam<double> {};  // the side on which the image is brighter
 
 TEST_P(OutlineOffset, IsFoundInSpiteOfAnotherBorder) {
-  const auto metrics = shipped::call("evaluate.outline_offset", inputs(circle(61.2, 150.5, 149.3, GetParam())),
-                                     {{"polarity", "either"}})
-                           .at("metrics");
+  const auto metrics =
+      shipped::call("evaluate.outline_offset", inputs(circle(61.2, 150.5, 149.3, GetParam())), {{"polarity", "either"}})
+          .at("metrics");
   EXPECT_NEAR(figure(metrics, "first_across_px"), 1.2, 0.1);
   EXPECT_NEAR(figure(metrics, "first_shift_u_px"), 0.5, 0.1);
   EXPECT_NEAR(figure(metrics, "first_shift_v_px"), -0.7, 0.1);
@@ -74,9 +74,10 @@ TEST_P(OutlineOffset, IsFoundInSpiteOfAnotherBorder) {
 INSTANTIATE_TEST_SUITE_P(Polarity, OutlineOffset, testing::Values(1.0, -1.0));
 
 TEST(OutlineOffsetRefuses, EdgesThatSayNothing) {
-  EXPECT_EQ(shipped::refusal("evaluate.outline_offset", inputs(circle(61, 150, 150, -1))),
-            "view 'first': only 0 points of the outline have an edge within 6 px, and 20 are needed; check the pose, or "
-            "raise reach_px");
+  EXPECT_EQ(
+      shipped::refusal("evaluate.outline_offset", inputs(circle(61, 150, 150, -1))),
+      "view 'first': only 0 points of the outline have an edge within 6 px, and 20 are needed; check the pose, or "
+      "raise reach_px");
   EXPECT_EQ(shipped::refusal("evaluate.outline_offset", inputs(circle(61, 150, 150, 1), 50), {{"reach_px", 7.0}}),
             "view 'first': all of the outline runs in one direction, which does not tell an offset across it from a "
             "shift; leave this view out");
