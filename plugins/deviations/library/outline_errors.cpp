@@ -34,8 +34,7 @@ std::vector<OutlineRow> rows_of(const View& view, const OutlineProjector& projec
 
 }  // namespace
 
-std::optional<OutlineFit> OutlineFit::of(const List<View>& views, const OutlineProjector& projector,
-                                         const Pose& pose) {
+std::optional<OutlineFit> OutlineFit::of(const List<View>& views, const OutlineProjector& projector, const Pose& pose) {
   OutlineFit fit;
   Matrix7d normal = Matrix7d::Zero();
   for (const View& view : views) {
