@@ -14,11 +14,6 @@ using namespace marrow;
 using deviations::OutlineError, deviations::OutlineRow;
 using geometry::CameraDeviations;
 
-struct Result {
-  Pose pose;
-  List<Pose> stages;
-};
-
 /// Each parameter of a camera that is not exact, and how an error of one unit moves the image along the outline's
 /// normals. The camera turns about the point `centre_mm` of its own frame.
 std::vector<OutlineError> errors_of(const CameraDeviations& stated, const Eigen::Vector3d& centre_mm) {
@@ -40,31 +35,21 @@ std::vector<OutlineError> errors_of(const CameraDeviations& stated, const Eigen:
   return all;
 }
 
-Result with_cameras(const List<Pose>& stages, const OutlineProjector& projector, const List<View>& views,
-                    const List<CameraDeviations>& stated, Context& context) {
-  if (stages.empty()) throw Error("there is no pose; wire the stages of a registration");
+deviations::Widened with_cameras(const List<Pose>& stages, const OutlineProjector& projector, const List<View>& views,
+                                 const List<CameraDeviations>& stated, Context& context) {
   if (stated.names() != views.names())
     throw Error("camera_deviations and views are not of the same views; wire both from the node that reads the views");
-  bool is_stated = false;
-  for (const CameraDeviations& camera : stated) is_stated = is_stated || !camera.is_none();
-  Result result;
-  for (std::size_t i = 0; i < stages.size(); ++i) {
-    check_pose(stages[i], "the pose of stage '" + stages.name(i) + "'");
-    Pose pose = stages[i];
-    if (is_stated && pose.covariance && pose.covariance->allFinite()) {
-      const auto errors = [&](std::size_t v) {
-        return errors_of(stated[v], views[v].camera.camera_from_world * (pose.world_from_model * pose.frame.origin_mm));
-      };
-      if (const auto fit = deviations::OutlineFit::of(views, projector, pose))
-        *pose.covariance += fit->covariance(errors);
-      else
-        context.warn("the outline of stage '" + stages.name(i) +
-                     "' does not determine the pose, so what is not known about the cameras is not added");
-    }
-    result.stages.add(stages.name(i), pose);
-  }
-  result.pose = result.stages[result.stages.size() - 1];
-  return result;
+  const bool is_stated =
+      !std::all_of(stated.begin(), stated.end(), [](const auto& camera) { return camera.is_none(); });
+  const auto by_cameras = [&](const Pose& pose) -> std::optional<Matrix6d> {
+    if (!is_stated) return Matrix6d::Zero();
+    const auto fit = deviations::OutlineFit::of(views, projector, pose);
+    if (!fit) return std::nullopt;
+    return fit->covariance([&](std::size_t v) {
+      return errors_of(stated[v], views[v].camera.camera_from_world * (pose.world_from_model * pose.frame.origin_mm));
+    });
+  };
+  return deviations::widened(stages, by_cameras, "what is not known about the cameras is not added", context);
 }
 
 }  // namespace
@@ -76,6 +61,8 @@ MARROW_PLUGIN(plugin) {
       .in("projector", "draws the bone's outline")
       .in("views", "X-ray views; only their cameras are used", over("view"))
       .in("camera_deviations", "what is stated about each camera, as a camera file says it", over("view"))
-      .out("pose", &Result::pose, "the last pose; a covariance that is absent or not finite stays as it is")
-      .out("stages", &Result::stages, "all poses; they stay as they are if nothing is stated", over("stage"));
+      .out("pose", &deviations::Widened::pose,
+           "the last pose; a covariance that is absent or not finite stays as it is")
+      .out("stages", &deviations::Widened::stages, "all poses; they stay as they are if nothing is stated",
+           over("stage"));
 }

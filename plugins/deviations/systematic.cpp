@@ -24,11 +24,6 @@ struct Options {
   double blur_px = 2;
 };
 
-struct Result {
-  Pose pose;
-  List<Pose> stages;
-};
-
 /// The offset of the edges has a constant part and two that change with the border's direction, as those of upright and
 /// level borders differ. A camera shifts and scales the whole image.
 std::vector<OutlineError> errors_of(const Options& options) {
@@ -91,25 +86,12 @@ std::optional<Matrix6d> covariance_of(const List<View>& views, const OutlineProj
   return covariance;
 }
 
-Result systematic(const List<Pose>& stages, const Mesh& model, const OutlineProjector& projector,
-                  const List<View>& views, const Options& options, Context& context) {
-  if (stages.empty()) throw Error("there is no pose; wire the stages of a registration");
+deviations::Widened systematic(const List<Pose>& stages, const Mesh& model, const OutlineProjector& projector,
+                               const List<View>& views, const Options& options, Context& context) {
   check_mesh(model, "model");
-  Result result;
-  for (std::size_t i = 0; i < stages.size(); ++i) {
-    check_pose(stages[i], "the pose of stage '" + stages.name(i) + "'");
-    Pose pose = stages[i];
-    if (pose.covariance && pose.covariance->allFinite()) {
-      if (const auto more = covariance_of(views, projector, model, pose, options))
-        *pose.covariance += *more;
-      else
-        context.warn("the outline of stage '" + stages.name(i) +
-                     "' does not determine the pose, so its deviations are left as they are");
-    }
-    result.stages.add(stages.name(i), pose);
-  }
-  result.pose = result.stages[result.stages.size() - 1];
-  return result;
+  return deviations::widened(
+      stages, [&](const Pose& pose) { return covariance_of(views, projector, model, pose, options); },
+      "its deviations are left as they are", context);
 }
 
 }  // namespace
@@ -124,8 +106,9 @@ MARROW_PLUGIN(plugin) {
       .in("model", "surface of the bone or implant")
       .in("projector", "draws its outline")
       .in("views", "X-ray views; only their cameras are used", over("view"))
-      .out("pose", &Result::pose, "the last pose; a covariance that is absent or not finite stays as it is")
-      .out("stages", &Result::stages, "all poses", over("stage"))
+      .out("pose", &deviations::Widened::pose,
+           "the last pose; a covariance that is absent or not finite stays as it is")
+      .out("stages", &deviations::Widened::stages, "all poses", over("stage"))
       .option(
           "offset_px", &Options::offset_px,
           "standard deviation of the offset of the edges in a view from the offset that all views share, and of its "

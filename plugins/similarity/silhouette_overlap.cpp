@@ -6,6 +6,7 @@
 // correlation of silhouette and metal. It needs no edges and no threshold, and sees metal from farther away than edges.
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
@@ -154,17 +155,29 @@ class SilhouetteOverlap : public match::ViewsCost {
     return drawn;
   }
 
+  /// Marks the pixels whose centres lie in a triangle. OpenCV's fillConvexPoly would also mark those that a border
+  /// touches on one side, so that the silhouette would lie beside the body by a part of a pixel.
   void fill(Drawn& drawn, const std::vector<Eigen::Vector2d>& pixels) const {
-    constexpr int kShift = 4;
     for (const auto& triangle : scene_->model->triangles) {
-      std::array<cv::Point, 3> corners;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Eigen::Vector2d& at = pixels[triangle[k]];
-        corners[k] = {int(std::lround((at.x() - drawn.u_px) / step_ * (1 << kShift))),
-                      int(std::lround((at.y() - drawn.v_px) / step_ * (1 << kShift)))};
-      }
-      cv::fillConvexPoly(drawn.silhouette, corners.data(), 3, 255, cv::LINE_8, kShift);
+      std::array<Eigen::Vector2d, 3> corners;
+      for (std::size_t k = 0; k < 3; ++k)
+        corners[k] = (pixels[triangle[k]] - Eigen::Vector2d(drawn.u_px, drawn.v_px)) / step_;
+      const auto [top, bottom] = std::minmax({corners[0].y(), corners[1].y(), corners[2].y()});
+      const int last = int(std::floor(std::min(bottom, drawn.silhouette.rows - 1.0)));
+      for (int row = int(std::ceil(std::max(top, 0.0))); row <= last; ++row) fill_row(drawn, corners, row);
     }
+  }
+  static void fill_row(Drawn& drawn, const std::array<Eigen::Vector2d, 3>& corners, int row) {
+    double left = drawn.silhouette.cols, right = -1;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector2d &a = corners[k], &b = corners[(k + 1) % 3];
+      if (a.y() == b.y() || (a.y() < row) == (b.y() < row)) continue;
+      const double at = a.x() + (row - a.y()) / (b.y() - a.y()) * (b.x() - a.x());
+      left = std::min(left, at), right = std::max(right, at);
+    }
+    const int last = int(std::floor(std::min(right, drawn.silhouette.cols - 1.0)));
+    for (int column = int(std::ceil(std::max(left, 0.0))); column <= last; ++column)
+      drawn.silhouette(row, column) = 255;
   }
 
   std::shared_ptr<const Scene> scene_;

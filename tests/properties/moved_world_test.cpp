@@ -20,6 +20,7 @@ using marrow::RigidTransform, marrow::Value;
 const std::map<std::string, std::string>& apart() {
   static const std::map<std::string, std::string> nodes{
       {"evaluate.calibration", "compares two camera matrices of one device, which have no place"},
+      {"evaluate.common_offset", "sums up figures"},
       {"evaluate.contact", "needs several bones; tests/plugins/evaluate moves them together"},
       {"evaluate.deepfluoro", "reads a file"},
       {"evaluate.distortion", "compares two distortions of one device, which have no place"},

@@ -70,4 +70,23 @@ Matrix6d OutlineFit::covariance(const std::function<std::vector<OutlineError>(st
   return covariance;
 }
 
+Widened widened(const List<Pose>& stages, const std::function<std::optional<Matrix6d>(const Pose&)>& more,
+                const std::string& so, Context& context) {
+  if (stages.empty()) throw Error("there is no pose; wire the stages of a registration");
+  Widened result;
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    check_pose(stages[i], "the pose of stage '" + stages.name(i) + "'");
+    Pose pose = stages[i];
+    if (pose.covariance && pose.covariance->allFinite()) {
+      if (const auto covariance = more(pose))
+        *pose.covariance += *covariance;
+      else
+        context.warn("the outline of stage '" + stages.name(i) + "' does not determine the pose, so " + so);
+    }
+    result.stages.add(stages.name(i), pose);
+  }
+  result.pose = result.stages[result.stages.size() - 1];
+  return result;
+}
+
 }  // namespace marrow::deviations

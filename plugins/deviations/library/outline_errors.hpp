@@ -7,6 +7,7 @@
 #include <functional>
 #include <marrow/plugin.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace marrow::deviations {
@@ -45,5 +46,16 @@ class OutlineFit {
   std::vector<std::vector<OutlineRow>> rows_;
   std::vector<Eigen::Matrix<double, 6, Eigen::Dynamic>> motions_;
 };
+
+/// The poses of a search with wider deviations, and the last of them.
+struct Widened {
+  Pose pose;
+  List<Pose> stages;
+};
+/// Adds to the covariance of each pose what `more` gives for it. A covariance that is absent or not finite stays. Where
+/// `more` gives nothing, a warning says that the outline does not determine the pose, `so`. Throws Error if there is no
+/// pose, or as check_pose() does.
+Widened widened(const List<Pose>& stages, const std::function<std::optional<Matrix6d>(const Pose&)>& more,
+                const std::string& so, Context& context);
 
 }  // namespace marrow::deviations
