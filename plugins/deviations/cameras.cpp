@@ -39,8 +39,8 @@ deviations::Widened with_cameras(const List<Pose>& stages, const OutlineProjecto
                                  const List<CameraDeviations>& stated, Context& context) {
   if (stated.names() != views.names())
     throw Error("camera_deviations and views are not of the same views; wire both from the node that reads the views");
-  const bool is_stated =
-      !std::all_of(stated.begin(), stated.end(), [](const auto& camera) { return camera.is_none(); });
+  bool is_stated = false;
+  for (const CameraDeviations& camera : stated) is_stated = is_stated || !camera.is_none();
   const auto by_cameras = [&](const Pose& pose) -> std::optional<Matrix6d> {
     if (!is_stated) return Matrix6d::Zero();
     const auto fit = deviations::OutlineFit::of(views, projector, pose);

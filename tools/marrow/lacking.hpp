@@ -8,9 +8,9 @@
 
 namespace marrow::cli {
 
-/// Outputs that were not made although no node failed, by the reason: "node 'bone' (segment.level_set) needs 'seeds',
-/// which node 'case' (read.case) does not give". An output is left out of it if only its own node lacks something, as a
-/// figure that needs a truth: it is there only for data that have one.
+/// Outputs that were not made although no node failed, by the reason: "node 'bone' (its type) needs 'seeds', which node
+/// 'case' (its type) does not give". An output is left out of it if only its own node lacks something, as a figure that
+/// needs a truth: it is there only for data that have one.
 std::map<std::string, std::vector<std::string>> lacking_outputs(const Pipeline& pipeline, const RunResult& result);
 
 /// Prints a line for each reason.
