@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 #include <optional>
+#include <string>
 
 #include "marrow/verdict/spread.hpp"
 
@@ -21,6 +22,7 @@ struct Options {
   double wrong_above = 0.5;
   double contradicts_above = 1.8;
   double clear_times = 1.2;
+  double beside_px = 3;
 };
 
 /// Adds the reasons why the pose is uncertain, the more important first, each with what would settle it.
@@ -135,8 +137,28 @@ void judge_by_other(const marrow::Pose& pose, const marrow::Pose& other, const O
       "another view, or a look at both overlays: which of the two can be, beside the other bones and parts?");
 }
 
+/// A pose is doubtful at best if in one of the views half of its outline lies far from all edges. Predicted deviations
+/// describe one minimum of the cost, and a wrong one may be as narrow as the right one.
+void judge_by_outline(const marrow::Metrics& distance, const Options& options, Verdict& verdict) {
+  const std::string ending = "_median_px";
+  const marrow::Metric* worst = nullptr;
+  for (const marrow::Metric& figure : distance.items)
+    if (figure.name.ends_with(ending) && (!worst || !(figure.value <= worst->value))) worst = &figure;
+  if (!worst)
+    throw marrow::Error(
+        "the distance has no figure of a view, such as frontal_median_px; wire evaluate.outline_distance");
+  verdict.figures.push_back({"outline_distance_px", worst->value, "px"});
+  if (worst->value <= options.beside_px) return;  // not a number is beside
+  verdict.judgement = std::max(verdict.judgement, Judgement::doubtful);
+  verdict.reasons.insert(verdict.reasons.begin(),
+                         formatted("view '{}': half of the outline lies {:.1f} pixels or more from the nearest edge",
+                                   worst->name.substr(0, worst->name.size() - ending.size()), worst->value));
+  verdict.remedies.emplace_back("a look at the overlay of this view, and a start nearer to the pose");
+}
+
 Verdict predicted(const marrow::Pose& pose, const marrow::Mesh& mesh, const marrow::Pose* prior,
-                  const marrow::Pose* other, const Options& options, marrow::Context& context) {
+                  const marrow::Pose* other, const marrow::Metrics* distance, const Options& options,
+                  marrow::Context& context) {
   marrow::check_pose(pose, "pose");
   Verdict verdict;
   judge_by_deviations(pose, mesh, options, verdict);
@@ -144,6 +166,7 @@ Verdict predicted(const marrow::Pose& pose, const marrow::Mesh& mesh, const marr
   if (prior)
     judge_by_prior(about_the_bones_axes(pose, mesh), about_the_bones_axes(*prior, mesh), options, verdict, context);
   if (other) judge_by_other(pose, *other, options, verdict);
+  if (distance) judge_by_outline(*distance, options, verdict);
   return verdict;
 }
 
@@ -151,7 +174,7 @@ Verdict predicted(const marrow::Pose& pose, const marrow::Mesh& mesh, const marr
 
 MARROW_PLUGIN(plugin) {
   plugin.node("verdict.predicted", predicted)
-      .summary("Judges a pose by its predicted deviations and its warnings alone")
+      .summary("Judges a pose by its predicted deviations and its warnings, and by what else is wired")
       .in("pose", "pose to judge, with its predicted covariance")
       .in("model", "surface of the bone; 200 points spread over it are the targets of the mTRE")
       .in("prior",
@@ -160,6 +183,8 @@ MARROW_PLUGIN(plugin) {
       .in("other",
           "another pose with its cost, from the same cost, such as the mirror pose of an implant: a pose that this one "
           "nearly equals is doubtful")
+      .in("distance",
+          "figures of evaluate.outline_distance: a pose whose outline lies beside the edges of a view is doubtful")
       .out("verdict",
            "probability that the mTRE is above 2 mm or the rotation about the long axis off by more than 5 degrees, "
            "from 10000 errors drawn with the predicted covariance; not known for a pose without one")
@@ -174,5 +199,8 @@ MARROW_PLUGIN(plugin) {
               marrow::at_least(0))
       .option("clear_times", &Options::clear_times,
               "the other pose must cost at least this many times what the pose costs; else the pose is doubtful",
-              marrow::at_least(1));
+              marrow::at_least(1))
+      .option("beside_px", &Options::beside_px,
+              "a pose is doubtful if the median distance between outline and edges is above this in one of the views",
+              marrow::at_least(0));
 }

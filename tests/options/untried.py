@@ -80,6 +80,7 @@ UNTRIED = [
     "track.predict.keyframe_speed_mm_s",
     "verdict.evidence.contour_failure_model",
     "verdict.evidence.max_intersection_mm",
+    "verdict.predicted.beside_px",
     "verdict.predicted.clear_times",
     "verdict.predicted.doubtful_above",
     "verdict.predicted.wrong_above",

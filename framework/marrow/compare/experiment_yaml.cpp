@@ -4,6 +4,7 @@
 #include "experiment_layers.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/number_text.hpp"
@@ -28,11 +29,27 @@ PlacedTexts texts_of(StrictYaml& yaml, const YamlEntry& entry) {
   return result;
 }
 
+namespace {
+
+/// A text as it is, or for $env:NAME the environment variable NAME.
+std::string with_variable(StrictYaml& yaml, const std::string& text, const Place& place) {
+  const std::string variable = "$env:";
+  if (!text.starts_with(variable)) return text;
+  const std::string name = text.substr(variable.size());
+  if (const char* value = name.empty() ? nullptr : std::getenv(name.c_str())) return value;
+  yaml.fault(place,
+             name.empty() ? "$env: names no environment variable" : "the environment has no variable '" + name + "'",
+             name.empty() ? "write it as  $env:NAME" : "set it, as in  export " + name + "=...");
+  return text;
+}
+
+}  // namespace
+
 std::vector<InputValue> inputs_of(StrictYaml& yaml, const YamlEntry& section) {
   std::vector<InputValue> result;
   for (const YamlEntry& entry : yaml.map(section.value, section.place, "'" + section.key + "'")) {
     if (entry.value.IsScalar())
-      result.push_back({entry.key, entry.value.Scalar(), entry.place});
+      result.push_back({entry.key, with_variable(yaml, entry.value.Scalar(), entry.place), entry.place});
     else
       yaml.fault(entry.place, "'" + entry.key + "' must be one value");
   }

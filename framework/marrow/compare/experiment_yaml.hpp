@@ -21,7 +21,7 @@ struct Named {
 
 /// Reads a list of texts.
 PlacedTexts texts_of(StrictYaml& yaml, const YamlEntry& entry);
-/// Reads values of inputs, written as name: value.
+/// Reads values of inputs, written as name: value, or as name: $env:VARIABLE.
 std::vector<InputValue> inputs_of(StrictYaml& yaml, const YamlEntry& section);
 /// Reads changes of a pipeline, written as node.option: value and so on. `what` names the section in messages.
 std::vector<Override> patches_of(StrictYaml& yaml, const YamlEntry& section, const std::string& what);

@@ -79,6 +79,9 @@ TEST_F(ExperimentFaults, HeadOfTheFile) {
 TEST_F(ExperimentFaults, Inputs) {
   expect_fault_of("inputs: [1]", "'inputs' must be a map, got a list of 1", kMapHint);
   expect_fault_of("inputs: {x: [1]}", "'x' must be one value");
+  expect_fault_of("inputs: {x: $env:MARROW_NOT_SET}", "the environment has no variable 'MARROW_NOT_SET'",
+                  "set it, as in  export MARROW_NOT_SET=...");
+  expect_fault_of("inputs: {x: '$env:'}", "$env: names no environment variable", "write it as  $env:NAME");
   expect_fault_of("inputs: {csae: 1}", "the pipeline has no input 'csae'", "did you mean 'case'?");
   scratch.write("p.yaml",
                 std::string(kPipeline).insert(std::string(kPipeline).find("{case:") + 1, "x: {type: number}, "));

@@ -154,6 +154,18 @@ TEST_F(ExperimentFiles, SimulatedCasesDrawTheirInputs) {
   EXPECT_EQ(input(1, 0).value, input(1, 0).value) << "the seed decides";
 }
 
+TEST_F(ExperimentFiles, AnInputMayBeAnEnvironmentVariable) {
+  setenv("MARROW_TEST_SHAPE", "7", 1);
+  const Experiment e =
+      read(std::string(kHead) +
+           "cases: {simulate: {pipeline: s.yaml, seeds: 1..2, inputs: {shape: $env:MARROW_TEST_SHAPE}}}\n" + kVariants +
+           kMetrics);
+  unsetenv("MARROW_TEST_SHAPE");
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const marrow::InputValue shape = marrow::compare::simulation_arguments_of(e, 0).inputs.at(0);
+  EXPECT_EQ(shape.name + "=" + shape.value, "shape=7");
+}
+
 TEST_F(ExperimentFiles, SeedsAloneAreThoseOfTheRuns) {
   const Experiment e =
       read(std::string(kHead) + "cases: {seeds: [4, 9]}\ninputs: {case: cases/a}\n" + kVariants + kMetrics);

@@ -115,6 +115,38 @@ TEST(VerdictPredicted, IsTheSameEachTime) {
   EXPECT_EQ(marrow::hash_of(verdict_of(pose)), marrow::hash_of(verdict_of(pose)));
 }
 
+/// The verdict on a pose that is known well, with this distance of its outline from the edges in the second of two
+/// views.
+Verdict verdict_beside_edges(double median_px, const shipped::Options& options = {}) {
+  marrow::Metrics distance;
+  distance.items = {{"median_px", 0.5, "px"}, {"first_median_px", 0.4, "px"}, {"second_median_px", median_px, "px"}};
+  return shipped::call("verdict.predicted",
+                       {{"pose", shipped::item(pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1}))},
+                        {"model", shipped::item(box())},
+                        {"distance", shipped::item(distance)}},
+                       options)
+      .at("verdict")
+      .as<Verdict>();
+}
+
+TEST(VerdictPredicted, AnOutlineBesideTheEdgesMakesItDoubtful) {
+  const Verdict verdict = verdict_beside_edges(3.5);
+  EXPECT_EQ(verdict.judgement, Judgement::doubtful);
+  EXPECT_EQ(verdict.reasons.at(0), "view 'second': half of the outline lies 3.5 pixels or more from the nearest edge");
+  EXPECT_EQ(verdict.remedies, Texts{"a look at the overlay of this view, and a start nearer to the pose"});
+  EXPECT_EQ(figure(verdict, "outline_distance_px"), 3.5);
+  EXPECT_EQ(verdict_beside_edges(2.5).judgement, Judgement::trusted);
+  EXPECT_EQ(verdict_beside_edges(3.5, {{"beside_px", 4.0}}).judgement, Judgement::trusted);
+  EXPECT_EQ(verdict_beside_edges(std::nan("")).judgement, Judgement::doubtful) << "nothing was compared there";
+}
+
+TEST(VerdictPredicted, ADistanceOfNoViewIsRefused) {
+  EXPECT_EQ(shipped::refusal("verdict.predicted", {{"pose", shipped::item(pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1}))},
+                                                   {"model", shipped::item(box())},
+                                                   {"distance", shipped::item(marrow::Metrics())}}),
+            "the distance has no figure of a view, such as frontal_median_px; wire evaluate.outline_distance");
+}
+
 /// The verdict on a pose with a cost of 1, beside another pose.
 Verdict beside(double apart_deg, double cost, const shipped::Options& options = {}) {
   marrow::Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1}), other = pose;
