@@ -4,12 +4,12 @@
 #include "experiment_layers.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/plain_path.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/environment_variable.hpp"
 #include "marrow/runtime/pipeline/given_value.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 
@@ -33,14 +33,10 @@ namespace {
 
 /// A text as it is, or for $env:NAME the environment variable NAME.
 std::string with_variable(StrictYaml& yaml, const std::string& text, const Place& place) {
-  const std::string variable = "$env:";
+  const std::string variable = kEnvironmentVariable;
   if (!text.starts_with(variable)) return text;
-  const std::string name = text.substr(variable.size());
-  if (const char* value = name.empty() ? nullptr : std::getenv(name.c_str())) return value;
-  yaml.fault(place,
-             name.empty() ? "$env: names no environment variable" : "the environment has no variable '" + name + "'",
-             name.empty() ? "write it as  $env:NAME" : "set it, as in  export " + name + "=...");
-  return text;
+  const auto fault = [&](const std::string& message, const std::string& hint) { yaml.fault(place, message, hint); };
+  return value_of_variable(text.substr(variable.size()), fault).value_or(text);
 }
 
 }  // namespace

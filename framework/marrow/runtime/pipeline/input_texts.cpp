@@ -2,10 +2,10 @@
 #include "marrow/runtime/pipeline/input_texts.hpp"
 
 #include <cctype>
-#include <cstdlib>
 
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/environment_variable.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow {
@@ -14,7 +14,7 @@ namespace {
 /// Without a limit, a long value that is named often fills memory, terminal and records.
 constexpr std::size_t kMostInputBytes = 256'000;
 
-const std::string kVariable = "$env:";
+const std::string kVariable = kEnvironmentVariable;
 
 }  // namespace
 
@@ -23,6 +23,9 @@ std::optional<std::string> InputTexts::put_into(const std::string& text, const P
   static const DeclaredInputs kNone;
   const DeclaredInputs& declared = inputs ? *inputs : kNone;
   const bool has_env = find_named(declared.all, "env") != nullptr;
+  const auto fault = [&](const std::string& message, const std::string& hint) {
+    diagnostics_.add(place, message, hint);
+  };
   std::string result;
   bool known = true;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -37,7 +40,7 @@ std::optional<std::string> InputTexts::put_into(const std::string& text, const P
     std::size_t end = begin;
     while (end < text.size() && (std::isalnum(static_cast<unsigned char>(text[end])) || text[end] == '_')) ++end;
     const std::string name = text.substr(begin, end - begin);
-    const auto value = is_variable ? value_of_variable(name, place) : value_of(name, place, declared);
+    const auto value = is_variable ? value_of_variable(name, fault) : value_of(name, place, declared);
     if (value && (bytes_ += value->size()) > kMostInputBytes) {
       diagnostics_.add(place,
                        formatted("the values of inputs make the pipeline longer than {} kB", kMostInputBytes / 1000),
@@ -67,15 +70,6 @@ std::optional<std::string> InputTexts::value_of(const std::string& name, const P
                             : "the pipeline has no input " + in_quotes(name),
                    declared ? "wire it under  in:  by its name" : suggested(diagnostics_, name, names));
   if (is_own) unknown.insert(name);
-  return std::nullopt;
-}
-
-std::optional<std::string> InputTexts::value_of_variable(const std::string& name, const Place& place) {
-  if (const char* value = name.empty() ? nullptr : std::getenv(name.c_str())) return value;
-  diagnostics_.add(
-      place,
-      name.empty() ? "$env: names no environment variable" : "the environment has no variable " + in_quotes(name),
-      name.empty() ? "write it as  $env:NAME" : "set it, as in  export " + name + "=...");
   return std::nullopt;
 }
 

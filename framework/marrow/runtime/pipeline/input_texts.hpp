@@ -23,7 +23,6 @@ class InputTexts {
 
  private:
   std::optional<std::string> value_of(const std::string& name, const Place& place, const DeclaredInputs& inputs);
-  std::optional<std::string> value_of_variable(const std::string& name, const Place& place);
 
   const WrittenPipeline& pipeline_;
   Diagnostics& diagnostics_;
