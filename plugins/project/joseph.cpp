@@ -14,7 +14,7 @@ using marrow::rays::RayProjector;
 using marrow::rays::Slices;
 
 /// Sums of bilinear values over the slices that are perpendicular to the axis nearest to the ray's direction.
-class JosephProjector : public RayProjector {
+class JosephProjector : public RayProjector, public marrow::RadiographDerivatives {
  public:
   explicit JosephProjector(Attenuation attenuation)
       : RayProjector(std::move(attenuation)), slices_(attenuation_), bricks_(attenuation_) {}
@@ -24,6 +24,15 @@ class JosephProjector : public RayProjector {
                                 const PixelGrid& grid) const override {
     const auto values = slices_.radiograph(marrow::rays::rays_of(camera, world_from_model, attenuation_.grid), grid);
     return values ? *values : RayProjector::radiograph(camera, world_from_model, grid);
+  }
+
+  marrow::RadiographExpansion expansion(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model,
+                                        const marrow::FragmentFrame& frame, const PixelGrid& grid) const override {
+    const marrow::rays::RayMotion motion(camera, world_from_model, attenuation_.grid, frame);
+    if (auto expansion = slices_.expansion(motion, grid)) return std::move(*expansion);
+    return marrow::rays::expansion_by_rays(motion, grid, [&](const Eigen::Vector3d& direction) {
+      return bricks_.change(motion, direction);
+    });
   }
 
  protected:
