@@ -30,7 +30,7 @@ marrow::match::WholeMeasure measure_of(const Patch& whole, const Options& option
     if (whole.counts[i]) image[std::size_t(within.of(whole.seen[i]))] += 1, n += 1;
   const double before = marrow::match::entropy(image, n);
   return [=](const Patch& patch) {
-    const double scale = marrow::match::scale_of(marrow::match::gradients_of(patch));
+    const double scale = marrow::match::scale_of(marrow::match::gradients_of(patch)).value;
     if (!(scale > 0) || !(before > 0)) return 1.0;
     std::vector<double> histogram = image;
     for (std::size_t i = 0; i < patch.seen.size(); ++i) {

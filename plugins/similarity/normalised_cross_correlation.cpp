@@ -7,9 +7,11 @@ namespace {
 
 using marrow::match::Patch;
 
-double value(const Patch& patch) { return 1 - marrow::match::correlation(patch.rendered, patch.seen, patch.counts); }
+marrow::match::CorrelationMeasure measure_of(const Patch&) {
+  return {[](const Patch& patch) { return std::vector<Patch>{patch}; }};
+}
 
-constexpr auto normalised_cross_correlation = marrow::match::intensity_node<value>;
+constexpr auto normalised_cross_correlation = marrow::match::intensity_node<measure_of>;
 
 }  // namespace
 

@@ -7,10 +7,8 @@ using marrow::match::Patch;
 using marrow::match::PatchOptions;
 
 marrow::match::SumMeasure measure_of(const Patch&, const PatchOptions& options) {
-  const auto add = [side = options.patch_pixels](const Patch& patch, marrow::match::Tally& tally) {
-    marrow::match::add_patch_correlations(patch, patch.rendered, patch.seen, patch.counts, side, tally);
-  };
-  return {add, marrow::match::value_of_patch_correlations};
+  return marrow::match::correlation_in_squares(options.patch_pixels,
+                                               [](const Patch& patch) { return std::vector<Patch>{patch}; });
 }
 
 constexpr auto patch_correlation = marrow::match::intensity_node<measure_of, PatchOptions>;
