@@ -26,10 +26,10 @@ class JosephProjector : public RayProjector, public marrow::RadiographDerivative
     return values ? *values : RayProjector::radiograph(camera, world_from_model, grid);
   }
 
-  marrow::RadiographExpansion expansion(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model,
+  std::optional<marrow::RadiographExpansion> expansion(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model,
                                         const marrow::FragmentFrame& frame, const PixelGrid& grid) const override {
     const marrow::rays::RayMotion motion(camera, world_from_model, attenuation_.grid, frame);
-    if (auto expansion = slices_.expansion(motion, grid)) return std::move(*expansion);
+    if (auto expansion = slices_.expansion(motion, grid)) return expansion;
     return marrow::rays::expansion_by_rays(motion, grid, [&](const Eigen::Vector3d& direction) {
       return bricks_.change(motion, direction);
     });

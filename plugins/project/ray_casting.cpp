@@ -21,7 +21,7 @@ class RayCastingProjector : public RayProjector, public marrow::RadiographDeriva
   RayCastingProjector(marrow::rays::Attenuation attenuation, double step_mm)
       : RayProjector(std::move(attenuation)), step_mm_(step_mm) {}
 
-  marrow::RadiographExpansion expansion(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model,
+  std::optional<marrow::RadiographExpansion> expansion(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model,
                                         const marrow::FragmentFrame& frame,
                                         const marrow::PixelGrid& grid) const override {
     const RayMotion motion(camera, world_from_model, attenuation_.grid, frame);

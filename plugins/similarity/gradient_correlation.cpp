@@ -23,6 +23,7 @@ MARROW_PLUGIN(plugin) {
   node.summary(
           "1 - mean of the correlations of the horizontal and of the vertical gradients (Penney et al., IEEE Trans Med "
           "Imaging 1998)")
-      .trait("unmoved_by_gain");
+      .trait("unmoved_by_gain")
+      .trait("derivatives");
   marrow::match::declare<marrow::match::IntensityOptions>(node);
 }

@@ -67,6 +67,7 @@ MARROW_PLUGIN(plugin) {
   node.summary(
           "Gradients that remain after the radiograph is subtracted from the image (gradient difference); thin bright "
           "lines hardly disturb this measure (Penney et al., IEEE Trans Med Imaging 1998)")
-      .trait("unmoved_by_gain");
+      .trait("unmoved_by_gain")
+      .trait("derivatives");
   marrow::match::declare<marrow::match::IntensityOptions>(node);
 }

@@ -43,7 +43,8 @@ MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.metal_gradient_correlation", metal_gradient_correlation);
   node.summary(
           "similarity.patch_gradient_correlation for implants: the radiograph saturates, as images do behind metal")
-      .trait("unmoved_by_gain");
+      .trait("unmoved_by_gain")
+      .trait("derivatives");
   marrow::match::declare<MetalOptions>(node);
   node.option("patch_pixels", &MetalOptions::patch_pixels, "side of the squares, counted in compared pixels",
               marrow::at_least(5), marrow::at_most(201))

@@ -18,6 +18,7 @@ constexpr auto normalised_cross_correlation = marrow::match::intensity_node<meas
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.normalised_cross_correlation", normalised_cross_correlation);
   node.summary("1 - normalised cross-correlation of radiograph and image (Penney et al., IEEE Trans Med Imaging 1998)")
-      .trait("unmoved_by_gain");
+      .trait("unmoved_by_gain")
+      .trait("derivatives");
   marrow::match::declare<marrow::match::IntensityOptions>(node);
 }

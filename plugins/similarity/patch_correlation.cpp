@@ -20,6 +20,7 @@ MARROW_PLUGIN(plugin) {
   node.summary(
           "1 - mean correlation of the grey values within small squares, weighted by the radiograph's variance (LaRose "
           "2001; Knaan and Joskowicz, MICCAI 2003)")
-      .trait("unmoved_by_gain");
+      .trait("unmoved_by_gain")
+      .trait("derivatives");
   marrow::match::declare_patches(node);
 }

@@ -22,6 +22,7 @@ MARROW_PLUGIN(plugin) {
   node.summary(
           "1 - mean correlation of the gradients within small squares, weighted by the variance of the radiograph's "
           "gradients (Grupp et al., IEEE Trans Biomed Eng 2020)")
-      .trait("unmoved_by_gain");
+      .trait("unmoved_by_gain")
+      .trait("derivatives");
   marrow::match::declare_patches(node);
 }

@@ -79,7 +79,8 @@ MARROW_PLUGIN(plugin) {
   node.summary(
           "Structure that remains after the radiograph is subtracted from the image (pattern intensity: Weese et al., "
           "IEEE Trans Inf Technol Biomed 1997; Penney et al. 1998)")
-      .trait("unmoved_by_gain");
+      .trait("unmoved_by_gain")
+      .trait("derivatives");
   marrow::match::declare<Options>(node);
   node.option("radius_pixels", &Options::radius_pixels, "radius of the neighbourhood", marrow::at_least(1),
               marrow::at_most(20))

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "marrow/domain/functions.hpp"
@@ -23,9 +24,17 @@ class RadiographDerivatives {
   virtual ~RadiographDerivatives() = default;
   /// The radiograph at the pixels of a grid, and its derivatives by a small motion of the model in `frame`. They are
   /// the derivatives of the values that are computed, not those of the exact line integrals. Takes about as long as
-  /// three radiographs.
-  virtual RadiographExpansion expansion(const Camera& camera, const RigidTransform& world_from_model,
-                                        const FragmentFrame& frame, const PixelGrid& grid) const = 0;
+  /// three radiographs. Absent if a projector that this one is made of knows no derivatives.
+  virtual std::optional<RadiographExpansion> expansion(const Camera& camera, const RigidTransform& world_from_model,
+                                                       const FragmentFrame& frame, const PixelGrid& grid) const = 0;
 };
+
+/// The expansion of any projector; absent if it knows no derivatives.
+inline std::optional<RadiographExpansion> expansion_of(const RadiographProjector& projector, const Camera& camera,
+                                                       const RigidTransform& world_from_model,
+                                                       const FragmentFrame& frame, const PixelGrid& grid) {
+  const auto* derivatives = dynamic_cast<const RadiographDerivatives*>(&projector);
+  return derivatives ? derivatives->expansion(camera, world_from_model, frame, grid) : std::nullopt;
+}
 
 }  // namespace marrow

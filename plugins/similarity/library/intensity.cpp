@@ -62,8 +62,8 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
 
   std::optional<Expansion> expansion(const RigidTransform& world_from_model,
                                      const FragmentFrame& frame) const override {
-    if (!has_derivatives()) return std::nullopt;
     const std::vector<ViewExpansion> views = expansions(world_from_model, frame);
+    if (views.empty()) return std::nullopt;
     Expansion mean;
     for (std::size_t i = 0; i < views.size(); ++i) add(views[i].whole, share(i), mean);
     return mean;
@@ -71,7 +71,7 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
 
   std::vector<Expansion> expansion_without_each_block(const RigidTransform& world_from_model,
                                                       const FragmentFrame& frame) const override {
-    if (!has_derivatives() || !options_.has_blocks) return {};
+    if (!options_.has_blocks) return {};
     const std::vector<ViewExpansion> views = expansions(world_from_model, frame);
     Expansion mean;
     for (std::size_t i = 0; i < views.size(); ++i) add(views[i].whole, share(i), mean);
@@ -109,17 +109,20 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
     std::vector<Measure> measures;
   };
 
-  bool has_derivatives() const {
-    return dynamic_cast<const RadiographDerivatives*>(&projector()) &&
-           std::all_of(seen_->measures.begin(), seen_->measures.end(), marrow::match::has_derivatives);
-  }
+  /// Of all views; empty if there are no derivatives.
   std::vector<ViewExpansion> expansions(const RigidTransform& world_from_model, const FragmentFrame& frame) const {
-    std::vector<ViewExpansion> of_view(views_.size());
+    if (!std::all_of(seen_->measures.begin(), seen_->measures.end(), has_derivatives)) return {};
+    std::vector<std::optional<ViewExpansion>> of_view(views_.size());
     tbb::parallel_for(std::size_t(0), of_view.size(), [&](std::size_t i) {
-      of_view[i] = expansion_of(seen_->measures[i], patch_of(i, world_from_model, &frame), options_.pixel_step,
-                                Blocks::of(views_[i].camera), worst_);
+      if (const auto patch = patch_with_slopes(i, world_from_model, frame))
+        of_view[i] = expansion_of(seen_->measures[i], *patch, options_.pixel_step, Blocks::of(views_[i].camera), worst_);
     });
-    return of_view;
+    std::vector<ViewExpansion> all;
+    for (auto& view : of_view) {
+      if (!view) return {};
+      all.push_back(std::move(*view));
+    }
+    return all;
   }
 
   std::string silence(std::size_t view, const RigidTransform& world_from_model) const override {
@@ -196,11 +199,33 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
 
   const RadiographProjector& projector() const { return smoothed_ ? *smoothed_ : *projector_; }
 
-  /// The pixels of a view to compare; with a frame, also the slopes. Empty if there are too few.
-  Patch patch_of(std::size_t view, const RigidTransform& world_from_model, const FragmentFrame* frame = nullptr) const {
-    const Camera& camera = views_[view].camera;
+  /// The pixels of a view to compare; empty if there are too few.
+  Patch patch_of(std::size_t view, const RigidTransform& world_from_model) const {
+    Patch patch = region_of(view, world_from_model);
+    if (patch.seen.empty()) return patch;
+    patch.rendered = projector().radiograph(views_[view].camera, world_from_model, grid_of(patch));
+    return patch;
+  }
+  /// The same with slopes; absent if the projector has no derivatives.
+  std::optional<Patch> patch_with_slopes(std::size_t view, const RigidTransform& world_from_model,
+                                         const FragmentFrame& frame) const {
+    Patch patch = region_of(view, world_from_model);
+    if (patch.seen.empty()) return patch;
+    auto expansion = marrow::expansion_of(projector(), views_[view].camera, world_from_model, frame, grid_of(patch));
+    if (!expansion) return std::nullopt;
+    patch.rendered = std::move(expansion->values);
+    patch.slopes = std::move(expansion->slopes);
+    return patch;
+  }
+  PixelGrid grid_of(const Patch& patch) const {
+    const int step = options_.pixel_step;
+    return {double(patch.left) * step, double(patch.top) * step, double(step), patch.columns, patch.rows};
+  }
+
+  /// The pixels of a view to compare, without `rendered`. Empty if there are too few.
+  Patch region_of(std::size_t view, const RigidTransform& world_from_model) const {
     const Patch& image = seen_->images[view];
-    const PixelGrid region = projector().region(camera, world_from_model);
+    const PixelGrid region = projector().region(views_[view].camera, world_from_model);
     if (region.count() == 0) return {};
     const int step = options_.pixel_step, margin = std::max(options_.margin_px, options_.least_margin_steps * step);
     const int left = std::max(0, (int(region.u_px) - margin) / step),
@@ -209,17 +234,8 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
               bottom = std::min(image.rows - 1, (int(region.v_px) + region.rows - 1 + margin) / step);
     if (right - left < 3 || bottom - top < 3) return {};
     Patch patch{right - left + 1, bottom - top + 1, left, top, {}, {}, {}};
-    const PixelGrid grid{double(left) * step, double(top) * step, double(step), patch.columns, patch.rows};
-    if (frame) {
-      const auto& derivatives = dynamic_cast<const RadiographDerivatives&>(projector());
-      RadiographExpansion expansion = derivatives.expansion(camera, world_from_model, *frame, grid);
-      patch.rendered = std::move(expansion.values);
-      patch.slopes = std::move(expansion.slopes);
-    } else {
-      patch.rendered = projector().radiograph(camera, world_from_model, grid);
-    }
-    patch.seen.resize(patch.rendered.size());
-    patch.counts.resize(patch.rendered.size());
+    patch.seen.resize(std::size_t(patch.columns) * std::size_t(patch.rows));
+    patch.counts.resize(patch.seen.size());
     for (int row = 0; row < patch.rows; ++row) {
       const auto from = std::ptrdiff_t(image.at(left, top + row)), to = std::ptrdiff_t(patch.at(0, row));
       std::copy_n(image.seen.begin() + from, patch.columns, patch.seen.begin() + to);
@@ -227,7 +243,6 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
     }
     return patch;
   }
-
   std::shared_ptr<const RadiographProjector> projector_;
   std::shared_ptr<const RadiographProjector> smoothed_;  ///< as much as the image; null if projector_ cannot
   const List<View> views_;

@@ -7,15 +7,15 @@
 #include <string>
 #include <vector>
 
-#include "marrow/domain/functions.hpp"
 #include "marrow/domain/list.hpp"
+#include "marrow/domain/radiograph_expansion.hpp"
 
 namespace marrow::match {
 
 /// The radiograph of a bone together with those of other bones in known poses: line integrals add. The pose that a
 /// radiograph is asked for is that of the bone; the others stay where they are. The region holds all of them, and is
 /// empty if the bone itself is out of view.
-class BonesTogether : public RadiographProjector {
+class BonesTogether : public RadiographProjector, public RadiographDerivatives {
  public:
   using Projector = std::shared_ptr<const RadiographProjector>;
   struct Other {
@@ -29,6 +29,8 @@ class BonesTogether : public RadiographProjector {
                                 const PixelGrid& grid) const override;
   std::vector<float> radiograph(const Camera& camera, const RigidTransform& world_from_model,
                                 const std::vector<Eigen::Vector2f>& pixels) const override;
+  std::optional<RadiographExpansion> expansion(const Camera& camera, const RigidTransform& world_from_model,
+                                               const FragmentFrame& frame, const PixelGrid& grid) const override;
   PixelGrid region(const Camera& camera, const RigidTransform& world_from_model) const override;
   /// Null if one of the bones has none.
   Projector smoothed(double sigma_mm) const override;

@@ -16,7 +16,7 @@ using marrow::Vector6d;
 class BlobsInSpace : public pixelwise_projector::PixelwiseProjector, public marrow::RadiographDerivatives {
  public:
   PixelGrid region(const Camera&, const RigidTransform&) const override { return {45, 40, 1, 100, 85}; }
-  marrow::RadiographExpansion expansion(const Camera& camera, const RigidTransform& pose, const FragmentFrame& frame,
+  std::optional<marrow::RadiographExpansion> expansion(const Camera& camera, const RigidTransform& pose, const FragmentFrame& frame,
                                         const PixelGrid& grid) const override {
     constexpr double kStep = 1e-4;
     marrow::RadiographExpansion expansion{radiograph(camera, pose, grid), {}};
@@ -144,7 +144,7 @@ TEST_P(GreyDerivatives, WithoutEachBlock) {
                least = *std::min_element(values.begin(), values.end());
   EXPECT_GT(most - least, 1e-4);
   for (std::size_t i = 0; i < values.size(); ++i) {
-    EXPECT_NEAR(without[i].value, values[i], is_masked ? 0.4 * (most - least) : 1e-6) << i;
+    EXPECT_NEAR(without[i].value, values[i], is_masked ? 0.5 * (most - least) : 1e-6) << i;
     if (is_masked) continue;
     for (std::size_t k = 0; k < 6; ++k)
       EXPECT_NEAR(without[i].gradient[Eigen::Index(k)], (above[k][i] - below[k][i]) / (2 * step(int(k)).sum()),
