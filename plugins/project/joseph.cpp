@@ -60,5 +60,6 @@ MARROW_PLUGIN(plugin) {
   auto node = plugin.node("project.joseph", joseph);
   marrow::rays::declare<AttenuationOptions>(
       node.summary("Radiographs by Joseph's method (IEEE Trans Med Imaging 1982): line integrals as sums over slices; "
-                   "whole images are computed slice by slice"));
+                   "whole images are computed slice by slice")
+                     .trait("derivatives"));
 }

@@ -125,7 +125,8 @@ std::shared_ptr<const marrow::RadiographProjector> ray_casting(const marrow::Vol
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("project.ray_casting", ray_casting);
   marrow::rays::declare<Options>(
-      node.summary("Radiographs by ray casting: line integrals as sums of trilinear values at even steps"))
+      node.summary("Radiographs by ray casting: line integrals as sums of trilinear values at even steps")
+                     .trait("derivatives"))
       .option("sample_spacing_mm", &Options::sample_spacing_mm,
               "largest distance from one value to the next along a ray", marrow::at_least(0.01));
 }
