@@ -42,7 +42,7 @@ RayMotion::RayMotion(const Camera& camera, const RigidTransform& world_from_mode
   frame_from_direction_ = frame.axes.transpose() * model_from_index;
   frame_from_gradient_ = frame_from_direction_.inverse().transpose();
   const RigidTransform model_from_camera = inverse(world_from_model) * inverse(camera.camera_from_world);
-  source_ = frame.axes.transpose() * (model_from_camera.translation_mm - frame.origin_mm);
+  source_mm_ = frame.axes.transpose() * (model_from_camera.translation_mm - frame.origin_mm);
 }
 
 RayMotion::Change RayMotion::change(double value, const Eigen::Vector3d& by_source, const Eigen::Vector3d& by_direction,
@@ -50,7 +50,7 @@ RayMotion::Change RayMotion::change(double value, const Eigen::Vector3d& by_sour
   // A motion of the model is the opposite motion of the ray.
   const Eigen::Vector3d force = frame_from_gradient_ * by_source, turning = frame_from_gradient_ * by_direction;
   Change change{value, {}};
-  change.slopes << -source_.cross(force) - (frame_from_direction_ * direction).cross(turning), -force;
+  change.slopes << -source_mm_.cross(force) - (frame_from_direction_ * direction).cross(turning), -force;
   return change;
 }
 
@@ -140,16 +140,16 @@ std::vector<float> RayProjector::radiograph(const Camera& camera, const RigidTra
   return values;
 }
 
-PixelGrid RayProjector::region(const Camera& camera, const RigidTransform& world_from_model) const {
+PixelGrid region_of(const Attenuation& attenuation, const Camera& camera, const RigidTransform& world_from_model) {
   check_camera(camera, "the camera");
-  if (attenuation_.is_empty()) return {};
+  if (attenuation.is_empty()) return {};
   const PixelGrid whole{0, 0, 1, camera.width_px, camera.height_px};
   Eigen::Vector2d low(1e30, 1e30), high(-1e30, -1e30);
   for (int corner = 0; corner < 8; ++corner) {
     Eigen::Vector3d index;
     for (int k = 0; k < 3; ++k)
-      index[k] = corner >> k & 1 ? attenuation_.last[std::size_t(k)] + 1.0 : attenuation_.first[std::size_t(k)] - 1.0;
-    const Eigen::Vector2d pixel = project(camera, world_from_model * attenuation_.grid.point_from_index(index));
+      index[k] = corner >> k & 1 ? attenuation.last[std::size_t(k)] + 1.0 : attenuation.first[std::size_t(k)] - 1.0;
+    const Eigen::Vector2d pixel = project(camera, world_from_model * attenuation.grid.point_from_index(index));
     if (!pixel.allFinite()) return whole;  // part of the box lies behind the source
     low = low.cwiseMin(pixel);
     high = high.cwiseMax(pixel);

@@ -37,6 +37,12 @@ class RayMotion {
   /// The grid and the frame are in the model's frame. Throws Error as rays_of() does.
   RayMotion(const Camera& camera, const RigidTransform& world_from_model, const Grid& grid, const FragmentFrame& frame);
   const Rays& rays() const { return rays_; }
+  /// Turns a gradient by voxel indices into one by mm along the frame's axes.
+  const Eigen::Matrix3d& frame_from_gradient() const { return frame_from_gradient_; }
+  /// Turns a direction in voxel indices into mm along the frame's axes.
+  const Eigen::Matrix3d& frame_from_direction() const { return frame_from_direction_; }
+  /// The source along the frame's axes, from its origin.
+  const Eigen::Vector3d& source_mm() const { return source_mm_; }
   /// The integral along a ray in mm of water, and its derivatives by (r [rad], t [mm]).
   struct Change {
     double value = 0;
@@ -50,9 +56,8 @@ class RayMotion {
 
  private:
   const Rays rays_;
-  Eigen::Matrix3d frame_from_gradient_;   ///< turns a gradient by voxel indices into one by mm along the frame's axes
-  Eigen::Matrix3d frame_from_direction_;  ///< turns a direction in voxel indices into mm along the frame's axes
-  Eigen::Vector3d source_;                ///< in mm along the frame's axes, from its origin
+  Eigen::Matrix3d frame_from_gradient_, frame_from_direction_;
+  Eigen::Vector3d source_mm_;
 };
 
 /// The part [from, to] of a ray, in multiples of its direction vector. Empty if from >= to.
@@ -69,6 +74,9 @@ Span span_in_box(const std::array<int, 3>& first, const std::array<int, 3>& last
 RadiographExpansion expansion_by_rays(const RayMotion& motion, const PixelGrid& grid,
                                       const std::function<RayMotion::Change(const Eigen::Vector3d&)>& change);
 
+/// What RadiographProjector::region() gives for a model with this attenuation.
+PixelGrid region_of(const Attenuation& attenuation, const Camera& camera, const RigidTransform& world_from_model);
+
 /// A projector that integrates ray by ray, for many rays at once in several threads.
 class RayProjector : public RadiographProjector {
  public:
@@ -76,7 +84,9 @@ class RayProjector : public RadiographProjector {
   std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model, const PixelGrid&) const override;
   std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model,
                                 const std::vector<Eigen::Vector2f>& pixels) const override;
-  PixelGrid region(const Camera&, const RigidTransform& world_from_model) const override;
+  PixelGrid region(const Camera& camera, const RigidTransform& world_from_model) const override {
+    return region_of(attenuation_, camera, world_from_model);
+  }
   std::shared_ptr<const RadiographProjector> smoothed(double sigma_mm) const override {
     return of(rays::smoothed(attenuation_, sigma_mm));
   }
