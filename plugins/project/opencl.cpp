@@ -26,7 +26,10 @@ struct Options : marrow::rays::AttenuationOptions {
 /// As the kernel declares it.
 struct DeviceView {
   std::array<float, 3> source, middle;
-  std::array<float, 9> direction_from_pixel, frame_from_direction, frame_from_gradient;
+  std::array<float, 2> pixel;
+  std::array<float, 9> direction_from_pixel;
+  std::array<float, 6> place_from_pixel;
+  std::array<float, 9> frame_from_direction, frame_from_gradient;
   std::array<float, 3> source_mm;
   std::int32_t across;
 };
@@ -84,21 +87,29 @@ class OpenClProjector : public marrow::RadiographProjector, public marrow::Radio
     return pixels;
   }
 
-  /// `middle`: a pixel among those that are asked for.
-  DeviceView view_of(const marrow::rays::RayMotion& motion, const Eigen::Vector2d& middle) const {
+  /// `pixel`: in the middle of those that are asked for.
+  DeviceView view_of(const marrow::rays::RayMotion& motion, const Eigen::Vector2d& pixel) const {
     DeviceView view;
-    motion.rays()
-        .direction(middle.x(), middle.y())
-        .cwiseProduct(motion.rays().spacing_mm)
-        .cwiseAbs()
-        .maxCoeff(&view.across);
-    Eigen::Vector3d source = motion.rays().source;
-    for (std::size_t k = 0; k < 3; ++k) {
-      source[Eigen::Index(k)] -= attenuation_.first[k] - kBorder;
-      view.middle[k] = float(size_[k] / 2);
+    Eigen::Vector3d source = motion.rays().source, middle;
+    for (int k = 0; k < 3; ++k) {
+      source[k] -= attenuation_.first[std::size_t(k)] - kBorder;
+      middle[k] = size_[std::size_t(k)] / 2;
+    }
+    Eigen::Matrix3d direction_from_pixel = motion.rays().direction_from_pixel;
+    direction_from_pixel.col(2) += direction_from_pixel.leftCols<2>() * pixel;
+    direction_from_pixel.col(2).cwiseProduct(motion.rays().spacing_mm).cwiseAbs().maxCoeff(&view.across);
+    const int c = view.across;
+    Eigen::Matrix<double, 2, 3> place_from_pixel;
+    for (int k = 0; k < 2; ++k) {
+      const int axis = k == 0 ? (c == 0 ? 1 : 0) : (c == 2 ? 1 : 2);
+      place_from_pixel.row(k) = (source[axis] - middle[axis]) * direction_from_pixel.row(c) +
+                                (middle[c] - source[c]) * direction_from_pixel.row(axis);
     }
     fill(view.source, source);
-    fill(view.direction_from_pixel, motion.rays().direction_from_pixel);
+    fill(view.middle, middle);
+    fill(view.pixel, pixel);
+    fill(view.direction_from_pixel, direction_from_pixel);
+    fill(view.place_from_pixel, place_from_pixel);
     fill(view.frame_from_direction, motion.frame_from_direction());
     fill(view.frame_from_gradient, motion.frame_from_gradient());
     fill(view.source_mm, motion.source_mm());

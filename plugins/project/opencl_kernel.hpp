@@ -9,7 +9,10 @@ namespace marrow::opencl {
 constexpr const char* kKernel = R"cl(
 typedef struct {
   float source[3], middle[3];        // in voxels; the middle of the volume
+  float pixel[2];                    // in the middle of the image: pixels are counted from it
   float direction_from_pixel[9];     // row by row
+  float place_from_pixel[6];         // where a ray passes the middle slice, from the volume's middle, times its
+                                     // direction across the slices
   float frame_from_direction[9], frame_from_gradient[9], source_mm[3];  // see RayMotion
   int across;                        // the axis from slice to slice
 } View;
@@ -25,7 +28,8 @@ __kernel void radiograph(__global const short* voxels, int4 size, float4 spacing
   const int i = get_global_id(0), pose = get_global_id(1);
   if (i >= count) return;
   __constant const View* view = views + pose;
-  const float3 direction = row_times(view->direction_from_pixel, (float3)(pixels[i].x, pixels[i].y, 1.0f));
+  const float3 pixel = (float3)(pixels[i].x - view->pixel[0], pixels[i].y - view->pixel[1], 1.0f);
+  const float3 direction = row_times(view->direction_from_pixel, pixel);
   const float d[3] = {direction.x, direction.y, direction.z};
   const float mm[3] = {spacing.x, spacing.y, spacing.z};
   const int sizes[3] = {size.x, size.y, size.z}, strides[3] = {1, size.x, size.x * size.y};
@@ -36,9 +40,15 @@ __kernel void radiograph(__global const short* voxels, int4 size, float4 spacing
       if (fabs(d[k] * mm[k]) > fabs(d[c] * mm[c])) c = k;
   const int a = c == 0 ? 1 : 0, b = c == 2 ? 1 : 2;
   const float p = d[a] / d[c], q = d[b] / d[c];
-  // From the point where the ray passes the middle slice, which is exact in single precision.
+  // From the point where the ray passes the middle slice. The source is far away, so that its own place would be too
+  // rough in single precision.
   const float depth = view->middle[c] - view->source[c];
-  const float x0 = view->source[a] + p * depth, y0 = view->source[b] + q * depth;
+  float x0 = view->source[a] + p * depth, y0 = view->source[b] + q * depth;
+  if (c == view->across) {
+    __constant const float* m = view->place_from_pixel;
+    x0 = view->middle[a] + (m[0] * pixel.x + m[1] * pixel.y + m[2]) / d[c];
+    y0 = view->middle[b] + (m[3] * pixel.x + m[4] * pixel.y + m[5]) / d[c];
+  }
   // The slices between which the ray is inside the volume, and in front of the source.
   float from = 1, to = sizes[c] - 2;
   if (d[c] > 0) from = fmax(from, ceil(view->source[c]));
