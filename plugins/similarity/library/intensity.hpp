@@ -52,7 +52,11 @@ using TallyOfExpansions = PlacesOf<ExpansionTally>;
 
 /// How badly radiograph and image agree; smaller is better. Must give its worst value if there is nothing to compare.
 /// Must be safe to call from several threads at once.
-using WholeMeasure = std::function<double(const Patch&)>;
+struct WholeMeasure {
+  std::function<double(const Patch&)> value;
+  /// The quadratic model, for a patch with slopes; empty if there is none.
+  std::function<Cost::Expansion(const Patch&)> expansion;
+};
 /// A measure that follows from sums over places: 1 - sum of the values / sum of the weights.
 struct SumMeasure {
   std::function<void(const Patch&, Tally&)> add;
@@ -109,7 +113,7 @@ std::shared_ptr<const Cost> intensity_node(const RadiographProjector& projector,
   };
   if constexpr (std::is_same_v<decltype(called(Patch())), double>)
     return intensity_cost(projector, views, others, other_projectors, other_outlines, own, kWorst,
-                          [called](const Patch&) -> Measure { return called; });
+                          [called](const Patch&) -> Measure { return WholeMeasure{called, {}}; });
   else
     return intensity_cost(projector, views, others, other_projectors, other_outlines, own, kWorst, called);
 }

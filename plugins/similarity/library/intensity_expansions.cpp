@@ -88,7 +88,7 @@ double SumMeasure::value(const BlockSums::Sums& sums) const {
 }
 
 double value_of(const Measure& measure, const Patch& patch, double step_px, const Blocks& blocks) {
-  if (const auto* whole = std::get_if<WholeMeasure>(&measure)) return (*whole)(patch);
+  if (const auto* whole = std::get_if<WholeMeasure>(&measure)) return whole->value(patch);
   if (const auto* correlations = std::get_if<CorrelationMeasure>(&measure)) {
     const std::vector<Patch> compared = correlations->compared(patch);
     double sum = 0;
@@ -104,7 +104,8 @@ double value_of(const Measure& measure, const Patch& patch, double step_px, cons
 
 bool has_derivatives(const Measure& measure) {
   if (const auto* sum = std::get_if<SumMeasure>(&measure)) return bool(sum->add_expansion);
-  return std::holds_alternative<CorrelationMeasure>(measure);
+  const auto* whole = std::get_if<WholeMeasure>(&measure);
+  return !whole || bool(whole->expansion);
 }
 
 ViewExpansion expansion_of(const Measure& measure, const Patch& patch, double step_px, const Blocks& blocks,
@@ -117,8 +118,10 @@ ViewExpansion expansion_of(const Measure& measure, const Patch& patch, double st
   }
   if (const auto* sum = std::get_if<SumMeasure>(&measure))
     view = by_sums(*sum, patch, step_px, blocks);
+  else if (const auto* correlations = std::get_if<CorrelationMeasure>(&measure))
+    view = by_correlations(*correlations, patch, step_px, blocks);
   else
-    view = by_correlations(std::get<CorrelationMeasure>(measure), patch, step_px, blocks);
+    view.whole = std::get<WholeMeasure>(measure).expansion(patch);
   make_finite(view.whole, worst);
   for (Cost::Expansion& without : view.without_block) make_finite(without, worst);
   return view;
