@@ -118,7 +118,7 @@ set(CPACK_DEBIAN_MARROW-DEV_PACKAGE_DEPENDS
   "marrow (= ${PROJECT_VERSION}), g++, cmake, libeigen3-dev, libfmt-dev, libopencv-dev, libtbb-dev")
 set(CPACK_DEBIAN_MARROW-DEV_PACKAGE_RECOMMENDS
   libcgal-dev libcharls-dev libdcmtk-dev libexpat1-dev libgtest-dev libhdf5-dev libinsighttoolkit5-dev libjpeg-dev
-  libnlopt-cxx-dev libnlopt-dev libopenjp2-7-dev libpcl-dev libpng-dev libvtk9-dev libyaml-cpp-dev
+  libnlopt-cxx-dev libnlopt-dev libopenjp2-7-dev libpcl-dev libpng-dev libtiff-dev libvtk9-dev libyaml-cpp-dev
   nlohmann-json3-dev zlib1g-dev)
 list(JOIN CPACK_DEBIAN_MARROW-DEV_PACKAGE_RECOMMENDS ", " CPACK_DEBIAN_MARROW-DEV_PACKAGE_RECOMMENDS)
 set(CPACK_DEBIAN_MARROW-DOC_PACKAGE_ARCHITECTURE all)

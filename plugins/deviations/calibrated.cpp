@@ -30,17 +30,28 @@ marrow::Pose scaled(const marrow::Pose& pose, const marrow::FragmentFrame& axes,
   return in_frame(along_axes, pose.frame);
 }
 
-Result calibrated(const marrow::List<marrow::Pose>& stages, const marrow::Mesh& model, const Options& options) {
+/// Adds what the covariance of the same pose grew by.
+void add_growth(const marrow::Pose& from, const marrow::Pose& to, marrow::Pose& pose) {
+  if (!from.covariance || !to.covariance || !pose.covariance) return;
+  const marrow::Matrix6d growth = *in_frame(to, pose.frame).covariance - *in_frame(from, pose.frame).covariance;
+  if (growth.allFinite()) *pose.covariance += growth;
+}
+
+Result calibrated(const marrow::List<marrow::Pose>& stages, const marrow::List<marrow::Pose>* widened,
+                  const marrow::Mesh& model, const Options& options) {
   if (stages.empty()) throw marrow::Error("there is no pose; wire the stages of a registration");
+  if (widened && widened->names() != stages.names())
+    throw marrow::Error("widened and stages are not the same poses; wire the stages of the node that got these stages");
   marrow::check_mesh(model, "model");
   const marrow::FragmentFrame axes = marrow::fragment_frame(model);
   Result result;
   for (std::size_t i = 0; i < stages.size(); ++i) {
     check_pose(stages[i], "the pose of stage '" + stages.name(i) + "'");
     const bool is_first = stages.name(i) == "first" && i + 1 < stages.size();
-    result.stages.add(stages.name(i),
-                      scaled(stages[i], axes, is_first ? options.first_rotation_factors : options.rotation_factors,
-                             is_first ? options.first_translation_factors : options.translation_factors));
+    marrow::Pose pose = scaled(stages[i], axes, is_first ? options.first_rotation_factors : options.rotation_factors,
+                               is_first ? options.first_translation_factors : options.translation_factors);
+    if (widened) add_growth(stages[i], (*widened)[i], pose);
+    result.stages.add(stages.name(i), pose);
   }
   result.pose = result.stages[result.stages.size() - 1];
   return result;
@@ -53,6 +64,9 @@ MARROW_PLUGIN(plugin) {
       .summary("Multiplies the predicted deviations of poses by factors that were fitted to known errors")
       .in("stages",
           "poses of a search; 'first' is the result of the first cost (register.sequence), unless it is the last pose",
+          marrow::over("stage"))
+      .in("widened",
+          "the same poses with what the cameras add (deviations.cameras); this part is added, not multiplied",
           marrow::over("stage"))
       .in("model", "surface of the bone; it gives the axes")
       .out("pose", &Result::pose, "the last pose; a covariance that is absent or not finite stays as it is")

@@ -110,12 +110,25 @@ std::vector<marrow::RigidTransform> finalists_of(const std::vector<marrow::Rigid
   return chosen;
 }
 
+/// Of the poses with nearly as much evidence as any, that of the least cost. Cost alone prefers those of which little
+/// is in view, or that are so far away that their outline is short.
+marrow::RigidTransform best_of(const std::vector<marrow::RigidTransform>& poses,
+                               const marrow::initial::Evidence& evidence, const marrow::Cost& cost) {
+  constexpr double kNearly = 0.9;
+  const std::vector<marrow::RigidTransform> sorted = evidence.best(poses, poses.size());
+  const double most = evidence.of(sorted.front());
+  std::vector<marrow::RigidTransform> good;
+  for (const marrow::RigidTransform& pose : sorted)
+    if (evidence.of(pose) >= std::min(most, kNearly * most)) good.push_back(pose);
+  return in_order_of(cost, good).front();
+}
+
 /// The best pose of all orientations at all places that the views show. The best of a scan are moved to more evidence,
 /// then refined by the cost through all levels.
 marrow::RigidTransform anywhere(const marrow::Mesh& model, const Images& images, const marrow::FragmentFrame& frame,
                                 const marrow::search::Levels& levels, const Options& options,
                                 marrow::search::Search& search, marrow::Context& context) {
-  constexpr std::size_t kScanned = 4;  // poses of the scan for each candidate; the scan orders poses only roughly
+  constexpr std::size_t kScanned = 16;  // poses of the scan for each candidate; the scan orders poses only roughly
   images.check();
   const marrow::initial::Seen seen{model, *images.projector, *images.views, *images.edges};
   const auto candidates = std::size_t(options.candidates);
@@ -124,7 +137,7 @@ marrow::RigidTransform anywhere(const marrow::Mesh& model, const Images& images,
   const marrow::initial::Evidence coarse(seen, middle_mm, cell_mm);
   std::vector<marrow::RigidTransform> poses = scanned;
   double step = 1;
-  for (const std::size_t kept : {2 * candidates, candidates, candidates}) {
+  for (const std::size_t kept : {4 * candidates, 2 * candidates, candidates}) {
     coarse.climb(poses, frame.origin_mm, 8 * step, 2 * cell_mm * step);
     poses = coarse.best(poses, kept);
     step /= 2;
@@ -143,7 +156,7 @@ marrow::RigidTransform anywhere(const marrow::Mesh& model, const Images& images,
   poses = finalists_of(poses, {seen, middle_mm, cell_mm / 2}, *levels.front(), {frame.origin_mm, 3 * cell_mm},
                        std::size_t(options.finalists));
   for (std::size_t level = 1; level < levels.size(); ++level) refine(level, 0.4 / double(levels.size() - 1));
-  return in_order_of(*levels.back(), poses).front();
+  return best_of(poses, coarse, *levels.back());
 }
 
 marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, const marrow::Optimizer& optimizer,

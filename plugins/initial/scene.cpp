@@ -138,4 +138,30 @@ Inputs inputs_of(const Scene& scene) {
           {"optimizer", Value::of<Optimizer>(std::make_shared<const Compass>())}};
 }
 
+FreeScene free_scene(int seed) {
+  Random random{std::uint64_t(seed)};
+  const Body body{{{0, 0, 0}, {16, 12, 30}}, {{26, 4, 18}, {7, 8, 11}}, {{-20, -16, -14}, {9, 6, 7}}};
+  FreeScene scene;
+  scene.truth = moved_by(drawn(random, 3.1), drawn(random, 25));
+  List<View> views;
+  List<EdgeMap> edges;
+  std::vector<SeenBody> seen_bodies;
+  for (const auto& [name, angle_deg] : {std::pair("frontal", 0.0), std::pair("lateral", 80.0)}) {
+    const Camera camera = camera_of({}, angle_deg);
+    views.add(name, View{name, {cv::Mat(kSize_px, kSize_px, CV_16U, cv::Scalar(1000))}, camera, {}});
+    EdgeMap map{kSize_px, kSize_px, {}};
+    for (const OutlinePoint& p : BodyProjector(body).outline(camera, scene.truth, 1))
+      map.pixels.push_back({p.u_px, p.v_px, p.normal_u, p.normal_v, 10});
+    edges.add(name, map);
+    seen_bodies.push_back(seen(body, camera, scene.truth, 8, 8));
+  }
+  scene.inputs = {{"model", item(mesh_of(body))},
+                  {"views", Value::of(views, "view")},
+                  {"edges", Value::of(edges, "view")},
+                  {"projector", Value::of<OutlineProjector>(std::make_shared<const BodyProjector>(body))},
+                  {"cost", Value::of<Cost>(std::make_shared<const OutlineCost>(body, seen_bodies))},
+                  {"optimizer", Value::of<Optimizer>(std::make_shared<const Compass>())}};
+  return scene;
+}
+
 }  // namespace marrow::conformance

@@ -21,4 +21,11 @@ RigidTransform truth(const Scene& scene);
 /// errors of 1 px and 0.5 mm.
 Inputs inputs_of(const Scene& scene);
 
+/// A compact body in any orientation, with its edges in both views, and no placement.
+struct FreeScene {
+  RigidTransform truth;
+  Inputs inputs;
+};
+FreeScene free_scene(int seed);
+
 }  // namespace marrow::conformance

@@ -20,9 +20,8 @@ struct Off {
   double most() const { return std::max(deg, mm); }
 };
 
-Off off_truth(const Subject& subject, const Scene& scene) {
-  const RigidTransform found = subject.output(inputs_of(scene), "pose").as<Pose>().world_from_model,
-                       right = truth(scene);
+Off off_truth(const Subject& subject, const Inputs& inputs, const RigidTransform& right) {
+  const RigidTransform found = subject.output(inputs, "pose").as<Pose>().world_from_model;
   return {degrees(geodesic_angle_rad(found.rotation, right.rotation)),
           (found.translation_mm - right.translation_mm).norm()};  // the CT's origin is in the middle
 }
@@ -31,7 +30,8 @@ Off off_truth(const Subject& subject, const Scene& scene) {
 Off largest(const Subject& subject, bool is_mirrored, bool is_turned) {
   Off most;
   for (int seed = 1; seed <= kCases; ++seed) {
-    const Off off = off_truth(subject, {seed, is_mirrored, is_turned});
+    const Off off =
+        off_truth(subject, inputs_of({seed, is_mirrored, is_turned}), truth({seed, is_mirrored, is_turned}));
     most = {std::max(most.deg, off.deg), std::max(most.mm, off.mm)};
   }
   return most;
@@ -74,6 +74,19 @@ double starts_of_nothing(const Subject& subject) {
     count += !result.refusal;
   }
   return count;
+}
+
+/// The larger of the angle and the distance, of a body in any orientation.
+double without_start(const Subject& subject) {
+  for (const char* port : {"projector", "views", "edges", "cost"})
+    if (!takes(subject, port))
+      throw NotApplicable(std::string("it takes no ") + port + ", so it needs more than images");
+  double most = 0;
+  for (int seed = 1; seed <= kCases; ++seed) {
+    const FreeScene scene = free_scene(seed);
+    most = std::max(most, off_truth(subject, scene.inputs, scene.truth).most());
+  }
+  return most;
 }
 
 void validate(const Inputs&, const std::vector<PortInfo>& ports, const std::vector<Value>& outputs) {
@@ -164,6 +177,8 @@ Suite initial_suite() {
   add("mirrored", "the larger of both for the bone of the other side", kRange, "degrees or mm",
       [](const Subject& subject) { return largest(subject, true, false).most(); });
   add("long_axis", "the long axis of the start from that of the bone", 1e-3, "deg", long_axis_off_deg);
+  add("without_start", "the larger of both for a body of 8 cm in any of 3 orientations, about which nothing is known",
+      kRange, "degrees or mm", without_start);
   add("nothing_compared", "starts found where the cost is constant or not a number", 0, "starts", starts_of_nothing);
   return suite;
 }

@@ -84,7 +84,7 @@ View read_view(const std::string& name, const fs::path& image, const fs::path& c
   read::ViewSource source{name, image, nullptr, camera, {}, {}};
   source.scale = options.scale;
   files::warn_of_pixels(image, context);
-  return read::read_view_files(source, context);
+  return read::read_view_files(source, context).view;
 }
 
 /// The start in the file that `start` names. `position`: the frame's among all frames, from 0.

@@ -38,6 +38,10 @@ Camera camera(const Image* image, const Options& options, Context& context) {
         options.path.string() +
         ": the images of this camera are distorted; only read.view, read.views and read.case remove the distortion, if "
         "they read the camera file themselves. This camera is that of the image without distortion");
+  if (!read.deviations.is_none())
+    context.warn(options.path.string() +
+                 ": states how exactly the camera is known; only read.view, read.views and read.case pass that on, if "
+                 "they read the camera file themselves");
   if (const std::string doubt = read::doubt_about_unit(options.path, read.camera, options.scale); !doubt.empty())
     context.warn(doubt);
   return read.camera;

@@ -11,6 +11,7 @@
 #include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/image_sides.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
+#include "marrow/toolbox/files/stated_deviations.hpp"
 #include "marrow/toolbox/files/volume_doubts.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
@@ -87,12 +88,14 @@ std::optional<marrow::files::CameraInFile> read_camera(const fs::path& folder, c
   const bool is_map = node->IsMap(), names_file = is_map && (*node)["file"];
   if (is_map && !names_file) return marrow::files::camera_from(*node, map.file());
   marrow::read::CameraReading reading;
+  marrow::geometry::CameraDeviations deviations;
   std::optional<fs::path> file;
   if (names_file) {
     const YamlMap camera(map.file(), *node, "camera",
-                         {"file", "projection", "pixel_mm", "corner_mm", "mirror", "scale"});
+                         {"file", "projection", "pixel_mm", "corner_mm", "mirror", "scale", "deviations"});
     file = file_in(folder, camera, "file");
     reading = camera_reading(camera);
+    deviations = with_deviations(camera, deviations);
   } else {
     file = file_in(folder, map, "camera");
   }
@@ -102,8 +105,9 @@ std::optional<marrow::files::CameraInFile> read_camera(const fs::path& folder, c
     if (!image) return std::nullopt;  // the file does not say how large it is
     reading.size.size_px = {double(image->width()), double(image->height())};
   }
-  const auto read = read_or_fault(map, "camera", [&] { return marrow::read::read_camera(*file, reading); });
+  auto read = read_or_fault(map, "camera", [&] { return marrow::read::read_camera(*file, reading); });
   if (!read) return std::nullopt;
+  if (!deviations.is_none()) read->deviations = deviations;  // the case knows more than the file
   if (const auto doubt = marrow::read::doubt_about_unit(*file, read->camera, reading.scale); !doubt.empty())
     context.warn(doubt);
   return read;
@@ -171,6 +175,7 @@ void read_view(const fs::path& folder, const YamlMap& map, CaseFiles& result, ma
     return map.fault("image", error.what());
   }
   result.views.add(*name, std::move(view));
+  result.camera_deviations.add(*name, camera->deviations);
 }
 
 void read_views(const fs::path& folder, const YamlMap& map, CaseFiles& result, marrow::Context& context) {
@@ -241,6 +246,8 @@ MARROW_PLUGIN(plugin) {
            marrow::over("fragment"))
       .out("surface", &CaseFiles::surface, "surface of each fragment, if the case gives them", marrow::over("fragment"))
       .out("views", &CaseFiles::views, "X-ray views with cameras", marrow::over("view"))
+      .out("camera_deviations", &CaseFiles::camera_deviations,
+           "how exactly each camera is known, as the case or the camera file states it", marrow::over("view"))
       .out("start", &CaseFiles::start, "pose to start from, if the case gives one", marrow::over("fragment"))
       .out("truth", &CaseFiles::truth, "exact pose, if the case gives one (simulated cases)", marrow::over("fragment"))
       .option("path", &Options::path, "folder of the case, with case.yaml", marrow::required())

@@ -19,10 +19,10 @@ struct Options {
   double scale = 1;
 };
 
-marrow::View view(const marrow::Camera* camera, const Options& options, marrow::Context& context) {
+marrow::read::ViewAsStated view(const marrow::Camera* camera, const Options& options, marrow::Context& context) {
   if (!camera && options.camera.empty())
     throw marrow::Error("view '" + options.name + "': the node that is wired to 'camera' gave none");
-  marrow::View view = marrow::read::read_view_files(
+  marrow::read::ViewAsStated view = marrow::read::read_view_files(
       {options.name, options.image, camera, options.camera, options.calibration, options.distortion, options.frame,
        options.mirror, options.projection, options.pixel_mm, options.corner_mm, options.scale},
       context);
@@ -37,7 +37,9 @@ MARROW_PLUGIN(plugin) {
   plugin.node("read.view", view)
       .summary("Reads one X-ray view: an image and its camera; a known distortion is removed")
       .in("camera", "the camera, if no camera file is given")
-      .out("view", "the view")
+      .out("view", &marrow::read::ViewAsStated::view, "the view")
+      .out("camera_deviations", &marrow::read::ViewAsStated::camera_deviations,
+           "how exactly its camera is known, as the camera file states it")
       .option("name", &Options::name, "name of the view")
       .option("image", &Options::image, "image file, as read.image reads it", marrow::required())
       .option("camera", &Options::camera,

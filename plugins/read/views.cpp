@@ -20,33 +20,38 @@ struct Options {
   double scale = 1;
 };
 
+struct Result {
+  marrow::List<marrow::View> views;
+  marrow::List<marrow::geometry::CameraDeviations> camera_deviations;
+};
+
 /// The number of the view's projection; -1 if none are named.
 int projection_of(const Options& options, std::size_t view) {
   if (options.projections.empty()) return -1;
   return marrow::read::projection_number(options.projections.at(view), "view '" + options.names[view] + "'");
 }
 
-marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, const Options& options,
-                                 marrow::Context& context) {
+Result views(const marrow::List<marrow::Camera>* cameras, const Options& options, marrow::Context& context) {
   if (!cameras && options.cameras.empty()) throw marrow::Error("the node that is wired to 'camera' gave none");
-  marrow::List<marrow::View> views;
+  Result result;
   for (std::size_t i = 0; i < options.names.size(); ++i) {
     const std::string& name = options.names[i];
     if (options.images.at(i).empty()) continue;
     if (!cameras && options.cameras.at(i).empty()) throw marrow::Error("view '" + name + "': its camera is not given");
-    views.add(name,
-              marrow::read::read_view_files(
-                  {name, options.images.at(i), cameras ? &marrow::read::camera_of_view(name, *cameras) : nullptr,
-                   cameras ? std::filesystem::path() : options.cameras.at(i), options.calibration,
-                   options.distortions.empty() ? std::filesystem::path() : options.distortions.at(i), options.frame,
-                   options.mirror, projection_of(options, i), options.pixel_mm, options.corner_mm, options.scale},
-                  context));
+    marrow::read::ViewAsStated read = marrow::read::read_view_files(
+        {name, options.images.at(i), cameras ? &marrow::read::camera_of_view(name, *cameras) : nullptr,
+         cameras ? std::filesystem::path() : options.cameras.at(i), options.calibration,
+         options.distortions.empty() ? std::filesystem::path() : options.distortions.at(i), options.frame,
+         options.mirror, projection_of(options, i), options.pixel_mm, options.corner_mm, options.scale},
+        context);
+    result.views.add(name, std::move(read.view));
+    result.camera_deviations.add(name, read.camera_deviations);
     for (const std::string& doubt : marrow::files::doubts_about_sides(options.images.at(i), options.frame))
       context.warn(doubt);
     marrow::files::warn_of_pixels(options.images.at(i), context);
   }
-  if (views.empty()) throw marrow::Error("all images are empty, so there is no view; give at least one image");
-  return views;
+  if (result.views.empty()) throw marrow::Error("all images are empty, so there is no view; give at least one image");
+  return result;
 }
 
 }  // namespace
@@ -55,7 +60,9 @@ MARROW_PLUGIN(plugin) {
   plugin.node("read.views", views)
       .summary("Reads X-ray views: images and their cameras; a known distortion is removed")
       .in("camera", "one camera per view, with the view's name, if no camera files are given", marrow::over("view"))
-      .out("views", "the views", marrow::over("view"))
+      .out("views", &Result::views, "the views", marrow::over("view"))
+      .out("camera_deviations", &Result::camera_deviations, "how exactly each camera is known, as its file states it",
+           marrow::over("view"))
       .option("names", &Options::names, "one name per view", marrow::required())
       .relation(marrow::at_least_one({"names"}))
       .relation(marrow::distinct("names"))

@@ -27,8 +27,9 @@ marrow::Volume volume(const Options& options, marrow::Context& context) {
 MARROW_PLUGIN(plugin) {
   plugin.node("read.volume", volume)
       .summary(
-          "Reads a CT volume from MHA, NRRD, NIfTI, multi-page TIFF or a folder (DICOM series, MHD or NHDR with its "
-          "data)")
+          "Reads a CT volume from MHA, NRRD, NIfTI, multi-page TIFF, an enhanced DICOM file of many frames, or a "
+          "folder "
+          "(DICOM series, MHD or NHDR with its data)")
       .out("volume",
            "CT in Hounsfield units; patient axes are LPS; samples that a DICOM series marks as padding "
            "(PixelPaddingValue) become air, at most -1000 HU")

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Corrects cameras that are a little off, together with the poses of the bones that they show. refinement.hpp says how.
-#include <array>
-#include <cstdio>
 #include <marrow/base/names.hpp>
 #include <marrow/plugin.hpp>
 
+#include "determined.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/search/compared.hpp"
 #include "marrow/toolbox/search/search.hpp"
@@ -44,38 +43,17 @@ void check_inputs(const List<View>& views, const List<Cost>& costs, const List<P
   }
 }
 
-constexpr std::array<const char*, 6> kMotions{"rotation_u", "rotation_v", "rotation_depth",
-                                              "shift_u",    "shift_v",    "shift_depth"};
-
-/// How much of what was expected the images took away: 0 if a motion is as uncertain after the registration as the
-/// options say, 1 if it is known.
-Vector6d determined(const Vector6d& deviation, const Vector6d& expected) {
-  const Vector6d left = deviation.cwiseQuotient(expected);
-  return (Vector6d::Ones() - left.cwiseProduct(left)).cwiseMax(0);
-}
-
-Metrics metrics_of(const Vector6d& motion, const Vector6d& deviation, const Vector6d& expected) {
-  Metrics metrics;
-  for (const bool predicted : {false, true})
-    for (int i = 0; i < 6; ++i) {
-      const std::string name = kMotions[std::size_t(i)] + std::string(i < 3 ? "_deg" : "_mm");
-      metrics.items.push_back(
-          {(predicted ? "predicted_" : "") + name, (predicted ? deviation : motion)[i], i < 3 ? "deg" : "mm"});
-    }
-  const Vector6d share = determined(deviation, expected);
-  for (int i = 0; i < 6; ++i)
-    metrics.items.push_back({std::string("determined_") + kMotions[std::size_t(i)], 100 * share[i], "%"});
-  return metrics;
-}
-
-/// Says which motions of a camera the images leave nearly as uncertain as they were.
-void say_undetermined(const std::string& view, const Vector6d& share, const Context& context) {
-  std::string names;
-  for (int i = 0; i < 6; ++i)
-    if (share[i] < 0.5) names += (names.empty() ? "" : ", ") + std::string(kMotions[std::size_t(i)]);
-  if (!names.empty())
-    context.info("view '" + view + "': the images do not determine its camera's " + names +
-                 "; what the options expect of them counts in the poses' deviations");
+void check_optional_inputs(const List<View>& views, const List<Cost>& costs, const List<Cost>* coarse_costs,
+                           const List<geometry::CameraDeviations>* stated) {
+  if (coarse_costs && coarse_costs->names() != costs.names())
+    throw Error(
+        "coarse_costs and costs are not of the same bones; wire both from nodes that are called for each fragment");
+  for (std::size_t f = 0; coarse_costs && f < coarse_costs->size(); ++f)
+    if ((*coarse_costs)[f].view_count() != views.size())
+      throw Error(formatted("the coarse cost of '{}' compares {} views, but there are {}; make it of the same views",
+                            coarse_costs->name(f), (*coarse_costs)[f].view_count(), views.size()));
+  if (stated && stated->names() != views.names())
+    throw Error("camera_deviations and views are not of the same views; wire both from the node that reads the views");
 }
 
 void warn_of_large(const std::string& view, const Vector6d& in_deviations, Context& context) {
@@ -96,12 +74,15 @@ void check_compared(const Refinement& refinement, const List<Pose>& poses) {
   }
 }
 
-Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose>& poses, const Options& options,
+Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose>& poses,
+               const List<Cost>* coarse_costs, const List<geometry::CameraDeviations>* stated, const Options& options,
                Context& context) {
   search::check_level_list(options.pixel_step, "pixel_step");
   check_inputs(views, costs, poses, options.reference_view);
-  Refinement refinement(costs, poses, views, options);
+  check_optional_inputs(views, costs, coarse_costs, stated);
+  Refinement refinement(costs, poses, views, options, stated);
   check_compared(refinement, poses);
+  refinement.search(coarse_costs ? *coarse_costs : costs, context);
   refinement.run(context);
   check_compared(refinement, poses);
   if (!refinement.converged())
@@ -119,10 +100,10 @@ Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose
     view.camera.camera_from_world = view.camera.camera_from_world * refinement.sight(v).motion(motion);
     view.camera.camera_from_world.rotation = nearest_rotation(view.camera.camera_from_world.rotation);
     result.views.add(views.name(v), view);
-    const Vector6d deviation = refinement.deviation_of_motion(v), &expected = refinement.sight(v).deviation;
-    result.motions.add(views.name(v), metrics_of(motion, deviation, expected));
-    say_undetermined(views.name(v), determined(deviation, expected), context);
-    warn_of_large(views.name(v), motion.cwiseQuotient(refinement.sight(v).deviation), context);
+    const Matrix6d covariance = refinement.covariance_of_motion(v);
+    result.motions.add(views.name(v), refine::metrics_of(refinement.sight(v), motion, covariance));
+    for (const std::string& line : refine::words_of(views.name(v), refinement.sight(v), covariance)) context.info(line);
+    warn_of_large(views.name(v), motion.cwiseQuotient(refinement.sight(v).deviation()), context);
   }
   for (std::size_t f = 0; f < poses.size(); ++f) {
     Pose pose = poses[f];
@@ -147,6 +128,13 @@ MARROW_PLUGIN(plugin) {
       .in("views", "X-ray views with the cameras that a calibration gives", over("view"))
       .in("costs", "cost of each bone's pose in these views", over("fragment"))
       .in("poses", "pose of each bone, from a registration", over("fragment"))
+      .in("coarse_costs",
+          "costs of contours in the same views, for the search that comes first where a camera may be off by more than "
+          "reach_px; absent: costs",
+          over("fragment"))
+      .in("camera_deviations",
+          "what is stated about each camera, as a camera file says it; it takes the place of the expected errors below",
+          over("view"))
       .out("views", &Result::views, "the same images with corrected cameras", over("view"))
       .out("poses", &Result::poses,
            "poses that go with these cameras; their covariance includes the uncertainty of the cameras",
@@ -156,14 +144,37 @@ MARROW_PLUGIN(plugin) {
            "share do not count",
            over("fragment"))
       .out("motions", &Result::motions,
-           "motion of each camera, about and along the axes of its image (u, v, depth), its predicted deviations, and "
-           "how much of what the options expect the images determine: 0 % if it is as uncertain as before",
+           "motion of each camera, about and along the axes of its image (u, v, depth), the errors of the focal length "
+           "and of the principal point that are most probable with it, the predicted deviations of all, and how much "
+           "of what is expected the images determine: 0 % if it is as uncertain as before",
            over("view"))
-      .figures({"rotation_u_deg", "rotation_v_deg", "rotation_depth_deg", "shift_u_mm", "shift_v_mm", "shift_depth_mm",
-                "predicted_rotation_u_deg", "predicted_rotation_v_deg", "predicted_rotation_depth_deg",
-                "predicted_shift_u_mm", "predicted_shift_v_mm", "predicted_shift_depth_mm", "determined_rotation_u",
-                "determined_rotation_v", "determined_rotation_depth", "determined_shift_u", "determined_shift_v",
-                "determined_shift_depth"})
+      .figures({"rotation_u_deg",
+                "rotation_v_deg",
+                "rotation_depth_deg",
+                "shift_u_mm",
+                "shift_v_mm",
+                "shift_depth_mm",
+                "focal_percent",
+                "centre_u_px",
+                "centre_v_px",
+                "predicted_rotation_u_deg",
+                "predicted_rotation_v_deg",
+                "predicted_rotation_depth_deg",
+                "predicted_shift_u_mm",
+                "predicted_shift_v_mm",
+                "predicted_shift_depth_mm",
+                "predicted_focal_percent",
+                "predicted_centre_u_px",
+                "predicted_centre_v_px",
+                "determined_rotation_u",
+                "determined_rotation_v",
+                "determined_rotation_depth",
+                "determined_shift_u",
+                "determined_shift_v",
+                "determined_shift_depth",
+                "determined_focal",
+                "determined_centre_u",
+                "determined_centre_v"})
       .option("turn_deg", &Options::turn_deg, "root mean square of the cameras' rotations", at_least(1e-6))
       .option("shift_mm", &Options::shift_mm, "root mean square of the cameras' shifts", at_least(1e-6))
       .option(

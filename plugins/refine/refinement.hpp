@@ -21,6 +21,7 @@
 
 #include "bone_in_view.hpp"
 #include "camera_prior.hpp"
+#include "coarse_search.hpp"
 #include "sight.hpp"
 
 #include "marrow/base/number_text.hpp"
@@ -44,18 +45,44 @@ struct State {
 
 class Refinement {
  public:
-  Refinement(const List<Cost>& costs, const List<Pose>& poses, const List<View>& views, const Options& options)
+  /// What is stated about the cameras may be absent, as a list or in it.
+  Refinement(const List<Cost>& costs, const List<Pose>& poses, const List<View>& views, const Options& options,
+             const List<geometry::CameraDeviations>* stated)
       : costs_(costs), poses_(poses), views_(views), options_(options) {
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();
     for (const Pose& pose : poses) centre += pose.world_from_model * pose.frame.origin_mm / double(poses.size());
     for (std::size_t v = 0; v < views.size(); ++v) {
-      sights_.push_back(sight_of(views[v], centre, options));
-      if (views.name(v) == options.reference_view) sights_.back().deviation *= kOfReference;
+      sights_.push_back(sight_of(views[v], centre, options, stated ? (*stated)[v] : geometry::CameraDeviations()));
+      if (views.name(v) == options.reference_view) sights_.back().count_as_right();
     }
     prior_.emplace(sights_);
     for (const Pose& pose : poses) state_.poses.push_back(pose.world_from_model);
     state_.motions.assign(views.size(), Vector6d::Zero());
     compare_each(options_.pixel_step.front());
+  }
+
+  /// If a camera may be off by more than an outline's reach, looks for the bones in each view first, by these costs.
+  void search(const List<Cost>& coarse_costs, Context& context) {
+    if (!may_be_farther_off(views_, sights_, options_.reach_px)) return;
+    given_ = state_;
+    for (std::size_t v = 0; v < views_.size(); ++v)
+      state_.motions[v] =
+          CoarseSearch(coarse_costs, poses_, views_, v, sights_[v]).best_motion(options_.reach_px, context);
+    give_shared_motion_to_bones();
+    compare_at(coarse_costs, {options_.contour_spacing_px, options_.reach_px, int(options_.pixel_step.front())});
+    std::vector<Model> first;
+    descend(true, context, first);
+    compare_each(options_.pixel_step.front());
+  }
+
+  /// What all cameras are off by together is more probably a motion of the bones. No image changes by this.
+  void give_shared_motion_to_bones() {
+    for (int round = 0; round < 3; ++round) {
+      const RigidTransform shared = sights_[0].shared_motion(prior_->shared_motion(all_motions(state_)));
+      for (RigidTransform& pose : state_.poses) pose = shared * pose;
+      for (std::size_t v = 0; v < views_.size(); ++v)
+        state_.motions[v] = sights_[v].numbers(sights_[v].motion(state_.motions[v]) * inverse(shared));
+    }
   }
 
   /// Chooses the scale with the first pixel step, and goes on with the others, as from an approximate state.
@@ -82,8 +109,9 @@ class Refinement {
   /// The cost of a bone, as the mean over the views with their cameras corrected.
   double cost(std::size_t bone) const {
     double sum = 0;
-    for (std::size_t v = 0; v < views_.size(); ++v) sum += models_[bone * views_.size() + v].value;
-    return sum / double(views_.size());
+    for (std::size_t v = 0; v < views_.size(); ++v)
+      sum += models_[bone * views_.size() + v].value / double(views_.size());
+    return sum;
   }
   Matrix6d covariance_of_pose(std::size_t bone) const {
     const Eigen::MatrixXd root = root_.middleRows<6>(at_pose(bone));
@@ -100,11 +128,12 @@ class Refinement {
     const Eigen::MatrixXd root = root_.middleRows<6>(at_pose(bone)) - change * root_.middleRows<6>(at_pose(0));
     return root * root.transpose();
   }
-  Vector6d deviation_of_motion(std::size_t view) const { return root_.middleRows<6>(at_motion(view)).rowwise().norm(); }
+  Matrix6d covariance_of_motion(std::size_t view) const {
+    const Eigen::MatrixXd root = root_.middleRows<6>(at_motion(view));
+    return root * root.transpose();
+  }
 
  private:
-  /// How far the reference may move, as a fraction of what is expected of the others.
-  static constexpr double kOfReference = 1e-3;
   /// How far a model's outline may be off the image's edges on both sides of a bone, which no scatter of blocks tells.
   static constexpr double kOutline_px = 0.2;
 
@@ -120,10 +149,13 @@ class Refinement {
 
   /// Compares every n-th pixel from now on.
   void compare_each(double pixel_step) {
+    compare_at(costs_, {options_.contour_spacing_px, options_.reach_px, int(pixel_step)});
+  }
+  void compare_at(const List<Cost>& costs, const CostLevel& level) {
     in_views_.clear();
     levels_.clear();
     for (std::size_t f = 0; f < poses_.size(); ++f) {
-      levels_.push_back(costs_[f].at_level({options_.contour_spacing_px, options_.reach_px, int(pixel_step)}));
+      levels_.push_back(costs[f].at_level(level));
       for (std::size_t v = 0; v < views_.size(); ++v) in_views_.emplace_back(*levels_[f], poses_[f].frame, v, views_);
     }
     noise_.assign(poses_.size(), 0.0);
@@ -133,17 +165,19 @@ class Refinement {
   /// Finds the most probable state if the cameras are off relative to each other as expected, by a tenth and by a
   /// hundredth of it, and keeps the state with the largest marginal likelihood. So cameras that are right stay as they
   /// are. The other states count in the covariance by their likelihood, because the images may hardly tell how far the
-  /// cameras are off.
+  /// cameras are off. After a search, the first state is that which it found, and the others begin at the given one.
   void choose_scale(Context& context) {
     expand(true);
     doubt_depth_of_reference();
-    const State given = state_;
+    const State given = given_.value_or(state_);
     std::vector<Found> all;
     std::vector<Model> at_given = models_;
     for (const double scale : {1.0, 0.1, 0.01}) {
       scale_ = scale;
-      if (scale < 1) state_ = given, models_ = at_given;
+      if (scale < 1) state_ = given;
+      if (!at_given.empty()) models_ = at_given;
       const bool converged = descend(scale == 1, context, at_given);
+      if (scale == 1 && given_) at_given.clear();
       expand(scale == 1);
       all.push_back({scale, converged, evidence(), state_, models_, root_of_inverse(equations().first)});
       const std::string text =
@@ -185,8 +219,8 @@ class Refinement {
       const double across = std::max(curvature(0, 0), curvature(1, 1)),
                    along = std::max(curvature(2, 2), 1e-6 * across);
       const double outline_mm = kOutline_px * pixel_size_at_mm(views_[v].camera, sights_[v].centre_mm);
-      double& depth_mm = sights_[v].deviation[5];
-      if (across > 0) depth_mm = std::max(depth_mm, outline_mm * std::sqrt(across / along));
+      double& depth_variance = sights_[v].covariance(5, 5);
+      if (across > 0) depth_variance = std::max(depth_variance, outline_mm * outline_mm * across / along);
     }
     prior_.emplace(sights_);
   }
@@ -354,8 +388,9 @@ class Refinement {
   std::vector<Model> models_;
   std::vector<double> noise_;  ///< of each bone's cost in one view
   State state_;
-  double scale_ = 1;   ///< of the deviations that the options expect of the cameras relative to each other
-  double weight_ = 1;  ///< the probability of this scale
+  std::optional<State> given_;  ///< after a search: the state before it
+  double scale_ = 1;            ///< of the deviations that the options expect of the cameras relative to each other
+  double weight_ = 1;           ///< the probability of this scale
   Eigen::MatrixXd root_of_other_scales_;
   bool converged_ = false;
   Eigen::MatrixXd root_;  ///< the covariance of all poses and motions, in degrees and mm, is root_ * its transpose

@@ -6,9 +6,11 @@
 
 #include "bone_in_view.hpp"
 
+#include "marrow/toolbox/geometry/camera_deviations.hpp"
+
 namespace marrow::refine {
 
-/// Root mean square errors that are expected of a calibration.
+/// Root mean square errors that are expected of a calibration, where nothing else is stated about a camera.
 struct ExpectedErrors {
   double turn_deg = 0.5;
   double shift_mm = 1;
@@ -21,7 +23,16 @@ struct ExpectedErrors {
 struct Sight {
   Eigen::Vector3d centre_mm;
   Eigen::Matrix3d axes;  ///< u, v and depth in columns, in the world
-  Vector6d deviation;    ///< expected of the six numbers
+  Matrix6d covariance;   ///< expected of the six numbers
+  geometry::CameraParameters parameter_deviations;
+  Eigen::Matrix<double, 6, geometry::kCameraParameters> by_parameters;
+
+  Vector6d deviation() const { return covariance.diagonal().cwiseSqrt(); }
+  /// From now on hardly anything is expected of this camera: a thousandth of what was.
+  void count_as_right() {
+    covariance *= 1e-6;
+    parameter_deviations *= 1e-3;
+  }
 
   RigidTransform motion(const Vector6d& deg_and_mm) const {
     const Vector6d motion = from_units(deg_and_mm);
@@ -29,6 +40,18 @@ struct Sight {
     moved.rotation = rotation_from_vector(axes * motion.head<3>());
     moved.translation_mm = centre_mm - moved.rotation * centre_mm + axes * motion.tail<3>();
     return moved;
+  }
+  /// The inverse of motion().
+  Vector6d numbers(const RigidTransform& motion) const {
+    Vector6d numbers;
+    numbers << axes.transpose() * vector_from_rotation(motion.rotation) * degrees(1),
+        axes.transpose() * (motion.translation_mm - centre_mm + motion.rotation * centre_mm);
+    return numbers;
+  }
+  /// The motion of the whole world by six numbers about and along its own axes.
+  RigidTransform shared_motion(const Vector6d& deg_and_mm) const {
+    return Sight{centre_mm, Eigen::Matrix3d::Identity(), covariance, parameter_deviations, by_parameters}.motion(
+        deg_and_mm);
   }
   /// How a bone's pose moves along its own axes, for small motions of the camera; both in degrees and mm.
   Matrix6d of_bone(const RigidTransform& world_from_model, const FragmentFrame& frame) const {
@@ -41,20 +64,27 @@ struct Sight {
   }
 };
 
-/// What is expected of a view's camera, as motions about a point between the bones. Throws Error if that point does not
-/// lie in front of the camera.
-inline Sight sight_of(const View& view, const Eigen::Vector3d& centre_mm, const ExpectedErrors& expected) {
-  const double depth_mm = (view.camera.camera_from_world * centre_mm).z();
-  if (!(depth_mm > 0))
+/// What is expected of a view's camera, as motions about a point between the bones: what is stated about this camera,
+/// and the expected errors for the rest. Throws Error if that point does not lie in front of the camera.
+inline Sight sight_of(const View& view, const Eigen::Vector3d& centre_mm, const ExpectedErrors& expected,
+                      geometry::CameraDeviations stated = {}) {
+  // No device is better known than this. It keeps the covariance regular.
+  constexpr double kLeastTurn_deg = 1e-3, kLeastShift_mm = 1e-3;
+  // A motion shows an error of the principal point or of the focal length up to a tenth of itself.
+  constexpr double kApproximate = 0.1;
+  if (!((view.camera.camera_from_world * centre_mm).z() > 0))
     throw Error("view '" + view.name + "': the bones do not lie in front of its camera; look at the overlays first");
-  const double each = 1 / std::sqrt(3.0), each_of_two = 1 / std::sqrt(2.0);
-  const Eigen::Vector2d centre =
-      offset_at_mm(view.camera, centre_mm, Eigen::Vector2d::Constant(each_of_two * expected.centre_px));
-  const double shift = each * expected.shift_mm, depth = expected.focal_percent / 100 * depth_mm,
-               turn = each * expected.turn_deg;
-  Sight sight{centre_mm, view.camera.camera_from_world.rotation.transpose(), Vector6d()};
-  sight.deviation << turn, turn, turn, std::hypot(shift, centre.x()), std::hypot(shift, centre.y()),
-      std::hypot(shift, depth);
+  stated.focal_percent = stated.focal_percent.value_or(expected.focal_percent);
+  stated.centre_px = stated.centre_px.value_or(expected.centre_px);
+  const double of_ray = *stated.centre_px / view.camera.intrinsics(0, 0);
+  stated.turn_deg =
+      std::hypot(stated.turn_deg.value_or(expected.turn_deg), kLeastTurn_deg, kApproximate * degrees(of_ray));
+  stated.shift_mm = std::hypot(stated.shift_mm.value_or(expected.shift_mm), kLeastShift_mm,
+                               kApproximate * of_ray * (view.camera.camera_from_world * centre_mm).z());
+  Sight sight{centre_mm, view.camera.camera_from_world.rotation.transpose(), Matrix6d(),
+              geometry::deviations_of(stated), geometry::motion_by_parameters(view.camera, centre_mm)};
+  const Eigen::MatrixXd root = sight.by_parameters * sight.parameter_deviations.asDiagonal();
+  sight.covariance = root * root.transpose();
   return sight;
 }
 

@@ -37,7 +37,8 @@ double femoral_part(const Vector3d& p, double asymmetry) {
                right = disc(p - Vector3d(-20, 1, 0), 25, 12, rims);
   const double flange = box(p - Vector3d(-60 * asymmetry, -21, 12), {17, 4.5, 22}, 4);
   const double whole = join(join(left, right, 4), flange, 6);
-  const double bone = box(p - Vector3d(0, 1.5, 22), {60, 18, 37}, 2),
+  // The cuts of the bone are beveled: else the shell of the smaller condyle would break at its lower corner
+  const double bone = box(p - Vector3d(0, 1.5, 22), {60, 18, 37}, 8),
                notch = box(p - Vector3d(0, 14, -8), {7, 20, 25}, 3);
   const double pegs =
       std::min(capsule(p, {20, 1, -14}, {20, 1, 0}, 3, 2.5), capsule(p, {-20, 1, -14}, {-20, 1, 0}, 3, 2.5));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A bone from surface files, for example the outer and the endosteal surface of a real femur.
+// A bone from surfaces, for example the outer and the endosteal surface of a real femur in files.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <filesystem>
@@ -32,8 +32,7 @@ struct SurfaceOptions {
   double fat_mm = 12;
 };
 
-Mesh placed(const std::filesystem::path& path, const SurfaceOptions& options, const Context& context) {
-  Mesh mesh = exchange::read_surface_file(path, options.scale, context);
+Mesh placed(Mesh mesh, const SurfaceOptions& options) {
   const auto about = [&](std::size_t k, const Eigen::Vector3d& axis) {
     return Eigen::AngleAxisd(radians(options.rotation_deg[k]), axis).toRotationMatrix();
   };
@@ -66,10 +65,13 @@ Mesh endosteum(const Mesh& outer, const Eigen::Vector3d& low, const Eigen::Vecto
   return inner;
 }
 
-Bone surface(const SurfaceOptions& options, Context& context) {
+Bone surface(const Mesh* outer, const SurfaceOptions& options, Context& context) {
+  const auto read = [&](const std::filesystem::path& path) {
+    return placed(exchange::read_surface_file(path, options.scale, context), options);
+  };
   Bone bone;
-  bone.outer = placed(options.outer, options, context);
-  if (!options.inner.empty()) bone.inner = placed(options.inner, options, context);
+  bone.outer = outer ? placed(*outer, options) : read(options.outer);
+  if (!options.inner.empty()) bone.inner = read(options.inner);
   const Eigen::AlignedBox3d box = phantom::bounds_of(bone.outer.vertices_mm);
   const Eigen::Vector3d low = box.min(), extent = box.sizes();
   if (options.long_bone && extent.z() < std::max(extent.x(), extent.y()))
@@ -101,9 +103,11 @@ Bone surface(const SurfaceOptions& options, Context& context) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.surface", surface)
-      .summary("Makes a bone from closed surfaces in files (STL, PLY, OBJ or VTP)")
+      .summary("Makes a bone from closed surfaces in files (STL, PLY, OBJ or VTP), or from one that another node made")
+      .in("mesh", "the outer surface, in place of a file; scale does not count for it")
       .out("bone", "bone with a closed outer and a closed inner surface")
-      .option("outer", &SurfaceOptions::outer, "file of the outer surface: .stl, .ply, .obj or .vtp", required())
+      .option("outer", &SurfaceOptions::outer, "file of the outer surface: .stl, .ply, .obj or .vtp")
+      .relation(exactly_one({"in.mesh", "outer"}))
       .option("inner", &SurfaceOptions::inner,
               "file of the endosteal surface; empty: solid cortical bone, or as cortex_mm says")
       .option("cortex_mm", &SurfaceOptions::cortex_mm,

@@ -113,7 +113,6 @@ def calls(s):
         ),
         "simulate.skin_markers": lambda: ({"phantom": s.phantom}, {"false_rotation_deg": 1}),
         "simulate.sweeps": lambda: ({}, {}),
-        "simulate.femoral_implant": lambda: ({}, {"resolution_mm": 3, "variation": 0.5}),
         "simulate.pelvis": lambda: ({}, {"resolution_mm": 6, "variation": 0.5}),
         "simulate.vertebra": lambda: ({}, {"resolution_mm": 3, "variation": 0.5}),
         "simulate.whole": lambda: ({"bone": s.bone}, {}),

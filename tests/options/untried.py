@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nodes, and options of others, for which there is no call yet that shows an effect. This list must become shorter."""
 UNTRIED = [
+    "evaluate.common_offset",
     "evaluate.deepfluoro",
     "camera.dicom",
     "camera.distortion_between",
@@ -12,13 +13,12 @@ UNTRIED = [
     "evaluate.distortion",
     "evaluate.locking",
     "evaluate.mirror_pose",
+    "evaluate.outline_offset",
     "evaluate.shaft_width.width_deviation_mm",
     "evaluate.shaft_width.width_mm",
     "guide.closed_loop",
     "guide.open_loop",
     "guide.target",
-    "initial.global_search.needs_start",
-    "initial.global_search.pixel_step",
     "plan.locking.max_angle_deg",
     "plan.locking.max_cost",
     "plan.locking.max_offset_mm",
@@ -69,6 +69,7 @@ UNTRIED = [
     "simulate.knee_implant",
     "simulate.knee_motion.blank",
     "simulate.photograph",
+    "similarity.silhouette_overlap",
     "simulate.surface",
     "simulate.vertebra",
     "track.joint.centre_mm",

@@ -28,7 +28,6 @@ const std::map<std::string, std::string>& apart() {
       {"simulate.chessboard", "images of a board"},
       {"simulate.distortion_plate", "images of a plate"},
       {"simulate.export", "changes the grey values of an image"},
-      {"simulate.femoral_implant", "the part of one side, which is drawn"},
       {"simulate.implant", "an implant that is given, in a pose that is drawn"},
       {"simulate.knee_implant", "a part of a given asymmetry, of which either side is on the market"},
       {"simulate.landmarks", "takes any points of the surface, and tests/plugins/simulate says that they lie on it"},

@@ -20,11 +20,13 @@ using marrow::RigidTransform, marrow::Value;
 const std::map<std::string, std::string>& apart() {
   static const std::map<std::string, std::string> nodes{
       {"evaluate.calibration", "compares two camera matrices of one device, which have no place"},
+      {"evaluate.common_offset", "sums up figures"},
       {"evaluate.contact", "needs several bones; tests/plugins/evaluate moves them together"},
       {"evaluate.deepfluoro", "reads a file"},
       {"evaluate.distortion", "compares two distortions of one device, which have no place"},
       {"evaluate.frames", "sums up figures"},
       {"evaluate.locking", "a plan of plan.locking; tests/plugins/plan moves its world"},
+      {"evaluate.pose_difference", "tells shifts along the axes of the world"},
       {"evaluate.utrecht", "reads files"},
       {"register.together", "needs the costs of several bones; tests/plugins/register has wells for each"},
       {"similarity.with_contact", "needs several bones; its penalty is that of evaluate.contact"},

@@ -73,7 +73,6 @@ REFUSED = (
     ("nibabel writes", "pair.img", KNOWN_VOLUMES[2:]),
     ("tifffile", "tiles.tif", "is stored in tiles; expected strips"),
     ("tifffile", "half.tif", "its pixels have 16 bits in a format that is not read"),
-    ("tifffile", "double.tif", "its pixels have 64 bits in a format that is not read"),
     ("Pillow", "jpeg.tif", "its pixels are compressed by method 7, which is not read"),
     ("Pillow", "L.gif", "is a GIF picture, not an image that can be read"),
     ("Pillow", "L.jp2", "is a JPEG 2000 picture, not an image that can be read"),

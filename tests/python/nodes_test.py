@@ -130,7 +130,7 @@ class Nodes(Case):
         with self.assertRaisesRegex(marrow.RunError, "nowhere.yaml"):
             marrow.read.view(image=image, camera="nowhere.yaml")
         camera = marrow.Camera(8, 8, [[1000, 0, 4], [0, 1000, 4], [0, 0, 1]], numpy.eye(4))
-        self.assertEqual(marrow.read.view(camera, image=image).image.width, 8)
+        self.assertEqual(marrow.read.view(camera, image=image).view.image.width, 8)
         with self.assertRaisesRegex(marrow.PipelineError, "expects camera, got view"):
             marrow.read.view(image="nowhere.png", camera=small_case()[1].views["frontal"])
         self.assertEqual(list(inspect.signature(marrow.read.view).parameters).count("camera"), 1)

@@ -90,11 +90,15 @@ def mtre(call):
 def pose_difference(call):
     found, other = (call.one(port, read_pose).world_from_ct for port in ("pose", "reference"))
     targets = Targets(call)
-    turn, shift = motion(other, found, call.one("model", surface.read).frame())
+    frame = call.one("model", surface.read).frame()
+    turn, shift = motion(other, found, frame)
+    middle = np.array([frame.origin_mm])
+    apart = (found(middle) - other(middle))[0]
     return {
         "rotation_deg": exactly(angle_between_deg(found, other)),
-        "axial_deg": exactly(turn[2]),
+        **{"%s_deg" % axis: exactly(turn[k]) for k, axis in enumerate(AXES)},
         "translation_mm": exactly(np.linalg.norm(shift)),
+        **{"%s_mm" % axis: exactly(apart[k]) for k, axis in enumerate("xyz")},
         "distance_mm": targets.mean(np.linalg.norm(found(targets.points_mm) - other(targets.points_mm), axis=1)),
     }
 

@@ -16,7 +16,7 @@ TOPICS = {
     "calibration": {"files"},
     "draw": {"image"},
     "exchange": {"distortion", "files", "vtk"},
-    "files": {"distortion"},
+    "files": {"distortion", "geometry"},
     "match": {"image"},
     "phantom": {"calibration", "files"},
     "track": {"files"},

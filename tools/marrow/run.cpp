@@ -13,6 +13,7 @@
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "fruitless_run.hpp"
+#include "lacking.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
@@ -214,6 +215,7 @@ void print_summary(const Pipeline& pipeline, const RunResult& result, const std:
       std::printf("  %s: %s because %s\n", output.output.c_str(),
                   output.files.empty() ? "not there" : "not there as a whole", printable_lines(output.absent).c_str());
   }
+  print_lacking_outputs(pipeline, result);
 }
 
 void print_json_summary(const Pipeline& pipeline, const RunResult& result,
@@ -229,6 +231,8 @@ void print_json_summary(const Pipeline& pipeline, const RunResult& result,
     files[output.output] = output.files;
     if (!output.absent.empty()) absent[output.output] = output.absent;
   }
+  for (const auto& [reason, outputs] : lacking_outputs(pipeline, result))
+    for (const std::string& output : outputs) absent[output] = reason;
   json end = {{"event", "ended"},
               {"status", result.cancelled() ? "cancelled"
                          : result.failed()  ? "failed"

@@ -62,9 +62,12 @@ void adapt(json& document) {
   if (json& ct = document["ct"]; ct.is_string()) ct = {{"file", ct}};
   for (json& view : document.at("views"))
     if (json& camera = view.at("camera"); camera.is_string()) camera = {{"file", camera}};
-  for (auto& [name, fragment] : document.at("fragments").items())
+  for (auto& [name, fragment] : document.at("fragments").items()) {
     for (const char* key : {"start", "truth"})
       if (fragment.contains(key)) fragment[key] = matrix_of(fragment[key]);
+    if (fragment.contains("surface") && fragment["surface"].is_string())
+      fragment["surface"] = {{"file", fragment["surface"]}};
+  }
   document.erase("marrow-case");
 }
 
@@ -74,7 +77,10 @@ void put_below(json& document, const std::string& case_path) {
   const auto move = [&](json& path) {
     if (!case_path.empty()) path = case_path + "/" + path.get<std::string>();
   };
-  move(document.at("ct").at("file"));
+  if (document.at("ct").is_object()) move(document["ct"].at("file"));
+  if (document.contains("labels") && document["labels"].is_string()) move(document["labels"]);
+  for (auto& [name, fragment] : document.at("fragments").items())
+    if (fragment.contains("surface")) move(fragment["surface"].at("file"));
   for (json& view : document.at("views")) {
     move(view.at("image"));
     if (view.contains("mask") && !view["mask"].is_null()) move(view["mask"]);

@@ -24,10 +24,10 @@ std::string plain(const std::string& name, const std::string& otherwise) {
   return word.empty() ? otherwise : word;
 }
 
-/// ".nii.gz" counts as one extension.
+/// ".nii.gz" and ".seg.nrrd" count as one extension.
 std::string extension_of(const fs::path& file) {
-  const std::string last = file.extension().string();
-  return last == ".gz" ? file.stem().extension().string() + last : last;
+  const std::string last = file.extension().string(), before = file.stem().extension().string();
+  return last == ".gz" || before == ".seg" ? before + last : last;
 }
 
 class Planner {
@@ -89,16 +89,7 @@ class Planner {
   std::string faults_;
 };
 
-}  // namespace
-
-PlannedCase plan_case(const OpenedFolder& folder, const std::string& case_path, json document) {
-  Planner planner(folder, case_path);
-  json& ct = document["ct"];
-  if (ct.is_object())
-    planner.take(ct["file"], "the CT", "ct");
-  else
-    planner.miss("the CT is missing; choose one");
-  json& views = document["views"];
+void plan_views(Planner& planner, json& views) {
   if (!views.is_array() || views.empty()) planner.miss("there is no X-ray view; add at least one");
   int number = 0;
   for (json& view : views) {
@@ -115,11 +106,43 @@ PlannedCase plan_case(const OpenedFolder& folder, const std::string& case_path, 
     else if (!camera.is_object())
       planner.miss(what + " has no camera");
   }
-  json& fragments = document["fragments"];
-  if (!fragments.is_object() || fragments.empty()) planner.miss("there is no fragment; add one, with its seeds");
+}
+
+void plan_fragment(Planner& planner, const std::string& name, json& fragment, const json& labels) {
+  const std::string what = "fragment " + in_quotes(printable(name));
+  if (fragment.contains("surface"))
+    planner.take(fragment["surface"]["file"], what + ", its surface", plain(name, "surface"));
+  else if (fragment.contains("label") && !labels.is_string())
+    planner.miss(what + " has a label, but there is no label map; choose one");
+  else if (!fragment.contains("label") && fragment.value("seeds", json::array()).empty())
+    planner.miss(what + " has no seed; click inside its bone, or give it a label or a surface");
+}
+
+/// Only a CT can be segmented from seeds.
+bool needs_ct(const json& fragments) {
+  return fragments.empty() || std::any_of(fragments.begin(), fragments.end(), [](const json& fragment) {
+           return !fragment.contains("label") && !fragment.contains("surface");
+         });
+}
+
+}  // namespace
+
+PlannedCase plan_case(const OpenedFolder& folder, const std::string& case_path, json document) {
+  Planner planner(folder, case_path);
+  json &ct = document["ct"], &labels = document["labels"], &fragments = document["fragments"];
+  if (ct.is_object())
+    planner.take(ct["file"], "the CT", "ct");
+  else if (needs_ct(fragments))
+    planner.miss("the CT is missing; choose one");
+  if (labels.is_string())
+    planner.take(labels, "the label map", "labels");
+  else
+    document.erase("labels");
+  plan_views(planner, document["views"]);
+  if (!fragments.is_object() || fragments.empty())
+    planner.miss("there is no fragment; add one, with its seeds, its label or its surface");
   for (auto& [name, fragment] : fragments.items())
-    if (!fragment.contains("seeds") || !fragment["seeds"].is_array() || fragment["seeds"].empty())
-      planner.miss("fragment " + in_quotes(printable(name)) + " has no seed; click inside its bone");
+    plan_fragment(planner, name, fragment, document.value("labels", json()));
   return planner.finish(std::move(document));
 }
 

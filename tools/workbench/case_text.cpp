@@ -57,6 +57,11 @@ void put_ct(YAML::Emitter& out, const json& ct) {
   out << YAML::EndMap;
 }
 
+void put_volumes(YAML::Emitter& out, const json& document) {
+  if (document.at("ct").is_object()) put_ct(out, document["ct"]);
+  put_keys(out, document, {"labels"});
+}
+
 void put_view(YAML::Emitter& out, const json& view) {
   out << YAML::BeginMap;
   put_keys(out, view, {"name", "image"});
@@ -71,7 +76,12 @@ void put_view(YAML::Emitter& out, const json& view) {
 
 void put_fragment(YAML::Emitter& out, const json& fragment) {
   out << YAML::BeginMap;
-  put_keys(out, fragment, {"seeds", "register"});
+  put_keys(out, fragment, {"seeds", "label"});
+  if (fragment.contains("surface")) {
+    const json& surface = fragment["surface"];
+    put(out << YAML::Key << "surface" << YAML::Value, surface.size() == 1 ? surface.at("file") : surface);
+  }
+  put_keys(out, fragment, {"register"});
   for (const char* key : {"start", "truth"})
     if (fragment.contains(key) && fragment[key].is_array()) {
       out << YAML::Key << key << YAML::Value << YAML::BeginMap << YAML::Key << "target" << YAML::Value << "world"
@@ -139,7 +149,7 @@ std::string case_yaml(const PlannedCase& plan) {
   YAML::Emitter out;
   out.SetDoublePrecision(17);
   out << YAML::BeginMap << YAML::Key << "marrow-case" << YAML::Value << 1;
-  put_ct(out, document.at("ct"));
+  put_volumes(out, document);
   out << YAML::Key << "views" << YAML::Value << YAML::BeginSeq;
   for (const json& view : document.at("views")) put_view(out, view);
   out << YAML::EndSeq << YAML::Key << "fragments" << YAML::Value << YAML::BeginMap;

@@ -60,6 +60,7 @@ void add_ct_reading(Server& server, Workbench& workbench, const std::shared_ptr<
 void add_ct_page(Server& server, Workbench& workbench) {
   const auto memory = std::make_shared<CtMemory>();
   add_ct_reading(server, workbench, memory);
+  add_label_reading(server, workbench, memory);
   add_segmenting(server, workbench, memory);
   add_saving(server, workbench, memory);
 }

@@ -23,6 +23,8 @@ std::string content_of_ct(const std::filesystem::path& place, nlohmann::json ct,
 
 /// POST /api/ct/open, GET /api/ct/slice
 void add_ct_reading(Server& server, Workbench& workbench, const std::shared_ptr<CtMemory>& memory);
+/// POST /api/labels/open, GET /api/labels/slice
+void add_label_reading(Server& server, Workbench& workbench, const std::shared_ptr<CtMemory>& memory);
 /// POST /api/segment, GET /api/segmentation/outlines, GET /api/segmentation/surface
 void add_segmenting(Server& server, Workbench& workbench, const std::shared_ptr<CtMemory>& memory);
 /// POST /api/case/save

@@ -13,8 +13,9 @@
 namespace marrow::workbench {
 
 /// A draft's document has the keys of case.yaml (docs/case.md), with these differences: paths are relative to the
-/// opened folder; `ct` is always a map or null; the poses `start` are 4 x 4 matrices; and there are `landmarks: [{name,
-/// fragment, model_mm, pixels: {view: [u, v]}, tracked_mm}]`, where only the name is required.
+/// opened folder; `ct` is always a map or null, and `surface` of a fragment a map; the poses `start` are 4 x 4
+/// matrices; and there are `landmarks: [{name, fragment, model_mm, pixels: {view: [u, v]}, tracked_mm}]`, where only
+/// the name is required.
 class Drafts {
  public:
   explicit Drafts(const OpenedFolder& folder) : folder_(folder) {}

@@ -110,6 +110,10 @@ std::shared_ptr<const PlacedCase> open_case(const std::string& path, const Workb
   PipelineCall call{workbench_pipeline("place")};
   call.arguments.inputs = {{"case", workbench.folder.inside(path).string()}};
   std::map<std::string, Value> made = outputs_of(call, workbench, job);
+  const Value& drawn = made.at("radiographs");
+  if (drawn.is_absent() ||
+      std::any_of(drawn.items.begin(), drawn.items.end(), [](const Value& item) { return item.is_absent(); }))
+    throw Error("this case has no CT, and this page shows bones by their radiographs; add the CT to the case");
   const auto placed = std::make_shared<PlacedCase>();
   placed->path = path;
   placed->views = made.at("views").as_list<View>();

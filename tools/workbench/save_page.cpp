@@ -14,24 +14,52 @@ namespace {
 
 using nlohmann::json;
 
-/// Reads the written case as a pipeline does, and checks that its seeds are in the CT.
+bool is_inside(const Grid& grid, const Eigen::Vector3d& point_mm) {
+  const Eigen::Vector3d index = grid.index_from_point(point_mm);
+  for (int k = 0; k < 3; ++k)
+    if (!(index[k] >= -0.5 && index[k] <= grid.size[std::size_t(k)] - 0.5)) return false;
+  return true;
+}
+
+/// Whether a voxel of the mask lies in the grid.
+bool meets(const Grid& grid, const Volume& mask) {
+  std::size_t at = 0;
+  for (int z = 0; z < mask.grid.size[2]; ++z)
+    for (int y = 0; y < mask.grid.size[1]; ++y)
+      for (int x = 0; x < mask.grid.size[0]; ++x)
+        if (mask.values[at++] > 0 && is_inside(grid, mask.grid.point_from_index(Eigen::Vector3d(x, y, z)))) return true;
+  return false;
+}
+
+/// Throws Error with all fragments that are not in the CT.
+void check_fragments(const Grid& ct, const std::map<std::string, Value>& outputs) {
+  std::string faults;
+  const auto miss = [&](const std::string& fragment, const std::string& fault) {
+    faults += (faults.empty() ? "" : "\n") + ("fragment " + in_quotes(printable(fragment)) + ": " + fault);
+  };
+  for (const Seeds& seeds : outputs.at("seeds").as_list<Seeds>())
+    for (const Eigen::Vector3d& point_mm : seeds.points_mm)
+      if (!is_inside(ct, point_mm)) miss(seeds.fragment, "a seed lies outside the CT; move it into the bone");
+  const auto masks = outputs.at("label").as_list<Volume>();
+  for (std::size_t i = 0; i < masks.size(); ++i)
+    if (!meets(ct, masks[i])) miss(masks.name(i), "its label lies outside the CT; were both made from the same scan?");
+  const auto surfaces = outputs.at("surface").as_list<Mesh>();
+  for (std::size_t i = 0; i < surfaces.size(); ++i)
+    if (std::none_of(surfaces[i].vertices_mm.begin(), surfaces[i].vertices_mm.end(),
+                     [&](const Eigen::Vector3d& vertex_mm) { return is_inside(ct, vertex_mm); }))
+      miss(surfaces.name(i),
+           "its surface lies outside the CT; is it in cm, in another frame (RAS), or of another scan?");
+  if (!faults.empty()) throw Error(faults);
+}
+
+/// Reads the written case as a pipeline does, and checks that its fragments are in the CT.
 void check_case(const fs::path& place, bool has_landmarks, const Workbench& workbench, Job& job) {
-  PipelineCall call{.file = workbench_pipeline("case"), .only = {"ct", "seeds", "views"}, .keep = false};
+  PipelineCall call{
+      .file = workbench_pipeline("case"), .only = {"ct", "seeds", "label", "surface", "views"}, .keep = false};
   call.arguments.inputs.push_back({"case", place.string()});
   if (has_landmarks) call.only.push_back("landmarks");
   const auto outputs = outputs_of(call, workbench, job);
-  const Grid& grid = outputs.at("ct").as<Volume>().grid;
-  std::string faults;
-  for (const Seeds& seeds : outputs.at("seeds").as_list<Seeds>())
-    for (const Eigen::Vector3d& point_mm : seeds.points_mm) {
-      const Eigen::Vector3d index = grid.index_from_point(point_mm);
-      bool is_inside = true;
-      for (int k = 0; k < 3; ++k) is_inside = is_inside && index[k] >= -0.5 && index[k] <= grid.size[k] - 0.5;
-      if (!is_inside)
-        faults += (faults.empty() ? "" : "\n") + std::string("fragment ") + in_quotes(printable(seeds.fragment)) +
-                  ": a seed lies outside the CT; move it into the bone";
-    }
-  if (!faults.empty()) throw Error(faults);
+  if (const Value& ct = outputs.at("ct"); !ct.is_absent()) check_fragments(ct.as<Volume>().grid, outputs);
 }
 
 /// The texts of a case's files, with the comments of the existing ones.
@@ -71,11 +99,12 @@ json save(const std::string& case_path, int revision, Workbench& workbench, CtMe
   const CaseTexts texts = texts_of(place, plan, document);
   job.tell({{"event", "message"}, {"text", "writing and reading back"}});
   const json& ct = document["ct"];
-  const fs::path old_ct = workbench.folder.inside(ct["file"]), new_ct = place / plan.document["ct"]["file"];
-  const std::string content = content_of_ct(old_ct, ct, FilesOfCt(old_ct));
+  const auto content_at = [&](const fs::path& file) { return content_of_ct(file, ct, FilesOfCt(file)); };
+  const std::string content = ct.is_object() ? content_at(workbench.folder.inside(ct["file"])) : "";
   write_case_files(place, plan, texts.case_yaml, texts.landmarks_yaml,
                    [&](const fs::path& staged) { check_case(staged, !texts.landmarks_yaml.empty(), workbench, job); });
-  memory.add_copy(content, content_of_ct(new_ct, ct, FilesOfCt(new_ct)));  // so that it is not read again
+  if (ct.is_object())  // so that it is not read again
+    memory.add_copy(content, content_at(place / plan.document["ct"]["file"]));
   json copied = json::array();
   for (const PlannedCase::File& file : plan.files)
     if (file.is_new) copied.push_back(file.name);

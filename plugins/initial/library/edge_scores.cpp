@@ -33,7 +33,7 @@ EdgeScores::EdgeScores(const View& view, const EdgeMap& edges, double cell_px)
     : columns_(int(std::ceil(view.camera.width_px / cell_px))),
       rows_(int(std::ceil(view.camera.height_px / cell_px))),
       cell_px_(cell_px) {
-  constexpr double kMatchedOfBone = 0.95, kReach_cells = 4;
+  constexpr double kMatchedOfBone = 0.95, kReach_cells = 7;
   cv::Mat usable(rows_, columns_, CV_8U, cv::Scalar(255));
   if (!view.mask.empty()) cv::resize(view.mask, usable, usable.size(), 0, 0, cv::INTER_NEAREST);
   std::vector<cv::Mat> matched(kSectors);  // 1 at an edge, 0 from the reach on

@@ -27,13 +27,14 @@ class Evidence {
   std::vector<RigidTransform> best(const std::vector<RigidTransform>& poses, std::size_t count) const;
 
   /// Moves each pose to one of more evidence, by turns of `step_deg` and shifts of `step_mm` about and along six axes,
-  /// twice each. Turns are about the model's middle; if a view does not show that, about the middle of the views.
+  /// twice each. Turns are about the model's middle; if a view does not show that, about the middle of the views. An
+  /// outline is drawn once for each round of moves. A move is judged by where it takes these points of the surface; the
+  /// evidence of all moves of a round, drawn, decides whether they count.
   void climb(std::vector<RigidTransform>& poses, const Eigen::Vector3d& model_middle_mm, double step_deg,
              double step_mm) const;
 
  private:
-  RigidTransform climbed(const RigidTransform& pose, const Eigen::Vector3d& pivot_mm, double step_deg,
-                         double step_mm) const;
+  struct Climber;
 
   const Seen& seen_;
   const Eigen::Vector3d middle_mm_;

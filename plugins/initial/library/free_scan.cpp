@@ -117,7 +117,6 @@ struct Slide {
 /// The best place of the model in one orientation, with one of its points in view.
 struct Placed {
   int score = std::numeric_limits<int>::min();
-  int rotation = 0;
   RigidTransform world_from_model;
   Eigen::Vector3d middle_mm = Eigen::Vector3d::Zero();  ///< of the model, in the world
 };
@@ -133,6 +132,7 @@ class Scan {
     radius_mm = std::min(radius_mm, space_.width_mm);
     cell_mm_ = std::min(2 * radius_mm, space_.width_mm) / 40;
     places_mm_ = places_in(space_, seen.views, 2 * cell_mm_);
+    set_ranges();
     std::size_t first = 0;
     for (std::size_t view = 0; view < seen.views.size(); ++view) {
       slides_.emplace_back(seen.views[view], seen.edges[view], space_.middle_mm, cell_mm_, radius_mm);
@@ -149,17 +149,19 @@ class Scan {
       for (const Eigen::Vector3d& place : places_mm_) indices_.push_back(slide.index_of(place));
   }
 
+  /// For each orientation, aim and range of depths, the ranges last.
   std::vector<Placed> run(Context& context) const {
-    std::vector<Placed> all(std::size_t(rotations_) * aims_.size());
+    std::vector<Placed> all(std::size_t(rotations_) * aims_.size() * ranges());
     tbb::parallel_for(0, rotations_, [&](int rotation) {
       context.check_cancelled();
       std::vector<std::int16_t> sums(sums_);
       for (std::size_t k = 0; k < aims_.size(); ++k)
-        all[std::size_t(rotation) * aims_.size() + k] = best(rotation, aims_[k], sums);
+        best(rotation, aims_[k], sums, &all[(std::size_t(rotation) * aims_.size() + k) * ranges()]);
     });
     return all;
   }
 
+  std::size_t ranges() const { return range_ends_.size(); }
   const Eigen::Vector3d& middle_mm() const { return space_.middle_mm; }
   double cell_mm() const { return cell_mm_; }
   /// Neighbours: a registration from one may well end where one from the other does.
@@ -170,30 +172,45 @@ class Scan {
   }
 
  private:
+  /// Of one view, each doubling of the depth is a range of its own: far outlines are short, so their scores scatter
+  /// less, and near ones that are only nearly right would never come first. The places are in the order of their depth.
+  void set_ranges() {
+    double begin_mm = space_.nearest_mm;
+    for (std::size_t place = 0; seen_.views.size() == 1 && place < places_mm_.size(); ++place) {
+      const double depth_mm = (seen_.views[0].camera.camera_from_world * places_mm_[place]).z();
+      if (depth_mm < 1.99 * begin_mm) continue;
+      range_ends_.push_back(place);
+      begin_mm = depth_mm;
+    }
+    range_ends_.push_back(places_mm_.size());
+  }
+
   RigidTransform placed_at(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& aim,
                            const Eigen::Vector3d& at_mm) const {
     return {"world", seen_.model.frame, rotation, at_mm - rotation * aim};
   }
 
-  Placed best(int number, const Eigen::Vector3d& aim, std::vector<std::int16_t>& sums) const {
+  /// The best place in each range of depths.
+  void best(int number, const Eigen::Vector3d& aim, std::vector<std::int16_t>& sums, Placed* placed) const {
     constexpr double kSpacing_cells = 1.5;
     const Eigen::Matrix3d rotation = seen_.views[0].camera.camera_from_world.rotation.transpose() *
                                      orientation(number, rotations_) * frame_.axes.transpose();
     const RigidTransform in_middle = placed_at(rotation, aim, space_.middle_mm);
     for (const Slide& slide : slides_)
       slide.slide(seen_.projector.outline(slide.drawn, in_middle, kSpacing_cells * Slide::kFine), sums);
-    Placed placed;
-    std::size_t at = 0;
-    for (std::size_t place = 0; place < places_mm_.size(); ++place) {
-      int score = 0;
-      for (std::size_t view = 0; view < slides_.size(); ++view)
-        score += sums[indices_[view * places_mm_.size() + place]];
-      if (score > placed.score) placed.score = score, at = place;
+    std::size_t place = 0;
+    for (const std::size_t end : range_ends_) {
+      std::size_t at = place;
+      for (; place < end; ++place) {
+        int score = 0;
+        for (std::size_t view = 0; view < slides_.size(); ++view)
+          score += sums[indices_[view * places_mm_.size() + place]];
+        if (score > placed->score) placed->score = score, at = place;
+      }
+      placed->world_from_model = placed_at(rotation, aim, places_mm_[at]);
+      placed->middle_mm = placed->world_from_model * frame_.origin_mm;
+      ++placed;
     }
-    placed.rotation = number;
-    placed.world_from_model = placed_at(rotation, aim, places_mm_[at]);
-    placed.middle_mm = placed.world_from_model * frame_.origin_mm;
-    return placed;
   }
 
   const Seen& seen_;
@@ -201,6 +218,7 @@ class Scan {
   const int rotations_;
   const SeenSpace space_;
   std::vector<Eigen::Vector3d> aims_, places_mm_;
+  std::vector<std::size_t> range_ends_;  ///< the first place behind each range of depths
   double cell_mm_ = 1;
   std::vector<Slide> slides_;
   std::size_t sums_ = 0;
@@ -211,16 +229,21 @@ class Scan {
 
 Scanned free_scan(const Seen& seen, const FragmentFrame& frame, int rotations, std::size_t poses, Context& context) {
   const Scan scan(seen, frame, rotations);
-  std::vector<Placed> all = scan.run(context);
-  std::stable_sort(all.begin(), all.end(), [](const Placed& a, const Placed& b) { return a.score > b.score; });
-  std::vector<Placed> chosen;
+  const std::vector<Placed> all = scan.run(context);
+  const std::size_t ranges = scan.ranges();
   Scanned scanned{{}, scan.middle_mm(), scan.cell_mm()};
-  for (const Placed& placed : all) {
-    if (chosen.size() == poses) break;
-    if (std::any_of(chosen.begin(), chosen.end(), [&](const Placed& other) { return scan.near(placed, other); }))
-      continue;
-    chosen.push_back(placed);
-    scanned.poses.push_back(placed.world_from_model);
+  for (std::size_t range = 0; range < ranges; ++range) {
+    std::vector<Placed> in_range, chosen;
+    for (std::size_t i = range; i < all.size(); i += ranges) in_range.push_back(all[i]);
+    std::stable_sort(in_range.begin(), in_range.end(),
+                     [](const Placed& a, const Placed& b) { return a.score > b.score; });
+    for (const Placed& placed : in_range) {
+      if (chosen.size() == poses / ranges) break;
+      if (std::any_of(chosen.begin(), chosen.end(), [&](const Placed& other) { return scan.near(placed, other); }))
+        continue;
+      chosen.push_back(placed);
+      scanned.poses.push_back(placed.world_from_model);
+    }
   }
   return scanned;
 }

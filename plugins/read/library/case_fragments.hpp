@@ -19,6 +19,7 @@ struct CaseFiles {
   List<Volume> label;
   List<Mesh> surface;
   List<View> views;
+  List<geometry::CameraDeviations> camera_deviations;  ///< of each view, also if nothing is stated
   List<Pose> start;
   List<Truth> truth;
   std::vector<std::string> registered;  ///< names of the fragments whose pose is wanted

@@ -51,7 +51,11 @@ ViewCamera read_view_camera(const ViewSource& source, const Image& image, const 
     camera.camera.camera = *source.camera;
   else
     camera.camera = camera_in_file(source, image, context);
-  if (!source.calibration.empty()) camera.calibration = read::read_calibration_file(source.calibration);
+  if (!source.calibration.empty()) {
+    camera.calibration = read::read_calibration_file(source.calibration);
+    camera.camera.deviations.focal_percent.reset();  // that of the camera file's matrix, which is replaced
+    camera.camera.deviations.centre_px.reset();
+  }
   const bool in_calibration = camera.calibration && !camera.calibration->distortion.is_none();
   if (camera.camera.is_distorted() && camera.calibration)
     throw_two_distortions(source.name, source.camera_file, source.calibration);
@@ -73,11 +77,11 @@ View view_of(const std::string& name, Image image, const ViewCamera& camera) {
   return view;
 }
 
-View read_view_files(const ViewSource& source, const Context& context) {
+ViewAsStated read_view_files(const ViewSource& source, const Context& context) {
   check_item_name("view", source.name);
   Image image = files::turned_over(files::read_image_file(source.image, source.frame), source.mirror);
   const ViewCamera camera = read_view_camera(source, image, context);
-  return view_of(source.name, std::move(image), camera);
+  return {view_of(source.name, std::move(image), camera), camera.camera.deviations};
 }
 
 }  // namespace marrow::read

@@ -44,7 +44,13 @@ ViewCamera read_view_camera(const ViewSource& source, const Image& image, const 
 /// A view with a plain pinhole camera: a distortion is removed from the image. Throws Error if sizes do not match.
 View view_of(const std::string& name, Image image, const ViewCamera& camera);
 
+/// A view, and how exactly its camera is known.
+struct ViewAsStated {
+  View view;
+  geometry::CameraDeviations camera_deviations;
+};
+
 /// Reads a view. Throws Error as the functions above do, or if the image cannot be read.
-View read_view_files(const ViewSource& source, const Context& context);
+ViewAsStated read_view_files(const ViewSource& source, const Context& context);
 
 }  // namespace marrow::read

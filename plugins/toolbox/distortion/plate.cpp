@@ -22,6 +22,8 @@ constexpr double kSizeStep = 1.3;        ///< ratio of the diameters that are tr
 constexpr double kLeastRoundness = 0.5;  ///< of a dot that the border of the field does not cut
 constexpr double kLeastStrength = 0.8;   ///< of the median of a dot and its neighbours
 constexpr double kNearlyAsMany = 0.92;   ///< of the most dots
+constexpr int kLeastForTilt = 60;        ///< dots
+constexpr double kLeastAtBorder = 0.5;   ///< of a dot's brightness, around it
 
 cv::Mat1f grey_of(const Image& image) {
   if (image.pixels.empty() || image.pixels.channels() != 1)
@@ -48,7 +50,7 @@ std::vector<PlateImage> candidates(const cv::Mat1f& grey, const PlateSearch& sea
       const std::vector<Spot> spots = find_spots(grey, 0.5 * diameter, is_bright);
       for (const Pattern grid : {Pattern::square, Pattern::hexagonal}) {
         if (search.grid && *search.grid != grid) continue;
-        all.push_back({grid, is_bright, diameter, spots, find_grid(spots, grid)});
+        all.push_back({grid, is_bright, diameter, spots, find_grid(spots, grid), {}});
       }
     }
   return all;
@@ -89,8 +91,30 @@ double stretch_of(const Eigen::Matrix2d& map) {
   return std::sqrt(squares[1] / squares[0]);
 }
 
-/// Which dots are round, and stand out nearly as much as their neighbours in the grid do.
-std::vector<bool> which_are_whole(const PlateImage& plate) {
+/// The image with everything closed that is narrower than `width_px`.
+cv::Mat1f closed_of(const cv::Mat1f& grey, double width_px) {
+  const int width = 2 * int(std::ceil(0.5 * width_px)) + 1;
+  cv::Mat1f closed;
+  cv::morphologyEx(grey, closed, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_RECT, {width, width}));
+  return closed;
+}
+
+/// The least brightness within three quarters of a dot's diameter of each pixel, as a share of that of the pixel. Both
+/// are above the darkest, and the plate itself is closed. At the border of the field it is small.
+cv::Mat1f share_around(const cv::Mat1f& grey, double spacing, double dot_px) {
+  const cv::Mat1f closed = closed_of(grey, 2 * spacing);
+  double darkest = 0;
+  cv::minMaxLoc(closed, &darkest, nullptr);
+  const int reach = 2 * int(std::ceil(0.75 * dot_px)) + 1;
+  cv::Mat1f least, share;
+  cv::erode(closed, least, cv::getStructuringElement(cv::MORPH_ELLIPSE, {reach, reach}));
+  cv::divide(least - darkest, closed - darkest + 1e-9, share);
+  return share;
+}
+
+/// Which dots are round, stand out nearly as much as their neighbours in the grid do, and lie inside the field.
+std::vector<bool> which_are_whole(const PlateImage& plate, const cv::Mat1f& grey) {
+  const cv::Mat1f around = share_around(grey, spacing_px(plate.spots, plate.dots, plate.grid), plate.dot_px);
   std::map<std::pair<int, int>, double> strengths;
   for (const GridDot& dot : plate.dots) strengths[{dot.column, dot.row}] = plate.spots[std::size_t(dot.spot)].strength;
   std::vector<bool> whole;
@@ -101,7 +125,10 @@ std::vector<bool> which_are_whole(const PlateImage& plate) {
         if (const auto one = strengths.find({dot.column + column, dot.row + row}); one != strengths.end())
           near.push_back(one->second);
     const Spot& spot = plate.spots[std::size_t(dot.spot)];
-    whole.push_back(spot.roundness > kLeastRoundness && spot.strength > kLeastStrength * quantile_in_place(near, 0.5));
+    const int u = std::clamp(int(std::lround(spot.at_px.x())), 0, grey.cols - 1),
+              v = std::clamp(int(std::lround(spot.at_px.y())), 0, grey.rows - 1);
+    whole.push_back(spot.roundness > kLeastRoundness && around(v, u) > kLeastAtBorder &&
+                    spot.strength > kLeastStrength * quantile_in_place(near, 0.5));
   }
   return whole;
 }
@@ -135,7 +162,9 @@ PlateImage find_plate(const Image& image, const PlateSearch& search, std::size_t
         formatted("{} dots or holes of a regular grid were found; at least {} are needed. Check that the image shows "
                   "the plate alone, and give grid, dots and dot_px if they are known",
                   most, least_dots));
-  return *best;
+  PlateImage found = *best;
+  found.is_whole = which_are_whole(found, grey);
+  return found;
 }
 
 StraightPlate straight_plate(const PlateImage& plate, Straight straight, int width_px, int height_px) {
@@ -144,7 +173,14 @@ StraightPlate straight_plate(const PlateImage& plate, Straight straight, int wid
     places.push_back(place_on_plate(plate.grid, dot.column, dot.row));
     seen.push_back(plate.spots[std::size_t(dot.spot)].at_px);
   }
-  if (straight == Straight::homography) places = with_perspective(places, seen);
+  StraightPlate result;
+  if (straight == Straight::homography) {
+    places = with_perspective(places, seen);
+  } else if (std::count(plate.is_whole.begin(), plate.is_whole.end(), true) >= kLeastForTilt) {
+    result.tilt = tilt_of(places, seen, plate.is_whole, width_px, height_px);
+    result.is_tilted = straight == Straight::automatic && result.tilt.is_certain();
+  }
+  if (result.is_tilted) places = result.tilt.places;
   const Eigen::Vector2d middle(0.5 * (width_px - 1), 0.5 * (height_px - 1));
   std::size_t central = 0;
   for (std::size_t i = 0; i < seen.size(); ++i)
@@ -160,16 +196,15 @@ StraightPlate straight_plate(const PlateImage& plate, Straight straight, int wid
   if (!derivative.allFinite() || !(std::abs(derivative.determinant()) > 0) || !origin.allFinite())
     throw Error("the dots of the plate do not determine where its middle is; they may lie on one line");
   const Eigen::Matrix2d image_from_plate =
-      straight == Straight::similarity ? nearest_similarity(derivative) : derivative;
-  const std::vector<bool> whole = which_are_whole(plate);
-  StraightPlate result;
+      straight == Straight::similarity || straight == Straight::automatic ? nearest_similarity(derivative) : derivative;
   result.stretch = stretch_of(derivative);
   result.points.width_px = width_px;
   result.points.height_px = height_px;
   for (std::size_t i = 0; i < places.size(); ++i)
-    result.points.add(anchor + image_from_plate * (places[i] - origin), seen[i], whole[i]);
-  result.pixels_per_spacing =
-      straight == Straight::homography ? spacing : std::sqrt(std::abs(image_from_plate.determinant()));
+    result.points.add(anchor + image_from_plate * (places[i] - origin), seen[i], plate.is_whole[i]);
+  result.pixels_per_spacing = straight == Straight::homography || result.is_tilted
+                                  ? spacing
+                                  : std::sqrt(std::abs(image_from_plate.determinant()));
   return result;
 }
 
@@ -184,9 +219,7 @@ double covered_share(const std::vector<Eigen::Vector2d>& points, double reach_px
 
 cv::Mat1b field_of(const Image& image, double width_px) {
   const cv::Mat1f grey = grey_of(image);
-  const int width = 2 * int(std::ceil(0.5 * width_px)) + 1;
-  cv::Mat1f closed;
-  cv::morphologyEx(grey, closed, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_RECT, {width, width}));
+  const cv::Mat1f closed = closed_of(grey, width_px);
   std::vector<float> sorted(closed.begin(), closed.end());
   const double bright = quantile_in_place(sorted, 0.95), dark = sorted.empty() ? 0 : quantile_in_place(sorted, 0.0);
   return closed > dark + 0.25 * (bright - dark);

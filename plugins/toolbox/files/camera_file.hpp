@@ -5,13 +5,15 @@
 #include "marrow/domain/calibration.hpp"
 #include "marrow/domain/camera.hpp"
 #include "marrow/toolbox/distortion/distortion.hpp"
+#include "marrow/toolbox/geometry/camera_deviations.hpp"
 
 namespace marrow::files {
 
-/// A camera as read from its file: the pinhole model, and the distortion that is still in its images: the radial one of
-/// the base or a measured one, not both.
+/// A camera as read from its file: the pinhole model, how exactly it is known, and the distortion that is still in its
+/// images: the radial one of the base or a measured one, not both.
 struct CameraInFile : DistortedCamera {
   distortion::Distortion measured;
+  geometry::CameraDeviations deviations{};  ///< how exactly it is known
 
   bool is_distorted() const { return !distortion.is_none() || !measured.is_none(); }
 };

@@ -36,6 +36,6 @@ enum class JpegProcess { baseline, extended, lossless };
 std::vector<std::byte> decode_jpeg(CodedImage image, JpegProcess process);
 /// `is_lossless`: as the transfer syntax says.
 std::vector<std::byte> decode_jpeg_ls(const CodedImage& image, bool is_lossless);
-std::vector<std::byte> decode_jpeg_2000(const CodedImage& image);
+std::vector<std::byte> decode_jpeg_2000(CodedImage image);
 
 }  // namespace marrow::files

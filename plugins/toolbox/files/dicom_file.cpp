@@ -44,6 +44,7 @@ constexpr KnownSyntax kSyntaxes[] = {{"1.2.840.10008.1.2", "implicit little endi
                                      {"1.2.840.10008.1.2.4.100", "MPEG-2", false},
                                      {"1.2.840.10008.1.2.4.102", "MPEG-4", false},
                                      {"1.2.840.10008.1.2.4.201", "high-throughput JPEG 2000 lossless", false},
+                                     {"1.2.840.10008.1.2.4.202", "high-throughput JPEG 2000 lossless", false},
                                      {"1.2.840.10008.1.2.4.203", "high-throughput JPEG 2000", false}};
 
 constexpr std::uint32_t kGroupsOfValues[] = {
@@ -60,6 +61,7 @@ constexpr std::uint32_t kGroupsOfValues[] = {
     0x00209116,  // PlaneOrientationSequence
     0x00209450,  // PatientOrientationInFrameSequence
     0x00283000,  // ModalityLUTSequence
+    0x00289422,  // PixelIntensityRelationshipLUTSequence
     0x00289110,  // PixelMeasuresSequence
     0x00289145,  // PixelValueTransformationSequence
     0x00289443,  // FramePixelDataPropertiesSequence
@@ -229,16 +231,17 @@ class DicomWalk {
 
   void check_syntax() const {
     const std::string& uid = into_.transfer_syntax_;
-    std::string name = "unknown";
+    const std::string start = what() + ": is written in the transfer syntax " + uid;
     for (const KnownSyntax& known : kSyntaxes) {
       if (uid != known.uid) continue;
       if (known.is_read) return;
-      name = known.name;
+      throw Error(start + " (" + known.name +
+                  "), which is not read, nor does gdcmconv; export it again without compression (explicit VR little "
+                  "endian)");
     }
     if (uid.find_first_not_of("0123456789.") != std::string::npos || uid.empty())
       damaged("it does not say how it is written (TransferSyntaxUID)");
-    throw Error(what() + ": is written in the transfer syntax " + uid + " (" + name +
-                "), which is not read; convert it: gdcmconv --raw IN OUT");
+    throw Error(start + " (unknown), which is not read; convert it: gdcmconv --raw IN OUT");
   }
 
   /// Reads elements up to `end` or, if `delimited`, up to the delimiter of the item that holds them.

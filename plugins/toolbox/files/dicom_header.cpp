@@ -57,6 +57,8 @@ std::optional<std::vector<double>> binary_numbers(const std::string& bytes, Dico
   return numbers;
 }
 
+bool is_there(const DicomElement* element) { return element && (element->value.bytes > 0 || !element->items.empty()); }
+
 }  // namespace
 
 std::string without_padding(std::string value) {
@@ -70,7 +72,7 @@ std::string DicomTag::text() const { return formatted("{} ({:04x},{:04x})", name
 
 /// Looks for the element in a functional group, then in the sequences inside it.
 const DicomElement* DicomHeader::find_inside(const DicomElements& elements, std::uint32_t tag) const {
-  if (const auto* element = find_element(path(), elements, tag); element && element->value.bytes > 0) return element;
+  if (const auto* element = find_element(path(), elements, tag); is_there(element)) return element;
   for (const DicomElement& element : elements) {
     if (!is_group_of_values(element.tag)) continue;
     for (const DicomElements& item : element.items)
@@ -88,8 +90,7 @@ const DicomElement* DicomHeader::find(const DicomTag& tag) const {
     if (const auto* element = find_inside(sequence->items[item], tag.code())) return element;
   }
   const auto* element = find_element(path(), file_.elements(), tag.code());
-  if (element && (element->value.bytes > 0 || !element->items.empty())) return element;
-  return nullptr;
+  return is_there(element) ? element : nullptr;
 }
 
 std::string DicomHeader::bytes_of(const DicomElement& element, const DicomTag& tag) const {

@@ -36,6 +36,7 @@ inline constexpr DicomTag kRows{0x0028, 0x0010, "Rows", DicomTag::Kind::us};
 inline constexpr DicomTag kColumns{0x0028, 0x0011, "Columns", DicomTag::Kind::us};
 inline constexpr DicomTag kPixelRepresentation{0x0028, 0x0103, "PixelRepresentation", DicomTag::Kind::us};
 inline constexpr DicomTag kPixelSpacing{0x0028, 0x0030, "PixelSpacing"};
+inline constexpr DicomTag kIntensity{0x0028, 0x1040, "PixelIntensityRelationship"};
 inline constexpr DicomTag kRescaleSlope{0x0028, 0x1053, "RescaleSlope"};
 
 /// The value of an element of text without the blanks and zeros around it.

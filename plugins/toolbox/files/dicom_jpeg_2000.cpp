@@ -31,10 +31,32 @@ void check_size_segment(const CodedImage& image) {
   const int enough = is_signed == image.is_signed ? std::max(bits, image.bits_stored) : bits;
   check_coded(image, (long long)(right) - (long long)(left), (long long)(bottom) - (long long)(top), int(number(40, 2)),
               enough);
+  const std::uint64_t capabilities = number(6, 2);  // Rsiz
+  if (capabilities & 0x4000) throw CodecNotRead("its pixels are compressed by high-throughput JPEG 2000 (part 15)");
+  if (capabilities & 0x8000) throw CodecNotRead("its pixels are compressed by JPEG 2000 with extensions (part 2)");
   if (bytes[43] != 1 || bytes[44] != 1) throw CodecError("the compressed pixels have only a part of their samples");
   if (is_signed && !image.is_signed) throw CodecError("the compressed pixels have a sign, the header says none");
   if (tile_columns == 0 || tile_rows == 0 || (right / tile_columns + 1) * (bottom / tile_rows + 1) > kMostTiles)
     throw CodecError("the compressed pixels tell of more than 4096 tiles");
+}
+
+/// Takes away the boxes of a JP2 file (ITU T.800, annex I), in which some programs put the codestream.
+void unbox(CodedImage& image) {
+  const std::string_view bytes = image.bytes;
+  if (bytes.substr(0, 12) != std::string_view("\0\0\0\x0CjP  \r\n\x87\n", 12)) return;
+  for (std::size_t at = 0; at + 8 <= bytes.size();) {
+    const std::string_view type = bytes.substr(at + 4, 4);
+    const std::size_t length = std::size_t(number_in_bytes(bytes.substr(at, 4), true));
+    if (type == "jp2h" && bytes.substr(at + 8, length).find("pclr") != std::string_view::npos)
+      throw CodecNotRead("its pixels are compressed numbers of colours in a table (JP2 with a palette)");
+    if (type == "jp2c" && length != 1) {  // 1: a length of 8 bytes follows
+      image.bytes = std::string(bytes.substr(at + 8, length == 0 ? bytes.npos : std::max<std::size_t>(length, 8) - 8));
+      return;
+    }
+    if (length < 8) break;
+    at += length;
+  }
+  throw CodecError("no JPEG 2000 lies in the boxes of a JP2 file around the pixels");
 }
 
 /// Bytes that OpenJPEG reads one after the other.
@@ -102,7 +124,8 @@ Owned<opj_image_t> decoded_picture(const CodedImage& image) {
 
 }  // namespace
 
-std::vector<std::byte> decode_jpeg_2000(const CodedImage& image) {
+std::vector<std::byte> decode_jpeg_2000(CodedImage image) {
+  unbox(image);
   check_size_segment(image);
   const Owned<opj_image_t> picture = decoded_picture(image);
   const opj_image_comp_t& only = picture->comps[0];

@@ -13,13 +13,33 @@ namespace marrow::files {
 namespace {
 
 constexpr DicomTag kTable{0x0028, 0x3000, "ModalityLUTSequence"};
+constexpr DicomTag kIntensityTables{0x0028, 0x9422, "PixelIntensityRelationshipLUTSequence"};
+constexpr DicomTag kTableFunction{0x0028, 0x9474, "LUTFunction"};
 constexpr DicomTag kLayout{0x0028, 0x3002, "LUTDescriptor"};
 constexpr DicomTag kTableType{0x0028, 0x3004, "ModalityLUTType"};
 constexpr DicomTag kEntries{0x0028, 0x3006, "LUTData"};
 
 [[noreturn]] void damaged_table(const DicomHeader& header, const std::string& fault) {
-  throw Error(header.path().string() + ": is damaged: in the table for its values (" + kTable.text() + ") " + fault +
-              "; copy or export it again");
+  throw Error(header.path().string() + ": is damaged: in the table for its values (" +
+              (header.has(kTable) ? kTable : kIntensityTables).text() + ") " + fault + "; copy or export it again");
+}
+
+/// The item with the table for values: that of all images, or, where values are logarithms, the one of an enhanced XA
+/// that makes them linear (PS3.3 C.7.6.16.2.13). nullptr if there is none.
+const DicomElements* item_of_table(const DicomFile& file, const DicomHeader& header) {
+  if (const auto* items = header.items(kTable)) {
+    if (items->size() != 1) damaged_table(header, formatted("{} items stand where one should", items->size()));
+    return &items->front();
+  }
+  const auto* items = header.text(kIntensity).value_or("") == "LOG" ? header.items(kIntensityTables) : nullptr;
+  const DicomElements* found = nullptr;
+  for (std::size_t i = 0; items && i < items->size(); ++i) {
+    const DicomElement* function = find_element(header.path(), (*items)[i], kTableFunction.code());
+    if (!function || function->value.bytes > 64 || without_padding(file.text(function->value)) != "TO_LINEAR") continue;
+    if (found) damaged_table(header, "TO_LINEAR stands twice (" + kTableFunction.text() + ")");
+    found = &(*items)[i];
+  }
+  return found;
 }
 
 double value_of(const DicomPixels& pixels, double stored) {
@@ -43,11 +63,10 @@ double DicomTable::value_of(double stored) const {
 }
 
 std::optional<DicomTable> read_dicom_table(const DicomFile& file, const DicomHeader& header) {
-  const std::vector<DicomElements>* items = header.items(kTable);
-  if (!items) return std::nullopt;
-  if (items->size() != 1) damaged_table(header, formatted("{} items stand where one should", items->size()));
+  const DicomElements* const item = item_of_table(file, header);
+  if (!item) return std::nullopt;
   const auto bytes = [&](const DicomTag& tag, std::uint64_t most) {
-    const DicomElement* element = find_element(header.path(), (*items)[0], tag.code());
+    const DicomElement* element = find_element(header.path(), *item, tag.code());
     if (!element || element->value.bytes == 0) damaged_table(header, tag.text() + " is missing");
     if (element->value.bytes > most)
       damaged_table(header, formatted("{} has {} bytes", tag.text(), element->value.bytes));
@@ -73,7 +92,7 @@ std::optional<DicomTable> read_dicom_table(const DicomFile& file, const DicomHea
     table.entries.push_back(are_bytes ? std::uint8_t(entries[i]) : word(entries, 2 * i));
   if (*std::max_element(table.entries.begin(), table.entries.end()) >> table.bits != 0)
     damaged_table(header, formatted("an entry has more than {} bits", table.bits));
-  const DicomElement* type = find_element(header.path(), (*items)[0], kTableType.code());
+  const DicomElement* type = find_element(header.path(), *item, kTableType.code());
   if (type && type->value.bytes <= 64) table.type = without_padding(file.text(type->value));
   return table;
 }

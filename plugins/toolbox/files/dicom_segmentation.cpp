@@ -204,7 +204,10 @@ class Segmentation {
   }
 
   void put_numbers(std::vector<float>& layer) {
+    std::map<std::size_t, std::size_t> frame_at;  // by its place
     for (std::size_t frame = 0; frame < frames_.size(); ++frame) {
+      if (const auto [other, is_new] = frame_at.emplace(place_of(frame), frame); !is_new)
+        refuse_segmentation(path(), formatted("frames {} and {} show the same slice", other->second + 1, frame + 1));
       const std::vector<float> values = to_float(frame_samples(frame));
       std::copy(values.begin(), values.end(), layer.begin() + std::ptrdiff_t(place_of(frame)));
     }

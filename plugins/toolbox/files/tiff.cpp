@@ -11,7 +11,7 @@ namespace marrow::files {
 namespace {
 
 void check_kind(const std::string& what, const TiffPage& page) {
-  static constexpr std::uint64_t kCompressions[] = {1, 5, 8, 32773, 32946};
+  static constexpr std::uint16_t kCompressions[] = {1, 5, 8, 32773, 32946};
   if (std::find(std::begin(kCompressions), std::end(kCompressions), page.compression) == std::end(kCompressions))
     throw Error(
         formatted("{}: its pixels are compressed by method {}, which is not read; save it with LZW, Deflate or without "
@@ -21,11 +21,6 @@ void check_kind(const std::string& what, const TiffPage& page) {
     throw Error(formatted(
         "{}: its pixels are stored in an unusual order (FillOrder {}, Orientation {}); save it again as a plain TIFF",
         what, page.fill_order, page.orientation));
-  if (page.predictor != 1 && !(page.predictor == 2 && page.compression != 1))
-    throw Error(
-        formatted("{}: its pixels are stored as differences of kind {}, which is not read; save it without a predictor "
-                  "(tiffcp -c lzw:1 does it)",
-                  what, page.predictor));
   if (page.subfile & 5) throw Error(what + ": holds a thumbnail or a mask beside its image; save the image alone");
 }
 
@@ -38,29 +33,25 @@ Samples::Type type_of(const std::string& what, const TiffPage& page) {
   if (page.bits == 32 && page.format == 1) return Type::u32;
   if (page.bits == 32 && page.format == 2) return Type::i32;
   if (page.bits == 32 && page.format == 3) return Type::f32;
+  if (page.bits == 64 && page.format == 3) return Type::f64;
   throw Error(
       formatted("{}: its pixels have {} bits in a format that is not read; save it with 8 or 16 bits, or as float",
                 what, page.bits));
 }
 
-void read_page(const InputFile& file, const TiffPages& tiff, const TiffPage& page, std::byte* to) {
-  const std::size_t row_bytes = std::size_t(page.width * page.samples_together()) * std::size_t(page.bits / 8);
-  std::uint64_t row = 0;  // the rows of a second plane follow those of the first
-  for (const TiffStrip& strip : page.strips) {
-    const std::uint64_t rows = std::min(page.rows_per_strip, page.height - row % page.height);
-    read_tiff_strip(file, tiff, page, strip, to + row * row_bytes, std::size_t(rows) * row_bytes);
-    row += rows;
-  }
-  if (page.orientation == 4)  // the first row is the bottom one
-    for (std::uint64_t plane = 0; plane < row; plane += page.height)
-      for (std::uint64_t v = 0; v < page.height / 2; ++v)
-        std::swap_ranges(to + (plane + v) * row_bytes, to + (plane + v + 1) * row_bytes,
-                         to + (plane + page.height - 1 - v) * row_bytes);
+/// An image of some scanners has its bottom row first.
+void turn_rows(const TiffPage& page, std::size_t width, std::byte* pixels) {
+  const std::size_t row_bytes = page.width * page.samples_together() * width;
+  const std::size_t planes = page.samples / page.samples_together();
+  for (std::size_t plane = 0; plane < planes; ++plane, pixels += page.height * row_bytes)
+    for (std::size_t v = 0; v < page.height / 2; ++v)
+      std::swap_ranges(pixels + v * row_bytes, pixels + (v + 1) * row_bytes,
+                       pixels + (page.height - 1 - v) * row_bytes);
 }
 
 /// Puts the samples of a pixel side by side.
 void join_planes(const TiffPage& page, std::size_t width, std::byte* pixels) {
-  const std::size_t count = std::size_t(page.width * page.height), each = std::size_t(page.samples);
+  const std::size_t count = std::size_t(page.width) * page.height, each = std::size_t(page.samples);
   const std::vector<std::byte> planes(pixels, pixels + count * each * width);
   for (std::size_t k = 0; k < each; ++k)
     for (std::size_t i = 0; i < count; ++i)
@@ -69,19 +60,18 @@ void join_planes(const TiffPage& page, std::size_t width, std::byte* pixels) {
 
 /// The colours of indices of 8 bits. The palette has 16 bits a value, of which screens show the upper 8.
 void look_up_colours(const std::string& what, const TiffPage& page, Samples& samples) {
-  if (page.palette.size() != 3 * 256)
-    throw Error(formatted("{}: is damaged: its palette has {} values, 768 expected; copy or export it again", what,
-                          page.palette.size()));
+  if (page.palette[0].empty())
+    throw Error(what + ": is damaged: its pixels are colours of a palette, but it has none; copy or export it again");
   std::vector<std::byte> colours(3 * samples.bytes.size());
   for (std::size_t i = 0; i < colours.size(); ++i)
-    colours[i] = std::byte(page.palette[i % 3 * 256 + std::size_t(samples.bytes[i / 3])] >> 8);
+    colours[i] = std::byte(page.palette[i % 3][std::size_t(samples.bytes[i / 3])] >> 8);
   samples.bytes = std::move(colours);
   samples.components = 3;
 }
 
 /// Whether its colours, or grey levels with an opacity, are of a kind that is read.
 bool has_plain_colours(const TiffPage& page) {
-  constexpr std::uint64_t kRgb = 2, kPalette = 3;
+  constexpr std::uint16_t kRgb = 2, kPalette = 3;
   if (page.format != 1 || (page.planes != 1 && page.planes != 2)) return false;
   if (page.photometric == kPalette) return page.samples == 1 && page.bits == 8;
   if (page.bits != 8 && page.bits != 16) return false;
@@ -130,7 +120,7 @@ Samples read_tiff(const std::filesystem::path& path) {
   samples.slope = tiff.slope;
   samples.intercept = tiff.intercept;
   samples.size = {int(first.width), int(first.height), int(tiff.pages.size())};
-  samples.components = int(std::min<std::uint64_t>(first.samples, 1000));
+  samples.components = first.samples;
   const bool is_grey = first.samples == 1 && first.photometric <= 1;
   if (!is_grey && !has_plain_colours(first)) {
     samples.components = std::max(samples.components, 3);
@@ -141,11 +131,15 @@ Samples read_tiff(const std::filesystem::path& path) {
   check_calibration(what, samples, first);
   check_size(what, {samples.size[0], samples.size[1], samples.size[2]}, file.size());
   const std::size_t width = bytes_each(samples.type);
-  const std::size_t page_bytes = std::size_t(first.width * first.height * first.samples) * width;
+  const std::size_t page_bytes = std::size_t(first.width) * first.height * first.samples * width;
   samples.bytes.resize(page_bytes * tiff.pages.size());
-  for (std::size_t i = 0; i < tiff.pages.size(); ++i) {
-    read_page(file, tiff, tiff.pages[i], samples.bytes.data() + i * page_bytes);
-    if (first.planes == 2 && first.samples > 1) join_planes(first, width, samples.bytes.data() + i * page_bytes);
+  TiffReader reader(file);
+  for (std::byte* to = samples.bytes.data(); const TiffPage& page : tiff.pages) {
+    reader.read_strips(page, to);
+    if (page.orientation == 4) turn_rows(page, width, to);
+    if (page.planes == 2 && page.samples > 1) join_planes(page, width, to);
+    to += page_bytes;
+    reader.next();
   }
   if (first.photometric == 3) look_up_colours(what, first, samples);
   if (first.photometric == 0) invert(what, samples);

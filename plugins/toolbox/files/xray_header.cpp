@@ -26,7 +26,6 @@ constexpr DicomTag kPrimaryIncrement{0x0018, 0x1520, "PositionerPrimaryAngleIncr
 constexpr DicomTag kSecondaryIncrement{0x0018, 0x1521, "PositionerSecondaryAngleIncrement"};
 constexpr DicomTag kPositionerMotion{0x0018, 0x1500, "PositionerMotion"};
 constexpr DicomTag kPatientPosition{0x0018, 0x5100, "PatientPosition"};
-constexpr DicomTag kIntensity{0x0028, 0x1040, "PixelIntensityRelationship"};
 constexpr DicomTag kIntensitySign{0x0028, 0x1041, "PixelIntensityRelationshipSign", DicomTag::Kind::ss};
 constexpr DicomTag kFieldOfViewOrigin{0x0018, 0x7030, "FieldOfViewOrigin"};
 constexpr DicomTag kIsocentreProjection{0x0018, 0x9430, "PositionOfIsocenterProjection", DicomTag::Kind::fl};
@@ -222,11 +221,11 @@ bool is_inverted(const DicomHeader& header, const DicomPixels& stored) {
 /// (PS3.3 C.8.7.1.1.2).
 void check_linear(const DicomHeader& header, const DicomPixels& stored) {
   if (header.text(kIntensity).value_or("") == "LOG" && !stored.table)
-    throw Error(
-        header.path().string() + ": its values are logarithms (" + kIntensity.text() +
-        " is LOG) without the table that makes them linear (ModalityLUTSequence), but those of an X-ray image must "
-        "rise linearly with the radiation; export it as linear (LIN), "
-        "or, where only contours are looked for, save it as PNG or TIFF with bright air");
+    throw Error(header.path().string() + ": its values are logarithms (" + kIntensity.text() +
+                " is LOG) without the table that makes them linear (ModalityLUTSequence, or a "
+                "PixelIntensityRelationshipLUTSequence whose LUTFunction is TO_LINEAR), but those of an X-ray image "
+                "must rise linearly with the radiation; export it as linear (LIN), "
+                "or, where only contours are looked for, save it as PNG or TIFF with bright air");
 }
 
 XrayGeometry geometry_of_frame(const DicomFile& file, int frame, const XrayOverrides& overrides) {

@@ -9,6 +9,7 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/domain/c_arm.hpp"
 #include "marrow/toolbox/files/distortion_file.hpp"
+#include "marrow/toolbox/files/stated_deviations.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 
 namespace marrow::files {
@@ -90,22 +91,24 @@ std::optional<double> number_within(const YamlMap& map, const std::string& key, 
 }
 
 /// The camera of an isocentric C-arm from its angles and distances. The isocentre is the origin of the world.
-std::optional<Camera> camera_by_c_arm(const YAML::Node& node, int width_px, int height_px, YamlFile& file) {
+std::optional<Camera> camera_by_c_arm(const YAML::Node& node, int width_px, int height_px, YamlFile& file,
+                                      geometry::CameraDeviations& deviations) {
   const YamlMap map(file, node, "c_arm",
                     {"alpha_deg", "beta_deg", "source_to_detector_mm", "source_to_isocentre_mm", "pixel_mm"});
-  const auto alpha_deg = number_within(map, "alpha_deg", -90, 90), beta_deg = number_within(map, "beta_deg", -180, 180),
-             detector_mm = number_within(map, "source_to_detector_mm", 1, 10000),
-             isocentre_mm = number_within(map, "source_to_isocentre_mm", 1, 10000),
-             pixel_mm = number_within(map, "pixel_mm", 0.001, 100);
+  const auto alpha_deg = number_within(map, "alpha_deg", -90, 90), beta_deg = number_within(map, "beta_deg", -180, 180);
+  const auto detector_mm = stated_number_within(map, "source_to_detector_mm", 1, 10000),
+             isocentre_mm = stated_number_within(map, "source_to_isocentre_mm", 1, 10000),
+             pixel_mm = stated_number_within(map, "pixel_mm", 0.001, 100);
   if (!alpha_deg || !beta_deg || !detector_mm || !isocentre_mm || !pixel_mm) return std::nullopt;
-  if (*isocentre_mm >= *detector_mm) {
+  if (isocentre_mm->value >= detector_mm->value) {
     map.fault("source_to_isocentre_mm",
               "source_to_isocentre_mm: the isocentre lies between source and detector; expected less than "
               "source_to_detector_mm");
     return std::nullopt;
   }
-  const CArm arm{width_px,     height_px,     Eigen::Vector2d::Constant(*pixel_mm),
-                 *detector_mm, *isocentre_mm, Eigen::Vector3d::Zero()};
+  deviations = deviations_by_distances(*detector_mm, *isocentre_mm, *pixel_mm);
+  const CArm arm{width_px,           height_px,           Eigen::Vector2d::Constant(pixel_mm->value),
+                 detector_mm->value, isocentre_mm->value, Eigen::Vector3d::Zero()};
   return carm_camera(arm, world_from_camera_rotation(radians(*alpha_deg), radians(*beta_deg)));
 }
 
@@ -199,7 +202,7 @@ std::optional<Camera> camera_by_detector(const YamlMap& map, int width_px, int h
 std::optional<CameraInFile> camera_from(const YAML::Node& node, YamlFile& file) {
   const YamlMap map(file, node, "camera",
                     {"marrow-camera", "width_px", "height_px", "intrinsics", "radial_distortion", "camera_from_world",
-                     "c_arm", "projection_matrix", "detector", "distortion"});
+                     "c_arm", "projection_matrix", "detector", "distortion", "deviations"});
   if (map.has("marrow-camera")) check_version(map, "marrow-camera");
   const auto width = map.integer("width_px"), height = map.integer("height_px");
   const int width_px = width.value_or(0), height_px = height.value_or(0);
@@ -213,12 +216,15 @@ std::optional<CameraInFile> camera_from(const YAML::Node& node, YamlFile& file) 
   if (!whole.empty())
     for (const char* key : {"intrinsics", "camera_from_world"})
       if (map.has(key)) map.fault(key, std::string(key) + ": '" + whole + "' already gives it; keep one of the two");
-  const std::optional<Camera> camera = whole == "c_arm" ? camera_by_c_arm(map.node("c_arm"), width_px, height_px, file)
+  geometry::CameraDeviations deviations;
+  const std::optional<Camera> camera = whole == "c_arm"
+                                           ? camera_by_c_arm(map.node("c_arm"), width_px, height_px, file, deviations)
                                        : whole == "projection_matrix" ? camera_by_matrix(map, width_px, height_px)
                                        : whole == "detector"          ? camera_by_detector(map, width_px, height_px)
                                                              : camera_by_matrices(map, width_px, height_px, file);
+  deviations = with_deviations(map, deviations);
   if (!camera || !width || !height) return std::nullopt;
-  CameraInFile result{{*camera, {}}, {}};
+  CameraInFile result{{*camera, {}}, {}, deviations};
   if (map.has("distortion") && !take_measured(map, result)) return std::nullopt;
   if (map.has("radial_distortion")) {
     const auto terms = map.vector3("radial_distortion");

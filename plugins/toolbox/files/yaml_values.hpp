@@ -24,8 +24,8 @@ const std::vector<std::string>& transform_keys();
 std::optional<Detector> detector_from(const YamlMap& map, int width_px, int height_px);
 
 /// A camera from the keys width_px, height_px, then intrinsics with camera_from_world, or one of c_arm,
-/// projection_matrix and detector; and, for distorted images, radial_distortion or distortion. Faults are noted in
-/// `file`.
+/// projection_matrix and detector; for distorted images, radial_distortion or distortion; and deviations. Faults are
+/// noted in `file`.
 std::optional<CameraInFile> camera_from(const YAML::Node& node, YamlFile& file);
 
 /// Seeds of one fragment from the map's keys `seeds` and `register`.

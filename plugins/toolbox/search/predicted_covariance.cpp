@@ -70,7 +70,7 @@ PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform&
     const auto left_out = round > 1 ? std::count(open_.begin(), open_.end(), true) : 0;
     const double least_curvature = eigen_of_symmetric(h).values[left_out] / wanted_rise_, wanted_before = wanted_rise_;
     wanted_rise_ = std::min(wanted_rise_, kWantedRise * noise_);
-    const bool steps_are_right = wanted_rise_ > 0.5 * wanted_before && least_curvature > kFlatLater;
+    const bool steps_are_right = !close_again() && wanted_rise_ > 0.5 * wanted_before && least_curvature > kFlatLater;
     if (steps_are_right || round == kMostRounds) {
       move_without_each_block(at_diagonals, flat);
       break;
@@ -212,6 +212,16 @@ void PredictedCovariance::choose_steps() {
     open_[std::size_t(i)] = height <= kLeastRise * wanted_rise_;
   });
   for (const int count : evaluations) evaluations_ += count;
+}
+
+/// Directions count as flat before the noise is known. The first guess of it takes in all blocks, also those that show
+/// other bones and say nothing about this one. So a direction along which the cost does rise by more than its noise is
+/// not open after all. Returns whether there is one.
+bool PredictedCovariance::close_again() {
+  bool any = false;
+  for (std::size_t i = 0; i < 6; ++i)
+    if (open_[i] && rises_[Eigen::Index(i)] > kLeastRise * wanted_rise_) open_[i] = false, any = true;
+  return any;
 }
 
 /// Both ends of the diagonal of each two axes.

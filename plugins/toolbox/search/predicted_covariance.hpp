@@ -56,6 +56,7 @@ class PredictedCovariance {
   RigidTransform pose_at(const Vector6d& motion) const { return moved_by_units(pose_, frame_, motion); }
   static bool is_regular(const Matrix6d& hessian);
   bool rests_on_few_blocks();
+  bool close_again();
   void set_unknown();
   bool differentiate();
   bool rises_as_derivatives_say(const Matrix6d& hessian, const Matrix6d& covariance);

@@ -50,7 +50,7 @@ struct Case {
   std::string name;
   node_test::Options options;
   double limit_px;
-  double share = 90;  ///< of the true points that must be measured
+  double share = 88;  ///< of the true points that must be measured
 };
 
 class DistortionPlate : public testing::TestWithParam<Case> {};
@@ -68,17 +68,17 @@ TEST_P(DistortionPlate, StraightensPointsThatItDidNotSee) {
 }
 
 const std::vector<Case> kCases{
-    {"usual", {}, 0.15},
-    {"hexagonal_dark", {{"grid", std::string("hexagonal")}, {"dots", std::string("dark")}}, 0.1},
-    {"turned", {{"plate_turn_deg", 41.0}}, 0.1},
-    {"missing", {{"missing_share", 0.2}}, 0.1},
-    {"rod_apart", {{"instrument_px", 90.0}}, 0.15},
-    {"half_covered", {{"covered_share", 0.4}}, 0.2, 45},
-    {"uneven", {{"vignetting", 0.7}, {"unevenness", 0.6}}, 0.15},
-    {"few_photons", {{"photons", 60.0}}, 0.25},
-    {"blurred", {{"blur_px", 2.0}}, 0.25},
-    {"barrel", {{"pincushion_px", -12.0}}, 0.1},
-    {"iron", {{"iron_shift_px", 2.0}}, 0.15},
+    {"usual", {}, 0.05},
+    {"hexagonal_dark", {{"grid", std::string("hexagonal")}, {"dots", std::string("dark")}}, 0.07},
+    {"turned", {{"plate_turn_deg", 41.0}}, 0.05},
+    {"missing", {{"missing_share", 0.05}}, 0.04},
+    {"rod_apart", {{"instrument_px", 90.0}}, 0.07},
+    {"half_covered", {{"covered_share", 0.4}}, 0.1, 45},
+    {"uneven", {{"vignetting", 0.7}, {"unevenness", 0.6}}, 0.05},
+    {"few_photons", {{"photons", 60.0}}, 0.1},
+    {"blurred", {{"blur_px", 2.0}}, 0.05},
+    {"barrel", {{"pincushion_px", -12.0}}, 0.05},
+    {"iron", {{"iron_shift_px", 2.0}}, 0.06},
 };
 INSTANTIATE_TEST_SUITE_P(Plates, DistortionPlate, testing::ValuesIn(kCases),
                          [](const auto& info) { return info.param.name; });
@@ -89,8 +89,8 @@ TEST(DistortionPlates, SayTheTurnThePincushionAndTheCoverage) {
   const Value& metrics = found.at("metrics");
   EXPECT_NEAR(figure(metrics, "turn"), -0.6, 0.1);
   EXPECT_NEAR(figure(metrics, "pixel"), 0.3, 0.002);
-  EXPECT_GT(figure(metrics, "field_coverage"), 95);
-  EXPECT_NEAR(figure(metrics, "coverage"), 100 * 3.14159 * 235 * 235 / (512.0 * 512.0), 3);
+  EXPECT_GT(figure(metrics, "field_coverage"), 90);  // the rim cuts the outermost dots
+  EXPECT_NEAR(figure(metrics, "coverage"), 100 * 3.14159 * 235 * 235 / (512.0 * 512.0), 6);
   EXPECT_LT(figure(metrics, "residual"), 0.15);
   EXPECT_GE(figure(metrics, "validated"), figure(metrics, "residual"));
 }
@@ -106,17 +106,55 @@ TEST(DistortionPlates, AMirroredImageHasTheMirroredDistortion) {
   PlatePoints truth = device.truth[0];
   for (auto* places : {&truth.ideal_px, &truth.seen_px})
     for (Eigen::Vector2d& place : *places) place.x() = 511 - place.x();
-  EXPECT_LT(errors_of(other.at("distortion"), truth).usual_px, 0.1);
+  EXPECT_LT(errors_of(other.at("distortion"), truth).usual_px, 0.05);
 }
 
-TEST(DistortionPlates, ATiltedPlateNeedsItsPerspective) {
-  const Simulated device = simulated(4, {{"tilt_deg", 15.0}});
-  const auto error = [&](const std::string& straight) {
-    const auto found = call("camera.distortion_plate", {{"image", item(device.images[0])}}, {{"straight", straight}});
-    return errors_of(found.at("distortion"), device.truth[0]).usual_px;
-  };
-  EXPECT_LT(error("homography"), 0.5);
-  EXPECT_GT(error("similarity"), 1);
+struct Tilted {
+  double error_px = 0, perspective_px = 0, deviation_px = 0;
+  std::string told;
+};
+
+Tilted found_on_tilted(double tilt_deg, const std::string& straight, double iron_shift_px = 0) {
+  const Simulated device = simulated(4, {{"tilt_deg", tilt_deg}, {"iron_shift_px", iron_shift_px}});
+  Tilted result;
+  Context::Hooks hooks;
+  hooks.log = [&](std::string_view text, LogLevel) { result.told += text; };
+  const auto found =
+      call("camera.distortion_plate", {{"image", item(device.images[0])}}, {{"straight", straight}}, Context(hooks));
+  result.error_px = errors_of(found.at("distortion"), device.truth[0]).usual_px;
+  result.perspective_px = figure(found.at("metrics"), "perspective");
+  result.deviation_px = figure(found.at("metrics"), "perspective_deviation");
+  return result;
+}
+
+// Half an image of 512 px of 0.3 mm at 1000 mm: a tilt of a moves its rim by 256^2 sin(a) 0.3 / 1000 px.
+TEST(DistortionPlates, ATiltIsToldFromTheDistortion) {
+  for (const double tilt_deg : {2.0, 5.0, 15.0}) {
+    const Tilted found = found_on_tilted(tilt_deg, "automatic");
+    EXPECT_LT(found.error_px, 0.06) << tilt_deg;
+    EXPECT_NEAR(found.perspective_px, 256 * 256 * std::sin(tilt_deg * 3.14159 / 180) * 0.3 / 1000, 0.15) << tilt_deg;
+    EXPECT_LT(found.deviation_px, 0.1) << tilt_deg;
+    EXPECT_NE(found.told.find("is taken out of the distortion; if the plate is parallel"), std::string::npos)
+        << found.told;
+  }
+  const Tilted parallel = found_on_tilted(0, "automatic");
+  EXPECT_LT(parallel.perspective_px, 3 * parallel.deviation_px);
+  EXPECT_EQ(parallel.told.find("tilt"), std::string::npos) << parallel.told;
+}
+
+TEST(DistortionPlates, ATiltThatIsNotTakenIsSaid) {
+  const Tilted found = found_on_tilted(5, "similarity");
+  EXPECT_GT(found.error_px, 0.2);
+  EXPECT_NE(found.told.find("it becomes a part of the distortion unless straight=automatic"), std::string::npos)
+      << found.told;
+}
+
+TEST(DistortionPlates, WhereIronHidesTheTiltThePlateIsTakenAsParallel) {
+  const Tilted found = found_on_tilted(0, "automatic", 2);
+  EXPECT_LT(found.error_px, 0.1);
+  EXPECT_NE(found.told.find("which the distortion hides, so the plate is taken as parallel to the detector"),
+            std::string::npos)
+      << found.told;
 }
 
 TEST(DistortionPlates, RefuseAnImageWithoutAPlate) {
@@ -177,7 +215,7 @@ TEST(DistortionBetween, FindsAPoseThatWasHeldOut) {
   const auto found = call("camera.distortion_between", {{"distortions", list(measured, "view")}}, options);
   const auto& between = found.at("distortion").as_list<Distortion>();
   const double between_px = errors_of(item(between[0]), device.truth[5]).usual_px;
-  EXPECT_LT(between_px, 0.15);
+  EXPECT_LT(between_px, 0.06);
   // The calibration of another pose does not serve this one.
   EXPECT_GT(errors_of(item(measured[0]), device.truth[5]).usual_px, 2 * between_px);
 }

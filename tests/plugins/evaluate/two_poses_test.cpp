@@ -37,7 +37,12 @@ TEST(PoseDifference, OfATurnAndAShift) {
                            .at("metrics");
   EXPECT_NEAR(figure(metrics, "rotation_deg"), 10, 1e-9);
   EXPECT_NEAR(figure(metrics, "axial_deg"), 10, 1e-9);
+  EXPECT_NEAR(figure(metrics, "frontal_deg"), 0, 1e-9);
+  EXPECT_NEAR(figure(metrics, "lateral_deg"), 0, 1e-9);
   EXPECT_NEAR(figure(metrics, "translation_mm"), 5, 1e-9);
+  EXPECT_NEAR(figure(metrics, "x_mm"), 0, 1e-9);
+  EXPECT_NEAR(figure(metrics, "y_mm"), 0, 1e-9);
+  EXPECT_NEAR(figure(metrics, "z_mm"), -5, 1e-9);
   EXPECT_GT(figure(metrics, "distance_mm"), 5);
   EXPECT_LT(figure(metrics, "distance_mm"), std::hypot(5.0, marrow::radians(10) * 15));
   // What holds for one point by hand holds for all points of the surface: how far a point turns depends on its distance

@@ -30,10 +30,11 @@ Outcome outcome(const Bone& bone, const shipped::Options& options = {}) {
 
 TEST(RefineCameras, AMotionThatBothCamerasShareIsAsLargeAsTheOptionsSay) {
   // With exact images, only the shared motion is not known. Its inverse covariance is the sum of both cameras' own:
-  // with numpy, of each camera diag(D^-2) turned into the world's axes, the sum inverted and turned into the bone's.
-  // D: 0.5 / sqrt(3) degrees about each axis; across, the root of 1 / 3 + 25 / 2 (z / 1700)^2 mm; along the depth, of
-  // 1 / 3 + (0.01 z)^2 mm, with z the depth of the bone (602.602 and 591.405 mm).
-  const std::array<double, 6> expected{0.20412415, 0.20412415, 0.20412415, 1.2786902, 1.09424559, 1.29190544};
+  // with numpy, of each camera C^-1 turned into the world's axes, the sum inverted and turned into the bone's. C is the
+  // sum of 0.5 / sqrt(3) degrees about each axis, 1 / sqrt(3) mm along each, 0.01 z along the depth, and 5 / sqrt(2) px
+  // of the principal point along u and v, which turn the bone about the source; a tenth of these 5 px is added to the
+  // degrees and mm. z is the depth of the bone (602.602 and 591.405 mm).
+  const std::array<double, 6> expected{0.21255667, 0.21619969, 0.20960736, 1.26303855, 1.0507536, 1.24958536};
   const RigidTransform off = motion({0.2, 0.2, -0.2}, {1, 1, 1});
   const Outcome found = outcome(Bone({off, off}, 1e6));
   EXPECT_GT(found.error.tail<3>().norm(), 1.4) << "no image can show it";

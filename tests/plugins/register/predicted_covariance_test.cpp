@@ -123,6 +123,28 @@ TEST(PredictedCovariance, IsTheSumOfTheMotionsWithoutEachBlock) {
   }
 }
 
+/// Fifty blocks besides, which show other bones: each changes the cost, and none says anything about the pose.
+class WithOthers : public Bowl {
+ public:
+  explicit WithOthers(const Bowl& bowl) : Bowl(bowl) {}
+  std::vector<double> without_each_block(const marrow::RigidTransform& pose) const override {
+    std::vector<double> values = Bowl::without_each_block(pose);
+    values.resize(values.size() + 50, value(pose) + 1);
+    return values;
+  }
+};
+
+// What the other blocks cost is 7 in all, and 16 degrees about the least certain direction only a fifth of that.
+TEST(PredictedCovariance, DoesNotCountBlocksThatShowOtherBones) {
+  const WithOthers cost(Bowl(bottom(), frame(), hessian(), 350));
+  const marrow::FragmentFrame about = frame();
+  const PredictedCovariance predicted(cost, bottom(), about);
+  const Matrix6d expected = in_radians((350 * hessian()).inverse());
+  ASSERT_TRUE(predicted.covariance());
+  EXPECT_LT((*predicted.covariance() - expected).norm(), 1e-5 * expected.norm()) << *predicted.covariance() << "\n\n"
+                                                                                 << expected;
+}
+
 /// Sums of squares of nine blocks, four residuals each, so few that each block matters much.
 class Squares : public marrow::Cost {
  public:

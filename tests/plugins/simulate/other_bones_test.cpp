@@ -54,29 +54,40 @@ TEST(SimulatePelvis, IsOneBoneWithTwoSocketsWhateverItsShape) {
   EXPECT_LT(enclosed_volume_mm3(wide.outer), enclosed_volume_mm3(mean.outer));
 }
 
-TEST(SimulateKneeImplant, IsAShellWithTheMeasuresItIsMadeFrom) {
-  const Bone implant = bone("simulate.femoral_implant", {});
-  EXPECT_TRUE(is_closed(implant.outer));
-  EXPECT_TRUE(implant.inner.triangles.empty());
-  EXPECT_EQ(pieces(implant.outer), 1u);
-  const Eigen::Vector3d size = extent(implant.outer, [](const auto&) { return true; }).sizes();
-  EXPECT_NEAR(size.x(), 66, 2);
-  EXPECT_NEAR(size.y(), 62, 2);
-  // A shell of 9 mm is far from a solid block of this size.
-  EXPECT_LT(enclosed_volume_mm3(implant.outer), 0.45 * size.prod());
-  // The condyles are not alike.
+Mesh implant(const shipped::Options& options) {
+  return shipped::call("simulate.knee_implant", {}, options).at("mesh").as<Mesh>();
+}
+
+TEST(SimulateKneeImplant, IsAShellWithCondylesThatDiffer) {
+  const Mesh part = implant({{"resolution_mm", 1.2}});
+  EXPECT_TRUE(is_closed(part));
+  EXPECT_EQ(pieces(part), 1u);
+  const Eigen::Vector3d size = extent(part, [](const auto&) { return true; }).sizes();
+  EXPECT_NEAR(size.x(), 64, 3) << "two condyles of 24 mm, 40 mm apart";
+  EXPECT_LT(enclosed_volume_mm3(part), 0.45 * size.prod()) << "a shell is far from a solid block";
   const auto deepest = [&](double side) {
-    return extent(implant.outer, [&](const auto& p) { return side * p.x() > 10; }).min().z();
+    return extent(part, [&](const auto& p) { return side * p.x() > 10; }).min().z();
   };
-  EXPECT_LT(deepest(1), deepest(-1) - 0.3);
+  EXPECT_GT(deepest(1), deepest(-1) + 0.3) << "the condyle on the left is smaller";
 }
 
 TEST(SimulateKneeImplant, SeedsGiveOtherSizes) {
   const auto drawn = [](std::int64_t seed) {
-    return bone("simulate.femoral_implant", {{"shape_seed", seed}, {"variation", 1.0}, {"resolution_mm", 1.6}}).outer;
+    return implant({{"implant_seed", seed}, {"variation", 1.0}, {"resolution_mm", 2.0}});
   };
   EXPECT_NE(enclosed_volume_mm3(drawn(1)), enclosed_volume_mm3(drawn(2)));
   EXPECT_EQ(drawn(1).vertices_mm, drawn(1).vertices_mm);
+}
+
+// The maker of bones takes the surface that another node made, as it is but for its place.
+TEST(SimulateSurface, TakesASurfaceInPlaceOfAFile) {
+  const Mesh part = implant({{"resolution_mm", 2.0}});
+  const Bone made = shipped::call("simulate.surface", {{"mesh", shipped::item(part)}},
+                                  {{"long_bone", false}, {"isocentre_from_distal_end_mm", 20.0}})
+                        .at("bone")
+                        .as<Bone>();
+  EXPECT_NEAR(enclosed_volume_mm3(made.outer), enclosed_volume_mm3(part), 1e-6 * enclosed_volume_mm3(part));
+  EXPECT_NEAR(extent(made.outer, [](const auto&) { return true; }).min().z(), -20, 1e-6);
 }
 
 }  // namespace other_bones_test

@@ -69,6 +69,14 @@ class Bone(Case):
         _, errors = self.registered(self.copy(), "search_poses=2000")
         self.assertLess(errors["mtre_mm"], 1)
 
+    def test_the_search_alone(self):
+        out = self.scratch / "search"
+        case = "case=%s" % self.copy()
+        result = marrow("run", PIPELINES / "bone" / "search.yaml", case, "poses=2000", "--out", out)
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+        self.assertLess(metrics(out / "outputs" / "errors" / "bone.json")["mtre_mm"], 2)
+        self.assertLess(metrics(out / "outputs" / "in_image" / "bone.json")["mpd_mm"], 2)
+
     def test_all_ways_with_one_to_four_views(self):
         views = ["frontal", "lateral", "left", "right"]
         for count, limit_mm in ((1, 8), (3, 1), (4, 1)):

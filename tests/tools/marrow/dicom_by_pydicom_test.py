@@ -5,7 +5,7 @@ import shutil
 import subprocess
 import unittest
 
-from harness.program import main
+from harness.program import main, marrow
 from other_programs import Reading, needs, numpy, pydicom
 
 try:
@@ -21,16 +21,17 @@ except ImportError:
 
 EXPLICIT, DEFLATED, JPEG_2000 = "1.2.840.10008.1.2.1", "1.2.840.10008.1.2.1.99", "1.2.840.10008.1.2.4.90"
 CT, ENHANCED_CT, XA = "1.2.840.10008.5.1.4.1.1.2", "1.2.840.10008.5.1.4.1.1.2.1", "1.2.840.10008.5.1.4.1.1.12.1"
+ENHANCED_XA = "1.2.840.10008.5.1.4.1.1.12.1.1"
 
 
 def grey_levels(shape, seed, bits=12):
     return numpy.random.default_rng(seed).integers(0, 2**bits, shape).astype("u2")
 
 
-def jpeg_2000(frame):
-    """A codestream without a box around it. Pillow writes 16 bits."""
+def jpeg_2000(frame, boxed=False):
+    """A codestream, or a JP2 file with one in its boxes. Pillow writes 16 bits, and 8 bits of colours."""
     out = io.BytesIO()
-    Image.fromarray(frame).save(out, "JPEG2000", irreversible=False, no_jp2=True)
+    Image.fromarray(frame).save(out, "JPEG2000", irreversible=False, no_jp2=not boxed)
     return out.getvalue()
 
 
@@ -90,6 +91,47 @@ class Dicom(Reading):
     def test_jpeg_2000(self):
         self.assert_image(dicom(XA, "XA", grey_levels((37, 53), 1, 16), JPEG_2000))
 
+    def coded(self, code, **values):
+        """An image of 53 x 37 pixels of 16 bits, with these bytes as its JPEG 2000."""
+        data = dicom(XA, "XA", grey_levels((37, 53), 10, 16), JPEG_2000)
+        data.PixelData = encapsulate([code])
+        data["PixelData"].is_undefined_length = True
+        for name, value in values.items():
+            setattr(data, name, value)
+        return data
+
+    @unittest.skipIf(not HAS_JPEG_2000, "not installed here: Pillow with JPEG 2000")
+    def test_jpeg_2000_in_boxes(self):
+        pixels = grey_levels((37, 53), 11, 16)
+        code = jpeg_2000(pixels, boxed=True)
+        self.assertEqual(code[4:8], b"jP  ")
+        self.assertTrue((self.image(self.written(self.coded(code))) == pixels).all())
+        for bytes_of_file, text in (
+            (code.replace(b"jp2c", b"free"), "no JPEG 2000 lies in the boxes of a JP2 file around the pixels"),
+            (code[: code.index(b"jp2c") + 30], "the compressed pixels end too early"),
+            (
+                code.replace(b"colr", b"pclr"),
+                "numbers of colours in a table (JP2 with a palette); convert it: gdcmconv",
+            ),
+        ):
+            with self.subTest(text=text):
+                self.assertIn(text, self.refused("read.image", self.written(self.coded(bytes_of_file))))
+
+    @unittest.skipIf(not HAS_JPEG_2000, "not installed here: Pillow with JPEG 2000")
+    def test_other_kinds_of_jpeg_2000_are_refused(self):
+        grey = jpeg_2000(grey_levels((37, 53), 12, 16))
+        colours = jpeg_2000(grey_levels((37, 53, 3), 13, 8).astype("u1"))
+        eight = {"BitsAllocated": 8, "BitsStored": 8, "HighBit": 7}
+        with_colours = dict(eight, SamplesPerPixel=3, PhotometricInterpretation="YBR_RCT", PlanarConfiguration=0)
+        for data, text in (
+            (self.coded(colours, **with_colours), "has 3 channels; an X-ray image has one: save it as grey levels"),
+            (self.coded(colours, **eight), "the compressed pixels have 3 values each, the header says 1"),
+            (self.coded(grey[:6] + b"\x40\0" + grey[8:]), "are compressed by high-throughput JPEG 2000 (part 15)"),
+            (self.coded(grey[:6] + b"\x80\0" + grey[8:]), "are compressed by JPEG 2000 with extensions (part 2)"),
+        ):
+            with self.subTest(text=text):
+                self.assertIn(text, self.refused("read.image", self.written(data)))
+
     def test_deflated(self):
         self.assert_image(dicom(XA, "XA", grey_levels((37, 53), 2), DEFLATED))
 
@@ -109,6 +151,90 @@ class Dicom(Reading):
         data.PixelIntensityRelationship, data.PixelIntensityRelationshipSign = "LOG", 1
         data.ModalityLUTSequence = table(0, numpy.exp(numpy.arange(4096) / 4096 * 11).astype("u2"), "US")
         self.assert_image(data)
+
+    def enhanced_xa(self, pixels, syntax=EXPLICIT, relation="LIN"):
+        """Each frame from another side, and its geometry in functional groups."""
+        data = dicom(ENHANCED_XA, "XA", pixels, syntax, bits=16 if syntax == JPEG_2000 else 12)
+        geometry = item(DistanceSourceToDetector=1200.0)
+        geometry.add_new(0x00189402, "FL", 780.0)
+        data.ImagerPixelSpacing, data.PatientOrientation = [0.3, 0.3], ["R", "F"]
+        data.SharedFunctionalGroupsSequence = Sequence(
+            [
+                item(
+                    XRayGeometrySequence=Sequence([geometry]),
+                    FramePixelDataPropertiesSequence=Sequence(
+                        [item(PixelIntensityRelationship=relation, PixelIntensityRelationshipSign=1)]
+                    ),
+                )
+            ]
+        )
+        data.PerFrameFunctionalGroupsSequence = Sequence(
+            [
+                item(
+                    PositionerPositionSequence=Sequence(
+                        [item(PositionerPrimaryAngle=5.0 * k, PositionerSecondaryAngle=2.0 * k)]
+                    )
+                )
+                for k in range(len(pixels))
+            ]
+        )
+        return data
+
+    def test_an_enhanced_xa(self):
+        """Each frame is pydicom's, and its camera that of a plain file with the same angles and distances."""
+        pixels = grey_levels((3, 37, 53), 14)
+        for syntax in (EXPLICIT, DEFLATED) + ((JPEG_2000,) if HAS_JPEG_2000 else ()):
+            file = self.written(self.enhanced_xa(pixels, syntax))
+            self.assertIn("has 3 frames; name one with frame (from 1)", self.refused("read.image", file))
+            for k, frame in enumerate(pydicom.dcmread(file).pixel_array):
+                with self.subTest(syntax=syntax, frame=k + 1):
+                    self.assertTrue((self.image(file, ", frame: %d" % (k + 1)) == frame).all())
+        plain = dicom(XA, "XA", pixels[2], bits=12)
+        plain.ImagerPixelSpacing, plain.PatientOrientation = [0.3, 0.3], ["R", "F"]
+        plain.DistanceSourceToDetector, plain.DistanceSourceToPatient = 1200, 780
+        plain.PositionerPrimaryAngle, plain.PositionerSecondaryAngle = 10, 4
+        enhanced = self.camera(self.written(self.enhanced_xa(pixels)), frame=3)
+        self.assertEqual(enhanced, self.camera(self.written(plain), frame=1))
+        self.assertNotEqual(enhanced, self.camera(self.written(self.enhanced_xa(pixels)), frame=2))
+
+    def camera(self, file, frame):
+        pipeline = self.write(
+            "camera.yaml",
+            "marrow: 1\nnodes:\n  it: {uses: camera.dicom, with: {paths: ['%s'], names: [a], frame: %d}}\n"
+            "outputs: {it: it}\n" % (file, frame),
+        )
+        shutil.rmtree(self.scratch / "cameras", ignore_errors=True)
+        result = marrow("run", pipeline, "--out", self.scratch / "cameras", "--quiet")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return (self.scratch / "cameras/outputs/it/a.yaml").read_text()
+
+    def test_logarithms_of_an_enhanced_xa(self):
+        """The table TO_LINEAR of its PixelIntensityRelationshipLUTSequence makes them linear; TO_LOG does not count."""
+        pixels = grey_levels((2, 37, 53), 15)
+        data = self.enhanced_xa(pixels, relation="LOG")
+        said = self.refused("read.image", self.written(data), ", frame: 2")
+        self.assertIn(
+            "its values are logarithms (PixelIntensityRelationship (0028,1040) is LOG) without the table", said
+        )
+        tables = [
+            ("TO_LOG", numpy.log1p(numpy.arange(4096)) * 5000),
+            ("TO_LINEAR", numpy.exp(numpy.arange(4096) / 4096 * 11)),
+        ]
+        for there in (tables[:1], tables, tables + tables[1:]):
+            items = [table(0, entries.astype("u2"), "", 16)[0] for _, entries in there]
+            for part, (function, _) in zip(items, there):
+                part.LUTFunction = function
+                del part.ModalityLUTType
+            data.SharedFunctionalGroupsSequence[0].PixelIntensityRelationshipLUTSequence = Sequence(items)
+            file = self.written(data)
+            with self.subTest(tables=len(there)):
+                if len(there) == 2:
+                    self.assert_scaled(self.image(file, ", frame: 2"), tables[1][1].astype("u2")[pixels[1]])
+                else:
+                    text = (
+                        "without the table" if len(there) == 1 else "TO_LINEAR stands twice (LUTFunction (0028,9474))"
+                    )
+                    self.assertIn(text, self.refused("read.image", file, ", frame: 2"))
 
     def enhanced(self, pixels, syntax):
         data = dicom(ENHANCED_CT, "CT", pixels, syntax)

@@ -115,7 +115,7 @@ class Femur(Runs):
             told,
         )
         self.assertIn(
-            "In consequence differ: shaft, start, pose, verdict, calibrated, errors, distance, overlay, ", told
+            "In consequence differ: shaft, start, pose, stated, verdict, calibrated, errors, distance, overlay, ", told
         )
         self.assertRegex(
             told,

@@ -128,6 +128,24 @@ class Formats(Labels):
             result.stderr,
         )
 
+    @needs("nibabel")
+    def test_the_table_of_totalsegmentator(self):
+        """Ends of its runs of numbers, from totalsegmentator/map_to_binary.py of version 2."""
+        table = {
+            **{"sacrum": 25, "vertebrae_S1": 26, "vertebrae_L5": 27, "vertebrae_L1": 31, "vertebrae_T12": 32},
+            **{"vertebrae_T1": 43, "vertebrae_C7": 44, "vertebrae_C1": 50, "humerus_left": 69, "scapula_right": 72},
+            **{"clavicula_left": 73, "femur_right": 76, "hip_left": 77, "hip_right": 78, "skull": 91, "rib_left_1": 92},
+            **{"rib_left_12": 103, "rib_right_1": 104, "rib_right_12": 115, "sternum": 116, "costal_cartilages": 117},
+            **{"patella": 1, "fibula": 3, "tarsal": 4, "ulna": 7, "radius": 8, "metacarpal": 10, "phalanges_hand": 11},
+        }
+        values = numpy.zeros(SIZE, numpy.uint8)
+        for i, number in enumerate(table.values()):
+            values[i % SIZE[0], i // SIZE[0], 2] = number
+        names = ", ".join(table)
+        masks, _ = self.masks(self.nifti(values=values), ", labels: [%s], fragments: [%s]" % (names, names))
+        for name, number in table.items():
+            numpy.testing.assert_allclose(marked(masks[name]), places(values, number, AFFINE), atol=2e-3)
+
     def test_nrrd(self):
         self.expect(self.put("a.nrrd", nrrd(labels(), AFFINE)), "label 2", 2)
         ras = numpy.diag([-1, -1, 1, 1]) @ AFFINE
@@ -226,8 +244,51 @@ class DicomSegmentation(Labels):
         data.save_as(self.scratch / name, write_like_original=False)
         return self.scratch / name
 
+    def label_map(self, name, bits=8, change=lambda data: None):
+        """The type LABELMAP: a frame a slice, whose pixels are the numbers of segments; 0 is background."""
+        from pydicom.dataset import Dataset
+
+        def as_label_map(data):
+            data.SOPClassUID = "1.2.840.10008.5.1.4.1.1.66.7"
+            data.BitsAllocated, data.BitsStored, data.HighBit = bits, bits, bits - 1
+            data.PixelPaddingValue = 0
+            background = Dataset()
+            background.SegmentNumber, background.SegmentLabel = 0, "Background"
+            data.SegmentSequence.insert(0, background)
+            for frame in data.PerFrameFunctionalGroupsSequence:
+                del frame.SegmentIdentificationSequence
+            numbers = numpy.where(labels() == 5, 2, labels() == 2).astype(numpy.uint8 if bits == 8 else "<u2")
+            used = [z for z in range(SIZE[2]) if numbers[:, :, z].any()]
+            data.PixelData = b"".join(numbers[:, :, z].T.tobytes() for z in used)
+            data.PixelData += b"\0" * (len(data.PixelData) % 2)
+            change(data)
+
+        return self.segmentation(name, [labels() > 0], "LABELMAP", change=as_label_map)
+
     def boxes(self):
         return [labels() == 2, labels() == 5]
+
+    def test_label_maps(self):
+        for bits in (8, 16):
+            file = self.label_map("a.dcm", bits)
+            self.expect(file, "tibia", 2)
+            self.expect(file, "bone", 5, options=", labels: ['2'], fragments: [bone]")
+            self.assertEqual(sorted(self.masks(file)[0]), ["fibula", "tibia"])
+
+    def test_label_maps_that_are_refused(self):
+        def twice(data):
+            frames = data.PerFrameFunctionalGroupsSequence
+            frames[1].PlanePositionSequence = frames[0].PlanePositionSequence
+
+        def in_colour(data):
+            data.PhotometricInterpretation = "PALETTE COLOR"
+
+        def unlisted(data):
+            del data.SegmentSequence[2]
+
+        for change, expected in ((twice, "frames 1 and 2 show the same slice"), (in_colour, "PALETTE COLOR")):
+            self.assertIn(expected, self.refused("read.labels", self.label_map("a.dcm", change=change)))
+        self.expect(self.label_map("a.dcm", change=unlisted), "label 2", 5)
 
     def test_bits_by_name_and_number(self):
         file = self.segmentation("a.dcm", self.boxes())

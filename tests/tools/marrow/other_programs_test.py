@@ -192,6 +192,15 @@ class Images(Reading):
                     PIL.fromarray(pixels).save(self.scratch / name, **options)
                     self.assertTrue((self.image(self.scratch / name) == pixels).all())
 
+    def test_differences_between_floats(self):
+        values = numpy.random.default_rng(5).normal(100, 20, (20, 30)).astype("float32")
+        for predictor in (1, 3):
+            for compression in ("tiff_lzw", "tiff_adobe_deflate"):
+                with self.subTest(predictor=predictor, compression=compression):
+                    file = self.scratch / "a.tif"
+                    PIL.fromarray(values).save(file, compression=compression, tiffinfo={317: predictor})
+                    self.assert_scaled(self.image(file), values)
+
     def test_colours_and_palettes(self):
         colours = PIL.fromarray(numpy.random.default_rng(4).integers(0, 256, (9, 8, 3)).astype("uint8"))
         colours.save(self.scratch / "rgb.png")

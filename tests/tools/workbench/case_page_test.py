@@ -218,7 +218,10 @@ class CasePageTest(PageTest):
         self.wait("document.querySelectorAll('[data-saved] li').length === 2")
         self.assertEqual(
             self.browser.js("return [...document.querySelectorAll('[data-saved] li')].map((one) => one.textContent)"),
-            ["the CT is missing; choose one", "there is no fragment; add one, with its seeds"],
+            [
+                "the CT is missing; choose one",
+                "there is no fragment; add one, with its seeds, its label or its surface",
+            ],
         )
 
     def test_comments_that_would_go_are_shown_before(self):

@@ -37,6 +37,35 @@ def two_balls(size, first, second, radius):
     ]
 
 
+def seg_nrrd(grid, values, segments):
+    """Labels as 3D Slicer writes them: the bytes of a .seg.nrrd. segments: (name, label)."""
+    size, spacing, origin, direction = (grid[key] for key in ("size", "spacing_mm", "origin_mm", "direction"))
+    axes = " ".join("(%s)" % ",".join(str(direction[row][k] * spacing[k]) for row in range(3)) for k in range(3))
+    notes = "".join(
+        "Segment%d_ID:=Segment_%d\nSegment%d_Name:=%s\nSegment%d_LabelValue:=%d\nSegment%d_Layer:=0\n"
+        % (i, i + 1, i, name, i, label, i)
+        for i, (name, label) in enumerate(segments)
+    )
+    header = (
+        "NRRD0004\ntype: unsigned char\ndimension: 3\nspace: left-posterior-superior\nsizes: %s\n"
+        "space directions: %s\nkinds: domain domain domain\nencoding: raw\nspace origin: (%s)\n%s\n"
+        % (" ".join(map(str, size)), axes, ",".join(map(str, origin)), notes)
+    )
+    return header.encode() + bytes(values)
+
+
+def labelled_balls(grid, balls):
+    """The voxels of balls, given as (label, centre in mm, radius in mm); 0 elsewhere."""
+    size = grid["size"]
+    values = []
+    for z in range(size[2]):
+        for y in range(size[1]):
+            for x in range(size[0]):
+                place = point_of(grid, (x, y, z))
+                values.append(next((label for label, centre, radius in balls if ball(place, centre, radius)), 0))
+    return values
+
+
 CAMERA = {
     "width_px": 64,
     "height_px": 64,

@@ -7,8 +7,12 @@ import math
 import shlex
 import subprocess
 
+import yaml
+
 import bench
+import ct_cases
 from bench import MARROW, BenchTest, PageTest
+from harness import formats
 from placing import PageOfCase, Placing, angle_deg, at, seen, truth
 
 
@@ -44,6 +48,27 @@ class RequestsTest(Placing, BenchTest):
         status, headers, content = self.overlay(server, poses={"distal": away})
         self.assertEqual(
             (status, content, json.loads(headers["X-Marrow-About"])["layers"][0]["columns"]), (200, b"", 0)
+        )
+
+    def test_a_bone_given_by_a_label(self):
+        file = self.folder / "case" / "case.yaml"
+        case = yaml.safe_load(file.read_text())
+        middle = case["fragments"]["distal"]["seeds"][0]
+        grid = formats.straight((20, 20, 40), (2, 2, 2), [value - size for value, size in zip(middle, (19, 19, 39))])
+        values = ct_cases.labelled_balls(grid, [(7, middle, 15)])
+        (self.folder / "case" / "labels.mha").write_bytes(formats.mha(grid, values))
+        case.update(labels="labels.mha", fragments={"distal": {"label": 7}})
+        file.write_text(yaml.safe_dump(case))
+        server = self.open()
+        (bone,) = self.opened(server)["bones"]
+        self.assertEqual(bone["name"], "distal")
+        self.assertLess(math.dist(bone["middle_mm"], middle), 1)
+        del case["ct"]
+        file.write_text(yaml.safe_dump(case))
+        state = server.finish(server.json("POST", "/api/place/open", {"case": "case"})["job"])
+        self.assertEqual(
+            state["error"],
+            "this case has no CT, and this page shows bones by their radiographs; add the CT to the case",
         )
 
     def test_the_true_pose_costs_least(self):

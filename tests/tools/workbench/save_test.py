@@ -125,7 +125,7 @@ class SaveTest(BenchTest):
         self.assertEqual(
             state["error"],
             "the CT is missing; choose one\n  there is no X-ray view; add at least one\n"
-            "  there is no fragment; add one, with its seeds",
+            "  there is no fragment; add one, with its seeds, its label or its surface",
         )
         document = self.document()
         document["views"][0] = {"name": "frontal", "image": "gone.png"}
@@ -133,7 +133,7 @@ class SaveTest(BenchTest):
         self.assertEqual(
             self.save(server, document)["error"],
             "view 'frontal', its image: there is no 'gone.png' any more\n  view 'frontal' has no camera\n"
-            "  fragment 'distal' has no seed; click inside its bone",
+            "  fragment 'distal' has no seed; click inside its bone, or give it a label or a surface",
         )
         document = self.document()
         document["fragments"]["distal"]["seeds"] = [[200, 15, 10]]

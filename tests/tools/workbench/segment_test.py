@@ -113,7 +113,7 @@ class SegmentTest(BenchTest):
         for asked, status, fault in (
             ({"fragments": {}}, 400, "there is no fragment; add one, with seeds inside its bone"),
             ({"fragments": {"one": {}}}, 400, "fragment 'one' has no seed; click inside its bone first"),
-            ({"method": "magic"}, 400, "the method must be 'bone' or 'femur', got 'magic'"),
+            ({"method": "magic"}, 400, "the method must be 'bone', 'femur' or 'given', got 'magic'"),
             ({"ct": "ct-99"}, 409, "this CT is no longer in memory; it is opened again"),
         ):
             answer = server.ask("POST", "/api/segment", {"ct": ct, "fragments": seed, "method": "bone", **asked})

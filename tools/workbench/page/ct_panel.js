@@ -165,7 +165,9 @@ function make(draft) {
   let reset_for = null;  // the name of the CT
   function tell() {
     const {ct} = state, {ct: chosen} = draft.document;
-    name.textContent = chosen ? chosen.file : 'No CT is chosen.';
+    name.textContent = chosen ? chosen.file :
+        ct                    ? 'No CT is chosen. The slices have the grid of the labels.' :
+                                'No CT is chosen.';
     facts.textContent = state.isReading ? 'is being read' :
         ct                              ? ct.size.join(' × ') + ' voxels of ' +
             ct.spacing_mm.map((size) => Number(size.toPrecision(4))).join(' × ') + ' mm' :
@@ -173,7 +175,7 @@ function make(draft) {
     says.replaceChildren(
         ...(state.fault ? [el('p', {class: 'fault', role: 'alert'}, state.fault), ...seriesIn(draft, state.fault)] :
                           []),
-        ...(ct ? ct.doubts : []).map((doubt) => el('p', {class: 'fault doubt', role: 'status'}, doubt)));
+        ...(ct && chosen ? ct.doubts : []).map((doubt) => el('p', {class: 'fault doubt', role: 'status'}, doubt)));
     options.element.hidden = command.hidden = !chosen;
     if (state.fault) options.element.open = true;
     command.replaceChildren(command.firstChild, Dom.command(state.command));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The CT of the open case, and what its panels share: the crosshair, the window, the tool of a click, and the drawings
-// over the slices. Events: 'ct' (another CT, or a fault), 'slice' (the values of a slice have arrived), 'view'
-// (anything else).
+// over the slices. Events: 'ct' (another CT, or a fault), 'slice' (the values of a slice have arrived), 'lost' (what
+// stands for the CT is no longer in the server's memory), 'view' (anything else).
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
 import * as SliceGeometry from './slice_geometry.js';
@@ -17,7 +17,8 @@ export class CtState extends EventTarget {
     super();
     Object.assign(this, {
       draft,
-      ct: null,  // as about_ct() of the server describes it, or null
+      ct: null,         // as about_ct() of the server describes it, or null
+      stands_in: null,  // the same for a case without a CT: air on the grid of its labels
       fault: '',
       command: '',
       isReading: false,
@@ -26,6 +27,7 @@ export class CtState extends EventTarget {
       window: {level: 400, width: 1800},
       tool: null,          // {key, hint, place(point_mm)} or null: a click moves the crosshair
       marks: new Map(),    // name: () => [{key, point_mm, colour, label, moveTo(point_mm), remove()}]
+      overlay: null,       // {slice(ct, axis, index) => {key, places, colours} or null}: mixed with the values
       pointed() {},        // gets what is under the pointer: {view, index, value_hu} or null
       contours: new Map()  // name: {lines(axis, slice, later) => [{colour, ends}]}; ends: i, j, k of both ends of each
                            // line; later() is called when there is more
@@ -41,10 +43,9 @@ export class CtState extends EventTarget {
     const wanted = JSON.stringify(this.draft.document.ct);
     if (wanted === this.read && !isAgain) return;
     this.read = wanted;
-    const before = this.ct;
-    Object.assign(this, {isReading: wanted !== 'null', fault: '', ct: wanted === 'null' ? null : before});
+    Object.assign(this, {isReading: wanted !== 'null', fault: ''});
+    if (wanted === 'null') return this.show(this.stands_in);
     this.tell('ct');
-    if (wanted === 'null') return;
     let ct = null, fault = '';
     try {
       const {job, command} = await Ask.post('api/ct/open', {ct: JSON.parse(wanted)});
@@ -54,10 +55,21 @@ export class CtState extends EventTarget {
       fault = error.message;
     }
     if (this.read !== wanted) return;  // another CT was chosen in the meantime
-    const is_other = !isAgain && ct && !(before && before.name === ct.name);
-    Object.assign(this, {ct, fault, isReading: false});
+    Object.assign(this, {fault, isReading: false});
+    this.show(ct, isAgain);
+  }
+
+  // The crosshair goes to the middle of another CT.
+  show(ct, isAgain) {
+    const is_other = !isAgain && ct && !(this.ct && this.ct.name === ct.name);
+    this.ct = ct;
     if (is_other) this.cursor_mm = SliceGeometry.point(ct, ct.size.map((n) => Math.floor(n / 2)));
     this.tell('ct');
+  }
+  // Shows this in place of a CT while the case has none. `ct` may be null.
+  standIn(ct) {
+    this.stands_in = ct || null;
+    if (!this.draft.document.ct) this.show(this.stands_in);
   }
 
   // The values of a slice: int16 in HU, in the order of the server's slice_of().
@@ -67,7 +79,10 @@ export class CtState extends EventTarget {
       return new Int16Array((await Ask.bytes('api/ct/slice', {ct: name, axis, index}, signal)).bytes);
     } catch (error) {
       if (error.status !== 409) throw error;
-      if (this.ct && this.ct.name === name && !this.isReading) await this.follow(true);
+      if (this.ct && this.ct.name === name && !this.isReading) {
+        if (!this.draft.document.ct) this.tell('lost');
+        await this.follow(true);
+      }
       return null;
     }
   }

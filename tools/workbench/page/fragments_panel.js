@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The panel "Fragments": their names, and the seeds inside their bone.
-import {button, checkbox, el} from '../../report/page/dom.js';
+// The panel "Fragments": their names, and what gives them: seeds inside their bone, a label, or a surface.
+import {button, checkbox, el, labelled, select} from '../../report/page/dom.js';
 
 import * as CasePage from './case.js';
 import {CtState} from './ct_state.js';
+import {LabelsState} from './labels_state.js';
 import * as PointList from './point_list.js';
 import * as Shell from './shell.js';
 import * as SliceGeometry from './slice_geometry.js';
@@ -55,8 +56,85 @@ function remove(draft, state, name) {
   });
 }
 
-function fragmentOf(draft, state, [name, fragment], f) {
-  const key = 'seed ' + name, seeds = fragment.seeds || [];
+const wayOf = ({label, surface}) => (surface ? 'surface' : label !== undefined ? 'label' : 'seeds');
+const SURFACE = /\.(stl|ply|obj|vtp)$/i;
+
+// Gives a fragment in another way: `given` is {seeds}, {label} or {surface}.
+const giveBy = (draft, name, given) => draft.change('give ' + name + ' by ' + Object.keys(given)[0], (document) => {
+  const {seeds, label, surface, ...others} = document.fragments[name];
+  document.fragments[name] = {...given, ...others};
+});
+
+async function chooseSurface(draft, name, given) {
+  const at = given ? given.file.split('/').slice(0, -1).join('/') : '';
+  const file = await Shell.choose(
+      'Choose the closed surface of ' + name + ': STL, PLY, OBJ or VTP', {accepts: (one) => SURFACE.test(one), at});
+  if (file !== undefined) await giveBy(draft, name, {surface: {...given, file}});
+  return file !== undefined;
+}
+
+// What gives the fragment: seeds, a label by its number and name, or a surface.
+function wayField(draft, labels, name, fragment) {
+  const segments = labels.labels ? labels.labels.segments : [], way = wayOf(fragment);
+  const mine = way === 'label' ? segments.indexOf(labels.segmentOf(fragment.label)) : -1;
+  const listed = segments.map((segment, i) => ['label ' + i, LabelsState.title(segment), segment])
+                     .filter(([, , segment]) => segment.label !== null && segment.volume_ml);
+  const now = way === 'label' ? 'label ' + mine : way;
+  const options = [
+    ['seeds', 'seeds'], ...(mine < 0 && way === 'label' ? [[now, 'the label ' + fragment.label]] : []),
+    ...(listed.length ? [['Labels', listed.map(([value, title]) => [value, title])]] : []), ['surface', 'a surface …']
+  ];
+  const field = select('given by', options, now, async (value) => {
+    if (value === 'seeds') return giveBy(draft, name, {seeds: []});
+    if (value !== 'surface') return giveBy(draft, name, {label: segments[Number(value.split(' ')[1])].label});
+    if (!await Shell.guarded(() => chooseSurface(draft, name, fragment.surface))) field.box.value = now;
+  });
+  field.box.dataset.way = name;
+  field.box.setAttribute('aria-label', 'What gives ' + name);
+  return field;
+}
+
+function surfaceRow(draft, name, surface) {
+  const scale = el('input', {
+    type: 'number',
+    class: 'short',
+    min: 0.001,
+    step: 'any',
+    value: surface.scale || 1,
+    'aria-label': 'mm of one unit of the surface of ' + name,
+    onchange: () => {
+      if (!(Number(scale.value) > 0)) return void Shell.notice('One unit must be longer than 0 mm.', 'fault');
+      const given = Number(scale.value) === 1 ? {} : {scale: Number(scale.value)};
+      giveBy(draft, name, {surface: {file: surface.file, ...given}});
+    }
+  });
+  return el(
+      'div', {class: 'toolbar'}, el('span', {}, surface.file),
+      button('Choose another …', () => Shell.guarded(() => chooseSurface(draft, name, surface))),
+      labelled('one unit, mm', scale));
+}
+
+function labelRow(state, labels, label) {
+  const segment = labels.segmentOf(label);
+  if (!segment)
+    return el(
+        'p', {class: labels.labels ? 'fault' : 'note'},
+        labels.labels ? 'The label map has no label ' + label + '; choose one.' : 'No label map is read.');
+  return el(
+      'p', {class: 'note'}, button(LabelsState.title(segment), () => state.goTo(segment.middle_mm), {class: 'link'}));
+}
+
+function seedList(draft, state, name, seeds) {
+  if (!seeds.length) return el('p', {class: 'note'}, 'No seed yet.');
+  return el(
+      'ul', {class: 'points'},
+      seeds.map(
+          (point_mm, i) =>
+              PointList.row(state, 'seed ' + (i + 1) + ' of ' + name, point_mm, seedActions(draft, name, i))));
+}
+
+function fragmentOf(draft, state, labels, [name, fragment], f) {
+  const key = 'seed ' + name, way = wayOf(fragment);
   const tool = {
     key,
     hint: 'Click inside the bone of ' + name + ' to put a seed there. Esc ends.',
@@ -67,46 +145,65 @@ function fragmentOf(draft, state, [name, fragment], f) {
       (is_on) => draft.change(
           (is_on ? 'register ' : 'do not register ') + name,
           (document) => (document.fragments[name].register = is_on)));
+  const seeding = way === 'seeds' && state.ct ?
+      [
+        PointList.toggle(state, key, 'Add seeds', tool),
+        button('Seed at the crosshair', () => tool.place([...state.cursor_mm]))
+      ] :
+      [];
   return el(
       'li', {class: 'fragment', 'data-fragment': name},
       el('div', {class: 'toolbar'}, el('span', {class: 'swatch', style: 'background:' + PointList.colour(f)}),
-         el('strong', {}, name), registers, state.ct && PointList.toggle(state, key, 'Add seeds', tool),
-         state.ct && button('Seed at the crosshair', () => tool.place([...state.cursor_mm])),
+         el('strong', {}, name), wayField(draft, labels, name, fragment), registers, seeding,
          button('Rename', () => rename(draft, state, name), {'aria-label': 'Rename ' + name}),
          button('Remove', () => remove(draft, state, name), {'aria-label': 'Remove the fragment ' + name})),
-      seeds.length ? el('ul', {class: 'points'},
-                        seeds.map(
-                            (point_mm, i) => PointList.row(
-                                state, 'seed ' + (i + 1) + ' of ' + name, point_mm, seedActions(draft, name, i)))) :
-                     el('p', {class: 'note'}, 'No seed yet.'));
+      way === 'surface'   ? surfaceRow(draft, name, fragment.surface) :
+          way === 'label' ? labelRow(state, labels, fragment.label) :
+                            seedList(draft, state, name, fragment.seeds || []));
+}
+
+// A case gives all of its fragments in the same way.
+function faultOf(draft) {
+  const ways = [...new Set(entries(draft).map(([, fragment]) => wayOf(fragment)))];
+  return ways.length < 2 ?
+      '' :
+      'Some fragments are given by ' + ways[0] + ', some by ' + ways[1] + '. A case gives all of them in the same way.';
 }
 
 function make(draft) {
-  const state = CtState.of(draft), list = el('ul', {class: 'fragments'});
+  const state = CtState.of(draft), labels = LabelsState.of(draft), list = el('ul', {class: 'fragments'});
+  const fault = el('p', {class: 'fault', role: 'status'});
   const add = PointList.nameField('new fragment', 'Add', () => names(draft), (name) => {
     draft.change('add the fragment ' + name, (document) => {
       document.fragments = {...(document.fragments || {}), [name]: {seeds: [], register: true}};
     });
   });
-  const update = PointList.renewed(
-      list, () => [draft.document.fragments, state.tool && state.tool.key, Boolean(state.ct)],
-      () => entries(draft).map((entry, f) => fragmentOf(draft, state, entry, f)));
+  const renew = PointList.renewed(
+      list, () => [draft.document.fragments, state.tool && state.tool.key, Boolean(state.ct), labels.labels],
+      () => entries(draft).map((entry, f) => fragmentOf(draft, state, labels, entry, f)));
+  const update = () => {
+    fault.textContent = faultOf(draft);
+    fault.hidden = !fault.textContent;
+    renew();
+  };
   state.marks.set('seeds', () => marks(draft));
   state.addEventListener('ct', update);
   state.addEventListener('view', update);
+  labels.addEventListener('labels', update);
   const ends = (event) => event.key === 'Escape' && state.tool && state.setTool(null);
   document.addEventListener('keydown', ends);
   return {
     element: el(
         'div', {class: 'fragments-panel'},
         el('p', {class: 'note'},
-           'A bone fragment grows from its seeds: points inside its bone. A fragment that is not registered is only ' +
-               'separated from the others.'),
-        add, list),
+           'A bone fragment grows from its seeds: points inside its bone. Or a label or a surface of another program ' +
+               'gives it. A fragment that is not registered is only separated from the others.'),
+        add, fault, list),
     update,
     dispose() {
       state.removeEventListener('ct', update);
       state.removeEventListener('view', update);
+      labels.removeEventListener('labels', update);
       document.removeEventListener('keydown', ends);
     }
   };

@@ -3,6 +3,7 @@
 import './home.js';
 import './case.js';
 import './ct_panel.js';
+import './labels_panel.js';
 import './fragments_panel.js';
 import './segmentation_panel.js';
 import './ct_landmarks.js';

@@ -7,7 +7,10 @@ import * as CasePage from './case.js';
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
 
-const PIPELINES = [['femur/femur-best', 'A fractured femur:'], ['bone/bone', 'Any other bone:']];
+const FRACTURE = ['femur/femur-best', 'A fractured femur:'], ANY_BONE = ['bone/bone', 'Any other bone:'];
+// Pipelines for fractures segment the fragments themselves.
+const pipelinesFor = ({document}) =>
+    (Object.values(document.fragments).every(({seeds}) => seeds) ? [FRACTURE, ANY_BONE] : [ANY_BONE]);
 
 // Asks whether comments of the older files may be lost, if some cannot be kept. If the server gives no answer, for
 // example because the case is incomplete, saving reports the fault.
@@ -53,7 +56,7 @@ function make(draft) {
   const written = ({folder, copied, pipelines}) =>
       [el('p', {}, 'Saved in ', el('strong', {}, folder), copied.length ? '; copied into it: ' + copied.join(', ') : '',
           '.'),
-       ...PIPELINES.flatMap(
+       ...pipelinesFor(draft).flatMap(
            ([name, words]) =>
                [el('p', {class: 'note'}, words),
                 Dom.command(

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The panel "Segmentation": the fragments grow from their seeds, and are shown in the slices and in 3D.
+// The panel "Segmentation": the fragments grow from their seeds, or get the smooth surface of their labels, and are
+// shown in the slices and in 3D.
 import {button, command, el, labelled, number, select, shellPath, shellWord} from '../../report/page/dom.js';
 
 import * as CasePage from './case.js';
@@ -71,16 +72,17 @@ class Panel {
     this.solid.element.hidden = true;
     this.threshold = el('input', {type: 'number', class: 'short', value: 250, step: 10});
     const field = labelled('threshold, HU', this.threshold);
-    const how = select('how', METHODS, this.method, (value) => {
+    this.how = select('how', METHODS, this.method, (value) => {
       this.method = value;
-      field.hidden = value !== 'bone';
+      this.update();
     });
+    this.field = field;
     this.button = button('Segment', () => this.run(), {'data-do': 'segment'});
     this.outcome = el('p', {class: 'note', role: 'status', 'data-segmented': ''});
     this.old = el('p', {class: 'note'});
     this.command = el('details', {hidden: true}, el('summary', {}, 'The same in a shell, once the case is saved'));
     this.element =
-        el('div', {}, el('div', {class: 'toolbar'}, how, field, this.button), this.outcome, this.old,
+        el('div', {}, el('div', {class: 'toolbar'}, this.how, field, this.button), this.outcome, this.old,
            this.solid.element, this.command);
     this.renewed = () => {
       if (!this.state.ct || this.state.ct.name !== this.segmented) this.state.contours.delete('segmentation');
@@ -98,6 +100,11 @@ class Panel {
     return this.draft.document.fragments || {};
   }
 
+  // Whether labels or surfaces give the fragments, in place of seeds.
+  areGiven() {
+    return Object.values(this.fragments()).some(({label, surface}) => label !== undefined || surface);
+  }
+
   // Shows a result: its outlines, volumes and surfaces.
   async take({segmentation, stage, volumes_ml}) {
     const names = Object.keys(volumes_ml), mine = ++this.turn;
@@ -105,7 +112,8 @@ class Panel {
     this.state.contours.set('segmentation', outlines(segmentation, colourOf));
     this.state.tell('view');
     const volumes = names.map((name) => name + ' ' + number(volumes_ml[name]) + ' ml').join(', ');
-    this.outcome.textContent = 'Segmented ' + STAGES[stage] + ': ' + volumes;
+    this.outcome.textContent =
+        this.areGiven() ? 'As the pipelines take them: ' + volumes : 'Segmented ' + STAGES[stage] + ': ' + volumes;
     this.outcome.dataset.segmented = stage;
     const meshes = await Shell.guarded(() => surfaces(segmentation, names, colourOf));
     if (!meshes || mine !== this.turn) return;
@@ -113,19 +121,27 @@ class Panel {
     this.solid.set(meshes);
   }
 
+  // What a segmentation of the present draft is made from.
+  content() {
+    const {ct} = this.state, {labels} = this.draft.document, asked = {fragments: structuredClone(this.fragments())};
+    if (ct) asked.ct = ct.name;
+    if (labels) asked.labels = labels;
+    return asked;
+  }
+
   async run() {
     this.isRunning = true;
-    this.segmented = this.state.ct.name;
+    const content = this.content(), asked = {...content, method: this.areGiven() ? 'given' : this.method};
+    this.segmented = asked.ct || '';
     this.update();
-    const asked = {ct: this.state.ct.name, fragments: structuredClone(this.fragments()), method: this.method};
-    if (this.method === 'bone') asked.threshold_hu = Number(this.threshold.value);
+    if (asked.method === 'bone') asked.threshold_hu = Number(this.threshold.value);
     try {
       const {job, pipeline} = await Ask.post('api/segment', asked);
       this.tellCommand(pipeline, asked);
       await Shell.follow('Segmenting', job, (event) => {
         if (event.event === 'grown') this.take(event);
       });
-      this.shownFor = JSON.stringify([asked.fragments, asked.ct]);
+      this.shownFor = JSON.stringify(content);
     } catch (error) {
       Shell.notice(error.message, 'fault');
       if (error.status === 409) this.state.follow(true);
@@ -142,12 +158,17 @@ class Panel {
   }
 
   update() {
-    const has_seeds = Object.values(this.fragments()).some(({seeds}) => seeds && seeds.length);
-    this.button.disabled = this.isRunning || !this.state.ct || !has_seeds;
-    this.button.title = has_seeds ? '' : 'Add a fragment and put seeds into its bone first';
-    const now = JSON.stringify([this.draft.document.fragments, this.state.ct && this.state.ct.name]);
-    this.old.textContent =
-        this.shownFor && this.shownFor !== now ? 'The seeds or the CT have changed since; segment again.' : '';
+    const are_given = this.areGiven(),
+          has_seeds = Object.values(this.fragments()).some(({seeds}) => seeds && seeds.length);
+    this.how.hidden = are_given;
+    this.field.hidden = are_given || this.method !== 'bone';
+    this.button.textContent = are_given ? 'Show the surfaces' : 'Segment';
+    this.button.disabled = this.isRunning || !(are_given || (this.state.ct && has_seeds));
+    this.button.title = are_given || has_seeds ? '' : 'Add a fragment and put seeds into its bone first';
+    const now = JSON.stringify(this.content());
+    this.old.textContent = this.shownFor && this.shownFor !== now ?
+        'The fragments or the CT have changed since; ' + (are_given ? 'show them' : 'segment') + ' again.' :
+        '';
   }
 }
 

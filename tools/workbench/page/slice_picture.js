@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Draws a slice: its values, the outlines of fragments, the crosshair, points, and the patient's directions.
+// Draws a slice: its values, the labels over them, the outlines of fragments, the crosshair, points, and the patient's
+// directions.
 import * as SliceGeometry from './slice_geometry.js';
 import {letters, opposite} from './slice_geometry.js';
 
@@ -24,15 +25,28 @@ function tableOf({level, width}) {
 
 function fill(view, values) {
   const {ct, window} = view.state, [low, high] = [0, 1, 2].filter((axis) => axis !== view.plane.across);
-  const [width, height] = [ct.size[low], ct.size[high]], key = [ct.name, view.wanted, tableKey(window)].join(' ');
+  const overlay = view.state.overlay && view.state.overlay.slice(ct.name, view.plane.across, view.wanted);
+  const [width, height] = [ct.size[low], ct.size[high]];
+  const key = [ct.name, view.wanted, tableKey(window), overlay ? overlay.key : ''].join(' ');
   if (view.filled === key) return;
   if (view.picture.width !== width || view.picture.height !== height) Object.assign(view.picture, {width, height});
   const pen = view.picture.getContext('2d', PLAIN), image = pen.createImageData(width, height);
   const pixels = new Uint32Array(image.data.buffer), greys = tableOf(window);
   for (let i = 0; i < pixels.length; ++i) pixels[i] = greys[values[i] + 32768];
+  if (overlay) mix(image.data, overlay);
   pen.putImageData(image, 0, 0);
   view.filled = key;
 }
+
+// Colours the pixels of labelled voxels.
+function mix(bytes, {places, colours}) {
+  for (let i = 0; i < places.length; ++i) {
+    if (!places[i]) continue;
+    const {bytes: colour, opacity} = colours[places[i] - 1];
+    for (let k = 0; k < 3; ++k) bytes[4 * i + k] += opacity * (colour[k] - bytes[4 * i + k]);
+  }
+}
+
 const tableKey = ({level, width}) => level + '/' + width;
 
 function crosshair(view, pen) {

@@ -189,8 +189,8 @@ void add_to_description(const LibraryInfo& described, const LoadedByPython& more
   LibraryInfo more = described;
   for (const std::string& file : more_loaded.files) more.linked.push_back(with_size(file));
   for (const auto& [path, names] : more_loaded.searched) {
-    auto folder =
-        std::find_if(more.searched.begin(), more.searched.end(), [&](const auto& one) { return one.path == path; });
+    auto folder = std::find_if(more.searched.begin(), more.searched.end(),
+                               [&path = path](const auto& one) { return one.path == path; });
     if (folder == more.searched.end()) folder = more.searched.insert(more.searched.end(), SearchedFolder{path, {}});
     folder->names.insert(folder->names.end(), names.begin(), names.end());
   }

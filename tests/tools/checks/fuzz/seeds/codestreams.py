@@ -23,3 +23,14 @@ JPEG_EXTENDED = bytes.fromhex(
     "080103020b0cffda0008010100003f0049940ff2dc7af6ac5186234ce794deb346d77a76c4eec3487b47349d3ca4d56701fc"
     "8e83ed7ac142a46d94bdd4e0e30da94252a0cd9024c33514e4cbc1672d9a120531180701310ddf239fffffd9"
 )
+
+
+def in_boxes(codestream):
+    """A JP2 file of boxes: its signature, its kind, a header (of two boxes in it), the codestream."""
+
+    def box(kind, content):
+        return (8 + len(content)).to_bytes(4, "big") + kind + content
+
+    header = box(b"ihdr", bytes.fromhex("0000000400000006000107070000")) + box(b"colr", b"\1\0\0\0\0\0\x11")
+    start = box(b"jP  ", b"\r\n\x87\n") + box(b"ftyp", b"jp2 \0\0\0\0jp2 ")
+    return start + box(b"jp2h", header) + box(b"jp2c", codestream)

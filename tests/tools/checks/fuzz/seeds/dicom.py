@@ -178,6 +178,7 @@ def seeds():
         ("jpeg_lossless", "1.2.840.10008.1.2.4.57", codestreams.JPEG_LOSSLESS),
         ("jpeg_ls", "1.2.840.10008.1.2.4.80", codestreams.JPEG_LS),
         ("jpeg_2000", "1.2.840.10008.1.2.4.90", codestreams.JPEG_2000),
+        ("jpeg_2000_in_boxes", "1.2.840.10008.1.2.4.90", codestreams.in_boxes(codestreams.JPEG_2000)),
     ):
         whole = coded + b"\0" * (len(coded) % 2)
         result["i_whole_" + name] = (
@@ -190,6 +191,8 @@ def seeds():
         )
     table = element(0x00283002, "US", struct.pack("<3H", 4, 1, 16)) + element(0x00283006, "OW", bytes(range(8)))
     result["i_table"] = b"i" + dicom(fluoroscopy(), extra=element(0x00283000, "SQ", item(table)))
+    linear = element(0x00289422, "SQ", item(table + element(0x00289474, "CS", b"TO_LINEAR ")))
+    result["i_logarithms"] = b"i" + dicom(fluoroscopy(**{"00281040": ("CS", "LOG")}), extra=linear)
     result["s_frames"] = b"s" + enhanced_ct()
     result["i_delimited"] = b"i" + dicom(headless, extra=nested) + element(0x7FE00010, "OW", bytes(48))
     result["f_frames"] = b"f" + frames()
