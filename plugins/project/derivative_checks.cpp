@@ -8,7 +8,7 @@
 #include "made.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/domain/quantile.hpp"
-#include "marrow/domain/radiograph_expansion.hpp"
+#include "marrow/domain/functions.hpp"
 #include "marrow/domain/random.hpp"
 
 namespace marrow::conformance {
@@ -22,7 +22,7 @@ constexpr int kPoses = 200;
 PixelGrid coarse() { return {1, 2, 4, 39, 39}; }
 
 /// The exact radiograph of a Gaussian cloud, for nodes that pass the radiographs of others on.
-class Cloud : public RadiographProjector, public RadiographDerivatives {
+class Cloud : public RadiographProjector {
  public:
   std::vector<float> radiograph(const Camera& camera, const RigidTransform& pose, const PixelGrid& grid) const override {
     std::vector<float> values;
@@ -81,7 +81,7 @@ RigidTransform random_pose(Random& random) {
 /// the next: there the derivative of interpolated values jumps.
 double slopes_off(const RadiographProjector& projector, const Camera& camera, const RigidTransform& at) {
   const PixelGrid grid = coarse();
-  const auto expansion = expansion_of(projector, camera, at, frame(), grid);
+  const auto expansion = projector.expansion(camera, at, frame(), grid);
   expect(expansion.has_value(), "it declares the trait 'derivatives', but its radiographs have none");
   double worst = 0;
   for (int k = 0; k < 6; ++k) {
@@ -124,7 +124,7 @@ double slopes_of_smooth_off(const RadiographProjector& projector) {
 double values_off_mm(const RadiographProjector& projector) {
   double most = 0;
   for (const double angle : angles()) {
-    const auto expansion = expansion_of(projector, camera_at(angle), pose(), frame(), coarse());
+    const auto expansion = projector.expansion(camera_at(angle), pose(), frame(), coarse());
     expect(expansion.has_value(), "it declares the trait 'derivatives', but its radiographs have none");
     const std::vector<float> values = projector.radiograph(camera_at(angle), pose(), coarse());
     for (std::size_t i = 0; i < values.size(); ++i)
@@ -136,7 +136,7 @@ double values_off_mm(const RadiographProjector& projector) {
 /// Whether it has derivatives, as it declares. Throws NotApplicable if it has none.
 void check_declared(const Subject& subject, const RadiographProjector& projector) {
   const bool is_declared = subject.has_trait("derivatives");
-  const bool has_some = expansion_of(projector, camera_at(0), pose(), frame(), coarse()).has_value();
+  const bool has_some = projector.expansion(camera_at(0), pose(), frame(), coarse()).has_value();
   expect(is_declared || !has_some, "its radiographs have derivatives, but it does not declare the trait 'derivatives'");
   if (!is_declared) throw NotApplicable("its radiographs have no derivatives");
 }

@@ -40,7 +40,7 @@ void fill(std::array<float, count>& values, const Matrix& matrix) {
     values[i] = float(matrix(Eigen::Index(i) / matrix.cols(), Eigen::Index(i) % matrix.cols()));
 }
 
-class OpenClProjector : public marrow::RadiographProjector, public marrow::RadiographDerivatives {
+class OpenClProjector : public marrow::RadiographProjector {
  public:
   OpenClProjector(Attenuation attenuation, std::shared_ptr<const Device> device)
       : attenuation_(std::move(attenuation)), device_(std::move(device)) {

@@ -16,7 +16,7 @@ struct Options : AttenuationOptions {
 };
 
 /// Sums trilinear values at even steps. Each value counts for the step around it.
-class RayCastingProjector : public RayProjector, public marrow::RadiographDerivatives {
+class RayCastingProjector : public RayProjector {
  public:
   RayCastingProjector(marrow::rays::Attenuation attenuation, double step_mm)
       : RayProjector(std::move(attenuation)), step_mm_(step_mm) {}

@@ -10,7 +10,7 @@
 namespace marrow::rays {
 
 /// Sums of bilinear values over the slices that are perpendicular to the axis nearest to the ray's direction.
-class JosephProjector : public RayProjector, public RadiographDerivatives {
+class JosephProjector : public RayProjector {
  public:
   explicit JosephProjector(Attenuation attenuation)
       : RayProjector(std::move(attenuation)), slices_(attenuation_), bricks_(attenuation_) {}

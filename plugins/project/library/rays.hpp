@@ -5,7 +5,7 @@
 #include <functional>
 
 #include "marrow/domain/mesh.hpp"
-#include "marrow/domain/radiograph_expansion.hpp"
+#include "marrow/domain/functions.hpp"
 #include "marrow/project/attenuation.hpp"
 
 namespace marrow::rays {

@@ -9,7 +9,7 @@
 
 #include "marrow/base/error.hpp"
 #include "marrow/domain/camera.hpp"
-#include "marrow/domain/radiograph_expansion.hpp"
+#include "marrow/domain/functions.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
 #include "marrow/toolbox/match/among_others.hpp"
 #include "marrow/toolbox/match/bones_together.hpp"
@@ -211,7 +211,7 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
                                          const FragmentFrame& frame) const {
     Patch patch = region_of(view, world_from_model);
     if (patch.seen.empty()) return patch;
-    auto expansion = marrow::expansion_of(projector(), views_[view].camera, world_from_model, frame, grid_of(patch));
+    auto expansion = projector().expansion(views_[view].camera, world_from_model, frame, grid_of(patch));
     if (!expansion) return std::nullopt;
     patch.rendered = std::move(expansion->values);
     patch.slopes = std::move(expansion->slopes);

@@ -13,7 +13,7 @@
 #include <optional>
 
 #include "marrow/domain/pose.hpp"
-#include "marrow/domain/radiograph_expansion.hpp"
+#include "marrow/domain/functions.hpp"
 
 namespace marrow::match {
 namespace {
@@ -62,7 +62,7 @@ std::optional<Box> box_of(const RadiographProjector& projector) {
   return box;
 }
 
-class SmoothedAtBone : public RadiographProjector, public RadiographDerivatives {
+class SmoothedAtBone : public RadiographProjector {
  public:
   SmoothedAtBone(const RadiographProjector& projector, double sigma_px, const Box& box)
       : projector_(projector), sigma_px_(sigma_px), box_(box) {}
@@ -78,8 +78,8 @@ class SmoothedAtBone : public RadiographProjector, public RadiographDerivatives 
   std::optional<RadiographExpansion> expansion(const Camera& camera, const RigidTransform& world_from_model,
                                                const FragmentFrame& frame, const PixelGrid& grid) const override {
     const Mixture mixture = mixture_at(camera, world_from_model);
-    auto sharper = expansion_of(at(mixture.level), camera, world_from_model, frame, grid),
-         smoother = expansion_of(at(mixture.level + 1), camera, world_from_model, frame, grid);
+    auto sharper = at(mixture.level).expansion(camera, world_from_model, frame, grid),
+         smoother = at(mixture.level + 1).expansion(camera, world_from_model, frame, grid);
     if (!sharper || !smoother) return std::nullopt;
     for (int k = 0; k < 6; ++k) {
       // By differences, because it is a number and costs no radiograph.

@@ -4,7 +4,7 @@
 // analytically.
 #include <vector>
 
-#include "marrow/domain/radiograph_expansion.hpp"
+#include "marrow/domain/functions.hpp"
 #include "marrow/domain/mesh.hpp"
 #include "marrow/domain/volume.hpp"
 
@@ -39,7 +39,7 @@ Camera c_arm(double angle_deg, int width_px, int height_px, double pixel_mm);
 RigidTransform moved_by(const Eigen::Vector3d& turn_rad, const Eigen::Vector3d& shift_mm);
 
 /// Draws the body exactly: the outer outline, and radiographs whose values are chord lengths in mm times a density.
-class BodyProjector : public OutlineProjector, public RadiographProjector, public RadiographDerivatives {
+class BodyProjector : public OutlineProjector, public RadiographProjector {
  public:
   explicit BodyProjector(Body body, double density = 1) : body_(std::move(body)), density_(density) {}
   std::vector<OutlinePoint> outline(const Camera&, const RigidTransform& world_from_model,

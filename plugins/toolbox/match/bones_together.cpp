@@ -50,7 +50,7 @@ std::vector<float> BonesTogether::radiograph(const Camera& camera, const RigidTr
 std::optional<RadiographExpansion> BonesTogether::expansion(const Camera& camera,
                                                             const RigidTransform& world_from_model,
                                                             const FragmentFrame& frame, const PixelGrid& grid) const {
-  auto expansion = expansion_of(*bone_, camera, world_from_model, frame, grid);
+  auto expansion = bone_->expansion(camera, world_from_model, frame, grid);
   if (expansion && !others_.empty() && bone_->region(camera, world_from_model).count() > 0)
     add_others(camera, grid, expansion->values);
   return expansion;

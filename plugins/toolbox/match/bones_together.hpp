@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "marrow/domain/list.hpp"
-#include "marrow/domain/radiograph_expansion.hpp"
+#include "marrow/domain/functions.hpp"
 
 namespace marrow::match {
 
 /// The radiograph of a bone together with those of other bones in known poses: line integrals add. The pose that a
 /// radiograph is asked for is that of the bone; the others stay where they are. The region holds all of them, and is
 /// empty if the bone itself is out of view.
-class BonesTogether : public RadiographProjector, public RadiographDerivatives {
+class BonesTogether : public RadiographProjector {
  public:
   using Projector = std::shared_ptr<const RadiographProjector>;
   struct Other {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The derivatives of the costs that compare grey values, against differences of their values.
 #include <marrow/domain/pose.hpp>
-#include <marrow/domain/radiograph_expansion.hpp>
+#include <marrow/domain/functions.hpp>
 
 #include "marrow/domain/decompositions.hpp"
 #include "tests/plugins/similarity/blob_scene.hpp"
@@ -13,7 +13,7 @@ using marrow::FragmentFrame;
 using marrow::Vector6d;
 
 /// Blobs in space, each seen as a blob around its projection.
-class BlobsInSpace : public pixelwise_projector::PixelwiseProjector, public marrow::RadiographDerivatives {
+class BlobsInSpace : public pixelwise_projector::PixelwiseProjector {
  public:
   PixelGrid region(const Camera&, const RigidTransform&) const override { return {45, 40, 1, 100, 85}; }
   std::optional<marrow::RadiographExpansion> expansion(const Camera& camera, const RigidTransform& pose, const FragmentFrame& frame,
