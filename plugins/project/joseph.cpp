@@ -1,48 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/project/bricks.hpp"
-#include "marrow/project/slices.hpp"
+#include "marrow/project/joseph_projector.hpp"
 
 namespace {
 
-using marrow::PixelGrid;
-using marrow::rays::Attenuation;
 using marrow::rays::AttenuationOptions;
-using marrow::rays::Bricks;
-using marrow::rays::RayProjector;
-using marrow::rays::Slices;
-
-/// Sums of bilinear values over the slices that are perpendicular to the axis nearest to the ray's direction.
-class JosephProjector : public RayProjector {
- public:
-  explicit JosephProjector(Attenuation attenuation)
-      : RayProjector(std::move(attenuation)), slices_(attenuation_), bricks_(attenuation_) {}
-
-  using RayProjector::radiograph;
-  std::vector<float> radiograph(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model,
-                                const PixelGrid& grid) const override {
-    const auto values = slices_.radiograph(marrow::rays::rays_of(camera, world_from_model, attenuation_.grid), grid);
-    return values ? *values : RayProjector::radiograph(camera, world_from_model, grid);
-  }
-
- protected:
-  std::shared_ptr<const marrow::RadiographProjector> of(marrow::rays::Attenuation attenuation) const override {
-    return std::make_shared<JosephProjector>(std::move(attenuation));
-  }
-  float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const override {
-    return bricks_.integral(source, direction);
-  }
-
- private:
-  const Slices slices_;
-  const Bricks bricks_;
-};
 
 std::shared_ptr<const marrow::RadiographProjector> joseph(const marrow::Volume& volume,
                                                           const marrow::SignedField* field,
                                                           const AttenuationOptions& options) {
-  return std::make_shared<JosephProjector>(attenuation_of(volume, field, options));
+  return std::make_shared<marrow::rays::JosephProjector>(attenuation_of(volume, field, options));
 }
 
 }  // namespace
@@ -51,5 +19,6 @@ MARROW_PLUGIN(plugin) {
   auto node = plugin.node("project.joseph", joseph);
   marrow::rays::declare<AttenuationOptions>(
       node.summary("Radiographs by Joseph's method (IEEE Trans Med Imaging 1982): line integrals as sums over slices; "
-                   "whole images are computed slice by slice"));
+                   "whole images are computed slice by slice")
+                     .trait("derivatives"));
 }

@@ -17,5 +17,6 @@ MARROW_PLUGIN(plugin) {
                                        marrow::over("fragment"))
       .out<marrow::OutlineProjector, marrow::RadiographProjector>("projector",
                                                                   "draws the model for any camera and pose")
+      .trait("derivatives", "its radiographs have derivatives")
       .suite(marrow::conformance::project_suite());
 }

@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "bodies.hpp"
+#include "derivative_checks.hpp"
 #include "made.hpp"
 #include "marrow/base/number_text.hpp"
 #include "outline_checks.hpp"
@@ -153,6 +154,7 @@ Suite project_suite() {
   suite.accuracy.push_back(
       {{"any_threads", "outlines and radiographs that differ with 1, 2 and 7 threads", 0, "pictures"},
        differing_drawings});
+  for (const Check& check : derivative_checks()) suite.accuracy.push_back(check);
   for (const Check& check : outline_checks()) suite.accuracy.push_back(check);
   return suite;
 }

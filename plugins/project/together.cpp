@@ -29,6 +29,7 @@ MARROW_PLUGIN(plugin) {
       .summary(
           "The radiograph of a bone together with those of other bones in known poses: line integrals add, so that a "
           "bone is explained with what overlaps it")
+      .trait("derivatives")
       .in("projector", "makes radiographs of the bone itself")
       .in("others", "poses of all bones; that of the bone itself does not count", marrow::over("fragment"))
       .in("other_projectors", "make radiographs of the other bones, and maybe of this one", marrow::over("fragment"))

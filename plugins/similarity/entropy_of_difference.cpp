@@ -20,7 +20,7 @@ struct Options : marrow::match::IntensityOptions {
 marrow::match::WholeMeasure measure_of(const Patch& whole, const Options& options) {
   const int bins = options.bins;
   marrow::match::Bins within = bins_of(whole.seen, whole.counts, bins);
-  if (within.per_unit == 0) return [](const Patch&) { return 1.0; };
+  if (within.per_unit == 0) return {[](const Patch&) { return 1.0; }, {}};
   // The lowest integral, often that of the background, lies in the middle of its bin.
   within.low -= (bins + 0.5) / within.per_unit;
   within.count = 2 * bins + 1;
@@ -29,8 +29,8 @@ marrow::match::WholeMeasure measure_of(const Patch& whole, const Options& option
   for (std::size_t i = 0; i < whole.seen.size(); ++i)
     if (whole.counts[i]) image[std::size_t(within.of(whole.seen[i]))] += 1, n += 1;
   const double before = marrow::match::entropy(image, n);
-  return [=](const Patch& patch) {
-    const double scale = marrow::match::scale_of(marrow::match::gradients_of(patch));
+  const auto value = [=](const Patch& patch) {
+    const double scale = marrow::match::scale_of(marrow::match::gradients_of(patch)).value;
     if (!(scale > 0) || !(before > 0)) return 1.0;
     std::vector<double> histogram = image;
     for (std::size_t i = 0; i < patch.seen.size(); ++i) {
@@ -40,6 +40,7 @@ marrow::match::WholeMeasure measure_of(const Patch& whole, const Options& option
     }
     return std::min(2.0, marrow::match::entropy(histogram, n) / before);
   };
+  return {value, {}};
 }
 
 constexpr auto entropy_of_difference = marrow::match::intensity_node<measure_of, Options>;

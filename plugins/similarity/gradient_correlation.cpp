@@ -7,13 +7,14 @@ namespace {
 
 using marrow::match::Patch;
 
-double value(const Patch& patch) {
-  const marrow::match::Gradients g = marrow::match::gradients_of(patch);
-  using marrow::match::correlation;
-  return 1 - 0.5 * (correlation(g.rendered_u, g.seen_u, g.counts) + correlation(g.rendered_v, g.seen_v, g.counts));
+marrow::match::CorrelationMeasure measure_of(const Patch&) {
+  return {[](const Patch& patch) {
+    marrow::match::Gradients g = marrow::match::gradients_of(patch);
+    return std::vector<Patch>{std::move(g.u), std::move(g.v)};
+  }};
 }
 
-constexpr auto gradient_correlation = marrow::match::intensity_node<value>;
+constexpr auto gradient_correlation = marrow::match::intensity_node<measure_of>;
 
 }  // namespace
 
@@ -22,6 +23,7 @@ MARROW_PLUGIN(plugin) {
   node.summary(
           "1 - mean of the correlations of the horizontal and of the vertical gradients (Penney et al., IEEE Trans Med "
           "Imaging 1998)")
-      .trait("unmoved_by_gain");
+      .trait("unmoved_by_gain")
+      .trait("derivatives");
   marrow::match::declare<marrow::match::IntensityOptions>(node);
 }

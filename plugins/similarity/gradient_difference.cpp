@@ -3,11 +3,22 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/similarity/intensity.hpp"
+#include "marrow/similarity/structure.hpp"
 
 namespace {
 
 using marrow::match::Patch;
+using marrow::match::Structure;
+
+/// Calls of(column, row, i) for each place where the radiograph has a gradient.
+template <class Of>
+void each_gradient(const marrow::match::Gradients& g, const Of& of) {
+  for (int row = 0; row < g.u.rows; ++row)
+    for (int column = 0; column < g.u.columns; ++column)
+      if (const std::size_t i = g.u.at(column, row);
+          g.u.counts[i] && (g.u.rendered[i] != 0 || g.v.rendered[i] != 0))
+        of(column, row, i);
+}
 
 /// Remaining structure: the sums over the image, for both directions, of 1 - A / (A + d^2), divided by the same sums
 /// without the model. d is the difference of the gradients, and A the variance of the image's gradients. Except for
@@ -16,28 +27,35 @@ marrow::match::SumMeasure measure_of(const Patch& whole) {
   Patch unseen = whole;
   unseen.rendered.assign(whole.seen.size(), 0.0f);
   const marrow::match::Gradients image = marrow::match::gradients_of(unseen);
-  const auto variance = [&](const std::vector<float>& gradients) {
-    return std::max(1e-14, std::pow(marrow::match::deviation(gradients, image.counts), 2));
+  const auto structure = [&](const Patch& gradients) {
+    return Structure{std::max(1e-14, std::pow(marrow::match::deviation(gradients.seen, gradients.counts), 2))};
   };
-  const double u2 = variance(image.seen_u), v2 = variance(image.seen_v);
-  const auto structure = [](double d, double variance) { return d * d / (variance + d * d); };
+  const Structure of_u = structure(image.u), of_v = structure(image.v);
   double all = 0;
-  for (std::size_t i = 0; i < image.counts.size(); ++i)
-    if (image.counts[i]) all += structure(image.seen_u[i], u2) + structure(image.seen_v[i], v2);
-  const auto add = [=](const Patch& patch, marrow::match::Tally& tally) {
+  for (std::size_t i = 0; i < image.u.counts.size(); ++i)
+    if (image.u.counts[i]) all += of_u(image.u.seen[i]) + of_v(image.v.seen[i]);
+  marrow::match::SumMeasure measure;
+  measure.whole = all;
+  measure.add = [=](const Patch& patch, marrow::match::Tally& tally) {
     const marrow::match::Gradients g = marrow::match::gradients_of(patch);
-    const double scale = marrow::match::scale_of(g);
+    const double scale = marrow::match::scale_of(g).value;
     if (!(scale > 0)) return;
-    for (int row = 0; row < patch.rows; ++row)
-      for (int column = 0; column < patch.columns; ++column) {
-        const std::size_t i = patch.at(column, row);
-        if (!g.counts[i] || (g.rendered_u[i] == 0 && g.rendered_v[i] == 0)) continue;
-        const double less = structure(g.seen_u[i], u2) - structure(g.seen_u[i] - scale * g.rendered_u[i], u2) +
-                            (structure(g.seen_v[i], v2) - structure(g.seen_v[i] - scale * g.rendered_v[i], v2));
-        tally.add(column, row, less, 0);
-      }
+    each_gradient(g, [&](int column, int row, std::size_t i) {
+      tally.add(column, row,
+                of_u.removed(g.u.seen[i], g.u.rendered[i], scale) + of_v.removed(g.v.seen[i], g.v.rendered[i], scale),
+                0);
+    });
   };
-  return {add, [all](const auto& sums) { return all > 0 ? std::min(2.0, 1 - sums.values / all) : 1; }};
+  measure.add_expansion = [=](const Patch& patch, marrow::match::TallyOfExpansions& tally) {
+    const marrow::match::Gradients g = marrow::match::gradients_of(patch);
+    const marrow::match::Scale scale = marrow::match::scale_of(g);
+    if (!(scale.value > 0)) return;
+    each_gradient(g, [&](int column, int row, std::size_t i) {
+      auto removed = of_u.removed(g.u.seen[i], g.u.rendered[i], g.u.slopes_at(i), scale);
+      tally.add(column, row, removed += of_v.removed(g.v.seen[i], g.v.rendered[i], g.v.slopes_at(i), scale));
+    });
+  };
+  return measure;
 }
 
 constexpr auto gradient_difference = marrow::match::intensity_node<measure_of>;
@@ -49,6 +67,7 @@ MARROW_PLUGIN(plugin) {
   node.summary(
           "Gradients that remain after the radiograph is subtracted from the image (gradient difference); thin bright "
           "lines hardly disturb this measure (Penney et al., IEEE Trans Med Imaging 1998)")
-      .trait("unmoved_by_gain");
+      .trait("unmoved_by_gain")
+      .trait("derivatives");
   marrow::match::declare<marrow::match::IntensityOptions>(node);
 }

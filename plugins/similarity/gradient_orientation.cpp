@@ -28,16 +28,16 @@ double median_length(const std::vector<float>& u, const std::vector<float>& v, c
 /// than a tenth of the pixels, the missing ones count as 1.
 double value(const Patch& patch) {
   const marrow::match::Gradients g = marrow::match::gradients_of(patch);
-  const double least_rendered = median_length(g.rendered_u, g.rendered_v, g.counts),
-               least_seen = median_length(g.seen_u, g.seen_v, g.counts);
+  const double least_rendered = median_length(g.u.rendered, g.v.rendered, g.u.counts),
+               least_seen = median_length(g.u.seen, g.v.seen, g.u.counts);
   double used = 0, sum = 0, all = 0;
-  for (std::size_t i = 0; i < g.counts.size(); ++i) {
-    if (!g.counts[i]) continue;
+  for (std::size_t i = 0; i < g.u.counts.size(); ++i) {
+    if (!g.u.counts[i]) continue;
     all += 1;
-    const double a = std::hypot(g.rendered_u[i], g.rendered_v[i]), b = std::hypot(g.seen_u[i], g.seen_v[i]);
+    const double a = std::hypot(g.u.rendered[i], g.v.rendered[i]), b = std::hypot(g.u.seen[i], g.v.seen[i]);
     if (a < least_rendered || b < least_seen || a == 0 || b == 0) continue;
     used += 1;
-    sum += 0.5 * (1 + (double(g.rendered_u[i]) * g.seen_u[i] + double(g.rendered_v[i]) * g.seen_v[i]) / (a * b));
+    sum += 0.5 * (1 + (double(g.u.rendered[i]) * g.u.seen[i] + double(g.v.rendered[i]) * g.v.seen[i]) / (a * b));
   }
   return used > 0 ? 1 - sum / std::max(used, 0.1 * all) : 1;
 }

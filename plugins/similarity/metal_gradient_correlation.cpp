@@ -9,7 +9,6 @@
 namespace {
 
 using marrow::match::Patch;
-using marrow::match::Tally;
 
 struct MetalOptions : marrow::match::PatchOptions {
   double opaque_mm = 10;
@@ -19,18 +18,21 @@ struct MetalOptions : marrow::match::PatchOptions {
 /// -log(exp(-r / opaque_mm) + scatter): what is measured behind a line integral r.
 Patch as_measured(const Patch& patch, const MetalOptions& options) {
   Patch result = patch;
-  for (float& value : result.rendered)
-    value = float(-std::log(std::exp(-double(value) / options.opaque_mm) + options.scatter));
+  for (std::size_t i = 0; i < result.rendered.size(); ++i) {
+    const double direct = std::exp(-double(patch.rendered[i]) / options.opaque_mm), all = direct + options.scatter;
+    result.rendered[i] = float(-std::log(all));
+    const auto slope = float(direct / (options.opaque_mm * all));
+    for (std::vector<float>& slopes : result.slopes)
+      if (!slopes.empty()) slopes[i] *= slope;
+  }
   return result;
 }
 
 marrow::match::SumMeasure measure_of(const Patch&, const MetalOptions& options) {
-  const auto add = [options](const Patch& patch, Tally& tally) {
-    const marrow::match::Gradients g = marrow::match::gradients_of(as_measured(patch, options));
-    marrow::match::add_patch_correlations(patch, g.rendered_u, g.seen_u, g.counts, options.patch_pixels, tally);
-    marrow::match::add_patch_correlations(patch, g.rendered_v, g.seen_v, g.counts, options.patch_pixels, tally);
-  };
-  return {add, marrow::match::value_of_patch_correlations};
+  return marrow::match::correlation_in_squares(options.patch_pixels, [options](const Patch& patch) {
+    marrow::match::Gradients g = marrow::match::gradients_of(as_measured(patch, options));
+    return std::vector<Patch>{std::move(g.u), std::move(g.v)};
+  });
 }
 
 constexpr auto metal_gradient_correlation = marrow::match::intensity_node<measure_of, MetalOptions>;
@@ -41,7 +43,8 @@ MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.metal_gradient_correlation", metal_gradient_correlation);
   node.summary(
           "similarity.patch_gradient_correlation for implants: the radiograph saturates, as images do behind metal")
-      .trait("unmoved_by_gain");
+      .trait("unmoved_by_gain")
+      .trait("derivatives");
   marrow::match::declare<MetalOptions>(node);
   node.option("patch_pixels", &MetalOptions::patch_pixels, "side of the squares, counted in compared pixels",
               marrow::at_least(5), marrow::at_most(201))

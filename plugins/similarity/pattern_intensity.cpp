@@ -2,7 +2,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/similarity/intensity.hpp"
+#include "marrow/similarity/structure.hpp"
 
 namespace {
 
@@ -28,28 +28,46 @@ void each_pair(const Patch& patch, int radius, const Of& of) {
       }
 }
 
+/// The same for pairs between which the radiograph changes, with the column and row of the first pixel.
+template <class Of>
+void each_rendered_pair(const Patch& patch, int radius, const Of& of) {
+  const auto columns = std::size_t(patch.columns);
+  each_pair(patch, radius, [&](std::size_t i, std::size_t j) {
+    if (patch.rendered[i] != patch.rendered[j]) of(int(i % columns), int(i / columns), i, j);
+  });
+}
+
 /// Remaining structure: the sum over all pairs in the image of 1 - s^2 / (s^2 + (D_i - D_j)^2), divided by the same sum
 /// without the model. D = seen - scale * rendered, and s is the given fraction of the image's standard deviation.
 /// Except for constants, this is the sum of Weese and of Penney over a fixed region, the image. A mean over the
 /// surroundings of the model would be lowest where the image is flat.
 marrow::match::SumMeasure measure_of(const Patch& whole, const Options& options) {
-  const double deviation = marrow::match::deviation(whole.seen, whole.counts),
-               s2 = std::max(1e-14, std::pow(options.sigma * deviation, 2));
-  const auto structure = [s2](double d) { return d * d / (s2 + d * d); };
+  const double deviation = marrow::match::deviation(whole.seen, whole.counts);
+  const marrow::match::Structure structure{std::max(1e-14, std::pow(options.sigma * deviation, 2))};
   double all = 0;
   each_pair(whole, options.radius_pixels,
             [&](std::size_t i, std::size_t j) { all += structure(whole.seen[i] - whole.seen[j]); });
-  const auto add = [=, radius = options.radius_pixels](const Patch& patch, marrow::match::Tally& tally) {
-    const float scale = float(marrow::match::scale_of(marrow::match::gradients_of(patch)));
+  marrow::match::SumMeasure measure;
+  measure.whole = all;
+  measure.add = [=, radius = options.radius_pixels](const Patch& patch, marrow::match::Tally& tally) {
+    const double scale = marrow::match::scale_of(marrow::match::gradients_of(patch)).value;
     if (!(scale > 0)) return;
-    each_pair(patch, radius, [&](std::size_t i, std::size_t j) {
-      const float seen = patch.seen[i] - patch.seen[j], rendered = patch.rendered[i] - patch.rendered[j];
-      if (rendered == 0) return;
-      const auto columns = std::size_t(patch.columns);
-      tally.add(double(i % columns), double(i / columns), structure(seen) - structure(seen - scale * rendered), 0);
+    each_rendered_pair(patch, radius, [&](int column, int row, std::size_t i, std::size_t j) {
+      tally.add(column, row,
+                structure.removed(patch.seen[i] - patch.seen[j], patch.rendered[i] - patch.rendered[j], scale), 0);
     });
   };
-  return {add, [all](const auto& sums) { return all > 0 ? std::min(2.0, 1 - sums.values / all) : 1; }};
+  measure.add_expansion = [=, radius = options.radius_pixels](const Patch& patch,
+                                                              marrow::match::TallyOfExpansions& tally) {
+    const marrow::match::Scale scale = marrow::match::scale_of(marrow::match::gradients_of(patch));
+    if (!(scale.value > 0)) return;
+    each_rendered_pair(patch, radius, [&](int column, int row, std::size_t i, std::size_t j) {
+      tally.add(column, row,
+                structure.removed(patch.seen[i] - patch.seen[j], patch.rendered[i] - patch.rendered[j],
+                                  patch.slopes_at(i) - patch.slopes_at(j), scale));
+    });
+  };
+  return measure;
 }
 
 constexpr auto pattern_intensity = marrow::match::intensity_node<measure_of, Options>;
@@ -61,7 +79,8 @@ MARROW_PLUGIN(plugin) {
   node.summary(
           "Structure that remains after the radiograph is subtracted from the image (pattern intensity: Weese et al., "
           "IEEE Trans Inf Technol Biomed 1997; Penney et al. 1998)")
-      .trait("unmoved_by_gain");
+      .trait("unmoved_by_gain")
+      .trait("derivatives");
   marrow::match::declare<Options>(node);
   node.option("radius_pixels", &Options::radius_pixels, "radius of the neighbourhood", marrow::at_least(1),
               marrow::at_most(20))

@@ -9,6 +9,11 @@ RadiographProjector::~RadiographProjector() = default;
 Cost::~Cost() = default;
 Optimizer::~Optimizer() = default;
 
+std::optional<RadiographExpansion> RadiographProjector::expansion(const Camera&, const RigidTransform&,
+                                                                  const FragmentFrame&, const PixelGrid&) const {
+  return std::nullopt;
+}
+
 std::shared_ptr<const RadiographProjector> RadiographProjector::smoothed(double) const { return nullptr; }
 
 std::vector<double> Cost::values(const std::vector<RigidTransform>& poses) const {

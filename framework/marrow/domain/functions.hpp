@@ -4,6 +4,7 @@
 // safe to call from several threads at once. A function may refer to the inputs of the node that made it: the runtime
 // keeps these inputs alive as long as the function.
 #include <Eigen/Core>
+#include <array>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -44,6 +45,14 @@ class OutlineProjector {
                                             double spacing_px) const = 0;
 };
 
+/// A radiograph and how each of its pixels changes when the model moves.
+struct RadiographExpansion {
+  std::vector<float> values;  ///< as RadiographProjector::radiograph() gives them
+  /// The derivative of each pixel by a small motion m = (r [rad], t [mm]) of the model as defined at Pose: one image
+  /// for each of the six. In mm of water per radian, and in mm of water per mm.
+  std::array<std::vector<float>, 6> slopes;
+};
+
 /// Computes digitally reconstructed radiographs (DRRs) of a model as a view would see it.
 class RadiographProjector {
  public:
@@ -55,6 +64,11 @@ class RadiographProjector {
   /// The same for single pixels (u, v), in the given order.
   virtual std::vector<float> radiograph(const Camera& camera, const RigidTransform& world_from_model,
                                         const std::vector<Eigen::Vector2f>& pixels) const = 0;
+  /// The radiograph at the pixels of a grid, and its derivatives by a small motion of the model in `frame`. They are
+  /// those of the values that are computed, not of the exact line integrals. The call takes about as long as three
+  /// radiographs. Absent if the projector knows no derivatives, which is the default.
+  virtual std::optional<RadiographExpansion> expansion(const Camera& camera, const RigidTransform& world_from_model,
+                                                       const FragmentFrame& frame, const PixelGrid& grid) const;
   /// A region of whole pixels, cut to the image, outside of which radiograph() is 0. Empty if the model is out of view.
   virtual PixelGrid region(const Camera& camera, const RigidTransform& world_from_model) const = 0;
   /// A projector of the same model, smoothed by a Gaussian of this standard deviation: for radiographs that are

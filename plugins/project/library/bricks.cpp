@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "marrow/project/rays.hpp"
-
 namespace marrow::rays {
 namespace {
 
@@ -42,17 +40,25 @@ Bricks::Bricks(const Attenuation& attenuation)
   });
 }
 
-float Bricks::integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const {
+Bricks::Path Bricks::path_of(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const {
+  Path path;
   const Span span = span_in_box(first_, last_, source, direction, 1);
-  if (!(span.from < span.to)) return 0;
+  if (!(span.from < span.to)) return path;
   int across = 0;
   direction.cwiseProduct(spacing_mm_).cwiseAbs().maxCoeff(&across);
-  const int a = across == 0 ? 1 : 0, b = across == 2 ? 1 : 2;
-  const Eigen::Vector3d slope = direction / direction[across];
+  path.axes = {across == 0 ? 1 : 0, across == 2 ? 1 : 2, across};
   const double entry = source[across] + span.from * direction[across],
                exit = source[across] + span.to * direction[across];
-  const int begin = std::max(int(std::ceil(std::min(entry, exit))), first_[std::size_t(across)]);
-  const int end = std::min(int(std::floor(std::max(entry, exit))), last_[std::size_t(across)]);
+  path.begin = std::max(int(std::ceil(std::min(entry, exit))), first_[std::size_t(across)]);
+  path.end = std::min(int(std::floor(std::max(entry, exit))), last_[std::size_t(across)]);
+  return path;
+}
+
+float Bricks::integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const {
+  const auto [axes, begin, end] = path_of(source, direction);
+  if (begin > end) return 0;
+  const int a = axes.first, b = axes.second, across = axes.across;
+  const Eigen::Vector3d slope = direction / direction[across];
   const std::uint32_t *slices = offsets(across), *columns = offsets(a), *rows = offsets(b);
   // From this origin all positions are positive, so that truncation rounds down.
   const int left = first_[std::size_t(a)] - 3, top = first_[std::size_t(b)] - 3;
@@ -85,6 +91,30 @@ float Bricks::integral(const Eigen::Vector3d& source, const Eigen::Vector3d& dir
     }
   }
   return float(double(sum[0] + sum[1] + sum[2] + sum[3]) * slope.cwiseProduct(spacing_mm_).norm() * 1e-3);
+}
+
+RayMotion::Change Bricks::change(const RayMotion& motion, const Eigen::Vector3d& direction) const {
+  const Eigen::Vector3d& source = motion.rays().source;
+  const auto [axes, begin, end] = path_of(source, direction);
+  const Eigen::Vector3d slope = direction / direction[axes.across];
+  SliceSums sums;
+  for (int slice = begin; slice <= end; ++slice) {
+    const double depth = slice - source[axes.across], x = source[axes.first] + slope[axes.first] * depth,
+                 y = source[axes.second] + slope[axes.second] * depth;
+    const int i = int(std::floor(x)), j = int(std::floor(y));
+    const double u = x - i, v = y - j;
+    const std::int16_t* at = values_.data() + offsets(axes.across)[slice];
+    const std::uint32_t *columns = offsets(axes.first) + i, *rows = offsets(axes.second) + j;
+    const double a = at[rows[0] + columns[0]], b = at[rows[0] + columns[1]], c = at[rows[1] + columns[0]],
+                 d = at[rows[1] + columns[1]];
+    const double along = (1 - v) * (b - a) + v * (d - c), across = (1 - u) * (c - a) + u * (d - b);
+    sums.sum += (1 - v) * (a + u * (b - a)) + v * (c + u * (d - c));
+    sums.by_p += depth * along;
+    sums.by_q += depth * across;
+    sums.by_first += along;
+    sums.by_second += across;
+  }
+  return motion.change(sums, axes, 1, direction);
 }
 
 }  // namespace marrow::rays

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "marrow/project/attenuation.hpp"
+#include "marrow/project/rays.hpp"
 
 namespace marrow::rays {
 
@@ -21,8 +21,17 @@ class Bricks {
   /// and `direction` are in fractional voxel indices.
   float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const;
 
+  /// The same with its derivatives by a small motion of the model.
+  RayMotion::Change change(const RayMotion& motion, const Eigen::Vector3d& direction) const;
+
  private:
   static constexpr int kBorder = 4;  ///< number of empty voxels around the box that may be read
+  /// The slices that a ray crosses; none if begin > end.
+  struct Path {
+    SliceAxes axes;
+    int begin = 0, end = -1;
+  };
+  Path path_of(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const;
   /// The place of voxel (x, y, z) in values_ is offsets(0)[x] + offsets(1)[y] + offsets(2)[z].
   const std::uint32_t* offsets(int axis) const {
     return offsets_[std::size_t(axis)].data() - begin_[std::size_t(axis)];

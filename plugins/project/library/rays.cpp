@@ -35,6 +35,64 @@ Rays rays_of(const Camera& camera, const RigidTransform& world_from_model, const
           index_from_model * model_from_camera.rotation * camera.intrinsics.inverse(), grid.spacing_mm};
 }
 
+RayMotion::RayMotion(const Camera& camera, const RigidTransform& world_from_model, const Grid& grid,
+                     const FragmentFrame& frame)
+    : rays_(rays_of(camera, world_from_model, grid)) {
+  const Eigen::Matrix3d model_from_index = grid.direction * grid.spacing_mm.asDiagonal();
+  frame_from_direction_ = frame.axes.transpose() * model_from_index;
+  frame_from_gradient_ = frame_from_direction_.inverse().transpose();
+  const RigidTransform model_from_camera = inverse(world_from_model) * inverse(camera.camera_from_world);
+  source_mm_ = frame.axes.transpose() * (model_from_camera.translation_mm - frame.origin_mm);
+}
+
+RayMotion::Change RayMotion::change(double value, const Eigen::Vector3d& by_source, const Eigen::Vector3d& by_direction,
+                                    const Eigen::Vector3d& direction) const {
+  // A motion of the model is the opposite motion of the ray.
+  const Eigen::Vector3d force = frame_from_gradient_ * by_source, turning = frame_from_gradient_ * by_direction;
+  Change change{value, {}};
+  change.slopes << -source_mm_.cross(force) - (frame_from_direction_ * direction).cross(turning), -force;
+  return change;
+}
+
+RayMotion::Change RayMotion::change(const SliceSums& sums, const SliceAxes& axes, int per_slice,
+                                    const Eigen::Vector3d& direction) const {
+  const double nearer = 1 / direction[axes.across], p = direction[axes.first] * nearer,
+               q = direction[axes.second] * nearer;
+  const Eigen::Vector3d& mm = rays_.spacing_mm;
+  const double along_p = p * mm[axes.first], along_q = q * mm[axes.second], straight = mm[axes.across];
+  // The path from one slice to the next, in mm.
+  const double path = std::sqrt(along_p * along_p + along_q * along_q + straight * straight);
+  const double thousandth = 1e-3 * per_slice, factor = thousandth * path;
+  const double by_p = factor * sums.by_p + thousandth * along_p * mm[axes.first] / path * sums.sum,
+               by_q = factor * sums.by_q + thousandth * along_q * mm[axes.second] / path * sums.sum;
+  // The derivatives of the integral by the source and by the direction, in voxel indices.
+  Eigen::Vector3d by_source, by_direction;
+  by_source[axes.first] = factor * sums.by_first;
+  by_source[axes.second] = factor * sums.by_second;
+  by_source[axes.across] = -(p * by_source[axes.first] + q * by_source[axes.second]);
+  by_direction[axes.first] = by_p * nearer;
+  by_direction[axes.second] = by_q * nearer;
+  by_direction[axes.across] = -(p * by_p + q * by_q) * nearer;
+  return change(factor * sums.sum, by_source, by_direction, direction);
+}
+
+RadiographExpansion expansion_by_rays(const RayMotion& motion, const PixelGrid& grid,
+                                      const std::function<RayMotion::Change(const Eigen::Vector3d&)>& change) {
+  RadiographExpansion expansion;
+  expansion.values.assign(grid.count(), 0.0f);
+  for (auto& slopes : expansion.slopes) slopes.assign(grid.count(), 0.0f);
+  tbb::parallel_for(0, grid.rows, [&](int row) {
+    for (int column = 0; column < grid.columns; ++column) {
+      const Eigen::Vector2d pixel = grid.pixel(column, row);
+      const RayMotion::Change one = change(motion.rays().direction(pixel.x(), pixel.y()));
+      const std::size_t i = std::size_t(row) * std::size_t(grid.columns) + std::size_t(column);
+      expansion.values[i] = float(one.value);
+      for (std::size_t k = 0; k < 6; ++k) expansion.slopes[k][i] = float(one.slopes[Eigen::Index(k)]);
+    }
+  });
+  return expansion;
+}
+
 Span span_in_box(const std::array<int, 3>& first, const std::array<int, 3>& last, const Eigen::Vector3d& source,
                  const Eigen::Vector3d& direction, double margin) {
   Span span{0, std::numeric_limits<double>::infinity()};
@@ -82,16 +140,16 @@ std::vector<float> RayProjector::radiograph(const Camera& camera, const RigidTra
   return values;
 }
 
-PixelGrid RayProjector::region(const Camera& camera, const RigidTransform& world_from_model) const {
+PixelGrid region_of(const Attenuation& attenuation, const Camera& camera, const RigidTransform& world_from_model) {
   check_camera(camera, "the camera");
-  if (attenuation_.is_empty()) return {};
+  if (attenuation.is_empty()) return {};
   const PixelGrid whole{0, 0, 1, camera.width_px, camera.height_px};
   Eigen::Vector2d low(1e30, 1e30), high(-1e30, -1e30);
   for (int corner = 0; corner < 8; ++corner) {
     Eigen::Vector3d index;
     for (int k = 0; k < 3; ++k)
-      index[k] = corner >> k & 1 ? attenuation_.last[std::size_t(k)] + 1.0 : attenuation_.first[std::size_t(k)] - 1.0;
-    const Eigen::Vector2d pixel = project(camera, world_from_model * attenuation_.grid.point_from_index(index));
+      index[k] = corner >> k & 1 ? attenuation.last[std::size_t(k)] + 1.0 : attenuation.first[std::size_t(k)] - 1.0;
+    const Eigen::Vector2d pixel = project(camera, world_from_model * attenuation.grid.point_from_index(index));
     if (!pixel.allFinite()) return whole;  // part of the box lies behind the source
     low = low.cwiseMin(pixel);
     high = high.cwiseMax(pixel);

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <functional>
 
+#include "marrow/domain/mesh.hpp"
 #include "marrow/domain/functions.hpp"
 #include "marrow/project/attenuation.hpp"
 
@@ -20,6 +21,45 @@ struct Rays {
 /// The grid is in the model's frame. Throws Error if check_camera() refuses the camera or the frames do not match.
 Rays rays_of(const Camera& camera, const RigidTransform& world_from_model, const Grid& grid);
 
+/// A sum over the slices along a ray, and its derivatives: by the ray's slopes p and q, in voxels per slice, and by the
+/// position of the source across the slices. p belongs to the axis `first`, q to `second`, both lie in the slices.
+struct SliceSums {
+  double sum = 0, by_p = 0, by_q = 0, by_first = 0, by_second = 0;
+};
+/// The axes of the grid along which SliceSums has its slopes, and the axis from slice to slice.
+struct SliceAxes {
+  int first = 0, second = 1, across = 2;
+};
+
+/// Turns derivatives of a ray's integral into those by a small motion of the model.
+class RayMotion {
+ public:
+  /// The grid and the frame are in the model's frame. Throws Error as rays_of() does.
+  RayMotion(const Camera& camera, const RigidTransform& world_from_model, const Grid& grid, const FragmentFrame& frame);
+  const Rays& rays() const { return rays_; }
+  /// Turns a gradient by voxel indices into one by mm along the frame's axes.
+  const Eigen::Matrix3d& frame_from_gradient() const { return frame_from_gradient_; }
+  /// Turns a direction in voxel indices into mm along the frame's axes.
+  const Eigen::Matrix3d& frame_from_direction() const { return frame_from_direction_; }
+  /// The source along the frame's axes, from its origin.
+  const Eigen::Vector3d& source_mm() const { return source_mm_; }
+  /// The integral along a ray in mm of water, and its derivatives by (r [rad], t [mm]).
+  struct Change {
+    double value = 0;
+    Vector6d slopes = Vector6d::Zero();
+  };
+  /// From the derivatives by the source and by the direction, all in voxel indices.
+  Change change(double value, const Eigen::Vector3d& by_source, const Eigen::Vector3d& by_direction,
+                const Eigen::Vector3d& direction) const;
+  /// From sums over every `per_slice`-th slice.
+  Change change(const SliceSums& sums, const SliceAxes& axes, int per_slice, const Eigen::Vector3d& direction) const;
+
+ private:
+  const Rays rays_;
+  Eigen::Matrix3d frame_from_gradient_, frame_from_direction_;
+  Eigen::Vector3d source_mm_;
+};
+
 /// The part [from, to] of a ray, in multiples of its direction vector. Empty if from >= to.
 struct Span {
   double from = 0, to = 0;
@@ -30,6 +70,13 @@ struct Span {
 Span span_in_box(const std::array<int, 3>& first, const std::array<int, 3>& last, const Eigen::Vector3d& source,
                  const Eigen::Vector3d& direction, double margin);
 
+/// The radiograph and its derivatives, ray by ray in several threads; `change` takes a ray's direction.
+RadiographExpansion expansion_by_rays(const RayMotion& motion, const PixelGrid& grid,
+                                      const std::function<RayMotion::Change(const Eigen::Vector3d&)>& change);
+
+/// What RadiographProjector::region() gives for a model with this attenuation.
+PixelGrid region_of(const Attenuation& attenuation, const Camera& camera, const RigidTransform& world_from_model);
+
 /// A projector that integrates ray by ray, for many rays at once in several threads.
 class RayProjector : public RadiographProjector {
  public:
@@ -37,7 +84,9 @@ class RayProjector : public RadiographProjector {
   std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model, const PixelGrid&) const override;
   std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model,
                                 const std::vector<Eigen::Vector2f>& pixels) const override;
-  PixelGrid region(const Camera&, const RigidTransform& world_from_model) const override;
+  PixelGrid region(const Camera& camera, const RigidTransform& world_from_model) const override {
+    return region_of(attenuation_, camera, world_from_model);
+  }
   std::shared_ptr<const RadiographProjector> smoothed(double sigma_mm) const override {
     return of(rays::smoothed(attenuation_, sigma_mm));
   }

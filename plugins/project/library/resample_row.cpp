@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "resample_row.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #if defined(__x86_64__)
@@ -21,6 +22,18 @@ void add_plain(const float* row, float position, float step, int first, int coun
     const int n = int(x);
     const float fraction = x - float(n);
     sum[i] += row[n] + fraction * (row[n + 1] - row[n]);
+  }
+}
+
+void add_slopes_plain(const float* row, const float* change, float position, float step, int first, int count,
+                      float weight, const ResampledSums& sums) {
+  for (int i = first; i < count; ++i) {
+    const float x = position + step * float(i);
+    const int n = int(x);
+    const float fraction = x - float(n), slope = row[n + 1] - row[n];
+    sums.values[i] += row[n] + fraction * slope;
+    sums.along[i] += weight * slope;
+    sums.across[i] += weight * (change[n] + fraction * (change[n + 1] - change[n]));
   }
 }
 
@@ -65,6 +78,20 @@ __attribute__((target("avx2"))) inline __m256 look_up(const __m256 (&floats)[reg
   return found;
 }
 
+/// The floats at eight places and those after them. `registers` as in add_avx2().
+struct Eight {
+  __m256 low, high;
+};
+template <int registers>
+__attribute__((target("avx2"))) inline Eight neighbours(const float* row, __m256i n, bool is_forward) {
+  if constexpr (registers == 0) return {_mm256_i32gather_ps(row, n, 4), _mm256_i32gather_ps(row + 1, n, 4)};
+  const int base = is_forward ? _mm256_extract_epi32(n, 0) : _mm256_extract_epi32(n, 7);
+  __m256 floats[registers > 0 ? registers : 1];
+  for (int k = 0; k < registers; ++k) floats[k] = _mm256_loadu_ps(row + base + 8 * k);
+  const __m256i at = _mm256_sub_epi32(n, _mm256_set1_epi32(base));
+  return {look_up(floats, at), look_up(floats, _mm256_add_epi32(at, _mm256_set1_epi32(1)))};
+}
+
 /// For steps so small that eight positions and their neighbours lie within `registers` times eight floats; 0: for all.
 template <int registers>
 __attribute__((target("avx2"))) int add_avx2(const float* row, float position, float step, int count, float* sum) {
@@ -75,28 +102,63 @@ __attribute__((target("avx2"))) int add_avx2(const float* row, float position, f
         _mm256_add_ps(_mm256_set1_ps(position), _mm256_mul_ps(steps, _mm256_add_ps(_mm256_set1_ps(float(i)), lanes)));
     const __m256i n = _mm256_cvttps_epi32(x);
     const __m256 fraction = _mm256_sub_ps(x, _mm256_cvtepi32_ps(n));
-    __m256 low, high;
-    if constexpr (registers > 0) {
-      const int base = step >= 0 ? _mm256_extract_epi32(n, 0) : _mm256_extract_epi32(n, 7);
-      __m256 floats[registers];
-      for (int k = 0; k < registers; ++k) floats[k] = _mm256_loadu_ps(row + base + 8 * k);
-      const __m256i at = _mm256_sub_epi32(n, _mm256_set1_epi32(base));
-      low = look_up<registers>(floats, at);
-      high = look_up<registers>(floats, _mm256_add_epi32(at, _mm256_set1_epi32(1)));
-    } else {
-      low = _mm256_i32gather_ps(row, n, 4);
-      high = _mm256_i32gather_ps(row + 1, n, 4);
-    }
+    const auto [low, high] = neighbours<registers>(row, n, step >= 0);
     const __m256 value = _mm256_add_ps(low, _mm256_mul_ps(fraction, _mm256_sub_ps(high, low)));
     _mm256_storeu_ps(sum + i, _mm256_add_ps(_mm256_loadu_ps(sum + i), value));
   }
   return i;
 }
 
+__attribute__((target("avx2"))) inline void add_to(float* sum, __m256 value) {
+  _mm256_storeu_ps(sum, _mm256_add_ps(_mm256_loadu_ps(sum), value));
+}
+
+template <int registers>
+__attribute__((target("avx2"))) int add_slopes_avx2(const float* row, const float* change, float position, float step,
+                                                    int count, float weight, const ResampledSums& sums) {
+  const __m256 lanes = _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), steps = _mm256_set1_ps(step),
+               weights = _mm256_set1_ps(weight);
+  int i = 0;
+  for (; i + 8 <= count; i += 8) {
+    const __m256 x =
+        _mm256_add_ps(_mm256_set1_ps(position), _mm256_mul_ps(steps, _mm256_add_ps(_mm256_set1_ps(float(i)), lanes)));
+    const __m256i n = _mm256_cvttps_epi32(x);
+    const __m256 fraction = _mm256_sub_ps(x, _mm256_cvtepi32_ps(n));
+    const auto [low, high] = neighbours<registers>(row, n, step >= 0);
+    const auto [from, to] = neighbours<registers>(change, n, step >= 0);
+    const __m256 slope = _mm256_sub_ps(high, low);
+    const __m256 across = _mm256_add_ps(from, _mm256_mul_ps(fraction, _mm256_sub_ps(to, from)));
+    add_to(sums.values + i, _mm256_add_ps(low, _mm256_mul_ps(fraction, slope)));
+    add_to(sums.along + i, _mm256_mul_ps(weights, slope));
+    add_to(sums.across + i, _mm256_mul_ps(weights, across));
+  }
+  return i;
+}
+
+/// The floats at sixteen places and those after them. All lie within 32 floats from `base` on if is_near.
+struct Sixteen {
+  __m512 low, high;
+};
+__attribute__((target("avx512f"))) inline Sixteen neighbours(const float* row, __m512i n, bool is_near, int base) {
+  if (!is_near) return {_mm512_i32gather_ps(n, row, 4), _mm512_i32gather_ps(n, row + 1, 4)};
+  const __m512 first = _mm512_loadu_ps(row + base), second = _mm512_loadu_ps(row + base + 16);
+  const __m512i at = _mm512_sub_epi32(n, _mm512_set1_epi32(base));
+  return {_mm512_permutex2var_ps(first, at, second),
+          _mm512_permutex2var_ps(first, _mm512_add_epi32(at, _mm512_set1_epi32(1)), second)};
+}
+__attribute__((target("avx512f"))) inline void add_to(float* sum, __m512 value) {
+  _mm512_storeu_ps(sum, _mm512_add_ps(_mm512_loadu_ps(sum), value));
+}
+
+constexpr float kNear = 1.9f;  ///< longest step for which 15 steps and one neighbour lie within 32 floats
+/// The place before the least position of sixteen. One voxel earlier, because the least position may be rounded
+/// differently from the lane's own.
+int base_of(float least) { return std::max(int(least) - 1, 0); }
+
 __attribute__((target("avx512f"))) int add_avx512(const float* row, float position, float step, int count, float* sum) {
   const __m512 lanes = _mm512_setr_ps(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15),
                steps = _mm512_set1_ps(step);
-  const bool is_near = std::abs(step) <= 1.9f;  // 15 steps and one neighbour lie within 32 floats
+  const bool is_near = std::abs(step) <= kNear;
   const float back = step >= 0 ? 0 : 15 * step;
   int i = 0;
   for (; i + 16 <= count; i += 16) {
@@ -104,20 +166,33 @@ __attribute__((target("avx512f"))) int add_avx512(const float* row, float positi
         _mm512_add_ps(_mm512_set1_ps(position), _mm512_mul_ps(steps, _mm512_add_ps(_mm512_set1_ps(float(i)), lanes)));
     const __m512i n = _mm512_cvttps_epi32(x);
     const __m512 fraction = _mm512_sub_ps(x, _mm512_cvtepi32_ps(n));
-    __m512 low, high;
-    if (is_near) {
-      // One voxel earlier, because this sum may be rounded differently from the lane's own position.
-      const int least = int(position + step * float(i) + back) - 1, base = least > 0 ? least : 0;
-      const __m512 first = _mm512_loadu_ps(row + base), second = _mm512_loadu_ps(row + base + 16);
-      const __m512i at = _mm512_sub_epi32(n, _mm512_set1_epi32(base));
-      low = _mm512_permutex2var_ps(first, at, second);
-      high = _mm512_permutex2var_ps(first, _mm512_add_epi32(at, _mm512_set1_epi32(1)), second);
-    } else {
-      low = _mm512_i32gather_ps(n, row, 4);
-      high = _mm512_i32gather_ps(n, row + 1, 4);
-    }
-    const __m512 value = _mm512_add_ps(low, _mm512_mul_ps(fraction, _mm512_sub_ps(high, low)));
-    _mm512_storeu_ps(sum + i, _mm512_add_ps(_mm512_loadu_ps(sum + i), value));
+    const auto [low, high] = neighbours(row, n, is_near, base_of(position + step * float(i) + back));
+    add_to(sum + i, _mm512_add_ps(low, _mm512_mul_ps(fraction, _mm512_sub_ps(high, low))));
+  }
+  return i;
+}
+
+__attribute__((target("avx512f"))) int add_slopes_avx512(const float* row, const float* change, float position,
+                                                         float step, int count, float weight,
+                                                         const ResampledSums& sums) {
+  const __m512 lanes = _mm512_setr_ps(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15),
+               steps = _mm512_set1_ps(step), weights = _mm512_set1_ps(weight);
+  const bool is_near = std::abs(step) <= kNear;
+  const float back = step >= 0 ? 0 : 15 * step;
+  int i = 0;
+  for (; i + 16 <= count; i += 16) {
+    const __m512 x =
+        _mm512_add_ps(_mm512_set1_ps(position), _mm512_mul_ps(steps, _mm512_add_ps(_mm512_set1_ps(float(i)), lanes)));
+    const __m512i n = _mm512_cvttps_epi32(x);
+    const __m512 fraction = _mm512_sub_ps(x, _mm512_cvtepi32_ps(n));
+    const int base = base_of(position + step * float(i) + back);
+    const auto [low, high] = neighbours(row, n, is_near, base);
+    const auto [from, to] = neighbours(change, n, is_near, base);
+    const __m512 slope = _mm512_sub_ps(high, low);
+    const __m512 across = _mm512_add_ps(from, _mm512_mul_ps(fraction, _mm512_sub_ps(to, from)));
+    add_to(sums.values + i, _mm512_add_ps(low, _mm512_mul_ps(fraction, slope)));
+    add_to(sums.along + i, _mm512_mul_ps(weights, slope));
+    add_to(sums.across + i, _mm512_mul_ps(weights, across));
   }
   return i;
 }
@@ -155,6 +230,26 @@ void add_resampled(const float* row, float position, float step, int count, floa
     done = add_avx2<0>(row, position, step, count, sum);
 #endif
   add_plain(row, position, step, done, count, sum);
+}
+
+void subtract_rows(const std::int16_t* a, const std::int16_t* b, int count, float* change) {
+  for (int i = 0; i < count; ++i) change[i] = (b ? float(b[i]) : 0) - (a ? float(a[i]) : 0);
+}
+
+void add_resampled_slopes(const float* row, const float* change, float position, float step, int count, float weight,
+                          const ResampledSums& sums) {
+  int done = 0;
+#if defined(__x86_64__)
+  if (kHasAvx512)
+    done = add_slopes_avx512(row, change, position, step, count, weight, sums);
+  else if (kHasAvx2 && std::abs(step) <= 0.7f)
+    done = add_slopes_avx2<1>(row, change, position, step, count, weight, sums);
+  else if (kHasAvx2 && std::abs(step) <= 1.9f)
+    done = add_slopes_avx2<2>(row, change, position, step, count, weight, sums);
+  else if (kHasAvx2)
+    done = add_slopes_avx2<0>(row, change, position, step, count, weight, sums);
+#endif
+  add_slopes_plain(row, change, position, step, done, count, weight, sums);
 }
 
 }  // namespace marrow::rays

@@ -24,37 +24,81 @@ struct Columns {
   void add(const Columns& more) { first = std::min(first, more.first), last = std::max(last, more.last); }
 };
 
+/// What is summed over the slices: the attenuation, and for derivatives also its slopes along and across the rows, times
+/// 1 - depth / middle: a point of a ray moves by this part of the source's displacement if the ray's point in the
+/// volume's middle stays.
+constexpr int kValues = 1, kValuesAndSlopes = 3;
+
 /// The image before it is warped, on a grid of slopes. p is the slope along the rows and q that across the rows, both
-/// in voxels per slice.
+/// in voxels per slice. It has one layer for each quantity that is summed.
 struct Sheared {
   double p = 0, q = 0, step_p = 0, step_q = 0;
   int columns = 0, rows = 0;
+  int layers = kValues;
+  double middle = 1;  ///< of the volume, in slices from the source; negative if they count towards it
   std::vector<float> sums;
   std::vector<Columns> filled;  ///< of each row, the one before and the two after it
 
-  float* row(int row) { return sums.data() + std::size_t(row) * std::size_t(columns); }
+  std::size_t layer_size() const { return std::size_t(columns) * std::size_t(rows); }
+  float* row(int row, int layer = 0) {
+    return sums.data() + std::size_t(layer) * layer_size() + std::size_t(row) * std::size_t(columns);
+  }
 
   /// Cubic convolution (Keys, IEEE Trans Acoust Speech Signal Process 1981). Bilinear values would be smoother half-way
   /// between the grid's points than on them, and a cost that compares them would be rough. 0 near the border: the grid
   /// is two steps larger than needed on each side.
   float at(double column, double row) const {
-    if (!(column >= 1 && row >= 1 && column < columns - 2 && row < rows - 2)) return 0;
-    const int c = int(column), r = int(row);
-    const Columns& around = filled[std::size_t(r)];
-    if (c + 2 < around.first || c - 1 > around.last) return 0;
-    const std::array<float, 4> across = cubic(float(column - c)), down = cubic(float(row - r));
-    const float* at = sums.data() + std::size_t(r - 1) * std::size_t(columns) + std::size_t(c - 1);
-    float sum = 0;
-    for (std::size_t k = 0; k < 4; ++k, at += columns)
-      sum += down[k] * (across[0] * at[0] + across[1] * at[1] + across[2] * at[2] + across[3] * at[3]);
-    return std::max(sum, 0.0f);
+    const Cell cell = cell_of(column, row);
+    return cell.at ? std::max(interpolated(cell, 0, cubic(cell.x), cubic(cell.y)), 0.0f) : 0;
+  }
+
+  /// The interpolated value, and its derivatives by p, by q, and by the position of the source along and across rows.
+  struct Expansion {
+    float value = 0, by_p = 0, by_q = 0, by_along = 0, by_across = 0;
+  };
+  Expansion expansion_at(double column, double row) const {
+    const Cell cell = cell_of(column, row);
+    if (!cell.at) return {};
+    const std::array<float, 4> across = cubic(cell.x), down = cubic(cell.y);
+    const float value = interpolated(cell, 0, across, down);
+    if (!(value > 0)) return {};
+    const float by_p = interpolated(cell, 0, cubic_slope(cell.x), down) / float(step_p),
+                by_q = interpolated(cell, 0, across, cubic_slope(cell.y)) / float(step_q), nearer = 1 / float(middle);
+    return {value, by_p, by_q, by_p * nearer + interpolated(cell, 1, across, down),
+            by_q * nearer + interpolated(cell, 2, across, down)};
   }
 
  private:
-  /// The weights of the four points around a position, which lies x after the second.
+  /// The first of the 4 x 4 points around a position; null where all of them are 0. (x, y) is the position after the
+  /// second point.
+  struct Cell {
+    const float* at = nullptr;
+    float x = 0, y = 0;
+  };
+  Cell cell_of(double column, double row) const {
+    if (!(column >= 1 && row >= 1 && column < columns - 2 && row < rows - 2)) return {};
+    const int c = int(column), r = int(row);
+    const Columns& around = filled[std::size_t(r)];
+    if (c + 2 < around.first || c - 1 > around.last) return {};
+    return {sums.data() + std::size_t(r - 1) * std::size_t(columns) + std::size_t(c - 1), float(column - c),
+            float(row - r)};
+  }
+  float interpolated(const Cell& cell, int layer, const std::array<float, 4>& across,
+                     const std::array<float, 4>& down) const {
+    const float* at = cell.at + std::size_t(layer) * layer_size();
+    float sum = 0;
+    for (std::size_t k = 0; k < 4; ++k, at += columns)
+      sum += down[k] * (across[0] * at[0] + across[1] * at[1] + across[2] * at[2] + across[3] * at[3]);
+    return sum;
+  }
+  /// The weights of the four points around a position, which lies x after the second, and their derivatives by x.
   static std::array<float, 4> cubic(float x) {
     const float y = 1 - x;
     return {-0.5f * x * y * y, 1 + x * x * (1.5f * x - 2.5f), 1 + y * y * (1.5f * y - 2.5f), -0.5f * y * x * x};
+  }
+  static std::array<float, 4> cubic_slope(float x) {
+    const float y = 1 - x;
+    return {-0.5f * y * (y - 2 * x), x * (4.5f * x - 5), -y * (4.5f * y - 5), -0.5f * x * (2 * y - x)};
   }
 };
 
@@ -86,11 +130,12 @@ class RowSums {
         source_(source),
         image_(image),
         filled_(filled),
-        mixed_(std::size_t(stack.length + 3 + 2 * kSpare)) {}
+        mixed_(std::size_t(stack.length + 3 + 2 * kSpare)),
+        change_(image.layers == kValuesAndSlopes ? mixed_.size() : 0) {}
 
   void add(int slice, int first_row, int end_row) {
     const double depth = slice - source_[stack_.axes[1]];
-    const Along along{source_[stack_.axes[0]] + image_.p * depth, image_.step_p * depth, 1 / (image_.step_p * depth)};
+    const Along along{source_[stack_.axes[0]] + image_.p * depth, image_.step_p * depth, 1 / (image_.step_p * depth), float(depth)};
     for (int row = first_row; row < end_row; ++row) {
       const double line = source_[stack_.axes[2]] + (image_.q + image_.step_q * row) * depth;
       if (line > -1 && line < stack_.rows) add(slice, line, along, row);
@@ -101,6 +146,7 @@ class RowSums {
   /// Positions of the sheared image's columns along the rows of a slice, in voxels.
   struct Along {
     double start, step, per_step;
+    float depth;
   };
 
   void add(int slice, double line, const Along& along, int row) {
@@ -124,18 +170,25 @@ class RowSums {
     mixed[0] = 0;
     mix_rows(row_a, row_b, weight, last - first + 1, mixed + 1);
     mixed[last - first + 2] = mixed[last - first + 3] = 0;
-    add_resampled(mixed, position, step, end - column + 1, image_.row(row) + column);
+    const int count = end - column + 1;
+    if (image_.layers == kValues) return add_resampled(mixed, position, step, count, image_.row(row) + column);
+    float* change = change_.data() + kSpare;
+    change[0] = 0;
+    subtract_rows(row_a, row_b, last - first + 1, change + 1);
+    change[last - first + 2] = change[last - first + 3] = 0;
+    add_resampled_slopes(mixed, change, position, step, count, 1 - along.depth / float(image_.middle),
+                         {image_.row(row, 0) + column, image_.row(row, 1) + column, image_.row(row, 2) + column});
   }
 
   const Slices::Stack& stack_;
   const Eigen::Vector3d& source_;
   Sheared& image_;
   std::vector<Columns>& filled_;
-  std::vector<float> mixed_;
+  std::vector<float> mixed_, change_;
 };
 
 void sum_slices(const Slices::Stack& stack, const Rays& rays, Sheared& image) {
-  image.sums.assign(std::size_t(image.columns) * std::size_t(image.rows), 0.0f);
+  image.sums.assign(image.layer_size() * std::size_t(image.layers), 0.0f);
   std::vector<Columns> filled(std::size_t(image.rows));
   const int blocks = (image.rows + kRowsAtOnce - 1) / kRowsAtOnce;
   tbb::parallel_for(0, blocks, [&](int block) {
@@ -149,6 +202,20 @@ void sum_slices(const Slices::Stack& stack, const Rays& rays, Sheared& image) {
     for (std::size_t other = row > 0 ? row - 1 : 0; other < std::min(row + 3, filled.size()); ++other)
       image.filled[row].add(filled[other]);
 }
+
+/// Slopes of rays whose points in the volume's middle have fixed places and distances, in voxels. Such a grid does not
+/// change with a small motion, so a radiograph changes smoothly and has derivatives.
+struct Lattice {
+  double step, offset;
+
+  /// At most `finest` apart: the next smaller one of eight steps an octave.
+  Lattice(double finest, double source, double middle) : offset(source / middle) {
+    const double voxels = std::max(finest * std::abs(middle), kFinest);
+    step = std::exp2(std::floor(8 * std::log2(voxels)) / 8) / std::abs(middle);
+  }
+  /// Two steps before the last one that is not above a slope.
+  double before(double slope) const { return (std::floor((slope + offset) / step) - 2) * step - offset; }
+};
 
 /// The grid of slopes that both the pixels and the volume cover. std::nullopt if slopes against this stack cannot
 /// describe the rays.
@@ -186,14 +253,15 @@ std::optional<Sheared> sheared_grid(const Slices::Stack& stack, const Attenuatio
       volume_p.add(edge(stack.axes[0]) / depth);
       volume_q.add(edge(stack.axes[2]) / depth);
     }
-  const double middle = 0.5 * std::abs(near + far);
   Sheared image;
-  image.step_p =
-      std::max(step * std::sqrt(rays.spacing_mm[stack.axes[2]] / rays.spacing_mm[stack.axes[0]]), kFinest / middle);
-  image.step_q =
-      std::max(step * std::sqrt(rays.spacing_mm[stack.axes[0]] / rays.spacing_mm[stack.axes[2]]), kFinest / middle);
-  image.p = std::max(p.low, volume_p.low) - 2 * image.step_p;
-  image.q = std::max(q.low, volume_q.low) - 2 * image.step_q;
+  image.middle = 0.5 * (near + far);
+  const double ratio = std::sqrt(rays.spacing_mm[stack.axes[2]] / rays.spacing_mm[stack.axes[0]]);
+  const Lattice columns(step * ratio, rays.source[stack.axes[0]], image.middle),
+      rows(step / ratio, rays.source[stack.axes[2]], image.middle);
+  image.step_p = columns.step;
+  image.step_q = rows.step;
+  image.p = columns.before(std::max(p.low, volume_p.low));
+  image.q = rows.before(std::max(q.low, volume_q.low));
   image.columns = std::max(0, int(std::ceil((std::min(p.high, volume_p.high) - image.p) / image.step_p)) + 3);
   image.rows = std::max(0, int(std::ceil((std::min(q.high, volume_q.high) - image.q) / image.step_q)) + 3);
   return image;
@@ -220,6 +288,30 @@ std::vector<float> warped(const Sheared& image, const Slices::Stack& stack, cons
     }
   });
   return values;
+}
+
+/// The same as warped(), with derivatives.
+void warp(const Sheared& image, const Slices::Stack& stack, const RayMotion& motion, const PixelGrid& grid,
+          RadiographExpansion& expansion) {
+  const SliceAxes axes{stack.axes[0], stack.axes[2], stack.axes[1]};
+  const double per_p = 1 / image.step_p, per_q = 1 / image.step_q;
+  tbb::parallel_for(0, grid.rows, [&](int row) {
+    const Eigen::Vector2d pixel = grid.pixel(0, row);
+    const Eigen::Vector3d first = motion.rays().direction(pixel.x(), pixel.y()),
+                          change = grid.step_px * motion.rays().direction_from_pixel.col(0);
+    for (int column = 0; column < grid.columns; ++column) {
+      const Eigen::Vector3d direction = first + column * change;
+      const double nearer = 1 / direction[axes.across], p = direction[axes.first] * nearer,
+                   q = direction[axes.second] * nearer;
+      const Sheared::Expansion at = image.expansion_at((p - image.p) * per_p, (q - image.q) * per_q);
+      if (at.value == 0) continue;
+      const RayMotion::Change moved =
+          motion.change({at.value, at.by_p, at.by_q, at.by_along, at.by_across}, axes, stack.slice_step, direction);
+      const std::size_t i = std::size_t(row) * std::size_t(grid.columns) + std::size_t(column);
+      expansion.values[i] = float(moved.value);
+      for (std::size_t k = 0; k < 6; ++k) expansion.slopes[k][i] = float(moved.slopes[Eigen::Index(k)]);
+    }
+  });
 }
 
 Slices::Stack stack_of(std::array<int, 3> axes, const Grid& grid, const std::int16_t* values, std::size_t slice_stride,
@@ -270,17 +362,34 @@ Slices::Slices(const Attenuation& attenuation) : attenuation_(attenuation), turn
   }
 }
 
-std::optional<std::vector<float>> Slices::radiograph(const Rays& rays, const PixelGrid& grid) const {
-  if (attenuation_.is_empty()) return std::vector<float>(grid.count(), 0.0f);
-  if (grid.count() == 0) return std::vector<float>();
+const Slices::Stack& Slices::stack_for(const Rays& rays, const PixelGrid& grid) const {
   const Eigen::Vector2d middle = grid.pixel(grid.columns / 2, grid.rows / 2);
   int across = 0;
   rays.direction(middle.x(), middle.y()).cwiseProduct(rays.spacing_mm).cwiseAbs().maxCoeff(&across);
-  const Stack& stack = stacks_[std::size_t(across)];
+  return stacks_[std::size_t(across)];
+}
+
+std::optional<std::vector<float>> Slices::radiograph(const Rays& rays, const PixelGrid& grid) const {
+  if (attenuation_.is_empty() || grid.count() == 0) return std::vector<float>(grid.count(), 0.0f);
+  const Stack& stack = stack_for(rays, grid);
   std::optional<Sheared> image = sheared_grid(stack, attenuation_, rays, grid);
   if (!image) return std::nullopt;
   sum_slices(stack, rays, *image);
   return warped(*image, stack, rays, grid);
+}
+
+std::optional<RadiographExpansion> Slices::expansion(const RayMotion& motion, const PixelGrid& grid) const {
+  RadiographExpansion expansion;
+  expansion.values.assign(grid.count(), 0.0f);
+  for (auto& slopes : expansion.slopes) slopes.assign(grid.count(), 0.0f);
+  if (attenuation_.is_empty() || grid.count() == 0) return expansion;
+  const Stack& stack = stack_for(motion.rays(), grid);
+  std::optional<Sheared> image = sheared_grid(stack, attenuation_, motion.rays(), grid);
+  if (!image) return std::nullopt;
+  image->layers = kValuesAndSlopes;
+  sum_slices(stack, motion.rays(), *image);
+  warp(*image, stack, motion, grid, expansion);
+  return expansion;
 }
 
 }  // namespace marrow::rays

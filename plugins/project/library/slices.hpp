@@ -20,6 +20,9 @@ class Slices {
   /// too much or the source lies within the volume's slices. Such a view must be computed ray by ray (see Bricks).
   std::optional<std::vector<float>> radiograph(const Rays& rays, const PixelGrid& grid) const;
 
+  /// The same with its derivatives by a small motion of the model.
+  std::optional<RadiographExpansion> expansion(const RayMotion& motion, const PixelGrid& grid) const;
+
   /// The first and last voxel of a row that attenuate. None does if last < first.
   struct Extent {
     std::int16_t first = INT16_MAX, last = -1;
@@ -42,6 +45,9 @@ class Slices {
   };
 
  private:
+  /// The slices that the ray through the middle of a grid crosses best.
+  const Stack& stack_for(const Rays& rays, const PixelGrid& grid) const;
+
   const Attenuation& attenuation_;
   std::vector<std::int16_t, LargePages<std::int16_t>> turned_;  ///< y fastest, then x, then z
   std::array<Stack, 3> stacks_;                                 ///< one for each axis from slice to slice

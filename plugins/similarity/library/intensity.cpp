@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/similarity/intensity.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/base/error.hpp"
 #include "marrow/domain/camera.hpp"
+#include "marrow/domain/functions.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
 #include "marrow/toolbox/match/among_others.hpp"
 #include "marrow/toolbox/match/bones_together.hpp"
-#include "moments.hpp"
+#include "intensity_expansions.hpp"
 #include "smoothed_at_bone.hpp"
 
 namespace marrow::match {
@@ -57,6 +60,31 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
     return patch.rendered.empty() ? worst_ : measured(view, patch);
   }
 
+  std::optional<Expansion> expansion(const RigidTransform& world_from_model,
+                                     const FragmentFrame& frame) const override {
+    const std::vector<ViewExpansion> views = expansions(world_from_model, frame);
+    if (views.empty()) return std::nullopt;
+    Expansion mean;
+    for (std::size_t i = 0; i < views.size(); ++i) add(views[i].whole, share(i), mean);
+    return mean;
+  }
+
+  std::vector<Expansion> expansion_without_each_block(const RigidTransform& world_from_model,
+                                                      const FragmentFrame& frame) const override {
+    if (!options_.has_blocks) return {};
+    const std::vector<ViewExpansion> views = expansions(world_from_model, frame);
+    Expansion mean;
+    for (std::size_t i = 0; i < views.size(); ++i) add(views[i].whole, share(i), mean);
+    std::vector<Expansion> without;
+    for (std::size_t i = 0; i < views.size(); ++i)
+      for (const Expansion& block : views[i].without_block) {
+        without.push_back(mean);
+        add(views[i].whole, -share(i), without.back());
+        add(block, share(i), without.back());
+      }
+    return without;
+  }
+
   std::shared_ptr<const Cost> at_level(const CostLevel& level) const override {
     if (level.pixel_step <= 0 || level.pixel_step == options_.pixel_step) return std::make_shared<IntensityCost>(*this);
     IntensityOptions options = options_;
@@ -80,6 +108,22 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
     std::vector<Patch> images;
     std::vector<Measure> measures;
   };
+
+  /// Of all views; empty if there are no derivatives.
+  std::vector<ViewExpansion> expansions(const RigidTransform& world_from_model, const FragmentFrame& frame) const {
+    if (!std::all_of(seen_->measures.begin(), seen_->measures.end(), has_derivatives)) return {};
+    std::vector<std::optional<ViewExpansion>> of_view(views_.size());
+    tbb::parallel_for(std::size_t(0), of_view.size(), [&](std::size_t i) {
+      if (const auto patch = patch_with_slopes(i, world_from_model, frame))
+        of_view[i] = expansion_of(seen_->measures[i], *patch, options_.pixel_step, Blocks::of(views_[i].camera), worst_);
+    });
+    std::vector<ViewExpansion> all;
+    for (auto& view : of_view) {
+      if (!view) return {};
+      all.push_back(std::move(*view));
+    }
+    return all;
+  }
 
   std::string silence(std::size_t view, const RigidTransform& world_from_model) const override {
     return in_view(views_, view, silence_of(view, patch_of(view, world_from_model)));
@@ -117,20 +161,19 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
     const Blocks blocks = Blocks::of(views_[view].camera);
     const Patch patch = patch_of(view, world_from_model);
     if (patch.rendered.empty()) return {worst_, std::vector<double>(std::size_t(blocks.count()), worst_)};
-    if (const auto* whole = std::get_if<WholeMeasure>(&seen_->measures[view]))
-      return split_by_masks(*whole, patch, blocks);
-    const auto& measure = std::get<SumMeasure>(seen_->measures[view]);
+    const auto* measure = std::get_if<SumMeasure>(&seen_->measures[view]);
+    if (!measure) return split_by_masks(view, patch, blocks);
     BlockSums sums(blocks);
-    Tally tally(patch, options_.pixel_step, &sums);
-    measure.add(patch, tally);
-    return {finite(measure.value(tally.sums())),
-            sums.without_each([&](const BlockSums::Sums& left) { return finite(measure.value(left)); })};
+    Tally tally(patch, options_.pixel_step, sums);
+    measure->add(patch, tally);
+    return {finite(measure->value(sums.all())),
+            sums.without_each([&](const BlockSums::Sums& left) { return finite(measure->value(left)); })};
   }
 
   /// Leaves out the pixels of one block after the other.
-  Split split_by_masks(const WholeMeasure& measure, Patch patch, const Blocks& blocks) const {
+  Split split_by_masks(std::size_t view, Patch patch, const Blocks& blocks) const {
     Split split;
-    split.value = finite(measure(patch));
+    split.value = measured(view, patch);
     split.without_block.assign(std::size_t(blocks.count()), split.value);
     const std::vector<char> counts = patch.counts;
     const int step = options_.pixel_step;
@@ -143,27 +186,46 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
         if (left >= right || top >= bottom) continue;
         for (int y = top; y < bottom; ++y)
           std::fill_n(patch.counts.begin() + std::ptrdiff_t(patch.at(left, y)), right - left, 0);
-        split.without_block[std::size_t(row * blocks.columns + column)] = finite(measure(patch));
+        split.without_block[std::size_t(row * blocks.columns + column)] = measured(view, patch);
         patch.counts = counts;
       }
     return split;
   }
 
   double measured(std::size_t view, const Patch& patch) const {
-    if (const auto* whole = std::get_if<WholeMeasure>(&seen_->measures[view])) return finite((*whole)(patch));
-    const auto& measure = std::get<SumMeasure>(seen_->measures[view]);
-    Tally tally(patch, options_.pixel_step, nullptr);
-    measure.add(patch, tally);
-    return finite(measure.value(tally.sums()));
+    return finite(value_of(seen_->measures[view], patch, options_.pixel_step, Blocks::of(views_[view].camera)));
   }
   double finite(double value) const { return std::isfinite(value) ? value : worst_; }
 
-  /// The pixels of a view to compare. Empty if there are too few.
+  const RadiographProjector& projector() const { return smoothed_ ? *smoothed_ : *projector_; }
+
+  /// The pixels of a view to compare; empty if there are too few.
   Patch patch_of(std::size_t view, const RigidTransform& world_from_model) const {
-    const Camera& camera = views_[view].camera;
+    Patch patch = region_of(view, world_from_model);
+    if (patch.seen.empty()) return patch;
+    patch.rendered = projector().radiograph(views_[view].camera, world_from_model, grid_of(patch));
+    return patch;
+  }
+  /// The same with slopes; absent if the projector has no derivatives.
+  std::optional<Patch> patch_with_slopes(std::size_t view, const RigidTransform& world_from_model,
+                                         const FragmentFrame& frame) const {
+    Patch patch = region_of(view, world_from_model);
+    if (patch.seen.empty()) return patch;
+    auto expansion = projector().expansion(views_[view].camera, world_from_model, frame, grid_of(patch));
+    if (!expansion) return std::nullopt;
+    patch.rendered = std::move(expansion->values);
+    patch.slopes = std::move(expansion->slopes);
+    return patch;
+  }
+  PixelGrid grid_of(const Patch& patch) const {
+    const int step = options_.pixel_step;
+    return {double(patch.left) * step, double(patch.top) * step, double(step), patch.columns, patch.rows};
+  }
+
+  /// The pixels of a view to compare, without `rendered`. Empty if there are too few.
+  Patch region_of(std::size_t view, const RigidTransform& world_from_model) const {
     const Patch& image = seen_->images[view];
-    const RadiographProjector& projector = smoothed_ ? *smoothed_ : *projector_;
-    const PixelGrid region = projector.region(camera, world_from_model);
+    const PixelGrid region = projector().region(views_[view].camera, world_from_model);
     if (region.count() == 0) return {};
     const int step = options_.pixel_step, margin = std::max(options_.margin_px, options_.least_margin_steps * step);
     const int left = std::max(0, (int(region.u_px) - margin) / step),
@@ -172,11 +234,8 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
               bottom = std::min(image.rows - 1, (int(region.v_px) + region.rows - 1 + margin) / step);
     if (right - left < 3 || bottom - top < 3) return {};
     Patch patch{right - left + 1, bottom - top + 1, left, top, {}, {}, {}};
-    patch.rendered = projector.radiograph(
-        camera, world_from_model,
-        PixelGrid{double(left) * step, double(top) * step, double(step), patch.columns, patch.rows});
-    patch.seen.resize(patch.rendered.size());
-    patch.counts.resize(patch.rendered.size());
+    patch.seen.resize(std::size_t(patch.columns) * std::size_t(patch.rows));
+    patch.counts.resize(patch.seen.size());
     for (int row = 0; row < patch.rows; ++row) {
       const auto from = std::ptrdiff_t(image.at(left, top + row)), to = std::ptrdiff_t(patch.at(0, row));
       std::copy_n(image.seen.begin() + from, patch.columns, patch.seen.begin() + to);
@@ -184,7 +243,6 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
     }
     return patch;
   }
-
   std::shared_ptr<const RadiographProjector> projector_;
   std::shared_ptr<const RadiographProjector> smoothed_;  ///< as much as the image; null if projector_ cannot
   const List<View> views_;
@@ -205,85 +263,6 @@ std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector,
   const List<View> own = without_shadows(views, shadows_of(&projector, others, other_projectors, other_outlines));
   const std::shared_ptr<const RadiographProjector> kept_elsewhere(std::shared_ptr<void>(), &projector);
   return std::make_shared<IntensityCost>(kept_elsewhere, own, options, worst, std::move(measure_of));
-}
-
-namespace {
-
-/// Sobel's gradients of a row. Its neighbours lie `down` values before and after it.
-void sobel(const float* row, std::ptrdiff_t down, int count, float* __restrict du, float* __restrict dv) {
-  for (int i = 0; i < count; ++i) {
-    const float* p = row + i;
-    const float a = p[-down - 1], b = p[-down], d = p[-down + 1], e = p[-1], f = p[1], h = p[down - 1], k = p[down],
-                m = p[down + 1];
-    du[i] = 0.125f * (d - a + 2 * (f - e) + m - h);
-    dv[i] = 0.125f * (h - a + 2 * (k - b) + m - d);
-  }
-}
-
-/// Which pixels of a row count together with all their neighbours.
-void all_around(const char* row, std::ptrdiff_t down, int count, char* __restrict all) {
-  for (int i = 0; i < count; ++i) {
-    const char* c = row + i;
-    all[i] = char(c[-down - 1] & c[-down] & c[-down + 1] & c[-1] & c[0] & c[1] & c[down - 1] & c[down] & c[down + 1]);
-  }
-}
-
-}  // namespace
-
-Gradients gradients_of(const Patch& patch) {
-  Gradients g;
-  const std::size_t count = patch.rendered.size();
-  for (auto* values : {&g.rendered_u, &g.rendered_v, &g.seen_u, &g.seen_v}) values->assign(count, 0.0f);
-  g.counts.assign(count, 0);
-  for (int row = 1; row + 1 < patch.rows; ++row) {
-    const std::size_t i = patch.at(1, row);
-    all_around(patch.counts.data() + i, patch.columns, patch.columns - 2, g.counts.data() + i);
-    sobel(patch.rendered.data() + i, patch.columns, patch.columns - 2, g.rendered_u.data() + i,
-          g.rendered_v.data() + i);
-    sobel(patch.seen.data() + i, patch.columns, patch.columns - 2, g.seen_u.data() + i, g.seen_v.data() + i);
-  }
-  return g;
-}
-
-double scale_of(const Gradients& g) {
-  double products = 0, squares = 0;
-  for (std::size_t i = 0; i < g.counts.size(); ++i) {
-    if (!g.counts[i]) continue;
-    products += double(g.rendered_u[i]) * g.seen_u[i] + double(g.rendered_v[i]) * g.seen_v[i];
-    squares += double(g.rendered_u[i]) * g.rendered_u[i] + double(g.rendered_v[i]) * g.rendered_v[i];
-  }
-  return squares > 0 ? products / squares : 0;
-}
-
-namespace {
-
-Moments moments_of(const std::vector<float>& a, const std::vector<float>& b, const std::vector<char>& counts) {
-  Moments m;
-  // Relative to the first value that counts, so that a large constant causes no rounding errors.
-  const auto first = std::find(counts.begin(), counts.end(), 1);
-  if (first == counts.end()) return m;
-  const std::size_t at = std::size_t(first - counts.begin());
-  const double a0 = a[at], b0 = b[at];
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    if (!counts[i]) continue;
-    m.add(a[i] - a0, b[i] - b0);
-  }
-  return m;
-}
-
-}  // namespace
-
-double correlation(const std::vector<float>& a, const std::vector<float>& b, const std::vector<char>& counts) {
-  const Moments m = moments_of(a, b, counts);
-  if (m.n < 16) return 0;
-  const double aa = m.spread_a(), bb = m.spread_b(), ab = m.spread_ab();
-  if (!(aa > 1e-12 * std::max(m.aa, 1e-30)) || !(bb > 1e-12 * std::max(m.bb, 1e-30))) return 0;
-  return std::clamp(ab / std::sqrt(aa * bb), -1.0, 1.0);
-}
-
-double deviation(const std::vector<float>& values, const std::vector<char>& counts) {
-  const Moments m = moments_of(values, values, counts);
-  return m.n < 16 ? 0 : std::sqrt(std::max(0.0, m.spread_a()) / m.n);
 }
 
 }  // namespace marrow::match

@@ -1,58 +1,76 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The common part of costs that compare a radiograph of the model with the image, grey value by grey value.
+#include <array>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <type_traits>
 #include <variant>
 #include <vector>
 
 #include "marrow/plugin.hpp"
+#include "marrow/similarity/expansions.hpp"
 #include "marrow/toolbox/image/grey_range.hpp"
-#include "marrow/toolbox/match/views_cost.hpp"
 
 namespace marrow::match {
 
-/// Pixels of a region, row by row: `rendered` from the model and `seen` in the image. Both are line integrals. A pixel
-/// whose `counts` is 0 must not be compared; its value may be NaN.
+/// Pixels of a region, row by row: `rendered` from the model and `seen` in the image. Both are line integrals, or a
+/// component of their gradients. A pixel whose `counts` is 0 must not be compared; its value may be NaN.
 struct Patch {
   int columns = 0, rows = 0;
   int left = 0, top = 0;  ///< position of the region in the image, in units of the pixels that are compared
   std::vector<float> rendered, seen;
   std::vector<char> counts;
+  /// The derivatives of `rendered` by a small motion (r [rad], t [mm]) of the model; empty if nobody asks for them.
+  std::array<std::vector<float>, 6> slopes{};
 
   std::size_t at(int column, int row) const { return std::size_t(row) * std::size_t(columns) + std::size_t(column); }
+  Vector6d slopes_at(std::size_t i) const {
+    return Vector6d{slopes[0][i], slopes[1][i], slopes[2][i], slopes[3][i], slopes[4][i], slopes[5][i]};
+  }
 };
 
-/// Adds up what each place of a patch contributes to a measure.
-class Tally {
+/// Adds up what each place of a patch contributes to a measure: BlockSums, or an ExpansionTally with derivatives.
+template <class Sums>
+class PlacesOf {
  public:
-  /// `blocks` also gets the sums of each block of the image, whose pixels are `step_px` times those compared. It may be
-  /// null.
-  Tally(const Patch& patch, double step_px, BlockSums* blocks) : patch_(patch), step_px_(step_px), blocks_(blocks) {}
-  void add(double column, double row, double value, double weight) {
-    sums_.values += value;
-    sums_.weights += weight;
-    if (blocks_) blocks_->add((patch_.left + column) * step_px_, (patch_.top + row) * step_px_, value, weight);
+  /// The patch's pixels are `step_px` times those of the image.
+  PlacesOf(const Patch& patch, double step_px, Sums& sums) : patch_(patch), step_px_(step_px), sums_(sums) {}
+  template <class... What>
+  void add(double column, double row, const What&... what) {
+    sums_.add((patch_.left + column) * step_px_, (patch_.top + row) * step_px_, what...);
   }
-  const BlockSums::Sums& sums() const { return sums_; }
 
  private:
   const Patch& patch_;
   const double step_px_;
-  BlockSums* blocks_;
-  BlockSums::Sums sums_;
+  Sums& sums_;
 };
+using Tally = PlacesOf<BlockSums>;
+using TallyOfExpansions = PlacesOf<ExpansionTally>;
 
 /// How badly radiograph and image agree; smaller is better. Must give its worst value if there is nothing to compare.
 /// Must be safe to call from several threads at once.
-using WholeMeasure = std::function<double(const Patch&)>;
-/// The same for a measure that follows from sums over places.
+struct WholeMeasure {
+  std::function<double(const Patch&)> value;
+  /// The quadratic model, for a patch with slopes; empty if there is none.
+  std::function<Cost::Expansion(const Patch&)> expansion;
+};
+/// A measure that follows from sums over places: 1 - sum of the values / sum of the weights.
 struct SumMeasure {
   std::function<void(const Patch&, Tally&)> add;
-  std::function<double(const BlockSums::Sums&)> value;
+  /// The same with derivatives, for a patch with slopes.
+  std::function<void(const Patch&, TallyOfExpansions&)> add_expansion;
+  std::optional<double> whole;  ///< divides the sum of the values instead of the sum of the weights
+
+  double value(const BlockSums::Sums& sums) const;
 };
-using Measure = std::variant<WholeMeasure, SumMeasure>;
+/// 1 - mean of the correlations of some patches, such as the two components of the gradients.
+struct CorrelationMeasure {
+  std::function<std::vector<Patch>(const Patch&)> compared;
+};
+using Measure = std::variant<WholeMeasure, SumMeasure, CorrelationMeasure>;
 /// Makes the measure for one image at one level. `whole` is the whole image, without `rendered`.
 using MeasureOf = std::function<Measure(const Patch& whole)>;
 
@@ -77,7 +95,7 @@ std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector,
                                            const IntensityOptions& options, double worst, MeasureOf measure_of);
 
 /// The function of a node. Its cost is the mean of kMeasure over the views. kMeasure either takes a patch and returns
-/// the measure's value, or takes a whole image and returns a SumMeasure. In both cases it may take the options as a
+/// the measure's value, or takes a whole image and returns a SumMeasure or a CorrelationMeasure. In both cases it may take the options as a
 /// second argument. A view that does not show the model counts as kWorst.
 template <auto kMeasure, class Options = IntensityOptions, int kWorst = 2>
 std::shared_ptr<const Cost> intensity_node(const RadiographProjector& projector, const List<View>& views,
@@ -95,20 +113,25 @@ std::shared_ptr<const Cost> intensity_node(const RadiographProjector& projector,
   };
   if constexpr (std::is_same_v<decltype(called(Patch())), double>)
     return intensity_cost(projector, views, others, other_projectors, other_outlines, own, kWorst,
-                          [called](const Patch&) -> Measure { return called; });
+                          [called](const Patch&) -> Measure { return WholeMeasure{called, {}}; });
   else
     return intensity_cost(projector, views, others, other_projectors, other_outlines, own, kWorst, called);
 }
 
-/// Gradients per pixel by Sobel's operator divided by 8; 0 at the border. A gradient counts if all nine pixels do.
+/// Gradients per pixel by Sobel's operator divided by 8, along the columns and the rows; 0 at the border. A gradient
+/// counts if all nine pixels do. With the slopes of the rendered gradients, if the patch has slopes.
 struct Gradients {
-  std::vector<float> rendered_u, rendered_v, seen_u, seen_v;
-  std::vector<char> counts;
+  Patch u, v;
 };
 Gradients gradients_of(const Patch& patch);
 /// The factor that fits the rendered gradients to the seen ones by least squares; 0 if there are none. The radiograph
-/// of a bone has no soft tissue, but soft tissue has small gradients, so it hardly affects this factor.
-double scale_of(const Gradients& gradients);
+/// of a bone has no soft tissue, but soft tissue has small gradients, so it hardly affects this factor. With its
+/// derivatives, if the gradients have slopes.
+struct Scale {
+  double value = 0;
+  Vector6d slopes = Vector6d::Zero();
+};
+Scale scale_of(const Gradients& gradients);
 
 /// Pearson's correlation over the pixels that count; 0 if one of the two is constant or fewer than 16 count.
 double correlation(const std::vector<float>& a, const std::vector<float>& b, const std::vector<char>& counts);

@@ -10,16 +10,22 @@
 namespace marrow::match {
 namespace {
 
-/// Of the pixels of a square that count.
-Moments moments_in(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b,
-                   const std::vector<char>& counts, const cv::Rect& cell) {
-  Moments moments;
+/// Of the pixels of a rectangle that count.
+void add_pixels(const Patch& patch, const cv::Rect& cell, Moments& moments) {
   for (int row = cell.y; row < cell.y + cell.height; ++row)
     for (std::size_t i = patch.at(cell.x, row); i < patch.at(cell.x, row) + std::size_t(cell.width); ++i) {
-      if (!counts[i]) continue;  // its value may be NaN
-      moments.add(a[i], b[i]);
+      if (!patch.counts[i]) continue;  // its value may be NaN
+      moments.add(patch.rendered[i], patch.seen[i]);
     }
-  return moments;
+}
+void add_pixels(const Patch& patch, const cv::Rect& cell, JointMoments& moments) {
+  for (int row = cell.y; row < cell.y + cell.height; ++row)
+    for (std::size_t i = patch.at(cell.x, row); i < patch.at(cell.x, row) + std::size_t(cell.width); ++i) {
+      if (!patch.counts[i]) continue;
+      JointMoments::Vector values;
+      values << patch.slopes_at(i), patch.rendered[i], patch.seen[i];
+      moments.add(values);
+    }
 }
 
 struct Correlation {
@@ -34,10 +40,9 @@ Correlation correlation_of(const Moments& m) {
   return {va, vb > 1e-14 + 1e-12 * m.bb ? std::clamp(m.spread_ab() / std::sqrt(va * vb), -1.0, 1.0) : 0};
 }
 
-}  // namespace
-
-void add_patch_correlations(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b,
-                            const std::vector<char>& counts, int side, Tally& tally) {
+/// Calls use(column, row, moments) for each square, with the position of its middle.
+template <class AnyMoments, class Use>
+void each_square(const Patch& patch, int side, const Use& use) {
   const int step = std::max(1, side / 2);
   // The squares have fixed positions in the image. If they moved along with the compared region, each pixel of its
   // motion would change all squares, and the cost would be rough.
@@ -50,25 +55,44 @@ void add_patch_correlations(const Patch& patch, const std::vector<float>& a, con
   const int rest = side % step, per_step = rest > 0 ? 2 : 1, cells = side / step * per_step + (rest > 0 ? 1 : 0);
   const auto border = [&](int i) { return i / per_step * step + i % per_step * rest; };
   const int cell_columns = (columns - 1) * per_step + cells, cell_rows = (rows - 1) * per_step + cells;
-  std::vector<Moments> of_cells;
+  std::vector<AnyMoments> of_cells(std::size_t(cell_columns) * std::size_t(cell_rows));
   for (int y = 0; y < cell_rows; ++y)
     for (int x = 0; x < cell_columns; ++x)
-      of_cells.push_back(
-          moments_in(patch, a, b, counts,
-                     {left + border(x), top + border(y), border(x + 1) - border(x), border(y + 1) - border(y)}));
+      add_pixels(patch, {left + border(x), top + border(y), border(x + 1) - border(x), border(y + 1) - border(y)},
+                 of_cells[std::size_t(y * cell_columns + x)]);
   for (int row = 0; row < rows; ++row)
     for (int column = 0; column < columns; ++column) {
-      Moments moments;
+      AnyMoments moments;
       for (int y = row * per_step; y < row * per_step + cells; ++y)
         for (int x = column * per_step; x < column * per_step + cells; ++x)
           moments += of_cells[std::size_t(y * cell_columns + x)];
-      const Correlation one = correlation_of(moments);
-      tally.add(left + column * step + 0.5 * side, top + row * step + 0.5 * side, one.weight * one.value, one.weight);
+      use(left + column * step + 0.5 * side, top + row * step + 0.5 * side, moments);
     }
 }
 
-double value_of_patch_correlations(const BlockSums::Sums& sums) {
-  return sums.weights > 0 ? 1 - sums.values / sums.weights : 2;
+}  // namespace
+
+SumMeasure correlation_in_squares(int side, std::function<std::vector<Patch>(const Patch&)> compared) {
+  SumMeasure measure;
+  measure.add = [side, compared](const Patch& patch, Tally& tally) {
+    for (const Patch& one : compared(patch))
+      each_square<Moments>(one, side, [&](double column, double row, const Moments& moments) {
+        const Correlation square = correlation_of(moments);
+        tally.add(column, row, square.weight * square.value, square.weight);
+      });
+  };
+  measure.add_expansion = [side, compared](const Patch& patch, TallyOfExpansions& tally) {
+    for (const Patch& one : compared(patch))
+      each_square<JointMoments>(one, side, [&](double column, double row, const JointMoments& moments) {
+        const CorrelationExpansion square = correlation_expansion(moments);
+        tally.add(column, row,
+                  SumsExpansion{{square.spread * square.value, square.spread},
+                                square.spread * square.by_value + square.value * square.by_spread,
+                                square.by_spread,
+                                square.spread * square.curvature});
+      });
+  };
+  return measure;
 }
 
 }  // namespace marrow::match

@@ -12,14 +12,12 @@ struct PatchOptions : IntensityOptions {
   int patch_pixels = 13;
 };
 
-/// Adds the correlations of `a` (radiograph) and `b` (image) within squares of `side` pixels, half a square apart, at
-/// the squares' middles. Each square is weighted by the variance of `a` in it, so the image does not matter where the
-/// model shows nothing. A square in which the image is constant counts as 0. Variance-weighted local correlation:
-/// LaRose (PhD thesis, Carnegie Mellon University 2001); Knaan and Joskowicz (MICCAI 2003).
-void add_patch_correlations(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b,
-                            const std::vector<char>& counts, int side, Tally& tally);
-/// 1 - the weighted mean of the correlations; 2 if no square counts.
-double value_of_patch_correlations(const BlockSums::Sums& sums);
+/// 1 - the mean of the correlations of radiograph and image within squares of `side` pixels, half a square apart. Each
+/// square is weighted by the variance of the radiograph in it, so the image does not matter where the model shows
+/// nothing. A square in which the image is constant counts as 0. `compared` says what is compared: the grey values, or
+/// the components of their gradients. Variance-weighted local correlation: LaRose (PhD thesis, Carnegie Mellon
+/// University 2001); Knaan and Joskowicz (MICCAI 2003).
+SumMeasure correlation_in_squares(int side, std::function<std::vector<Patch>(const Patch&)> compared);
 
 /// Declares inputs, output and options of the nodes that use patches.
 template <class Node>

@@ -12,6 +12,9 @@
 #include <mutex>
 #include <optional>
 
+#include "marrow/domain/pose.hpp"
+#include "marrow/domain/functions.hpp"
+
 namespace marrow::match {
 namespace {
 
@@ -72,6 +75,27 @@ class SmoothedAtBone : public RadiographProjector {
                                 const std::vector<Eigen::Vector2f>& pixels) const override {
     return mixed(camera, world_from_model, pixels);
   }
+  std::optional<RadiographExpansion> expansion(const Camera& camera, const RigidTransform& world_from_model,
+                                               const FragmentFrame& frame, const PixelGrid& grid) const override {
+    const Mixture mixture = mixture_at(camera, world_from_model);
+    auto sharper = at(mixture.level).expansion(camera, world_from_model, frame, grid),
+         smoother = at(mixture.level + 1).expansion(camera, world_from_model, frame, grid);
+    if (!sharper || !smoother) return std::nullopt;
+    for (int k = 0; k < 6; ++k) {
+      // By differences, because it is a number and costs no radiograph.
+      constexpr double kStep = 1e-4;
+      const auto variance = [&](double step) {
+        return variance_at(camera, moved(world_from_model, frame, step * Vector6d::Unit(k)));
+      };
+      const auto change = float((variance(kStep) - variance(-kStep)) / (2 * kStep) / std::exp2(mixture.level));
+      std::vector<float>&slopes = sharper->slopes[std::size_t(k)], &others = smoother->slopes[std::size_t(k)];
+      for (std::size_t i = 0; i < slopes.size(); ++i)
+        slopes[i] += mixture.share * (others[i] - slopes[i]) + change * (smoother->values[i] - sharper->values[i]);
+    }
+    for (std::size_t i = 0; i < sharper->values.size(); ++i)
+      sharper->values[i] += mixture.share * (smoother->values[i] - sharper->values[i]);
+    return sharper;
+  }
   PixelGrid region(const Camera& camera, const RigidTransform& world_from_model) const override {
     const PixelGrid sharp = projector_.region(camera, world_from_model);
     if (sharp.count() == 0) return sharp;
@@ -92,11 +116,20 @@ class SmoothedAtBone : public RadiographProjector {
     return *one;
   }
 
-  template <class Pixels>
-  std::vector<float> mixed(const Camera& camera, const RigidTransform& world_from_model, const Pixels& pixels) const {
+  /// The share of the radiograph for the variance 2^(level + 1) mm^2; the rest is that for 2^level mm^2.
+  struct Mixture {
+    int level = 0;
+    float share = 0;
+  };
+  Mixture mixture_at(const Camera& camera, const RigidTransform& world_from_model) const {
     const double variance_mm2 = variance_at(camera, world_from_model);
     const int level = int(std::floor(std::log2(variance_mm2)));
-    const auto share = float(variance_mm2 / std::exp2(level) - 1);
+    return {level, float(variance_mm2 / std::exp2(level) - 1)};
+  }
+
+  template <class Pixels>
+  std::vector<float> mixed(const Camera& camera, const RigidTransform& world_from_model, const Pixels& pixels) const {
+    const auto [level, share] = mixture_at(camera, world_from_model);
     std::vector<float> values = at(level).radiograph(camera, world_from_model, pixels);
     if (!(share > 0)) return values;
     const std::vector<float> smoother = at(level + 1).radiograph(camera, world_from_model, pixels);

@@ -179,24 +179,54 @@ std::vector<OutlinePoint> BodyProjector::outline(const Camera& camera, const Rig
   return points;
 }
 
-std::vector<float> BodyProjector::radiograph(const Camera& camera, const RigidTransform& world_from_model,
-                                             const PixelGrid& grid) const {
+namespace {
+
+std::vector<Eigen::Vector2f> pixels_of(const PixelGrid& grid) {
   std::vector<Eigen::Vector2f> pixels;
   for (int row = 0; row < grid.rows; ++row)
     for (int column = 0; column < grid.columns; ++column) pixels.push_back(grid.pixel(column, row).cast<float>());
-  return radiograph(camera, world_from_model, pixels);
+  return pixels;
+}
+
+}  // namespace
+
+std::vector<float> BodyProjector::radiograph(const Camera& camera, const RigidTransform& world_from_model,
+                                             const PixelGrid& grid) const {
+  return radiograph(camera, world_from_model, pixels_of(grid));
 }
 
 std::vector<float> BodyProjector::radiograph(const Camera& camera, const RigidTransform& world_from_model,
                                              const std::vector<Eigen::Vector2f>& pixels) const {
+  const std::vector<double> values = integrals(camera, world_from_model, pixels);
+  return {values.begin(), values.end()};
+}
+
+std::optional<RadiographExpansion> BodyProjector::expansion(const Camera& camera, const RigidTransform& world_from_model,
+                                             const FragmentFrame& frame, const PixelGrid& grid) const {
+  constexpr double kStep_mm = 2.5e-4, kStep_rad = 1e-5;
+  const std::vector<Eigen::Vector2f> pixels = pixels_of(grid);
+  RadiographExpansion expansion{radiograph(camera, world_from_model, pixels), {}};
+  for (int k = 0; k < 6; ++k) {
+    const double step = k < 3 ? kStep_rad : kStep_mm;
+    const Vector6d motion = step * Vector6d::Unit(k);
+    const std::vector<double> above = integrals(camera, moved(world_from_model, frame, motion), pixels),
+                              below = integrals(camera, moved(world_from_model, frame, -motion), pixels);
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+      expansion.slopes[std::size_t(k)].push_back(float((above[i] - below[i]) / (2 * step)));
+  }
+  return expansion;
+}
+
+std::vector<double> BodyProjector::integrals(const Camera& camera, const RigidTransform& world_from_model,
+                                             const std::vector<Eigen::Vector2f>& pixels) const {
   const RigidTransform model_from_camera = inverse(camera.camera_from_world * world_from_model);
   const Eigen::Matrix3d ray_from_pixel = model_from_camera.rotation * camera.intrinsics.inverse();
-  std::vector<float> values;
+  std::vector<double> values;
   values.reserve(pixels.size());
   for (const Eigen::Vector2f& pixel : pixels) {
     const Eigen::Vector3d direction =
         (ray_from_pixel * Eigen::Vector3d(double(pixel.x()), double(pixel.y()), 1)).normalized();
-    values.push_back(float(density_ * chord_mm(body_, model_from_camera.translation_mm, direction)));
+    values.push_back(density_ * chord_mm(body_, model_from_camera.translation_mm, direction));
   }
   return values;
 }

@@ -47,9 +47,17 @@ class BodyProjector : public OutlineProjector, public RadiographProjector {
   std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model, const PixelGrid&) const override;
   std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model,
                                 const std::vector<Eigen::Vector2f>& pixels) const override;
+  /// By differences of chords half a micrometre apart. At the outline itself, where a chord begins like a square root,
+  /// they are large.
+  std::optional<RadiographExpansion> expansion(const Camera&, const RigidTransform& world_from_model, const FragmentFrame& frame,
+                                const PixelGrid&) const override;
   PixelGrid region(const Camera&, const RigidTransform& world_from_model) const override;
 
  private:
+  /// The line integrals along the rays through these pixels.
+  std::vector<double> integrals(const Camera&, const RigidTransform& world_from_model,
+                                const std::vector<Eigen::Vector2f>& pixels) const;
+
   Body body_;
   double density_;
 };

@@ -47,6 +47,15 @@ std::vector<float> BonesTogether::radiograph(const Camera& camera, const RigidTr
   return values;
 }
 
+std::optional<RadiographExpansion> BonesTogether::expansion(const Camera& camera,
+                                                            const RigidTransform& world_from_model,
+                                                            const FragmentFrame& frame, const PixelGrid& grid) const {
+  auto expansion = bone_->expansion(camera, world_from_model, frame, grid);
+  if (expansion && !others_.empty() && bone_->region(camera, world_from_model).count() > 0)
+    add_others(camera, grid, expansion->values);
+  return expansion;
+}
+
 PixelGrid BonesTogether::region(const Camera& camera, const RigidTransform& world_from_model) const {
   const PixelGrid own = bone_->region(camera, world_from_model);
   return own.count() == 0 ? own : united(own, region_of_others(camera));

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "marrow/domain/functions.hpp"
 #include "marrow/domain/list.hpp"
+#include "marrow/domain/functions.hpp"
 
 namespace marrow::match {
 
@@ -29,6 +29,8 @@ class BonesTogether : public RadiographProjector {
                                 const PixelGrid& grid) const override;
   std::vector<float> radiograph(const Camera& camera, const RigidTransform& world_from_model,
                                 const std::vector<Eigen::Vector2f>& pixels) const override;
+  std::optional<RadiographExpansion> expansion(const Camera& camera, const RigidTransform& world_from_model,
+                                               const FragmentFrame& frame, const PixelGrid& grid) const override;
   PixelGrid region(const Camera& camera, const RigidTransform& world_from_model) const override;
   /// Null if one of the bones has none.
   Projector smoothed(double sigma_mm) const override;

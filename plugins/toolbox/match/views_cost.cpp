@@ -36,16 +36,19 @@ double ViewsCost::mean_of(const std::vector<double>& of_view) const {
   return sum / total;
 }
 
+double ViewsCost::share(std::size_t view) const {
+  return weights_[view] / std::accumulate(weights_.begin(), weights_.end(), 0.0);
+}
+
 std::vector<double> ViewsCost::without_each_block(const RigidTransform& world_from_model) const {
   const std::vector<Split> views = splits(world_from_model);
   if (std::any_of(views.begin(), views.end(), [](const Split& view) { return view.without_block.empty(); })) return {};
-  const double total = std::accumulate(weights_.begin(), weights_.end(), 0.0);
   double all = 0;
-  for (std::size_t i = 0; i < views.size(); ++i) all += weights_[i] / total * views[i].value;
+  for (std::size_t i = 0; i < views.size(); ++i) all += share(i) * views[i].value;
   std::vector<double> values;
   for (std::size_t i = 0; i < views.size(); ++i)
     for (const double without : views[i].without_block)
-      values.push_back(all + weights_[i] / total * (without - views[i].value));
+      values.push_back(all + share(i) * (without - views[i].value));
   return values;
 }
 

@@ -85,6 +85,8 @@ class ViewsCost : public Cost {
   /// The same as split() for all views, and the values alone. A cost whose views depend on each other overrides both.
   virtual std::vector<Split> splits(const RigidTransform& world_from_model) const;
   virtual std::vector<double> values_of_views(const RigidTransform& world_from_model) const;
+  /// The view's part of the weights.
+  double share(std::size_t view) const;
   /// The weighted mean of a value for each view.
   double mean_of(const std::vector<double>& of_view) const;
 

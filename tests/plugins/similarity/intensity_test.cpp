@@ -14,10 +14,14 @@ using marrow::match::Gradients;
 using marrow::match::Patch;
 
 /// The mean correlation in squares of 4 x 4, or of 6 x 6.
-double mean_patch_correlation(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b, int side) {
-  marrow::match::Tally tally(patch, 1, nullptr);
-  marrow::match::add_patch_correlations(patch, a, b, patch.counts, side, tally);
-  return 1 - marrow::match::value_of_patch_correlations(tally.sums());
+double mean_patch_correlation(Patch patch, const std::vector<float>& a, const std::vector<float>& b, int side) {
+  patch.rendered = a;
+  patch.seen = b;
+  marrow::match::BlockSums sums((marrow::match::Blocks()));
+  marrow::match::Tally tally(patch, 1, sums);
+  const auto measure = marrow::match::correlation_in_squares(side, [](const Patch& one) { return std::vector{one}; });
+  measure.add(patch, tally);
+  return 1 - measure.value(sums.all());
 }
 
 /// Five columns and four rows. The radiograph is 2 u + 3 v, the image 10 u - v; all pixels count.
@@ -38,15 +42,15 @@ TEST(Gradients, OfARampAreItsSlopes) {
     for (int u = 0; u < 5; ++u) {
       const std::size_t i = patch.at(u, v);
       const bool is_inside = u > 0 && u < 4 && v > 0 && v < 3;
-      EXPECT_EQ(gradients.counts[i], is_inside) << u << ' ' << v;
+      EXPECT_EQ(gradients.u.counts[i], is_inside) << u << ' ' << v;
       // Half the difference between neighbours is the slope.
-      EXPECT_EQ(gradients.rendered_u[i], is_inside ? 2 : 0) << u << ' ' << v;
-      EXPECT_EQ(gradients.rendered_v[i], is_inside ? 3 : 0);
-      EXPECT_EQ(gradients.seen_u[i], is_inside ? 10 : 0);
-      EXPECT_EQ(gradients.seen_v[i], is_inside ? -1 : 0);
+      EXPECT_EQ(gradients.u.rendered[i], is_inside ? 2 : 0) << u << ' ' << v;
+      EXPECT_EQ(gradients.v.rendered[i], is_inside ? 3 : 0);
+      EXPECT_EQ(gradients.u.seen[i], is_inside ? 10 : 0);
+      EXPECT_EQ(gradients.v.seen[i], is_inside ? -1 : 0);
     }
   // (2 * 10 + 3 * -1) / (2^2 + 3^2) at each of the six pixels.
-  EXPECT_NEAR(marrow::match::scale_of(gradients), 17.0 / 13.0, 1e-12);
+  EXPECT_NEAR(marrow::match::scale_of(gradients).value, 17.0 / 13.0, 1e-12);
 }
 
 TEST(Gradients, CountWhereAllNinePixelsDo) {
@@ -57,7 +61,7 @@ TEST(Gradients, CountWhereAllNinePixelsDo) {
       const Gradients gradients = marrow::match::gradients_of(patch);
       for (int row = 1; row < 3; ++row)
         for (int column = 1; column < 4; ++column)
-          EXPECT_EQ(gradients.counts[patch.at(column, row)], std::abs(column - u) > 1 || std::abs(row - v) > 1)
+          EXPECT_EQ(gradients.u.counts[patch.at(column, row)], std::abs(column - u) > 1 || std::abs(row - v) > 1)
               << "without pixel " << u << ' ' << v << ", at " << column << ' ' << row;
     }
 }
@@ -65,11 +69,11 @@ TEST(Gradients, CountWhereAllNinePixelsDo) {
 TEST(Gradients, ScaleLeavesOutWhatDoesNotCount) {
   Patch patch = ramps();
   Gradients gradients = marrow::match::gradients_of(patch);
-  gradients.seen_u[patch.at(1, 1)] = 1e6f;
-  gradients.counts[patch.at(1, 1)] = 0;
-  EXPECT_NEAR(marrow::match::scale_of(gradients), 17.0 / 13.0, 1e-12);
-  gradients.counts.assign(20, 0);
-  EXPECT_EQ(marrow::match::scale_of(gradients), 0);
+  gradients.u.seen[patch.at(1, 1)] = 1e6f;
+  gradients.u.counts[patch.at(1, 1)] = 0;
+  EXPECT_NEAR(marrow::match::scale_of(gradients).value, 17.0 / 13.0, 1e-12);
+  gradients.u.counts.assign(20, 0);
+  EXPECT_EQ(marrow::match::scale_of(gradients).value, 0);
 }
 
 TEST(Moments, OfTheValuesThatCount) {

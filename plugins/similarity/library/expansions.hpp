@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Quadratic models of measures that follow from sums over an image, by a small motion m = (r [rad], t [mm]).
+#include <array>
+#include <vector>
+
+#include "marrow/toolbox/match/views_cost.hpp"
+
+namespace marrow::match {
+
+/// A place's share of a BlockSums::Sums, with derivatives. `curvature` is a part of minus the second derivative of the
+/// values, without negative eigenvalues (Gauss-Newton).
+struct SumsExpansion {
+  BlockSums::Sums sums;
+  Vector6d by_values = Vector6d::Zero(), by_weights = Vector6d::Zero();
+  Matrix6d curvature = Matrix6d::Zero();
+
+  SumsExpansion& operator+=(const SumsExpansion& more);
+  SumsExpansion& operator-=(const SumsExpansion& less);
+};
+
+/// Sums of the products of pairs among: the six slopes of a radiograph, the radiograph and the image.
+struct JointMoments {
+  static constexpr int kRendered = 6, kSeen = 7;
+  using Vector = Eigen::Matrix<double, 8, 1>;
+  using Matrix = Eigen::Matrix<double, 8, 8>;
+
+  double n = 0;
+  Vector sums = Vector::Zero();
+  Matrix products = Matrix::Zero();
+
+  void add(const Vector& values) {
+    n += 1;
+    sums += values;
+    products.noalias() += values * values.transpose();
+  }
+  JointMoments& operator+=(const JointMoments& more);
+  JointMoments& operator-=(const JointMoments& less);
+  /// The products of the differences to the means. They need n > 0.
+  Matrix spread() const { return products - sums * sums.transpose() / n; }
+};
+
+/// Pearson's correlation of radiograph and image, and minus its second derivative where the image is like the
+/// radiograph but for noise. `spread` is the sum of the squares of the radiograph's differences to its mean.
+struct CorrelationExpansion {
+  double value = 0, spread = 0;
+  Vector6d by_value = Vector6d::Zero(), by_spread = Vector6d::Zero();
+  Matrix6d curvature = Matrix6d::Zero();
+};
+/// All 0 if fewer than 16 pixels count or the radiograph is constant. If the image is constant, the value is 0.
+CorrelationExpansion correlation_expansion(const JointMoments& moments);
+
+/// Adds up what the places of one view contribute, for the whole image and for each of its blocks.
+class ExpansionTally {
+ public:
+  explicit ExpansionTally(const Blocks& blocks) : blocks_(blocks), of_block_(std::size_t(blocks.count())) {}
+  void add(double u_px, double v_px, const SumsExpansion& one) {
+    all_ += one;
+    of_block_[std::size_t(blocks_.at(u_px, v_px))] += one;
+  }
+  const SumsExpansion& all() const { return all_; }
+  const std::vector<SumsExpansion>& of_block() const { return of_block_; }
+
+ private:
+  Blocks blocks_;
+  SumsExpansion all_;
+  std::vector<SumsExpansion> of_block_;
+};
+
+}  // namespace marrow::match
