@@ -40,9 +40,11 @@ class BoneInView {
 
   double value(const RigidTransform& pose) const { return cost_.value_in_view(view_, pose); }
 
-  /// By central differences; the scatter only if asked for. Steps are chosen so long that the cost rises by about
-  /// `wanted_rise`; 0: by the deviation of the cost's value from block to block.
+  /// By the cost's derivatives in a view, if it has them; the scatter only if asked for. Otherwise by central
+  /// differences: steps are chosen so long that the cost rises by about `wanted_rise`; 0: by the deviation of the cost's
+  /// value from block to block.
   Model model_at(const RigidTransform& pose, double wanted_rise, bool with_scatter) {
+    if (const auto exact = exact_model(pose, with_scatter)) return *exact;
     Model model;
     const Sample here = sample(pose, !(wanted_rise > 0));
     model.value = here.value;
@@ -71,9 +73,14 @@ class BoneInView {
     return model;
   }
 
-  /// Moves a model, which already holds the value of the new pose: computes its gradient again by the steps of the last
-  /// model, and keeps its curvature and scatter. This takes a quarter of the time.
+  /// Moves a model, which already holds the value of the new pose. It keeps its scatter. Without derivatives it keeps
+  /// its curvature, too, and has its gradient by the steps of the last model. This takes a quarter of the time.
   void move(Model& model, const RigidTransform& pose) const {
+    if (const auto exact = exact_model(pose, false)) {
+      model.gradient = exact->gradient;
+      model.curvature = exact->curvature;
+      return;
+    }
     tbb::parallel_for(0, 6, [&](int axis) {
       model.gradient[axis] =
           (value(moved_by(pose, Vector6d::Unit(axis))) - value(moved_by(pose, -Vector6d::Unit(axis)))) /
@@ -82,6 +89,26 @@ class BoneInView {
   }
 
  private:
+  std::optional<Model> exact_model(const RigidTransform& pose, bool with_scatter) const {
+    const auto* views = dynamic_cast<const match::ViewsCost*>(&cost_);
+    const auto expansion = views ? views->expansion_in_view(view_, pose, frame_) : std::nullopt;
+    if (!expansion) return std::nullopt;
+    const Vector6d unit = from_units(Vector6d::Ones());
+    Model model;
+    model.value = expansion->whole.value;
+    model.gradient = unit.cwiseProduct(expansion->whole.gradient);
+    model.curvature = unit.asDiagonal() * expansion->whole.curvature * unit.asDiagonal();
+    if (!with_scatter) return model;
+    check_count(expansion->without_block.size(), blocks_);
+    Vector6d mean = Vector6d::Zero();
+    for (const Cost::Expansion& without : expansion->without_block) mean += without.gradient / double(blocks_);
+    for (const Cost::Expansion& without : expansion->without_block) {
+      const Vector6d change = unit.cwiseProduct(without.gradient - mean);
+      model.scatter += change * change.transpose();
+    }
+    return model;
+  }
+
   static constexpr double kMostStep = 4, kLeastStep = 1.0 / 64;  // degrees or mm
 
   RigidTransform moved_by(const RigidTransform& pose, const Vector6d& steps) const {

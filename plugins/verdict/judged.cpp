@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "marrow/toolbox/geometry/targets.hpp"
+#include "marrow/toolbox/search/derivatives.hpp"
+#include "marrow/toolbox/search/search.hpp"
 
 namespace marrow::verdict {
 
@@ -35,6 +37,10 @@ Minimum minimum_near(const Judged& judged, const Cost& cost, const RigidTransfor
   MinimisationProblem problem;
   const auto at = [&](const Eigen::VectorXd& x) { return judged.moved_by(from, Vector6d(x)); };
   problem.function = [&](const Eigen::VectorXd& x) { return cost.value(at(x)); };
+  if (cost.expansion(from, judged.frame))
+    problem.expansion = [&](const Eigen::VectorXd& x) {
+      return search::in_coordinates(cost.expansion(at(x), judged.frame), Vector6d(x), search::kAllAxes);
+    };
   problem.start = Eigen::VectorXd::Zero(6);
   problem.initial_step = Eigen::VectorXd::Constant(6, steps.mm);
   problem.initial_step.head<3>() << steps.deg, steps.deg, steps.axial_deg;

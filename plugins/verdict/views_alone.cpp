@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 #include "judged.hpp"
+#include "marrow/toolbox/match/views_cost.hpp"
 
 namespace marrow::verdict {
 namespace {
@@ -25,6 +28,21 @@ RigidTransform moved_in_view(const Judged& judged, const Camera& camera, const E
   return result;
 }
 
+/// The quadratic model of the cost in a view, for motions as moved_in_view() takes them, after one of them.
+MinimisationProblem::Expansion in_view_coordinates(const Judged& judged, const Camera& camera,
+                                                   const RigidTransform& pose,
+                                                   const std::optional<match::ViewsCost::ViewExpansion>& about) {
+  if (!about) return {std::numeric_limits<double>::quiet_NaN(), {}, {}};
+  const Eigen::Matrix3d frame_from_camera =
+      (camera.camera_from_world.rotation * pose.rotation * judged.frame.axes).transpose();
+  Eigen::Matrix<double, 6, 3> motion = Eigen::Matrix<double, 6, 3>::Zero();
+  motion.col(0).head<3>() = radians(1) * frame_from_camera.col(2);
+  motion.col(1).tail<3>() = frame_from_camera.col(0);
+  motion.col(2).tail<3>() = frame_from_camera.col(1);
+  return {about->whole.value, motion.transpose() * about->whole.gradient,
+          motion.transpose() * about->whole.curvature * motion};
+}
+
 /// How far the view would move the bone in its image: mTRE.
 double pull_mm(const Judged& judged, const Cost& cost, std::size_t view, const Camera& camera) {
   judged.context->check_cancelled();
@@ -32,6 +50,12 @@ double pull_mm(const Judged& judged, const Cost& cost, std::size_t view, const C
   problem.function = [&](const Eigen::VectorXd& x) {
     return cost.value_in_view(view, moved_in_view(judged, camera, Eigen::Vector3d(x)));
   };
+  const auto* in_views = dynamic_cast<const match::ViewsCost*>(&cost);
+  if (in_views && in_views->expansion_in_view(view, judged.pose.world_from_model, judged.frame))
+    problem.expansion = [&](const Eigen::VectorXd& x) {
+      const RigidTransform there = moved_in_view(judged, camera, Eigen::Vector3d(x));
+      return in_view_coordinates(judged, camera, there, in_views->expansion_in_view(view, there, judged.frame));
+    };
   problem.start = Eigen::VectorXd::Zero(3);
   problem.initial_step = Eigen::VectorXd::Constant(3, 1);
   problem.max_evaluations = 60;

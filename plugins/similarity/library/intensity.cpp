@@ -60,6 +60,17 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
     return patch.rendered.empty() ? worst_ : measured(view, patch);
   }
 
+  std::optional<ViewExpansion> expansion_in_view(std::size_t view, const RigidTransform& world_from_model,
+                                                 const FragmentFrame& frame) const override {
+    if (!has_derivatives(seen_->measures[view])) return std::nullopt;
+    const auto patch = patch_with_slopes(view, world_from_model, frame);
+    if (!patch) return std::nullopt;
+    const Blocks blocks = Blocks::of(views_[view].camera);
+    ViewExpansion expansion = expansion_of(seen_->measures[view], *patch, options_.pixel_step, blocks, worst_);
+    if (!options_.has_blocks) expansion.without_block.clear();
+    return expansion;
+  }
+
   std::optional<Expansion> expansion(const RigidTransform& world_from_model,
                                      const FragmentFrame& frame) const override {
     const std::vector<ViewExpansion> views = expansions(world_from_model, frame);
@@ -71,7 +82,6 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
 
   std::vector<Expansion> expansion_without_each_block(const RigidTransform& world_from_model,
                                                       const FragmentFrame& frame) const override {
-    if (!options_.has_blocks) return {};
     const std::vector<ViewExpansion> views = expansions(world_from_model, frame);
     Expansion mean;
     for (std::size_t i = 0; i < views.size(); ++i) add(views[i].whole, share(i), mean);
@@ -111,12 +121,9 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
 
   /// Of all views; empty if there are no derivatives.
   std::vector<ViewExpansion> expansions(const RigidTransform& world_from_model, const FragmentFrame& frame) const {
-    if (!std::all_of(seen_->measures.begin(), seen_->measures.end(), has_derivatives)) return {};
     std::vector<std::optional<ViewExpansion>> of_view(views_.size());
-    tbb::parallel_for(std::size_t(0), of_view.size(), [&](std::size_t i) {
-      if (const auto patch = patch_with_slopes(i, world_from_model, frame))
-        of_view[i] = expansion_of(seen_->measures[i], *patch, options_.pixel_step, Blocks::of(views_[i].camera), worst_);
-    });
+    tbb::parallel_for(std::size_t(0), of_view.size(),
+                      [&](std::size_t i) { of_view[i] = expansion_in_view(i, world_from_model, frame); });
     std::vector<ViewExpansion> all;
     for (auto& view : of_view) {
       if (!view) return {};

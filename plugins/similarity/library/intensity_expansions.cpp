@@ -6,6 +6,8 @@
 namespace marrow::match {
 namespace {
 
+using ViewExpansion = ViewsCost::ViewExpansion;
+
 constexpr double kWorstCorrelation = 2;
 
 /// The quadratic model of SumMeasure::value().

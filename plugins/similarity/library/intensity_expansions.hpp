@@ -9,15 +9,10 @@ double value_of(const Measure& measure, const Patch& patch, double step_px, cons
 
 bool has_derivatives(const Measure& measure);
 
-/// The quadratic model of a measure in one view, and the same without each block of the view in turn.
-struct ViewExpansion {
-  Cost::Expansion whole;
-  std::vector<Cost::Expansion> without_block;
-};
 /// For a measure that has derivatives and a patch with slopes. `worst` counts where the patch is empty or the measure is
 /// not finite.
-ViewExpansion expansion_of(const Measure& measure, const Patch& patch, double step_px, const Blocks& blocks,
-                           double worst);
+ViewsCost::ViewExpansion expansion_of(const Measure& measure, const Patch& patch, double step_px, const Blocks& blocks,
+                                      double worst);
 
 /// sum += share * more.
 void add(const Cost::Expansion& more, double share, Cost::Expansion& sum);

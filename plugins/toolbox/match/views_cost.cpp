@@ -52,6 +52,11 @@ std::vector<double> ViewsCost::without_each_block(const RigidTransform& world_fr
   return values;
 }
 
+std::optional<ViewsCost::ViewExpansion> ViewsCost::expansion_in_view(std::size_t, const RigidTransform&,
+                                                                     const FragmentFrame&) const {
+  return std::nullopt;
+}
+
 std::string ViewsCost::silence(std::size_t, const RigidTransform&) const { return {}; }
 
 std::vector<std::string> ViewsCost::silent_views(const RigidTransform& world_from_model) const {

@@ -2,6 +2,7 @@
 #pragma once
 // The common part of costs that are a weighted mean over views.
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -77,6 +78,16 @@ class ViewsCost : public Cost {
     std::vector<double> without_block;
   };
   virtual Split split(std::size_t view, const RigidTransform& world_from_model) const = 0;
+
+  /// The quadratic model of the cost in a view as Cost::expansion() defines it, and the same without each block of the
+  /// view in turn, or nothing of the latter if the cost gives no blocks.
+  struct ViewExpansion {
+    Expansion whole;
+    std::vector<Expansion> without_block;
+  };
+  /// By exact derivatives. Absent if the cost has none in a view alone, which is the default.
+  virtual std::optional<ViewExpansion> expansion_in_view(std::size_t view, const RigidTransform& world_from_model,
+                                                         const FragmentFrame& frame) const;
 
  protected:
   /// Why a view says nothing about a pose, such as "view 'lateral': the mask hides the whole outline"; empty, the

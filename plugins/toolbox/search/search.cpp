@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-#include "derivatives.hpp"
+#include "marrow/toolbox/search/derivatives.hpp"
 #include "marrow/toolbox/search/compared.hpp"
 #include "predicted_covariance.hpp"
 #include "scan.hpp"

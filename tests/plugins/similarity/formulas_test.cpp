@@ -75,7 +75,7 @@ std::vector<double> difference(const Images& images, bool with_model = true) {
   return d;
 }
 
-double entropy(const std::map<std::pair<int, int>, int>& histogram, double n) {
+double entropy(const std::map<std::pair<int, int>, double>& histogram, double n) {
   double sum = 0;
   for (const auto& [bin, count] : histogram) sum -= count / n * std::log(count / n);
   return sum;
@@ -122,16 +122,29 @@ TEST(Formulas, GradientCorrelation) {
   }
 }
 
+/// The cubic B-spline about 0.
+double b_spline(double x) {
+  const double a = std::abs(x);
+  return a < 1 ? 2.0 / 3 - a * a * (1 - a / 2) : a < 2 ? std::pow(2 - a, 3) / 6 : 0;
+}
+
 TEST(Formulas, MutualInformation) {
+  constexpr int kBins = 32;
   for (const auto& [du, dv] : kPlaces) {
     const Images images = images_at(du, dv);
-    const auto [a_low, a_high] = range(images.rendered);
     const auto [b_low, b_high] = range(images.seen);
-    std::map<std::pair<int, int>, int> of_a, of_b, joint;
+    const double most = range(images.rendered).second;
+    double top = 1;  // the next number of four an octave that is not below the largest value
+    while (top < most) top *= std::pow(2, 0.25);
+    while (top * std::pow(2, -0.25) >= most) top *= std::pow(2, -0.25);
+    std::map<std::pair<int, int>, double> of_a, of_b, joint;
     for (std::size_t i = 0; i < images.seen.size(); ++i) {
-      const int a = std::min(31, int(32 * (images.rendered[i] - a_low) / (a_high - a_low))),
-                b = std::min(31, int(32 * (images.seen[i] - b_low) / (b_high - b_low)));
-      of_a[{a, 0}] += 1, of_b[{0, b}] += 1, joint[{a, b}] += 1;
+      const int b = std::min(kBins - 1, int(kBins * (images.seen[i] - b_low) / (b_high - b_low)));
+      of_b[{0, b}] += 1;
+      for (int a = 0; a < kBins; ++a) {
+        const double weight = b_spline(images.rendered[i] / top * (kBins - 3) - a + 1);
+        if (weight > 0) of_a[{a, 0}] += weight, joint[{a, b}] += weight;
+      }
     }
     const double n = kWidth * kHeight;
     EXPECT_NEAR(value("mutual_information", du, dv), 2 - (entropy(of_a, n) + entropy(of_b, n)) / entropy(joint, n),
@@ -145,7 +158,7 @@ TEST(Formulas, EntropyOfDifference) {
     const Images images = images_at(du, dv);
     const auto [low, high] = range(images.seen);
     const auto entropy_of = [&, low = low, high = high](const std::vector<double>& d) {
-      std::map<std::pair<int, int>, int> histogram;
+      std::map<std::pair<int, int>, double> histogram;
       for (const double x : d) histogram[{std::min(64, int(std::floor(0.5 + 64 * (x - low) / (high - low)))), 0}] += 1;
       return entropy(histogram, kWidth * kHeight);
     };
