@@ -27,7 +27,12 @@ Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimi
   search.go_to(best.axial);
   result.stages.add("axial", pose_of(search, initial, last));
   search.go_to(best.pose);
-  result.pose = final_pose_of(search, initial, last, search.steps_of(levels.size() - 1), options, context);
+  std::shared_ptr<const marrow::Cost> coarser;
+  if (!options.pixel_step.empty())
+    coarser = cost.at_level({options.contour_spacing_px.back(), options.reach_px.back(),
+                             marrow::search::coarser_pixel_step(options.pixel_step.back())});
+  result.pose = final_pose_of(search, initial, last, search.steps_of(levels.size() - 1), options, context,
+                              coarser.get());
   result.stages.add("final", result.pose);
   return result;
 }

@@ -70,7 +70,9 @@ marrow::Pose refined(const marrow::Pose& first, const marrow::Cost& finer_cost, 
         {options.contour_spacing_px.back(), options.reach_px.back(), int(options.finer_pixel_step[i])});
     search.refine(*level, marrow::search::kAllAxes, steps, double(i) * share, share);
   }
-  marrow::Pose pose = final_pose_of(search, first, *level, steps, options, context);
+  const auto coarser = finer_cost.at_level({options.contour_spacing_px.back(), options.reach_px.back(),
+                                            marrow::search::coarser_pixel_step(options.finer_pixel_step.back())});
+  marrow::Pose pose = final_pose_of(search, first, *level, steps, options, context, coarser.get());
   pose.evaluations += first.evaluations;
   return pose;
 }

@@ -107,6 +107,51 @@ Attenuation smoothed(const Attenuation& attenuation, double sigma_mm) {
   return result;
 }
 
+namespace {
+
+/// The attenuation of single voxels.
+class Voxels {
+ public:
+  Voxels(const Volume& volume, const SignedField* field, const AttenuationOptions& options)
+      : volume_(volume), field_(field), options_(options) {}
+
+  std::int16_t at(std::size_t i) const {
+    const double hu = volume_.values[i];
+    if (hu < options_.below_hu || (field_ && field_->values_mm[i] > options_.margin_mm)) return 0;
+    return std::int16_t(std::lround(std::clamp(hu - options_.background_hu, 0.0, 32767.0)));
+  }
+
+  /// The box of the voxels that attenuate; its last voxel is before its first one if none does.
+  std::pair<std::array<int, 3>, std::array<int, 3>> box() const {
+    const Grid& grid = volume_.grid;
+    std::vector<std::pair<std::array<int, 3>, std::array<int, 3>>> of_slice(std::size_t(grid.size[2]),
+                                                                            {grid.size, {-1, -1, -1}});
+    tbb::parallel_for(0, grid.size[2], [&](int z) {
+      auto& [first, last] = of_slice[std::size_t(z)];
+      for (int y = 0; y < grid.size[1]; ++y)
+        for (int x = 0; x < grid.size[0]; ++x) {
+          if (at(grid.offset(x, y, z)) == 0) continue;
+          const std::array<int, 3> here{x, y, z};
+          for (std::size_t k = 0; k < 3; ++k) first[k] = std::min(first[k], here[k]), last[k] = std::max(last[k], here[k]);
+        }
+    });
+    std::pair<std::array<int, 3>, std::array<int, 3>> all{grid.size, {-1, -1, -1}};
+    for (const auto& [first, last] : of_slice)
+      for (std::size_t k = 0; k < 3; ++k) {
+        all.first[k] = std::min(all.first[k], first[k]);
+        all.second[k] = std::max(all.second[k], last[k]);
+      }
+    return all;
+  }
+
+ private:
+  const Volume& volume_;
+  const SignedField* const field_;
+  const AttenuationOptions& options_;
+};
+
+}  // namespace
+
 Attenuation attenuation_of(const Volume& volume, const SignedField* field, const AttenuationOptions& options) {
   check_volume(volume, "the volume to project");
   if (field) {
@@ -114,17 +159,24 @@ Attenuation attenuation_of(const Volume& volume, const SignedField* field, const
     if (field->values_mm.size() != field->grid.count())
       throw Error(formatted("the field has {} values for {} voxels", field->values_mm.size(), field->grid.count()));
   }
+  const Voxels voxels(volume, field, options);
+  auto [first, last] = voxels.box();
   Attenuation attenuation;
   attenuation.grid = volume.grid;
-  attenuation.thousandths.resize(volume.grid.count());
-  const std::size_t row = std::size_t(volume.grid.size[0]);
-  tbb::parallel_for(std::size_t(0), volume.grid.count() / row, [&](std::size_t r) {
-    for (std::size_t i = r * row; i < (r + 1) * row; ++i) {
-      const double hu = volume.values[i];
-      const bool is_out = hu < options.below_hu || (field && field->values_mm[i] > options.margin_mm);
-      attenuation.thousandths[i] =
-          is_out ? 0 : std::int16_t(std::lround(std::clamp(hu - options.background_hu, 0.0, 32767.0)));
-    }
+  if (last[0] < first[0]) first = last = {0, 0, 0};  // one voxel that does not attenuate
+  // With a border of empty voxels where the CT goes on: the attenuation ends between them and the last that attenuate.
+  for (std::size_t k = 0; k < 3; ++k) {
+    first[k] = std::max(first[k] - 1, 0);
+    last[k] = std::min(last[k] + 1, volume.grid.size[k] - 1);
+    attenuation.grid.size[k] = last[k] - first[k] + 1;
+  }
+  attenuation.grid.origin_mm = volume.grid.point_from_index({double(first[0]), double(first[1]), double(first[2])});
+  attenuation.thousandths.resize(attenuation.grid.count());
+  tbb::parallel_for(0, attenuation.grid.size[2], [&](int z) {
+    for (int y = 0; y < attenuation.grid.size[1]; ++y)
+      for (int x = 0; x < attenuation.grid.size[0]; ++x)
+        attenuation.thousandths[attenuation.grid.offset(x, y, z)] =
+            voxels.at(volume.grid.offset(x + first[0], y + first[1], z + first[2]));
   });
   find_box(attenuation);
   return attenuation;

@@ -29,7 +29,8 @@ struct Attenuation {
 };
 
 /// Attenuation of a voxel: (HU - background_hu) / 1000, between 0 and 32.767. With a field, only the voxels of that
-/// fragment attenuate. `field` may be null. Throws Error if check_volume() refuses the volume, or if the sizes of field
+/// fragment attenuate. The grid is the part of the volume's that holds all voxels that attenuate. `field` may be null.
+/// Throws Error if check_volume() refuses the volume, or if the sizes of field
 /// and volume differ.
 Attenuation attenuation_of(const Volume& volume, const SignedField* field, const AttenuationOptions& options);
 

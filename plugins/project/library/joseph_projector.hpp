@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#define TBB_PREVIEW_COLLABORATIVE_CALL_ONCE 1
+#include <tbb/collaborative_call_once.h>
+
 #include <memory>
 #include <optional>
 #include <utility>
@@ -13,7 +16,7 @@ namespace marrow::rays {
 class JosephProjector : public RayProjector {
  public:
   explicit JosephProjector(Attenuation attenuation)
-      : RayProjector(std::move(attenuation)), slices_(attenuation_), bricks_(attenuation_) {}
+      : RayProjector(std::move(attenuation)), slices_(attenuation_) {}
 
   using RayProjector::radiograph;
   std::vector<float> radiograph(const Camera& camera, const RigidTransform& world_from_model,
@@ -26,9 +29,8 @@ class JosephProjector : public RayProjector {
                                         const FragmentFrame& frame, const PixelGrid& grid) const override {
     const RayMotion motion(camera, world_from_model, attenuation_.grid, frame);
     if (auto expansion = slices_.expansion(motion, grid)) return expansion;
-    return expansion_by_rays(motion, grid, [&](const Eigen::Vector3d& direction) {
-      return bricks_.change(motion, direction);
-    });
+    return expansion_by_rays(
+        motion, grid, [&](const Eigen::Vector3d& direction) { return bricks().change(motion, direction); });
   }
 
  protected:
@@ -36,12 +38,19 @@ class JosephProjector : public RayProjector {
     return std::make_shared<JosephProjector>(std::move(attenuation));
   }
   float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const override {
-    return bricks_.integral(source, direction);
+    return bricks().integral(source, direction);
   }
 
  private:
+  /// Made for the first ray that needs them: whole images do without.
+  const Bricks& bricks() const {
+    tbb::collaborative_call_once(has_bricks_, [&] { bricks_.emplace(attenuation_); });
+    return *bricks_;
+  }
+
   const Slices slices_;
-  const Bricks bricks_;
+  mutable tbb::collaborative_once_flag has_bricks_;
+  mutable std::optional<Bricks> bricks_;
 };
 
 }  // namespace marrow::rays

@@ -26,6 +26,12 @@ SumsExpansion& SumsExpansion::operator-=(const SumsExpansion& less) {
 
 JointMoments& JointMoments::operator+=(const JointMoments& more) {
   n += more.n;
+  if (!more.shows_bone) {
+    sums[kSeen] += more.sums[kSeen];
+    products(kSeen, kSeen) += more.products(kSeen, kSeen);
+    return *this;
+  }
+  shows_bone = true;
   sums += more.sums;
   products += more.products;
   return *this;

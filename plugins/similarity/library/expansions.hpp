@@ -26,13 +26,26 @@ struct JointMoments {
   using Matrix = Eigen::Matrix<double, 8, 8>;
 
   double n = 0;
+  bool shows_bone = false;  ///< if not, only the sums of the image are not 0, which saves time
   Vector sums = Vector::Zero();
   Matrix products = Matrix::Zero();
 
   void add(const Vector& values) {
     n += 1;
+    shows_bone = true;
     sums += values;
     products.noalias() += values * values.transpose();
+  }
+  void add_pixel(const Vector6d& slopes, double rendered, double seen) {
+    if (rendered == 0 && slopes.isZero(0)) {
+      n += 1;
+      sums[kSeen] += seen;
+      products(kSeen, kSeen) += seen * seen;
+      return;
+    }
+    Vector values;
+    values << slopes, rendered, seen;
+    add(values);
   }
   JointMoments& operator+=(const JointMoments& more);
   JointMoments& operator-=(const JointMoments& less);

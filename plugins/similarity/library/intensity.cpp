@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <mutex>
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/base/error.hpp"
@@ -36,24 +38,45 @@ std::shared_ptr<const RadiographProjector> as_smooth_as_images(const RadiographP
   return projector.smoothed(sum / double(views.size()));
 }
 
+/// What costs at one level share: the model, smoothed as much as the images, and what the images show at every
+/// pixel_step-th pixel.
+struct Level {
+  std::shared_ptr<const RadiographProjector> smoothed;  ///< null if the projector cannot be smoothed
+  std::vector<Patch> images;
+  std::vector<Measure> measures;
+};
+
+/// The levels that were made so far, by their pixel steps. Several nodes compare at the same levels.
+class Levels {
+ public:
+  template <class Make>
+  std::shared_ptr<const Level> at(int pixel_step, const Make& make) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (const auto found = made_.find(pixel_step); found != made_.end()) return found->second;
+    }
+    std::shared_ptr<const Level> level = make();  // unlocked, because it works in parallel
+    const std::lock_guard lock(mutex_);
+    return made_.emplace(pixel_step, std::move(level)).first->second;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::map<int, std::shared_ptr<const Level>> made_;
+};
+
 class IntensityCost : public ViewsCost, public CostAmongOthers {
  public:
   IntensityCost(std::shared_ptr<const RadiographProjector> projector, const List<View>& views,
-                const IntensityOptions& options, double worst, MeasureOf measure_of)
+                const IntensityOptions& options, double worst, MeasureOf measure_of, std::shared_ptr<Levels> levels)
       : ViewsCost(views.size(), options.weights),
         projector_(std::move(projector)),
         views_(views),
         options_(options),
         worst_(worst),
-        measure_of_(std::move(measure_of)) {
-    smoothed_ = as_smooth_as_images(*projector_, views, options.sigma_steps * options.pixel_step);
-    auto seen = std::make_shared<Seen>();
-    for (const View& view : views) {
-      seen->images.push_back(image_of(view));
-      seen->measures.push_back(measure_of_(seen->images.back()));
-    }
-    seen_ = std::move(seen);
-  }
+        measure_of_(std::move(measure_of)),
+        levels_(std::move(levels)),
+        level_(levels_->at(options.pixel_step, [&] { return make_level(); })) {}
 
   double value_in_view(std::size_t view, const RigidTransform& world_from_model) const override {
     const Patch patch = patch_of(view, world_from_model);
@@ -62,11 +85,11 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
 
   std::optional<ViewExpansion> expansion_in_view(std::size_t view, const RigidTransform& world_from_model,
                                                  const FragmentFrame& frame) const override {
-    if (!has_derivatives(seen_->measures[view])) return std::nullopt;
+    if (!has_derivatives(level_->measures[view])) return std::nullopt;
     const auto patch = patch_with_slopes(view, world_from_model, frame);
     if (!patch) return std::nullopt;
     const Blocks blocks = Blocks::of(views_[view].camera);
-    ViewExpansion expansion = expansion_of(seen_->measures[view], *patch, options_.pixel_step, blocks, worst_);
+    ViewExpansion expansion = expansion_of(level_->measures[view], *patch, options_.pixel_step, blocks, worst_);
     if (!options_.has_blocks) expansion.without_block.clear();
     return expansion;
   }
@@ -99,7 +122,7 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
     if (level.pixel_step <= 0 || level.pixel_step == options_.pixel_step) return std::make_shared<IntensityCost>(*this);
     IntensityOptions options = options_;
     options.pixel_step = level.pixel_step;
-    return std::make_shared<IntensityCost>(projector_, views_, options, worst_, measure_of_);
+    return std::make_shared<IntensityCost>(projector_, views_, options, worst_, measure_of_, levels_);
   }
 
   std::shared_ptr<const Cost> with_others(const List<RigidTransform>& world_from_others) const override {
@@ -107,17 +130,25 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
     if (!bones) return nullptr;
     auto cost = std::make_shared<IntensityCost>(*this);
     cost->projector_ = bones->with_others(world_from_others);
-    if (const auto* smoothed = dynamic_cast<const BonesTogether*>(smoothed_.get()))
-      cost->smoothed_ = smoothed->with_others(world_from_others);
+    cost->levels_ = std::make_shared<Levels>();
+    if (const auto* smoothed = dynamic_cast<const BonesTogether*>(level_->smoothed.get())) {
+      auto level = std::make_shared<Level>(*level_);
+      level->smoothed = smoothed->with_others(world_from_others);
+      cost->level_ = std::move(level);
+    }
     return cost;
   }
 
  private:
-  /// What the images show, at every pixel_step-th pixel. Costs that differ in their projector share it.
-  struct Seen {
-    std::vector<Patch> images;
-    std::vector<Measure> measures;
-  };
+  std::shared_ptr<const Level> make_level() const {
+    auto level = std::make_shared<Level>();
+    level->smoothed = as_smooth_as_images(*projector_, views_, options_.sigma_steps * options_.pixel_step);
+    for (const View& view : views_) {
+      level->images.push_back(image_of(view));
+      level->measures.push_back(measure_of_(level->images.back()));
+    }
+    return level;
+  }
 
   /// Of all views; empty if there are no derivatives.
   std::vector<ViewExpansion> expansions(const RigidTransform& world_from_model, const FragmentFrame& frame) const {
@@ -168,7 +199,7 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
     const Blocks blocks = Blocks::of(views_[view].camera);
     const Patch patch = patch_of(view, world_from_model);
     if (patch.rendered.empty()) return {worst_, std::vector<double>(std::size_t(blocks.count()), worst_)};
-    const auto* measure = std::get_if<SumMeasure>(&seen_->measures[view]);
+    const auto* measure = std::get_if<SumMeasure>(&level_->measures[view]);
     if (!measure) return split_by_masks(view, patch, blocks);
     BlockSums sums(blocks);
     Tally tally(patch, options_.pixel_step, sums);
@@ -200,11 +231,11 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
   }
 
   double measured(std::size_t view, const Patch& patch) const {
-    return finite(value_of(seen_->measures[view], patch, options_.pixel_step, Blocks::of(views_[view].camera)));
+    return finite(value_of(level_->measures[view], patch, options_.pixel_step, Blocks::of(views_[view].camera)));
   }
   double finite(double value) const { return std::isfinite(value) ? value : worst_; }
 
-  const RadiographProjector& projector() const { return smoothed_ ? *smoothed_ : *projector_; }
+  const RadiographProjector& projector() const { return level_->smoothed ? *level_->smoothed : *projector_; }
 
   /// The pixels of a view to compare; empty if there are too few.
   Patch patch_of(std::size_t view, const RigidTransform& world_from_model) const {
@@ -231,7 +262,7 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
 
   /// The pixels of a view to compare, without `rendered`. Empty if there are too few.
   Patch region_of(std::size_t view, const RigidTransform& world_from_model) const {
-    const Patch& image = seen_->images[view];
+    const Patch& image = level_->images[view];
     const PixelGrid region = projector().region(views_[view].camera, world_from_model);
     if (region.count() == 0) return {};
     const int step = options_.pixel_step, margin = std::max(options_.margin_px, options_.least_margin_steps * step);
@@ -251,12 +282,12 @@ class IntensityCost : public ViewsCost, public CostAmongOthers {
     return patch;
   }
   std::shared_ptr<const RadiographProjector> projector_;
-  std::shared_ptr<const RadiographProjector> smoothed_;  ///< as much as the image; null if projector_ cannot
   const List<View> views_;
   const IntensityOptions options_;
   const double worst_;
   const MeasureOf measure_of_;
-  std::shared_ptr<const Seen> seen_;
+  std::shared_ptr<Levels> levels_;
+  std::shared_ptr<const Level> level_;
 };
 
 }  // namespace
@@ -269,7 +300,8 @@ std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector,
   check_weights(options.weights, views.size());
   const List<View> own = without_shadows(views, shadows_of(&projector, others, other_projectors, other_outlines));
   const std::shared_ptr<const RadiographProjector> kept_elsewhere(std::shared_ptr<void>(), &projector);
-  return std::make_shared<IntensityCost>(kept_elsewhere, own, options, worst, std::move(measure_of));
+  return std::make_shared<IntensityCost>(kept_elsewhere, own, options, worst, std::move(measure_of),
+                                         std::make_shared<Levels>());
 }
 
 }  // namespace marrow::match

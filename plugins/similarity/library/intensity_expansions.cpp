@@ -61,9 +61,8 @@ ViewExpansion by_correlations(const CorrelationMeasure& measure, const Patch& pa
       for (int column = 0; column < patch.columns; ++column) {
         const std::size_t i = patch.at(column, row);
         if (!one.counts[i]) continue;
-        JointMoments::Vector values;
-        values << one.slopes_at(i), one.rendered[i], one.seen[i];
-        of_block[std::size_t(blocks.at((patch.left + column) * step_px, (patch.top + row) * step_px))][k].add(values);
+        of_block[std::size_t(blocks.at((patch.left + column) * step_px, (patch.top + row) * step_px))][k].add_pixel(
+            one.slopes_at(i), one.rendered[i], one.seen[i]);
       }
     for (const auto& block : of_block) all[k] += block[k];
   }

@@ -22,9 +22,7 @@ void add_pixels(const Patch& patch, const cv::Rect& cell, JointMoments& moments)
   for (int row = cell.y; row < cell.y + cell.height; ++row)
     for (std::size_t i = patch.at(cell.x, row); i < patch.at(cell.x, row) + std::size_t(cell.width); ++i) {
       if (!patch.counts[i]) continue;
-      JointMoments::Vector values;
-      values << patch.slopes_at(i), patch.rendered[i], patch.seen[i];
-      moments.add(values);
+      moments.add_pixel(patch.slopes_at(i), patch.rendered[i], patch.seen[i]);
     }
 }
 
@@ -84,6 +82,7 @@ SumMeasure correlation_in_squares(int side, std::function<std::vector<Patch>(con
   measure.add_expansion = [side, compared](const Patch& patch, TallyOfExpansions& tally) {
     for (const Patch& one : compared(patch))
       each_square<JointMoments>(one, side, [&](double column, double row, const JointMoments& moments) {
+        if (!moments.shows_bone) return;
         const CorrelationExpansion square = correlation_expansion(moments);
         tally.add(column, row,
                   SumsExpansion{{square.spread * square.value, square.spread},

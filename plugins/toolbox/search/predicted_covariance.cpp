@@ -28,8 +28,9 @@ RigidTransform moved_by_units(const RigidTransform& pose, const FragmentFrame& f
   return moved(pose, frame, motion);
 }
 
-PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform& pose, const FragmentFrame& frame)
-    : cost_(cost), pose_(pose), frame_(frame) {
+PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform& pose, const FragmentFrame& frame,
+                                         const Cost* coarser)
+    : cost_(cost), coarser_(coarser), pose_(pose), frame_(frame) {
   value_ = cost.value(pose);
   ++evaluations_;
   if (differentiate()) {

@@ -33,7 +33,10 @@ RigidTransform moved_by_units(const RigidTransform& pose, const FragmentFrame& f
 /// something at the pose (compared.hpp).
 class PredictedCovariance {
  public:
-  PredictedCovariance(const Cost& cost, const RigidTransform& pose, const FragmentFrame& frame);
+  /// `coarser` is the same cost at a coarser level, if it is much cheaper there: where it says that the cost is far
+  /// above that of the pose, the cost itself is not computed. It must outlive the constructor only.
+  PredictedCovariance(const Cost& cost, const RigidTransform& pose, const FragmentFrame& frame,
+                      const Cost* coarser = nullptr);
 
   /// Covariance of (r, t) in rad and mm, as in Pose. Absent if the cost has no blocks.
   const std::optional<Matrix6d>& covariance() const { return covariance_; }
@@ -79,9 +82,11 @@ class PredictedCovariance {
   std::vector<RigidTransform> line(const Vector6d& direction, double step, int side) const;
   double variance_of_density(const std::vector<double>& values, double step) const;
   std::vector<double> values_along(const std::vector<RigidTransform>& poses);
+  std::vector<std::size_t> worth_computing(const std::vector<RigidTransform>& poses) const;
   void find_other_minima(const std::vector<RigidTransform>& poses, const std::vector<double>& values);
 
   const Cost& cost_;
+  const Cost* const coarser_;
   const RigidTransform pose_;
   const FragmentFrame& frame_;
   double value_ = 0;        ///< the cost at the pose

@@ -76,6 +76,20 @@ double PredictedCovariance::variance_of_density(const std::vector<double>& value
   return squares / sum;
 }
 
+/// Every second pose of a line, but for those where the coarser cost, if there is one, is far above that of the pose.
+std::vector<std::size_t> PredictedCovariance::worth_computing(const std::vector<RigidTransform>& poses) const {
+  constexpr double kFarAbove = 2 * kMattersBelow;  // the costs of two levels differ
+  std::vector<std::size_t> chosen;
+  for (std::size_t i = 0; i < poses.size(); i += 2) chosen.push_back(i);
+  if (!coarser_) return chosen;
+  std::vector<RigidTransform> at{pose_};
+  for (const std::size_t i : chosen) at.push_back(poses[i]);
+  const std::vector<double> values = coarser_->values(at);
+  std::size_t next = 0;
+  std::erase_if(chosen, [&](std::size_t) { return values[++next] - values[0] > kFarAbove * noise_; });
+  return chosen;
+}
+
 /// The cost at poses on a line, a standard deviation or less apart. Every second one is computed first. Those between
 /// are computed only beside a cost that could matter, and are infinite elsewhere.
 std::vector<double> PredictedCovariance::values_along(const std::vector<RigidTransform>& poses) {
@@ -87,8 +101,7 @@ std::vector<double> PredictedCovariance::values_along(const std::vector<RigidTra
     for (std::size_t k = 0; k < chosen.size(); ++k) values[chosen[k]] = computed[k];
     evaluations_ += int(chosen.size());
   };
-  std::vector<std::size_t> chosen;
-  for (std::size_t i = 0; i < poses.size(); i += 2) chosen.push_back(i);
+  std::vector<std::size_t> chosen = worth_computing(poses);
   compute(chosen);
   chosen.clear();
   for (std::size_t i = 1; i + 1 < poses.size(); i += 2)

@@ -198,12 +198,12 @@ PredictedCovariance on_rough_ground(const PredictedCovariance& at_pose, const Co
 }
 
 /// Goes to the best of the minima along the least certain direction, and predicts the covariance there.
-PredictedCovariance settle(Search& search, const FragmentFrame& frame, const Cost& cost, const Steps& steps,
-                           int& evaluations) {
+PredictedCovariance settle(Search& search, const FragmentFrame& frame, const Cost& cost, const Cost* coarser,
+                           const Steps& steps, int& evaluations) {
   constexpr int kRounds = 3;
   for (int round = 1;; ++round) {
     const RigidTransform here = search.pose();
-    PredictedCovariance predicted(cost, here, frame);
+    PredictedCovariance predicted(cost, here, frame, coarser);
     evaluations += predicted.evaluations();
     RigidTransform best = here;
     double least = predicted.value();
@@ -225,11 +225,14 @@ PredictedCovariance settle(Search& search, const FragmentFrame& frame, const Cos
 }  // namespace
 
 Pose final_pose_of(Search& search, const Pose& initial, const Cost& cost, const Steps& steps,
-                   const SearchOptions& options, Context& context) {
+                   const SearchOptions& options, Context& context, const Cost* coarser) {
   check_compared(cost, search.pose(), initial.frame);
+  const RigidTransform before = search.pose();
   int evaluations = 0;
-  const PredictedCovariance predicted = settle(search, initial.frame, cost, steps, evaluations);
-  check_compared(cost, search.pose(), initial.frame);
+  const PredictedCovariance predicted = settle(search, initial.frame, cost, coarser, steps, evaluations);
+  const bool has_moved =
+      before.rotation != search.pose().rotation || before.translation_mm != search.pose().translation_mm;
+  if (has_moved) check_compared(cost, search.pose(), initial.frame);
   if (predicted.covariance() && !predicted.covariance()->allFinite())
     refuse_pose("without some blocks of the images the cost is not a number");
   Pose pose = pose_of(search, initial, cost);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Search for the pose of least cost, from coarse to fine. Several nodes use it.
+#include <algorithm>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -106,11 +107,16 @@ Pose pose_of(const Search& search, const Pose& initial, const Cost& cost);
 /// out blocks, also with the predicted covariance and with warnings about axes that the images hardly determine. Along
 /// the direction that they determine least, the cost may have several minima, and the start decides in which the search
 /// ends. So the others are refined with `steps`, and the search goes to the best of them. Throws Error if the images
-/// say nothing about the pose (compared.hpp); a view that says nothing, where others do, is a warning.
+/// say nothing about the pose (compared.hpp); a view that says nothing, where others do, is a warning. `coarser`, the
+/// same cost of grey values at a coarser level, saves time: PredictedCovariance says how.
 Pose final_pose_of(Search& search, const Pose& initial, const Cost& cost, const Steps& steps,
-                   const SearchOptions& options, Context& context);
+                   const SearchOptions& options, Context& context, const Cost* coarser = nullptr);
 
 inline const std::vector<int> kAllAxes{0, 1, 2, 3, 4, 5};
+
+/// The pixel step at which grey values look around a result: coarse enough to be cheap, and fine enough to tell a bone's
+/// other poses.
+inline int coarser_pixel_step(double pixel_step) { return std::max(int(pixel_step), std::min(8, 4 * int(pixel_step))); }
 
 /// Declares the options of the search.
 template <class Options, class Node>
