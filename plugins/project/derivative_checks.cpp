@@ -7,8 +7,8 @@
 #include "bodies.hpp"
 #include "made.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/domain/quantile.hpp"
 #include "marrow/domain/functions.hpp"
+#include "marrow/domain/quantile.hpp"
 #include "marrow/domain/random.hpp"
 
 namespace marrow::conformance {
@@ -24,7 +24,8 @@ PixelGrid coarse() { return {1, 2, 4, 39, 39}; }
 /// The exact radiograph of a Gaussian cloud, for nodes that pass the radiographs of others on.
 class Cloud : public RadiographProjector {
  public:
-  std::vector<float> radiograph(const Camera& camera, const RigidTransform& pose, const PixelGrid& grid) const override {
+  std::vector<float> radiograph(const Camera& camera, const RigidTransform& pose,
+                                const PixelGrid& grid) const override {
     std::vector<float> values;
     for (int row = 0; row < grid.rows; ++row)
       for (int column = 0; column < grid.columns; ++column)
@@ -171,12 +172,13 @@ Check check_of(const char* name, const char* what, double limit, const char* uni
 }  // namespace
 
 std::vector<Check> derivative_checks() {
-  return {check_of("slopes",
-                   "derivatives of radiographs against differences at 200 poses: root mean square over the pixels, as a "
-                   "part of the largest derivative",
-                   3e-3, "1", slopes_of_smooth_off),
-          check_of("values_with_slopes", "a radiograph with derivatives against one without: largest difference", 1e-3,
-                   "mm of water", values_off_mm)};
+  return {
+      check_of("slopes",
+               "derivatives of radiographs against differences at 200 poses: root mean square over the pixels, as a "
+               "part of the largest derivative",
+               3e-3, "1", slopes_of_smooth_off),
+      check_of("values_with_slopes", "a radiograph with derivatives against one without: largest difference", 1e-3,
+               "mm of water", values_off_mm)};
 }
 
 }  // namespace marrow::conformance

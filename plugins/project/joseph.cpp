@@ -20,5 +20,5 @@ MARROW_PLUGIN(plugin) {
   marrow::rays::declare<AttenuationOptions>(
       node.summary("Radiographs by Joseph's method (IEEE Trans Med Imaging 1982): line integrals as sums over slices; "
                    "whole images are computed slice by slice")
-                     .trait("derivatives"));
+          .trait("derivatives"));
 }

@@ -21,12 +21,13 @@ class RayCastingProjector : public RayProjector {
   RayCastingProjector(marrow::rays::Attenuation attenuation, double step_mm)
       : RayProjector(std::move(attenuation)), step_mm_(step_mm) {}
 
-  std::optional<marrow::RadiographExpansion> expansion(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model,
-                                        const marrow::FragmentFrame& frame,
-                                        const marrow::PixelGrid& grid) const override {
+  std::optional<marrow::RadiographExpansion> expansion(const marrow::Camera& camera,
+                                                       const marrow::RigidTransform& world_from_model,
+                                                       const marrow::FragmentFrame& frame,
+                                                       const marrow::PixelGrid& grid) const override {
     const RayMotion motion(camera, world_from_model, attenuation_.grid, frame);
-    return marrow::rays::expansion_by_rays(
-        motion, grid, [&](const Eigen::Vector3d& direction) { return change(motion, direction); });
+    return marrow::rays::expansion_by_rays(motion, grid,
+                                           [&](const Eigen::Vector3d& direction) { return change(motion, direction); });
   }
 
  protected:
@@ -126,7 +127,7 @@ MARROW_PLUGIN(plugin) {
   auto node = plugin.node("project.ray_casting", ray_casting);
   marrow::rays::declare<Options>(
       node.summary("Radiographs by ray casting: line integrals as sums of trilinear values at even steps")
-                     .trait("derivatives"))
+          .trait("derivatives"))
       .option("sample_spacing_mm", &Options::sample_spacing_mm,
               "largest distance from one value to the next along a ray", marrow::at_least(0.01));
 }

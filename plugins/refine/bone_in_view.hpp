@@ -41,8 +41,8 @@ class BoneInView {
   double value(const RigidTransform& pose) const { return cost_.value_in_view(view_, pose); }
 
   /// By the cost's derivatives in a view, if it has them; the scatter only if asked for. Otherwise by central
-  /// differences: steps are chosen so long that the cost rises by about `wanted_rise`; 0: by the deviation of the cost's
-  /// value from block to block.
+  /// differences: steps are chosen so long that the cost rises by about `wanted_rise`; 0: by the deviation of the
+  /// cost's value from block to block.
   Model model_at(const RigidTransform& pose, double wanted_rise, bool with_scatter) {
     if (const auto exact = exact_model(pose, with_scatter)) return *exact;
     Model model;

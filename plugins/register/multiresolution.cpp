@@ -31,8 +31,8 @@ Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimi
   if (!options.pixel_step.empty())
     coarser = cost.at_level({options.contour_spacing_px.back(), options.reach_px.back(),
                              marrow::search::coarser_pixel_step(options.pixel_step.back())});
-  result.pose = final_pose_of(search, initial, last, search.steps_of(levels.size() - 1), options, context,
-                              coarser.get());
+  result.pose =
+      final_pose_of(search, initial, last, search.steps_of(levels.size() - 1), options, context, coarser.get());
   result.stages.add("final", result.pose);
   return result;
 }

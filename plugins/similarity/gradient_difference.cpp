@@ -15,8 +15,7 @@ template <class Of>
 void each_gradient(const marrow::match::Gradients& g, const Of& of) {
   for (int row = 0; row < g.u.rows; ++row)
     for (int column = 0; column < g.u.columns; ++column)
-      if (const std::size_t i = g.u.at(column, row);
-          g.u.counts[i] && (g.u.rendered[i] != 0 || g.v.rendered[i] != 0))
+      if (const std::size_t i = g.u.at(column, row); g.u.counts[i] && (g.u.rendered[i] != 0 || g.v.rendered[i] != 0))
         of(column, row, i);
 }
 

@@ -132,7 +132,8 @@ class Voxels {
         for (int x = 0; x < grid.size[0]; ++x) {
           if (at(grid.offset(x, y, z)) == 0) continue;
           const std::array<int, 3> here{x, y, z};
-          for (std::size_t k = 0; k < 3; ++k) first[k] = std::min(first[k], here[k]), last[k] = std::max(last[k], here[k]);
+          for (std::size_t k = 0; k < 3; ++k)
+            first[k] = std::min(first[k], here[k]), last[k] = std::max(last[k], here[k]);
         }
     });
     std::pair<std::array<int, 3>, std::array<int, 3>> all{grid.size, {-1, -1, -1}};

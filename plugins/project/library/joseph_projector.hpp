@@ -15,8 +15,7 @@ namespace marrow::rays {
 /// Sums of bilinear values over the slices that are perpendicular to the axis nearest to the ray's direction.
 class JosephProjector : public RayProjector {
  public:
-  explicit JosephProjector(Attenuation attenuation)
-      : RayProjector(std::move(attenuation)), slices_(attenuation_) {}
+  explicit JosephProjector(Attenuation attenuation) : RayProjector(std::move(attenuation)), slices_(attenuation_) {}
 
   using RayProjector::radiograph;
   std::vector<float> radiograph(const Camera& camera, const RigidTransform& world_from_model,
@@ -26,11 +25,11 @@ class JosephProjector : public RayProjector {
   }
 
   std::optional<RadiographExpansion> expansion(const Camera& camera, const RigidTransform& world_from_model,
-                                        const FragmentFrame& frame, const PixelGrid& grid) const override {
+                                               const FragmentFrame& frame, const PixelGrid& grid) const override {
     const RayMotion motion(camera, world_from_model, attenuation_.grid, frame);
     if (auto expansion = slices_.expansion(motion, grid)) return expansion;
-    return expansion_by_rays(
-        motion, grid, [&](const Eigen::Vector3d& direction) { return bricks().change(motion, direction); });
+    return expansion_by_rays(motion, grid,
+                             [&](const Eigen::Vector3d& direction) { return bricks().change(motion, direction); });
   }
 
  protected:

@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <functional>
 
-#include "marrow/domain/mesh.hpp"
 #include "marrow/domain/functions.hpp"
+#include "marrow/domain/mesh.hpp"
 #include "marrow/project/attenuation.hpp"
 
 namespace marrow::rays {

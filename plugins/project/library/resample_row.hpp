@@ -19,8 +19,8 @@ void subtract_rows(const std::int16_t* a, const std::int16_t* b, int count, floa
 struct ResampledSums {
   float *values, *along, *across;
 };
-/// Adds `row` as add_resampled() does, and in the same pass `weight` times its slope per voxel and times the interpolated
-/// `change`.
+/// Adds `row` as add_resampled() does, and in the same pass `weight` times its slope per voxel and times the
+/// interpolated `change`.
 void add_resampled_slopes(const float* row, const float* change, float position, float step, int count, float weight,
                           const ResampledSums& sums);
 

@@ -24,8 +24,8 @@ struct Columns {
   void add(const Columns& more) { first = std::min(first, more.first), last = std::max(last, more.last); }
 };
 
-/// What is summed over the slices: the attenuation, and for derivatives also its slopes along and across the rows, times
-/// 1 - depth / middle: a point of a ray moves by this part of the source's displacement if the ray's point in the
+/// What is summed over the slices: the attenuation, and for derivatives also its slopes along and across the rows,
+/// times 1 - depth / middle: a point of a ray moves by this part of the source's displacement if the ray's point in the
 /// volume's middle stays.
 constexpr int kValues = 1, kValuesAndSlopes = 3;
 
@@ -135,7 +135,8 @@ class RowSums {
 
   void add(int slice, int first_row, int end_row) {
     const double depth = slice - source_[stack_.axes[1]];
-    const Along along{source_[stack_.axes[0]] + image_.p * depth, image_.step_p * depth, 1 / (image_.step_p * depth), float(depth)};
+    const Along along{source_[stack_.axes[0]] + image_.p * depth, image_.step_p * depth, 1 / (image_.step_p * depth),
+                      float(depth)};
     for (int row = first_row; row < end_row; ++row) {
       const double line = source_[stack_.axes[2]] + (image_.q + image_.step_q * row) * depth;
       if (line > -1 && line < stack_.rows) add(slice, line, along, row);

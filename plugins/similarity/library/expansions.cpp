@@ -60,8 +60,8 @@ CorrelationExpansion correlation_expansion(const JointMoments& moments) {
   expansion.value = std::clamp(spread(a, b) * per_deviations, -1.0, 1.0);
   expansion.by_value = per_deviations * spread.col(b).head<6>() - expansion.value / aa * with_a;
   // The normalised radiograph is a unit vector; what changes its direction lowers the correlation.
-  expansion.curvature = std::max(expansion.value, 0.0) / aa *
-                        (spread.topLeftCorner<6, 6>() - with_a * with_a.transpose() / aa);
+  expansion.curvature =
+      std::max(expansion.value, 0.0) / aa * (spread.topLeftCorner<6, 6>() - with_a * with_a.transpose() / aa);
   return expansion;
 }
 

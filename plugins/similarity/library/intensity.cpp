@@ -9,13 +9,13 @@
 #include <mutex>
 #include <opencv2/imgproc.hpp>
 
+#include "intensity_expansions.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/domain/camera.hpp"
 #include "marrow/domain/functions.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
 #include "marrow/toolbox/match/among_others.hpp"
 #include "marrow/toolbox/match/bones_together.hpp"
-#include "intensity_expansions.hpp"
 #include "smoothed_at_bone.hpp"
 
 namespace marrow::match {

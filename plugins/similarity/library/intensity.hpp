@@ -95,8 +95,8 @@ std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector,
                                            const IntensityOptions& options, double worst, MeasureOf measure_of);
 
 /// The function of a node. Its cost is the mean of kMeasure over the views. kMeasure either takes a patch and returns
-/// the measure's value, or takes a whole image and returns a SumMeasure or a CorrelationMeasure. In both cases it may take the options as a
-/// second argument. A view that does not show the model counts as kWorst.
+/// the measure's value, or takes a whole image and returns a SumMeasure or a CorrelationMeasure. In both cases it may
+/// take the options as a second argument. A view that does not show the model counts as kWorst.
 template <auto kMeasure, class Options = IntensityOptions, int kWorst = 2>
 std::shared_ptr<const Cost> intensity_node(const RadiographProjector& projector, const List<View>& views,
                                            const List<Pose>* others, const List<RadiographProjector>* other_projectors,
@@ -113,7 +113,9 @@ std::shared_ptr<const Cost> intensity_node(const RadiographProjector& projector,
   };
   if constexpr (std::is_same_v<decltype(called(Patch())), double>)
     return intensity_cost(projector, views, others, other_projectors, other_outlines, own, kWorst,
-                          [called](const Patch&) -> Measure { return WholeMeasure{called, {}}; });
+                          [called](const Patch&) -> Measure {
+                            return WholeMeasure{called, {}};
+                          });
   else
     return intensity_cost(projector, views, others, other_projectors, other_outlines, own, kWorst, called);
 }

@@ -9,8 +9,8 @@ double value_of(const Measure& measure, const Patch& patch, double step_px, cons
 
 bool has_derivatives(const Measure& measure);
 
-/// For a measure that has derivatives and a patch with slopes. `worst` counts where the patch is empty or the measure is
-/// not finite.
+/// For a measure that has derivatives and a patch with slopes. `worst` counts where the patch is empty or the measure
+/// is not finite.
 ViewsCost::ViewExpansion expansion_of(const Measure& measure, const Patch& patch, double step_px, const Blocks& blocks,
                                       double worst);
 

@@ -12,8 +12,8 @@
 #include <mutex>
 #include <optional>
 
-#include "marrow/domain/pose.hpp"
 #include "marrow/domain/functions.hpp"
+#include "marrow/domain/pose.hpp"
 
 namespace marrow::match {
 namespace {

@@ -201,8 +201,9 @@ std::vector<float> BodyProjector::radiograph(const Camera& camera, const RigidTr
   return {values.begin(), values.end()};
 }
 
-std::optional<RadiographExpansion> BodyProjector::expansion(const Camera& camera, const RigidTransform& world_from_model,
-                                             const FragmentFrame& frame, const PixelGrid& grid) const {
+std::optional<RadiographExpansion> BodyProjector::expansion(const Camera& camera,
+                                                            const RigidTransform& world_from_model,
+                                                            const FragmentFrame& frame, const PixelGrid& grid) const {
   constexpr double kStep_mm = 2.5e-4, kStep_rad = 1e-5;
   const std::vector<Eigen::Vector2f> pixels = pixels_of(grid);
   RadiographExpansion expansion{radiograph(camera, world_from_model, pixels), {}};

@@ -49,8 +49,8 @@ class BodyProjector : public OutlineProjector, public RadiographProjector {
                                 const std::vector<Eigen::Vector2f>& pixels) const override;
   /// By differences of chords half a micrometre apart. At the outline itself, where a chord begins like a square root,
   /// they are large.
-  std::optional<RadiographExpansion> expansion(const Camera&, const RigidTransform& world_from_model, const FragmentFrame& frame,
-                                const PixelGrid&) const override;
+  std::optional<RadiographExpansion> expansion(const Camera&, const RigidTransform& world_from_model,
+                                               const FragmentFrame& frame, const PixelGrid&) const override;
   PixelGrid region(const Camera&, const RigidTransform& world_from_model) const override;
 
  private:

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "marrow/domain/list.hpp"
 #include "marrow/domain/functions.hpp"
+#include "marrow/domain/list.hpp"
 
 namespace marrow::match {
 

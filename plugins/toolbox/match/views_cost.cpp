@@ -47,8 +47,7 @@ std::vector<double> ViewsCost::without_each_block(const RigidTransform& world_fr
   for (std::size_t i = 0; i < views.size(); ++i) all += share(i) * views[i].value;
   std::vector<double> values;
   for (std::size_t i = 0; i < views.size(); ++i)
-    for (const double without : views[i].without_block)
-      values.push_back(all + share(i) * (without - views[i].value));
+    for (const double without : views[i].without_block) values.push_back(all + share(i) * (without - views[i].value));
   return values;
 }
 

@@ -6,8 +6,8 @@
 #include <limits>
 #include <numeric>
 
-#include "marrow/toolbox/search/derivatives.hpp"
 #include "marrow/toolbox/search/compared.hpp"
+#include "marrow/toolbox/search/derivatives.hpp"
 #include "predicted_covariance.hpp"
 #include "scan.hpp"
 

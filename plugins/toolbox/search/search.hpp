@@ -114,8 +114,8 @@ Pose final_pose_of(Search& search, const Pose& initial, const Cost& cost, const 
 
 inline const std::vector<int> kAllAxes{0, 1, 2, 3, 4, 5};
 
-/// The pixel step at which grey values look around a result: coarse enough to be cheap, and fine enough to tell a bone's
-/// other poses.
+/// The pixel step at which grey values look around a result: coarse enough to be cheap, and fine enough to tell a
+/// bone's other poses.
 inline int coarser_pixel_step(double pixel_step) { return std::max(int(pixel_step), std::min(8, 4 * int(pixel_step))); }
 
 /// Declares the options of the search.

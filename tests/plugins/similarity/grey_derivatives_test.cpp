@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The derivatives of the costs that compare grey values, against differences of their values.
-#include <marrow/domain/pose.hpp>
 #include <marrow/domain/functions.hpp>
+#include <marrow/domain/pose.hpp>
 
 #include "marrow/domain/decompositions.hpp"
 #include "tests/plugins/similarity/blob_scene.hpp"
@@ -16,8 +16,9 @@ using marrow::Vector6d;
 class BlobsInSpace : public pixelwise_projector::PixelwiseProjector {
  public:
   PixelGrid region(const Camera&, const RigidTransform&) const override { return {45, 40, 1, 100, 85}; }
-  std::optional<marrow::RadiographExpansion> expansion(const Camera& camera, const RigidTransform& pose, const FragmentFrame& frame,
-                                        const PixelGrid& grid) const override {
+  std::optional<marrow::RadiographExpansion> expansion(const Camera& camera, const RigidTransform& pose,
+                                                       const FragmentFrame& frame,
+                                                       const PixelGrid& grid) const override {
     constexpr double kStep = 1e-4;
     marrow::RadiographExpansion expansion{radiograph(camera, pose, grid), {}};
     for (int k = 0; k < 6; ++k) {
@@ -82,9 +83,7 @@ std::shared_ptr<const Cost> cost_of(const std::string& node) {
 }
 
 /// A frame that is turned and lies beside the model's origin.
-FragmentFrame frame() {
-  return {{4, -7, 12}, marrow::rotation_from_vector({0.3, -0.5, 0.8})};
-}
+FragmentFrame frame() { return {{4, -7, 12}, marrow::rotation_from_vector({0.3, -0.5, 0.8})}; }
 const std::vector<Vector6d>& motions() {
   static const std::vector<Vector6d> all{Vector6d{0, 0, 0, 0, 0, 0}, Vector6d{0.02, -0.01, 0.04, 1.2, -0.7, 3},
                                          Vector6d{-0.05, 0.03, -0.02, -2, 1.5, -6},
@@ -96,8 +95,7 @@ class GreyDerivatives : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(, GreyDerivatives,
                          testing::Values("normalised_cross_correlation", "gradient_correlation", "patch_correlation",
                                          "patch_gradient_correlation", "metal_gradient_correlation",
-                                         "gradient_difference", "pattern_intensity",
-                                         "mutual_information"),
+                                         "gradient_difference", "pattern_intensity", "mutual_information"),
                          [](const auto& info) { return info.param; });
 
 TEST_P(GreyDerivatives, AreThoseOfTheValue) {
@@ -122,7 +120,8 @@ TEST_P(GreyDerivatives, AreThoseOfTheValue) {
       return gradient;
     };
     EXPECT_LT(in_mm(about->gradient - expected).norm(), 1e-3 * in_mm(expected).norm() + 1e-6)
-        << about->gradient.transpose() << "\n" << expected.transpose();
+        << about->gradient.transpose() << "\n"
+        << expected.transpose();
     EXPECT_GT(marrow::eigen_of_symmetric(about->curvature).values[0], -1e-9);
   }
 }
