@@ -24,6 +24,16 @@ TEST(RefineCameras, ACostOfViewsGivesTheSame) {
   EXPECT_LT((*pose.covariance - *wanted.covariance).norm(), 1e-6 * wanted.covariance->norm());
 }
 
+TEST(RefineCameras, ACostWithDerivativesGivesTheSame) {
+  Bone bone({motion({0.3, -0.2, 0.4}, {0.8, 0.5, -3}), motion({-0.4, 0.3, 0.1}, {2, -0.7, 0.6})});
+  const marrow::Pose wanted = shipped::call("refine.cameras", inputs({bone})).at("poses").as_list<marrow::Pose>()[0];
+  bone.cost = std::make_shared<SplitWithDerivatives>(bone.cost);
+  const marrow::Pose pose = shipped::call("refine.cameras", inputs({bone})).at("poses").as_list<marrow::Pose>()[0];
+  EXPECT_LT((pose.world_from_model.translation_mm - wanted.world_from_model.translation_mm).norm(), 0.02);
+  EXPECT_LT(marrow::geodesic_angle_rad(pose.world_from_model.rotation, wanted.world_from_model.rotation), 2e-4);
+  EXPECT_LT((*pose.covariance - *wanted.covariance).norm(), 0.05 * wanted.covariance->norm());
+}
+
 TEST(RefineCameras, HalfOfAnErrorGoesToEachOfTwoViews) {
   // v of both images is y of the world, so nothing tells which of the two cameras is too high by 2 mm.
   const auto outputs =

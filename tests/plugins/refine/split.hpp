@@ -88,6 +88,40 @@ class SplitInViews : public marrow::match::ViewsCost {
   std::shared_ptr<const marrow::Cost> cost_;
 };
 
+/// The same with derivatives, and without blocks of values.
+class SplitWithDerivatives : public SplitInViews {
+ public:
+  explicit SplitWithDerivatives(std::shared_ptr<const marrow::Cost> cost) : SplitInViews(std::move(cost)) {}
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
+    return std::make_shared<SplitWithDerivatives>(*this);
+  }
+  ViewsCost::Split split(std::size_t view, const RigidTransform& pose) const override {
+    return {value_in_view(view, pose), {}};
+  }
+  std::optional<ViewExpansion> expansion_in_view(std::size_t view, const RigidTransform& pose,
+                                                 const marrow::FragmentFrame& frame) const override {
+    constexpr double kStep = 1e-4;  // rad and mm
+    const auto values = [&](const Vector6d& step) {
+      const ViewsCost::Split split = SplitInViews::split(view, moved(pose, frame, step));
+      Eigen::VectorXd all(1 + Eigen::Index(split.without_block.size()));
+      all << split.value, Eigen::VectorXd::Map(split.without_block.data(), Eigen::Index(split.without_block.size()));
+      return all;
+    };
+    const Eigen::VectorXd here = values(Vector6d::Zero());
+    std::vector<Expansion> all(std::size_t(here.size()));
+    for (int k = 0; k < 6; ++k) {
+      const Eigen::VectorXd above = values(kStep * Vector6d::Unit(k)), below = values(-kStep * Vector6d::Unit(k));
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        const auto at = Eigen::Index(i);
+        all[i].value = here[at];
+        all[i].gradient[k] = (above[at] - below[at]) / (2 * kStep);
+        all[i].curvature(k, k) = (above[at] - 2 * here[at] + below[at]) / (kStep * kStep);
+      }
+    }
+    return ViewExpansion{all[0], {all.begin() + 1, all.end()}};
+  }
+};
+
 /// A bone 40 mm above the origin of the world, seen by each camera as if it had moved.
 struct Bone {
   explicit Bone(const std::vector<RigidTransform>& motions, double information = 1e4, double at_mm = 40) {

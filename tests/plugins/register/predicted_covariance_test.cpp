@@ -313,6 +313,17 @@ TEST(PredictedCovariance, CoversAnotherMinimumThatIsAsDeep) {
   EXPECT_NEAR(axial_deg(Double(bottom(), frame(), of_one, 4)), std::sqrt(2 + 0.25 * 0.25), 0.01);
 }
 
+TEST(PredictedCovariance, ACoarserCostSavesValuesFarAway) {
+  const marrow::RigidTransform pose = bottom();
+  const marrow::FragmentFrame about = frame();
+  const Counted alone(bottom(), frame(), hessian()), with(bottom(), frame(), hessian()),
+      coarser(bottom(), frame(), 0.8 * hessian());
+  const PredictedCovariance without_it(alone, pose, about), with_it(with, pose, about, &coarser);
+  EXPECT_EQ(*without_it.covariance(), *with_it.covariance()) << "values that matter are the cost's own";
+  EXPECT_LT(with.asked, alone.asked - 4);
+  EXPECT_GT(coarser.asked, 0);
+}
+
 TEST(PredictedCovariance, SaysWhichAxesTheImagesDoNotTell) {
   // sd of 5 degrees and of 8 mm; two axes along which nothing changes.
   Matrix6d flat = Matrix6d::Zero();

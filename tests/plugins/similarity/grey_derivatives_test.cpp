@@ -3,6 +3,7 @@
 #include <marrow/domain/functions.hpp>
 #include <marrow/domain/pose.hpp>
 
+#include "marrow/toolbox/match/views_cost.hpp"
 #include "marrow/domain/decompositions.hpp"
 #include "tests/plugins/similarity/blob_scene.hpp"
 
@@ -124,6 +125,24 @@ TEST_P(GreyDerivatives, AreThoseOfTheValue) {
         << expected.transpose();
     EXPECT_GT(marrow::eigen_of_symmetric(about->curvature).values[0], -1e-9);
   }
+}
+
+TEST_P(GreyDerivatives, OfSingleViews) {
+  const auto cost = cost_of(GetParam());
+  const auto* in_views = dynamic_cast<const marrow::match::ViewsCost*>(cost.get());
+  ASSERT_TRUE(in_views);
+  const RigidTransform pose = moved(at(0, 0), frame(), motions()[1]);
+  Vector6d mean = Vector6d::Zero();
+  std::size_t blocks = 0;
+  for (std::size_t view = 0; view < cost->view_count(); ++view) {
+    const auto about = in_views->expansion_in_view(view, pose, frame());
+    ASSERT_TRUE(about);
+    EXPECT_NEAR(about->whole.value, cost->value_in_view(view, pose), 1e-6);
+    mean += about->whole.gradient / double(cost->view_count());
+    blocks += about->without_block.size();
+  }
+  EXPECT_LT((mean - cost->expansion(pose, frame())->gradient).norm(), 1e-9 * mean.norm());
+  EXPECT_EQ(blocks, cost->without_each_block(pose).size());
 }
 
 TEST_P(GreyDerivatives, WithoutEachBlock) {
