@@ -331,7 +331,7 @@ function build(data) {
   if (data.passes.length) add(section('passes', 'Passes', null, ...Passes.draw(data)));
   if (data.profile)
     add(section(
-        'profile', 'Time',
+        'profile', 'Profile',
         'A row for each thread, a bar for each call; it lies below what called it. ' +
             'Click a bar to see its time alone.',
         ...Profile.figure(data.profile)));

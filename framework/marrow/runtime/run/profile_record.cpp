@@ -5,6 +5,7 @@
 
 #include <charconv>
 #include <fstream>
+#include <sstream>
 
 namespace marrow {
 namespace {
