@@ -29,8 +29,9 @@ struct PipelineRequest {
 
 struct RunRequest {
   PipelineRequest pipeline;
-  std::filesystem::path folder;   ///< empty = runs/NAME, with a number if it exists
-  std::vector<std::string> only;  ///< the outputs to compute; empty = all
+  std::filesystem::path folder;        ///< empty = runs/NAME, with a number if it exists
+  std::vector<std::string> only;       ///< the outputs to compute; empty = all
+  std::filesystem::path profile = {};  ///< the file to write the profile to; empty = none
   std::uint64_t seed = 1;
   int threads = 0;
   bool no_cache = false;

@@ -18,11 +18,10 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/judged_poses.hpp"
-#include "marrow/runtime/run/place_of_results.hpp"
 #include "marrow/runtime/run/run_folder.hpp"
 #include "marrow/runtime/run/verdict_json.hpp"
-#include "marrow/runtime/store/shared_store.hpp"
 #include "process.hpp"
+#include "profile_of_run.hpp"
 #include "report/report.hpp"
 
 namespace marrow::cli {
@@ -271,14 +270,18 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   else
     settings.store = store;
   folder.keep_failed_calls(settings, catalogue);
+  const ProfileOfRun profile(request.profile, settings);
   RunOutcome outcome;
   outcome.result = run_pipeline(pipeline, catalogue, settings);
   progress.clear();
-  outcome.written = folder.write_outputs(pipeline, outcome.result, catalogue, recipe_of_run(pipeline, settings));
+  {
+    const Profile::Bar bar(settings.profile, Profile::Kind::output, "", "", "writes the outputs");
+    outcome.written = folder.write_outputs(pipeline, outcome.result, catalogue, recipe_of_run(pipeline, settings));
+  }
   folder.write_record(pipeline, outcome.result, settings, catalogue, arguments, outcome.written);
   const std::string untidy = settings.store ? settings.store->tidy(settings.cancelled) : "";
   if (!untidy.empty()) note("the store of results is not tidied up: " + untidy);
-  outcome.is_faulty = outcome.result.failed();
+  outcome.is_faulty = !profile.write(pipeline.name, folder, note) || outcome.result.failed();
   for (const RunFolder::Written& output : outcome.written) {
     if (output.fault.empty()) continue;
     if (!output.fault.starts_with("not made"))
@@ -292,27 +295,6 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   const std::string log_fault = folder.log().fault();
   if (!log_fault.empty()) std::fprintf(stderr, "marrow: warning: %s\n", printable(log_fault).c_str());
   return outcome;
-}
-
-void expect_files_can_hold(const Pipeline& pipeline, const Catalogue& catalogue) {
-  for (const PipelineOutput& output : pipeline.outputs) {
-    const TypeInfo& type = pipeline.output_of(output.source).type;
-    if (!catalogue.find_writer(type))
-      throw Error(printable(pipeline.file.string()) + ": output '" + output.name + "' is " +
-                  (type.is_function ? "a function" : "of the type " + std::string(type.id)) +
-                  ", which no file can hold; the program itself runs this pipeline (only_inside): name other outputs "
-                  "with --only");
-  }
-}
-
-void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& folder, const Store* store) {
-  expect_nothing_reads(pipeline, folder.empty() ? "runs" : folder, "the output folder", "choose another with --out");
-  if (store && store->fault().empty())
-    expect_nothing_reads(pipeline, store->folder(), "the store of results",
-                         "set MARROW_CACHE to another folder, or give --no-cache");
-  if (store && store->shared())
-    expect_nothing_reads(pipeline, store->shared()->folder(), "the shared store of results",
-                         "set MARROW_SHARED_CACHE to another folder, or give --no-cache");
 }
 
 namespace {
@@ -348,6 +330,7 @@ int run(const RunRequest& request) {
   }
   const Store store;
   expect_good_place(pipeline, request.folder, request.no_cache ? nullptr : &store);
+  if (!request.profile.empty()) expect_place_of_profile(pipeline, request.profile);
   if (request.dry_run) return show_plan(pipeline, catalogue, request.seed, request.json);
   const std::filesystem::path runs = "runs";
   FolderOfItsOwn own(runs);
@@ -385,7 +368,13 @@ void add_run(CLI::App& app, int& code) {
   show_default(add_whole_number(command, "--seed", request->seed, "seed of all randomness"), request->seed);
   add_whole_number(command, "--threads", request->threads, "threads to use (default: all)", 1, 1024);
   CLI::Option* no_cache = command->add_flag("--no-cache", request->no_cache, "neither read nor keep results of nodes");
-  command->add_flag("-n,--dry-run", request->dry_run, "run nothing: say what 'marrow plan' says")->excludes(no_cache);
+  CLI::Option* profile = command->add_option(
+      "--profile", request->profile,
+      "write to this JSON file where the time went (Chrome's trace format); the page of 'marrow show' draws it");
+  profile->type_name("FILE");
+  command->add_flag("-n,--dry-run", request->dry_run, "run nothing: say what 'marrow plan' says")
+      ->excludes(no_cache)
+      ->excludes(profile);
   add_shared_cache(command);
   add_log_level(command, request->log_level);
   command->add_flag("-q,--quiet", request->quiet, "print only errors");

@@ -53,6 +53,10 @@ std::string text_in_page(const nlohmann::json& data);
 /// The figures of merit that a run wrote: one table for each folder of files, one column for each file in it.
 nlohmann::json figures_of(const std::filesystem::path& folder, const nlohmann::json& record);
 
+/// The profile that a run wrote, as the page draws it; null if there is none. A damaged one adds a sentence to
+/// `left_out`.
+nlohmann::json profile_of(const std::filesystem::path& folder, std::vector<std::string>& left_out);
+
 /// Writes the page of a single run, and returns the file. An empty `file` means RUN/report.html. Throws Error if the
 /// folder is not that of a run.
 std::filesystem::path write_run_page(const std::filesystem::path& folder, std::filesystem::path file = {});

@@ -142,6 +142,7 @@ json page_of(const fs::path& folder, const json& record, ReportMaterial& materia
                {"variants", {{{"name", "result"}, {"is_baseline", false}, {"options", json::object()}}}}};
   data["figures"] = figures_of(folder, record);
   data["passes"] = passes_of(record);
+  if (json profile = profile_of(folder, material.left_out); !profile.is_null()) data["profile"] = std::move(profile);
   material.add_run(folder, cell);
   data["cells"] = {cell};
   for (const auto& [name, group] : material.groups()) data[name] = std::move(*group);

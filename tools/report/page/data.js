@@ -10,6 +10,10 @@
 //   variants: [{name, is_baseline, options: {"NODE.uses": "KIND.NAME", "NODE.OPTION": value}}]
 //   figures: [{name, columns: [name], rows: [{name, unit, values: [number | null per column]}]}]     of a run
 //   passes: [{node, end, passes: [{name, status, seconds, reason}]}]     of a run whose nodes have bodies
+//   profile: {us, rows: [title], names: [{title, kind, node}], bars: [[row, name, begin, length, thread's processor
+//   time
+//     or -1]] by row and beginning, busy: [[begin, {thread: processors}]], sums (as in the file of --profile),
+//     left_out} of a run with a profile, in microseconds
 //   metrics, comparisons, all_pairs, rankings, effects, curves, tuning, initial_error: as in comparison.json, whose
 //   keys docs/comparing.md lists; the
 //     first metric is the main one, and the variant of a comparison may be a name or an index

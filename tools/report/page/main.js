@@ -15,6 +15,7 @@ import * as Parts from './parts.js';
 import * as Passes from './passes.js';
 import * as Pictures from './pictures.js';
 import * as Plots from './plots.js';
+import * as Profile from './profile.js';
 import * as Recipes from './recipes.js';
 import * as Response from './response.js';
 import {SceneView} from './scene.js';
@@ -328,6 +329,12 @@ function build(data) {
   add(sequence(data));
   add(closer(data));
   if (data.passes.length) add(section('passes', 'Passes', null, ...Passes.draw(data)));
+  if (data.profile)
+    add(section(
+        'profile', 'Profile',
+        'A row for each thread, a bar for each call; it lies below what called it. ' +
+            'Click a bar to see its time alone.',
+        ...Profile.figure(data.profile)));
   if (data.graph && (data.graph.nodes || []).length) {
     add(section(
         'graph', 'Pipeline', data.variants.length > 1 ? 'Framed nodes differ between the variants.' : null,

@@ -114,8 +114,8 @@ class Evaluation {
   std::vector<Value> call_node(std::size_t node, std::vector<Value>& inputs, const std::string& item,
                                const Recipe& recipe, std::vector<std::string>& warnings);
   std::uint64_t seed_of_call(std::size_t node, const std::string& item, const Recipe& recipe) const;
-  void save(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe, const CallResult& result,
-            double seconds, std::vector<std::string> warnings);
+  void save(std::size_t node, const std::string& item, const std::vector<Value>& inputs, const Recipe& recipe,
+            const CallResult& result, double seconds, std::vector<std::string> warnings);
   void check_unchanged(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe,
                        const Digest& states) const;
   static void make_inputs(const NodeDefinition& definition, std::vector<Value>& inputs);

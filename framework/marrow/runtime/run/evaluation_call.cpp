@@ -17,6 +17,7 @@
 #include "marrow/runtime/run/evaluation.hpp"
 #include "marrow/runtime/run/keys.hpp"
 #include "marrow/runtime/run/output_faults.hpp"
+#include "marrow/runtime/run/profiled_functions.hpp"
 #include "marrow/runtime/run/replay.hpp"
 #include "marrow/runtime/store/shared_store.hpp"
 
@@ -56,6 +57,7 @@ void finish_value(Value& value, const Digest& key, std::size_t output, const std
 
 CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, const std::string& item,
                                const Recipe& recipe) {
+  const Profile::Bar bar(settings_.profile, Profile::Kind::node, pipeline_.nodes[node].id, item);
   CallResult result;
   std::vector<std::string> warnings;
   const Clock::time_point start = Clock::now();
@@ -72,6 +74,8 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
     check_unchanged(node, inputs, recipe, before);
     seconds = seconds_since(start);
     for (std::size_t i = 0; i < result.outputs.size(); ++i) finish_value(result.outputs[i], recipe.key, i, inputs);
+    if (settings_.profile.profile)
+      for (Value& output : result.outputs) show_calls(output, settings_.profile, pipeline_.nodes[node].id, item);
     report(RunEvent::Kind::finished, node, item, "", 1, seconds);
   } catch (const MissingInput& missing) {
     result.status = missing.status;
@@ -97,7 +101,7 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
   if (is_failed) note_failure(node, item, result.reason, seed_of_call(node, item, recipe), inputs);
   if (is_failed) result = failure(node, item, result.reason, is_own);
   if (!is_failed && is_replayed(node, item)) end_replay(node, result, seconds);
-  if (result.status == Status::done) save(node, inputs, recipe, result, seconds, std::move(warnings));
+  if (result.status == Status::done) save(node, item, inputs, recipe, result, seconds, std::move(warnings));
   const std::scoped_lock lock(mutex_);
   NodeRecord& record = records_[node];
   record.seconds += seconds_since(start);
@@ -166,7 +170,7 @@ std::vector<Value> Evaluation::call_node(std::size_t node, std::vector<Value>& i
   return outputs;
 }
 
-void Evaluation::save(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe,
+void Evaluation::save(std::size_t node, const std::string& item, const std::vector<Value>& inputs, const Recipe& recipe,
                       const CallResult& result, double seconds, std::vector<std::string> warnings) {
   const std::vector<PortInfo>& outputs = pipeline_.nodes[node].info.outputs;
   if (!settings_.store || recipe.is_kept ||
@@ -174,6 +178,7 @@ void Evaluation::save(std::size_t node, const std::vector<Value>& inputs, const 
     return;
   // It depends on files that its key does not cover. The next run knows them.
   if (!is_fully_described(*catalogue_.library_of(pipeline_.nodes[node].info.name))) return;
+  const Profile::Bar bar(settings_.profile, Profile::Kind::store, pipeline_.nodes[node].id, item, "keeps the result");
   Provenance made_from = provenance(node, inputs);
   made_from.seconds = seconds;
   made_from.warnings = std::move(warnings);

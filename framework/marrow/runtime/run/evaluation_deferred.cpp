@@ -35,6 +35,9 @@ class Evaluation::Deferred {
     return *result_;
   }
   void drop_stored() const { evaluation_.settings_.store->drop(recipe_.key); }
+  Profile::Bar bar(const char* what) const {
+    return Profile::Bar(evaluation_.settings_.profile, Profile::Kind::store, node_id(), item_, what);
+  }
   const std::string& node_id() const { return evaluation_.pipeline_.nodes[node_].id; }
 
  private:
@@ -55,6 +58,7 @@ class Evaluation::DeferredSource : public Source {
 
   std::shared_ptr<const void> data(const TypeInfo& type) override {
     if (stored_) {
+      const Profile::Bar bar = call_->bar("reads the result");
       try {
         return stored_->data(type);
       } catch (const DamagedEntry&) {
@@ -97,11 +101,15 @@ void Evaluation::defer(std::size_t node, Call& call, const Recipe& recipe) {
 
 bool Evaluation::read_back(std::size_t node, Call& call, const Recipe& recipe, Where where) {
   if (!settings_.store || settings_.made_anew.contains(pipeline_.nodes[node].id)) return false;
+  Profile::Bar bar(settings_.profile, Profile::Kind::cached, pipeline_.nodes[node].id, call.item);
   std::optional<StoredResult> stored = settings_.store->find(recipe.key, where);
-  if (!stored) return false;
   const std::vector<PortInfo>& outputs = pipeline_.nodes[node].info.outputs;
-  if (!std::equal(stored->outputs.begin(), stored->outputs.end(), outputs.begin(), outputs.end(), is_of)) {
+  if (stored && !std::equal(stored->outputs.begin(), stored->outputs.end(), outputs.begin(), outputs.end(), is_of)) {
     settings_.store->drop(recipe.key);
+    stored.reset();
+  }
+  if (!stored) {
+    bar.leave_out();
     return false;
   }
   const auto deferred = std::make_shared<Deferred>(*this, node, call, recipe);

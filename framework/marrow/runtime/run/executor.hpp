@@ -13,6 +13,7 @@
 #include "marrow/base/export.hpp"
 #include "marrow/runtime/pipeline/pipeline.hpp"
 #include "marrow/runtime/plugins/catalogue.hpp"
+#include "marrow/runtime/run/profile.hpp"
 #include "marrow/runtime/store/store.hpp"
 
 namespace MARROW_EXPORT marrow {
@@ -61,6 +62,7 @@ struct RunSettings {
   std::function<void(const FailedCall&)> on_failed_call = {};  ///< called by the thread that made the call
   CallKeys* call_keys = nullptr;                               ///< receives the keys of all results but functions
   const Replay* replay = nullptr;  ///< makes one call of an earlier run again, and only what that needs
+  ProfilePlace profile = {};       ///< where the time of each call is noted; at first nowhere
 };
 
 struct PassesRecord;

@@ -221,7 +221,10 @@ void GraphRun::set_fault() {
 
 void GraphRun::watch() {
   std::unique_lock lock(mutex_);
-  while (!all_done_.wait_for(lock, std::chrono::milliseconds(20), [&] { return is_over(); })) sample_memory();
+  while (!all_done_.wait_for(lock, std::chrono::milliseconds(20), [&] { return is_over(); })) {
+    sample_memory();
+    if (settings_.profile.profile) settings_.profile.profile->sample();
+  }
 }
 
 void GraphRun::sample_memory() {

@@ -141,6 +141,7 @@ std::unique_ptr<Passes::Run> Passes::make_run(Pipeline pipeline, const std::stri
   run->settings = outer_.settings_;
   run->settings.within = this->within() + (within.empty() ? "" : "/" + within);
   run->settings.given = constants_;
+  run->settings.profile = outer_.settings_.profile.inside(node_.id, within);
   for (const std::string& id : outer_.settings_.made_anew)
     if (id == node_.id)
       for (const PipelineNode& node : run->pipeline.nodes) run->settings.made_anew.insert(node.id);
@@ -251,6 +252,7 @@ void Passes::go_on() {
     if (outer_.cancelled()) return finish(Status::cancelled, "stopped before it was done");
     if (!has_next()) return finish(Status::done, "");
     run_ = next_pass();
+    pass_begin_ = Clock::now();
     run_->graph->begin(*outer_.arena_, [this] { release([this] { after_pass(); }); });
   } catch (...) {
     outer_.set_fault();
@@ -264,6 +266,7 @@ void Passes::after_pass() {
   try {
     const RunResult result = run_->graph->finish();
     pass.seconds = result.seconds;
+    note_in_profile(pass.name, pass_begin_);
     if (result.cancelled()) return finish(Status::cancelled, "stopped before it was done");
     if (is_last_) return finish(Status::done, "");
     take(result, pass);
@@ -330,7 +333,15 @@ void Passes::collect_outputs() {
   }
 }
 
+/// A pass runs on no thread of its own.
+void Passes::note_in_profile(const std::string& pass, Clock::time_point begin) const {
+  const ProfilePlace& place = outer_.settings_.profile;
+  if (!place.profile) return;
+  place.profile->add_pass(place, "passes of " + place.nodes + node_.id, node_.id, pass, begin, Clock::now());
+}
+
 void Passes::finish(Status status, const std::string& reason) {
+  note_in_profile("", begin_);
   if (status == Status::failed) {
     call_.result = outer_.evaluation_.failure(index_, "", reason);
   } else {

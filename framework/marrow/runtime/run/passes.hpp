@@ -39,6 +39,7 @@ class Passes {
   void after_constants();
   void after_pass();
   void take(const RunResult& result, const PassesRecord::Pass& pass);
+  void note_in_profile(const std::string& pass, Clock::time_point begin) const;
   void finish(NodeRecord::Status status, const std::string& reason);
   void collect_outputs();
   void release(const std::function<void()>& work);
@@ -59,6 +60,8 @@ class Passes {
   std::shared_ptr<PassesRecord> record_ = std::make_shared<PassesRecord>();
   std::unique_ptr<Run> constants_run_, run_;
   std::size_t pass_ = 0;
+  const Clock::time_point begin_ = Clock::now();
+  Clock::time_point pass_begin_;
   bool is_first_ = false;  ///< whether the pass that runs has to make carried values itself
   bool is_last_ = false;   ///< whether the pass that runs is for the one call of a replay
 };
