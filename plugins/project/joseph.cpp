@@ -7,10 +7,16 @@ namespace {
 
 using marrow::rays::AttenuationOptions;
 
+/// In this file alone, so that `marrow run --profile` can show its calls.
+class Joseph : public marrow::rays::JosephProjector {
+ public:
+  using JosephProjector::JosephProjector;
+};
+
 std::shared_ptr<const marrow::RadiographProjector> joseph(const marrow::Volume& volume,
                                                           const marrow::SignedField* field,
                                                           const AttenuationOptions& options) {
-  return std::make_shared<marrow::rays::JosephProjector>(attenuation_of(volume, field, options));
+  return std::make_shared<Joseph>(attenuation_of(volume, field, options));
 }
 
 }  // namespace
