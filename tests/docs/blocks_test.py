@@ -189,7 +189,7 @@ class Shell(Documents):
             word = words.pop(0)
             if word == "--set":
                 kept += [word, words.pop(0)]
-            elif word in ("--seed", "--out", "--only", "--threads", "--log-level"):
+            elif word in ("--seed", "--out", "--only", "--profile", "--threads", "--log-level"):
                 words.pop(0)
             elif not word.startswith("--") and "=$" not in word:  # a variable of the shell
                 kept.append(word)

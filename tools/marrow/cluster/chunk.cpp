@@ -186,7 +186,8 @@ void add_chunk(CLI::App& app, int& code) {
   command->add_option("plan", request->plan, "file of the plan, which --on or --emit of 'marrow compare' wrote")
       ->required();
   command->add_option("name", request->name, "the chunk")->required();
-  add_whole_number(command, "-j,--jobs", request->jobs, "cells at once (default: the number of cores)", 1, 1024);
+  add_whole_number(command, "-j,--jobs", request->jobs,
+                   "cells at once (default: the number of cores, divided by the threads of a cell)", 1, 1024);
   command->add_flag("-q,--quiet", request->quiet, "no progress");
   command->callback([request, &code] { code = run_chunk(*request); });
 }

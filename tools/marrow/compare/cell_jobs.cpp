@@ -16,7 +16,9 @@ namespace fs = std::filesystem;
 
 PoolSettings pool_of(const CompareRequest& request, const fs::path& folder, int threads) {
   PoolSettings pool;
-  pool.workers = request.jobs > 0 ? request.jobs : int(std::max(1u, std::thread::hardware_concurrency()));
+  // All cells together have as many threads as there are cores.
+  const int cores = int(std::thread::hardware_concurrency());
+  pool.workers = request.jobs > 0 ? request.jobs : std::max(1, cores / std::max(1, threads));
   pool.time_limit_s = request.time_limit_s;
   pool.memory_limit_mb = request.memory_limit_mb;
   pool.cancelled = &stop_on_signals();

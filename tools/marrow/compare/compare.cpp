@@ -213,7 +213,8 @@ void add_compare(CLI::App& app, int& code) {
   add_experiment_arguments(command, *request);
   command->add_option("inputs", request->inputs, "values of the pipeline's inputs, as name=value")
       ->type_name("NAME=VALUE");
-  add_whole_number(command, "-j,--jobs", request->jobs, "cells at once (default: the number of cores)", 1, 1024);
+  add_whole_number(command, "-j,--jobs", request->jobs,
+                   "cells at once (default: the number of cores, divided by the threads of a cell)", 1, 1024);
   show_default(add_amount(command, "--time-limit", request->time_limit_s, "seconds", "seconds that one cell may take"),
                request->time_limit_s);
   show_default(

@@ -39,7 +39,7 @@ struct CompareRequest {
   std::filesystem::path file;
   std::vector<std::string> inputs = {};  ///< name=value, for the pipeline's inputs
   std::filesystem::path folder;          ///< empty = runs/compare/NAME
-  int jobs = 0;                          ///< number of cells at once; 0 = the number of the machine's cores
+  int jobs = 0;                          ///< number of cells at once; 0 = the machine's cores / threads
   int threads = 1;                       ///< threads of each cell
   double time_limit_s = 600;
   double memory_limit_mb = 4000;
