@@ -316,8 +316,8 @@ TEST(PredictedCovariance, CoversAnotherMinimumThatIsAsDeep) {
 TEST(PredictedCovariance, ACoarserCostSavesValuesFarAway) {
   const marrow::RigidTransform pose = bottom();
   const marrow::FragmentFrame about = frame();
-  const Counted alone(bottom(), frame(), hessian()), with(bottom(), frame(), hessian()),
-      coarser(bottom(), frame(), 0.8 * hessian());
+  const Matrix6d steep = 1e4 * hessian();
+  const Counted alone(bottom(), frame(), steep), with(bottom(), frame(), steep), coarser(bottom(), frame(), 0.8 * steep);
   const PredictedCovariance without_it(alone, pose, about), with_it(with, pose, about, &coarser);
   EXPECT_EQ(*without_it.covariance(), *with_it.covariance()) << "values that matter are the cost's own";
   EXPECT_LT(with.asked, alone.asked - 4);
