@@ -140,6 +140,20 @@ std::vector<float> RayProjector::radiograph(const Camera& camera, const RigidTra
   return values;
 }
 
+std::shared_ptr<const RadiographProjector> RayProjector::smoothed(double sigma_mm) const {
+  constexpr std::size_t kMost = 4;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [of_kept_mm, kept] : kept_)
+      if (of_kept_mm == sigma_mm) return kept;
+  }
+  std::shared_ptr<const RadiographProjector> made = of(rays::smoothed(attenuation_, sigma_mm));  // in parallel: unlocked
+  const std::lock_guard lock(mutex_);
+  kept_.emplace_back(sigma_mm, made);
+  if (kept_.size() > kMost) kept_.pop_front();
+  return made;
+}
+
 PixelGrid region_of(const Attenuation& attenuation, const Camera& camera, const RigidTransform& world_from_model) {
   check_camera(camera, "the camera");
   if (attenuation.is_empty()) return {};

@@ -2,7 +2,11 @@
 #pragma once
 // The rays of a view in the volume's voxel coordinates, and projectors that follow them one by one.
 #include <Eigen/Core>
+#include <deque>
 #include <functional>
+#include <memory>
+#include <mutex>
+#include <utility>
 
 #include "marrow/domain/functions.hpp"
 #include "marrow/domain/mesh.hpp"
@@ -87,9 +91,8 @@ class RayProjector : public RadiographProjector {
   PixelGrid region(const Camera& camera, const RigidTransform& world_from_model) const override {
     return region_of(attenuation_, camera, world_from_model);
   }
-  std::shared_ptr<const RadiographProjector> smoothed(double sigma_mm) const override {
-    return of(rays::smoothed(attenuation_, sigma_mm));
-  }
+  /// The last few are kept, because each frame of a sequence asks for the same.
+  std::shared_ptr<const RadiographProjector> smoothed(double sigma_mm) const override;
 
  protected:
   /// A projector of the same kind for another model; null, the default, if there is none.
@@ -98,6 +101,10 @@ class RayProjector : public RadiographProjector {
   /// to call from several threads at once.
   virtual float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const = 0;
   const Attenuation attenuation_;
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::deque<std::pair<double, std::shared_ptr<const RadiographProjector>>> kept_;  ///< by sigma_mm
 };
 
 }  // namespace marrow::rays
