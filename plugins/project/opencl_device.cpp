@@ -46,8 +46,8 @@ std::vector<cl_device_id> devices() {
 
 void check(cl_int code, const std::string& tried) {
   if (code == CL_SUCCESS) return;
-  const bool is_full = code == CL_MEM_OBJECT_ALLOCATION_FAILURE || code == CL_OUT_OF_RESOURCES ||
-                       code == CL_INVALID_BUFFER_SIZE;
+  const bool is_full =
+      code == CL_MEM_OBJECT_ALLOCATION_FAILURE || code == CL_OUT_OF_RESOURCES || code == CL_INVALID_BUFFER_SIZE;
   throw Error(formatted("OpenCL failed {} (its error {}){}", tried, code,
                         is_full ? "; the device has too little memory: crop the CT, or use project.joseph" : ""));
 }

@@ -16,7 +16,8 @@ struct Released {
   void operator()(Handle handle) const { release(handle); }
 };
 using Context = std::unique_ptr<std::remove_pointer_t<cl_context>, Released<cl_context, clReleaseContext>>;
-using Queue = std::unique_ptr<std::remove_pointer_t<cl_command_queue>, Released<cl_command_queue, clReleaseCommandQueue>>;
+using Queue =
+    std::unique_ptr<std::remove_pointer_t<cl_command_queue>, Released<cl_command_queue, clReleaseCommandQueue>>;
 using Program = std::unique_ptr<std::remove_pointer_t<cl_program>, Released<cl_program, clReleaseProgram>>;
 using Kernel = std::unique_ptr<std::remove_pointer_t<cl_kernel>, Released<cl_kernel, clReleaseKernel>>;
 using Buffer = std::unique_ptr<std::remove_pointer_t<cl_mem>, Released<cl_mem, clReleaseMemObject>>;

@@ -87,7 +87,9 @@ class Fits(Case):
         self.assertEqual(fits["project.silhouette"]["fits"], "no")
         checked = check(INTENSITY, "drr", "project.lightfield")
         self.assertIn("input 'views' of project.lightfield is not wired", checked.stderr)
-        self.assertIn("or use project.joseph, project.ray_casting, project.siddon_jacobs", checked.stderr)
+        self.assertIn(
+            "or use project.joseph, project.opencl, project.ray_casting, project.siddon_jacobs", checked.stderr
+        )
 
     def test_a_result_that_nothing_writes(self):
         fits = {fit["node"]: fit for fit in fits_of(SOURCE / "pipelines" / "simulate" / "simulate.yaml", "case")}
