@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // drr_benchmark [FOLDER]: how long a radiograph takes, and how far it is from one by fine steps. With a folder, the
 // volume, the geometry and the images are written there, for drr_peers to compare with other programs.
+// drr_benchmark --batches: 64 poses at once by project.joseph and by project.opencl.
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
@@ -190,12 +191,15 @@ void batches(const Catalogue& catalogue, const Volume& volume) {
 int main(int argc, char** argv) {
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 2);
   const Catalogue catalogue;
+  if (argc > 1 && std::string(argv[1]) == "--batches") {
+    batches(catalogue, thigh(false));
+    return 0;
+  }
   const RigidTransform world_from_model{"world", "ct"};
   for (const bool bone_only : {false, true}) {
     const Volume volume = thigh(bone_only);
     const std::string what = bone_only ? "bone" : "thigh";
     if (argc > 1) write_volume(std::filesystem::path(argv[1]) / (what + ".mha"), volume);
-    if (!bone_only) batches(catalogue, volume);
     const auto fine = projector(catalogue, "project.ray_casting", volume, 0.05);
     for (const std::string name : {"joseph", "ray_casting", "siddon_jacobs"}) {
       const auto one = projector(catalogue, "project." + name, volume);
