@@ -33,7 +33,8 @@ found = []
 for project in (marrow.project.joseph, marrow.project.opencl):
     drr = project(volume=case.ct, field=bone, background_hu=50)
     cost = marrow.similarity.patch_gradient_correlation(projector=drr, views=case.views)
-    found.append(marrow.register.sequence(cost=cost, finer_cost=cost, optimizer=optimizer, start=marrow.Pose(start)).pose.matrix)
+    node = dict(cost=cost, finer_cost=cost, optimizer=optimizer, start=marrow.Pose(start))
+    found.append(marrow.register.sequence(**node).pose.matrix)
 joseph, opencl = found
 turn = joseph[:3, :3].T @ opencl[:3, :3]
 middle = numpy.append(numpy.zeros(3), 1)
