@@ -18,5 +18,6 @@ MARROW_PLUGIN(plugin) {
       .out<marrow::OutlineProjector, marrow::RadiographProjector>("projector",
                                                                   "draws the model for any camera and pose")
       .trait("derivatives", "its radiographs have derivatives")
+      .trait("device", "computes on a device that not every machine has, and says which is there")
       .suite(marrow::conformance::project_suite());
 }

@@ -2,12 +2,16 @@
 #include "opencl_device.hpp"
 
 #include <algorithm>
+#include <sstream>
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 
 namespace marrow::opencl {
 namespace {
+
+constexpr const char* kNoDevice =
+    "no device with OpenCL is here; a driver for the graphics card, or Debian's package pocl-opencl-icd, provides one";
 
 std::string name_of(cl_device_id device) {
   std::size_t size = 0;
@@ -33,7 +37,7 @@ std::vector<cl_device_id> devices() {
   std::vector<cl_device_id> all;
   for (const cl_platform_id platform : platforms) {
     cl_uint here = 0;
-    if (clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, 0, nullptr, &here) != CL_SUCCESS) continue;
+    if (clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, 0, nullptr, &here) != CL_SUCCESS || here == 0) continue;
     std::vector<cl_device_id> found(here);
     check(clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, here, found.data(), nullptr), "to list the devices");
     all.insert(all.end(), found.begin(), found.end());
@@ -42,30 +46,57 @@ std::vector<cl_device_id> devices() {
   return all;
 }
 
+/// The first lines of what a compiler says, in one line.
+std::string beginning_of(const std::string& log) {
+  constexpr int kLines = 4;
+  std::istringstream lines(log);
+  std::string text, line;
+  for (int i = 0; i < kLines && std::getline(lines, line);)
+    if (line.find_first_not_of(" \t\r") != std::string::npos) {
+      text += (i++ ? " | " : "") + line;
+    }
+  return text.empty() ? "its compiler does not say why" : text;
+}
+
 }  // namespace
 
 void check(cl_int code, const std::string& tried) {
   if (code == CL_SUCCESS) return;
-  const bool is_full = code == CL_MEM_OBJECT_ALLOCATION_FAILURE || code == CL_OUT_OF_RESOURCES ||
-                       code == CL_INVALID_BUFFER_SIZE;
+  const bool is_full =
+      code == CL_MEM_OBJECT_ALLOCATION_FAILURE || code == CL_OUT_OF_RESOURCES || code == CL_INVALID_BUFFER_SIZE;
   throw Error(formatted("OpenCL failed {} (its error {}){}", tried, code,
                         is_full ? "; the device has too little memory: crop the CT, or use project.joseph" : ""));
 }
 
-std::vector<std::string> Device::names() {
-  std::vector<std::string> names;
-  for (const cl_device_id device : devices()) names.push_back(name_of(device));
-  return names;
+Choice Device::choose(const std::string& name, const char* source) {
+  const std::vector<cl_device_id> all = devices();
+  if (all.empty()) return {nullptr, kNoDevice};
+  std::string known;
+  for (const cl_device_id device : all) {
+    if (name_of(device).find(name) == std::string::npos) {
+      known += (known.empty() ? "'" : ", '") + name_of(device) + "'";
+      continue;
+    }
+    try {
+      return {std::shared_ptr<const Device>(new Device(device, source)), ""};
+    } catch (const Error& error) {
+      return {nullptr, error.what()};
+    }
+  }
+  throw Error("no device's name contains '" + name + "'; there are " + known);
 }
 
-std::shared_ptr<const Device> Device::find(const std::string& name, const char* source) {
-  for (const cl_device_id device : devices())
-    if (name_of(device).find(name) != std::string::npos)
-      return std::shared_ptr<const Device>(new Device(device, source));
-  return nullptr;
+std::string Device::first() {
+  const std::vector<cl_device_id> all = devices();
+  if (all.empty()) return kNoDevice;
+  return formatted("it would use the {} '{}'", is_graphics_card(all[0]) ? "graphics card" : "device", name_of(all[0]));
 }
 
 Device::Device(cl_device_id id, const char* source) : name_(name_of(id)) {
+  cl_ulong largest = 0;
+  check(clGetDeviceInfo(id, CL_DEVICE_MAX_MEM_ALLOC_SIZE, sizeof(largest), &largest, nullptr),
+        "to ask '" + name_ + "' for its memory");
+  largest_buffer_bytes_ = largest;
   cl_int code = CL_SUCCESS;
   context_.reset(clCreateContext(nullptr, 1, &id, nullptr, nullptr, &code));
   check(code, "to open '" + name_ + "'");
@@ -79,7 +110,8 @@ Device::Device(cl_device_id id, const char* source) : name_(name_of(id)) {
   clGetProgramBuildInfo(program_.get(), id, CL_PROGRAM_BUILD_LOG, 0, nullptr, &size);
   std::string log(size, 0);
   clGetProgramBuildInfo(program_.get(), id, CL_PROGRAM_BUILD_LOG, size, log.data(), nullptr);
-  throw Error("'" + name_ + "' cannot build marrow's program for radiographs: " + log.c_str());
+  throw Error(formatted("'{}' cannot build the program for radiographs (error {}): {}", name_, code,
+                        beginning_of(log.c_str())));
 }
 
 Kernel Device::kernel(const char* name) const {

@@ -1,20 +1,40 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
+#include <cstdint>
 
 namespace marrow::opencl {
 
-/// Joseph's sums (IEEE Transactions on Medical Imaging 1982) along the ray of each pixel for each pose, and their
-/// derivatives by a small motion of the model; see marrow/project/rays.hpp. OpenCL C 1.2. Positions are counted from
-/// the first voxel that attenuates, which `voxels` begins with; around it lies a border of one empty voxel.
+/// One radiograph that the kernel computes, as the kernel declares it.
+struct View {
+  std::array<float, 3> source, middle;
+  std::array<float, 9> direction_from_pixel;
+  std::array<float, 6> place_from_pixel;
+  std::array<float, 9> frame_from_direction, frame_from_gradient;
+  std::array<float, 3> source_mm;
+  std::int32_t across;
+  std::array<float, 2> first;
+  float step;
+  std::int32_t columns, count, with_slopes;
+  std::uint32_t first_pixel, first_result;
+};
+
+/// Joseph's sums (IEEE Transactions on Medical Imaging 1982) along the ray of each pixel of each view, and their
+/// derivatives by a small motion of the model; see marrow/project/rays.hpp. OpenCL C 1.2. `voxels` is the part of the
+/// volume that attenuates, with a border of one empty voxel.
 constexpr const char* kKernel = R"cl(
 typedef struct {
   float source[3], middle[3];        // in voxels; the middle of the volume
-  float pixel[2];                    // in the middle of the image: pixels are counted from it
-  float direction_from_pixel[9];     // row by row
+  float direction_from_pixel[9];     // row by row; pixels are counted from the middle of the image
   float place_from_pixel[6];         // where a ray passes the middle slice, from the volume's middle, times its
                                      // direction across the slices
   float frame_from_direction[9], frame_from_gradient[9], source_mm[3];  // see RayMotion
   int across;                        // the axis from slice to slice
+  float first[2], step;              // of a grid of pixels
+  int columns;                       // 0: there is no grid, the pixels are in a list
+  int count;                         // of pixels
+  int with_slopes;
+  uint first_pixel, first_result;    // where its pixels begin in the list, and its results; slopes follow the values
 } View;
 
 float3 row_times(__constant const float* m, float3 v) {
@@ -23,12 +43,17 @@ float3 row_times(__constant const float* m, float3 v) {
 }
 
 __kernel void radiograph(__global const short* voxels, int4 size, float4 spacing, __constant const View* views,
-                         __global const float2* pixels, int count, int with_slopes, __global float* values,
-                         __global float* slopes) {
-  const int i = get_global_id(0), pose = get_global_id(1);
+                         __global const float2* pixels, __global float* results) {
+  const int i = get_global_id(0);
+  __constant const View* view = views + get_global_id(1);
+  const int count = view->count, with_slopes = view->with_slopes;
   if (i >= count) return;
-  __constant const View* view = views + pose;
-  const float3 pixel = (float3)(pixels[i].x - view->pixel[0], pixels[i].y - view->pixel[1], 1.0f);
+  float3 pixel = (float3)(0.0f, 0.0f, 1.0f);
+  if (view->columns > 0)
+    pixel.xy = (float2)(view->first[0] + view->step * (i % view->columns),
+                        view->first[1] + view->step * (i / view->columns));
+  else
+    pixel.xy = pixels[view->first_pixel + i];
   const float3 direction = row_times(view->direction_from_pixel, pixel);
   const float d[3] = {direction.x, direction.y, direction.z};
   const float mm[3] = {spacing.x, spacing.y, spacing.z};
@@ -63,13 +88,14 @@ __kernel void radiograph(__global const short* voxels, int4 size, float4 spacing
     from = fmax(from, ceil(fmin(s, t)));
     to = fmin(to, floor(fmax(s, t)));
   }
+  const int last_column = sizes[a] - 2, last_row = sizes[b] - 2, next_a = strides[a], next_b = strides[b];
   float sum = 0, by_p = 0, by_q = 0, by_a = 0, by_b = 0;
   for (int slice = (int)from; slice <= (int)to; ++slice) {
     const float t = slice - view->middle[c], x = x0 + p * t, y = y0 + q * t;
-    const int column = clamp((int)floor(x), 0, sizes[a] - 2), row = clamp((int)floor(y), 0, sizes[b] - 2);
+    const int column = clamp((int)x, 0, last_column), row = clamp((int)y, 0, last_row);
     const float u = clamp(x - column, 0.0f, 1.0f), v = clamp(y - row, 0.0f, 1.0f);
-    __global const short* at = voxels + slice * strides[c] + column * strides[a] + row * strides[b];
-    const float v00 = at[0], v10 = at[strides[a]], v01 = at[strides[b]], v11 = at[strides[a] + strides[b]];
+    __global const short* at = voxels + slice * strides[c] + column * next_a + row * next_b;
+    const float v00 = at[0], v10 = at[next_a], v01 = at[next_b], v11 = at[next_a + next_b];
     const float low = v00 + u * (v10 - v00), high = v01 + u * (v11 - v01);
     sum += low + v * (high - low);
     if (with_slopes) {
@@ -81,7 +107,8 @@ __kernel void radiograph(__global const short* voxels, int4 size, float4 spacing
     }
   }
   const float path = sqrt(p * p * mm[a] * mm[a] + q * q * mm[b] * mm[b] + mm[c] * mm[c]), factor = 1e-3f * path;
-  values[pose * count + i] = factor * sum;
+  __global float* out = results + view->first_result + i;
+  *out = factor * sum;
   if (!with_slopes) return;
   // By the slopes about the middle slice, and by the source: a point of the ray there moves as far as the source does,
   // and by the depth times the change of the slope.
@@ -95,13 +122,14 @@ __kernel void radiograph(__global const short* voxels, int4 size, float4 spacing
   by_direction[b] = to_q * nearer;
   by_direction[c] = -(p * to_p + q * to_q) * nearer;
   const float3 force = row_times(view->frame_from_gradient, (float3)(by_source[0], by_source[1], by_source[2])),
-               turning = row_times(view->frame_from_gradient, (float3)(by_direction[0], by_direction[1], by_direction[2])),
+               turning = row_times(view->frame_from_gradient,
+                                   (float3)(by_direction[0], by_direction[1], by_direction[2])),
                source = (float3)(view->source_mm[0], view->source_mm[1], view->source_mm[2]),
                way = row_times(view->frame_from_direction, direction);
   const float3 torque = -cross(source, force) - cross(way, turning);
-  __global float* out = slopes + (size_t)pose * 6 * count + i;
-  out[0] = torque.x, out[count] = torque.y, out[2 * count] = torque.z;
-  out[3 * count] = -force.x, out[4 * count] = -force.y, out[5 * count] = -force.z;
+  const size_t next = count;
+  out[next] = torque.x, out[2 * next] = torque.y, out[3 * next] = torque.z;
+  out[4 * next] = -force.x, out[5 * next] = -force.y, out[6 * next] = -force.z;
 }
 )cl";
 

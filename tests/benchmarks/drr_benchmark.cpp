@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // drr_benchmark [FOLDER]: how long a radiograph takes, and how far it is from one by fine steps. With a folder, the
 // volume, the geometry and the images are written there, for drr_peers to compare with other programs.
+// drr_benchmark --batches: 64 poses at once by project.joseph and by project.opencl.
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
@@ -147,11 +148,53 @@ void lookup(const Catalogue& catalogue, const Volume& volume, const std::string&
       rms(one->radiograph(camera, turned, some), fine.radiograph(camera, turned, some)));
 }
 
+/// 64 poses near each other, several at a time, as a search computes them: wall clock and time of all processors, as
+/// multiples of those of project.joseph, in turns.
+void batches(const Catalogue& catalogue, const Volume& volume) {
+  constexpr int kPoses = 64, kTurns = 3;
+  const Camera camera = camera_of(512);
+  const PixelGrid grid{0, 0, 1, 512, 512};
+  std::vector<RigidTransform> poses;
+  std::mt19937 random(5);
+  const auto offset = [&](double most) { return most * (2 * double(random()) / 4294967296.0 - 1); };
+  for (int i = 0; i < kPoses; ++i) {
+    const Eigen::Vector3d turn(offset(0.1), offset(0.1), offset(0.1)), shift_mm(offset(5), offset(5), offset(5));
+    poses.push_back({"world", "ct", rotation_from_vector(turn), shift_mm});
+  }
+  const auto joseph = projector(catalogue, "project.joseph", volume),
+             opencl = projector(catalogue, "project.opencl", volume);
+  for (const bool with_slopes : {false, true}) {
+    const auto times_s = [&](const RadiographProjector& one) {
+      const auto start = std::chrono::steady_clock::now();
+      const std::clock_t processor = std::clock();
+      tbb::parallel_for(0, kPoses, [&](int i) {
+        const RigidTransform& pose = poses[std::size_t(i)];
+        if (with_slopes)
+          one.expansion(camera, pose, FragmentFrame(), grid);
+        else
+          one.radiograph(camera, pose, grid);
+      });
+      return std::array{std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
+                        double(std::clock() - processor) / CLOCKS_PER_SEC};
+    };
+    for (int turn = 0; turn < kTurns; ++turn) {
+      const auto theirs = times_s(*joseph), ours = times_s(*opencl);
+      std::printf(
+          "thigh  64 poses%s, 512 x 512: joseph %.2f s, %.2f s of processors; opencl %.2f and %.2f times these\n",
+          with_slopes ? " with derivatives" : "", theirs[0], theirs[1], ours[0] / theirs[0], ours[1] / theirs[1]);
+    }
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 2);
   const Catalogue catalogue;
+  if (argc > 1 && std::string(argv[1]) == "--batches") {
+    batches(catalogue, thigh(false));
+    return 0;
+  }
   const RigidTransform world_from_model{"world", "ct"};
   for (const bool bone_only : {false, true}) {
     const Volume volume = thigh(bone_only);

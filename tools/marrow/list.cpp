@@ -8,6 +8,7 @@
 #include "columns.hpp"
 #include "command_options.hpp"
 #include "commands.hpp"
+#include "device_text.hpp"
 #include "marrow/base/printable.hpp"
 
 namespace marrow::cli {
@@ -87,6 +88,8 @@ void print_fits(const std::vector<Fit>& fits, const Catalogue& catalogue) {
       is_first = false;
       print_beside("  " + printable(fit.node), printable(catalogue.find(fit.node)->summary), 37);
       for (const std::string& line : fit.*lines) print_beside("   ", printable(line), 4);
+      if (const std::string device = device_text(fit.node, catalogue); !device.empty())
+        print_beside("   ", printable(device), 4);
     }
   };
   section(
@@ -111,7 +114,10 @@ int list_fits(const ListRequest& request) {
   }
   if (request.as_json) {
     json all = json::array();
-    for (const Fit& fit : fits) all.push_back(fit_json(fit));
+    for (const Fit& fit : fits) {
+      all.push_back(fit_json(fit));
+      if (const std::string device = device_text(fit.node, catalogue); !device.empty()) all.back()["device"] = device;
+    }
     print_as_json(all);
     return 0;
   }

@@ -87,7 +87,19 @@ class Fits(Case):
         self.assertEqual(fits["project.silhouette"]["fits"], "no")
         checked = check(INTENSITY, "drr", "project.lightfield")
         self.assertIn("input 'views' of project.lightfield is not wired", checked.stderr)
-        self.assertIn("or use project.joseph, project.ray_casting, project.siddon_jacobs", checked.stderr)
+        self.assertIn(
+            "or use project.joseph, project.opencl, project.ray_casting, project.siddon_jacobs", checked.stderr
+        )
+
+    def test_a_node_that_needs_a_device_says_whether_one_is_there(self):
+        fits = {fit["node"]: fit for fit in fits_of(INTENSITY, "drr")}
+        self.assertEqual([name for name, fit in fits.items() if "device" in fit], ["project.opencl"])
+        hidden = marrow("list", "--fits", INTENSITY, "drr", extra_environment={"OCL_ICD_VENDORS": "/nonexistent"})
+        self.assertIn(
+            "no device with OpenCL is here; a driver for the graphics card, or Debian's package pocl-opencl-icd, "
+            "provides one",
+            " ".join(hidden.stdout.split()),
+        )
 
     def test_a_result_that_nothing_writes(self):
         fits = {fit["node"]: fit for fit in fits_of(SOURCE / "pipelines" / "simulate" / "simulate.yaml", "case")}
