@@ -147,7 +147,8 @@ std::shared_ptr<const RadiographProjector> RayProjector::smoothed(double sigma_m
     for (const auto& [of_kept_mm, kept] : kept_)
       if (of_kept_mm == sigma_mm) return kept;
   }
-  std::shared_ptr<const RadiographProjector> made = of(rays::smoothed(attenuation_, sigma_mm));  // in parallel: unlocked
+  std::shared_ptr<const RadiographProjector> made =
+      of(rays::smoothed(attenuation_, sigma_mm));  // in parallel: unlocked
   const std::lock_guard lock(mutex_);
   kept_.emplace_back(sigma_mm, made);
   if (kept_.size() > kMost) kept_.pop_front();

@@ -317,7 +317,8 @@ TEST(PredictedCovariance, ACoarserCostSavesValuesFarAway) {
   const marrow::RigidTransform pose = bottom();
   const marrow::FragmentFrame about = frame();
   const Matrix6d steep = 1e4 * hessian();
-  const Counted alone(bottom(), frame(), steep), with(bottom(), frame(), steep), coarser(bottom(), frame(), 0.8 * steep);
+  const Counted alone(bottom(), frame(), steep), with(bottom(), frame(), steep),
+      coarser(bottom(), frame(), 0.8 * steep);
   const PredictedCovariance without_it(alone, pose, about), with_it(with, pose, about, &coarser);
   EXPECT_EQ(*without_it.covariance(), *with_it.covariance()) << "values that matter are the cost's own";
   EXPECT_LT(with.asked, alone.asked - 4);

@@ -3,8 +3,8 @@
 #include <marrow/domain/functions.hpp>
 #include <marrow/domain/pose.hpp>
 
-#include "marrow/toolbox/match/views_cost.hpp"
 #include "marrow/domain/decompositions.hpp"
+#include "marrow/toolbox/match/views_cost.hpp"
 #include "tests/plugins/similarity/blob_scene.hpp"
 
 namespace grey_derivatives_test {
