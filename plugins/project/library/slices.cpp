@@ -212,7 +212,8 @@ struct Lattice {
   /// At most `finest` apart: the next smaller one of eight steps an octave.
   Lattice(double finest, double source, double middle) : offset(source / middle) {
     const double voxels = std::max(finest * std::abs(middle), kFinest);
-    step = std::exp2(std::floor(8 * std::log2(voxels)) / 8) / std::abs(middle);
+    constexpr double kTie = 1e-9;  // the last digits of a depth in another world must not decide
+    step = std::exp2(std::floor(8 * std::log2(voxels) + kTie) / 8) / std::abs(middle);
   }
   /// Two steps before the last one that is not above a slope.
   double before(double slope) const { return (std::floor((slope + offset) / step) - 2) * step - offset; }
