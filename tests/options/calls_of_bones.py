@@ -36,7 +36,10 @@ def calls(s):
     )
     made.update({"mesh.%s" % name: lambda: ({"field": s.two_parts}, {}) for name in ("delaunay", "poisson")})
     made.update(
-        {"project.%s" % n: lambda: ({"volume": s.volume, "field": s.field}, {}) for n in ("joseph", "ray_casting")}
+        {
+            "project.%s" % n: lambda: ({"volume": s.volume, "field": s.field}, {})
+            for n in ("joseph", "opencl", "ray_casting")
+        }
     )
     made.update(
         {

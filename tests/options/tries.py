@@ -115,7 +115,11 @@ TRIES = {
     "camera.check.pixel_mm": one(source_to_detector_mm=1000, to=1),
     "camera.check.detector_mm": one(pixel_mm=1.9, to=100),
     # Voxels that are softer than this within the bone's margin.
-    **{"project.%s.below_hu" % name: one(to=300) for name in ("joseph", "lightfield", "ray_casting", "siddon_jacobs")},
+    **{
+        "project.%s.below_hu" % name: one(to=300)
+        for name in ("joseph", "lightfield", "opencl", "ray_casting", "siddon_jacobs")
+    },
+    "project.opencl.device": one(to="no such device"),
     "project.lightfield.max_memory_mb": one(ray_spacing_mm=5, direction_spacing_deg=3, to=1),
     "evaluate.projection_distance.source_to_detector_mm": one(to=[1000]),
     "fracture.misalignment.fracture_mm": one(to=[0, 0, 40]),
