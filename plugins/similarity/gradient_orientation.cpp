@@ -15,13 +15,16 @@ struct Options : marrow::match::IntensityOptions {
   Options() { has_blocks = false; }
 };
 
-/// The median length of the gradients that count and are not zero.
+/// The median length of the gradients that count and are not zero but for rounding.
 double median_length(const std::vector<float>& u, const std::vector<float>& v, const std::vector<char>& counts) {
+  constexpr double kRounding = 1e-4;  // of the longest
   std::vector<double> lengths;
   for (std::size_t i = 0; i < u.size(); ++i)
-    if (counts[i] && (u[i] != 0 || v[i] != 0)) lengths.push_back(std::hypot(u[i], v[i]));
+    if (counts[i]) lengths.push_back(std::hypot(u[i], v[i]));
   if (lengths.empty()) return INFINITY;
-  return marrow::quantile_in_place(lengths, 0.5);
+  const double longest = *std::max_element(lengths.begin(), lengths.end());
+  std::erase_if(lengths, [&](double length) { return !(length > kRounding * longest); });
+  return lengths.empty() ? INFINITY : marrow::quantile_in_place(lengths, 0.5);
 }
 
 /// Mean of (1 - cos(angle)) / 2 over the pixels where both gradients are longer than their medians. If these are less

@@ -93,7 +93,7 @@ def calls(s):
                 ),
                 {},
             ),
-            "similarity.gradient_projection": lambda: (views_and(mesh=s.mesh, volume=s.volume), {}),
+            "similarity.gradient_projection": lambda: (views_and(model=s.mesh, volume=s.volume), {}),
             "similarity.ray_to_surface": lambda: (
                 views_and(
                     field=s.field,

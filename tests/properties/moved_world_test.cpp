@@ -56,12 +56,12 @@ double allowed(const std::string& node, const Change& change) {
     if (node == "similarity.ray_to_surface") return kInfinite;  // every second edge pixel, counted from the left
     // Every second pixel is compared, from the left of the bone on. A search goes another way. A mirrored triangle is
     // sampled at other points.
-    return kind == "similarity" ? 250000 : is_search ? 500000 : 50000;
+    return kind == "similarity" ? 250000 : is_search ? 700000 : 50000;
   }
   if (is_cut && is_of_whole_image(node)) return kInfinite;
   // Pixels of an outline are floats of 32 bits. Their last digits send a search another way; it ends within a last
   // step.
-  if (is_cut && is_search) return 100000;
+  if (is_cut && is_search) return 200000;
   if (is_cut && kind == "shaft") return 30000;  // places along a border are counted in whole pixels of the image
   if (node == "register.icp") return 500;       // nearest points are searched for in floats of 32 bits
   return is_cut || is_search || node == "similarity.with_prior" ? 50 : 1;  // points of an outline are such floats, too

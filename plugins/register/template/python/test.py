@@ -28,7 +28,7 @@ class NewNode(unittest.TestCase):
         cost = marrow.similarity.gradient_correlation(projector=drr, views=views)
         off = np.array(turned(marrow.Pose(np.eye(4)), 4).matrix)
         off[:3, 3] = 2, 0, 0
-        found = new_node(cost, cost, marrow.optimizer.bobyqa(), marrow.Pose(off), turns_deg=[-4.0, 0.0])
+        found = new_node(cost, cost, marrow.optimizer.levenberg_marquardt(), marrow.Pose(off), turns_deg=[-4.0, 0.0])
         np.testing.assert_allclose(found.pose.matrix[:3, 3], 0, atol=0.3)
         np.testing.assert_allclose(found.pose.matrix[:3, :3], np.eye(3), atol=0.03)
 
