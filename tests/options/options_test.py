@@ -20,9 +20,10 @@ CALLS = {}
 for module in (calls_of_bones, calls_of_simulation, calls_of_files, calls_of_programs):
     CALLS.update(module.calls(SCENE))
 # Options that change no output, each with the reason.
+BESIDE_BONE = "squares that do not show the bone do not count, and a margin of one is always there"
 NO_EFFECT = {
-    "similarity.%s.margin_px" % node: "squares that do not show the bone do not count, and a margin of one is always there"
-    for node in ("patch_correlation", "patch_gradient_correlation")
+    "similarity.patch_correlation.margin_px": BESIDE_BONE,
+    "similarity.patch_gradient_correlation.margin_px": BESIDE_BONE,
 }
 OF_TESTS = ("test.", "parse.test_")
 NODES = {name: marrow._core.node_info(name) for name in marrow._core.node_names() if not name.startswith(OF_TESTS)}

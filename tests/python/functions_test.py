@@ -169,7 +169,7 @@ class Projectors(Written):
         self.assertEqual(seen[0, 0], 0)
         every_fourth = projector(camera(), marrow.Pose(numpy.eye(4)), step_px=4)
         self.assertEqual(every_fourth.shape, (24, 32))
-        self.assertLess(numpy.abs(every_fourth - seen[::4, ::4]).max(), 3)  # steep at the border
+        self.assertLess(numpy.abs(every_fourth - seen[::4, ::4]).max(), 4.5)  # steep at the border
         with self.assertRaisesRegex(marrow.Error, "step_px: expected a positive number, got 0.0"):
             projector(camera(), numpy.eye(4), step_px=0)
         with self.assertRaisesRegex(marrow.Error, "camera: expected a marrow.Camera or a marrow.View"):
