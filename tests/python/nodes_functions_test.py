@@ -146,7 +146,7 @@ class Functions(Written):
         """Levels, blocks of the images and so the predicted deviations are those of the cost inside."""
         case = marrow.read.case(path=str(small_case()[0]))
         bone = marrow.segment.threshold(case.ct, case.seeds)["distal"]
-        drr = marrow.project.joseph(volume=case.ct, field=bone)
+        drr = marrow.project.siddon_jacobs(volume=case.ct, field=bone)  # no derivatives, which Python does not get
         plain = marrow.similarity.gradient_correlation(projector=drr, views=case.views)
         optimizer = marrow.optimizer.nelder_mead()
         start = marrow.Pose(case.truth["distal"].matrix)
