@@ -128,8 +128,8 @@ class Shipped(Case):
 
 
 class RealWrist(Case):
-    """These poses were found before the wrist was read as a trial: the radius in frame 0002 by grey values, and that of
-    the third metacarpal in frame 0158, which has a neighbour."""
+    """These poses were found before the wrist was read as a trial, by another optimizer. 0.1 to 0.2 degrees lie between
+    them, a fifth of what is predicted about the long axis."""
 
     def registered(self, trial, bone, frame, start):
         out = self.scratch / bone
@@ -147,7 +147,7 @@ class RealWrist(Case):
             found = self.registered(trial, bone, frame, "%s-%s.pose.yaml" % (name, frame))
             for i in range(3):
                 for k in range(4):
-                    self.assertAlmostEqual(found[i][k], known[i][k], delta=0.05 if k == 3 else 0.001)
+                    self.assertAlmostEqual(found[i][k], known[i][k], delta=0.1 if k == 3 else 0.004)
 
     def test_the_cameras(self):
         trial = real_trial(self.scratch / "wrist")
