@@ -182,6 +182,7 @@ void batches(const Catalogue& catalogue, const Volume& volume) {
       std::printf(
           "thigh  64 poses%s, 512 x 512: joseph %.2f s, %.2f s of processors; opencl %.2f and %.2f times these\n",
           with_slopes ? " with derivatives" : "", theirs[0], theirs[1], ours[0] / theirs[0], ours[1] / theirs[1]);
+      std::fflush(stdout);
     }
   }
 }
