@@ -54,9 +54,13 @@ struct Prepared {
            const std::set<std::string>& of_ct, const std::vector<marrow::Override>& overrides = {})
       : catalogue(all), pipeline(read(all, file, "pose", {{"case", "in memory"}}, overrides)) {
     settings.threads = 2;
-    settings.given["case"] = {Value::of(std::make_shared<const marrow::Volume>(data.ct)),
-                              Value::of(data.seeds, "fragment"), Value::of(data.views, "view"),
-                              Value::of(data.start, "fragment"), Value::of(data.truth, "fragment")};
+    std::map<std::string, Value> of_case{{"ct", Value::of(std::make_shared<const marrow::Volume>(data.ct))},
+                                         {"seeds", Value::of(data.seeds, "fragment")},
+                                         {"views", Value::of(data.views, "view")},
+                                         {"start", Value::of(data.start, "fragment")},
+                                         {"truth", Value::of(data.truth, "fragment")}};
+    for (const marrow::PortInfo& port : all.find("read.case")->outputs)
+      settings.given["case"].push_back(of_case[port.name]);
     const marrow::RunResult first = run(pipeline, catalogue, settings);
     for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
       if (of_ct.count(pipeline.nodes[i].id)) settings.given[pipeline.nodes[i].id] = first.nodes[i].outputs;
