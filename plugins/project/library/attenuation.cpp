@@ -164,12 +164,16 @@ Attenuation attenuation_of(const Volume& volume, const SignedField* field, const
   auto [first, last] = voxels.box();
   Attenuation attenuation;
   attenuation.grid = volume.grid;
-  if (last[0] < first[0]) first = last = {0, 0, 0};  // one voxel that does not attenuate
+  const bool is_empty = last[0] < first[0];
+  if (is_empty) first = last = {0, 0, 0};  // one voxel that does not attenuate
+  attenuation.first = first, attenuation.last = last;
   // With a border of empty voxels where the CT goes on: the attenuation ends between them and the last that attenuate.
   for (std::size_t k = 0; k < 3; ++k) {
     first[k] = std::max(first[k] - 1, 0);
     last[k] = std::min(last[k] + 1, volume.grid.size[k] - 1);
     attenuation.grid.size[k] = last[k] - first[k] + 1;
+    attenuation.first[k] -= first[k];
+    attenuation.last[k] = is_empty ? -1 : attenuation.last[k] - first[k];
   }
   attenuation.grid.origin_mm = volume.grid.point_from_index({double(first[0]), double(first[1]), double(first[2])});
   attenuation.thousandths.resize(attenuation.grid.count());
@@ -179,7 +183,6 @@ Attenuation attenuation_of(const Volume& volume, const SignedField* field, const
         attenuation.thousandths[attenuation.grid.offset(x, y, z)] =
             voxels.at(volume.grid.offset(x + first[0], y + first[1], z + first[2]));
   });
-  find_box(attenuation);
   return attenuation;
 }
 

@@ -29,10 +29,6 @@ void all_around(const char* row, std::ptrdiff_t down, int count, char* __restric
   }
 }
 
-}  // namespace
-
-namespace {
-
 /// Sobel's gradients of a whole picture.
 void gradients_of(const std::vector<float>& values, const Patch& patch, std::vector<float>& u, std::vector<float>& v) {
   u.assign(values.size(), 0.0f);
