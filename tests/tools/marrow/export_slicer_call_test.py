@@ -119,7 +119,8 @@ class Called(Export):
             "warning: pose: is odd\n"
             "<filter-progress>%.3f</filter-progress>\n"
             "<filter-end>\n<filter-name>pose (a&lt;b)</filter-name>\n<filter-time>1.500</filter-time>\n</filter-end>\n"
-            "verdict (distal): doubtful: x; y\n" % (1 / total),
+            "verdict (distal): doubtful: x; y\n"
+            "<filter-progress>1.000</filter-progress>\n" % (1 / total),
         )
 
     def test_faults_of_a_call(self):
