@@ -8,5 +8,6 @@ MARROW_PLUGIN(plugin) {
       .summary("edge pixels of an X-ray view")
       .in<marrow::View>("view", "X-ray view")
       .out<marrow::EdgeMap>("edges", "edge pixels at sub-pixel positions")
+      .runs_apart(marrow::Apart::computes)
       .suite(marrow::conformance::edges_suite());
 }

@@ -12,5 +12,6 @@ MARROW_PLUGIN(plugin) {
       .in<marrow::Volume>("label", "mask of each fragment: 1 inside, 0 outside", marrow::over("fragment"))
       .out<marrow::SignedField>("field", "signed distance to the outer surface of each wanted fragment",
                                 marrow::over("fragment"))
+      .runs_apart(marrow::Apart::computes)
       .suite(marrow::conformance::segment_suite());
 }

@@ -47,6 +47,7 @@ from .annotations import (
     at_least_one,
     at_most,
     below,
+    beside,
     distinct,
     exactly_one,
     figures,

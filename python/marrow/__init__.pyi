@@ -33,6 +33,7 @@ from .annotations import at_least as at_least
 from .annotations import at_least_one as at_least_one
 from .annotations import at_most as at_most
 from .annotations import below as below
+from .annotations import beside as beside
 from .annotations import distinct as distinct
 from .annotations import exactly_one as exactly_one
 from .annotations import figures as figures

@@ -11,6 +11,7 @@ __all__ = [
     "at_most",
     "unit",
     "length",
+    "beside",
     "replaces",
     "over",
     "named",
@@ -55,6 +56,12 @@ def length(count: int) -> Note:
 def replaces(*options: str) -> Note:
     """Options of the nodes whose functions reach this node: what a pipeline gives to such a node has no effect here."""
     return Note("replaces", list(options))
+
+
+def beside(*endings: str) -> Note:
+    """Endings, as ".onnx", of files that lie beside the file of an option of type pathlib.Path and have its name
+    otherwise. They count in the key of the result by their content, and the node may open them."""
+    return Note("beside", list(endings))
 
 
 def over(axis: str) -> Note:

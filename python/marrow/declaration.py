@@ -236,6 +236,7 @@ def _option(where: str, name: str, default: Any, hint: Any) -> Tuple[Dict[str, A
     option = {"name": name, "help": notes.get("help", ""), "type": known[of], "required": required}
     option["unit"] = notes.get("unit", _UNITS.get(name.rpartition("_")[2], "") if "_" in name else "")
     option.update({"default": value, "choices": choices, "length": count, "replaces": notes.get("replaces", [])})
+    option["beside"] = notes.get("beside", [])
     option.update({key: notes[key] for key in ("minimum", "maximum") if key in notes})
     return option, of
 

@@ -22,7 +22,8 @@ struct Landmarks {
   struct Seen {
     std::string name, view;
     Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
-    using fields = Fields<&Seen::name, &Seen::view, &Seen::pixel>;
+    double deviation_px = 0;  ///< standard deviation of each coordinate; 0: not known
+    using fields = Fields<&Seen::name, &Seen::view, &Seen::pixel, &Seen::deviation_px>;
   };
   /// A point as a tracking system measured it, in world coordinates.
   struct Tracked {

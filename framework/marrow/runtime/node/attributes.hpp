@@ -18,7 +18,7 @@ struct Over {
 };
 /// A property of an option. The texts must live until the option is declared.
 struct Attribute {
-  enum class Type { minimum, maximum, unit, choices, required, replaces };
+  enum class Type { minimum, maximum, unit, choices, required, replaces, beside };
   Type type = Type::required;
   double number = 0;
   std::string_view text = {};
@@ -42,6 +42,12 @@ inline Attribute required() { return {}; }
 /// If a pipeline gives both, `marrow check` prints a note.
 inline Attribute replaces(std::initializer_list<std::string_view> names) {
   return {.type = Attribute::Type::replaces, .names = names};
+}
+
+/// Beside the file that this option of type path names lie files that belong to it. They have its name, but these
+/// endings: ".onnx". They count in the key of the result by their content, and the node may open them.
+inline Attribute beside(std::initializer_list<std::string_view> endings) {
+  return {.type = Attribute::Type::beside, .names = endings};
 }
 
 /// The number of option `low` must not be above that of option `high`.

@@ -88,6 +88,15 @@ void check_replaces(const NodeInfo& node, const OptionInfo& option, std::vector<
   }
 }
 
+void check_beside(const OptionInfo& option, std::vector<std::string>& faults) {
+  const std::string what = "option '" + option.name + "': beside: ";
+  if (!option.beside.empty() && option.type != OptionType::path)
+    faults.push_back(what + "files can lie beside an option of type path only");
+  for (const std::string& ending : option.beside)
+    if (ending.size() < 2 || ending[0] != '.' || ending.find('/') != std::string::npos)
+      faults.push_back(what + "an ending begins with a dot, as .onnx, but this is '" + ending + "'");
+}
+
 const std::string& name_of(const std::string& name) { return name; }
 template <class Item>
 const std::string& name_of(const Item& item) {
@@ -182,6 +191,7 @@ void check_declaration(NodeDefinition& node) {
   for (const OptionInfo& option : info.options) {
     check_option(option, faults);
     check_replaces(info, option, faults);
+    check_beside(option, faults);
   }
   for (const RelationInfo& relation : info.relations) check_relation(info, relation, faults);
   check_names(info.traits, "trait", faults);

@@ -57,6 +57,7 @@ struct OptionInfo {
   std::vector<std::string> choices;
   std::size_t length = 0;             ///< how many numbers a list must have; 0 = any
   std::vector<std::string> replaces;  ///< options of nodes whose functions reach this node, which then have no effect
+  std::vector<std::string> beside;    ///< endings of files beside the named one that belong to it: ".onnx"
 };
 
 /// Conditions between the options of a node.

@@ -142,7 +142,7 @@ class NodeBuilder {
   }
 
   /// An option, bound to a member of the options struct. Its default is the value of the member in a
-  /// default-constructed struct. Attributes: at_least, at_most, one_of, unit, required, replaces.
+  /// default-constructed struct. Attributes: at_least, at_most, one_of, unit, required, replaces, beside.
   template <class M, class O, class... Attributes>
   NodeBuilder& option(std::string_view name, M O::*member, std::string_view help, const Attributes&... attributes) {
     static_assert(std::is_base_of_v<O, Options>, "the option is not a member of the node's options struct");

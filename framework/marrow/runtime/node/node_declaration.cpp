@@ -40,6 +40,9 @@ void apply(OptionInfo& option, const Attribute& attribute) {
     case Attribute::Type::replaces:
       option.replaces.assign(attribute.names.begin(), attribute.names.end());
       break;
+    case Attribute::Type::beside:
+      option.beside.assign(attribute.names.begin(), attribute.names.end());
+      break;
   }
 }
 

@@ -23,7 +23,7 @@
   OF(View, "view", 1)                \
   OF(EdgeMap, "edge_map", 1)         \
   OF(ShaftLines, "shaft_lines", 2)   \
-  OF(Landmarks, "landmarks", 1)      \
+  OF(Landmarks, "landmarks", 2)      \
   OF(Pose, "pose", 3)                \
   OF(Truth, "truth", 1)              \
   OF(Metrics, "metrics", 1)          \

@@ -77,6 +77,9 @@ std::vector<std::string> paths_of(const PipelineNode& node, std::size_t option) 
   const OptionType type = node.info.options[option].type;
   if (type == OptionType::path) paths = {std::get<std::string>(node.options[option])};
   if (type == OptionType::paths) paths = std::get<std::vector<std::string>>(node.options[option]);
+  if (type == OptionType::path && !paths[0].empty())
+    for (const std::string& ending : node.info.options[option].beside)
+      paths.push_back(fs::path(paths[0]).replace_extension(ending).string());
   std::error_code error;
   if (type == OptionType::path && names_files(node, node.info.options[option]) && fs::is_regular_file(paths[0], error))
     paths.push_back(fs::path(paths[0]).parent_path().string());

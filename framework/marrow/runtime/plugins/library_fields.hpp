@@ -55,10 +55,10 @@ const char* visit_fields(T& of, const Function& field) {
         field("figures", figures);
     return "a port";
   } else if constexpr (std::is_same_v<Type, OptionInfo>) {
-    auto& [name, help, unit, type, default_value, required, minimum, maximum, choices, length, replaces] = of;
+    auto& [name, help, unit, type, default_value, required, minimum, maximum, choices, length, replaces, beside] = of;
     field("name", name), field("help", help), field("unit", unit), field("type", type), field("default", default_value),
         field("required", required), field("minimum", minimum), field("maximum", maximum), field("choices", choices),
-        field("length", length), field("replaces", replaces);
+        field("length", length), field("replaces", replaces), field("beside", beside);
     return "an option";
   } else if constexpr (std::is_same_v<Type, RelationInfo>) {
     auto& [type, names] = of;
