@@ -77,9 +77,8 @@ TEST(Inference, PlacesAStridedMapAtTheMiddleOfItsPixels) {
 }
 
 TEST(Inference, AppliesTheActivation) {
-  const std::string description =
-      with(kPlain, "edge_strength: {layer: maps, activation: none}",
-           "classes: {layer: maps, names: [a, b, c], activation: softmax}");
+  const std::string description = with(kPlain, "edge_strength: {layer: maps, activation: none}",
+                                       "classes: {layer: maps, names: [a, b, c], activation: softmax}");
   const Written written(
       Convolution{.side = 1, .weights = {1, 0, 0}, .bias = {0, std::log(2.0f), std::log(3.0f)}}.bytes(), description);
   const std::vector<cv::Mat> maps = maps_of(written, {cv::Mat1f(9, 9, 0.0f)});
@@ -101,7 +100,7 @@ TEST(Inference, SaysWhatIsWrongWithAModel) {
   const auto expect = [](const std::string& said, const std::string& part) {
     EXPECT_NE(said.find(part), std::string::npos) << said;
   };
-  expect(fault_of(""), "plain.onnx: is empty");
+  expect(fault_of(""), "plain.onnx: the file is empty");
   expect(fault_of("PK not a network"), "plain.onnx: is no ONNX model, or a damaged one; export it again");
   expect(fault_of(good.bytes().substr(0, 90)), "is no ONNX model, or a damaged one");
   Convolution unknown = good;
@@ -115,10 +114,12 @@ TEST(Inference, SaysWhatIsWrongWithAModel) {
   Convolution colours = good;
   colours.channels = 3;
   colours.weights.resize(27);
-  expect(fault_of(colours.bytes()), "the network does not take a tile of 32 x 32 px with 1 channel, as plain.yaml says");
+  expect(fault_of(colours.bytes()),
+         "the network does not take a tile of 32 x 32 px with 1 channel, as plain.yaml says");
   Convolution diverged = good;
   diverged.weights[4] = std::nanf("");
-  expect(fault_of(diverged.bytes()), "has values that are not finite (NaN or infinity); the training may have diverged");
+  expect(fault_of(diverged.bytes()),
+         "has values that are not finite (NaN or infinity); the training may have diverged");
 }
 
 }  // namespace inference_test

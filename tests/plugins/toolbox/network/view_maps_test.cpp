@@ -39,7 +39,8 @@ TEST(Normalised, FollowsItsMethod) {
   network::Input dark = input_by(Normalisation::Method::percentiles, 0, 100);
   dark.bone_is_bright = false;
   EXPECT_NEAR(at(network::normalised(values, counts, dark), 1), 2.0 / 3, 1e-6);
-  const cv::Mat constant = network::normalised(cv::Mat1f(3, 3, 7.0f), {}, input_by(Normalisation::Method::percentiles, 1, 99));
+  const cv::Mat constant =
+      network::normalised(cv::Mat1f(3, 3, 7.0f), {}, input_by(Normalisation::Method::percentiles, 1, 99));
   EXPECT_EQ(cv::norm(constant, cv::NORM_INF), 0);
 }
 
@@ -101,10 +102,10 @@ TEST(ViewMaps, HavePixelsOfTheSizeAtTheBone) {
 TEST(NetworkNodes, KeepWhatTheNetworkSees) {
   View view = edges::drawn(160, [](double u, double v) {
     const bool left = std::hypot(u - 45, v - 80) < 25, right = std::hypot(u - 115, v - 80) < 25;
-    return left ? 20000.0 : right ? 10000.0 : 40000.0;  // the line integrals are 0.69 and 1.39
+    return left ? 26800.0 : right ? 10000.0 : 40000.0;  // the line integrals are 0.40 and 1.39
   });
-  // Nearly 1 above a line integral of 1, nearly 0 below.
-  const Written written(Convolution{.side = 1, .weights = {100}, .bias = {-100}}.bytes(),
+  // Nearly 1 above a line integral of 0.5, nearly 0 below.
+  const Written written(Convolution{.side = 1, .weights = {100}, .bias = {-50}}.bytes(),
                         with(with(kPlain, "activation: none", "activation: sigmoid"), "grey_values", "line_integrals"));
   const auto option = [&] { return shipped::Options{{"network", written.file().string()}}; };
   const EdgeMap edges =
@@ -117,9 +118,8 @@ TEST(NetworkNodes, KeepWhatTheNetworkSees) {
                         with(with(kPlain, "edge_strength: {layer: maps, activation: none}",
                                   "classes: {layer: maps, names: [bone, metal], activation: softmax}"),
                              "grey_values", "line_integrals"));
-  shipped::Options options{{"network", classes.file().string()},
-                           {"leave_out", std::vector<std::string>{"metal"}},
-                           {"margin_px", 2}};
+  shipped::Options options{
+      {"network", classes.file().string()}, {"leave_out", std::vector<std::string>{"metal"}}, {"margin_px", 2}};
   const auto masked = [&] {
     return shipped::call("mask.network", {{"view", shipped::item(view)}}, options).at("view").as<View>().mask;
   };
