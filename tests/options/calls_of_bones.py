@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the nodes are called that make models, features and poses: (inputs, options) by the node's name."""
 
+from files_of_scene import network
+
 GREY_VALUES = (  # costs that compare a radiograph with the image
     "entropy_of_difference",
     "gradient_correlation",
@@ -178,6 +180,12 @@ def calls(s):
             ),
             "verdict.predicted": lambda: ({"pose": s.found.pose, "model": s.mesh, "prior": s.known}, {}),
             "mask.body": lambda: ({"view": s.views["frontal"], "projector": s.drr, "pose": s.start}, {}),
+            "mask.metal": lambda: ({"view": s.views["frontal"]}, {"low": 0.2, "high": 0.3}),
+            "mask.network": lambda: (
+                {"view": s.views["frontal"]},
+                {"network": network(classes=("metal", "outside")), "leave_out": ["metal"]},
+            ),
+            "edges.network": lambda: ({"view": s.views["frontal"]}, {"network": network(), "threshold": 4}),
             "mask.near_holes": lambda: (
                 {"view": s.views["frontal"], "implant": s.nail.implant, "pose": s.nailed.start},
                 {},

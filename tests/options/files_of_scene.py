@@ -2,6 +2,7 @@
 """Files for the nodes that read some, written by a pipeline."""
 import pathlib
 
+from harness import onnx
 from harness.formats import mha, straight
 from harness.package import SCRATCH, SOURCE, marrow
 
@@ -58,4 +59,35 @@ def labels_of(first, second):
     values = [0] * 125
     values[62], values[63] = first, second
     path.write_bytes(mha(straight((5, 5, 5)), values))
+    return str(path)
+
+
+NETWORK = """marrow-network: 1
+name: written
+help: a network of one convolution
+version: 1.0.0
+licence: Apache-2.0
+trained: {on: nothing, good_for: tests, not_for: anything else}
+input:
+  values: line_integrals
+  bone: bright
+  pixel_mm: 4
+  normalise: {method: percentiles, low: 1, high: 99}
+  size_px: [32, 32]
+  overlap_px: 8
+outputs:
+  edge_strength: {layer: maps, activation: sigmoid}
+"""
+
+
+def network(least=0.5, classes=()):
+    """The description of a network that sees a border, or the classes in turn, the more the denser the surroundings."""
+    path = pathlib.Path(SCRATCH / ("network-%s-%s.yaml" % (least, "-".join(classes))))
+    text, count = NETWORK, max(1, len(classes))
+    if classes:
+        text = text.replace("edge_strength: {layer: maps,", "classes: {layer: maps, names: [%s]," % ", ".join(classes))
+    weights = [[[[(1 + k) / 3] * 3] * 3] for k in range(count)]
+    layer, tensors = onnx.convolution("image", "maps", weights, [-3 * least * (1 + k) - k for k in range(count)])
+    path.write_text(text)
+    path.with_suffix(".onnx").write_bytes(onnx.model([layer], tensors, {"maps": (count, 32, 32)}, 32, 32))
     return str(path)

@@ -16,8 +16,8 @@ trained: {on: nothing, good_for: tests, not_for: anything else}
 input:
   values: line_integrals
   bone: bright
-  pixel_px: 2
-  normalise: {method: percentiles, low: 1, high: 99}
+  pixel_px: 1
+  normalise: {method: fixed, low: 0, high: 1}
   size_px: [64, 64]
   overlap_px: 16
 outputs:
@@ -25,11 +25,10 @@ outputs:
 """
 
 
-def write(folder, channels, outputs):
-    """A network that gives each channel as this constant everywhere. Returns the description's file."""
-    weights = [[[[0.0]]] for _ in channels]
-    layer, tensors = onnx.convolution("image", "maps", weights, channels)
-    (folder / "written.onnx").write_bytes(onnx.model([layer], tensors, {"maps": (len(channels), 64, 64)}, 64, 64))
+def write(folder, weights, biases, outputs):
+    """A network whose channels are weight * image + bias. Returns the description's file."""
+    layer, tensors = onnx.convolution("image", "maps", [[[[weight]]] for weight in weights], biases)
+    (folder / "written.onnx").write_bytes(onnx.model([layer], tensors, {"maps": (len(biases), 64, 64)}, 64, 64))
     (folder / "written.yaml").write_text(DESCRIPTION % outputs)
     return folder / "written.yaml"
 
@@ -45,13 +44,21 @@ class Suites(unittest.TestCase):
         self.folder = pathlib.Path(scratch.name)
 
     def test_edges(self):
-        file = write(self.folder, [1.0], "edge_strength: {layer: maps, activation: none}")
+        file = write(self.folder, [0.0], [1.0], "edge_strength: {layer: maps, activation: none}")
         checked = conformance("edges.network", "--set", "network=%s" % file, "--set", "threshold=4")
         self.assertEqual(checked.returncode, 0, checked.stdout)
         self.assertNotIn("n/a", checked.stdout)
 
+    def test_mask(self):
+        # Metal where the line integral is above 2.1, which no bone of the suite reaches.
+        classes = "classes: {layer: maps, names: [other, metal], activation: softmax}"
+        file = write(self.folder, [0.0, 50.0], [0.0, -105.0], classes)
+        checked = conformance("mask.network", "--set", "network=%s" % file, "--set", "leave_out=[metal]")
+        self.assertEqual(checked.returncode, 0, checked.stdout)
+        self.assertNotIn("n/a", checked.stdout)
+
     def test_a_network_that_sees_nothing_fails(self):
-        file = write(self.folder, [0.0], "edge_strength: {layer: maps, activation: none}")
+        file = write(self.folder, [0.0], [0.0], "edge_strength: {layer: maps, activation: none}")
         checked = conformance("edges.network", "--set", "network=%s" % file, "--check", "disc_missed")
         self.assertEqual(checked.returncode, 1, checked.stdout)
         self.assertIn("FAIL disc_missed                100 %, limit 3", checked.stdout)
