@@ -16,7 +16,7 @@ using namespace marrow;
 
 struct Options {
   std::vector<std::string> leave_out{"metal", "outside"};
-  double low = 0.5, high = 1;
+  double contrast_low = 0.5, contrast_high = 1;
   double window_mm = 40;
   int margin_px = 3;
 };
@@ -64,8 +64,8 @@ View metal(const View& view, const Options& options, Context& context) {
   cv::Mat left_out = cv::Mat::zeros(image.values.size(), CV_8U);
   for (const std::string& what : options.leave_out) {
     if (what == "metal")
-      left_out |= by_hysteresis(above_surroundings(-image.values, window_px(view, options.window_mm)), options.low,
-                                options.high);
+      left_out |= by_hysteresis(above_surroundings(-image.values, window_px(view, options.window_mm)),
+                                options.contrast_low, options.contrast_high);
     else if (what == "outside")
       left_out |= image.usable == 0;
     else
@@ -91,9 +91,10 @@ MARROW_PLUGIN(plugin) {
       .out("view", "the same view; its mask is 0 where these are, and where it was 0 before")
       .option("leave_out", &Options::leave_out, "what does not count: metal, outside")
       .relation(at_least_one({"leave_out"}))
-      .option("low", &Options::low, "metal: line integral above the median of the window, at its border", at_least(0))
-      .option("high", &Options::high, "metal: the same, which it reaches somewhere", at_least(0))
-      .relation(not_above("low", "high"))
+      .option("contrast_low", &Options::contrast_low,
+              "metal: line integral above the median of the window, at its border", at_least(0))
+      .option("contrast_high", &Options::contrast_high, "metal: the same, which it reaches somewhere", at_least(0))
+      .relation(not_above("contrast_low", "contrast_high"))
       .option("window_mm", &Options::window_mm, "side of the window, at the world's origin; wider than the metal",
               at_least(1), at_most(1000))
       .option("margin_px", &Options::margin_px, "pixels this near are left out, too", at_least(0), at_most(100));

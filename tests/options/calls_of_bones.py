@@ -180,7 +180,7 @@ def calls(s):
             ),
             "verdict.predicted": lambda: ({"pose": s.found.pose, "model": s.mesh, "prior": s.known}, {}),
             "mask.body": lambda: ({"view": s.views["frontal"], "projector": s.drr, "pose": s.start}, {}),
-            "mask.metal": lambda: ({"view": s.views["frontal"]}, {"low": 0.2, "high": 0.3}),
+            "mask.metal": lambda: ({"view": s.views["frontal"]}, {"contrast_low": 0.2, "contrast_high": 0.3}),
             "mask.network": lambda: (
                 {"view": s.views["frontal"]},
                 {"network": network(classes=("metal", "outside")), "leave_out": ["metal"]},
