@@ -31,11 +31,10 @@ struct Result {
   Pose pose, other;
 };
 
-/// Small triangles cost time and do not change what is seen at this size.
-Mesh coarse(const Mesh& mesh) {
-  constexpr std::size_t kMostTriangles = 8000;
+/// Merged triangles make the surface a little smaller, which is no matter for the coarse silhouettes.
+Mesh with_at_most(std::size_t triangles, const Mesh& mesh) {
   Mesh result = mesh;
-  while (result.triangles.size() > kMostTriangles) {
+  while (result.triangles.size() > triangles) {
     const std::size_t before = result.triangles.size();
     result = geometry::coarse_surface(result, std::vector<char>(result.vertices_mm.size(), 0)).mesh;
     if (result.triangles.size() == before) break;
@@ -127,13 +126,13 @@ Pose pose_of(const Fitted& fit, const FragmentFrame& frame) {
 Result silhouette(const Mesh& model, const List<View>& silhouettes, const Options& options, Context& context) {
   check_mesh(model, "model");
   if (silhouettes.empty()) throw Error(std::string(kNode) + ": there are no silhouettes");
-  const Mesh surface = coarse(model);
+  const Mesh coarse = with_at_most(8000, model), surface = with_at_most(300000, model);
   const FragmentFrame frame = fragment_frame(model);
   const std::vector<SeenSilhouette> views = whole_silhouettes(silhouettes, kCoarse_px, &context),
                                     fine = whole_silhouettes(silhouettes, kFine_px, nullptr);
-  const std::vector<RigidTransform> candidates = candidates_of(views, surface, options, context);
+  const std::vector<RigidTransform> candidates = candidates_of(views, coarse, options, context);
   context.progress(0.5, "shapes compared");
-  const std::vector<Fitted> fits = all_fitted(views, surface, frame, candidates, 12, context);
+  const std::vector<Fitted> fits = all_fitted(views, coarse, frame, candidates, 12, context);
   const std::vector<Fitted> last = all_fitted(fine, surface, frame, apart(fits, options.least_apart_deg, 4), 8, context);
   const auto other = std::find_if(last.begin(), last.end(), [&](const Fitted& one) {
     return !are_near(one.world_from_model, last[0].world_from_model, options.least_apart_deg);
