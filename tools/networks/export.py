@@ -30,10 +30,14 @@ def write(network, card, folder):
     )
     size_mb = model.stat().st_size / 1e6
     if size_mb > LARGEST_MB:
-        raise SystemExit("train: %s has %.1f MB, but a network has at most %d; use fewer maps" % (model, size_mb, LARGEST_MB))
+        raise SystemExit(
+            "train: %s has %.1f MB, but a network has at most %d; use fewer maps" % (model, size_mb, LARGEST_MB)
+        )
     worst = difference(network, model, (channels, rows, columns))
     if not worst <= WORST:
-        raise SystemExit("train: OpenCV's values of %s differ from PyTorch's by %g, more than %g" % (model, worst, WORST))
+        raise SystemExit(
+            "train: OpenCV's values of %s differ from PyTorch's by %g, more than %g" % (model, worst, WORST)
+        )
     text = yaml.safe_dump(card, sort_keys=False, width=110, default_flow_style=None, allow_unicode=True)
     (folder / (name + ".yaml")).write_text(text)
     print("%s: %.2f MB, sha256 %s; OpenCV differs from PyTorch by %.1e" % (model, size_mb, digest(model), worst))

@@ -49,7 +49,9 @@ def changed(random, values):
         low = float(values.min())
         values = low + scale * ((values - low) / scale) ** np.float32(np.exp(random.normal(0, 0.25)))
     if random.random() < 0.5:
-        values = values + scale * abs(random.normal(0, 0.12)) * smooth_field(random, values.shape, random.integers(2, 6))
+        values = values + scale * abs(random.normal(0, 0.12)) * smooth_field(
+            random, values.shape, random.integers(2, 6)
+        )
     if random.random() < 0.3:
         values = cv2.GaussianBlur(values, (0, 0), random.uniform(0.4, 1.2))
     if random.random() < 0.6:

@@ -34,7 +34,9 @@ class Progress:
         figures["processor_s"] = round(time.process_time() - self.start, 1)
         with open(self.file, "a") as stream:
             stream.write(json.dumps(figures) + "\n")
-        print("  ".join("%s %s" % (k, "%.4f" % v if isinstance(v, float) else v) for k, v in figures.items()), flush=True)
+        print(
+            "  ".join("%s %s" % (k, "%.4f" % v if isinstance(v, float) else v) for k, v in figures.items()), flush=True
+        )
 
 
 def train(network, batch, loss, judge, *, steps, seed, out, rate=3e-3, looks=10):
