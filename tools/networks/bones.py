@@ -19,6 +19,7 @@ HELP = "classes and borders of bone in X-ray images, from simulated femora"
 KIND = "femur"
 PIXEL_MM = 0.75
 TILE_PX, OVERLAP_PX = (256, 256), 64
+PERCENTILES = (5, 70)  # a collimator may cover a quarter of the image, and air another
 BATCH = 4
 METAL, BONE, OUTSIDE = (simulated.CLASSES.index(name) for name in ("metal", "bone", "outside"))
 CLASS_WEIGHTS = torch.tensor([1.0, 1.0, 3.0, 1.0])
@@ -36,7 +37,7 @@ CARD = {
         "values": "line_integrals",
         "bone": "bright",
         "pixel_mm": PIXEL_MM,
-        "normalise": {"method": "percentiles", "low": 1, "high": 99},
+        "normalise": {"method": "percentiles", "low": PERCENTILES[0], "high": PERCENTILES[1]},
         "size_px": list(TILE_PX),
         "overlap_px": OVERLAP_PX,
     },
@@ -85,7 +86,7 @@ def tile_of(random, plane):
     rows, columns = plane.values.shape
     middle = random.uniform(0.25, 0.75, 2) * (columns, rows)
     matrix = images.random_motion(random, TILE_PX, middle, zoom=1.25)
-    values = images.normalised(images.changed(random, plane.values))
+    values = images.normalised(images.changed(random, plane.values), *PERCENTILES)
     inside = cv2.warpAffine(np.ones_like(plane.classes), matrix, TILE_PX[::-1], flags=cv2.INTER_NEAREST)
     points = plane.borders_px @ matrix[:, :2].T + matrix[:, 2]
     return (
@@ -117,7 +118,7 @@ def loss_of(outputs, classes, borders, inside):
 
 def maps_of(network, plane):
     """Number of the most probable class, and strength of borders, of a whole view."""
-    values = images.normalised(plane.values)
+    values = images.normalised(plane.values, *PERCENTILES)
     rows, columns = values.shape
     wide = cv2.copyMakeBorder(values, 16, 16 + -rows % 16, 16, 16 + -columns % 16, cv2.BORDER_REFLECT_101)
     with torch.no_grad():

@@ -12,7 +12,7 @@ def line_integrals(grey):
     return -np.log(np.clip(grey / max(float(grey.max()), 1e-6), DARKEST, 1))
 
 
-def normalised(values, low=1, high=99):
+def normalised(values, low, high):
     """(value - p_low) / (p_high - p_low), with the percentiles of all pixels. A constant image becomes 0."""
     least, most = np.percentile(values, (low, high))
     if not most > least:

@@ -125,7 +125,8 @@ def settings_of(kind, seed, views, size_px):
     drawn = {"bone.uses": bone["bone"], **clutter_of(random, kind), **motion_of(random, bone)}
     if "femur" in kind:
         drawn["bone.side"] = str(random.choice(["left", "right"]))
-        drawn["bone.isocentre_from_distal_end_mm"] = "%.1f" % random.uniform(*bone["isocentre_mm"])
+        at_knee_mm, anywhere_mm = random.uniform(20, 130), random.uniform(*bone["isocentre_mm"])
+        drawn["bone.isocentre_from_distal_end_mm"] = "%.1f" % (at_knee_mm if random.random() < 0.6 else anywhere_mm)
         drawn["bone.thigh_radius_mm"] = "%.1f" % random.uniform(55, 100)
         drawn["bone.fat_mm"] = "%.1f" % random.uniform(5, 30)
     drawn.update(cameras_of(random, views, bone, size_px))
