@@ -25,7 +25,8 @@ def symmetry_of(points_mm):
     tree, diameter = cKDTree(points_mm), np.ptp(points_mm, axis=0).max()
     found = []
     for normal in np.linalg.eigh(np.cov((points_mm - middle).T))[1].T:
-        mirrored = points_mm - 2 * np.outer((points_mm - middle) @ normal, normal)
+        some = points_mm[:3000]
+        mirrored = some - 2 * np.outer((some - middle) @ normal, normal)
         found.append((float(tree.query(mirrored)[0].mean() / diameter), normal))
     rest, normal = min(found, key=lambda one: one[0])
     return middle, normal, rest
@@ -48,7 +49,7 @@ def points_of(vertices_mm, triangles, count=12):
     its mirror image have changed places. A network cannot tell them apart. So the points of a nearly symmetric part lie
     in its plane of symmetry, where each is its own mirror image. They lie in a plane, so one view gives two poses:
     initial.landmarks says so, and initial.silhouette gives both."""
-    spread = evenly(vertices_mm, triangles, 6000)
+    spread = evenly(vertices_mm, triangles, 60000)
     middle, normal, rest = symmetry_of(spread)
     is_symmetric = rest < NEARLY_SYMMETRIC
     if is_symmetric:
