@@ -195,10 +195,13 @@ def liked(figures):
     return float(dice[BONE] + dice[METAL] + figures.balance().max()) / 3
 
 
-def make_half_the_threshold(network, threshold):
-    """Shifts the borders' scores so that a strength of 0.5 means what `threshold` meant."""
+def make_half_the_threshold(network, planes):
+    """Shifts the borders' scores so that a strength of 0.5 means what the best threshold for these views meant, the
+    one with the largest harmonic mean of precision and recall. Returns that threshold."""
+    threshold = float(THRESHOLDS[np.argmax(measured(network, planes).balance())])
     with torch.no_grad():
         network.out["borders"].bias -= float(np.log(threshold / (1 - threshold)))
+    return threshold
 
 
 def declare(parser):
@@ -206,7 +209,7 @@ def declare(parser):
     parser.add_argument("--choice", type=int, default=20, help="anatomies of choice (default: %(default)s)")
     parser.add_argument("--judgement", type=int, default=40, help="anatomies of judgement (default: %(default)s)")
     parser.add_argument("--views", type=int, default=3, help="views of each anatomy (default: %(default)s)")
-    parser.add_argument("--size-px", type=int, default=512, help="side of the images (default: %(default)s)")
+    parser.add_argument("--size-px", type=int, default=400, help="side of the images (default: %(default)s)")
     parser.add_argument("--name", default="bones", help="name of the files (default: %(default)s)")
 
 
@@ -231,8 +234,7 @@ def run(arguments):
         seed=arguments.seed,
         out=out,
     )
-    threshold = float(THRESHOLDS[np.argmax(measured(network, planes["choice"]).balance())])
-    make_half_the_threshold(network, threshold)
+    threshold = make_half_the_threshold(network, planes["choice"])
     figures = {part: measured(network, some[:120]).at(0.5) for part, some in planes.items()}
     (out / "figures.json").write_text(json.dumps({"threshold": threshold, "losses": losses, **figures}, indent=1))
     for part, found in figures.items():
