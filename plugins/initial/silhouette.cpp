@@ -25,7 +25,7 @@ struct Options {
 };
 
 constexpr const char* kNode = "initial.silhouette";
-constexpr int kCoarse_px = 100, kFine_px = 250;
+constexpr int kCoarse_px = 75, kFine_px = 190, kFinalists = 6;
 
 struct Result {
   Pose pose, other;
@@ -133,7 +133,7 @@ Result silhouette(const Mesh& model, const List<View>& silhouettes, const Option
   const std::vector<RigidTransform> candidates = candidates_of(views, coarse, options, context);
   context.progress(0.5, "shapes compared");
   const std::vector<Fitted> fits = all_fitted(views, coarse, frame, candidates, 12, context);
-  const std::vector<Fitted> last = all_fitted(fine, surface, frame, apart(fits, options.least_apart_deg, 4), 8, context);
+  const std::vector<Fitted> last = all_fitted(fine, surface, frame, apart(fits, options.least_apart_deg, kFinalists), 25, context);
   const auto other = std::find_if(last.begin(), last.end(), [&](const Fitted& one) {
     return !are_near(one.world_from_model, last[0].world_from_model, options.least_apart_deg);
   });

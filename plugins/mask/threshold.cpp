@@ -20,13 +20,27 @@ struct Options {
   int region = 1;
 };
 
+/// The pixels outside of the detector's field: as dark (or bright) as any, in regions that touch the image's border.
+cv::Mat outside_of_field(const cv::Mat& pixels, const Options& options) {
+  constexpr double kTolerance = 0.03;  // of the range of grey values
+  double low = 0, high = 0;
+  cv::minMaxLoc(pixels, &low, &high);
+  const double margin = kTolerance * (high - low);
+  const cv::Mat extreme = options.bright ? cv::Mat(pixels >= high - margin) : cv::Mat(pixels <= low + margin);
+  cv::Mat outside;
+  cv::copyMakeBorder(extreme, outside, 1, 1, 1, 1, cv::BORDER_CONSTANT, cv::Scalar(255));
+  cv::floodFill(outside, {0, 0}, cv::Scalar(128), nullptr, cv::Scalar(0), cv::Scalar(0), 8);
+  return outside(cv::Rect({1, 1}, pixels.size())) == 128;
+}
+
 /// The grey value that separates the darkest (or brightest) pixels: by Otsu's method, then again among those of the
 /// side that counts.
 double separating_value(const cv::Mat& pixels, const cv::Mat& counts, const Options& options) {
   std::vector<std::uint16_t> values;
+  const cv::Mat outside = outside_of_field(pixels, options);
   for (int row = 0; row < pixels.rows; ++row)
     for (int column = 0; column < pixels.cols; ++column)
-      if (counts.empty() || counts.at<std::uint8_t>(row, column))
+      if ((counts.empty() || counts.at<std::uint8_t>(row, column)) && !outside.at<std::uint8_t>(row, column))
         values.push_back(pixels.at<std::uint16_t>(row, column));
   double value = 0;
   for (int i = 0; i < options.times && !values.empty(); ++i) {

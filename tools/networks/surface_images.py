@@ -109,9 +109,19 @@ def field_of(random, size_px):
     return inside
 
 
+def uneven(random, size_px):
+    """Factors of the brightness over the picture: darker towards the rim, or to one side."""
+    v, u = (np.mgrid[:size_px, :size_px].astype(np.float32) + 0.5) / size_px - 0.5
+    rim = np.hypot(u - random.normal(0, 0.1), v - random.normal(0, 0.1)) / random.uniform(0.4, 0.7)
+    slope = random.normal(0, 0.3) * u + random.normal(0, 0.3) * v
+    return np.maximum(0.05, 1 + slope - random.uniform(0, 0.9) * np.minimum(rim, 1.2) ** random.uniform(2, 6))
+
+
 def exposed(random, line_integrals):
     """Grey values from 0 to 1 of an exposure, by a device that nobody knows."""
     signal = np.exp(-line_integrals)
+    if random.random() < 0.5:
+        signal = signal * uneven(random, len(signal))
     if random.random() < 0.8:
         signal = signal + random.uniform(0, 0.35) * cv2.GaussianBlur(signal, (0, 0), random.uniform(8, 30))
     signal = cv2.GaussianBlur(signal, (0, 0), random.uniform(0.3, 1.2))

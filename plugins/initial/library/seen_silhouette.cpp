@@ -14,6 +14,7 @@ namespace {
 struct Pieces {
   cv::Mat1b mask;    ///< 255 in the pieces that count
   cv::Rect largest;  ///< the box of the largest one
+  int area_px = 0;   ///< of the largest one
 };
 
 Pieces pieces_of(const cv::Mat1b& mask) {
@@ -24,11 +25,12 @@ Pieces pieces_of(const cv::Mat1b& mask) {
   int largest = 1;
   for (int piece = 2; piece < count; ++piece)
     if (area(piece) > area(largest)) largest = piece;
-  Pieces pieces{cv::Mat1b(mask.size(), std::uint8_t(0)), {}};
+  Pieces pieces{cv::Mat1b(mask.size(), std::uint8_t(0)), {}, 0};
   for (int piece = 1; piece < count; ++piece)
     if (area(piece) >= kLeastPart * area(largest)) pieces.mask.setTo(255, labels == piece);
   pieces.largest = {figures.at<int>(largest, cv::CC_STAT_LEFT), figures.at<int>(largest, cv::CC_STAT_TOP),
                     figures.at<int>(largest, cv::CC_STAT_WIDTH), figures.at<int>(largest, cv::CC_STAT_HEIGHT)};
+  pieces.area_px = area(largest);
   return pieces;
 }
 
@@ -56,7 +58,7 @@ SeenSilhouette seen_silhouette(const View& view, int size_px, const std::string&
   const cv::Rect& box = pieces.largest;
   const int margin = std::max(4, int(0.5 * std::max(box.width, box.height)));
   const cv::Rect around(box.x - margin, box.y - margin, box.width + 2 * margin, box.height + 2 * margin);
-  const double scale = std::min(1.0, double(size_px) / std::max(box.width, box.height));
+  const double scale = std::min(1.0, size_px / std::sqrt(double(pieces.area_px)));
   SeenSilhouette seen;
   seen.is_whole = box.x > 0 && box.y > 0 && box.br().x < view.mask.cols && box.br().y < view.mask.rows;
   const cv::Size size(int(std::lround(scale * around.width)), int(std::lround(scale * around.height)));

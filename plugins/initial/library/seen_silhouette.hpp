@@ -17,8 +17,9 @@ struct SeenSilhouette {
 };
 
 /// The silhouette in a view whose mask is not 0 where the part is seen. Pieces with less than a twentieth of the
-/// largest one's area are left out. The largest one becomes `size_px` wide or high, or stays smaller. Throws Error if
-/// the view has no mask, or if nothing or everything is in it; `node` is named in the message.
+/// largest one's area are left out. The largest one becomes as large as a square of `size_px`, or stays smaller: so a
+/// thin one is not lost. Throws Error if the view has no mask, or if nothing or everything is in it; `node` is named in
+/// the message.
 SeenSilhouette seen_silhouette(const View& view, int size_px, const std::string& node);
 
 /// The outer outline of the largest piece, as rays (x, y, 1) in the camera's frame: for a mask in this camera's image.
