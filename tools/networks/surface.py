@@ -26,6 +26,7 @@ HELP = "silhouette and landmarks of your own bone or implant, from its surface"
 TILE_PX, OVERLAP_PX, STRIDE = 192, 64, 2
 WIDTHS = (8, 16, 32, 48, 64)  # one part is easier than all anatomies
 BATCH, SPREAD_PX = 6, 1.5  # of a heat map's peak, in its own pixels
+PERCENTILES = (1, 99)
 NEAR_PX = 4  # a point is found within this distance
 FEWER = {"training": 1, "choice": 0.15, "judgement": 0.15}  # shadows and anatomies of each part
 
@@ -93,7 +94,7 @@ def heat_maps(points_px):
 
 def input_of(grey):
     """As plugins/toolbox/network makes it of grey values in which bone is dark."""
-    return images.normalised(-grey)
+    return images.normalised(-grey, *PERCENTILES)
 
 
 def pictures_of(sources, pixel_mm, count, seed):
@@ -169,7 +170,7 @@ def card_of(arguments, name, names, pixel_mm, is_symmetric):
             "values": "grey_values",
             "bone": "dark",
             "pixel_mm": pixel_mm,
-            "normalise": {"method": "percentiles", "low": 1, "high": 99},
+            "normalise": {"method": "percentiles", "low": PERCENTILES[0], "high": PERCENTILES[1]},
             "size_px": [TILE_PX, TILE_PX],
             "overlap_px": OVERLAP_PX,
         },

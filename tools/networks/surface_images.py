@@ -131,7 +131,7 @@ def exposed(random, line_integrals):
     if random.random() < 0.35:  # shown as a logarithm
         dark = random.uniform(0.005, 0.05)
         signal = 1 - np.log(np.maximum(signal, dark)) / np.log(dark)
-    signal = signal ** np.float32(random.uniform(0.4, 1.5))
+    signal = np.clip(signal, 0, 1) ** np.float32(random.uniform(0.4, 1.5))
     low = random.uniform(0, 0.2)
     return low + (random.uniform(0.75, 1) - low) * signal
 
