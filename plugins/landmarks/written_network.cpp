@@ -41,8 +41,8 @@ std::string model(int channels) {
   const std::string graph =
       part(1, layer) + part(2, "network") +
       part(5, tensor("weights", {channels, 1, 1, 1}, std::vector<float>(std::size_t(channels), 1))) +
-      part(5, tensor("bias", {channels}, std::vector<float>(std::size_t(channels), 0))) +
-      part(11, shape("image", 1)) + part(12, shape("points", channels));
+      part(5, tensor("bias", {channels}, std::vector<float>(std::size_t(channels), 0))) + part(11, shape("image", 1)) +
+      part(12, shape("points", channels));
   return whole(1, 6) + part(7, graph) + part(8, part(1, "") + whole(2, 11));
 }
 

@@ -124,7 +124,9 @@ def heat_maps(points_px):
     width = SIGMA * STRIDE_PX
     for i, (u, v) in enumerate(points_px):
         if np.isfinite(u):
-            maps[i] = np.exp(-0.5 * ((columns - u) / width) ** 2)[None] * np.exp(-0.5 * ((rows - v) / width) ** 2)[:, None]
+            maps[i] = (
+                np.exp(-0.5 * ((columns - u) / width) ** 2)[None] * np.exp(-0.5 * ((rows - v) / width) ** 2)[:, None]
+            )
     return maps
 
 
@@ -153,7 +155,9 @@ def loss_of(outputs, maps):
 def maps_of(network, values):
     """The heat maps of a whole view."""
     rows, columns = values.shape
-    wide = cv2.copyMakeBorder(images.normalised(values), 16, 16 + -rows % 16, 16, 16 + -columns % 16, cv2.BORDER_REFLECT_101)
+    wide = cv2.copyMakeBorder(
+        images.normalised(values), 16, 16 + -rows % 16, 16, 16 + -columns % 16, cv2.BORDER_REFLECT_101
+    )
     with torch.no_grad():
         maps = torch.sigmoid(network(torch.from_numpy(wide[None, None]))[0])[0].numpy()
     skipped = 16 // STRIDE_PX

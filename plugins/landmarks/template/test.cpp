@@ -46,8 +46,7 @@ TEST(NewNode, FindsTheMiddleOfABall) {
   view.camera = marrow::carm_camera(arm, marrow::world_from_camera_rotation(0, 0));
   const auto projector = std::make_shared<const Ball>();
   const marrow::RigidTransform there{"world", "ct", Eigen::Matrix3d::Identity(), {6, 3, -5}};
-  const std::vector<float> depth_mm =
-      projector->radiograph(view.camera, there, marrow::PixelGrid{0, 0, 1, 200, 200});
+  const std::vector<float> depth_mm = projector->radiograph(view.camera, there, marrow::PixelGrid{0, 0, 1, 200, 200});
   view.image.pixels = cv::Mat(200, 200, CV_16U);
   for (int i = 0; i < 200 * 200; ++i)
     view.image.pixels.ptr<std::uint16_t>()[i] = std::uint16_t(40000 * std::exp(-0.02 * depth_mm[std::size_t(i)]));
