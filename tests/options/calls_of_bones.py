@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the nodes are called that make models, features and poses: (inputs, options) by the node's name."""
 
-from files_of_scene import network
+from files_of_scene import network, points_network
 
 GREY_VALUES = (  # costs that compare a radiograph with the image
     "entropy_of_difference",
@@ -155,6 +155,24 @@ def calls(s):
                 {"poses": 60, "candidates": 6, "finalists": 2, "max_evaluations": 60},
             ),
             "initial.landmarks": lambda: ({"model": s.mesh, "landmarks": s.landmarks, "views": s.views}, {}),
+            "landmarks.network": lambda: (
+                {"points": s.landmarks, "views": s.views},
+                {"network": points_network("points", sorted(s.landmarks.points_mm))},
+            ),
+            "landmarks.template_matching": lambda: (
+                {"points": s.landmarks, "views": s.views, "projector": s.drr, "start": s.start},
+                {},
+            ),
+            "points.extremes": lambda: (
+                {"model": s.mesh},
+                {
+                    "names": ["medial", "lateral"],
+                    "outward": [-1, 1],
+                    "back": [0, 0.5],
+                    "up": [0, -0.5],
+                    "level": ["medial", "lateral"],
+                },
+            ),
             "initial.manual": lambda: ({"model": s.mesh, "start": s.start}, {"rotation_deg": [3, 1, 2]}),
             "initial.shaft_axis": lambda: ({"model": s.mesh, "lines": s.lines, "views": s.views}, {}),
             "initial.skin_markers": lambda: ({"model": s.mesh, "landmarks": s.skin}, {}),
