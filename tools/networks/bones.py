@@ -209,7 +209,7 @@ def declare(parser):
     parser.add_argument("--choice", type=int, default=20, help="anatomies of choice (default: %(default)s)")
     parser.add_argument("--judgement", type=int, default=40, help="anatomies of judgement (default: %(default)s)")
     parser.add_argument("--views", type=int, default=3, help="views of each anatomy (default: %(default)s)")
-    parser.add_argument("--size-px", type=int, default=400, help="side of the images (default: %(default)s)")
+    parser.add_argument("--size-px", type=int, default=288, help="side of the images (default: %(default)s)")
     parser.add_argument("--name", default="bones", help="name of the files (default: %(default)s)")
 
 

@@ -154,7 +154,7 @@ def settings_of(kind, seed, views, size_px):
     return drawn, level(random, (0.35, 0.2, 0.25, 0.2))
 
 
-def make_case(folder, kind, seed, views=3, size_px=400, surfaces=False):
+def make_case(folder, kind, seed, views=3, size_px=288, surfaces=False):
     """Makes the case in the folder, unless it is there. Ends the program if marrow cannot."""
     if (folder / "truths").exists() and (not surfaces or (folder / "models").exists()):
         return
