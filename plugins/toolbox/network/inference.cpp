@@ -33,8 +33,7 @@ std::vector<float> tile_weights(int tile, int overlap, int stride) {
   std::vector<float> weights;
   for (int i = 0; i < tile; i += stride) {
     const double place = i + 0.5 * (stride - 1), from_border = std::min(place, tile - 1 - place) + 0.5;
-    weights.push_back(overlap == 0 ? 1.0f
-                                   : float(std::clamp((from_border - 0.25 * overlap) / (0.5 * overlap), 0.0, 1.0)));
+    weights.push_back(overlap == 0 ? 1.0f : float(std::clamp((from_border - 0.25 * overlap) / (0.5 * overlap), 0.0, 1.0)));
   }
   return weights;
 }
@@ -103,8 +102,7 @@ class Joined {
     for (int c = 0; c < channels; ++c) sums_.emplace_back(size, CV_32F, cv::Scalar(0));
   }
 
-  void add(const cv::Mat& result, int row, int column, const std::vector<float>& rows,
-           const std::vector<float>& columns) {
+  void add(const cv::Mat& result, int row, int column, const std::vector<float>& rows, const std::vector<float>& columns) {
     for (int v = std::max(0, -row); v < int(rows.size()) && row + v < weights_.rows; ++v)
       for (int u = std::max(0, -column); u < int(columns.size()) && column + u < weights_.cols; ++u) {
         const float weight = rows[std::size_t(v)] * columns[std::size_t(u)];
