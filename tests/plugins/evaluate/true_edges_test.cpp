@@ -30,7 +30,7 @@ EdgeMap edges_of(const std::vector<std::pair<std::string, Truth>>& fragments, co
     outlines.add_shared(name, std::make_shared<const analytic::BodyProjector>(kBall));
   return shipped::call("evaluate.true_edges", {{"camera", shipped::item(camera())},
                                                {"truths", shipped::list(truths, "fragment")},
-                                               {"outlines", shipped::list(outlines, "fragment")}})
+                                               {"projectors", shipped::list(outlines, "fragment")}})
       .at("edges")
       .as<EdgeMap>();
 }
