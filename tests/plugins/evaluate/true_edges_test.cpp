@@ -26,10 +26,11 @@ EdgeMap edges_of(const std::vector<std::pair<std::string, Truth>>& fragments, co
   List<Truth> truths;
   for (const auto& [name, truth] : fragments) truths.add(name, truth);
   List<OutlineProjector> outlines;
-  for (const std::string& name : drawn) outlines.add_shared(name, std::make_shared<const analytic::BodyProjector>(kBall));
+  for (const std::string& name : drawn)
+    outlines.add_shared(name, std::make_shared<const analytic::BodyProjector>(kBall));
   return shipped::call("evaluate.true_edges", {{"camera", shipped::item(camera())},
                                                {"truths", shipped::list(truths, "fragment")},
-                                               {"outlines", shipped::list(outlines, "fragment")}})
+                                               {"projectors", shipped::list(outlines, "fragment")}})
       .at("edges")
       .as<EdgeMap>();
 }
@@ -64,8 +65,7 @@ TEST(TrueEdges, AreOneForEachPixelInTheOrderOfPixelsAlsoWhereFragmentsOverlap) {
 }
 
 TEST(TrueEdges, SayWhichOutlineIsMissing) {
-  const std::string message =
-      test::message_of([] { edges_of({{"distal", at({0, 0, 0})}}, {"proximal"}); });
+  const std::string message = test::message_of([] { edges_of({{"distal", at({0, 0, 0})}}, {"proximal"}); });
   EXPECT_NE(message.find("there is no outline of fragment 'distal'; make outlines from the models"), std::string::npos)
       << message;
 }

@@ -52,8 +52,8 @@ TEST(SimulateLabels, BoneIsSeenWhereTheBoxIs) {
 
 TEST(SimulateLabels, MetalCountsBeforeAndBehindBoneAndOtherBonesAreBone) {
   ClutteredPhantom phantom = box_of_bone();
-  phantom.bodies.push_back(body("steel", test::box({-5, 20, -5}, {5, 22, 5})));            // behind the bone
-  phantom.bodies.push_back(body("plastic", test::box({-40, -22, -10}, {-30, -20, 10})));   // background
+  phantom.bodies.push_back(body("steel", test::box({-5, 20, -5}, {5, 22, 5})));              // behind the bone
+  phantom.bodies.push_back(body("plastic", test::box({-40, -22, -10}, {-30, -20, 10})));     // background
   phantom.bodies.push_back(body("cancellous bone", test::box({30, -1, -10}, {40, 1, 10})));  // another bone
   phantom.bodies.push_back(body("copper", test::box({30, -1, -60}, {40, 1, -50})));
   phantom.tissues.push_back(body("fat", test::box({-60, -60, -60}, {60, 60, 60})));
@@ -75,11 +75,10 @@ TEST(SimulateLabels, OutsideIsWhereTheCollimatorDarkensTheExportedImage) {
   views.add("frontal", view);
   for (const char* level : {"mild", "usual", "bad"}) {
     const shipped::Options options{{"collimator", std::string(level)}, {"collimator_seed", 7}};
-    const cv::Mat grey =
-        shipped::call("simulate.export", {{"views", shipped::list(views, "view")}}, options)
-            .at("views")
-            .as_list<View>()[0]
-            .image.pixels;
+    const cv::Mat grey = shipped::call("simulate.export", {{"views", shipped::list(views, "view")}}, options)
+                             .at("views")
+                             .as_list<View>()[0]
+                             .image.pixels;
     const cv::Mat image = classes(box_of_bone(), options, size_px);
     int outside = 0;
     for (int v = 0; v < size_px; ++v)

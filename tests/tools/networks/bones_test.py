@@ -38,7 +38,7 @@ class Planes(unittest.TestCase):
 
     def test_a_tile_moves_image_classes_and_borders_alike(self):
         plane = planes(1, 2)[0]
-        with unittest.mock.patch.object(bones, "TILE_PX", TILE_PX):
+        with unittest.mock.patch.object(bones, "TRAINING_PX", TILE_PX):
             with unittest.mock.patch.object(bones.images, "changed", lambda random, values: values):
                 tiles = [bones.tile_of(np.random.default_rng(seed), plane) for seed in range(6)]
         for image, classes, borders, inside in tiles:
@@ -91,7 +91,7 @@ class SmallestCase(unittest.TestCase):
         cls.network = UNet(1, {"classes": Head(4), "borders": Head(1)}, widths=(6, 12, 16))
         card = {**bones.CARD, "file": "discs", "trained": {"on": "discs", "good_for": "discs", "not_for": "all else"}}
         card["input"] = {**card["input"], "size_px": list(TILE_PX), "overlap_px": 16}
-        with unittest.mock.patch.object(bones, "TILE_PX", TILE_PX), contextlib.redirect_stdout(io.StringIO()):
+        with unittest.mock.patch.object(bones, "TRAINING_PX", TILE_PX), contextlib.redirect_stdout(io.StringIO()):
             batch = bones.batches(planes(12, 4))
             judge = lambda network: bones.liked(bones.measured(network, planes(3, 5)))
             arguments = {"steps": 80, "seed": 1, "out": cls.folder, "rate": 1e-2, "looks": 2}

@@ -54,7 +54,8 @@ class Case(unittest.TestCase):
                 world = vertices[fragment.name] @ fragment.world_from_model[:3, :3].T + fragment.world_from_model[:3, 3]
                 at = np.rint(view.project(world)).astype(int)
                 at = at[((at >= 0) & (at < 128)).all(axis=1)]
-                self.assertGreater(np.mean(shown[at[:, 1], at[:, 0]]), 0.99)
+                if len(at) > 100:  # one of a broken bone may be out of view
+                    self.assertGreater(np.mean(shown[at[:, 1], at[:, 0]]), 0.99)
             at = view.borders_px.astype(int)
             self.assertTrue((view.classes[at[:, 1], at[:, 0]] < 2).all())
             near = cv2.dilate(bone.astype(np.uint8), np.ones((3, 3), np.uint8))
