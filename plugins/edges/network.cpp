@@ -29,8 +29,8 @@ EdgeMap network_edges(const View& view, const Options& options, Context& context
   const Prepared image = prepare(view, options.sigma_px, options.logarithm, context);
   const cv::Mat strength = strength_of(view, options, context);
   const Gradient gradient = gaussian_gradient(image.values, options.sigma_px);
-  EdgeMap edges = edges_above_noise(image, gradient, options,
-                                    [&](int u, int v) { return way_to_ridge(gradient, u, v); });
+  EdgeMap edges =
+      edges_above_noise(image, gradient, options, [&](int u, int v) { return way_to_ridge(gradient, u, v); });
   std::erase_if(edges.pixels, [&](const EdgePixel& pixel) {
     return bilinear(strength, pixel.u_px, pixel.v_px) < float(options.strength);
   });
@@ -42,10 +42,12 @@ EdgeMap network_edges(const View& view, const Options& options, Context& context
 MARROW_PLUGIN(plugin) {
   declare_thresholds(
       plugin.node("edges.network", network_edges)
-          .summary("Edges where a trained network sees a border of bone, at sub-pixel positions of the image's gradient")
-          .option("network", &Options::network,
-                  "the network's description, a YAML file with the output 'edge_strength'; its ONNX file lies beside it",
-                  required(), beside({".onnx"}))
+          .summary(
+              "Edges where a trained network sees a border of bone, at sub-pixel positions of the image's gradient")
+          .option(
+              "network", &Options::network,
+              "the network's description, a YAML file with the output 'edge_strength'; its ONNX file lies beside it",
+              required(), beside({".onnx"}))
           .option("strength", &Options::strength, "least value of the network where an edge is kept", at_least(0),
                   at_most(1))
           .option("sigma_px", &Options::sigma_px, "standard deviation of the Gaussian derivative", at_least(0.7),

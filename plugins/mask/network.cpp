@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A trained network says what each pixel shows. Metal and what lies outside of the detector's field must not count where
-// a bone is compared with the image.
+// A trained network says what each pixel shows. Metal and what lies outside of the detector's field must not count
+// where a bone is compared with the image.
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -25,8 +25,7 @@ cv::Mat pixels_of_classes(const View& view, const Options& options, const Contex
   network::expect_values(network.description(), {network::Values::line_integrals, network::Values::grey_values},
                          "mask.network");
   const network::Output& output = network::output_of(network.description(), network::Output::Kind::classes);
-  const std::vector<cv::Mat> maps =
-      network::maps_of_view(network, output, view, options.object_distance_mm, context);
+  const std::vector<cv::Mat> maps = network::maps_of_view(network, output, view, options.object_distance_mm, context);
   cv::Mat sum = cv::Mat::zeros(view.image.pixels.size(), CV_32F);
   for (const std::string& name : options.leave_out) {
     const auto found = std::find(output.names.begin(), output.names.end(), name);
@@ -66,8 +65,7 @@ MARROW_PLUGIN(plugin) {
       .relation(at_least_one({"leave_out"}))
       .option("probability", &Options::probability, "least sum of their probabilities where a pixel is left out",
               at_least(0), at_most(1))
-      .option("margin_px", &Options::margin_px, "pixels this near to them are left out, too", at_least(0),
-              at_most(100))
+      .option("margin_px", &Options::margin_px, "pixels this near to them are left out, too", at_least(0), at_most(100))
       .option("object_distance_mm", &Options::object_distance_mm,
               "distance of the bone from the source, where the network's pixels have their size; 0: that of the "
               "world's origin",

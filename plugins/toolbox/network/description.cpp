@@ -143,8 +143,8 @@ Input input_of(const YamlMap& description) {
   if (map.has("slices")) {
     take_integer(map, "slices", 1, kMostSlices, input.slices);
     if (input.slices % 2 == 0)
-      map.fault("slices", formatted("slices: expected an odd number, so that one is in the middle, got {}",
-                                    input.slices));
+      map.fault("slices",
+                formatted("slices: expected an odd number, so that one is in the middle, got {}", input.slices));
     if (input.slices > 1 && input.values != Values::hounsfield)
       map.fault("slices", "slices: only a CT has slices; values are not 'hounsfield'");
   }
@@ -242,9 +242,8 @@ void expect_values(const Description& description, std::initializer_list<Values>
     if (values == description.input.values) return;
     given.push_back(name_in(kValues, values));
   }
-  throw Error(description.file.string() + ": the network wants values: " +
-              name_in(kValues, description.input.values) + ", but " + node + " can give only " +
-              listed(given));
+  throw Error(description.file.string() + ": the network wants values: " + name_in(kValues, description.input.values) +
+              ", but " + node + " can give only " + listed(given));
 }
 
 }  // namespace marrow::network

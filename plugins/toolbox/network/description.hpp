@@ -38,8 +38,8 @@ struct Output {
   enum class Kind { classes, edge_strength, heat_maps };
   enum class Activation { none, sigmoid, softmax };
   Kind kind = Kind::classes;
-  std::string layer;               ///< name of the output in the ONNX file
-  std::vector<std::string> names;  ///< of the channels; none for edge_strength
+  std::string layer;                         ///< name of the output in the ONNX file
+  std::vector<std::string> names;            ///< of the channels; none for edge_strength
   Activation activation = Activation::none;  ///< what is still to be applied to the network's values
   int stride_px = 1;                         ///< pixels of the input for one of this output
   /// heat_maps: the deviation of a point is this times the spread of its map.

@@ -33,7 +33,8 @@ std::vector<float> tile_weights(int tile, int overlap, int stride) {
   std::vector<float> weights;
   for (int i = 0; i < tile; i += stride) {
     const double place = i + 0.5 * (stride - 1), from_border = std::min(place, tile - 1 - place) + 0.5;
-    weights.push_back(overlap == 0 ? 1.0f : float(std::clamp((from_border - 0.25 * overlap) / (0.5 * overlap), 0.0, 1.0)));
+    weights.push_back(overlap == 0 ? 1.0f
+                                   : float(std::clamp((from_border - 0.25 * overlap) / (0.5 * overlap), 0.0, 1.0)));
   }
   return weights;
 }
@@ -102,7 +103,8 @@ class Joined {
     for (int c = 0; c < channels; ++c) sums_.emplace_back(size, CV_32F, cv::Scalar(0));
   }
 
-  void add(const cv::Mat& result, int row, int column, const std::vector<float>& rows, const std::vector<float>& columns) {
+  void add(const cv::Mat& result, int row, int column, const std::vector<float>& rows,
+           const std::vector<float>& columns) {
     for (int v = std::max(0, -row); v < int(rows.size()) && row + v < weights_.rows; ++v)
       for (int u = std::max(0, -column); u < int(columns.size()) && column + u < weights_.cols; ++u) {
         const float weight = rows[std::size_t(v)] * columns[std::size_t(u)];
@@ -133,15 +135,6 @@ class Quiet {
   cv::utils::logging::LogLevel before_;
 };
 
-}  // namespace
-
-struct Network::Model {
-  Description description;
-  std::string bytes;
-};
-
-namespace {
-
 cv::dnn::Net net_of(const Description& description, const std::string& bytes) {
   try {
     cv::dnn::Net net = cv::dnn::readNetFromONNX(bytes.data(), bytes.size());
@@ -167,11 +160,18 @@ cv::Mat result_of(cv::dnn::Net& net, const Description& description, const Outpu
 
 }  // namespace
 
-Network::Network(Description description) : model_(std::make_unique<Model>()) {
-  model_->description = std::move(description);
+struct Network::Model {
+  explicit Model(Description read) : description(std::move(read)), bytes(model_file(description.model)) {}
+
+  Description description;
+  std::string bytes;
+  /// Each thread has its own: a net holds the values of its layers. Many images are computed without reading it again.
+  tbb::enumerable_thread_specific<cv::dnn::Net> nets{[this] { return net_of(description, bytes); }};
+};
+
+Network::Network(Description description) : model_(std::make_unique<Model>(std::move(description))) {
   const Quiet quiet;
-  model_->bytes = model_file(model_->description.model);
-  const cv::dnn::Net net = net_of(model_->description, model_->bytes);
+  const cv::dnn::Net& net = model_->nets.local();
   const std::vector<std::string> layers = net.getUnconnectedOutLayersNames();
   for (const Output& output : model_->description.outputs)
     if (std::find(layers.begin(), layers.end(), output.layer) == layers.end())
@@ -191,10 +191,9 @@ std::vector<cv::Mat> Network::maps(const std::vector<cv::Mat>& planes, const Out
     for (const int column : tile_starts(planes[0].cols, input.size_px.width, overlap)) tiles.push_back({row, column});
   const Quiet quiet;
   std::vector<cv::Mat> results(tiles.size());
-  tbb::enumerable_thread_specific<cv::dnn::Net> nets([&] { return net_of(model_->description, model_->bytes); });
   tbb::parallel_for(std::size_t(0), tiles.size(), [&](std::size_t i) {
     context.check_cancelled();
-    results[i] = result_of(nets.local(), model_->description, output, blob_of(planes, tiles[i], input.size_px));
+    results[i] = result_of(model_->nets.local(), model_->description, output, blob_of(planes, tiles[i], input.size_px));
     check_result(results[i], model_->description, output);
     activate(results[i], output.activation);
   });

@@ -32,9 +32,10 @@ cv::Size size_for(const View& view, const Input& input, double object_distance_m
   const double columns = std::max(1.0, std::round(view.image.width() / step)),
                rows = std::max(1.0, std::round(view.image.height() / step));
   if (!(columns * rows <= kMostPixels))
-    throw Error(formatted("view '{}': {} x {} pixels would be {:.0f} x {:.0f} for the network, which is too many; is "
-                          "the size of its pixels right?",
-                          view.name, view.image.width(), view.image.height(), columns, rows));
+    throw Error(
+        formatted("view '{}': {} x {} pixels would be {:.0f} x {:.0f} for the network, which is too many; is "
+                  "the size of its pixels right?",
+                  view.name, view.image.width(), view.image.height(), columns, rows));
   return {int(columns), int(rows)};
 }
 

@@ -37,11 +37,13 @@ TEST(NetworkDescription, IsRead) {
   EXPECT_EQ(maps.names, (std::vector<std::string>{"a", "b"}));
   EXPECT_EQ(maps.stride_px, 4);
   EXPECT_EQ(maps.deviation_factor, 1.5);
-  EXPECT_NE(message_of([&] { network::output_of(read, Output::Kind::edge_strength); })
-                .find("the network has no output 'edge_strength'; it has classes, heat_maps"),
+  EXPECT_NE(message_of([&] {
+              network::output_of(read, Output::Kind::edge_strength);
+            }).find("the network has no output 'edge_strength'; it has classes, heat_maps"),
             std::string::npos);
-  EXPECT_NE(message_of([&] { network::expect_values(read, {network::Values::hounsfield}, "segment.network"); })
-                .find("wants values: grey_values, but segment.network can give only hounsfield"),
+  EXPECT_NE(message_of([&] {
+              network::expect_values(read, {network::Values::hounsfield}, "segment.network");
+            }).find("wants values: grey_values, but segment.network can give only hounsfield"),
             std::string::npos);
 }
 
@@ -62,8 +64,9 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"licence:", "license:", "did you mean 'licence'?"},
         Fault{"values: grey_values", "values: grey", "expected line_integrals, grey_values, hounsfield; got 'grey'"},
         Fault{"bone: bright", "bone: white", "expected bright, dark; got 'white'"},
-        Fault{"pixel_px: 1", "pixel_px: 1\n  pixel_mm: 1", "expected one of pixel_mm (its size at the bone) and "
-                                                             "pixel_px (in pixels of the image), got both"},
+        Fault{"pixel_px: 1", "pixel_px: 1\n  pixel_mm: 1",
+              "expected one of pixel_mm (its size at the bone) and "
+              "pixel_px (in pixels of the image), got both"},
         Fault{"pixel_px: 1", "pixel_px: 0", "pixel_px: expected 0.1 to 100, got 0"},
         Fault{"low: 0, high: 1", "low: 2, high: 1", "high: expected more than low, 2, got 1"},
         Fault{"method: fixed", "method: deviation", "the method 'deviation' takes no numbers"},
@@ -75,8 +78,10 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"activation: none", "activation: none, stride_px: 3",
               "must be multiples of the stride of 'edge_strength', 3"},
         Fault{"activation: none", "activation: none, names: [a]", "names"},
-        Fault{"edge_strength: {layer: maps, activation: none}", "{}", "expected classes, edge_strength, heat_maps; got none"},
+        Fault{"edge_strength: {layer: maps, activation: none}", "{}",
+              "expected classes, edge_strength, heat_maps; got none"},
         Fault{"edge_strength: {layer: maps,", "classes: {layer: maps, names: [a, a],", "one occurs twice"},
-        Fault{"edge_strength: {layer: maps,", "classes: {layer: maps,", "expected the names of its channels, got none"}));
+        Fault{"edge_strength: {layer: maps,", "classes: {layer: maps,",
+              "expected the names of its channels, got none"}));
 
 }  // namespace description_test

@@ -77,9 +77,8 @@ TEST(Inference, PlacesAStridedMapAtTheMiddleOfItsPixels) {
 }
 
 TEST(Inference, AppliesTheActivation) {
-  const std::string description =
-      with(kPlain, "edge_strength: {layer: maps, activation: none}",
-           "classes: {layer: maps, names: [a, b, c], activation: softmax}");
+  const std::string description = with(kPlain, "edge_strength: {layer: maps, activation: none}",
+                                       "classes: {layer: maps, names: [a, b, c], activation: softmax}");
   const Written written(
       Convolution{.side = 1, .weights = {1, 0, 0}, .bias = {0, std::log(2.0f), std::log(3.0f)}}.bytes(), description);
   const std::vector<cv::Mat> maps = maps_of(written, {cv::Mat1f(9, 9, 0.0f)});
@@ -115,10 +114,12 @@ TEST(Inference, SaysWhatIsWrongWithAModel) {
   Convolution colours = good;
   colours.channels = 3;
   colours.weights.resize(27);
-  expect(fault_of(colours.bytes()), "the network does not take a tile of 32 x 32 px with 1 channel, as plain.yaml says");
+  expect(fault_of(colours.bytes()),
+         "the network does not take a tile of 32 x 32 px with 1 channel, as plain.yaml says");
   Convolution diverged = good;
   diverged.weights[4] = std::nanf("");
-  expect(fault_of(diverged.bytes()), "has values that are not finite (NaN or infinity); the training may have diverged");
+  expect(fault_of(diverged.bytes()),
+         "has values that are not finite (NaN or infinity); the training may have diverged");
 }
 
 }  // namespace inference_test

@@ -40,7 +40,8 @@ inline std::string shape(const std::string& name, const std::vector<int>& sides)
 }  // namespace onnx_bytes
 
 /// The input "image" of 1 x channels x rows x columns, and the output "maps": its convolution with square kernels of
-/// `side` (weights by output channel, input channel, row, column), at every stride-th pixel. An odd side keeps the size.
+/// `side` (weights by output channel, input channel, row, column), at every stride-th pixel. An odd side keeps the
+/// size.
 struct Convolution {
   int rows = 32, columns = 32, channels = 1, side = 3, stride = 1;
   std::vector<float> weights, bias;
@@ -52,10 +53,10 @@ struct Convolution {
     std::string node = part(1, "image") + part(1, "w") + part(1, "b") + part(2, "maps") + part(3, "first_layer");
     node += part(4, type) + numbers("kernel_shape", {side, side}) + numbers("pads", {pad, pad, pad, pad}) +
             numbers("strides", {stride, stride});
-    const std::string graph = part(1, node) + part(2, "network") +
-                              part(5, tensor("w", {outs, channels, side, side}, weights)) +
-                              part(5, tensor("b", {outs}, bias)) + part(11, shape("image", {1, channels, rows, columns})) +
-                              part(12, shape("maps", {1, outs, rows / stride, columns / stride}));
+    const std::string graph =
+        part(1, node) + part(2, "network") + part(5, tensor("w", {outs, channels, side, side}, weights)) +
+        part(5, tensor("b", {outs}, bias)) + part(11, shape("image", {1, channels, rows, columns})) +
+        part(12, shape("maps", {1, outs, rows / stride, columns / stride}));
     return whole(1, 6) + part(7, graph) + part(8, part(1, "") + whole(2, 11));
   }
 };

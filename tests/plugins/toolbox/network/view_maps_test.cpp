@@ -39,7 +39,8 @@ TEST(Normalised, FollowsItsMethod) {
   network::Input dark = input_by(Normalisation::Method::percentiles, 0, 100);
   dark.bone_is_bright = false;
   EXPECT_NEAR(at(network::normalised(values, counts, dark), 1), 2.0 / 3, 1e-6);
-  const cv::Mat constant = network::normalised(cv::Mat1f(3, 3, 7.0f), {}, input_by(Normalisation::Method::percentiles, 1, 99));
+  const cv::Mat constant =
+      network::normalised(cv::Mat1f(3, 3, 7.0f), {}, input_by(Normalisation::Method::percentiles, 1, 99));
   EXPECT_EQ(cv::norm(constant, cv::NORM_INF), 0);
 }
 
@@ -117,9 +118,8 @@ TEST(NetworkNodes, KeepWhatTheNetworkSees) {
                         with(with(kPlain, "edge_strength: {layer: maps, activation: none}",
                                   "classes: {layer: maps, names: [bone, metal], activation: softmax}"),
                              "grey_values", "line_integrals"));
-  shipped::Options options{{"network", classes.file().string()},
-                           {"leave_out", std::vector<std::string>{"metal"}},
-                           {"margin_px", 2}};
+  shipped::Options options{
+      {"network", classes.file().string()}, {"leave_out", std::vector<std::string>{"metal"}}, {"margin_px", 2}};
   const auto masked = [&] {
     return shipped::call("mask.network", {{"view", shipped::item(view)}}, options).at("view").as<View>().mask;
   };
