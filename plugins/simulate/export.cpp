@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Images as a C-arm exports them: with lag, behind a collimator, saturated, of 8 bits with gamma and local contrast.
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "marrow/domain/random.hpp"
+#include "marrow/simulate/collimator.hpp"
 
 namespace {
 
@@ -23,50 +22,20 @@ struct ExportOptions {
 
 // The figures of the levels mild, usual and bad (docs/simulation.md).
 constexpr std::array<double, 3> kLag{0.05, 0.15, 0.35};
-constexpr std::array<double, 3> kCovered{0.03, 0.08, 0.16};   // by each blade at most, of the image's width
 constexpr std::array<double, 3> kWhite{50000, 30000, 16000};  // soft tissue alone is 12000
 constexpr std::array<double, 3> kBlack{0, 1500, 3500};
 constexpr std::array<double, 3> kGamma{0.8, 0.6, 0.45};
 constexpr std::array<double, 3> kClipLimit{0, 1.5, 3};  // 0: no local contrast
 constexpr int kTiles = 8;
 constexpr double kBehindBlade = 0.02;  // leakage and scatter
-constexpr double kHalfShadowPx = 2;    // focal spot of 0.6 mm, blades at a fourth of the way to the detector
 constexpr double kWholeRange = 65535;
 
 int level_of(const std::string& name) { return name == "off" ? -1 : name == "mild" ? 0 : name == "usual" ? 1 : 2; }
 
-/// Four blades, each a little turned; with `iris` a round opening too. The distance from the opening's border in
-/// pixels, positive inside, is turned into a half shadow.
-void collimate(cv::Mat1d& grey, double covered, bool iris, marrow::Random& random) {
-  const double width = grey.cols, height = grey.rows;
-  const Eigen::Vector2d middle(0.5 * (width - 1), 0.5 * (height - 1));
-  struct Blade {
-    Eigen::Vector2d inward;
-    double offset;
-  };
-  std::array<Blade, 4> blades;
-  for (std::size_t k = 0; k < blades.size(); ++k) {
-    const double angle = 0.5 * kPi * double(k) + radians(4 * (random.uniform() - 0.5));
-    const double side = k % 2 == 0 ? width : height;
-    blades[k].inward = {-std::cos(angle), -std::sin(angle)};
-    blades[k].offset = 0.5 * side - covered * side * (0.3 + 0.7 * random.uniform());
-  }
-  const double radius = (0.52 - 0.5 * covered) * std::hypot(width, height) * 0.94;
-  for (int v = 0; v < grey.rows; ++v)
-    for (int u = 0; u < grey.cols; ++u) {
-      const Eigen::Vector2d from = Eigen::Vector2d(u, v) - middle;
-      double inside = iris ? radius - from.norm() : width;
-      for (const Blade& blade : blades) inside = std::min(inside, blade.offset + blade.inward.dot(from));
-      const double lit = 0.5 * std::erfc(-inside / (kHalfShadowPx * std::sqrt(2.0)));
-      grey(v, u) *= kBehindBlade + (1 - kBehindBlade) * lit;
-    }
-}
-
-View exported(const View& view, const View* earlier, const ExportOptions& options, std::uint64_t seed) {
-  const int lag = level_of(options.lag), collimator = level_of(options.collimator),
-            saturation = level_of(options.saturation), eight_bit = level_of(options.eight_bit);
+View exported(const View& view, const View* earlier, const ExportOptions& options, std::size_t number) {
+  const int lag = level_of(options.lag), saturation = level_of(options.saturation), eight_bit = level_of(options.eight_bit);
   View result = view;
-  if (!(lag >= 0 && earlier) && collimator < 0 && saturation < 0 && eight_bit < 0) return result;
+  if (!(lag >= 0 && earlier) && options.collimator == "off" && saturation < 0 && eight_bit < 0) return result;
   cv::Mat1d grey;
   view.image.pixels.convertTo(grey, CV_64F);
   if (lag >= 0 && earlier) {
@@ -75,10 +44,9 @@ View exported(const View& view, const View* earlier, const ExportOptions& option
     earlier->image.pixels.convertTo(before, CV_64F);
     grey = (1 - share) * grey + share * before;
   }
-  if (collimator >= 0) {
-    marrow::Random random(seed, 0);
-    collimate(grey, kCovered[std::size_t(collimator)], collimator == 2, random);
-  }
+  const cv::Mat1d passed = phantom::passed_by_collimator(grey.size(), options.collimator,
+                                                         std::uint64_t(options.collimator_seed), number);
+  if (!passed.empty()) grey = grey.mul(kBehindBlade + (1 - kBehindBlade) * passed);
   double black = 0, white = kWholeRange;
   if (saturation >= 0) {
     black = kBlack[std::size_t(saturation)];
@@ -114,7 +82,7 @@ List<View> export_views(const List<View>& views, const List<View>* earlier, cons
                   "'; give 'earlier_views' the same views");
     if (before && before->image.pixels.size() != views[i].image.pixels.size())
       throw Error("simulate.export: the earlier image of view '" + name + "' has another size");
-    results.add(name, exported(views[i], before, options, marrow::Random(std::uint64_t(options.collimator_seed), i)()));
+    results.add(name, exported(views[i], before, options, i));
   }
   return results;
 }

@@ -82,6 +82,18 @@ TEST(Declaration, ReplacesWhatNoFunctionBrings) {
             std::string::npos);
   EXPECT_NE(faults(plugin).find("option 'size_mm' replaces 'Size': names are lower_case"), std::string::npos);
 }
+TEST(Declaration, FilesBesideWhatIsNoFile) {
+  Plugin plugin;
+  plugin.node("test.plain", plain)
+      .summary("s")
+      .in("a", "h")
+      .out("b", "h")
+      .option("word", &Options::word, "h", marrow::beside({".onnx", "yaml", "../x"}));
+  EXPECT_NE(faults(plugin).find("option 'word': beside: files can lie beside an option of type path only"),
+            std::string::npos);
+  EXPECT_NE(faults(plugin).find("an ending begins with a dot, as .onnx, but this is 'yaml'"), std::string::npos);
+  EXPECT_NE(faults(plugin).find("an ending begins with a dot, as .onnx, but this is '../x'"), std::string::npos);
+}
 TEST(Declaration, OptionNamedTwice) {
   Plugin plugin;
   plugin.node("test.plain", plain)

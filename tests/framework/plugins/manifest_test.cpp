@@ -63,6 +63,7 @@ marrow::LibraryInfo library() {
   node.options[2].maximum = 1;
   node.options[3].choices = {"one", "two"};
   node.options[5].length = 3;
+  node.options[4].beside = {".onnx"};
   node.options[6].replaces = {"texts", "words"};
   node.relations = {{marrow::RelationType::not_above, {"integer", "number"}},
                     {marrow::RelationType::same_length, {"numbers", "texts", "paths"}}};

@@ -129,6 +129,22 @@ TEST_F(Keys, EachPartOfARecipeCountsOnItsOwn) {
   is_new("the port");
 }
 
+TEST_F(Keys, FilesBesideTheNamedOneCount) {
+  const std::string named = write("networks/bones.yaml", "what it is"), model = write("networks/bones.onnx", "a");
+  option("file") = named;
+  const Digest without = recipe();
+  for (marrow::OptionInfo& info : node_.info.options)
+    if (info.name == "file") info.beside = {".onnx"};
+  std::set<Digest> seen{without, recipe()};
+  EXPECT_EQ(seen.size(), 2u) << "the file beside it";
+  write("networks/other.onnx", "other");
+  EXPECT_FALSE(seen.insert(recipe()).second) << "a file of another name";
+  write("networks/bones.onnx", "b");
+  EXPECT_TRUE(seen.insert(recipe()).second) << "its content";
+  fs::remove(model);
+  EXPECT_TRUE(seen.insert(recipe()).second) << "it is gone";
+}
+
 TEST_F(Keys, FilesCountByTheirContentAndNames) {
   const Digest before = recipe();
   std::set<Digest> seen{before};

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Images as a network sees them, as plugins/toolbox/network computes them, and how training changes them at random."""
+import cv2
+import numpy as np
+
+DARKEST = 0.005  # of the grey value in air, as in plugins/toolbox/image/line_integrals.hpp
+
+
+def line_integrals(grey):
+    """-log(grey / air); air is the greatest grey value, and grey values are counted from 0."""
+    grey = grey.astype(np.float32)
+    return -np.log(np.clip(grey / max(float(grey.max()), 1e-6), DARKEST, 1))
+
+
+def normalised(values, low, high):
+    """(value - p_low) / (p_high - p_low), with the percentiles of all pixels. A constant image becomes 0."""
+    least, most = np.percentile(values, (low, high))
+    if not most > least:
+        return np.zeros_like(values, np.float32)
+    return ((values - least) / (most - least)).astype(np.float32)
+
+
+def resized(values, step_px):
+    """The image in the network's pixels, each as large as step_px pixels of the image."""
+    rows, columns = (max(1, round(side / step_px)) for side in values.shape)
+    smaller = rows < values.shape[0] or columns < values.shape[1]
+    return cv2.resize(values, (columns, rows), interpolation=cv2.INTER_AREA if smaller else cv2.INTER_LINEAR)
+
+
+def tile(plane, row, column, size):
+    """A part of the image of (rows, columns) from a corner, which may lie outside; continued by its mirror image."""
+    border = max(size)
+    wide = cv2.copyMakeBorder(plane, border, border, border, border, cv2.BORDER_REFLECT_101)
+    return wide[row + border : row + border + size[0], column + border : column + border + size[1]]
+
+
+def smooth_field(random, shape, nodes):
+    """A smooth random field, about normal with deviation 1, with so many nodes along the longer side."""
+    coarse = random.normal(0, 1, (nodes, nodes)).astype(np.float32)
+    return cv2.resize(coarse, (shape[1], shape[0]), interpolation=cv2.INTER_CUBIC)
+
+
+def changed(random, values):
+    """Line integrals as another device might show them: another gamma, uneven brightness, blur, noise of several
+    widths, saturation. Each change comes by chance, and weak ones are more usual than strong ones."""
+    values = values.astype(np.float32)
+    scale = max(float(np.percentile(values, 99) - np.percentile(values, 1)), 1e-3)
+    if random.random() < 0.7:
+        low = float(values.min())
+        values = low + scale * ((values - low) / scale) ** np.float32(np.exp(random.normal(0, 0.25)))
+    if random.random() < 0.5:
+        values = values + scale * abs(random.normal(0, 0.12)) * smooth_field(
+            random, values.shape, random.integers(2, 6)
+        )
+    if random.random() < 0.3:
+        values = cv2.GaussianBlur(values, (0, 0), random.uniform(0.4, 1.2))
+    if random.random() < 0.6:
+        noise = random.normal(0, 1, values.shape).astype(np.float32)
+        width = random.uniform(0, 1.2)
+        if width > 0.4:
+            noise = cv2.GaussianBlur(noise, (0, 0), width)
+            noise /= noise.std()
+        values = values + scale * abs(random.normal(0, 0.04)) * noise
+    if random.random() < 0.3:
+        values = np.minimum(values, np.percentile(values, random.uniform(90, 99.5)))
+    if random.random() < 0.2:
+        values = np.maximum(values, np.percentile(values, random.uniform(1, 15)))
+    return values.astype(np.float32)
+
+
+def random_motion(random, size_px, middle_px, zoom):
+    """A 2 x 3 matrix that takes pixels of the image to those of a tile: by chance turned by any angle or a little,
+    mirrored, larger or smaller by up to `zoom`, with the place middle_px of the image in the tile's middle."""
+    angle = random.uniform(0, 2 * np.pi) if random.random() < 0.3 else random.normal(0, 0.2)
+    factor = np.exp(random.uniform(-1, 1) * np.log(zoom))
+    turn = factor * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    if random.random() < 0.5:
+        turn[:, 0] *= -1
+    middle_of_tile = 0.5 * (np.array(size_px[::-1]) - 1)
+    return np.column_stack([turn, middle_of_tile - turn @ np.asarray(middle_px)])
+
+
+def moved(plane, matrix, size_px, interpolation=cv2.INTER_LINEAR):
+    """The tile of an image, continued by its mirror image."""
+    return cv2.warpAffine(plane, matrix, size_px[::-1], flags=interpolation, borderMode=cv2.BORDER_REFLECT_101)
