@@ -12,7 +12,7 @@ namespace onnx_bytes {
 
 inline std::string varint(std::uint64_t number) {
   std::string bytes;
-  for (; number > 127; number >>= 7) bytes += char(number & 127 | 128);
+  for (; number > 127; number >>= 7) bytes += char((number & 127) | 128);
   return bytes + char(number);
 }
 inline std::string whole(int field, std::uint64_t value) { return varint(std::uint64_t(field) << 3) + varint(value); }
