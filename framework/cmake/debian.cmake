@@ -1,6 +1,6 @@
 # Debian packages by CPack: marrow (program, plugins, pipelines), marrow-workbench (the program behind `marrow open`),
-# marrow-dev (headers, toolbox, CMake package), marrow-cgal (the one node under the GPL), marrow-doc, python3-marrow. A
-# package is a component of the installation.
+# marrow-dev (headers, toolbox, CMake package), marrow-networks (the trained networks), marrow-cgal (the one node under
+# the GPL), marrow-doc, python3-marrow. A package is a component of the installation.
 set(MARROW_MAINTAINER "$ENV{DEBFULLNAME} <$ENV{DEBEMAIL}>")
 if(NOT DEFINED ENV{DEBEMAIL})
   set(MARROW_MAINTAINER "The marrow developers <marrow@marrow.invalid>")
@@ -14,7 +14,7 @@ set(CPACK_STRIP_FILES ON)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE
   WORLD_READ WORLD_EXECUTE)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
-set(CPACK_COMPONENTS_ALL marrow marrow-workbench marrow-dev marrow-cgal marrow-doc)
+set(CPACK_COMPONENTS_ALL marrow marrow-workbench marrow-dev marrow-networks marrow-cgal marrow-doc)
 if(MARROW_PYTHON)
   list(APPEND CPACK_COMPONENTS_ALL python3-marrow)
 endif()
@@ -71,6 +71,10 @@ edited and results looked at in the browser.")
 marrow_debian_package(marrow-dev libdevel "files to write plugins for marrow"
 "Headers, the toolbox of static libraries, and the CMake package by which a
 plugin of your own is built.")
+marrow_debian_package(marrow-networks science "trained networks of marrow"
+"Networks that find borders of bone, metal, and bone in the slices of a CT,
+for the nodes of marrow that compute a network. They were trained on simulated
+data. The card of each says what it is good for, and what not.")
 marrow_debian_package(marrow-cgal science "node of marrow that is under the GPL"
 "A node that makes surfaces by CGAL's mesher. CGAL is under the GPL, so this
 node is not in the package marrow, which is under the Apache License.")
@@ -110,7 +114,7 @@ file(WRITE ${PROJECT_BINARY_DIR}/debian/overrides/marrow
 install(FILES ${PROJECT_BINARY_DIR}/debian/overrides/marrow DESTINATION ${CMAKE_INSTALL_DATADIR}/lintian/overrides
   EXCLUDE_FROM_ALL)
 set(CPACK_DEBIAN_MARROW-CGAL_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_MARROW_PACKAGE_RECOMMENDS "marrow-workbench, libjs-three")
+set(CPACK_DEBIAN_MARROW_PACKAGE_RECOMMENDS "marrow-networks, marrow-workbench, libjs-three")
 set(CPACK_DEBIAN_MARROW_PACKAGE_SUGGESTS "pocl-opencl-icd | opencl-icd")  # a driver for OpenCL; the loader is linked
 set(CPACK_DEBIAN_MARROW-WORKBENCH_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_MARROW-WORKBENCH_PACKAGE_DEPENDS "marrow (= ${PROJECT_VERSION})")
@@ -123,4 +127,5 @@ set(CPACK_DEBIAN_MARROW-DEV_PACKAGE_RECOMMENDS
   nlohmann-json3-dev zlib1g-dev)
 list(JOIN CPACK_DEBIAN_MARROW-DEV_PACKAGE_RECOMMENDS ", " CPACK_DEBIAN_MARROW-DEV_PACKAGE_RECOMMENDS)
 set(CPACK_DEBIAN_MARROW-DOC_PACKAGE_ARCHITECTURE all)
+set(CPACK_DEBIAN_MARROW-NETWORKS_PACKAGE_ARCHITECTURE all)
 include(CPack)

@@ -1,9 +1,10 @@
 # What is installed beside libraries and headers, and the Debian packages that CPack makes (tools/package).
-install(DIRECTORY pipelines schemas DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow)
-install(DIRECTORY tools/templates/case tools/templates/slicer
+install(DIRECTORY pipelines schemas DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow PATTERN pipelines/networks EXCLUDE)
+install(DIRECTORY pipelines/networks DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/pipelines COMPONENT marrow-networks)
+install(DIRECTORY tools/templates/case tools/templates/network tools/templates/slicer
   DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/templates)
 install(DIRECTORY tools/templates DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow COMPONENT marrow-dev
-  USE_SOURCE_PERMISSIONS PATTERN case EXCLUDE PATTERN slicer EXCLUDE)
+  USE_SOURCE_PERMISSIONS PATTERN case EXCLUDE PATTERN network EXCLUDE PATTERN slicer EXCLUDE)
 install(FILES docs/example-kind/kind.cpp docs/example-kind/nodes.cpp
   DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/example-kind COMPONENT marrow-dev)
 

@@ -26,7 +26,8 @@ def _shape(name, sides):
     return _field(1, name) + _field(2, _field(1, _field(1, 1) + _field(2, dimensions)))
 
 
-def _tensor(name, sides, values):
+def tensor(name, sides, values):
+    """Weights of a layer, as 32-bit floats."""
     parts = b"".join(_field(1, side) for side in sides) + _field(2, 1) + _field(8, name)
     return parts + _field(9, struct.pack("<%df" % len(values), *values))
 
@@ -48,7 +49,7 @@ def convolution(source, output, weights, bias):
     flat = [value for one in weights for channel in one for row in channel for value in row]
     pads = [rows // 2, columns // 2] * 2
     layer = node("Conv", [source, output + "_w", output + "_b"], output, kernel_shape=[rows, columns], pads=pads)
-    return layer, [_tensor(output + "_w", [outs, ins, rows, columns], flat), _tensor(output + "_b", [outs], bias)]
+    return layer, [tensor(output + "_w", [outs, ins, rows, columns], flat), tensor(output + "_b", [outs], bias)]
 
 
 def model(layers, tensors, outputs, rows, columns, channels=1):

@@ -35,6 +35,7 @@ GROUPS = {
         "tracking",
         "python",
         "simulation",
+        "networks",
         "nailing",
         "guidance",
     ],

@@ -135,15 +135,6 @@ class Quiet {
   cv::utils::logging::LogLevel before_;
 };
 
-}  // namespace
-
-struct Network::Model {
-  Description description;
-  std::string bytes;
-};
-
-namespace {
-
 cv::dnn::Net net_of(const Description& description, const std::string& bytes) {
   try {
     cv::dnn::Net net = cv::dnn::readNetFromONNX(bytes.data(), bytes.size());
@@ -169,11 +160,18 @@ cv::Mat result_of(cv::dnn::Net& net, const Description& description, const Outpu
 
 }  // namespace
 
-Network::Network(Description description) : model_(std::make_unique<Model>()) {
-  model_->description = std::move(description);
+struct Network::Model {
+  explicit Model(Description read) : description(std::move(read)), bytes(model_file(description.model)) {}
+
+  Description description;
+  std::string bytes;
+  /// Each thread has its own: a net holds the values of its layers. Many images are computed without reading it again.
+  tbb::enumerable_thread_specific<cv::dnn::Net> nets{[this] { return net_of(description, bytes); }};
+};
+
+Network::Network(Description description) : model_(std::make_unique<Model>(std::move(description))) {
   const Quiet quiet;
-  model_->bytes = model_file(model_->description.model);
-  const cv::dnn::Net net = net_of(model_->description, model_->bytes);
+  const cv::dnn::Net& net = model_->nets.local();
   const std::vector<std::string> layers = net.getUnconnectedOutLayersNames();
   for (const Output& output : model_->description.outputs)
     if (std::find(layers.begin(), layers.end(), output.layer) == layers.end())
@@ -193,10 +191,9 @@ std::vector<cv::Mat> Network::maps(const std::vector<cv::Mat>& planes, const Out
     for (const int column : tile_starts(planes[0].cols, input.size_px.width, overlap)) tiles.push_back({row, column});
   const Quiet quiet;
   std::vector<cv::Mat> results(tiles.size());
-  tbb::enumerable_thread_specific<cv::dnn::Net> nets([&] { return net_of(model_->description, model_->bytes); });
   tbb::parallel_for(std::size_t(0), tiles.size(), [&](std::size_t i) {
     context.check_cancelled();
-    results[i] = result_of(nets.local(), model_->description, output, blob_of(planes, tiles[i], input.size_px));
+    results[i] = result_of(model_->nets.local(), model_->description, output, blob_of(planes, tiles[i], input.size_px));
     check_result(results[i], model_->description, output);
     activate(results[i], output.activation);
   });

@@ -6,7 +6,7 @@ import subprocess
 import unittest
 
 import yaml
-from harness import BUILD, MARROW, SOURCE
+from harness import BUILD, MARROW, SOURCE, onnx
 from harness.program import Case, main, marrow
 from harness.sample import sample
 
@@ -130,6 +130,47 @@ class New(Case):
         self.assertIn("export PYTHONPATH=MARROW/build/python  where marrow was built in MARROW", done.stderr)
         self.assertIn("No module named 'marrow'", done.stderr)
 
+    ONLY_EDGES = """marrow: 1
+extends: pipeline.yaml
+outputs: {verdict: null, pose: null, errors: null, overlay: null, edges: edges}
+"""
+
+    def finds_edges(self, folder):
+        """Runs the part of the folder's pipeline that ends with the network's edges, on a coarse femur."""
+        (folder / "edges.yaml").write_text(self.ONLY_EDGES)
+        coarse = ["--set", "femur.resolution_mm=3", "--set", "ct.range_mm=[0, 60]"]
+        ran = marrow("run", "edges.yaml", "--only", "edges", "--out", "out", *coarse, cwd=folder)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertTrue(any((folder / "out/outputs/edges").iterdir()))
+
+    def test_a_network_takes_the_place_of_a_node(self):
+        said = self.new("network", "mine").stdout
+        self.assertIn("mine/ci trains the network, and tries it in a pipeline", said)
+        folder = self.scratch / "mine"
+        names = {".gitignore", "README.md", "ci", "mine.yaml", "pipeline.yaml", "train.py"}
+        self.assertEqual({path.name for path in folder.iterdir()}, names)
+        self.assertFalse(any("@name@" in path.read_text() for path in folder.iterdir()))
+        self.assertTrue(os.access(folder / "ci", os.X_OK))
+        checked = marrow("check", "pipeline.yaml", cwd=folder)
+        self.assertIn("mine.onnx", checked.stdout + checked.stderr, "it says that the network is not there yet")
+        # As trained: a convolution that is sure of a border everywhere.
+        layer, tensors = onnx.convolution("image", "borders", [[[[0.0]]]], [5.0])
+        (folder / "mine.onnx").write_bytes(onnx.model([layer], tensors, {"borders": (1, 256, 256)}, 256, 256))
+        checked = marrow("check", "pipeline.yaml", cwd=folder)
+        self.assertEqual(checked.returncode, 0, checked.stderr)
+        self.finds_edges(folder)
+
+    def test_the_training_of_a_new_network(self):
+        if subprocess.run(["/usr/bin/python3", "-c", "import torch, onnx"], capture_output=True).returncode:
+            self.skipTest("PyTorch is not installed (python3-torch, python3-onnx)")
+        self.new("network", "mine")
+        folder = self.scratch / "mine"
+        text = (folder / "train.py").read_text()
+        self.assertIn("STEPS, BATCH = 300, 8", text)
+        (folder / "train.py").write_text(text.replace("STEPS, BATCH = 300, 8", "STEPS, BATCH = 5, 2"))
+        self.assertIn("wrote mine.onnx", self.run_in(folder, "/usr/bin/python3", "train.py"))
+        self.finds_edges(folder)
+
     def test_a_pipeline_and_an_experiment_work_where_they_are_put(self):
         (self.scratch / "mine").mkdir()
         self.assertEqual(self.new("pipeline", "simple").returncode, 0)
@@ -178,6 +219,9 @@ class New(Case):
         self.assertEqual(
             self.refused("case", "a/b"), "new case 'a/b': expected the name of a folder; its place is given with --out"
         )
+        self.assertTrue(
+            self.refused("network", "My net").startswith("new network: the name 'My net': a name has small")
+        )
         self.assertEqual(
             self.refused("pipeline", "mine", "--from", "femr"),
             "--from 'femr': neither a file here nor one of marrow's own; did you mean 'femur'?",
@@ -187,6 +231,7 @@ class New(Case):
         for what, name, place in (
             ("node", "edges.mine", "edges_mine"),
             ("kind", "denoised", "denoised"),
+            ("network", "mine", "mine"),
             ("case", "patient", "patient"),
             ("pipeline", "mine", "mine.yaml"),
             ("experiment", "mine", "mine.yaml"),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `marrow new`: nodes and kinds are made by node_project.cpp, pipelines, experiments and cases here.
+// `marrow new`: nodes and kinds are made by node_project.cpp, the others here.
 #include <algorithm>
 #include <cstdio>
 
@@ -58,11 +58,14 @@ NewCommand add_what(CLI::App* command, const std::string& what, const std::strin
   return made;
 }
 
-/// The folders of marrow's own pipelines, one for each family. A file beside them says only where it has moved.
+/// The folders of marrow's own pipelines, one for each family. A file beside them says only where it has moved; the
+/// YAML files of networks are no pipelines.
 std::vector<fs::path> families() {
   std::vector<fs::path> found;
   for (const fs::directory_entry& entry : fs::directory_iterator(shared_files("pipelines")))
-    if (entry.is_directory() && entry.path().filename() != "experiments") found.push_back(entry.path());
+    if (const fs::path name = entry.path().filename();
+        entry.is_directory() && name != "experiments" && name != "networks")
+      found.push_back(entry.path());
   return found;
 }
 
@@ -92,6 +95,18 @@ fs::path copy(const std::string& name, const fs::path& from, const fs::path& fil
   return target;
 }
 
+/// A network that finds edges, its training, and a registration of simulated data that uses it.
+fs::path network_folder(const std::string& name, const fs::path& folder) {
+  expect_name(name, "new network: the name");
+  Files files = filled_templates(
+      shared_files("templates/network"),
+      {{"@name@", name}, {"@pipeline@", shared_files("pipelines/femur/simulated-femur.yaml").string()}});
+  auto description = files.extract("network.yaml");
+  description.key() = name + ".yaml";
+  files.insert(std::move(description));
+  return write_project(folder, name, files);
+}
+
 fs::path new_case(const std::string& name, const fs::path& folder) {
   if (name.empty() || name.find('/') != std::string::npos)
     throw Error("new case '" + printable(name) + "': expected the name of a folder; its place is given with --out");
@@ -104,6 +119,9 @@ Made make_node(const NewRequest& r) {
 }
 Made make_kind(const NewRequest& r) {
   return {new_kind(r.name, r.out), "{}/ci builds it, tests it, and compares variants"};
+}
+Made make_network(const NewRequest& r) {
+  return {network_folder(r.name, r.out), "{}/ci trains the network, and tries it in a pipeline"};
 }
 Made make_pipeline(const NewRequest& r) {
   return {copy(r.name, file_named(r.from, families()), r.out), "marrow check {}"};
@@ -120,7 +138,7 @@ Made make_case(const NewRequest& r) {
 
 void add_new(CLI::App& app, int& code) {
   CLI::App* command = app.add_subcommand(
-      "new", "make the files of a new node, kind, pipeline, experiment or case, which work as they are");
+      "new", "make the files of a new node, kind, network, pipeline, experiment or case, which work as they are");
   command->require_subcommand(1);
   const NewCommand node = add_what(
       command, "node", "a node in C++ or Python, with a test of a value, a pipeline that uses it and a comparison",
@@ -128,6 +146,9 @@ void add_new(CLI::App& app, int& code) {
   node.app->add_flag("--python", node.request->in_python, "in Python, which needs no build");
   add_what(command, "kind", "a kind with its checks, two nodes, a pipeline that uses it and a comparison", "NAME",
            make_kind, code);
+  add_what(command, "network",
+           "a network of your own: its training by PyTorch, its description and a pipeline that uses it", "NAME",
+           make_network, code);
   add_what(command, "pipeline", "a pipeline, as a copy of one of marrow's own", "NAME", make_pipeline, code)
       .add_from("simulated-femur");
   add_what(command, "experiment", "an experiment for marrow compare, as a copy of one of marrow's own", "NAME",
