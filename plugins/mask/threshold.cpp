@@ -66,8 +66,8 @@ std::vector<cv::Mat> regions_at(double value, const cv::Mat& pixels, const View&
   for (int region = 1; region < count; ++region) {
     const auto at = [&](int what) { return figures.at<int>(region, what); };
     const int left = at(cv::CC_STAT_LEFT), top = at(cv::CC_STAT_TOP);
-    const bool is_cut = left == 0 || top == 0 || left + at(cv::CC_STAT_WIDTH) == kept.cols ||
-                        top + at(cv::CC_STAT_HEIGHT) == kept.rows;
+    const bool is_cut =
+        left == 0 || top == 0 || left + at(cv::CC_STAT_WIDTH) == kept.cols || top + at(cv::CC_STAT_HEIGHT) == kept.rows;
     if (area(region) >= 0.01 * options.least_percent * double(kept.total()) && (options.at_border || !is_cut))
       chosen.push_back(region);
   }

@@ -35,10 +35,8 @@ void expect_box(const cv::Rect& box, const cv::Rect& expected) {
 
 /// The box of what is kept, and how much of it is kept.
 std::pair<cv::Rect, int> kept(const marrow::View& view, const shipped::Options& options) {
-  const cv::Mat mask = shipped::call("mask.threshold", {{"view", shipped::item(view)}}, options)
-                           .at("view")
-                           .as<marrow::View>()
-                           .mask;
+  const cv::Mat mask =
+      shipped::call("mask.threshold", {{"view", shipped::item(view)}}, options).at("view").as<marrow::View>().mask;
   cv::Rect box;
   for (int v = 0; v < mask.rows; ++v)
     for (int u = 0; u < mask.cols; ++u)
@@ -52,9 +50,7 @@ TEST(MaskThreshold, KeepsTheLargestRegionOfMetal) {
   EXPECT_NEAR(pixels, kLarge.area(), 20) << "an opening rounds the corners";
 }
 
-TEST(MaskThreshold, KeepsTheSecondRegion) {
-  expect_box(kept(view(), {{"region", std::int64_t(2)}}).first, kSmall);
-}
+TEST(MaskThreshold, KeepsTheSecondRegion) { expect_box(kept(view(), {{"region", std::int64_t(2)}}).first, kSmall); }
 
 TEST(MaskThreshold, KeepsTheOutsideIfAsked) {
   EXPECT_EQ(kept(view(), {{"at_border", true}, {"grey_value", 2000.0}}).first, cv::Rect(0, 190, 200, 10));
@@ -94,9 +90,10 @@ TEST(MaskThreshold, LeavesOutWhatWasLeftOut) {
 }
 
 TEST(MaskThreshold, SaysIfThereAreTooFewRegions) {
-  EXPECT_EQ(shipped::refusal("mask.threshold", {{"view", shipped::item(view())}}, {{"region", std::int64_t(3)}}),
-            "mask.threshold: view 'front': no grey value gives 3 regions away from the image's border; give a grey_value, "
-            "or another mask");
+  EXPECT_EQ(
+      shipped::refusal("mask.threshold", {{"view", shipped::item(view())}}, {{"region", std::int64_t(3)}}),
+      "mask.threshold: view 'front': no grey value gives 3 regions away from the image's border; give a grey_value, "
+      "or another mask");
 }
 
 }  // namespace mask_threshold_test
