@@ -12,7 +12,7 @@ def line_integrals(grey):
     return -np.log(np.clip(grey / max(float(grey.max()), 1e-6), DARKEST, 1))
 
 
-def normalised(values, low=1, high=99):
+def normalised(values, low, high):
     """(value - p_low) / (p_high - p_low), with the percentiles of all pixels. A constant image becomes 0."""
     least, most = np.percentile(values, (low, high))
     if not most > least:
@@ -25,13 +25,6 @@ def resized(values, step_px):
     rows, columns = (max(1, round(side / step_px)) for side in values.shape)
     smaller = rows < values.shape[0] or columns < values.shape[1]
     return cv2.resize(values, (columns, rows), interpolation=cv2.INTER_AREA if smaller else cv2.INTER_LINEAR)
-
-
-def tile(plane, row, column, size):
-    """A part of the image of (rows, columns) from a corner, which may lie outside; continued by its mirror image."""
-    border = max(size)
-    wide = cv2.copyMakeBorder(plane, border, border, border, border, cv2.BORDER_REFLECT_101)
-    return wide[row + border : row + border + size[0], column + border : column + border + size[1]]
 
 
 def smooth_field(random, shape, nodes):

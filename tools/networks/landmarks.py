@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Named points of a bone in X-ray images, as heat maps: the network of landmarks.network. The points are those that
-marrow places on the bone's surface, so a user's CT gives the same ones."""
+"""Named points of a bone in X-ray images, as heat maps. The points are those that marrow places on the bone's surface, so
+a user's CT gives the same ones."""
 import dataclasses
 import json
 import pathlib
@@ -26,7 +26,7 @@ SIGMA = 2.0  # of a point's heat map, in its pixels
 BATCH = 8
 POINT_WEIGHT = 30.0  # of a pixel at a point, because these are few
 WIDTHS = (8, 16, 32, 48, 64)
-LEAST, REACH = 0.3, 6  # as landmarks.network has them
+LEAST, REACH = 0.3, 6  # as the node that uses the network has them
 
 # What is drawn for each bone. sides_deg: from which sides the views are taken.
 ANATOMIES = {
@@ -277,7 +277,7 @@ def declare(parser):
     parser.add_argument("--choice", type=int, default=20, help="anatomies of choice (default: %(default)s)")
     parser.add_argument("--judgement", type=int, default=40, help="anatomies of judgement (default: %(default)s)")
     parser.add_argument("--views", type=int, default=3, help="views of each anatomy (default: %(default)s)")
-    parser.add_argument("--size-px", type=int, default=384, help="side of the images (default: %(default)s)")
+    parser.add_argument("--size-px", type=int, default=288, help="side of the images (default: %(default)s)")
 
 
 def new_network(names):

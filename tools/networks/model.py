@@ -5,6 +5,7 @@ import dataclasses
 
 import torch
 from torch import nn
+from torch.nn import functional
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,15 +26,17 @@ def double(before, after):
 
 class UNet(nn.Module):
     """Takes (batch, channels, rows, columns); rows and columns are multiples of 2 ** (len(widths) - 1). Gives a tuple
-    with one tensor for each head, in their order, before any sigmoid or softmax."""
+    with one tensor for each head, in their order, before any sigmoid or softmax. Values of the input are cut to
+    `limits`, so that what is far beyond the scale of an image, such as a collimator's blades, cannot dominate."""
 
-    def __init__(self, channels, heads, widths=(12, 24, 40, 56, 64)):
+    def __init__(self, channels, heads, widths=(8, 16, 32, 48, 64), limits=(-1, 5)):
         super().__init__()
+        self.limits = limits
         self.heads = dict(heads)
         self.widths = tuple(widths)
         self.down = nn.ModuleList(double(a, b) for a, b in zip((channels, *widths[:-1]), widths))
-        self.half = nn.MaxPool2d(2)
-        self.twice = nn.ModuleList(nn.ConvTranspose2d(a, b, 2, stride=2) for a, b in zip(widths[1:], widths[:-1]))
+        self.smaller = nn.MaxPool2d(2)
+        self.larger = nn.ModuleList(nn.ConvTranspose2d(a, b, 2, stride=2) for a, b in zip(widths[1:], widths[:-1]))
         self.up = nn.ModuleList(double(2 * width, width) for width in widths[:-1])
         levels = {name: head.stride.bit_length() - 1 for name, head in self.heads.items()}
         for name, head in self.heads.items():
@@ -46,13 +49,15 @@ class UNet(nn.Module):
         self.levels = levels
 
     def forward(self, image):
+        low, high = self.limits
+        image = functional.relu(image - low) - functional.relu(image - high)  # OpenCV 4.6 does not read Clip
         kept = []
         for level, block in enumerate(self.down):
-            image = block(image if level == 0 else self.half(image))
+            image = block(image if level == 0 else self.smaller(image))
             kept.append(image)
         at = {len(self.widths) - 1: image}
         for level in reversed(range(self.finest, len(self.widths) - 1)):
-            image = self.up[level](torch.cat([kept[level], self.twice[level](image)], 1))
+            image = self.up[level](torch.cat([kept[level], self.larger[level](image)], 1))
             at[level] = image
         return tuple(self.out[name](at[level]) for name, level in self.levels.items())
 
