@@ -20,6 +20,7 @@ from model import Head, UNet
 
 HELP = "named points of a bone in X-ray images, from simulated femora"
 PIXEL_MM = 1.0
+PERCENTILES = (5, 70)  # a collimator may cover a quarter of the image, and air another
 TILE_PX, OVERLAP_PX = (192, 192), 32
 STRIDE_PX = 2
 SIGMA = 2.0  # of a point's heat map, in its pixels
@@ -134,7 +135,7 @@ def batches(views):
     def tile_of(random):
         shown = views[random.integers(len(views))]
         matrix = random_motion(random, shown)
-        values = images.normalised(images.changed(random, shown.values))
+        values = images.normalised(images.changed(random, shown.values), *PERCENTILES)
         points = shown.points_px @ matrix[:, :2].T + matrix[:, 2]
         return images.moved(values, matrix, TILE_PX)[None], heat_maps(points)
 
@@ -155,9 +156,8 @@ def loss_of(outputs, maps):
 def maps_of(network, values):
     """The heat maps of a whole view."""
     rows, columns = values.shape
-    wide = cv2.copyMakeBorder(
-        images.normalised(values), 16, 16 + -rows % 16, 16, 16 + -columns % 16, cv2.BORDER_REFLECT_101
-    )
+    values = images.normalised(values, *PERCENTILES)
+    wide = cv2.copyMakeBorder(values, 16, 16 + -rows % 16, 16, 16 + -columns % 16, cv2.BORDER_REFLECT_101)
     with torch.no_grad():
         maps = torch.sigmoid(network(torch.from_numpy(wide[None, None]))[0])[0].numpy()
     skipped = 16 // STRIDE_PX
@@ -255,7 +255,7 @@ def card_of(arguments, names, factor, steps):
             "values": "line_integrals",
             "bone": "bright",
             "pixel_mm": PIXEL_MM,
-            "normalise": {"method": "percentiles", "low": 1, "high": 99},
+            "normalise": {"method": "percentiles", "low": PERCENTILES[0], "high": PERCENTILES[1]},
             "size_px": list(TILE_PX),
             "overlap_px": OVERLAP_PX,
         },
