@@ -93,11 +93,11 @@ def network(least=0.5, classes=()):
     return str(path)
 
 
-def points_network(name, names, sigma=1.0):
-    """A network whose heat map of each point is the bone, moved to one side; half as high with sigma=0.5."""
+def points_network(name, names, kernel=(0.6, 0, 0)):
+    """A network whose heat map of each point is the bone, moved to one side."""
     path = pathlib.Path(SCRATCH / (name + ".yaml"))
-    kernel = [[[[0, 0, 0], [sigma, 0, 0], [0, 0, 0]]] for _ in names]
-    layer, tensors = onnx.convolution("image", "points", kernel, [0] * len(names))
+    weights = [[[[0, 0, 0], list(kernel), [0, 0, 0]]] for _ in names]
+    layer, tensors = onnx.convolution("image", "points", weights, [0] * len(names))
     path.with_suffix(".onnx").write_bytes(onnx.model([layer], tensors, {"points": (len(names), 64, 64)}, 64, 64))
     path.write_text(
         "marrow-network: 1\nname: moved\nhelp: for tests\nversion: 1.0.0\nlicence: Apache-2.0\n"
