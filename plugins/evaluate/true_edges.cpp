@@ -13,11 +13,11 @@ using namespace marrow;
 /// The nearest pixel, as (row, column).
 std::pair<long, long> pixel_of(const EdgePixel& edge) { return {std::lround(edge.v_px), std::lround(edge.u_px)}; }
 
-EdgeMap true_edges(const Camera& camera, const List<Truth>& truths, const List<OutlineProjector>& outlines) {
+EdgeMap true_edges(const Camera& camera, const List<Truth>& truths, const List<OutlineProjector>& projectors) {
   check_camera(camera, "evaluate.true_edges: the camera");
   EdgeMap edges{camera.width_px, camera.height_px, {}};
   for (std::size_t i = 0; i < truths.size(); ++i) {
-    const OutlineProjector* outline = outlines.find(truths.name(i));
+    const OutlineProjector* outline = projectors.find(truths.name(i));
     if (!outline)
       throw Error("evaluate.true_edges: there is no outline of fragment '" + truths.name(i) +
                   "'; make outlines from the models of the node that gives the truths");
@@ -39,6 +39,6 @@ MARROW_PLUGIN(plugin) {
       .summary("The exact borders of all fragments in an image, also where one lies before another")
       .in("camera", "camera of the view, as it really is")
       .in("truths", "exact pose of each fragment", over("fragment"))
-      .in("outlines", "outline of each fragment's exact surface", over("fragment"))
+      .in("projectors", "outline of each fragment's exact surface", over("fragment"))
       .out("edges", "one edge for each pixel that a border passes; directions point out of the bone, magnitudes are 1");
 }

@@ -33,7 +33,8 @@ constexpr double kWholeRange = 65535;
 int level_of(const std::string& name) { return name == "off" ? -1 : name == "mild" ? 0 : name == "usual" ? 1 : 2; }
 
 View exported(const View& view, const View* earlier, const ExportOptions& options, std::size_t number) {
-  const int lag = level_of(options.lag), saturation = level_of(options.saturation), eight_bit = level_of(options.eight_bit);
+  const int lag = level_of(options.lag), saturation = level_of(options.saturation),
+            eight_bit = level_of(options.eight_bit);
   View result = view;
   if (!(lag >= 0 && earlier) && options.collimator == "off" && saturation < 0 && eight_bit < 0) return result;
   cv::Mat1d grey;
@@ -44,8 +45,8 @@ View exported(const View& view, const View* earlier, const ExportOptions& option
     earlier->image.pixels.convertTo(before, CV_64F);
     grey = (1 - share) * grey + share * before;
   }
-  const cv::Mat1d passed = phantom::passed_by_collimator(grey.size(), options.collimator,
-                                                         std::uint64_t(options.collimator_seed), number);
+  const cv::Mat1d passed =
+      phantom::passed_by_collimator(grey.size(), options.collimator, std::uint64_t(options.collimator_seed), number);
   if (!passed.empty()) grey = grey.mul(kBehindBlade + (1 - kBehindBlade) * passed);
   double black = 0, white = kWholeRange;
   if (saturation >= 0) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What each pixel of a simulated image shows: the truth for the training of networks and for measures of what they find.
-// The borders of the bone are those of evaluate.true_edges.
+// What each pixel of a simulated image shows: the truth for the training of networks and for measures of what they
+// find. The borders of the bone are those of evaluate.true_edges.
 #include <tbb/parallel_for.h>
 
 #include <Eigen/LU>
@@ -32,9 +32,10 @@ phantom::SolidRays::Map rays_of(const Camera& camera, const RigidTransform& came
   return [&camera, camera_from_body](const Eigen::Vector3d& point) {
     const Eigen::Vector3d x = camera_from_body * point;
     if (!(x.z() >= kNearestMm))
-      throw Error(formatted("simulate.labels: something in the beam reaches to {:f} mm from the X-ray source; it must "
-                            "lie in front of the source, so check the camera's distances",
-                            x.z()));
+      throw Error(
+          formatted("simulate.labels: something in the beam reaches to {:f} mm from the X-ray source; it must "
+                    "lie in front of the source, so check the camera's distances",
+                    x.z()));
     const Eigen::Vector2d pixel = (camera.intrinsics * x).hnormalized();
     return phantom::RayVertex{pixel.x(), pixel.y(), -1 / x.z()};
   };
@@ -84,8 +85,8 @@ List<Image> labels(const ClutteredPhantom& given, const List<Camera>& cameras, c
     const Camera& camera = cameras[i];
     check_camera(camera, "simulate.labels: camera '" + cameras.name(i) + "'");
     cv::Mat1b classes = bone_and_metal(cluttered, camera);
-    const cv::Mat1d passed = phantom::passed_by_collimator(classes.size(), options.collimator,
-                                                           std::uint64_t(options.collimator_seed), i);
+    const cv::Mat1d passed =
+        phantom::passed_by_collimator(classes.size(), options.collimator, std::uint64_t(options.collimator_seed), i);
     if (!passed.empty()) classes.setTo(kOutside, passed < kLeastBeam);
     result.add(cameras.name(i), Image{classes});
   }

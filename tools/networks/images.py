@@ -27,13 +27,6 @@ def resized(values, step_px):
     return cv2.resize(values, (columns, rows), interpolation=cv2.INTER_AREA if smaller else cv2.INTER_LINEAR)
 
 
-def tile(plane, row, column, size):
-    """A part of the image of (rows, columns) from a corner, which may lie outside; continued by its mirror image."""
-    border = max(size)
-    wide = cv2.copyMakeBorder(plane, border, border, border, border, cv2.BORDER_REFLECT_101)
-    return wide[row + border : row + border + size[0], column + border : column + border + size[1]]
-
-
 def smooth_field(random, shape, nodes):
     """A smooth random field, about normal with deviation 1, with so many nodes along the longer side."""
     coarse = random.normal(0, 1, (nodes, nodes)).astype(np.float32)

@@ -29,7 +29,7 @@ class UNet(nn.Module):
     with one tensor for each head, in their order, before any sigmoid or softmax. Values of the input are cut to
     `limits`, so that what is far beyond the scale of an image, such as a collimator's blades, cannot dominate."""
 
-    def __init__(self, channels, heads, widths=(12, 24, 40, 56, 64), limits=(-1, 5)):
+    def __init__(self, channels, heads, widths=(8, 16, 32, 48, 64), limits=(-1, 5)):
         super().__init__()
         self.limits = limits
         self.heads = dict(heads)

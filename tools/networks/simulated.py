@@ -51,7 +51,22 @@ class View:
 class Fragment:
     name: str
     world_from_model: np.ndarray  # 4 x 4, in mm
-    surface: pathlib.Path  # PLY, in the frame of the model; made only with surfaces=True
+    surface: pathlib.Path  # PLY as marrow writes it; made only with surfaces=True
+
+    def mesh(self):
+        """Corners in mm (n x 3) in the frame of the model, and triangles (m x 3). A fragment of a broken bone has the
+        corners of the whole bone, but only its own triangles."""
+        content = self.surface.read_bytes()
+        header, end = content.split(b"end_header\n", 1)[0].decode(), content.index(b"end_header\n") + 11
+        corners, faces = (int(header.split("element %s " % name)[1].split()[0]) for name in ("vertex", "face"))
+        vertices_mm = np.frombuffer(content, "<f8", 3 * corners, end).reshape(-1, 3)
+        face = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
+        return vertices_mm, np.frombuffer(content, face, faces, end + 24 * corners)["corners"]
+
+    def vertices_mm(self):
+        """The corners of the fragment's own triangles (n x 3), in the frame of the model."""
+        vertices_mm, triangles = self.mesh()
+        return vertices_mm[np.unique(triangles)]
 
 
 @dataclasses.dataclass
@@ -124,6 +139,7 @@ def settings_of(kind, seed, views, size_px):
     bone = BONES[kind]
     drawn = {"bone.uses": bone["bone"], **clutter_of(random, kind), **motion_of(random, bone)}
     if "femur" in kind:
+        drawn["bone.resolution_mm"] = 1.6
         drawn["bone.side"] = str(random.choice(["left", "right"]))
         at_knee_mm, anywhere_mm = random.uniform(20, 130), random.uniform(*bone["isocentre_mm"])
         drawn["bone.isocentre_from_distal_end_mm"] = "%.1f" % (at_knee_mm if random.random() < 0.6 else anywhere_mm)
@@ -138,7 +154,7 @@ def settings_of(kind, seed, views, size_px):
     return drawn, level(random, (0.35, 0.2, 0.25, 0.2))
 
 
-def make_case(folder, kind, seed, views=3, size_px=512, surfaces=False):
+def make_case(folder, kind, seed, views=3, size_px=288, surfaces=False):
     """Makes the case in the folder, unless it is there. Ends the program if marrow cannot."""
     if (folder / "truths").exists() and (not surfaces or (folder / "models").exists()):
         return

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The network, the loop that trains it, and its export."""
+import contextlib
+import io
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+import unittest.mock
+
+import network_cases
+import numpy as np
+import yaml
+import export
+import torch
+import training
+from model import Head, UNet
+
+
+def small(heads=None):
+    torch.manual_seed(3)
+    return UNet(1, heads or {"sum": Head(1)}, widths=(4, 8))
+
+
+def batch(random):
+    """The network is to find the mean of 3 x 3 pixels."""
+    image = torch.from_numpy(random.normal(0.5, 0.3, (2, 1, 16, 16)).astype(np.float32))
+    return image, torch.nn.functional.avg_pool2d(image, 3, 1, 1)
+
+
+def loss(outputs, wanted):
+    return ((outputs[0] - wanted) ** 2).mean()
+
+
+def trained(folder, steps=40, seed=1, judge=lambda network: 0, network=None, loss_of=loss):
+    network = network or small()
+    with contextlib.redirect_stdout(io.StringIO()):
+        losses = training.train(network, batch, loss_of, judge, steps=steps, seed=seed, out=folder, looks=4)
+    return network, losses
+
+
+def same(one, other):
+    return all(torch.equal(a, b) for a, b in zip(one.state_dict().values(), other.state_dict().values()))
+
+
+class InAFolder(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+
+class Network(unittest.TestCase):
+    def test_each_head_has_its_channels_and_stride(self):
+        network = UNet(3, {"classes": Head(4), "points": Head(7, 4)}, widths=(4, 8, 12))
+        shapes = [tuple(output.shape) for output in network(torch.zeros(2, 3, 32, 48))]
+        self.assertEqual(shapes, [(2, 4, 32, 48), (2, 7, 8, 12)])
+
+    def test_a_stride_that_no_level_has_is_refused(self):
+        for stride in (3, 8):
+            with self.assertRaisesRegex(ValueError, "head points: the stride must be 1, 2, 4 ... 4"):
+                UNet(1, {"points": Head(1, stride)}, widths=(4, 8, 12))
+
+    def test_values_beyond_the_limits_count_as_the_limits(self):
+        network = small().eval()
+        with torch.no_grad():
+            far, limit = (network(torch.full((1, 1, 8, 8), value))[0] for value in (1000.0, 5.0))
+        self.assertTrue(torch.equal(far, limit))
+
+
+class Loop(InAFolder):
+    def test_the_loss_falls_and_the_same_seed_gives_the_same_network(self):
+        network, losses = trained(self.folder)
+        self.assertLess(np.mean(losses[-5:]), 0.5 * np.mean(losses[:5]))
+        with tempfile.TemporaryDirectory() as other:
+            self.assertTrue(same(network, trained(pathlib.Path(other))[0]))
+        with tempfile.TemporaryDirectory() as other:
+            self.assertFalse(same(network, trained(pathlib.Path(other), seed=2)[0]))
+
+    def test_goes_on_where_it_was_interrupted(self):
+        with tempfile.TemporaryDirectory() as other:
+            whole, losses = trained(pathlib.Path(other))
+        calls = []
+
+        def stops_at_the_third_look(network):
+            calls.append(1)
+            if len(calls) == 3:
+                raise KeyboardInterrupt
+            return 0
+
+        with self.assertRaises(KeyboardInterrupt):
+            trained(self.folder, judge=stops_at_the_third_look)
+        network, rest = trained(self.folder)
+        self.assertEqual(rest, losses[20:])
+        self.assertTrue(same(network, whole))
+
+    def test_keeps_the_weights_that_were_liked_best(self):
+        liked, figures = {}, iter([1, 3, 2, 0])
+
+        def judge(network):
+            figure = next(figures)
+            liked[figure] = {name: value.clone() for name, value in network.state_dict().items()}
+            return figure
+
+        network, _ = trained(self.folder, judge=judge)
+        self.assertTrue(all(torch.equal(value, liked[3][name]) for name, value in network.state_dict().items()))
+
+    def test_a_loss_that_is_not_finite_ends_it(self):
+        with self.assertRaisesRegex(SystemExit, "train: the loss is not finite at step 0; try a smaller rate"):
+            trained(self.folder, loss_of=lambda outputs, wanted: outputs[0].mean() * float("nan"))
+
+    def test_rate_rises_and_falls(self):
+        rates = [training.rate_at(step, 100, 2.0) for step in (0, 4, 5, 52, 99)]
+        np.testing.assert_allclose(rates, [0.4, 2, 2, 1.0408, 0.0405], atol=0.02)
+
+
+class Export(InAFolder):
+    CARD = {
+        "file": "sums",
+        "marrow-network": 1,
+        "input": {"size_px": [16, 24]},
+        "outputs": {"classes": {"layer": "classes", "names": ["a", "b"]}},
+    }
+
+    def write(self, network=None):
+        network = network or small({"classes": Head(2), "points": Head(3, 2)})
+        with contextlib.redirect_stdout(io.StringIO()) as said:
+            worst = export.write(network, self.CARD, self.folder)
+        return worst, said.getvalue()
+
+    def test_opencv_gives_the_values_of_pytorch(self):
+        network = small({"classes": Head(2), "points": Head(3, 2)})
+        trained(self.folder, network=network, steps=5, loss_of=lambda outputs, wanted: (outputs[0] ** 2).mean())
+        worst, said = self.write(network)
+        self.assertLess(worst, 1e-4)
+        self.assertRegex(said, r"sums.onnx: 0.0\d MB, sha256 [0-9a-f]{16}; OpenCV differs from PyTorch by \d")
+        card = yaml.safe_load((self.folder / "sums.yaml").read_text())
+        self.assertEqual(card, {key: value for key, value in self.CARD.items() if key != "file"})
+
+    def test_other_values_are_found(self):
+        network, _ = trained(self.folder, steps=5)
+        self.CARD = {**self.CARD, "input": {"size_px": [16, 16]}}
+        self.write(network)
+        with torch.no_grad():
+            network.out["sum"].bias += 0.01
+        self.assertGreater(export.difference(network, self.folder / "sums.onnx", (1, 16, 16)), 5e-3)
+
+    def test_a_network_that_is_too_large_or_not_what_opencv_computes_is_refused(self):
+        with unittest.mock.patch.object(export, "LARGEST_MB", 0.001):
+            with self.assertRaisesRegex(SystemExit, "sums.onnx has 0.0 MB, but a network has at most 0.*fewer maps"):
+                self.write()
+        with unittest.mock.patch.object(export, "difference", lambda *_: 0.5):
+            with self.assertRaisesRegex(
+                SystemExit, "values of .*sums.onnx differ from PyTorch's by 0.5, more than 0.0001"
+            ):
+                self.write()
+
+
+class Command(InAFolder):
+    def run_train(self, *words, **environment):
+        command = [sys.executable, str(network_cases.TRAIN), *map(str, words)]
+        return subprocess.run(command, text=True, capture_output=True, env={**os.environ, **environment})
+
+    def test_says_which_packages_are_missing(self):
+        for module in ("torch", "cv2"):
+            (self.folder / (module + ".py")).write_text("raise ImportError")
+        done = self.run_train("bones", "--data", "d", "--out", "o", PYTHONPATH=str(self.folder))
+        self.assertEqual(done.returncode, 1)
+        wanted = "train: a training needs packages that are not there: apt install python3-torch python3-opencv\n"
+        self.assertEqual(done.stderr, wanted)
+
+    def test_help_names_the_networks(self):
+        done = self.run_train("--help", PYTHONPATH="")
+        self.assertEqual(done.returncode, 0)
+        self.assertIn("bones", done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
