@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The training of the network of slices: what is drawn, its figures, its smallest case, and the node with its export."""
+"""The training of the network of slices: what is drawn, its figures, its smallest case, the node with its export."""
 import contextlib
 import io
 import json
