@@ -9,6 +9,7 @@ MARROW_PLUGIN(plugin) {
       .in<marrow::Mesh>("model", "surface of the fragment")
       .in<marrow::ShaftLines>("lines", "outer borders of the shaft", marrow::over("view"))
       .in<marrow::View>("views", "X-ray views; only their cameras are used", marrow::over("view"))
+      .in<marrow::View>("silhouettes", "X-ray views whose masks are not 0 where the part is seen", marrow::over("view"))
       .in<marrow::Pose>("start", "nominal placement; none: CT coordinates are taken as world coordinates")
       .in<marrow::Landmarks>("landmarks", "points in the CT and where they were marked in views or tracked")
       .in<marrow::Pose>("first", "a start to choose from")

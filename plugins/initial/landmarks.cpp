@@ -1,27 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
-// A start from landmarks that were marked in one view or more. First poses are computed in several ways: from points
-// that two views show, and from each view alone. Each is refined over all views at once. The best one is the result.
-#include <Eigen/Geometry>
+// A start from landmarks that were marked in one view or more, by a person or a network. First poses are computed in
+// several ways: from points that two views show, and from each view alone. Each is refined over all views at once. The
+// best one is the result. Landmarks that the others contradict are left out.
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <marrow/domain/decompositions.hpp>
 #include <marrow/plugin.hpp>
 
-#include <marrow/domain/decompositions.hpp>
 #include "marrow/base/number_text.hpp"
-#include "marrow/initial/pose_starts.hpp"
+#include "marrow/initial/agreeing_sights.hpp"
+#include "marrow/initial/reprojection_fit.hpp"
 #include "marrow/toolbox/geometry/rigid_fit.hpp"
 
 namespace {
 
 using namespace marrow;
-using initial::Sight;
+using initial::Candidate, initial::Sight;
 
 struct Options {
   double noise_px = 1;
 };
 
-std::vector<Sight> sights_of(const Landmarks& landmarks, const List<View>& views, const Context& context) {
+/// The landmarks that the views show. Those that do not state their deviation have that of `noise_px`.
+std::vector<Sight> sights_of(const Landmarks& landmarks, const List<View>& views, double noise_px,
+                             const Context& context) {
   std::vector<Sight> sights;
   std::vector<std::string> unknown;
   for (const Landmarks::Seen& seen : landmarks.seen) {
@@ -32,7 +34,13 @@ std::vector<Sight> sights_of(const Landmarks& landmarks, const List<View>& views
                   "', but the landmarks have no point of that name in the CT; give its place there, or leave it out");
     if (const View* view = views.find(seen.view)) {
       check_camera(view->camera, "view '" + seen.view + "'");
-      sights.push_back({seen.name, seen.view, point->model_mm, seen.pixel, &view->camera});
+      if (!std::isfinite(seen.deviation_px) || seen.deviation_px < 0)
+        throw Error(
+            formatted("the landmark '{}' in view '{}' has a deviation of {} px, which must be positive, or 0 "
+                      "where it is not known",
+                      seen.name, seen.view, seen.deviation_px));
+      sights.push_back({seen.name, seen.view, point->model_mm, seen.pixel, &view->camera,
+                        seen.deviation_px > 0 ? seen.deviation_px : noise_px});
     } else if (std::find(unknown.begin(), unknown.end(), seen.view) == unknown.end()) {
       unknown.push_back(seen.view);
       context.warn("landmarks are seen in a view '" + seen.view + "', which is none of the views; they are left out");
@@ -58,86 +66,21 @@ void check_enough(const std::vector<Sight>& sights) {
   geometry::check_spread(points, "the landmarks that are seen");
 }
 
-/// Sum of squared reprojection errors [px^2]; infinite if a landmark lies behind a source.
-double squares_px(const std::vector<Sight>& sights, const RigidTransform& pose) {
+/// Root mean square of the distances in the images [px].
+double root_mean_square_px(const std::vector<Sight>& sights, const RigidTransform& pose) {
   double sum = 0;
-  for (const Sight& sight : sights) {
-    const Eigen::Vector2d off = project(*sight.camera, pose * sight.model_mm) - sight.pixel;
-    sum += off.allFinite() ? off.squaredNorm() : std::numeric_limits<double>::infinity();
-  }
-  return sum;
-}
-
-/// Half the Gauss-Newton Hessian and half the gradient of the sum of squares, with respect to the small motion.
-struct Normal {
-  Matrix6d curvature = Matrix6d::Zero();
-  Vector6d gradient = Vector6d::Zero();
-};
-
-Normal normal_at(const std::vector<Sight>& sights, const RigidTransform& pose, const FragmentFrame& frame) {
-  Normal normal;
-  for (const Sight& sight : sights) {
-    const Camera& camera = *sight.camera;
-    const Eigen::Vector3d image = camera.intrinsics * (camera.camera_from_world * (pose * sight.model_mm));
-    const Eigen::Vector2d pixel = image.hnormalized();
-    Eigen::Matrix<double, 2, 3> by_image;
-    by_image << 1, 0, -pixel.x(), 0, 1, -pixel.y();
-    const Eigen::Matrix<double, 2, 6> by_motion = by_image / image.z() * camera.intrinsics *
-                                                  camera.camera_from_world.rotation * pose.rotation *
-                                                  geometry::point_by_motion(frame, sight.model_mm);
-    normal.curvature += by_motion.transpose() * by_motion;
-    normal.gradient += by_motion.transpose() * (pixel - sight.pixel);
-  }
-  return normal;
-}
-
-/// Least squares over all views with damped steps (Marquardt, SIAM J Appl Math 1963).
-RigidTransform refined(const std::vector<Sight>& sights, RigidTransform pose, const FragmentFrame& frame) {
-  double value = squares_px(sights, pose), damping = 1e-3;
-  for (int steps = 0; std::isfinite(value) && steps < 200 && damping < 1e12; ++steps) {
-    const Normal normal = normal_at(sights, pose, frame);
-    Matrix6d damped = normal.curvature;
-    damped.diagonal() *= 1 + damping;
-    const RigidTransform there = moved(pose, frame, -solve_symmetric(damped, normal.gradient));
-    const double value_there = squares_px(sights, there);
-    if (value_there < value) {
-      const bool is_last = value - value_there <= 1e-14 * value;
-      pose = there;
-      value = value_there;
-      damping *= 0.1;
-      if (is_last) break;
-    } else {
-      damping *= 10;
-    }
-  }
-  return pose;
-}
-
-struct Candidate {
-  RigidTransform pose;
-  double squares_px;
-};
-
-/// The minima found from the starts, the lowest first.
-std::vector<Candidate> minima(const std::vector<Sight>& sights, const FragmentFrame& frame) {
-  std::vector<Candidate> found;
-  for (const RigidTransform& start : initial::pose_starts(sights)) {
-    const RigidTransform pose = refined(sights, start, frame);
-    if (const double squares = squares_px(sights, pose); std::isfinite(squares)) found.push_back({pose, squares});
-  }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.squares_px < b.squares_px; });
-  return found;
+  for (const Sight& sight : sights) sum += (project(*sight.camera, pose * sight.model_mm) - sight.pixel).squaredNorm();
+  return std::sqrt(sum / double(sights.size()));
 }
 
 /// Throws Error if another pose explains the landmarks nearly as well.
-void check_unique(const std::vector<Candidate>& found, std::size_t sights, double noise_px) {
+void check_unique(const std::vector<Candidate>& found, const std::vector<Sight>& sights) {
   constexpr double kSame_rad = 0.01;
   constexpr double kFactor_100 = 9.2;  // 2 ln 100: a pose that is a hundred times less likely is ignored
   for (const Candidate& other : found) {
     const double apart = geodesic_angle_rad(other.pose.rotation, found.front().pose.rotation);
-    if (apart < kSame_rad || other.squares_px - found.front().squares_px > kFactor_100 * noise_px * noise_px) continue;
-    const auto rms = [&](const Candidate& one) { return short_number(std::sqrt(one.squares_px / double(sights))); };
+    if (apart < kSame_rad || other.squares - found.front().squares > kFactor_100) continue;
+    const auto rms = [&](const Candidate& one) { return short_number(root_mean_square_px(sights, one.pose)); };
     throw Error(
         formatted("two poses explain the landmarks: they differ by {:.3g} degrees, and leave {} and {} px. In one "
                   "view, points that lie nearly in a plane look the same tilted to either side; add a view, or a "
@@ -146,43 +89,69 @@ void check_unique(const std::vector<Candidate>& found, std::size_t sights, doubl
   }
 }
 
-std::string residual_warning(const std::vector<Sight>& sights, const Pose& pose, double noise_px) {
-  const Sight* worst = nullptr;
-  double largest = 0;
-  for (const Sight& sight : sights) {
-    const double off = (project(*sight.camera, pose.world_from_model * sight.model_mm) - sight.pixel).norm();
-    if (worst && off < largest) continue;
-    worst = &sight;
-    largest = off;
-  }
+/// How far a sight is from where the pose shows it [px].
+double off_px(const Sight& sight, const RigidTransform& pose) {
+  return (project(*sight.camera, pose * sight.model_mm) - sight.pixel).norm();
+}
+
+/// Keeps the sights that agree on a pose, and says which do not.
+std::vector<Sight> agreeing(const std::vector<Sight>& sights, const FragmentFrame& frame, std::vector<Sight>& wrong) {
+  const std::vector<bool> agrees = initial::agreeing_sights(sights, frame);
+  std::vector<Sight> kept;
+  for (std::size_t i = 0; i < sights.size(); ++i) (agrees[i] ? kept : wrong).push_back(sights[i]);
+  return kept;
+}
+
+std::string residual_warning(const std::vector<Sight>& sights, const Pose& pose) {
+  const auto deviations_off = [&](const Sight& sight) { return initial::square_of(sight, pose.world_from_model); };
+  const Sight& worst = *std::max_element(sights.begin(), sights.end(), [&](const Sight& a, const Sight& b) {
+    return deviations_off(a) < deviations_off(b);
+  });
+  double expected = 0;
+  for (const Sight& sight : sights) expected += sight.deviation_px * sight.deviation_px / double(sights.size());
   return formatted(
       "the landmarks are {:.3g} px away from where this pose shows them ('{}' in view '{}' {:.3g} px), but {:.3g} px "
       "were expected; are two names exchanged, or is a camera wrong?",
-      pose.cost, worst->name, worst->view, largest, noise_px);
+      pose.cost, worst.name, worst.view, off_px(worst, pose.world_from_model), std::sqrt(expected));
+}
+
+/// What a user should know about the pose.
+std::vector<std::string> warnings_of(const std::vector<Sight>& sights, const std::vector<Sight>& wrong,
+                                     const Candidate& found, const Pose& pose) {
+  constexpr double kMostDeviations = 3;
+  std::vector<std::string> warnings;
+  for (const Sight& sight : wrong)
+    warnings.push_back(formatted(
+        "the landmark '{}' in view '{}' is left out: it is {:.3g} px from where the others say, and {:.3g} px were "
+        "expected; is it marked on another point?",
+        sight.name, sight.view, off_px(sight, found.pose), sight.deviation_px));
+  if (found.squares > kMostDeviations * kMostDeviations * double(sights.size()))
+    warnings.push_back(residual_warning(sights, pose));
+  return warnings;
 }
 
 Pose landmarks(const Mesh& model, const Landmarks& landmarks, const List<View>& views, const Options& options,
                Context& context) {
   check_mesh(model, "model");
-  const std::vector<Sight> sights = sights_of(landmarks, views, context);
-  check_enough(sights);
+  const std::vector<Sight> all = sights_of(landmarks, views, options.noise_px, context);
+  check_enough(all);
   Pose pose;
   pose.frame = fragment_frame(model);
-  const std::vector<Candidate> found = minima(sights, pose.frame);
+  std::vector<Sight> wrong;
+  const std::vector<Sight> sights = agreeing(all, pose.frame, wrong);
+  check_enough(sights);
+  const std::vector<Candidate> found = initial::minima(sights, pose.frame);
   if (found.empty())
     throw Error(
         "no pose was found for the landmarks: no view shows three of them, and no three are seen in two views; mark "
         "more of them");
-  check_unique(found, sights.size(), options.noise_px);
+  check_unique(found, sights);
   pose.world_from_model = found.front().pose;
   pose.world_from_model.source = model.frame;
-  pose.cost = std::sqrt(found.front().squares_px / double(sights.size()));
-  pose.covariance = options.noise_px * options.noise_px *
-                    inverse_of_symmetric(normal_at(sights, pose.world_from_model, pose.frame).curvature);
-  if (pose.cost > 3 * options.noise_px) {
-    pose.warnings.push_back(residual_warning(sights, pose, options.noise_px));
-    context.warn(pose.warnings.back());
-  }
+  pose.cost = root_mean_square_px(sights, pose.world_from_model);
+  pose.covariance = inverse_of_symmetric(initial::curvature_at(sights, pose.world_from_model, pose.frame));
+  pose.warnings = warnings_of(sights, wrong, found.front(), pose);
+  for (const std::string& warning : pose.warnings) context.warn(warning);
   return pose;
 }
 
@@ -194,11 +163,14 @@ MARROW_PLUGIN(plugin) {
           "Pose with the least reprojection error of marked landmarks, over all views at once, with its predicted "
           "error")
       .in("model", "surface of the fragment; it gives the axes")
-      .in("landmarks", "points in the CT and their marked pixels in the views")
+      .in("landmarks",
+          "points in the CT and their marked pixels in the views; each counts by its deviation. Of six or more, those "
+          "that the others contradict are left out")
       .in("views", "X-ray views; only their cameras are used", over("view"))
       .out("pose", "pose of least reprojection error; its cost is the root mean square of this error in pixels")
-      .option("noise_px", &Options::noise_px,
-              "expected standard deviation of each coordinate of a marked landmark; used for the covariance, for the "
-              "warning, and to decide whether a second pose is possible too",
-              at_least(1e-3));
+      .option(
+          "noise_px", &Options::noise_px,
+          "expected standard deviation of each coordinate of a marked landmark that does not state its own; used for "
+          "its weight, the covariance, the warnings, and to decide whether a second pose is possible too",
+          at_least(1e-3));
 }

@@ -42,6 +42,20 @@ Camera camera_of(const Scene& scene, double angle_deg) {
   return camera;
 }
 
+/// A view whose image is wide enough for the whole bone, and whose mask is where it sees the bone.
+View silhouette_of(const Body& body, const RigidTransform& world_from_ct, const std::string& name, Camera camera) {
+  constexpr int kWide_px = 520;
+  constexpr double kWide_mm = 1.5;
+  camera.intrinsics.topLeftCorner<2, 2>() *= kPixel_mm / kWide_mm;
+  camera.intrinsics.topRightCorner<2, 1>().setConstant(0.5 * (kWide_px - 1));
+  camera.width_px = camera.height_px = kWide_px;
+  const std::vector<float> lengths_mm =
+      BodyProjector(body).radiograph(camera, world_from_ct, PixelGrid{0, 0, 1, kWide_px, kWide_px});
+  View view{name, {cv::Mat(kWide_px, kWide_px, CV_16U, cv::Scalar(1000))}, camera, {}};
+  view.mask = cv::Mat(kWide_px, kWide_px, CV_32F, const_cast<float*>(lengths_mm.data())) > 0;
+  return view;
+}
+
 /// The straight line through outline points, between the first and the last of them along the image's columns.
 LineSegment line_through(const std::vector<Eigen::Vector2d>& pixels) {
   Eigen::MatrixX2d terms(Eigen::Index(pixels.size()), 2);
@@ -116,18 +130,20 @@ RigidTransform truth(const Scene& scene) {
 
 Inputs inputs_of(const Scene& scene) {
   Random random(std::uint64_t(100 + scene.seed));
-  List<View> views;
+  List<View> views, silhouettes;
   List<ShaftLines> lines;
   std::vector<SeenBody> seen_bodies;
   for (const auto& [name, angle_deg] : {std::pair("frontal", 0.0), std::pair("lateral", 80.0)}) {
     const Camera camera = camera_of(scene, angle_deg);
     views.add(name, View{name, {cv::Mat(kSize_px, kSize_px, CV_16U, cv::Scalar(1000))}, camera, {}});
+    silhouettes.add(name, silhouette_of(bone(scene), truth(scene), name, camera));
     lines.add(name, lines_of(scene, camera));
     seen_bodies.push_back(seen(bone(scene), camera, truth(scene), 8, 8));
   }
   return {{"model", item(mesh_of(bone(scene)))},
           {"lines", Value::of(lines, "view")},
           {"views", Value::of(views, "view")},
+          {"silhouettes", Value::of(silhouettes, "view")},
           {"landmarks", item(landmarks_of(scene, views, random))},
           {"start", placed(scene, random, 8)},
           {"first", placed(scene, random, 40)},

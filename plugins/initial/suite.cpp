@@ -121,6 +121,20 @@ std::vector<Trial> trials() {
       return inputs;
     };
   };
+  const auto with_masks = [](const std::function<cv::Mat(const cv::Mat&)>& change) {
+    return [change] {
+      Inputs inputs = inputs_of({});
+      List<View> silhouettes;
+      for (const Value& one : inputs.at("silhouettes").items) {
+        View view = one.as<View>();
+        view.mask = change(view.mask);
+        const std::string name = view.name;
+        silhouettes.add(name, std::move(view));
+      }
+      inputs.set("silhouettes", Value::of(silhouettes, "view"));
+      return inputs;
+    };
+  };
   return {with_changed<Landmarks>("no_landmarks", "landmarks", [](Landmarks& marks) { marks = {}; }),
           with_changed<Landmarks>("two_landmarks", "landmarks",
                                   [](Landmarks& marks) {
@@ -136,17 +150,29 @@ std::vector<Trial> trials() {
                                   [](Landmarks& marks) { marks.points.erase(marks.points.begin()); }),
           {"no_lines", without("lines")},
           {"no_views", without("views")},
+          {"no_silhouettes", without("silhouettes")},
+          {"silhouettes_without_masks", with_masks([](const cv::Mat&) { return cv::Mat(); })},
+          {"empty_silhouettes",
+           with_masks([](const cv::Mat& mask) { return cv::Mat(mask.size(), CV_8U, cv::Scalar(0)); })},
+          {"silhouettes_cut_off",
+           with_masks([](const cv::Mat& mask) {
+             cv::Mat cut = mask.clone();
+             cut.rowRange(0, cut.rows / 2).setTo(255);
+             return cut;
+           })},
           {"broken_camera",
            [none] {
              Inputs inputs = inputs_of({});
-             List<View> views;
-             for (const Value& one : inputs.at("views").items) {
-               View view = one.as<View>();
-               view.camera.intrinsics(0, 0) = none;
-               const std::string name = view.name;
-               views.add(name, std::move(view));
+             for (const char* port : {"views", "silhouettes"}) {
+               List<View> views;
+               for (const Value& one : inputs.at(port).items) {
+                 View view = one.as<View>();
+                 view.camera.intrinsics(0, 0) = none;
+                 const std::string name = view.name;
+                 views.add(name, std::move(view));
+               }
+               inputs.set(port, Value::of(views, "view"));
              }
-             inputs.set("views", Value::of(views, "view"));
              return inputs;
            }},
           with_changed<Mesh>("no_surface", "model", [](Mesh& mesh) { mesh = {}; }),

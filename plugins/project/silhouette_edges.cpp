@@ -4,7 +4,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/dispatch.hpp"
-#include "marrow/project/coarse_surface.hpp"
+#include "marrow/toolbox/geometry/coarse_surface.hpp"
 #include "marrow/project/surface_patches.hpp"
 #include "marrow/project/volume_border.hpp"
 
@@ -362,7 +362,7 @@ std::shared_ptr<const marrow::OutlineProjector> silhouette_edges(const marrow::M
   const std::vector<char> at_border = marrow::rays::vertices_at_volume_border(mesh, volume, options.border_voxels);
   SurfacePatches coarse;
   if (mesh.triangles.size() >= kWorthIt) {
-    marrow::surface::CoarseSurface surface = marrow::surface::coarse_surface(mesh, at_border);
+    marrow::geometry::CoarseSurface surface = marrow::geometry::coarse_surface(mesh, at_border);
     if (!surface.mesh.triangles.empty()) coarse = make_surface_patches(surface.mesh, surface.at_border);
   }
   return std::make_shared<SilhouetteEdges>(make_surface_patches(mesh, at_border), std::move(coarse));

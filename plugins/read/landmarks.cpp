@@ -4,6 +4,7 @@
 
 #include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
+#include "marrow/base/yaml.hpp"
 #include "marrow/toolbox/exchange/marked_values.hpp"
 #include "marrow/toolbox/exchange/xreg_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
@@ -29,6 +30,22 @@ void check_known(const YamlMap& places, const YamlMap& map, const std::string& n
                       (near.empty() ? "give its place in the CT under 'points'" : "did you mean '" + near + "'?"));
 }
 
+/// Where a view shows a point: [u, v] or [u, v, deviation_px].
+void read_seen(const YamlMap& pixels, const std::string& name, const std::string& view, Landmarks& landmarks) {
+  const YAML::Node written = pixels.node(name);
+  const bool has_deviation = written.IsSequence() && written.size() == 3;
+  if (!has_deviation && !(written.IsSequence() && written.size() == 2)) {
+    pixels.fault(name, name + ": expected [u, v] or [u, v, deviation_px], got " + yaml_described(written));
+    return;
+  }
+  const auto numbers = pixels.numbers(name, has_deviation ? 3 : 2);
+  if (!numbers) return;
+  if (has_deviation && !((*numbers)[2] > 0))
+    pixels.fault(name, formatted("{}: its deviation must be greater than 0 px, got {}; leave it out if it is not known",
+                                 name, (*numbers)[2]));
+  landmarks.seen.push_back({name, view, {(*numbers)[0], (*numbers)[1]}, has_deviation ? (*numbers)[2] : 0});
+}
+
 Landmarks landmarks_of(const YamlMap& fragment, YamlFile& file) {
   Landmarks landmarks;
   const auto points = fragment.required("points");
@@ -46,8 +63,7 @@ Landmarks landmarks_of(const YamlMap& fragment, YamlFile& file) {
       const YamlMap pixels(file, views.node(view), fragment.what() + ", seen, view '" + view + "'", FreeKeys{});
       for (const std::string& name : pixels.keys()) {
         check_known(places, pixels, name);
-        if (const auto pixel = pixels.numbers(name, 2))
-          landmarks.seen.push_back({name, view, {(*pixel)[0], (*pixel)[1]}});
+        read_seen(pixels, name, view, landmarks);
       }
     }
   }

@@ -222,6 +222,16 @@ void bind_poses(py::module_& module) {
       .def("__repr__", [](const Truth& self) { return "<marrow.Truth " + mapping_text(self.world_from_model) + ">"; });
 }
 
+/// (u, v) or (u, v, deviation) as a landmark that a view shows.
+Landmarks::Seen seen_of(const std::string& name, const std::string& view, const py::handle& pixel) {
+  const bool has_deviation = py::isinstance<py::sequence>(pixel) && py::len(pixel) == 3;
+  const std::vector<double> numbers = numbers_of(pixel, {has_deviation ? 3 : 2}, "landmark as seen");
+  if (has_deviation && !(numbers[2] >= 0))
+    throw Error(formatted("landmark '{}' as seen: its deviation must be positive, or 0 if it is not known; got {}",
+                          name, numbers[2]));
+  return {name, view, {numbers[0], numbers[1]}, has_deviation ? numbers[2] : 0};
+}
+
 }  // namespace
 
 void bind_geometry(py::module_& module) {
@@ -249,12 +259,11 @@ void bind_geometry(py::module_& module) {
                made->points.push_back({py::str(name), point_of(point, "landmark " + std::string(py::str(name)))});
              for (const auto& [view, points] : seen_px)
                for (const auto& [name, pixel] : py::reinterpret_borrow<py::dict>(points))
-                 made->seen.push_back({py::str(name), py::str(view),
-                                       Eigen::Vector2d(numbers_of(pixel, {2}, "landmark as seen").data())});
+                 made->seen.push_back(seen_of(py::str(name), py::str(view), pixel));
              return made;
            }),
            py::arg("points_mm"), py::arg("seen_px") = py::dict(),
-           "points_mm: {name: (x, y, z)}; seen_px: {view: {name: (u, v)}}.")
+           "points_mm: {name: (x, y, z)}; seen_px: {view: {name: (u, v) or (u, v, deviation)}}.")
       .def_property_readonly(
           "points_mm",
           [](const Landmarks& self) {
@@ -264,6 +273,19 @@ void bind_geometry(py::module_& module) {
             return points;
           },
           "The points of the model, by name.")
+      .def_property_readonly(
+          "seen_px",
+          [](const Landmarks& self) {
+            py::dict views;
+            for (const Landmarks::Seen& one : self.seen) {
+              const py::str view(one.view);
+              if (!views.contains(view)) views[view] = py::dict();
+              const Eigen::Vector3d numbers(one.pixel.x(), one.pixel.y(), one.deviation_px);
+              views[view][py::str(one.name)] = array_of(Eigen::MatrixXd(numbers.transpose())).attr("ravel")();
+            }
+            return views;
+          },
+          "{view: {name: (u, v, deviation)}}: where views show the points; a deviation of 0 is not known.")
       .def("__repr__", [](const Landmarks& self) {
         return formatted("<marrow.Landmarks of {}, mm; seen {} times>", counted(self.points.size(), "point"),
                          self.seen.size());

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the nodes are called that make models, features and poses: (inputs, options) by the node's name."""
 
+from files_of_scene import network, points_network
+
 GREY_VALUES = (  # costs that compare a radiograph with the image
     "entropy_of_difference",
     "gradient_correlation",
@@ -153,6 +155,24 @@ def calls(s):
                 {"poses": 60, "candidates": 6, "finalists": 2, "max_evaluations": 60},
             ),
             "initial.landmarks": lambda: ({"model": s.mesh, "landmarks": s.landmarks, "views": s.views}, {}),
+            "landmarks.network": lambda: (
+                {"points": s.landmarks, "views": s.views},
+                {"network": points_network("points", sorted(s.landmarks.points_mm))},
+            ),
+            "landmarks.template_matching": lambda: (
+                {"points": s.landmarks, "views": s.views, "projector": s.drr, "start": s.start},
+                {},
+            ),
+            "points.extremes": lambda: (
+                {"model": s.mesh},
+                {
+                    "names": ["medial", "lateral"],
+                    "outward": [-1, 1],
+                    "back": [0, 0.5],
+                    "up": [0, -0.5],
+                    "level": ["medial", "lateral"],
+                },
+            ),
             "initial.manual": lambda: ({"model": s.mesh, "start": s.start}, {"rotation_deg": [3, 1, 2]}),
             "initial.shaft_axis": lambda: ({"model": s.mesh, "lines": s.lines, "views": s.views}, {}),
             "initial.skin_markers": lambda: ({"model": s.mesh, "landmarks": s.skin}, {}),
@@ -178,6 +198,12 @@ def calls(s):
             ),
             "verdict.predicted": lambda: ({"pose": s.found.pose, "model": s.mesh, "prior": s.known}, {}),
             "mask.body": lambda: ({"view": s.views["frontal"], "projector": s.drr, "pose": s.start}, {}),
+            "mask.metal": lambda: ({"view": s.views["frontal"]}, {"contrast_low": 0.2, "contrast_high": 0.3}),
+            "mask.network": lambda: (
+                {"view": s.views["frontal"]},
+                {"network": network(classes=("metal", "outside")), "leave_out": ["metal"]},
+            ),
+            "edges.network": lambda: ({"view": s.views["frontal"]}, {"network": network(), "threshold": 4}),
             "mask.near_holes": lambda: (
                 {"view": s.views["frontal"], "implant": s.nail.implant, "pose": s.nailed.start},
                 {},

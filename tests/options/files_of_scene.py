@@ -2,6 +2,7 @@
 """Files for the nodes that read some, written by a pipeline."""
 import pathlib
 
+from harness import onnx
 from harness.formats import mha, straight
 from harness.package import SCRATCH, SOURCE, marrow
 
@@ -58,4 +59,51 @@ def labels_of(first, second):
     values = [0] * 125
     values[62], values[63] = first, second
     path.write_bytes(mha(straight((5, 5, 5)), values))
+    return str(path)
+
+
+NETWORK = """marrow-network: 1
+name: written
+help: a network of one convolution
+version: 1.0.0
+licence: Apache-2.0
+trained: {on: nothing, good_for: tests, not_for: anything else}
+input:
+  values: line_integrals
+  bone: bright
+  pixel_mm: 4
+  normalise: {method: percentiles, low: 1, high: 99}
+  size_px: [32, 32]
+  overlap_px: 8
+outputs:
+  edge_strength: {layer: maps, activation: sigmoid}
+"""
+
+
+def network(least=0.5, classes=()):
+    """The description of a network that sees a border, or the classes in turn, the more the denser the surroundings."""
+    path = pathlib.Path(SCRATCH / ("network-%s-%s.yaml" % (least, "-".join(classes))))
+    text, count = NETWORK, max(1, len(classes))
+    if classes:
+        text = text.replace("edge_strength: {layer: maps,", "classes: {layer: maps, names: [%s]," % ", ".join(classes))
+    weights = [[[[(1 + k) / 3] * 3] * 3] for k in range(count)]
+    layer, tensors = onnx.convolution("image", "maps", weights, [-3 * least * (1 + k) - k for k in range(count)])
+    path.write_text(text)
+    path.with_suffix(".onnx").write_bytes(onnx.model([layer], tensors, {"maps": (count, 32, 32)}, 32, 32))
+    return str(path)
+
+
+def points_network(name, names, sigma=1.0):
+    """A network whose heat map of each point is the bone, moved to one side; half as high with sigma=0.5."""
+    path = pathlib.Path(SCRATCH / (name + ".yaml"))
+    kernel = [[[[0, 0, 0], [sigma, 0, 0], [0, 0, 0]]] for _ in names]
+    layer, tensors = onnx.convolution("image", "points", kernel, [0] * len(names))
+    path.with_suffix(".onnx").write_bytes(onnx.model([layer], tensors, {"points": (len(names), 64, 64)}, 64, 64))
+    path.write_text(
+        "marrow-network: 1\nname: moved\nhelp: for tests\nversion: 1.0.0\nlicence: Apache-2.0\n"
+        "trained: {on: nothing, good_for: tests, not_for: anything else}\n"
+        "input: {values: line_integrals, bone: bright, pixel_mm: 2, normalise: {method: percentiles, low: 1, high: 99},\n"
+        "  size_px: [64, 64], overlap_px: 16}\n"
+        "outputs: {heat_maps: {layer: points, names: [%s], activation: none}}\n" % ", ".join(names)
+    )
     return str(path)

@@ -3,7 +3,7 @@
 scene that gives sets of options. A key "in.NAME" is an input."""
 from calls_of_bones import GREY_VALUES
 from calls_of_programs import FORMATS
-from files_of_scene import labels_of, surface_of, written
+from files_of_scene import labels_of, network, points_network, surface_of, written
 
 
 def files(*names):
@@ -41,6 +41,9 @@ TRIES = {
         in__costs=lambda s: {"distal": s.grey}, in__starts=lambda s: {"distal": s.start}, to=[8, 4, 2]
     ),
     "register.together.reach_px": one(to=[4, 2, 1]),
+    "landmarks.network.network": one(to=lambda s: points_network("half", sorted(s.landmarks.points_mm), 0.5)),
+    "points.extremes.names": one(to=["inner", "outer"], level=[]),
+    "points.extremes.level": one(to=[]),
     # The gap of a joint
     "similarity.with_contact.joint": one(to=["distal", "other"]),
     "similarity.with_contact.joint_width_mm": one(joint=["distal", "other"], to=2),
@@ -48,6 +51,10 @@ TRIES = {
     # Files
     "camera.bead_board.board": one(to=lambda s: str(written() / "nothing.yaml")),
     "camera.check.known_points": one(to=""),
+    "edges.network.network": one(to=lambda s: network(0.8)),
+    "mask.metal.leave_out": one(to=["outside"]),
+    "mask.network.network": one(to=lambda s: network(0.8, ("metal", "outside"))),
+    "mask.network.leave_out": one(to=["outside"]),
     "read.camera.path": files("rtk.xml", "xreg.h5"),
     "read.camera.projection": one(path=lambda s: str(written() / "rtk.xml"), to=1),
     "read.cameras.path": files("xreg.h5"),

@@ -63,6 +63,15 @@ class Values(Case):
         for line, value in values().items():
             self.assertEqual(repr(value), line)
 
+    def test_landmarks_as_views_show_them(self):
+        landmarks = marrow.Landmarks({"tip": (1, 2, 3)}, {"ap": {"tip": (4, 5)}, "lateral": {"tip": (6, 7, 1.5)}})
+        seen = landmarks.seen_px
+        self.assertEqual({view: list(seen[view]["tip"]) for view in seen}, {"ap": [4, 5, 0], "lateral": [6, 7, 1.5]})
+        again = marrow.Landmarks(landmarks.points_mm, seen)
+        self.assertEqual(digest_of(again), digest_of(landmarks))
+        with self.assertRaisesRegex(marrow.Error, "^landmark 'tip' as seen: its deviation must be positive, or 0"):
+            marrow.Landmarks({"tip": (1, 2, 3)}, {"ap": {"tip": (4, 5, -1)}})
+
     def test_what_runs_make_in_a_line(self):
         case = small_case()[1]
         self.assertRegex(repr(case), r"^<marrow.Case of a CT of \d+ x \d+ x \d+, 2 views, 2 fragments>$")

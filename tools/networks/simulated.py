@@ -154,29 +154,36 @@ def settings_of(kind, seed, views, size_px):
     return drawn, level(random, (0.35, 0.2, 0.25, 0.2))
 
 
+def run_pipeline(folder, pipeline, seed, drawn, collimator, outputs):
+    """Runs a pipeline of pipelines/simulate with these settings, and leaves its outputs in the folder. Ends the program
+    if marrow cannot."""
+    marrow = ROOT / "build/bin/marrow"
+    if not marrow.exists():
+        sys.exit("train: build marrow first, with tools/setup")
+    work = folder.parent / (folder.name + ".run")
+    shutil.rmtree(work, ignore_errors=True)
+    words = [marrow, "run", PIPELINES / pipeline, "seed=%d" % seed, "collimator=" + collimator, "--out", work]
+    words += ["--seed", seed, "-q", "--no-cache", "--threads", "1"]
+    for item in drawn.items():
+        words += ["--set", "%s=%s" % item]
+    for output in outputs:
+        words += ["--only", output]
+    done = subprocess.run([str(word) for word in words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if done.returncode:
+        sys.exit("train: the simulation of %s, seed %d, failed:\n%s" % (pipeline, seed, done.stdout))
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.move(work / "outputs", folder)
+    shutil.rmtree(work)
+
+
 def make_case(folder, kind, seed, views=3, size_px=288, surfaces=False):
     """Makes the case in the folder, unless it is there. Ends the program if marrow cannot."""
     if (folder / "truths").exists() and (not surfaces or (folder / "models").exists()):
         return
-    marrow = ROOT / "build/bin/marrow"
-    if not marrow.exists():
-        sys.exit("train: build marrow first, with tools/setup")
     drawn, collimator = settings_of(kind, seed, views, size_px)
-    pipeline = PIPELINES / ("training.yaml" if BONES[kind]["broken"] else "training-whole.yaml")
-    work = folder.parent / (folder.name + ".run")
-    shutil.rmtree(work, ignore_errors=True)
-    words = [marrow, "run", pipeline, "seed=%d" % seed, "collimator=" + collimator, "--out", work, "--seed", seed, "-q"]
-    words += ["--no-cache", "--threads", "1"]
-    for item in drawn.items():
-        words += ["--set", "%s=%s" % item]
-    for output in ["views", "classes", "borders", "truths"] + ["models"] * surfaces:
-        words += ["--only", output]
-    done = subprocess.run([str(word) for word in words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    if done.returncode:
-        sys.exit("train: the simulation of %s, seed %d, failed:\n%s" % (kind, seed, done.stdout))
-    shutil.rmtree(folder, ignore_errors=True)
-    shutil.move(work / "outputs", folder)
-    shutil.rmtree(work)
+    outputs = ["views", "classes", "borders", "truths"] + ["models"] * surfaces
+    pipeline = "training.yaml" if BONES[kind]["broken"] else "training-whole.yaml"
+    run_pipeline(folder, pipeline, seed, drawn, collimator, outputs)
 
 
 def make_cases(data, kind, seeds, at_once=1, **options):

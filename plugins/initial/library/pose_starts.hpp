@@ -15,6 +15,7 @@ struct Sight {
   Eigen::Vector3d model_mm;
   Eigen::Vector2d pixel;
   const Camera* camera;
+  double deviation_px = 1;  ///< standard deviation of each coordinate of the pixel
 };
 
 /// Poses world_from_ct: one from the landmarks that two or more views show, triangulated from their rays, and several

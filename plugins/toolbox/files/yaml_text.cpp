@@ -80,6 +80,13 @@ void put_deviations(YAML::Emitter& out, const Matrix6d& covariance, const Fragme
   out << EndMap;
 }
 
+void put_seen(YAML::Emitter& out, const Landmarks::Seen& seen) {
+  if (seen.deviation_px > 0)
+    put_vector(out, Eigen::Vector3d(seen.pixel.x(), seen.pixel.y(), seen.deviation_px));
+  else
+    put_vector(out, seen.pixel);
+}
+
 /// The axes and the origin of the CT: what a pose has that came with no frame.
 bool is_of_ct(const FragmentFrame& frame) {
   return !frame.is_anatomical && frame.origin_mm.isZero(0) && frame.axes == Eigen::Matrix3d::Identity();
@@ -235,11 +242,14 @@ std::string landmarks(const Landmarks& landmarks, const std::string& fragment) {
   std::vector<std::string> views;
   for (const auto& seen : landmarks.seen)
     if (std::find(views.begin(), views.end(), seen.view) == views.end()) views.push_back(seen.view);
-  if (!views.empty()) out << Key << "seen" << Value << Comment("px, [u, v] by view") << BeginMap;
+  const bool states_deviation =
+      std::any_of(landmarks.seen.begin(), landmarks.seen.end(), [](const auto& seen) { return seen.deviation_px > 0; });
+  const char* const form = states_deviation ? "px, [u, v, deviation] by view" : "px, [u, v] by view";
+  if (!views.empty()) out << Key << "seen" << Value << Comment(form) << BeginMap;
   for (const std::string& view : views) {
     out << Key << DoubleQuoted << view << Value << BeginMap;
     for (const auto& seen : landmarks.seen)
-      if (seen.view == view) put_vector(out << Key << DoubleQuoted << seen.name << Value, seen.pixel);
+      if (seen.view == view) put_seen(out << Key << DoubleQuoted << seen.name << Value, seen);
     out << EndMap;
   }
   if (!views.empty()) out << EndMap;

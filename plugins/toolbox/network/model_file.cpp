@@ -33,11 +33,10 @@ std::string reason_of_model(const std::string& message) {
            "; export the network with other layers (Conv, ConvTranspose, BatchNormalization, Relu, MaxPool, Concat, "
            "Add, Sigmoid), with opset_version=11 and for a tile of fixed size";
   }
-  if (message.find("arse ONNX model") != std::string::npos || message.find("arse onnx model") != std::string::npos ||
-      message.find("has_graph") != std::string::npos)
-    return "is no ONNX model, or a damaged one; export it again";
-  static const std::regex frame(
-      "OpenCV\\([0-9.]+\\) \\S+ error: |\\s+$");  // the place in OpenCV's source says nothing here
+  static const std::regex damaged("parse onnx model|has_graph", std::regex::icase);
+  if (std::regex_search(message, damaged)) return "is no ONNX model, or a damaged one; export it again";
+  // The place in OpenCV's source says nothing here.
+  static const std::regex frame("OpenCV\\([0-9.]+\\) \\S+ error: |\\s+$");
   return "OpenCV says: " + printable(cut(std::regex_replace(message, frame, ""), kLongest));
 }
 

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <random>
 
+#include "marrow/base/number_text.hpp"
 #include "tests/plugins/initial/landmark_scene.hpp"
 
 namespace landmarks_test {
@@ -152,15 +153,113 @@ TEST(Landmarks, RefusesTheMirrorImage) {
       << refusal(landmarks);
 }
 
-TEST(Landmarks, WarnsOfExchangedNames) {
+void expect_near(const marrow::Pose& pose, double most_deg, double most_mm, const std::string& what) {
+  EXPECT_LT(marrow::degrees(marrow::geodesic_angle_rad(pose.world_from_model.rotation, exact_pose().rotation)),
+            most_deg)
+      << what;
+  EXPECT_LT((pose.world_from_model * Vector3d(0, 0, 50) - exact_pose() * Vector3d(0, 0, 50)).norm(), most_mm) << what;
+}
+
+TEST(Landmarks, ExchangedNamesAreLeftOut) {
   marrow::Landmarks landmarks = seen_in(scene::spread(), {"frontal", "lateral"});
-  std::swap(landmarks.seen[0].pixel, landmarks.seen[1].pixel);
+  std::swap(landmarks.seen[0].pixel, landmarks.seen[2].pixel);  // two names in the frontal view
   const marrow::Pose pose = found(landmarks);
-  ASSERT_EQ(pose.warnings.size(), 1u);
+  expect_near(pose, 1e-5, 1e-4, "the ten others are exact");
+  ASSERT_EQ(pose.warnings.size(), 2u);
+  const double apart_px = (landmarks.seen[0].pixel - landmarks.seen[2].pixel).norm();
+  EXPECT_EQ(pose.warnings[0],
+            "the landmark 'p(25 0 -10)' in view 'frontal' is left out: it is " + marrow::formatted("{:.3g}", apart_px) +
+                " px from where the others say, and 1 px were expected; is it marked on another point?");
+  EXPECT_LT(pose.cost, 1e-5) << "of those that count";
+}
+
+TEST(Landmarks, WarnsWhereAllAreOff) {
+  marrow::Landmarks landmarks = seen_in(scene::spread(), {"frontal", "lateral"});
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0, 15);
+  for (auto& seen : landmarks.seen) seen.pixel += Eigen::Vector2d(noise(random), noise(random));
+  const marrow::Pose pose = found(landmarks);
+  ASSERT_EQ(pose.warnings.size(), 1u) << "it is not known which are wrong";
   EXPECT_NE(pose.warnings[0].find("but 1 px were expected; are two names exchanged, or is a camera wrong?"),
             std::string::npos)
       << pose.warnings[0];
   EXPECT_GT(pose.cost, 3);
+}
+
+struct Wrong {
+  std::vector<std::string> views;
+  std::size_t count;  ///< of wrong sights, of 6 in each view
+};
+
+class WrongLandmarks : public testing::TestWithParam<Wrong> {};
+
+// Every choice of a wrong sight, and several wrong ones, each somewhere else in the image.
+TEST_P(WrongLandmarks, DoNotSpoilThePose) {
+  const marrow::Landmarks exact = seen_in(scene::spread(), GetParam().views);
+  std::mt19937 random(11);
+  std::normal_distribution<double> noise(0, 1);
+  std::uniform_real_distribution<double> anywhere(0, 511);
+  double worst_deg = 0;
+  int left_out = 0;
+  for (std::size_t first = 0; first < exact.seen.size(); ++first) {
+    marrow::Landmarks landmarks = exact;
+    for (auto& seen : landmarks.seen) seen.pixel += Eigen::Vector2d(noise(random), noise(random));
+    for (std::size_t i = 0; i < GetParam().count; ++i) {
+      auto& wrong = landmarks.seen[(first + 5 * i) % exact.seen.size()];
+      const Eigen::Vector2d right = wrong.pixel;
+      do wrong.pixel = {anywhere(random), anywhere(random)};
+      while ((wrong.pixel - right).norm() < 40);
+    }
+    const marrow::Pose pose = found(landmarks);
+    const double off_deg =
+        marrow::degrees(marrow::geodesic_angle_rad(pose.world_from_model.rotation, exact_pose().rotation));
+    worst_deg = std::max(worst_deg, off_deg);
+    left_out += int(pose.warnings.size());
+    const marrow::Vector6d off = marrow::motion_between(exact_pose(), pose.world_from_model, pose.frame);
+    EXPECT_LT(off.dot(pose.covariance->ldlt().solve(off)), 30) << "6 expected; sight " << first;
+  }
+  std::printf("%zu wrong of %zu: %.2f deg at worst\n", GetParam().count, exact.seen.size(), worst_deg);
+  EXPECT_EQ(left_out, int(GetParam().count * exact.seen.size()));
+}
+
+INSTANTIATE_TEST_SUITE_P(Views, WrongLandmarks,
+                         testing::Values(Wrong{{"frontal", "lateral"}, 1}, Wrong{{"frontal", "lateral"}, 3},
+                                         Wrong{{"frontal", "lateral", "oblique"}, 5}));
+
+TEST(Landmarks, OneWrongOfSixInOneView) {
+  marrow::Landmarks landmarks = seen_in(scene::spread(), {"frontal"});
+  landmarks.seen[3].pixel += Eigen::Vector2d(60, -45);
+  const marrow::Pose pose = found(landmarks);
+  expect_near(pose, 1e-4, 1e-2, "the five others are exact");
+  ASSERT_EQ(pose.warnings.size(), 1u);
+  EXPECT_NE(pose.warnings[0].find("is 75 px from where the others say"), std::string::npos) << pose.warnings[0];
+}
+
+// A stated deviation is the weight: two sights of one point in one view count like their weighted mean.
+TEST(Landmarks, CountByTheirDeviation) {
+  const marrow::Landmarks exact = seen_in(scene::spread(), {"frontal", "lateral"});
+  marrow::Landmarks twice = exact, mean = exact;
+  for (auto* landmarks : {&twice, &mean})
+    for (auto& seen : landmarks->seen) seen.deviation_px = 2;
+  // 1 px to the right with a deviation of 2 px, and 4 px to the left with 4 px: together (1/4 - 4/16) / (5/16) = 0,
+  // with a deviation of 1 / sqrt(5/16) px.
+  twice.seen[4].pixel.x() += 1;
+  twice.seen.push_back(exact.seen[4]);
+  twice.seen.back().pixel.x() -= 4;
+  twice.seen.back().deviation_px = 4;
+  mean.seen[4].deviation_px = 1 / std::sqrt(5.0 / 16);
+  const marrow::Pose of_twice = found(twice), of_mean = found(mean);
+  expect_near(of_twice, 1e-3, 1e-3, "the weighted mean is exact");
+  EXPECT_LT((*of_twice.covariance - *of_mean.covariance).norm(), 1e-3 * of_mean.covariance->norm());
+  // Half the deviation of all: a quarter of the covariance. Without one, noise_px counts.
+  marrow::Landmarks halved = exact;
+  for (auto& seen : halved.seen) seen.deviation_px = 0.5;
+  EXPECT_LT((4 * *found(halved).covariance - *found(exact, {{"noise_px", 1.0}}).covariance).norm(),
+            1e-9 * found(exact).covariance->norm());
+  halved.seen[1].deviation_px = -1;
+  EXPECT_EQ(refusal(halved),
+            "the landmark 'p(25 0 -10)' in view 'lateral' has a deviation of -1 px, which must be positive, or 0 where "
+            "it is not known");
 }
 
 }  // namespace landmarks_test

@@ -21,7 +21,7 @@ fragments:
     points: {medial epicondyle: [1, 2, 3], lateral epicondyle: [-4, 5, 6.5]}
     seen:
       frontal: {medial epicondyle: [100.5, 200]}
-      lateral: {lateral epicondyle: [10, 20], medial epicondyle: [30, 40]}
+      lateral: {lateral epicondyle: [10, 20], medial epicondyle: [30, 40, 1.5]}
     tracked: {lateral epicondyle: [7, 8, 9]}
   proximal:
     points: {head: [0, 0, 400]}
@@ -36,6 +36,8 @@ fragments:
   EXPECT_EQ(read[0].seen[0].view, "frontal");
   EXPECT_EQ(read[0].seen[2].name, "medial epicondyle");
   EXPECT_EQ(read[0].seen[2].pixel, Eigen::Vector2d(30, 40));
+  EXPECT_EQ(read[0].seen[1].deviation_px, 0) << "not known";
+  EXPECT_EQ(read[0].seen[2].deviation_px, 1.5);
   ASSERT_EQ(read[0].tracked.size(), 1u);
   EXPECT_EQ(read[0].tracked[0].world_mm, Eigen::Vector3d(7, 8, 9));
   EXPECT_TRUE(read[1].seen.empty() && read[1].tracked.empty());
@@ -48,7 +50,8 @@ fragments:
   distal:
     points: {medial: [1, 2], lateral: [-4, 5, 6], lateral: [0, 0, 0]}
     seen:
-      frontal: {medail: [100, 200], lateral: [1, 2, 3]}
+      frontal: {medail: [100, 200], lateral: [1, 2, 3, 4]}
+      lateral: {lateral: [1, 2, 0]}
     traked: {}
     tracked: {patella: [7, 8, 9]}
   proximal: {seen: {}}
@@ -58,13 +61,17 @@ fragments:
        {"l.yaml:4:22: fragment 'distal', points: medial: expected 3 numbers [x, y, z], got a list of 2",
         "l.yaml:4:51: 'lateral' is given twice in fragment 'distal', points; the first is at line 4",
         "l.yaml:6:25: fragment 'distal', seen, view 'frontal': the points have no 'medail'; did you mean 'medial'?",
-        "l.yaml:6:46: fragment 'distal', seen, view 'frontal': lateral: expected 2 numbers, got a list of 3",
-        "l.yaml:7:5: fragment 'distal': unknown key 'traked'; did you mean 'tracked'?",
-        "l.yaml:8:24: fragment 'distal', tracked: the points have no 'patella'; give its place in the CT under "
+        "l.yaml:6:46: fragment 'distal', seen, view 'frontal': lateral: expected [u, v] or [u, v, deviation_px], got "
+        "a list of 4",
+        "l.yaml:7:26: fragment 'distal', seen, view 'lateral': lateral: its deviation must be greater than 0 px, got "
+        "0; "
+        "leave it out if it is not known",
+        "l.yaml:8:5: fragment 'distal': unknown key 'traked'; did you mean 'tracked'?",
+        "l.yaml:9:24: fragment 'distal', tracked: the points have no 'patella'; give its place in the CT under "
         "'points'",
-        "l.yaml:9:13: fragment 'proximal': key 'points' is missing"})
+        "l.yaml:10:13: fragment 'proximal': key 'points' is missing"})
     EXPECT_NE(said.find(part), std::string::npos) << part << "\nit said:\n" << said;
-  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 13) << "7 faults, a line of the file under each:\n" << said;
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 15) << "8 faults, a line of the file under each:\n" << said;
 }
 
 // Many unknown points: only the first fifty are reported, without comparing all names with each other.

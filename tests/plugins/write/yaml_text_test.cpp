@@ -65,6 +65,13 @@ fragments:
     tracked:  # mm, in the world
       "b": [7, 8, 9]
 )");
+  landmarks.seen[0].deviation_px = 1.5;
+  EXPECT_NE(marrow::files::landmarks(landmarks, "bone").find(R"(    seen:  # px, [u, v, deviation] by view
+      "left":
+        "a": [10, 20.5, 1.5]
+        "b": [12, 22]
+)"),
+            std::string::npos);
 }
 
 TEST(YamlText, OddNamesAreQuotedAndReadBack) {

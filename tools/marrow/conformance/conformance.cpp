@@ -12,6 +12,7 @@
 
 #include "command_options.hpp"
 #include "commands.hpp"
+#include "conformance/given_options.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/reason_of_exception.hpp"
@@ -87,8 +88,12 @@ std::string measured(const Catalogue& catalogue, const NodeDefinition& node, con
 /// Runs the checks of one node, one after the other, in a worker.
 class Checks {
  public:
-  Checks(std::string node, json makers, const TemporaryFolder& files, const std::atomic<bool>& stopped)
-      : node_(std::move(node)), makers_(std::move(makers)), files_(files), stopped_(stopped) {}
+  Checks(std::string node, json makers, json options, const TemporaryFolder& files, const std::atomic<bool>& stopped)
+      : node_(std::move(node)),
+        makers_(std::move(makers)),
+        options_(std::move(options)),
+        files_(files),
+        stopped_(stopped) {}
 
   Outcome run(std::size_t number) {
     const bool was_fresh = !worker_;
@@ -108,7 +113,7 @@ class Checks {
     if (!worker_)
       worker_ =
           std::make_unique<Worker>(WorkerSettings{{this_program().string(), "check-worker", files_.path().string()}});
-    worker_->ask({{"do", "check"}, {"node", node_}, {"in", makers_}, {"check", number}});
+    worker_->ask({{"do", "check"}, {"node", node_}, {"in", makers_}, {"set", options_}, {"check", number}});
     const WorkerEnd end = worker_->wait({double(time_limit_s()), kMemory_mb}, &stopped_, nullptr);
     if (stopped_.load()) throw Cancelled();  // Ctrl-C in a terminal ends the worker too
     if (end.died) worker_.reset();
@@ -116,7 +121,8 @@ class Checks {
   }
 
   std::string node_;
-  json makers_;  ///< for inputs that the kind does not have: names of nodes, by port
+  json makers_;   ///< for inputs that the kind does not have: names of nodes, by port
+  json options_;  ///< texts by names
   const TemporaryFolder& files_;
   const std::atomic<bool>& stopped_;
   std::unique_ptr<Worker> worker_;
@@ -149,7 +155,8 @@ int check_worker(const std::filesystem::path& files_folder) {
                           const std::string name = request.at("node");
                           const NodeDefinition& node = catalogue.load(name);
                           const conformance::Suite& suite = catalogue.load_kind(node.info.kind()).suite;
-                          const OptionValues options = suite.options ? suite.options() : OptionValues{};
+                          OptionValues options = given_options(node.info, request.at("set"));
+                          if (suite.options) options.merge(suite.options());
                           return json(measured(catalogue, node, request.at("in"), options,
                                                conformance::checks_of(suite).at(request.at("check"))));
                         }}});
@@ -184,10 +191,12 @@ void expect_known(const std::vector<std::string>& wanted, const Catalogue& catal
     if (!contains(known, name)) throw Error("there is no check '" + name + "'; " + suggestion(name, known));
 }
 
-/// Runs the wanted checks of a node, or all if none are named, and counts their verdicts.
+/// Runs the wanted checks of a node, or all if none are named, and counts their verdicts. If none applies to a node
+/// that was asked for by its name, that counts as a failure.
 void check_node(const std::string& node, const std::vector<CheckInfo>& all, const std::vector<std::string>& wanted,
-                Checks& checks, std::map<char, int>& count) {
+                bool is_named, Checks& checks, std::map<char, int>& count) {
   std::printf("%s\n", node.c_str());
+  const int before = count['+'] + count['-'];
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!wanted.empty() && !contains(wanted, all[i].name)) continue;
     const Outcome outcome = checks.run(i);
@@ -199,11 +208,28 @@ void check_node(const std::string& node, const std::vector<CheckInfo>& all, cons
                 all[i].name.c_str(), outcome.text.c_str());
     std::fflush(stdout);
   }
+  if (!is_named || count['+'] + count['-'] > before) return;
+  ++count['-'];
+  std::printf("  FAIL nothing was checked\n");
 }
 
 struct ConformanceRequest {
-  std::vector<std::string> subjects, checks, inputs;
+  std::vector<std::string> subjects, checks, inputs, options;
 };
+
+/// The texts of --set by the names of options. Throws Error if none of the nodes has one of them.
+json options_of(const std::vector<std::string>& given, const Catalogue& catalogue,
+                const std::vector<std::string>& nodes) {
+  std::vector<std::string> known;
+  for (const std::string& node : nodes)
+    for (const OptionInfo& option : catalogue.find(node)->options) known.push_back(option.name);
+  json options = json::object();
+  for (const auto& [name, text] : pairs_of(given, "option=value")) {
+    if (!contains(known, name)) throw Error("there is no option '" + name + "'; " + suggestion(name, known));
+    options[name] = text;
+  }
+  return options;
+}
 
 int run_conformance(const ConformanceRequest& request) try {
   const std::vector<std::string>&subjects = request.subjects, &wanted = request.checks;
@@ -216,12 +242,13 @@ int run_conformance(const ConformanceRequest& request) try {
   for (const std::string& subject : subjects)
     for (const std::string& node : nodes_of(catalogue, subject)) nodes.push_back(node);
   expect_known(wanted, catalogue, nodes);
+  const json options = options_of(request.options, catalogue, nodes);
   const TemporaryFolder files(new_temporary_folder("conformance"));
   std::map<char, int> count;
   for (const std::string& node : nodes) {
     if (const std::vector<CheckInfo> all = checks_for(node, catalogue); !all.empty()) {
-      Checks checks(node, makers, files, stopped);
-      check_node(node, all, wanted, checks, count);
+      Checks checks(node, makers, options, files, stopped);
+      check_node(node, all, wanted, contains(subjects, node), checks, count);
       continue;
     }
     const std::string kind = catalogue.find(node)->kind();
@@ -252,6 +279,10 @@ void add_conformance(CLI::App& app, int& code) {
       ->add_option(
           "--in", request->inputs,
           "port=kind.name: for an input that the kind does not have, the node that makes it; may be given again")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--set", request->options,
+                   "option=value: for all of the nodes that have this option; may be given again")
       ->allow_extra_args(false);
   command->callback([request, &code] { code = run_conformance(*request); });
   say_that_libraries_are_described(command);

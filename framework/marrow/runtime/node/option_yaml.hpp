@@ -4,10 +4,11 @@
 #include <optional>
 #include <string>
 
+#include "marrow/base/export.hpp"
 #include "marrow/base/strict_yaml.hpp"
 #include "marrow/runtime/node/node.hpp"
 
-namespace marrow {
+namespace MARROW_EXPORT marrow {
 
 /// A value for an option as a person writes it, converted and checked against its range, choices and length. Faults go
 /// to the diagnostics of `yaml`. `substitute` replaces $names in texts before they are read. If it returns nothing, so

@@ -100,7 +100,7 @@ TEST(Inference, SaysWhatIsWrongWithAModel) {
   const auto expect = [](const std::string& said, const std::string& part) {
     EXPECT_NE(said.find(part), std::string::npos) << said;
   };
-  expect(fault_of(""), "plain.onnx: is empty");
+  expect(fault_of(""), "plain.onnx: the file is empty");
   expect(fault_of("PK not a network"), "plain.onnx: is no ONNX model, or a damaged one; export it again");
   expect(fault_of(good.bytes().substr(0, 90)), "is no ONNX model, or a damaged one");
   Convolution unknown = good;

@@ -102,10 +102,10 @@ TEST(ViewMaps, HavePixelsOfTheSizeAtTheBone) {
 TEST(NetworkNodes, KeepWhatTheNetworkSees) {
   View view = edges::drawn(160, [](double u, double v) {
     const bool left = std::hypot(u - 45, v - 80) < 25, right = std::hypot(u - 115, v - 80) < 25;
-    return left ? 20000.0 : right ? 10000.0 : 40000.0;  // the line integrals are 0.69 and 1.39
+    return left ? 26800.0 : right ? 10000.0 : 40000.0;  // the line integrals are 0.40 and 1.39
   });
-  // Nearly 1 above a line integral of 1, nearly 0 below.
-  const Written written(Convolution{.side = 1, .weights = {100}, .bias = {-100}}.bytes(),
+  // Nearly 1 above a line integral of 0.5, nearly 0 below.
+  const Written written(Convolution{.side = 1, .weights = {100}, .bias = {-50}}.bytes(),
                         with(with(kPlain, "activation: none", "activation: sigmoid"), "grey_values", "line_integrals"));
   const auto option = [&] { return shipped::Options{{"network", written.file().string()}}; };
   const EdgeMap edges =

@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
-namespace marrow::surface {
+namespace marrow::geometry {
 
 /// A surface with about an eighth of the triangles, for coarse outlines. All vertices within a cube of three edge
 /// lengths become one (Rossignac and Borrel 1993). `at_border`: for each vertex whether the surface ends there because
@@ -51,4 +51,4 @@ inline CoarseSurface coarse_surface(const Mesh& mesh, const std::vector<char>& a
   return coarse;
 }
 
-}  // namespace marrow::surface
+}  // namespace marrow::geometry

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+// A start from what the views show of a part that stands out, such as an implant of metal: its silhouette. The shape is
+// looked up among the outlines of the surface from all sides; the poses that are most like it are moved until the
+// silhouettes lie on one another.
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <marrow/plugin.hpp>
+
+#include "marrow/base/number_text.hpp"
+#include "marrow/initial/shape_library.hpp"
+#include "marrow/initial/silhouette_fit.hpp"
+#include "marrow/toolbox/geometry/coarse_surface.hpp"
+
+namespace {
+
+using namespace marrow;
+using initial::Fitted, initial::SeenSilhouette, initial::ShapeLibrary;
+
+struct Options {
+  int directions = 2000;
+  int candidates = 30;
+  double least_apart_deg = 15;
+  double least_overlap = 0.8;
+};
+
+constexpr const char* kNode = "initial.silhouette";
+constexpr int kCoarse_px = 75, kFine_px = 190, kFinalists = 6;
+
+struct Result {
+  Pose pose, other;
+};
+
+/// Merged triangles make the surface a little smaller, which is no matter for the coarse silhouettes.
+Mesh with_at_most(std::size_t triangles, const Mesh& mesh) {
+  Mesh result = mesh;
+  while (result.triangles.size() > triangles) {
+    const std::size_t before = result.triangles.size();
+    result = geometry::coarse_surface(result, std::vector<char>(result.vertices_mm.size(), 0)).mesh;
+    if (result.triangles.size() == before) break;
+  }
+  return result;
+}
+
+/// What the views show. A view that cuts the silhouette off is left out, with a warning.
+std::vector<SeenSilhouette> whole_silhouettes(const List<View>& views, int size_px, Context* context) {
+  std::vector<SeenSilhouette> whole;
+  std::string cut;
+  for (const View& view : views) {
+    SeenSilhouette seen = initial::seen_silhouette(view, size_px, kNode);
+    if (seen.is_whole)
+      whole.push_back(std::move(seen));
+    else
+      cut += (cut.empty() ? "'" : ", '") + view.name + "'";
+  }
+  if (whole.empty())
+    throw Error(std::string(kNode) + ": the image's border cuts off the silhouette in view " + cut +
+                ", so its shape is not known; take images that show the whole part, or another start");
+  if (!cut.empty() && context)
+    context->warn("the image's border cuts off the silhouette in view " + cut + "; it is left out");
+  return whole;
+}
+
+bool are_near(const RigidTransform& a, const RigidTransform& b, double deg) {
+  return degrees(geodesic_angle_rad(a.rotation, b.rotation)) < deg;
+}
+
+/// The most promising poses: those whose shape is most like that of one of the views, then of these the ones of most
+/// overlap in all views. No two of a view are within half the distance of what counts as another pose.
+std::vector<RigidTransform> candidates_of(const std::vector<SeenSilhouette>& views, const Mesh& surface,
+                                          const Options& options, Context& context) {
+  std::vector<Fitted> found;
+  const ShapeLibrary library(surface, views[0], options.directions, context);
+  for (const SeenSilhouette& seen : views) {
+    std::vector<RigidTransform> of_view;
+    for (const ShapeLibrary::Match& match : library.matches(seen)) {
+      if (of_view.size() == std::size_t(3 * options.candidates)) break;
+      const auto near = [&](const RigidTransform& one) {
+        return are_near(one, match.world_from_model, 0.5 * options.least_apart_deg);
+      };
+      if (std::none_of(of_view.begin(), of_view.end(), near)) of_view.push_back(match.world_from_model);
+    }
+    for (const RigidTransform& pose : of_view) found.push_back({pose, 0});
+  }
+  tbb::parallel_for(std::size_t(0), found.size(), [&](std::size_t i) {
+    found[i].overlap = initial::mean_overlap(views, surface, found[i].world_from_model);
+  });
+  std::stable_sort(found.begin(), found.end(), [](const Fitted& a, const Fitted& b) { return a.overlap > b.overlap; });
+  std::vector<RigidTransform> poses;
+  for (const Fitted& one : found)
+    if (poses.size() < std::size_t(options.candidates)) poses.push_back(one.world_from_model);
+  return poses;
+}
+
+/// The poses after a fit, that of most overlap first.
+std::vector<Fitted> all_fitted(const std::vector<SeenSilhouette>& views, const Mesh& surface,
+                               const FragmentFrame& frame, const std::vector<RigidTransform>& starts, int steps,
+                               Context& context) {
+  std::vector<Fitted> fits(starts.size());
+  tbb::parallel_for(std::size_t(0), starts.size(), [&](std::size_t i) {
+    context.check_cancelled();
+    fits[i] = initial::fitted(views, surface, frame, starts[i], steps);
+  });
+  std::stable_sort(fits.begin(), fits.end(), [](const Fitted& a, const Fitted& b) { return a.overlap > b.overlap; });
+  return fits;
+}
+
+/// The first poses of which no two are near one another.
+std::vector<RigidTransform> apart(const std::vector<Fitted>& fits, double deg, std::size_t count) {
+  std::vector<RigidTransform> poses;
+  for (const Fitted& fit : fits)
+    if (poses.size() < count &&
+        std::none_of(poses.begin(), poses.end(), [&](const auto& one) { return are_near(one, fit.world_from_model, deg); }))
+      poses.push_back(fit.world_from_model);
+  return poses;
+}
+
+Pose pose_of(const Fitted& fit, const FragmentFrame& frame) {
+  Pose pose;
+  pose.world_from_model = fit.world_from_model;
+  pose.frame = frame;
+  pose.cost = 1 - fit.overlap;
+  return pose;
+}
+
+Result silhouette(const Mesh& model, const List<View>& silhouettes, const Options& options, Context& context) {
+  check_mesh(model, "model");
+  if (silhouettes.empty()) throw Error(std::string(kNode) + ": there are no silhouettes");
+  const Mesh coarse = with_at_most(8000, model), surface = with_at_most(300000, model);
+  const FragmentFrame frame = fragment_frame(model);
+  const std::vector<SeenSilhouette> views = whole_silhouettes(silhouettes, kCoarse_px, &context),
+                                    fine = whole_silhouettes(silhouettes, kFine_px, nullptr);
+  const std::vector<RigidTransform> candidates = candidates_of(views, coarse, options, context);
+  context.progress(0.5, "shapes compared");
+  const std::vector<Fitted> fits = all_fitted(views, coarse, frame, candidates, 12, context);
+  const std::vector<Fitted> last = all_fitted(fine, surface, frame, apart(fits, options.least_apart_deg, kFinalists), 25, context);
+  const auto other = std::find_if(last.begin(), last.end(), [&](const Fitted& one) {
+    return !are_near(one.world_from_model, last[0].world_from_model, options.least_apart_deg);
+  });
+  Result result{pose_of(last[0], frame), pose_of(other == last.end() ? last[0] : *other, frame)};
+  context.info(formatted("the silhouettes cover {:.1f} % of what any of them covers; in the next pose that is "
+                         "{:.0f} degrees or more away {:.1f} %",
+                         100 * last[0].overlap, options.least_apart_deg, 100 * (1 - result.other.cost)));
+  if (last[0].overlap < options.least_overlap) {
+    result.pose.warnings.push_back(
+        formatted("in the best pose, the silhouette of the surface and that of the mask have only {:.0f} % in common; "
+                  "does the mask show this part, and all of it?",
+                  100 * last[0].overlap));
+    context.warn(result.pose.warnings.back());
+  }
+  return result;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("initial.silhouette", silhouette)
+      .summary(
+          "Pose from the silhouettes of a part, without any start: its shape is looked up among the outlines of the "
+          "surface from all sides (arXiv 2205.00057)")
+      .in("model", "surface of the part")
+      .in("silhouettes", "X-ray views whose masks are not 0 where the part is seen, and only there", over("view"))
+      .out("pose", &Result::pose, "pose of most overlap; its cost is 1 less the overlap")
+      .out("other", &Result::other,
+           "the next pose that is least_apart_deg away, such as the mirror pose of a nearly symmetric part; the pose "
+           "itself if there is none")
+      .option("directions", &Options::directions, "number of sides from which outlines are compared", at_least(50),
+              at_most(100000))
+      .option("candidates", &Options::candidates, "number of poses that are moved until the silhouettes meet",
+              at_least(1), at_most(10000))
+      .option("least_apart_deg", &Options::least_apart_deg, "poses that are nearer to one another count as one",
+              at_least(1), at_most(90))
+      .option("least_overlap", &Options::least_overlap,
+              "below this part, a warning says that the mask may be of another part", at_least(0), at_most(1),
+              unit(""));
+}

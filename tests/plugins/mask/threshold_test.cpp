@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// Grey values in steps: air 60000, a body 30000 with a stripe of bone 20000, two plates of metal 5000 in it, a cable
+// as dark, and the dark outside of the field at the border.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <marrow/domain/camera.hpp>
+
+#include "shipped.hpp"
+
+namespace mask_threshold_test {
+
+const cv::Rect kLarge(60, 70, 40, 30), kSmall(110, 80, 20, 20);
+
+marrow::View view() {
+  marrow::View view{"front", {cv::Mat(200, 200, CV_16U, cv::Scalar(60000))}, {}, {}};
+  view.camera.width_px = view.camera.height_px = 200;
+  view.camera.intrinsics << 900, 0, 99.5, 0, 900, 99.5, 0, 0, 1;
+  cv::Mat& pixels = view.image.pixels;
+  pixels(cv::Rect(40, 30, 110, 140)).setTo(30000);
+  pixels(cv::Rect(70, 30, 20, 140)).setTo(20000);
+  pixels(kLarge).setTo(5000);
+  pixels(kSmall).setTo(5000);
+  pixels(cv::Rect(0, 85, 200, 3)).setTo(5000);  // a cable through both
+  pixels(cv::Rect(0, 190, 200, 10)).setTo(1000);
+  return view;
+}
+
+/// Within a pixel at each side: an opening leaves the pixels of the cable that touch a plate.
+void expect_box(const cv::Rect& box, const cv::Rect& expected) {
+  const cv::Rect wider(expected.x - 1, expected.y - 1, expected.width + 2, expected.height + 2);
+  EXPECT_EQ(box | expected, box) << box << " is smaller than " << expected;
+  EXPECT_EQ(box & wider, box) << box << " is larger than " << expected;
+}
+
+/// The box of what is kept, and how much of it is kept.
+std::pair<cv::Rect, int> kept(const marrow::View& view, const shipped::Options& options) {
+  const cv::Mat mask = shipped::call("mask.threshold", {{"view", shipped::item(view)}}, options)
+                           .at("view")
+                           .as<marrow::View>()
+                           .mask;
+  cv::Rect box;
+  for (int v = 0; v < mask.rows; ++v)
+    for (int u = 0; u < mask.cols; ++u)
+      if (mask.at<std::uint8_t>(v, u)) box |= cv::Rect(u, v, 1, 1);
+  return {box, cv::countNonZero(mask)};
+}
+
+TEST(MaskThreshold, KeepsTheLargestRegionOfMetal) {
+  const auto [box, pixels] = kept(view(), {});
+  expect_box(box, kLarge);  // the cable is cut off, the outside touches the border
+  EXPECT_NEAR(pixels, kLarge.area(), 20) << "an opening rounds the corners";
+}
+
+TEST(MaskThreshold, KeepsTheSecondRegion) {
+  expect_box(kept(view(), {{"region", std::int64_t(2)}}).first, kSmall);
+}
+
+TEST(MaskThreshold, KeepsTheOutsideIfAsked) {
+  EXPECT_EQ(kept(view(), {{"at_border", true}}).first, cv::Rect(0, 190, 200, 10));
+}
+
+TEST(MaskThreshold, TakesTheGivenValue) {
+  expect_box(kept(view(), {{"grey_value", 20000.0}}).first, {60, 30, 40, 140});  // bone and a plate on it
+}
+
+TEST(MaskThreshold, KeepsWhatIsBright) {
+  marrow::View inverse = view();
+  inverse.image.pixels = 65535 - inverse.image.pixels;
+  expect_box(kept(inverse, {{"bright", true}}).first, kLarge);
+}
+
+TEST(MaskThreshold, LeavesOutWhatWasLeftOut) {
+  marrow::View masked = view();
+  masked.mask = cv::Mat(200, 200, CV_8U, cv::Scalar(255));
+  masked.mask(kLarge).setTo(0);
+  expect_box(kept(masked, {{"grey_value", 10000.0}}).first, kSmall);
+}
+
+TEST(MaskThreshold, SaysIfThereAreTooFewRegions) {
+  EXPECT_EQ(shipped::refusal("mask.threshold", {{"view", shipped::item(view())}}, {{"region", std::int64_t(3)}}),
+            "mask.threshold: view 'front' has 2 regions of that grey value away from the image's border, but region 3 "
+            "is wanted; give another grey_value, or a smaller opening_px");
+}
+
+}  // namespace mask_threshold_test
