@@ -247,7 +247,7 @@ def card_of(arguments, names, factor, steps):
         "version": "1.0.0",
         "licence": "Apache-2.0",
         "trained": {
-            "on": trained_on % (arguments.training, arguments.views, steps, BATCH),
+            "data": trained_on % (arguments.training, arguments.views, steps, BATCH),
             "good_for": bone["good_for"],
             "not_for": NOT_FOR,
         },

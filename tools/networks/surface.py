@@ -159,7 +159,7 @@ def card_of(arguments, name, names, pixel_mm, is_symmetric):
         "version": "1.0.0",
         "licence": "that of the surface",
         "trained": {
-            "on": "%d poses of %s before %d simulated femora, %d steps of %d images (tools/networks/train surface)"
+            "data": "%d poses of %s before %d simulated femora, %d steps of %d images (tools/networks/train surface)"
             % (arguments.shadows, arguments.surface.name, arguments.anatomies, arguments.steps, BATCH),
             "good_for": "this part alone, %.0f to %.0f mm from the source" % tuple(arguments.distance_mm),
             "not_for": "other parts, also of the same shape in another size; any use on patients"

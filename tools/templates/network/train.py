@@ -41,8 +41,9 @@ def example(random):
     )  # in pixels, negative inside
     wall = random.uniform(2, 6)  # a shaft is brightest in its wall
     bone = np.clip(-from_border, 0, wall) / wall
-    tissue = random.uniform(-0.4, 0.4) * across / SIDE_PX + random.uniform(-0.4, 0.4) * along / SIDE_PX
-    image = random.uniform(0.15, 0.7) * bone + tissue + random.normal(0, random.uniform(0.005, 0.06), bone.shape)
+    slopes = random.normal(0, 0.5, 2)  # soft tissue may fall across the whole bone
+    tissue = (slopes[0] * across + slopes[1] * along) / SIDE_PX
+    image = random.uniform(0.1, 0.5) * bone + tissue + random.normal(0, random.uniform(0.005, 0.06), bone.shape)
     return image - image.min(), abs(from_border) < 1.5
 
 
@@ -62,7 +63,7 @@ def batch(random):
 
 def train(network, random):
     optimizer = torch.optim.Adam(network.parameters(), lr=3e-3)
-    loss_of = nn.BCEWithLogitsLoss(pos_weight=torch.tensor(4.0))
+    loss_of = nn.BCEWithLogitsLoss(pos_weight=torch.tensor(8.0))
     for step in range(STEPS):
         image, borders = batch(random)
         optimizer.zero_grad()
