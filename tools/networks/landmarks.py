@@ -72,7 +72,7 @@ def make_cases(data, anatomy, seeds, views, size_px):
         if not (folder / str(seed)).exists():
             drawn, collimator = settings_of(bone, seed, views, size_px)
             simulated.run_pipeline(
-                folder / str(seed), bone["pipeline"], seed, drawn, collimator, ["views", "truths", "points"]
+                folder / str(seed), anatomy, bone["pipeline"], seed, drawn, collimator, ["views", "truths", "points"]
             )
         print("\rcases of %s: %d of %d" % (anatomy, i + 1, len(seeds)), end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
