@@ -155,8 +155,8 @@ def settings_of(kind, seed, views, size_px):
 
 
 def run_pipeline(folder, kind, pipeline, seed, drawn, collimator, outputs):
-    """Runs a pipeline of pipelines/simulate with these settings, and leaves its outputs in the folder. Ends the program,
-    with the kind of the bone, if marrow cannot."""
+    """Runs a pipeline of pipelines/simulate with these settings, and leaves its outputs in the folder. Ends the program
+    if marrow cannot, and names the kind of the bone."""
     marrow = ROOT / "build/bin/marrow"
     if not marrow.exists():
         sys.exit("train: build marrow first, with tools/setup")
