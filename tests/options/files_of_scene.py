@@ -102,8 +102,8 @@ def points_network(name, names, kernel=(0.6, 0, 0)):
     path.write_text(
         "marrow-network: 1\nname: moved\nhelp: for tests\nversion: 1.0.0\nlicence: Apache-2.0\n"
         "trained: {data: nothing, good_for: tests, not_for: anything else}\n"
-        "input: {values: line_integrals, bone: bright, pixel_mm: 2, normalise: {method: percentiles, low: 1, high: 99},\n"
-        "  size_px: [64, 64], overlap_px: 16}\n"
+        "input: {values: line_integrals, bone: bright, pixel_mm: 2, size_px: [64, 64], overlap_px: 16,\n"
+        "  normalise: {method: percentiles, low: 1, high: 99}}\n"
         "outputs: {heat_maps: {layer: points, names: [%s], activation: none}}\n" % ", ".join(names)
     )
     return str(path)

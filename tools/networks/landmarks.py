@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Named points of a bone in X-ray images, as heat maps. The points are those that marrow places on the bone's surface, so
-a user's CT gives the same ones."""
+"""Named points of a bone in X-ray images, as heat maps. The points are those that marrow places on the bone's surface,
+so a user's CT gives the same ones."""
 import dataclasses
 import json
 import pathlib
@@ -72,7 +72,7 @@ def make_cases(data, anatomy, seeds, views, size_px):
         if not (folder / str(seed)).exists():
             drawn, collimator = settings_of(bone, seed, views, size_px)
             simulated.run_pipeline(
-                folder / str(seed), bone["pipeline"], seed, drawn, collimator, ["views", "truths", "points"]
+                folder / str(seed), anatomy, bone["pipeline"], seed, drawn, collimator, ["views", "truths", "points"]
             )
         print("\rcases of %s: %d of %d" % (anatomy, i + 1, len(seeds)), end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
@@ -108,8 +108,8 @@ def shown_in(folder, world_mm):
 
 
 def random_motion(random, shown):
-    """A 2 x 3 matrix that takes pixels of a view to those of a tile: turned by up to 30 degrees, larger or smaller by up
-    to 15 %, with the middle of what is seen up to 30 pixels off the tile's middle."""
+    """A 2 x 3 matrix that takes pixels of a view to those of a tile: turned by up to 30 degrees, larger or smaller by
+    up to 15 %, with the middle of what is seen up to 30 pixels off the tile's middle."""
     angle, factor = np.radians(random.uniform(-30, 30)), np.exp(random.uniform(-1, 1) * np.log(1.15))
     turn = factor * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     seen = shown.points_px[np.isfinite(shown.points_px[:, 0])]

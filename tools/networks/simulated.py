@@ -154,9 +154,9 @@ def settings_of(kind, seed, views, size_px):
     return drawn, level(random, (0.35, 0.2, 0.25, 0.2))
 
 
-def run_pipeline(folder, pipeline, seed, drawn, collimator, outputs):
+def run_pipeline(folder, kind, pipeline, seed, drawn, collimator, outputs):
     """Runs a pipeline of pipelines/simulate with these settings, and leaves its outputs in the folder. Ends the program
-    if marrow cannot."""
+    if marrow cannot, and names the kind of the bone."""
     marrow = ROOT / "build/bin/marrow"
     if not marrow.exists():
         sys.exit("train: build marrow first, with tools/setup")
@@ -170,7 +170,7 @@ def run_pipeline(folder, pipeline, seed, drawn, collimator, outputs):
         words += ["--only", output]
     done = subprocess.run([str(word) for word in words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode:
-        sys.exit("train: the simulation of %s, seed %d, failed:\n%s" % (pipeline, seed, done.stdout))
+        sys.exit("train: the simulation of %s, seed %d, failed:\n%s" % (kind, seed, done.stdout))
     shutil.rmtree(folder, ignore_errors=True)
     shutil.move(work / "outputs", folder)
     shutil.rmtree(work)
@@ -183,7 +183,7 @@ def make_case(folder, kind, seed, views=3, size_px=288, surfaces=False):
     drawn, collimator = settings_of(kind, seed, views, size_px)
     outputs = ["views", "classes", "borders", "truths"] + ["models"] * surfaces
     pipeline = "training.yaml" if BONES[kind]["broken"] else "training-whole.yaml"
-    run_pipeline(folder, pipeline, seed, drawn, collimator, outputs)
+    run_pipeline(folder, kind, pipeline, seed, drawn, collimator, outputs)
 
 
 def make_cases(data, kind, seeds, at_once=1, **options):
