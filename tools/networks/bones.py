@@ -32,7 +32,7 @@ CARD = {
     "marrow-network": 1,
     "name": "bones-of-femur",
     "help": "Bone, metal and the collimator's rim in X-ray images of femora, and the borders of the femur's fragments",
-    "version": "1.0.0",
+    "version": "0.1.0",
     "licence": "Apache-2.0",
     "input": {
         "values": "line_integrals",
@@ -48,8 +48,7 @@ CARD = {
     },
 }
 GOOD_FOR = (
-    "broken and whole femora in fluoroscopy with pins, plates, clamps, cables, tables and collimators; pixels of 0.15 "
-    "to 0.75 mm at the bone"
+    "simulated femora in fluoroscopy, as far as the figures on other femora go; pixels of 0.15 to 0.75 mm at the bone"
 )
 NOT_FOR = (
     "other bones, whose borders it does not know; contrast medium; images without the size of their pixels; "
@@ -240,11 +239,15 @@ def run(arguments):
     (out / "figures.json").write_text(json.dumps({"threshold": threshold, "losses": losses, **figures}, indent=1))
     for part, found in figures.items():
         print(part, "  ".join("%s %.3f" % item for item in found.items()))
-    trained_on = "%d simulated femora of %d views each (marrow, tools/networks/train bones), %d steps of %d tiles" % (
+    made_by = "simulated femora of %d views each (marrow, tools/networks/train bones)" % arguments.views
+    told = ", ".join("%s %.2f" % (name.replace("_", " "), value) for name, value in figures["judgement"].items())
+    trained_on = "%d %s, %d steps of %d tiles; on %d other femora: %s" % (
         counts["training"],
-        arguments.views,
+        made_by,
         arguments.steps,
         BATCH,
+        counts["judgement"],
+        told,
     )
     card = {**CARD, "file": arguments.name, "trained": {"data": trained_on, "good_for": GOOD_FOR, "not_for": NOT_FOR}}
     export.write(network, card, out)
