@@ -109,8 +109,8 @@ std::vector<Fitted> all_fitted(const std::vector<SeenSilhouette>& views, const M
 std::vector<RigidTransform> apart(const std::vector<Fitted>& fits, double deg, std::size_t count) {
   std::vector<RigidTransform> poses;
   for (const Fitted& fit : fits)
-    if (poses.size() < count &&
-        std::none_of(poses.begin(), poses.end(), [&](const auto& one) { return are_near(one, fit.world_from_model, deg); }))
+    if (poses.size() < count && std::none_of(poses.begin(), poses.end(),
+                                             [&](const auto& one) { return are_near(one, fit.world_from_model, deg); }))
       poses.push_back(fit.world_from_model);
   return poses;
 }
@@ -133,14 +133,16 @@ Result silhouette(const Mesh& model, const List<View>& silhouettes, const Option
   const std::vector<RigidTransform> candidates = candidates_of(views, coarse, options, context);
   context.progress(0.5, "shapes compared");
   const std::vector<Fitted> fits = all_fitted(views, coarse, frame, candidates, 12, context);
-  const std::vector<Fitted> last = all_fitted(fine, surface, frame, apart(fits, options.least_apart_deg, kFinalists), 25, context);
+  const std::vector<Fitted> last =
+      all_fitted(fine, surface, frame, apart(fits, options.least_apart_deg, kFinalists), 25, context);
   const auto other = std::find_if(last.begin(), last.end(), [&](const Fitted& one) {
     return !are_near(one.world_from_model, last[0].world_from_model, options.least_apart_deg);
   });
   Result result{pose_of(last[0], frame), pose_of(other == last.end() ? last[0] : *other, frame)};
-  context.info(formatted("the silhouettes cover {:.1f} % of what any of them covers; in the next pose that is "
-                         "{:.0f} degrees or more away {:.1f} %",
-                         100 * last[0].overlap, options.least_apart_deg, 100 * (1 - result.other.cost)));
+  context.info(
+      formatted("the silhouettes cover {:.1f} % of what any of them covers; in the next pose that is "
+                "{:.0f} degrees or more away {:.1f} %",
+                100 * last[0].overlap, options.least_apart_deg, 100 * (1 - result.other.cost)));
   if (last[0].overlap < options.least_overlap) {
     result.pose.warnings.push_back(
         formatted("in the best pose, the silhouette of the surface and that of the mask have only {:.0f} % in common; "

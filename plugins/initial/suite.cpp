@@ -135,52 +135,51 @@ std::vector<Trial> trials() {
       return inputs;
     };
   };
-  return {with_changed<Landmarks>("no_landmarks", "landmarks", [](Landmarks& marks) { marks = {}; }),
-          with_changed<Landmarks>("two_landmarks", "landmarks",
-                                  [](Landmarks& marks) {
-                                    marks.tracked.resize(2);
-                                    marks.seen.resize(4);
-                                  }),
-          with_changed<Landmarks>("landmark_not_a_number", "landmarks",
-                                  [none](Landmarks& marks) {
-                                    marks.tracked[0].world_mm.x() = none;
-                                    marks.seen[0].pixel.x() = none;
-                                  }),
-          with_changed<Landmarks>("unknown_landmark", "landmarks",
-                                  [](Landmarks& marks) { marks.points.erase(marks.points.begin()); }),
-          {"no_lines", without("lines")},
-          {"no_views", without("views")},
-          {"no_silhouettes", without("silhouettes")},
-          {"silhouettes_without_masks", with_masks([](const cv::Mat&) { return cv::Mat(); })},
-          {"empty_silhouettes",
-           with_masks([](const cv::Mat& mask) { return cv::Mat(mask.size(), CV_8U, cv::Scalar(0)); })},
-          {"silhouettes_cut_off",
-           with_masks([](const cv::Mat& mask) {
-             cv::Mat cut = mask.clone();
-             cut.rowRange(0, cut.rows / 2).setTo(255);
-             return cut;
-           })},
-          {"broken_camera",
-           [none] {
-             Inputs inputs = inputs_of({});
-             for (const char* port : {"views", "silhouettes"}) {
-               List<View> views;
-               for (const Value& one : inputs.at(port).items) {
-                 View view = one.as<View>();
-                 view.camera.intrinsics(0, 0) = none;
-                 const std::string name = view.name;
-                 views.add(name, std::move(view));
-               }
-               inputs.set(port, Value::of(views, "view"));
-             }
-             return inputs;
-           }},
-          with_changed<Mesh>("no_surface", "model", [](Mesh& mesh) { mesh = {}; }),
-          with_changed<Pose>("start_not_a_number", "start",
-                             [none](Pose& start) { start.world_from_model.translation_mm.x() = none; }),
-          with_changed<Pose>("start_not_rigid", "start", [](Pose& start) { start.world_from_model.rotation *= 2; }),
-          with_changed<Pose>("start_far_off", "start",
-                             [](Pose& start) { start.world_from_model.translation_mm.z() += 5000; })};
+  return {
+      with_changed<Landmarks>("no_landmarks", "landmarks", [](Landmarks& marks) { marks = {}; }),
+      with_changed<Landmarks>("two_landmarks", "landmarks",
+                              [](Landmarks& marks) {
+                                marks.tracked.resize(2);
+                                marks.seen.resize(4);
+                              }),
+      with_changed<Landmarks>("landmark_not_a_number", "landmarks",
+                              [none](Landmarks& marks) {
+                                marks.tracked[0].world_mm.x() = none;
+                                marks.seen[0].pixel.x() = none;
+                              }),
+      with_changed<Landmarks>("unknown_landmark", "landmarks",
+                              [](Landmarks& marks) { marks.points.erase(marks.points.begin()); }),
+      {"no_lines", without("lines")},
+      {"no_views", without("views")},
+      {"no_silhouettes", without("silhouettes")},
+      {"silhouettes_without_masks", with_masks([](const cv::Mat&) { return cv::Mat(); })},
+      {"empty_silhouettes", with_masks([](const cv::Mat& mask) { return cv::Mat(mask.size(), CV_8U, cv::Scalar(0)); })},
+      {"silhouettes_cut_off", with_masks([](const cv::Mat& mask) {
+         cv::Mat cut = mask.clone();
+         cut.rowRange(0, cut.rows / 2).setTo(255);
+         return cut;
+       })},
+      {"broken_camera",
+       [none] {
+         Inputs inputs = inputs_of({});
+         for (const char* port : {"views", "silhouettes"}) {
+           List<View> views;
+           for (const Value& one : inputs.at(port).items) {
+             View view = one.as<View>();
+             view.camera.intrinsics(0, 0) = none;
+             const std::string name = view.name;
+             views.add(name, std::move(view));
+           }
+           inputs.set(port, Value::of(views, "view"));
+         }
+         return inputs;
+       }},
+      with_changed<Mesh>("no_surface", "model", [](Mesh& mesh) { mesh = {}; }),
+      with_changed<Pose>("start_not_a_number", "start",
+                         [none](Pose& start) { start.world_from_model.translation_mm.x() = none; }),
+      with_changed<Pose>("start_not_rigid", "start", [](Pose& start) { start.world_from_model.rotation *= 2; }),
+      with_changed<Pose>("start_far_off", "start",
+                         [](Pose& start) { start.world_from_model.translation_mm.z() += 5000; })};
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ using network::Output, network::ViewMaps;
 struct Options {
   std::filesystem::path network;
   double least = 0.3;
-  int reach = 6;
+  int peak_reach = 6;
   bool mirrored = false;
   double object_distance_mm = 0;
 };
@@ -113,7 +113,7 @@ Landmarks network_landmarks(const Landmarks& points, const List<View>& views, co
     const ViewMaps maps = network::raw_maps_of_view(network, output, options.mirrored ? mirrored(views[i]) : views[i],
                                                     options.object_distance_mm, context);
     for (const Wanted& one : wanted)
-      if (const auto peak = peak_of(maps.channels[one.channel], options.least, options.reach)) {
+      if (const auto peak = peak_of(maps.channels[one.channel], options.least, options.peak_reach)) {
         Landmarks::Seen seen = seen_at(*peak, maps, output.deviation_factor);
         if (options.mirrored) seen.pixel.x() = views[i].image.width() - 1 - seen.pixel.x();
         seen.name = one.name;
@@ -139,7 +139,7 @@ MARROW_PLUGIN(plugin) {
               required(), beside({".onnx"}))
       .option("least", &Options::least, "a point is not seen where the highest value of its map is below this",
               at_least(0), at_most(1))
-      .option("reach", &Options::reach,
+      .option("peak_reach", &Options::peak_reach,
               "how far the peak reaches around the highest value, in pixels of the map; what is farther does not count",
               at_least(1), at_most(100))
       .option("mirrored", &Options::mirrored,

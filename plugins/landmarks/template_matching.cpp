@@ -18,7 +18,7 @@ using namespace marrow;
 
 struct Options {
   double patch_mm = 40, reach_mm = 15, pixel_mm = 0.8;
-  double rotation_deg = 8, rotation_step_deg = 4;
+  double turn_deg = 8, turn_step_deg = 4;
   double least = 0.5;
   double deviation_factor = 1;
 };
@@ -129,9 +129,9 @@ std::optional<Match> matched(const Compared& compared, const Eigen::Vector2d& pl
   constexpr float kConstant = 1e-6f;
   const cv::Mat window = square_of(compared.image, place, side + 2 * reach, 0);
   std::optional<Match> best;
-  const int turns = options.rotation_step_deg > 0 ? int(options.rotation_deg / options.rotation_step_deg) : 0;
+  const int turns = options.turn_step_deg > 0 ? int(options.turn_deg / options.turn_step_deg) : 0;
   for (int turn = -turns; turn <= turns; ++turn) {
-    const cv::Mat patch = square_of(compared.radiograph, place, side, radians(turn * options.rotation_step_deg));
+    const cv::Mat patch = square_of(compared.radiograph, place, side, radians(turn * options.turn_step_deg));
     cv::Scalar mean, deviation;
     cv::meanStdDev(patch, mean, deviation);
     if (!(deviation[0] > kConstant)) continue;
@@ -191,10 +191,10 @@ MARROW_PLUGIN(plugin) {
               at_least(1), at_most(200))
       .option("pixel_mm", &Options::pixel_mm,
               "size of the pixels that are compared, at the bone; not below the image's", at_least(0.1), at_most(5))
-      .option("rotation_deg", &Options::rotation_deg, "the radiograph is turned by up to this angle in its plane",
-              at_least(0), at_most(45))
-      .option("rotation_step_deg", &Options::rotation_step_deg, "in steps of this angle; 0: it is not turned",
-              at_least(0), at_most(45))
+      .option("turn_deg", &Options::turn_deg, "the radiograph is turned by up to this angle in its plane", at_least(0),
+              at_most(45))
+      .option("turn_step_deg", &Options::turn_step_deg, "in steps of this angle; 0: it is not turned", at_least(0),
+              at_most(45))
       .option("least", &Options::least, "a point is not seen where the highest correlation is below this", at_least(0),
               at_most(1))
       .option("deviation_factor", &Options::deviation_factor, "the stated deviations are multiplied by this",

@@ -53,7 +53,7 @@ std::filesystem::path written_network(const std::filesystem::path& folder, const
   const std::filesystem::path description = folder / "network.yaml";
   std::ofstream text(description);
   text << "marrow-network: 1\nname: bright\nhelp: for checks\nversion: 1.0.0\nlicence: Apache-2.0\n"
-          "trained: {on: nothing, good_for: checks, not_for: anything else}\n"
+          "trained: {data: nothing, good_for: checks, not_for: anything else}\n"
           "input:\n  values: line_integrals\n  bone: bright\n  pixel_px: 2\n"
           "  normalise: {method: percentiles, low: 1, high: 99}\n"
        << "  size_px: [" << kSide_px << ", " << kSide_px << "]\n  overlap_px: 16\n"

@@ -4,9 +4,9 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/dispatch.hpp"
-#include "marrow/toolbox/geometry/coarse_surface.hpp"
 #include "marrow/project/surface_patches.hpp"
 #include "marrow/project/volume_border.hpp"
+#include "marrow/toolbox/geometry/coarse_surface.hpp"
 
 namespace {
 

@@ -67,7 +67,7 @@ name: written
 help: a network of one convolution
 version: 1.0.0
 licence: Apache-2.0
-trained: {on: nothing, good_for: tests, not_for: anything else}
+trained: {data: nothing, good_for: tests, not_for: anything else}
 input:
   values: line_integrals
   bone: bright
@@ -93,15 +93,15 @@ def network(least=0.5, classes=()):
     return str(path)
 
 
-def points_network(name, names, sigma=1.0):
-    """A network whose heat map of each point is the bone, moved to one side; half as high with sigma=0.5."""
+def points_network(name, names, kernel=(0.6, 0, 0)):
+    """A network whose heat map of each point is the bone, moved to one side."""
     path = pathlib.Path(SCRATCH / (name + ".yaml"))
-    kernel = [[[[0, 0, 0], [sigma, 0, 0], [0, 0, 0]]] for _ in names]
-    layer, tensors = onnx.convolution("image", "points", kernel, [0] * len(names))
+    weights = [[[[0, 0, 0], list(kernel), [0, 0, 0]]] for _ in names]
+    layer, tensors = onnx.convolution("image", "points", weights, [0] * len(names))
     path.with_suffix(".onnx").write_bytes(onnx.model([layer], tensors, {"points": (len(names), 64, 64)}, 64, 64))
     path.write_text(
         "marrow-network: 1\nname: moved\nhelp: for tests\nversion: 1.0.0\nlicence: Apache-2.0\n"
-        "trained: {on: nothing, good_for: tests, not_for: anything else}\n"
+        "trained: {data: nothing, good_for: tests, not_for: anything else}\n"
         "input: {values: line_integrals, bone: bright, pixel_mm: 2, normalise: {method: percentiles, low: 1, high: 99},\n"
         "  size_px: [64, 64], overlap_px: 16}\n"
         "outputs: {heat_maps: {layer: points, names: [%s], activation: none}}\n" % ", ".join(names)

@@ -41,7 +41,7 @@ TRIES = {
         in__costs=lambda s: {"distal": s.grey}, in__starts=lambda s: {"distal": s.start}, to=[8, 4, 2]
     ),
     "register.together.reach_px": one(to=[4, 2, 1]),
-    "landmarks.network.network": one(to=lambda s: points_network("half", sorted(s.landmarks.points_mm), 0.5)),
+    "landmarks.network.network": one(to=lambda s: points_network("other", sorted(s.landmarks.points_mm), (0, 0, 0.6))),
     "points.extremes.names": one(to=["inner", "outer"], level=[]),
     "points.extremes.level": one(to=[]),
     # The gap of a joint

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Named points of a bone in X-ray images, as heat maps: the network of landmarks.network. The points are those that
-marrow places on the bone's surface, so a user's CT gives the same ones."""
+"""Named points of a bone in X-ray images, as heat maps. The points are those that marrow places on the bone's surface, so
+a user's CT gives the same ones."""
 import dataclasses
 import json
 import pathlib
@@ -20,13 +20,14 @@ from model import Head, UNet
 
 HELP = "named points of a bone in X-ray images, from simulated femora"
 PIXEL_MM = 1.0
+PERCENTILES = (5, 70)  # a collimator may cover a quarter of the image, and air another
 TILE_PX, OVERLAP_PX = (192, 192), 32
 STRIDE_PX = 2
 SIGMA = 2.0  # of a point's heat map, in its pixels
 BATCH = 8
 POINT_WEIGHT = 30.0  # of a pixel at a point, because these are few
 WIDTHS = (8, 16, 32, 48, 64)
-LEAST, REACH = 0.3, 6  # as landmarks.network has them
+LEAST, REACH = 0.3, 6  # as the node that uses the network has them
 
 # What is drawn for each bone. sides_deg: from which sides the views are taken.
 ANATOMIES = {
@@ -134,7 +135,7 @@ def batches(views):
     def tile_of(random):
         shown = views[random.integers(len(views))]
         matrix = random_motion(random, shown)
-        values = images.normalised(images.changed(random, shown.values))
+        values = images.normalised(images.changed(random, shown.values), *PERCENTILES)
         points = shown.points_px @ matrix[:, :2].T + matrix[:, 2]
         return images.moved(values, matrix, TILE_PX)[None], heat_maps(points)
 
@@ -155,9 +156,8 @@ def loss_of(outputs, maps):
 def maps_of(network, values):
     """The heat maps of a whole view."""
     rows, columns = values.shape
-    wide = cv2.copyMakeBorder(
-        images.normalised(values), 16, 16 + -rows % 16, 16, 16 + -columns % 16, cv2.BORDER_REFLECT_101
-    )
+    values = images.normalised(values, *PERCENTILES)
+    wide = cv2.copyMakeBorder(values, 16, 16 + -rows % 16, 16, 16 + -columns % 16, cv2.BORDER_REFLECT_101)
     with torch.no_grad():
         maps = torch.sigmoid(network(torch.from_numpy(wide[None, None]))[0])[0].numpy()
     skipped = 16 // STRIDE_PX
@@ -247,7 +247,7 @@ def card_of(arguments, names, factor, steps):
         "version": "1.0.0",
         "licence": "Apache-2.0",
         "trained": {
-            "on": trained_on % (arguments.training, arguments.views, steps, BATCH),
+            "data": trained_on % (arguments.training, arguments.views, steps, BATCH),
             "good_for": bone["good_for"],
             "not_for": NOT_FOR,
         },
@@ -255,7 +255,7 @@ def card_of(arguments, names, factor, steps):
             "values": "line_integrals",
             "bone": "bright",
             "pixel_mm": PIXEL_MM,
-            "normalise": {"method": "percentiles", "low": 1, "high": 99},
+            "normalise": {"method": "percentiles", "low": PERCENTILES[0], "high": PERCENTILES[1]},
             "size_px": list(TILE_PX),
             "overlap_px": OVERLAP_PX,
         },
@@ -277,7 +277,7 @@ def declare(parser):
     parser.add_argument("--choice", type=int, default=20, help="anatomies of choice (default: %(default)s)")
     parser.add_argument("--judgement", type=int, default=40, help="anatomies of judgement (default: %(default)s)")
     parser.add_argument("--views", type=int, default=3, help="views of each anatomy (default: %(default)s)")
-    parser.add_argument("--size-px", type=int, default=384, help="side of the images (default: %(default)s)")
+    parser.add_argument("--size-px", type=int, default=288, help="side of the images (default: %(default)s)")
 
 
 def new_network(names):

@@ -210,5 +210,5 @@ def run(arguments):
         len(scans["training"]),
         arguments.steps,
     )
-    card = {**CARD, "file": arguments.name, "trained": {"on": trained_on, "good_for": GOOD_FOR, "not_for": NOT_FOR}}
+    card = {**CARD, "file": arguments.name, "trained": {"data": trained_on, "good_for": GOOD_FOR, "not_for": NOT_FOR}}
     export.write(network, card, out)

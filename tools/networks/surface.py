@@ -98,9 +98,7 @@ def input_of(grey):
 
 
 def pictures_of(sources, pixel_mm, count, seed):
-    return [
-        surface_images.picture(np.random.default_rng([seed, i]), sources, TILE_PX, pixel_mm) for i in range(count)
-    ]
+    return [surface_images.picture(np.random.default_rng([seed, i]), sources, TILE_PX, pixel_mm) for i in range(count)]
 
 
 def batches(sources, pixel_mm):
@@ -156,11 +154,12 @@ def card_of(arguments, name, names, pixel_mm, is_symmetric):
         "file": name,
         "marrow-network": 1,
         "name": name,
-        "help": "The silhouette of %s, and %d points of its surface, in X-ray images from any side" % (part, len(names)),
+        "help": "The silhouette of %s, and %d points of its surface, in X-ray images from any side"
+        % (part, len(names)),
         "version": "1.0.0",
         "licence": "that of the surface",
         "trained": {
-            "on": "%d poses of %s before %d simulated femora, %d steps of %d images (marrow, tools/networks/train surface)"
+            "data": "%d poses of %s before %d simulated femora, %d steps of %d images (tools/networks/train surface)"
             % (arguments.shadows, arguments.surface.name, arguments.anatomies, arguments.steps, BATCH),
             "good_for": "this part alone, %.0f to %.0f mm from the source" % tuple(arguments.distance_mm),
             "not_for": "other parts, also of the same shape in another size; any use on patients"

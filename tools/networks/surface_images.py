@@ -84,7 +84,9 @@ def things(random, size_px, pixel_mm):
     for _ in range(random.poisson(0.7)):  # cables, wires, rods and screws
         line = np.zeros_like(water)
         ends = np.array([point() for _ in range(random.integers(2, 5))], np.int32)
-        cv2.polylines(line, [ends], False, 1, max(1, int(np.exp(random.uniform(np.log(1), np.log(12))) / pixel_mm)), cv2.LINE_AA)
+        cv2.polylines(
+            line, [ends], False, 1, max(1, int(np.exp(random.uniform(np.log(1), np.log(12))) / pixel_mm)), cv2.LINE_AA
+        )
         metal += random.uniform(0.3, 8) * line
     for _ in range(random.poisson(0.7)):  # beads, markers and coins
         disc = np.zeros_like(water)

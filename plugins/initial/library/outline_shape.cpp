@@ -27,7 +27,9 @@ const std::array<Complex, kPoints>& roots() {
 Complex root(int order, int at) { return roots()[std::size_t(((order * at) % kPoints + kPoints) % kPoints)]; }
 
 /// The order of a term: -kOrders to -1, then 1 to kOrders.
-int order_of(int term) { return term < OutlineShape::kOrders ? term - OutlineShape::kOrders : term + 1 - OutlineShape::kOrders; }
+int order_of(int term) {
+  return term < OutlineShape::kOrders ? term - OutlineShape::kOrders : term + 1 - OutlineShape::kOrders;
+}
 
 /// kPoints points, evenly spaced along the polygon.
 std::array<Complex, kPoints> evenly_spaced(const std::vector<Eigen::Vector2d>& polygon) {
@@ -41,9 +43,8 @@ std::array<Complex, kPoints> evenly_spaced(const std::vector<Eigen::Vector2d>& p
     const double at = passed.back() * k / kPoints;
     while (side + 1 < polygon.size() && passed[side + 1] <= at) ++side;
     const double length = passed[side + 1] - passed[side];
-    const Eigen::Vector2d point =
-        polygon[side] +
-        (length > 0 ? (at - passed[side]) / length : 0) * (polygon[(side + 1) % polygon.size()] - polygon[side]);
+    const Eigen::Vector2d point = polygon[side] + (length > 0 ? (at - passed[side]) / length : 0) *
+                                                      (polygon[(side + 1) % polygon.size()] - polygon[side]);
     points[std::size_t(k)] = {point.x(), point.y()};
   }
   return points;

@@ -60,8 +60,7 @@ ShapeLibrary::ShapeLibrary(const Mesh& surface, const SeenSilhouette& about, int
     context.check_cancelled();
     Side& side = sides_[std::size_t(i)];
     side.camera_from_model = turned(direction(i, directions), Eigen::Vector3d::UnitZ());
-    const Eigen::Vector3d there_mm =
-        Eigen::Vector3d(0, 0, distance_mm_) - side.camera_from_model * middle_mm_;
+    const Eigen::Vector3d there_mm = Eigen::Vector3d(0, 0, distance_mm_) - side.camera_from_model * middle_mm_;
     const cv::Mat1b mask =
         geometry::silhouette_image(surface, camera, {"world", frame_, side.camera_from_model, there_mm}) >= 0;
     side.shape = outline_shape(outline_rays(mask, camera));
@@ -71,8 +70,7 @@ ShapeLibrary::ShapeLibrary(const Mesh& surface, const SeenSilhouette& about, int
 std::vector<ShapeLibrary::Match> ShapeLibrary::matches(const SeenSilhouette& seen) const {
   const std::vector<Eigen::Vector2d> rays = outline_rays(seen.mask, seen.camera);
   const std::complex<double> middle = outline_shape(rays).middle;
-  const Eigen::Matrix3d looking =
-      turned(Eigen::Vector3d(middle.real(), middle.imag(), 1), Eigen::Vector3d::UnitZ());
+  const Eigen::Matrix3d looking = turned(Eigen::Vector3d(middle.real(), middle.imag(), 1), Eigen::Vector3d::UnitZ());
   const OutlineShape shape = outline_shape(seen_along(rays, looking));
   const RigidTransform world_from_camera = inverse(seen.camera.camera_from_world);
   std::vector<Match> matches(sides_.size());

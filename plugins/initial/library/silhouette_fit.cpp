@@ -16,6 +16,7 @@ namespace {
 struct Residual {
   double mm;
   Vector6d by_motion;
+  double pixel_mm;  ///< the width of a pixel there
 };
 
 /// The value of the distance at a pixel and its derivatives along the image's axes.
@@ -42,11 +43,11 @@ void add_residuals(const SeenSilhouette& seen, const cv::Mat1i& triangle_of, con
       by_image << 1, 0, -at.x(), 0, 1, -at.y();
       const Eigen::Vector3d value = distance_at(seen.distance, pixel);
       const double mm_per_px = pixel_size_at_mm(seen.camera, pose * model_mm);
-      const Eigen::RowVector3d by_model = value.tail<2>().transpose() * by_image / image.z() *
-                                          seen.camera.intrinsics * camera_from_model.rotation;
+      const Eigen::RowVector3d by_model =
+          value.tail<2>().transpose() * by_image / image.z() * seen.camera.intrinsics * camera_from_model.rotation;
       // The part ends half a pixel beyond the centre of its last pixel.
       residuals.push_back({mm_per_px * (value[0] + 0.5),
-                           mm_per_px * (by_model * geometry::point_by_motion(frame, model_mm)).transpose()});
+                           mm_per_px * (by_model * geometry::point_by_motion(frame, model_mm)).transpose(), mm_per_px});
     }
 }
 
@@ -56,7 +57,8 @@ Vector6d step_of(const std::vector<Residual>& residuals, bool only_shift) {
   for (const Residual& one : residuals) sizes.push_back(std::abs(one.mm));
   if (sizes.size() < 6) return Vector6d::Zero();
   std::nth_element(sizes.begin(), sizes.begin() + std::ptrdiff_t(sizes.size() / 2), sizes.end());
-  const double usual_mm = std::max(1.5 * sizes[sizes.size() / 2], 1e-3);
+  // Not less than two pixels: a few points that stick out of a smooth part may be all that tells its turn.
+  const double usual_mm = std::max(1.5 * sizes[sizes.size() / 2], 2 * residuals[0].pixel_mm);
   Matrix6d curvature = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
   for (const Residual& one : residuals) {

@@ -214,8 +214,8 @@ Description read_description(const std::filesystem::path& path) {
   take_text(map, "version", description.version);
   take_text(map, "licence", description.licence);
   if (const auto node = map.required("trained")) {
-    const YamlMap trained(file, *node, "trained", {"on", "good_for", "not_for"});
-    take_text(trained, "on", description.trained_on);
+    const YamlMap trained(file, *node, "trained", {"data", "good_for", "not_for"});
+    take_text(trained, "data", description.trained_on);
     take_text(trained, "good_for", description.good_for);
     take_text(trained, "not_for", description.not_for);
   }

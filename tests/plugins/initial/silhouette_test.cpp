@@ -114,8 +114,10 @@ Body body() { return {{{0, 0, 0}, {16, 12, 30}}, {{18, 4, 18}, {12, 8, 11}}, {{-
 constexpr int kSize_px = 340;
 
 View view_of(const Body& body, const RigidTransform& world_from_ct, double angle_deg) {
-  View view{"at " + std::to_string(int(angle_deg)), {cv::Mat(kSize_px, kSize_px, CV_16U, cv::Scalar(1000))},
-            analytic::c_arm(angle_deg, kSize_px, kSize_px, 0.8), {}};
+  View view{"at " + std::to_string(int(angle_deg)),
+            {cv::Mat(kSize_px, kSize_px, CV_16U, cv::Scalar(1000))},
+            analytic::c_arm(angle_deg, kSize_px, kSize_px, 0.8),
+            {}};
   std::vector<float> lengths_mm =
       BodyProjector(body).radiograph(view.camera, world_from_ct, PixelGrid{0, 0, 1, kSize_px, kSize_px});
   view.mask = cv::Mat(kSize_px, kSize_px, CV_32F, lengths_mm.data()) > 0;

@@ -58,7 +58,7 @@ Answer found(const Written& written, const std::vector<std::string>& names, ship
 class LandmarksNetwork : public testing::TestWithParam<const char*> {};
 
 TEST_P(LandmarksNetwork, SeesThePointsAtTheirPeaks) {
-  const Landmarks landmarks = found(network(GetParam()), {"bright", "dark"}, {{"reach", 20}}).landmarks;
+  const Landmarks landmarks = found(network(GetParam()), {"bright", "dark"}, {{"peak_reach", 20}}).landmarks;
   ASSERT_EQ(landmarks.points.size(), 2u);
   ASSERT_EQ(landmarks.seen.size(), 2u);
   EXPECT_EQ(landmarks.seen[0].name, "bright");

@@ -79,7 +79,7 @@ TEST(TemplateMatching, TurnsTheRadiographInItsPlane) {
   const Landmarks turned = found(shown, start);
   ASSERT_EQ(turned.seen.size(), 2u);
   EXPECT_LT(worst_px(turned, shown, unmoved()), 2.5) << "round condyles look nearly the same when they are turned";
-  EXPECT_GT(worst_px(found(shown, start, {{"rotation_step_deg", 0.0}}), shown, unmoved()), 3.5);
+  EXPECT_GT(worst_px(found(shown, start, {{"turn_step_deg", 0.0}}), shown, unmoved()), 3.5);
 }
 
 TEST(TemplateMatching, StatesTwiceTheDeviationForAFactorOfTwo) {

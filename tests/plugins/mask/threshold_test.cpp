@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Grey values in steps: air 60000, a body 30000 with a stripe of bone 20000, two plates of metal 5000 in it, a cable
-// as dark, and the dark outside of the field at the border.
+// Grey values in steps: air 60000, a limb 30000 with a stripe of bone 20000, two plates of metal 5000 and 4500 in it, a
+// cable as dark, and the dark outside of the field at the border.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,10 +17,10 @@ marrow::View view() {
   view.camera.width_px = view.camera.height_px = 200;
   view.camera.intrinsics << 900, 0, 99.5, 0, 900, 99.5, 0, 0, 1;
   cv::Mat& pixels = view.image.pixels;
-  pixels(cv::Rect(40, 30, 110, 140)).setTo(30000);
-  pixels(cv::Rect(70, 30, 20, 140)).setTo(20000);
+  pixels(cv::Rect(40, 0, 110, 200)).setTo(30000);
+  pixels(cv::Rect(70, 0, 20, 200)).setTo(20000);
   pixels(kLarge).setTo(5000);
-  pixels(kSmall).setTo(5000);
+  pixels(kSmall).setTo(4500);
   pixels(cv::Rect(0, 85, 200, 3)).setTo(5000);  // a cable through both
   pixels(cv::Rect(0, 190, 200, 10)).setTo(1000);
   return view;
@@ -35,10 +35,8 @@ void expect_box(const cv::Rect& box, const cv::Rect& expected) {
 
 /// The box of what is kept, and how much of it is kept.
 std::pair<cv::Rect, int> kept(const marrow::View& view, const shipped::Options& options) {
-  const cv::Mat mask = shipped::call("mask.threshold", {{"view", shipped::item(view)}}, options)
-                           .at("view")
-                           .as<marrow::View>()
-                           .mask;
+  const cv::Mat mask =
+      shipped::call("mask.threshold", {{"view", shipped::item(view)}}, options).at("view").as<marrow::View>().mask;
   cv::Rect box;
   for (int v = 0; v < mask.rows; ++v)
     for (int u = 0; u < mask.cols; ++u)
@@ -52,16 +50,30 @@ TEST(MaskThreshold, KeepsTheLargestRegionOfMetal) {
   EXPECT_NEAR(pixels, kLarge.area(), 20) << "an opening rounds the corners";
 }
 
-TEST(MaskThreshold, KeepsTheSecondRegion) {
-  expect_box(kept(view(), {{"region", std::int64_t(2)}}).first, kSmall);
-}
+TEST(MaskThreshold, KeepsTheSecondRegion) { expect_box(kept(view(), {{"region", std::int64_t(2)}}).first, kSmall); }
 
 TEST(MaskThreshold, KeepsTheOutsideIfAsked) {
-  EXPECT_EQ(kept(view(), {{"at_border", true}}).first, cv::Rect(0, 190, 200, 10));
+  EXPECT_EQ(kept(view(), {{"at_border", true}, {"grey_value", 2000.0}}).first, cv::Rect(0, 190, 200, 10));
+}
+
+TEST(MaskThreshold, TakesImagesOf8Bits) {
+  marrow::View small = view();
+  small.image.pixels.convertTo(small.image.pixels, CV_8U, 1.0 / 256);
+  expect_box(kept(small, {}).first, kLarge);
 }
 
 TEST(MaskThreshold, TakesTheGivenValue) {
-  expect_box(kept(view(), {{"grey_value", 20000.0}}).first, {60, 30, 40, 140});  // bone and a plate on it
+  marrow::View no_cable = view();
+  no_cable.image.pixels(cv::Rect(0, 85, 200, 3)).setTo(30000);
+  no_cable.image.pixels(kSmall).setTo(4500);
+  expect_box(kept(no_cable, {{"grey_value", 4800.0}}).first, kSmall);  // the larger plate is brighter
+}
+
+TEST(MaskThreshold, LeavesOutSmallRegions) {
+  // The smaller plate has 1 % of the image.
+  EXPECT_NE(shipped::refusal("mask.threshold", {{"view", shipped::item(view())}},
+                             {{"region", std::int64_t(2)}, {"least_percent", 1.5}}),
+            "");
 }
 
 TEST(MaskThreshold, KeepsWhatIsBright) {
@@ -78,9 +90,10 @@ TEST(MaskThreshold, LeavesOutWhatWasLeftOut) {
 }
 
 TEST(MaskThreshold, SaysIfThereAreTooFewRegions) {
-  EXPECT_EQ(shipped::refusal("mask.threshold", {{"view", shipped::item(view())}}, {{"region", std::int64_t(3)}}),
-            "mask.threshold: view 'front' has 2 regions of that grey value away from the image's border, but region 3 "
-            "is wanted; give another grey_value, or a smaller opening_px");
+  EXPECT_EQ(
+      shipped::refusal("mask.threshold", {{"view", shipped::item(view())}}, {{"region", std::int64_t(3)}}),
+      "mask.threshold: view 'front': no grey value gives 3 regions away from the image's border; give a grey_value, "
+      "or another mask");
 }
 
 }  // namespace mask_threshold_test

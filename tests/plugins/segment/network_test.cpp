@@ -29,7 +29,7 @@ name: plain
 help: a soft threshold
 version: 1.0.0
 licence: Apache-2.0
-trained: {on: nothing, good_for: tests, not_for: anything else}
+trained: {data: nothing, good_for: tests, not_for: anything else}
 input:
   values: hounsfield
   bone: bright

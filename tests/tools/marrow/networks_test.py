@@ -26,7 +26,7 @@ CARD = {
     "help": "a network of a test",
     "version": "1.0.0",
     "licence": "Apache-2.0",
-    "trained": {"on": "nothing", "good_for": "tests", "not_for": "anything else"},
+    "trained": {"data": "nothing", "good_for": "tests", "not_for": "anything else"},
     "input": {
         "values": "grey_values",
         "bone": "dark",  # as in grey values, which the network then gets as they are

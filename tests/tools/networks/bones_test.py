@@ -89,7 +89,7 @@ class SmallestCase(unittest.TestCase):
         cls.folder = pathlib.Path(folder.name)
         torch.manual_seed(1)
         cls.network = UNet(1, {"classes": Head(4), "borders": Head(1)}, widths=(6, 12, 16))
-        card = {**bones.CARD, "file": "discs", "trained": {"on": "discs", "good_for": "discs", "not_for": "all else"}}
+        card = {**bones.CARD, "file": "discs", "trained": {"data": "discs", "good_for": "discs", "not_for": "all else"}}
         card["input"] = {**card["input"], "size_px": list(TILE_PX), "overlap_px": 16}
         with unittest.mock.patch.object(bones, "TRAINING_PX", TILE_PX), contextlib.redirect_stdout(io.StringIO()):
             batch = bones.batches(planes(12, 4))

@@ -135,11 +135,7 @@ class SmallestTraining(unittest.TestCase):
             grey = np.random.default_rng(1).integers(0, 60000, (220, 200)).astype("uint16")
             view = package.View(grey, camera, name="front")
             masked = package.mask.network(
-                view,
-                network=folder / "out/wedge.yaml",
-                leave_out=["background"],
-                object_distance_mm=900,
-                margin_px=0,
+                view, network=folder / "out/wedge.yaml", leave_out=["background"], object_distance_mm=900, margin_px=0
             )
             self.assertEqual(np.asarray(masked.mask).shape, (220, 200))
             points = package.read.landmarks(path=folder / "out/wedge-points.yaml", fragment="part")

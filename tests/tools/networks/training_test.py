@@ -174,7 +174,7 @@ class Command(InAFolder):
     def test_help_names_the_networks(self):
         done = self.run_train("--help", PYTHONPATH="")
         self.assertEqual(done.returncode, 0)
-        self.assertIn("bones", done.stdout)
+        self.assertIn("networks: bones", done.stdout)
 
 
 if __name__ == "__main__":

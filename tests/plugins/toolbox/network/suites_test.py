@@ -12,7 +12,7 @@ name: written
 help: a network of one convolution
 version: 1.0.0
 licence: Apache-2.0
-trained: {on: nothing, good_for: tests, not_for: anything else}
+trained: {data: nothing, good_for: tests, not_for: anything else}
 input:
   values: line_integrals
   bone: bright
