@@ -348,6 +348,7 @@ class Commands(Case):
         """But the workbench calls those that read the files of a case, and the export to 3D Slicer those that write. A
         network is made for a node."""
         may = {"workbench": re.compile(r"read\.\w+|camera\.dicom"), "slicer": re.compile(r"write\.\w+")}
+        may["studies"] = re.compile(r"mask\.threshold")
         may["network"] = may["networks"] = re.compile(r"(simulate|edges|mask|segment|landmarks|initial)\.\w+")
         names = [node["name"] for node in json.loads(marrow("list", "--json").stdout)]
         self.assertGreater(len(names), 20)
