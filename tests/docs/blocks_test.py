@@ -156,6 +156,8 @@ class Shell(Documents):
         if words[0].startswith(("tools/", "tests/")):
             self.assertTrue(os.access(SOURCE / words[0], os.X_OK), "there is no program " + words[0])
             text = (SOURCE / words[0]).read_text()
+            if words[0] == "tools/networks/train" and len(words) > 1:  # each network declares options of its own
+                text += (SOURCE / "tools/networks" / (words[1] + ".py")).read_text()
             for word in words[1:]:
                 if word.startswith("--"):
                     self.assertIn(word.split("=")[0], text)

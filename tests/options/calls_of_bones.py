@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the nodes are called that make models, features and poses: (inputs, options) by the node's name."""
 
-from files_of_scene import network, points_network
+from files_of_scene import network, points_network, slices_network
 
 GREY_VALUES = (  # costs that compare a radiograph with the image
     "entropy_of_difference",
@@ -70,6 +70,7 @@ def calls(s):
         {
             "mesh.simplify": lambda: ({"mesh": s.mesh}, {"triangles": 900}),
             "mesh.smooth": lambda: ({"mesh": s.closed_mesh}, {}),
+            "segment.network": lambda: (segment(), {"network": slices_network()}),
             "segment.given": lambda: ({"volume": s.volume, "surface": {"bone": s.closed_mesh}}, {}),
             "segment.atlas": lambda: (segment(template=s.mesh), {"iterations": 4}),
             "project.siddon_jacobs": lambda: ({"volume": s.volume, "field": s.field}, {}),

@@ -93,6 +93,17 @@ def network(least=0.5, classes=()):
     return str(path)
 
 
+def slices_network(least_hu=300):
+    """The description of a network of two classes of a CT: bone is brighter than this, cortex brighter still."""
+    path = pathlib.Path(SCRATCH / ("slices-%d.yaml" % least_hu))
+    layer, tensors = onnx.convolution("image", "maps", [[[[10.0]]]] * 2, [-least_hu / 100, -least_hu / 100 - 3])
+    path.with_suffix(".onnx").write_bytes(onnx.model([layer], tensors, {"maps": (2, 32, 32)}, 32, 32))
+    text = NETWORK.replace("values: line_integrals", "values: hounsfield").replace("pixel_mm: 4", "pixel_px: 1")
+    text = text.replace("{method: percentiles, low: 1, high: 99}", "{method: fixed, low: 0, high: 1000}")
+    path.write_text(text.replace("edge_strength: {layer: maps,", "classes: {layer: maps, names: [bone, cortex],"))
+    return str(path)
+
+
 def points_network(name, names, kernel=(0.6, 0, 0)):
     """A network whose heat map of each point is the bone, moved to one side."""
     path = pathlib.Path(SCRATCH / (name + ".yaml"))

@@ -3,7 +3,7 @@
 scene that gives sets of options. A key "in.NAME" is an input."""
 from calls_of_bones import GREY_VALUES
 from calls_of_programs import FORMATS
-from files_of_scene import labels_of, network, points_network, surface_of, written
+from files_of_scene import labels_of, network, points_network, slices_network, surface_of, written
 
 
 def files(*names):
@@ -55,6 +55,8 @@ TRIES = {
     "mask.metal.leave_out": one(to=["outside"]),
     "mask.network.network": one(to=lambda s: network(0.8, ("metal", "outside"))),
     "mask.network.leave_out": one(to=["outside"]),
+    "segment.network.network": one(to=lambda s: slices_network(500)),
+    "segment.network.bone": one(to=["cortex"]),
     "read.camera.path": files("rtk.xml", "xreg.h5"),
     "read.camera.projection": one(path=lambda s: str(written() / "rtk.xml"), to=1),
     "read.cameras.path": files("xreg.h5"),

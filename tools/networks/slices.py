@@ -43,10 +43,13 @@ CARD = {
     "outputs": {"classes": {"layer": "classes", "names": ["bone"], "activation": "sigmoid"}},
 }
 GOOD_FOR = (
-    "femora, whole or broken, lumbar vertebrae and pelves in CTs of 0.8 to 3 mm between slices, also with plates, pins "
-    "and their streaks"
+    "trials of how a network segments: femora, whole or broken, lumbar vertebrae and pelves in simulated CTs of 0.8 to "
+    "3 mm between slices, with little metal"
 )
-NOT_FOR = "contrast medium; bones joined by callus; CTs that are not in Hounsfield units; any use on patients"
+NOT_FOR = (
+    "CTs with much metal, whose streaks it takes for bone; sparse spongy bone of real pelves, which it misses in part; "
+    "contrast medium; CTs that are not in Hounsfield units; any use on patients"
+)
 
 
 class Scan:
