@@ -8,7 +8,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/base/names.hpp"
-#include "marrow/edges/gradient.hpp"
+#include "marrow/toolbox/image/field_of_view.hpp"
+#include "marrow/toolbox/image/grey_range.hpp"
+#include "marrow/toolbox/image/line_integrals.hpp"
 
 namespace {
 
@@ -58,16 +60,36 @@ double window_px(const View& view, double window_mm) {
   return window_mm * view.camera.intrinsics(0, 0) / depth_mm;
 }
 
+/// CV_32F. Throws Error for an image without content.
+cv::Mat grey_of(const View& view) {
+  cv::Mat grey;
+  view.image.pixels.convertTo(grey, CV_32F);
+  if (!cv::checkRange(grey))
+    throw Error("view '" + view.name + "': the image holds pixels that are not finite (NaN or infinity)");
+  const image::GreyRange range = image::grey_range(grey);
+  if (range.least == range.greatest)
+    throw Error("view '" + view.name + "': all pixels have the same value, so there is nothing to find; check the "
+                "image file");
+  return grey;
+}
+
+cv::Mat outside_of_field(const View& view, const cv::Mat& grey) {
+  const image::GreyRange range = image::grey_range(grey);
+  return image::usable_pixels(view, grey - range.dark(), range.least - range.dark(), range.greatest - range.dark(), 1) ==
+         0;
+}
+
 View metal(const View& view, const Options& options, Context& context) {
-  constexpr double kSmoothing_px = 0.3;  // for a margin of one pixel; nothing is smoothed
-  const edges::Prepared image = edges::prepare(view, kSmoothing_px, true, context);
-  cv::Mat left_out = cv::Mat::zeros(image.values.size(), CV_8U);
+  check_view(view);
+  image::warn_of_greys(view, context);
+  const cv::Mat grey = grey_of(view);
+  cv::Mat left_out = cv::Mat::zeros(grey.size(), CV_8U);
   for (const std::string& what : options.leave_out) {
     if (what == "metal")
       left_out |= by_hysteresis(above_surroundings(-image.values, window_px(view, options.window_mm)),
                                 options.contrast_low, options.contrast_high);
     else if (what == "outside")
-      left_out |= image.usable == 0;
+      left_out |= outside_of_field(view, grey);
     else
       throw Error("option 'leave_out': '" + what + "' is neither metal nor outside; " +
                   suggestion(what, {"metal", "outside"}));

@@ -121,6 +121,7 @@ MARROW_PLUGIN(plugin) {
       .summary("Keeps only what stands out by its grey value, such as an implant of metal")
       .in("view", "X-ray view")
       .out("view", "the same view; its mask is not 0 in this region only, and is 0 where it was 0 before")
+      .trait("keeps_what_it_finds")
       .option("grey_value", &Options::grey_value, "the darkest pixels up to this value count; 0: it is found",
               at_least(0), at_most(65535))
       .option("times", &Options::times,

@@ -18,6 +18,7 @@ TOPICS = {
     "exchange": {"distortion", "files", "vtk"},
     "files": {"distortion", "geometry"},
     "match": {"image"},
+    "network": {"files", "image"},
     "phantom": {"calibration", "files"},
     "track": {"files"},
 }

@@ -11,9 +11,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/base/number_text.hpp"
+#include "marrow/toolbox/image/field_of_view.hpp"
 #include "marrow/toolbox/image/grey_range.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
-#include "usable.hpp"
 
 namespace marrow::edges {
 namespace {
@@ -59,7 +59,7 @@ Prepared prepare(const View& view, double sigma_px, bool logarithm, const Contex
   const double dark = range.dark(), smallest = range.least - dark, largest = range.greatest - dark;
   if (dark < 0) grey -= dark;
   Prepared prepared;
-  prepared.usable = usable_pixels(view, grey, smallest, largest, int(std::ceil(3 * sigma_px)));
+  prepared.usable = image::usable_pixels(view, grey, smallest, largest, int(std::ceil(3 * sigma_px)));
   if (cv::countNonZero(prepared.usable) == 0)
     throw Error(
         formatted("{}: no pixel is left to search for edges (mask, image border and smoothing take all of {} x {})",

@@ -84,7 +84,7 @@ void check_result(const cv::Mat& result, const Description& description, const O
   std::vector<int> got(result.size.p, result.size.p + result.dims);
   const auto shape = [](const std::vector<int>& sides) {
     std::string text;
-    for (const int side : sides) text += (text.empty() ? "" : " x ") + std::to_string(side);
+    for (const int side : sides) text += formatted("{}{}", text.empty() ? "" : " x ", side);
     return text;
   };
   if (got != expected)

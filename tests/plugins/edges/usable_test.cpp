@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/edges/usable.hpp"
+#include "marrow/toolbox/image/field_of_view.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 
 namespace usable_test {
 
-using namespace marrow::edges;
+using namespace marrow::image;
 
 /// A limb with a bone across a round field of the given radius; beyond the field is scatter, and the outline is
 /// blurred.

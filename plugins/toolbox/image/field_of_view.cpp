@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "usable.hpp"
+#include "marrow/toolbox/image/field_of_view.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include <random>
 #include "marrow/domain/decompositions.hpp"
 
-namespace marrow::edges {
+namespace marrow::image {
 namespace {
 
 constexpr int kRays = 720, kStepsPerRay = 6, kTrials = 400, kHarmonics = 9;
@@ -234,4 +234,4 @@ cv::Mat usable_pixels(const View& view, const cv::Mat& grey, double smallest, do
   return usable;
 }
 
-}  // namespace marrow::edges
+}  // namespace marrow::image

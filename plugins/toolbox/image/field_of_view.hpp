@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Pixels at which edges may be reported: not at the border of the image or of a collimator, and only where the view's
+// Pixels that show the patient: not at the border of the image or of a collimator, and only where the view's
 // mask allows it.
 #include <marrow/domain/camera.hpp>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
-namespace marrow::edges {
+namespace marrow::image {
 
 /// The outline of a round collimator's field: its radius as a function of the direction from its centre. Removing an
 /// image's distortion turns a circle into a smooth oval, so the radius has a few harmonics.
@@ -26,4 +26,4 @@ std::optional<Field> collimator_field(const cv::Mat& grey, double largest);
 /// round collimator's field, black areas that reach three corners, and the image's border.
 cv::Mat usable_pixels(const View& view, const cv::Mat& grey, double smallest, double largest, int margin_px);
 
-}  // namespace marrow::edges
+}  // namespace marrow::image
