@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "marrow/runtime/node/types.hpp"
 #include "scene.hpp"
@@ -21,17 +20,10 @@ struct Off {
   double most() const { return std::max(deg, mm); }
 };
 
-/// Of a node with a second pose, for a body that looks nearly the same in two, the better one counts.
 Off off_truth(const Subject& subject, const Inputs& inputs, const RigidTransform& right) {
-  Off least{180, std::numeric_limits<double>::infinity()};
-  for (const PortInfo& port : subject.info().outputs) {
-    if (port.name != "pose" && port.name != "other") continue;
-    const RigidTransform found = subject.output(inputs, port.name).as<Pose>().world_from_model;
-    const Off off{degrees(geodesic_angle_rad(found.rotation, right.rotation)),
-                  (found.translation_mm - right.translation_mm).norm()};  // the CT's origin is in the middle
-    if (off.most() < least.most()) least = off;
-  }
-  return least;
+  const RigidTransform found = subject.output(inputs, "pose").as<Pose>().world_from_model;
+  return {degrees(geodesic_angle_rad(found.rotation, right.rotation)),
+          (found.translation_mm - right.translation_mm).norm()};  // the CT's origin is in the middle
 }
 
 /// The largest over some cases, in degrees and in mm.

@@ -68,15 +68,16 @@ cv::Mat grey_of(const View& view) {
     throw Error("view '" + view.name + "': the image holds pixels that are not finite (NaN or infinity)");
   const image::GreyRange range = image::grey_range(grey);
   if (range.least == range.greatest)
-    throw Error("view '" + view.name + "': all pixels have the same value, so there is nothing to find; check the "
+    throw Error("view '" + view.name +
+                "': all pixels have the same value, so there is nothing to find; check the "
                 "image file");
   return grey;
 }
 
 cv::Mat outside_of_field(const View& view, const cv::Mat& grey) {
   const image::GreyRange range = image::grey_range(grey);
-  return image::usable_pixels(view, grey - range.dark(), range.least - range.dark(), range.greatest - range.dark(), 1) ==
-         0;
+  return image::usable_pixels(view, grey - range.dark(), range.least - range.dark(), range.greatest - range.dark(),
+                              1) == 0;
 }
 
 View metal(const View& view, const Options& options, Context& context) {
@@ -86,7 +87,7 @@ View metal(const View& view, const Options& options, Context& context) {
   cv::Mat left_out = cv::Mat::zeros(grey.size(), CV_8U);
   for (const std::string& what : options.leave_out) {
     if (what == "metal")
-      left_out |= by_hysteresis(above_surroundings(-image.values, window_px(view, options.window_mm)),
+      left_out |= by_hysteresis(above_surroundings(image::line_integrals(grey), window_px(view, options.window_mm)),
                                 options.contrast_low, options.contrast_high);
     else if (what == "outside")
       left_out |= outside_of_field(view, grey);

@@ -139,7 +139,7 @@ class SmallestTraining(unittest.TestCase):
             )
             self.assertEqual(np.asarray(masked.mask).shape, (220, 200))
             points = package.read.landmarks(path=folder / "out/wedge-points.yaml", fragment="part")
-            self.assertEqual([point.name for point in points["part"].points], ["p1", "p2", "p3", "p4", "p5"])
+            self.assertEqual(list(points["part"].points_mm), ["p1", "p2", "p3", "p4", "p5"])
 
 
 if __name__ == "__main__":
