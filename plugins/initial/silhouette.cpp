@@ -19,7 +19,7 @@ using initial::Fitted, initial::SeenSilhouette, initial::ShapeLibrary;
 
 struct Options {
   int directions = 2000;
-  int candidates = 30;
+  int fits = 60;
   double least_apart_deg = 15;
   double least_overlap = 0.8;
 };
@@ -74,7 +74,7 @@ std::vector<RigidTransform> candidates_of(const std::vector<SeenSilhouette>& vie
   for (const SeenSilhouette& seen : views) {
     std::vector<RigidTransform> of_view;
     for (const ShapeLibrary::Match& match : library.matches(seen)) {
-      if (of_view.size() == std::size_t(3 * options.candidates)) break;
+      if (of_view.size() == std::size_t(3 * options.fits)) break;
       const auto near = [&](const RigidTransform& one) {
         return are_near(one, match.world_from_model, 0.5 * options.least_apart_deg);
       };
@@ -88,7 +88,7 @@ std::vector<RigidTransform> candidates_of(const std::vector<SeenSilhouette>& vie
   std::stable_sort(found.begin(), found.end(), [](const Fitted& a, const Fitted& b) { return a.overlap > b.overlap; });
   std::vector<RigidTransform> poses;
   for (const Fitted& one : found)
-    if (poses.size() < std::size_t(options.candidates)) poses.push_back(one.world_from_model);
+    if (poses.size() < std::size_t(options.fits)) poses.push_back(one.world_from_model);
   return poses;
 }
 
@@ -168,7 +168,7 @@ MARROW_PLUGIN(plugin) {
            "itself if there is none")
       .option("directions", &Options::directions, "number of sides from which outlines are compared", at_least(50),
               at_most(100000))
-      .option("candidates", &Options::candidates, "number of poses that are moved until the silhouettes meet",
+      .option("fits", &Options::fits, "number of poses that are moved until the silhouettes meet",
               at_least(1), at_most(10000))
       .option("least_apart_deg", &Options::least_apart_deg, "poses that are nearer to one another count as one",
               at_least(1), at_most(90))
