@@ -168,8 +168,8 @@ MARROW_PLUGIN(plugin) {
            "itself if there is none")
       .option("directions", &Options::directions, "number of sides from which outlines are compared", at_least(50),
               at_most(100000))
-      .option("fits", &Options::fits, "number of poses that are moved until the silhouettes meet",
-              at_least(1), at_most(10000))
+      .option("fits", &Options::fits, "number of poses that are moved until the silhouettes meet", at_least(1),
+              at_most(10000))
       .option("least_apart_deg", &Options::least_apart_deg, "poses that are nearer to one another count as one",
               at_least(1), at_most(90))
       .option("least_overlap", &Options::least_overlap,
