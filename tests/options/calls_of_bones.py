@@ -200,6 +200,7 @@ def calls(s):
             "verdict.predicted": lambda: ({"pose": s.found.pose, "model": s.mesh, "prior": s.known}, {}),
             "mask.body": lambda: ({"view": s.views["frontal"], "projector": s.drr, "pose": s.start}, {}),
             "mask.metal": lambda: ({"view": s.views["frontal"]}, {"contrast_low": 0.2, "contrast_high": 0.3}),
+            "mask.threshold": lambda: ({"view": s.views["frontal"]}, {"times": 1, "opening_px": 1, "at_border": True}),
             "mask.network": lambda: (
                 {"view": s.views["frontal"]},
                 {"network": network(classes=("metal", "outside")), "leave_out": ["metal"]},

@@ -93,6 +93,7 @@ def calls(s):
         "simulate.femur": lambda: ({}, {"resolution_mm": 3, "variation": 0.5}),
         "simulate.fluoroscopy": lambda: ({"phantom": s.phantom, "cameras": s.cameras}, {}),
         "simulate.fracture": lambda: ({"bone": s.bone}, {}),
+        "simulate.labels": lambda: ({"phantom": s.plated, "cameras": s.cameras}, {"collimator": "mild"}),
         "simulate.hexapod": lambda: ({"phantom": s.phantom, "commands": s.sweep}, {}),
         "simulate.knee_motion": lambda: ({"phantom": s.knee}, {"frames": 6}),
         "simulate.landmarks": lambda: ({"phantom": s.phantom, "cameras": s.cameras}, {}),

@@ -19,6 +19,8 @@ UNTRIED = [
     "guide.closed_loop",
     "guide.open_loop",
     "guide.target",
+    "initial.silhouette",
+    "mask.threshold.times",
     "plan.locking.max_angle_deg",
     "plan.locking.max_cost",
     "plan.locking.max_offset_mm",

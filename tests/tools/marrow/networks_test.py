@@ -12,6 +12,7 @@ import numpy
 import yaml
 from harness import formats, onnx
 from harness.program import Case, main
+from PIL import Image
 
 PIPELINE = """marrow: 1
 nodes:
@@ -68,9 +69,8 @@ def has_torch():
 
 def read_png(path):
     """Grey values of a PNG of 8 bits."""
-    import cv2
-
-    return cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    with Image.open(path) as picture:
+        return numpy.asarray(picture)
 
 
 def bytes_of(weights=(1.0, -1.0), bias=(0.0, 0.0), outputs=(2, ROWS, COLUMNS), rows=ROWS, columns=COLUMNS, layers=()):
