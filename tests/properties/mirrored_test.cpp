@@ -30,6 +30,7 @@ const std::map<std::string, std::string>& apart() {
       {"simulate.export", "changes the grey values of an image"},
       {"simulate.implant", "an implant that is given, in a pose that is drawn"},
       {"simulate.knee_implant", "a part of a given asymmetry, of which either side is on the market"},
+      {"simulate.labels", "names what the rays of simulate.cluttered_fluoroscopy meet, which has a check"},
       {"simulate.landmarks", "takes any points of the surface, and tests/plugins/simulate says that they lie on it"},
       {"simulate.mistake", "takes the other side for this one on purpose"},
       {"simulate.nail", "a nail is the same for both sides"},

@@ -27,6 +27,7 @@ const std::map<std::string, std::string>& apart() {
       {"evaluate.frames", "sums up figures"},
       {"evaluate.locking", "a plan of plan.locking; tests/plugins/plan moves its world"},
       {"evaluate.pose_difference", "tells shifts along the axes of the world"},
+      {"evaluate.true_edges", "takes the camera of one view by itself; tests/plugins/evaluate knows the borders"},
       {"evaluate.utrecht", "reads files"},
       {"register.together", "needs the costs of several bones; tests/plugins/register has wells for each"},
       {"similarity.with_contact", "needs several bones; its penalty is that of evaluate.contact"},
