@@ -29,6 +29,7 @@ const std::map<std::string, std::string>& apart() {
       {"evaluate.pose_difference", "tells shifts along the axes of the world"},
       {"evaluate.true_edges", "takes the camera of one view by itself; tests/plugins/evaluate knows the borders"},
       {"evaluate.utrecht", "reads files"},
+      {"initial.silhouette", "needs silhouettes of a whole part; the suite of its kind turns their world"},
       {"register.together", "needs the costs of several bones; tests/plugins/register has wells for each"},
       {"similarity.with_contact", "needs several bones; its penalty is that of evaluate.contact"},
       {"track.autoscoper", "with a volume, its poses are of the volume's corner; tests/plugins/read checks both ways"},
