@@ -42,6 +42,7 @@ UNTRIED = [
     "refine.cameras.max_iterations",
     "refine.cameras.pixel_step",
     "refine.cameras.reference_view",
+    "similarity.entropy_of_difference.margin_px",
     "register.multiresolution.candidates",
     "register.multiresolution.finalists",
     "register.multiresolution.reach_px",
