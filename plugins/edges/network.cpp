@@ -18,9 +18,7 @@ struct Options : ThresholdOptions {
 };
 
 cv::Mat strength_of(const View& view, const Options& options, const Context& context) {
-  const network::Network network(network::read_description(options.network));
-  network::expect_values(network.description(), {network::Values::line_integrals, network::Values::grey_values},
-                         "edges.network");
+  const network::Network network = network::read_for_views(options.network, "edges.network");
   const network::Output& output = network::output_of(network.description(), network::Output::Kind::edge_strength);
   return network::maps_of_view(network, output, view, options.object_distance_mm, context)[0];
 }

@@ -101,9 +101,7 @@ Landmarks::Seen seen_at(const Peak& peak, const ViewMaps& maps, double factor) {
 
 Landmarks network_landmarks(const Landmarks& points, const List<View>& views, const Options& options,
                             Context& context) {
-  const network::Network network(network::read_description(options.network));
-  network::expect_values(network.description(), {network::Values::line_integrals, network::Values::grey_values},
-                         "landmarks.network");
+  const network::Network network = network::read_for_views(options.network, "landmarks.network");
   const Output& output = network::output_of(network.description(), Output::Kind::heat_maps);
   const std::vector<Wanted> wanted = wanted_of(points, output, options, context);
   Landmarks result = points;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A body whose pose is known, such as an implant, hides what is searched for next. Its pixels are left out.
-#include <algorithm>
 #include <marrow/plugin.hpp>
-#include <opencv2/imgproc.hpp>
+
+#include "marrow/mask/leave_out.hpp"
 
 namespace {
 
@@ -24,14 +24,7 @@ marrow::View body(const marrow::View& view, const marrow::RadiographProjector& p
         if (values[std::size_t(row) * std::size_t(region.columns) + std::size_t(column)] > 0)
           shadow(int(region.v_px) + row, int(region.u_px) + column) = 255;
   }
-  if (options.margin_px > 0) {
-    const int side = 2 * options.margin_px + 1;
-    cv::dilate(shadow, shadow, cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
-  }
-  marrow::View result = view;
-  result.mask = view.mask.empty() ? cv::Mat1b(shadow.size(), std::uint8_t(255)) : view.mask.clone();
-  result.mask.setTo(0, shadow);
-  return result;
+  return marrow::mask::without(view, shadow, options.margin_px);
 }
 
 }  // namespace

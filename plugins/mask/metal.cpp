@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/base/names.hpp"
+#include "marrow/mask/leave_out.hpp"
 #include "marrow/toolbox/image/field_of_view.hpp"
 #include "marrow/toolbox/image/grey_range.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
@@ -95,14 +96,7 @@ View metal(const View& view, const Options& options, Context& context) {
       throw Error("option 'leave_out': '" + what + "' is neither metal nor outside; " +
                   suggestion(what, {"metal", "outside"}));
   }
-  if (options.margin_px > 0) {
-    const int side = 2 * options.margin_px + 1;
-    cv::dilate(left_out, left_out, cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
-  }
-  View result = view;
-  result.mask = view.mask.empty() ? cv::Mat(left_out.size(), CV_8U, cv::Scalar(255)) : view.mask.clone();
-  result.mask.setTo(0, left_out);
-  return result;
+  return mask::without(view, left_out, options.margin_px);
 }
 
 }  // namespace

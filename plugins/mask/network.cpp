@@ -2,9 +2,8 @@
 // A trained network says what each pixel shows. Metal and what lies outside of the detector's field must not count
 // where a bone is compared with the image.
 #include <marrow/plugin.hpp>
-#include <opencv2/imgproc.hpp>
 
-#include "marrow/base/names.hpp"
+#include "marrow/mask/leave_out.hpp"
 #include "marrow/toolbox/network/inference.hpp"
 
 namespace {
@@ -21,31 +20,17 @@ struct Options {
 
 /// CV_8U, 255 where the classes together are probable.
 cv::Mat pixels_of_classes(const View& view, const Options& options, const Context& context) {
-  const network::Network network(network::read_description(options.network));
-  network::expect_values(network.description(), {network::Values::line_integrals, network::Values::grey_values},
-                         "mask.network");
+  const network::Network network = network::read_for_views(options.network, "mask.network");
   const network::Output& output = network::output_of(network.description(), network::Output::Kind::classes);
   const std::vector<cv::Mat> maps = network::maps_of_view(network, output, view, options.object_distance_mm, context);
   cv::Mat sum = cv::Mat::zeros(view.image.pixels.size(), CV_32F);
-  for (const std::string& name : options.leave_out) {
-    const auto found = std::find(output.names.begin(), output.names.end(), name);
-    if (found == output.names.end())
-      throw Error(options.network.string() + ": the network has no class '" + name + "'; " +
-                  suggestion(name, output.names));
-    sum += maps[std::size_t(found - output.names.begin())];
-  }
+  for (const std::size_t channel : network::channels_of_classes(network.description(), output, options.leave_out))
+    sum += maps[channel];
   return sum >= options.probability;
 }
 
 View network_mask(const View& view, const Options& options, Context& context) {
-  cv::Mat left_out = pixels_of_classes(view, options, context);
-  if (options.margin_px > 0) {
-    const int side = 2 * options.margin_px + 1;
-    cv::dilate(left_out, left_out, cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
-  }
-  View result = view;
-  result.mask = view.mask.empty() ? cv::Mat(left_out.size(), CV_8U, cv::Scalar(255)) : view.mask.clone();
-  result.mask.setTo(0, left_out);
+  const View result = mask::without(view, pixels_of_classes(view, options, context), options.margin_px);
   if (cv::countNonZero(result.mask) == 0)
     context.warn("the network leaves out the whole image; is it made for images like this one?");
   return result;

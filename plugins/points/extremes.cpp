@@ -16,11 +16,12 @@ struct Options {
   std::vector<std::string> names;
   std::vector<double> outward, back, up;
   std::string side = "left";
+  std::string directions_of = "fragment";
   std::vector<std::string> level;
   double cap_mm = 3;
 };
 
-/// The directions in the fragment's axes, as unit vectors.
+/// The directions in these axes, as unit vectors.
 std::vector<Eigen::Vector3d> directions_of(const Options& options) {
   std::vector<Eigen::Vector3d> directions;
   const double left = options.side == "left" ? 1 : -1;
@@ -72,10 +73,10 @@ std::size_t place_of(const std::string& name, const Options& options) {
   return std::size_t(found - options.names.begin());
 }
 
-/// The fragment's axes, turned about the long axis until the two points of `level` lie beside each other: a leg that
-/// was turned in the CT gets the same points. Throws Error if that does not settle.
+/// The axes of the directions: the fragment's or the CT's, turned about the long axis until the two points of `level`
+/// lie beside each other: a leg that was turned in the CT gets the same points. Throws Error if that does not settle.
 Eigen::Matrix3d level_axes(const Mesh& model, const std::vector<Eigen::Vector3d>& directions, const Options& options) {
-  Eigen::Matrix3d axes = fragment_frame(model).axes;
+  Eigen::Matrix3d axes = options.directions_of == "ct" ? Eigen::Matrix3d::Identity() : fragment_frame(model).axes;
   if (options.level.empty()) return axes;
   if (options.level.size() != 2)
     throw Error(formatted("level: expected two names of points, got {}", options.level.size()));
@@ -108,7 +109,9 @@ Landmarks points(const Mesh& model, const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("points.extremes", points)
-      .summary("Named points where a surface reaches farthest in directions that are given in the fragment's axes")
+      .summary(
+          "Named points where a surface reaches farthest in directions that are given in the axes of the fragment or "
+          "the CT")
       .in("model", "surface of the fragment, in CT coordinates whose axes point to the left, to the back and up")
       .out("points", "the middles of the caps at the extremes, in CT coordinates")
       .option("names", &Options::names, "names of the points")
@@ -120,9 +123,14 @@ MARROW_PLUGIN(plugin) {
       .relation(distinct("names"))
       .relation(same_length({"names", "outward", "back", "up"}))
       .option("side", &Options::side, "side of the body; outward is to the left for left", one_of({"left", "right"}))
-      .option("level", &Options::level,
-              "two of the names: the axes are turned about the long axis until these points lie beside each other; "
-              "none: the CT's axes count")
+      .option("directions_of", &Options::directions_of,
+              "whose axes the directions are in. fragment: its long axis is up, and back is the CT's, across it; ct: "
+              "those of the CT, for a bone that is not long",
+              one_of({"fragment", "ct"}))
+      .option(
+          "level", &Options::level,
+          "two of the names: the axes are turned about the one that is up until these points lie beside each other; "
+          "none: they are not turned")
       .option("cap_mm", &Options::cap_mm, "height of the cap at the extreme whose middle is the point", at_least(0.1),
               at_most(50));
 }

@@ -10,7 +10,6 @@
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/segment/fragments.hpp"
 #include "marrow/segment/seed_points.hpp"
@@ -31,19 +30,6 @@ struct Options {
 constexpr double kCertain = 1000;
 constexpr int kSlicesAtOnce = 32;
 constexpr double kMostPixels = 64e6;
-
-/// Which channels of the output count as bone.
-std::vector<std::size_t> channels_of_bone(const network::Output& output, const Options& options) {
-  std::vector<std::size_t> channels;
-  for (const std::string& name : options.bone) {
-    const auto found = std::find(output.names.begin(), output.names.end(), name);
-    if (found == output.names.end())
-      throw Error(options.network.string() + ": the network has no class '" + name + "'; " +
-                  suggestion(name, output.names));
-    channels.push_back(std::size_t(found - output.names.begin()));
-  }
-  return channels;
-}
 
 /// The size of a slice in the network's pixels.
 cv::Size network_size(const Grid& grid, const network::Input& input) {
@@ -93,7 +79,7 @@ Volume probabilities(const Volume& volume, const Options& options, Context& cont
   const network::Input& input = network.description().input;
   network::expect_values(network.description(), {network::Values::hounsfield}, "segment.network");
   const network::Output& output = network::output_of(network.description(), network::Output::Kind::classes);
-  const std::vector<std::size_t> channels = channels_of_bone(output, options);
+  const std::vector<std::size_t> channels = network::channels_of_classes(network.description(), output, options.bone);
   const cv::Size size = network_size(volume.grid, input);
   Volume result{volume.grid, std::vector<float>(volume.grid.count())};
   const int slices = volume.grid.size[2];

@@ -17,6 +17,7 @@ def calls(s):
         "camera.check": lambda: ({"views": s.views, "mesh": s.coarse_mesh}, {"known_points": str(s.seen_points)}),
         "camera.chessboard": lambda: ({"boards": s.boards.boards, "placed": s.boards.placed}, {}),
         "camera.bead_board": lambda: ({"images": s.beads.images}, {"board": str(s.board)}),
+        "evaluate.edges": lambda: ({"edges": s.edges["frontal"], "truth": s.edges["lateral"]}, {}),
         "evaluate.frames": lambda: ({"metrics": s.frames_metrics}, {}),
         "evaluate.landscape": lambda: ({"cost": s.contour, "pose": s.found.pose}, {"profile_points": 7}),
         "evaluate.locking": lambda: ({"plan": s.plan.plan, "implant": s.nail.implant, "truth": s.nailed.truth}, {}),

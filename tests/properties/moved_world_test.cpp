@@ -24,6 +24,7 @@ const std::map<std::string, std::string>& apart() {
       {"evaluate.contact", "needs several bones; tests/plugins/evaluate moves them together"},
       {"evaluate.deepfluoro", "reads a file"},
       {"evaluate.distortion", "compares two distortions of one device, which have no place"},
+      {"evaluate.edges", "compares edges of one image"},
       {"evaluate.frames", "sums up figures"},
       {"evaluate.locking", "a plan of plan.locking; tests/plugins/plan moves its world"},
       {"evaluate.pose_difference", "tells shifts along the axes of the world"},

@@ -20,9 +20,10 @@ KIND = "femur"
 PIXEL_MM = 0.75
 TILE_PX, OVERLAP_PX = (256, 256), 64
 TRAINING_PX = (192, 192)  # a step costs half of one with whole tiles
-PERCENTILES = (5, 70)  # a collimator may cover a quarter of the image, and air another
-BATCH = 4
+WIDTHS = (8, 16, 32, 64, 80)
+BATCH = 8
 METAL, BONE, OUTSIDE = (simulated.CLASSES.index(name) for name in ("metal", "bone", "outside"))
+ROUND_FIELDS = 0.3  # of the tiles are as an image intensifier shows them
 CLASS_WEIGHTS = torch.tensor([1.0, 1.0, 3.0, 1.0])
 BORDER_WEIGHT = 3.0  # of a pixel on a border, because these are few
 NEAR_PX = 2  # a border is found within this distance
@@ -32,16 +33,9 @@ CARD = {
     "marrow-network": 1,
     "name": "bones-of-femur",
     "help": "Bone, metal and the collimator's rim in X-ray images of femora, and the borders of the femur's fragments",
-    "version": "0.1.0",
+    "version": "1.0.0",
     "licence": "Apache-2.0",
-    "input": {
-        "values": "line_integrals",
-        "bone": "bright",
-        "pixel_mm": PIXEL_MM,
-        "normalise": {"method": "percentiles", "low": PERCENTILES[0], "high": PERCENTILES[1]},
-        "size_px": list(TILE_PX),
-        "overlap_px": OVERLAP_PX,
-    },
+    "input": images.input_of_card(PIXEL_MM, TILE_PX, OVERLAP_PX),
     "outputs": {
         "classes": {"layer": "classes", "names": list(simulated.CLASSES), "activation": "softmax"},
         "edge_strength": {"layer": "borders", "activation": "sigmoid"},
@@ -86,13 +80,17 @@ def tile_of(random, plane):
     rows, columns = plane.values.shape
     middle = random.uniform(0.25, 0.75, 2) * (columns, rows)
     matrix = images.random_motion(random, TRAINING_PX, middle, zoom=1.25)
-    values = images.normalised(images.changed(random, plane.values), *PERCENTILES)
+    values, seen_classes = images.changed(random, plane.values), plane.classes
+    if random.random() < ROUND_FIELDS:
+        outside = images.outside_of_round_field(random, values.shape)
+        values, seen_classes = images.covered(random, values, outside), np.where(outside, OUTSIDE, seen_classes)
     inside = cv2.warpAffine(np.ones_like(plane.classes), matrix, TRAINING_PX[::-1], flags=cv2.INTER_NEAREST)
     points = plane.borders_px @ matrix[:, :2].T + matrix[:, 2]
+    classes = images.moved(seen_classes.astype(np.uint8), matrix, TRAINING_PX, cv2.INTER_NEAREST)
     return (
-        images.moved(values, matrix, TRAINING_PX)[None],
-        images.moved(plane.classes, matrix, TRAINING_PX, cv2.INTER_NEAREST).astype(np.int64),
-        border_map(points, TRAINING_PX).astype(np.float32)[None],
+        images.moved(images.scaled(values), matrix, TRAINING_PX)[None],
+        classes.astype(np.int64),
+        (border_map(points, TRAINING_PX) * (classes != OUTSIDE)).astype(np.float32)[None],
         inside.astype(np.float32)[None],
     )
 
@@ -118,12 +116,9 @@ def loss_of(outputs, classes, borders, inside):
 
 def maps_of(network, plane):
     """Number of the most probable class, and strength of borders, of a whole view."""
-    values = images.normalised(plane.values, *PERCENTILES)
-    rows, columns = values.shape
-    wide = cv2.copyMakeBorder(values, 16, 16 + -rows % 16, 16, 16 + -columns % 16, cv2.BORDER_REFLECT_101)
     with torch.no_grad():
-        classes, borders = network(torch.from_numpy(wide[None, None]))
-    inside = (slice(16, 16 + rows), slice(16, 16 + columns))
+        classes, borders = network(torch.from_numpy(images.widened(images.scaled(plane.values))[None, None]))
+    inside = tuple(slice(images.RIM_PX, images.RIM_PX + side) for side in plane.values.shape)
     return classes[0].argmax(0).numpy()[inside], torch.sigmoid(borders[0, 0]).numpy()[inside]
 
 
@@ -224,7 +219,7 @@ def run(arguments):
         simulated.make_cases(data, KIND, seeds[part], views=arguments.views, size_px=arguments.size_px)
         planes[part] = planes_of(data, seeds[part])
     torch.manual_seed(arguments.seed)
-    network = UNet(1, {"classes": Head(len(simulated.CLASSES)), "borders": Head(1)})
+    network = UNet(1, {"classes": Head(len(simulated.CLASSES)), "borders": Head(1)}, WIDTHS)
     losses = training.train(
         network,
         batches(planes["training"]),

@@ -4,6 +4,8 @@ import cv2
 import numpy as np
 
 DARKEST = 0.005  # of the grey value in air, as in plugins/toolbox/image/line_integrals.hpp
+RIM_PX = 16  # the coarsest pixel of a network
+SCALE = (0, 2)  # these line integrals become 0 and 1: percentiles would follow a collimator's blades
 
 
 def line_integrals(grey):
@@ -20,6 +22,34 @@ def normalised(values, low, high):
     return ((values - least) / (most - least)).astype(np.float32)
 
 
+def scaled(line_integrals):
+    """Line integrals as a network takes them."""
+    low, high = SCALE
+    return ((line_integrals - low) / (high - low)).astype(np.float32)
+
+
+def input_of_card(pixel_mm, tile_px, overlap_px):
+    """What the card of a network says of such images."""
+    low, high = SCALE
+    return {
+        "values": "line_integrals",
+        "bone": "bright",
+        "pixel_mm": pixel_mm,
+        "normalise": {"method": "fixed", "low": low, "high": high},
+        "size_px": list(tile_px),
+        "overlap_px": overlap_px,
+    }
+
+
+def widened(values):
+    """A whole image as a network takes it: continued by its mirror image, by RIM_PX above and to the left, and to
+    multiples of it."""
+    rows, columns = values.shape
+    return cv2.copyMakeBorder(
+        values, RIM_PX, RIM_PX + -rows % RIM_PX, RIM_PX, RIM_PX + -columns % RIM_PX, cv2.BORDER_REFLECT_101
+    )
+
+
 def resized(values, step_px):
     """The image in the network's pixels, each as large as step_px pixels of the image."""
     rows, columns = (max(1, round(side / step_px)) for side in values.shape)
@@ -34,9 +64,12 @@ def smooth_field(random, shape, nodes):
 
 
 def changed(random, values):
-    """Line integrals as another device might show them: another gamma, uneven brightness, blur, noise of several
-    widths, saturation. Each change comes by chance, and weak ones are more usual than strong ones."""
+    """Line integrals as another device might show them: another contrast, gamma and brightness, uneven brightness,
+    blur, noise of several widths, saturation. Each change comes by chance, and weak ones are more usual than strong
+    ones."""
     values = values.astype(np.float32)
+    if random.random() < 0.7:
+        values = values * np.float32(np.exp(random.normal(0, 0.3))) + np.float32(random.normal(0, 0.15))
     scale = max(float(np.percentile(values, 99) - np.percentile(values, 1)), 1e-3)
     if random.random() < 0.7:
         low = float(values.min())
@@ -59,6 +92,22 @@ def changed(random, values):
     if random.random() < 0.2:
         values = np.maximum(values, np.percentile(values, random.uniform(1, 15)))
     return values.astype(np.float32)
+
+
+def outside_of_round_field(random, shape):
+    """True outside of the field of an image intensifier, somewhere about the middle of the image."""
+    rows, columns = shape
+    middle = 0.5 * np.array(shape) + random.normal(0, 0.06, 2) * shape
+    radius = random.uniform(0.36, 0.7) * min(shape)
+    v, u = np.ogrid[:rows, :columns]
+    return (v - middle[0]) ** 2 + (u - middle[1]) ** 2 > radius**2
+
+
+def covered(random, values, outside):
+    """The image with what is outside of the field black, seldom white, and a rim that is a little blurred."""
+    share = cv2.GaussianBlur(outside.astype(np.float32), (0, 0), random.uniform(0.5, 2.5))
+    black = 0 if random.random() < 0.15 else random.uniform(2.5, -np.log(DARKEST))
+    return (values * (1 - share) + np.float32(black) * share).astype(np.float32)
 
 
 def random_motion(random, size_px, middle_px, zoom):

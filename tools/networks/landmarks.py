@@ -18,29 +18,42 @@ import simulated
 import training
 from model import Head, UNet
 
-HELP = "named points of a bone in X-ray images, from simulated femora"
-PIXEL_MM = 1.0
-PERCENTILES = (5, 70)  # a collimator may cover a quarter of the image, and air another
+HELP = "named points of a bone in X-ray images, from simulated bones"
 TILE_PX, OVERLAP_PX = (192, 192), 32
 STRIDE_PX = 2
 SIGMA = 2.0  # of a point's heat map, in its pixels
 BATCH = 8
 POINT_WEIGHT = 30.0  # of a pixel at a point, because these are few
-WIDTHS = (8, 16, 32, 48, 64)
+WIDTHS = (8, 16, 32, 64, 96)
 LEAST, REACH = 0.3, 6  # as the node that uses the network has them
 
-# What is drawn for each bone. sides_deg: from which sides the views are taken.
+# What is drawn for each bone. kind: as simulated.BONES has it; sides_deg: from which sides the views are taken;
+# pixel_mm: of the network.
 ANATOMIES = {
     "femur": {
+        "kind": "femur",
         "pipeline": "training-landmarks.yaml",
         "fragment": "distal",
-        "sides_deg": (0, 90, -90),
+        "sides_deg": (0, 90),  # from the other side, the image is nearly its mirror image, with other names
         "isocentre_mm": (45, 100),
-        "good_for": "the distal end of left femora in fluoroscopy from the front and from both sides, up to 20 degrees "
-        "off these; of right femora in a mirror (the option mirrored)",
-    }
+        "pixel_mm": 1.0,
+        "good_for": "the distal end of left femora in fluoroscopy from the front and from the side with beta = 90 "
+        "degrees, up to 20 degrees off these; of right femora from the front and with beta = -90 degrees (the option "
+        "mirrored)",
+        "not_for": "other bones; views from the other side, above or along the bone; children; implants of the knee; "
+        "any use on patients",
+    },
+    "pelvis": {
+        "kind": "pelvis",
+        "pipeline": "training-landmarks-pelvis.yaml",
+        "fragment": "bone",
+        "sides_deg": (0, 40, -40),
+        "pixel_mm": 1.6,
+        "good_for": "plain simulated pelves from the front and 40 degrees off it to both sides, up to 20 degrees off "
+        "these",
+        "not_for": "views from the side; fractures; children; implants of the hip; any use on patients",
+    },
 }
-NOT_FOR = "other bones; views from above or along the bone; children; implants of the knee; any use on patients"
 
 
 @dataclasses.dataclass
@@ -49,14 +62,17 @@ class Shown:
 
     values: np.ndarray
     points_px: np.ndarray  # n x 2, (u, v)
+    pixel_mm: float = 1.0
 
 
 def settings_of(bone, seed, views, size_px):
-    """What is drawn for a case: as for all femora, but a left one whose distal end is in view, from its sides."""
+    """What is drawn for a case: as for all bones of the kind, but seen from its sides. A femur is a left one whose
+    distal end is in view."""
     random = np.random.default_rng([seed, 55])
-    drawn, collimator = simulated.settings_of("femur", seed, views, size_px)
-    drawn["bone.side"] = "left"
-    drawn["bone.isocentre_from_distal_end_mm"] = "%.1f" % random.uniform(*bone["isocentre_mm"])
+    drawn, collimator = simulated.settings_of(bone["kind"], seed, views, size_px)
+    if bone["kind"] == "femur":
+        drawn["bone.side"] = "left"
+        drawn["bone.isocentre_from_distal_end_mm"] = "%.1f" % random.uniform(*bone["isocentre_mm"])
     first = random.integers(len(bone["sides_deg"]))
     sides = [bone["sides_deg"][(first + i) % len(bone["sides_deg"])] for i in range(views)]
     drawn["cameras.beta_deg"] = simulated.numbers(np.array(sides) + random.uniform(-20, 20, views))
@@ -91,20 +107,21 @@ def views_of(data, anatomy, seed):
     world_from_model = np.array(truth["matrix"], float)
     places = np.array(list(names_of(data, anatomy, seed).values()), float)
     world_mm = places @ world_from_model[:3, :3].T + world_from_model[:3, 3]
-    return [shown_in(path, world_mm) for path in sorted((folder / "views").iterdir())]
+    pixel_mm = ANATOMIES[anatomy]["pixel_mm"]
+    return [shown_in(path, world_mm, pixel_mm) for path in sorted((folder / "views").iterdir())]
 
 
-def shown_in(folder, world_mm):
+def shown_in(folder, world_mm, pixel_mm):
     camera = yaml.safe_load((folder / "camera.yaml").read_text())
     intrinsics = np.array(camera["intrinsics"], float)
     camera_from_world = np.array(camera["camera_from_world"]["matrix"], float)
     grey = cv2.imread(str(folder / "image.png"), -1)
     seen = intrinsics @ (camera_from_world[:3, :3] @ world_mm.T + camera_from_world[:3, 3:])
-    values = images.resized(images.line_integrals(grey), PIXEL_MM * intrinsics[0, 0] / camera_from_world[2, 3])
+    values = images.resized(images.line_integrals(grey), pixel_mm * intrinsics[0, 0] / camera_from_world[2, 3])
     scale = np.array(values.shape[::-1]) / grey.shape[::-1]
     points_px = ((seen[:2] / seen[2]).T + 0.5) * scale - 0.5
     points_px[((points_px < 0) | (points_px > np.array(values.shape[::-1]) - 1)).any(axis=1)] = np.nan
-    return Shown(values, points_px)
+    return Shown(values, points_px, pixel_mm)
 
 
 def random_motion(random, shown):
@@ -135,7 +152,7 @@ def batches(views):
     def tile_of(random):
         shown = views[random.integers(len(views))]
         matrix = random_motion(random, shown)
-        values = images.normalised(images.changed(random, shown.values), *PERCENTILES)
+        values = images.scaled(images.changed(random, shown.values))
         points = shown.points_px @ matrix[:, :2].T + matrix[:, 2]
         return images.moved(values, matrix, TILE_PX)[None], heat_maps(points)
 
@@ -156,11 +173,9 @@ def loss_of(outputs, maps):
 def maps_of(network, values):
     """The heat maps of a whole view."""
     rows, columns = values.shape
-    values = images.normalised(values, *PERCENTILES)
-    wide = cv2.copyMakeBorder(values, 16, 16 + -rows % 16, 16, 16 + -columns % 16, cv2.BORDER_REFLECT_101)
     with torch.no_grad():
-        maps = torch.sigmoid(network(torch.from_numpy(wide[None, None]))[0])[0].numpy()
-    skipped = 16 // STRIDE_PX
+        maps = torch.sigmoid(network(torch.from_numpy(images.widened(images.scaled(values))[None, None]))[0])[0].numpy()
+    skipped = images.RIM_PX // STRIDE_PX
     return maps[:, skipped : skipped + -(-rows // STRIDE_PX), skipped : skipped + -(-columns // STRIDE_PX)]
 
 
@@ -188,8 +203,8 @@ class Found:
             centre, spread, height = peak_of(heat_map)
             if np.isfinite(place[0]):
                 at = (centre + 0.5) * STRIDE_PX - 0.5
-                self.off_mm.append(PIXEL_MM * np.linalg.norm(at - place))
-                self.spread_mm.append(PIXEL_MM * STRIDE_PX * spread)
+                self.off_mm.append(shown.pixel_mm * np.linalg.norm(at - place))
+                self.spread_mm.append(shown.pixel_mm * STRIDE_PX * spread)
                 self.heights.append(height)
             else:
                 self.hidden += 1
@@ -236,9 +251,13 @@ def liked(found):
     return -float(np.mean(np.minimum(found.off_mm, 15)))
 
 
-def card_of(arguments, names, factor, steps):
+def card_of(arguments, names, factor, judged):
     bone = ANATOMIES[arguments.anatomy]
-    trained_on = "%d simulated femora of %d views each (marrow, tools/networks/train landmarks), %d steps of %d tiles"
+    trained_on = (
+        "%d simulated bones of %d views each (marrow, tools/networks/train landmarks), %d steps of %d tiles; on %d "
+        "other bones: median error %.1f mm, %.0f %% beyond 10 mm"
+    )
+    figures = (judged["median_mm"], 100 * judged.get("beyond_10_mm", 1))
     return {
         "marrow-network": 1,
         "file": "landmarks-" + arguments.anatomy,
@@ -247,18 +266,12 @@ def card_of(arguments, names, factor, steps):
         "version": "1.0.0",
         "licence": "Apache-2.0",
         "trained": {
-            "data": trained_on % (arguments.training, arguments.views, steps, BATCH),
+            "data": trained_on
+            % (arguments.training, arguments.views, arguments.steps, BATCH, arguments.judgement, *figures),
             "good_for": bone["good_for"],
-            "not_for": NOT_FOR,
+            "not_for": bone["not_for"],
         },
-        "input": {
-            "values": "line_integrals",
-            "bone": "bright",
-            "pixel_mm": PIXEL_MM,
-            "normalise": {"method": "percentiles", "low": PERCENTILES[0], "high": PERCENTILES[1]},
-            "size_px": list(TILE_PX),
-            "overlap_px": OVERLAP_PX,
-        },
+        "input": images.input_of_card(bone["pixel_mm"], TILE_PX, OVERLAP_PX),
         "outputs": {
             "heat_maps": {
                 "layer": "points",
@@ -313,4 +326,4 @@ def run(arguments):
     (out / "figures.json").write_text(json.dumps({"deviation_factor": factor, "losses": losses, **figures}, indent=1))
     for part, found in figures.items():
         print(part, "  ".join("%s %.3f" % item for item in found.items()))
-    export.write(network, card_of(arguments, names, factor, arguments.steps), out)
+    export.write(network, card_of(arguments, names, factor, figures["judgement"]), out)

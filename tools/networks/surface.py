@@ -187,8 +187,11 @@ def run(arguments):
     arguments.data.mkdir(parents=True, exist_ok=True)
     package = shadows.marrow()
     mesh = package.load(str(arguments.surface))
-    vertices = np.asarray(mesh.vertices_mm)
-    points, is_symmetric = surface_points.points_of(vertices, np.asarray(mesh.triangles), arguments.points)
+    vertices, triangles, holes = surface_points.closed(np.asarray(mesh.vertices_mm), np.asarray(mesh.triangles))
+    if holes:
+        print("%d small holes of the surface are closed" % holes)
+        mesh = package.Mesh(vertices, triangles)
+    points, is_symmetric = surface_points.points_of(vertices, triangles, arguments.points)
     if is_symmetric:
         print("the part is nearly symmetric: its points lie in the plane of symmetry, where one view can name them")
     points_mm = np.array(list(points.values()))

@@ -2,6 +2,7 @@
 """Points of a surface without anatomy: as far from one another as can be, so its ends and corners come first."""
 import numpy as np
 
+LARGEST_HOLE = 0.1  # that is closed, in diameters
 NEARLY_SYMMETRIC = 0.015  # mean distance of the surface from its mirror image, in diameters
 
 
@@ -30,6 +31,40 @@ def symmetry_of(points_mm):
         found.append((float(tree.query(mirrored)[0].mean() / diameter), normal))
     rest, normal = min(found, key=lambda one: one[0])
     return middle, normal, rest
+
+
+def holes_of(triangles):
+    """The borders of a surface's holes, each a list of corners in the order in which the missing triangles run."""
+    sides = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    there = set(map(tuple, sides.tolist()))
+    after = {b: a for a, b in there if (b, a) not in there}
+    holes = []
+    while after:
+        start, corner = next(iter(after.items()))
+        hole = [start]
+        del after[start]
+        while corner != start and corner in after:
+            hole.append(corner)
+            corner = after.pop(corner)
+        if corner != start:
+            raise SystemExit("train: the surface has a border that is no ring; repair it, or give another surface")
+        holes.append(hole)
+    return holes
+
+
+def closed(vertices_mm, triangles):
+    """The surface with its small holes closed, each by a fan about its middle, and how many these are. Ends the program
+    if a hole is large: what it would look like there, nobody knows."""
+    holes = holes_of(triangles)
+    diameter = np.ptp(vertices_mm, axis=0).max()
+    for hole in holes:
+        wide_mm = np.ptp(vertices_mm[hole], axis=0).max()
+        if wide_mm > LARGEST_HOLE * diameter:
+            raise SystemExit("train: the surface has a hole of %.1f mm; close it, or give a closed surface" % wide_mm)
+        vertices_mm = np.vstack([vertices_mm, vertices_mm[hole].mean(axis=0)])
+        fan = [[a, b, len(vertices_mm) - 1] for a, b in zip(hole, hole[1:] + hole[:1])]
+        triangles = np.vstack([triangles, np.array(fan, triangles.dtype)])
+    return vertices_mm, triangles, len(holes)
 
 
 def evenly(vertices_mm, triangles, count, seed=1):

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 
 LEAST_SHARE = 0.02  # of the learning rate, at the end
+SETTLING = 30  # batches from which the batch norms take their statistics before each look
 
 
 def rate_at(step, steps, rate):
@@ -72,6 +73,7 @@ def train(network, batch, loss, judge, *, steps, seed, out, rate=3e-3, looks=10)
         optimizer.step()
         losses.append(value.item())
         if (step + 1) % every == 0 or step + 1 == steps:
+            settle(network, batch, seed)
             figure = look(network, judge, state)
             progress.add(step=step + 1, loss=float(np.mean(losses[-every:])), choice=figure)
             state.update(step=step + 1, weights=network.state_dict(), optimizer=optimizer.state_dict())
@@ -80,6 +82,19 @@ def train(network, batch, loss, judge, *, steps, seed, out, rate=3e-3, looks=10)
         network.load_state_dict(state["best_weights"])
     network.eval()
     return losses
+
+
+def settle(network, batch, seed):
+    """Gives the batch norms the mean statistics of some batches under today's weights. Those of the training lag behind
+    the weights, and each remembers its last ten batches only."""
+    network.train()
+    norms = [layer for layer in network.modules() if isinstance(layer, torch.nn.BatchNorm2d)]
+    for norm in norms:
+        norm.reset_running_stats()
+        norm.momentum = None  # the mean over all batches
+    with torch.no_grad():
+        for i in range(SETTLING):
+            network(batch(np.random.default_rng([seed, i, 1]))[0])
 
 
 def look(network, judge, state):

@@ -17,6 +17,7 @@ constexpr int kRays = 720, kStepsPerRay = 6, kTrials = 400, kHarmonics = 9;
 constexpr double kDarkCorner = 0.25;  // part of the brightest pixel; not 0, because scatter reaches behind a collimator
 constexpr double kSupported =
     0.5;  // least part of the rays crossing the outline within the image that have a step there
+constexpr double kMostLit = 0.25;  // largest part of the pixels beyond the outline that is not dark
 // A rim inside the outline is left out, because it is blurred and because a collimator's iris may cut a crescent off
 // the intensifier's field. Its width is the larger of kRim_px and kRim times the radius.
 constexpr double kRim_px = 3, kRim = 0.02;
@@ -156,6 +157,19 @@ bool is_outside(const Field& field, const cv::Point& pixel) {
   return cv::norm(from) > field.radius(std::atan2(from.y, from.x));
 }
 
+/// The part of the pixels beyond the outline that is not dark. A plate across a rectangular collimator's field, or an
+/// arc of cables, may look like an outline, but there the image goes on behind it.
+double lit_outside(const cv::Mat& grey, const Field& field, double largest) {
+  int outside = 0, lit = 0;
+  for (int v = 0; v < grey.rows; v += 4)
+    for (int u = 0; u < grey.cols; u += 4)
+      if (is_outside(field, {u, v})) {
+        ++outside;
+        lit += grey.at<float>(v, u) >= kDarkCorner * largest;
+      }
+  return outside ? double(lit) / outside : 0;
+}
+
 /// Black areas that reach the corners, if at least three corners are black; else empty.
 cv::Mat black_corners(const cv::Mat& grey, double smallest, double largest) {
   if (smallest > 0.1 * largest) return {};
@@ -211,7 +225,7 @@ std::optional<Field> collimator_field(const cv::Mat& grey, double largest) {
   const auto outside = [&](const cv::Point& corner) { return is_outside(field, corner); };
   constexpr int kFewest = kRays / 10;
   if (found < kFewest || found < kSupported * rays_within(grey, field) ||
-      std::count_if(corners.begin(), corners.end(), outside) < 3)
+      std::count_if(corners.begin(), corners.end(), outside) < 3 || lit_outside(grey, field, largest) > kMostLit)
     return std::nullopt;
   return field;
 }

@@ -236,6 +236,19 @@ const Output& output_of(const Description& description, Output::Kind kind) {
               listed(there));
 }
 
+std::vector<std::size_t> channels_of_classes(const Description& description, const Output& output,
+                                             const std::vector<std::string>& names) {
+  std::vector<std::size_t> channels;
+  for (const std::string& name : names) {
+    const auto found = std::find(output.names.begin(), output.names.end(), name);
+    if (found == output.names.end())
+      throw Error(description.file.string() + ": the network has no class '" + name + "'; " +
+                  suggestion(name, output.names));
+    channels.push_back(std::size_t(found - output.names.begin()));
+  }
+  return channels;
+}
+
 void expect_values(const Description& description, std::initializer_list<Values> can_give, const std::string& node) {
   std::vector<std::string> given;
   for (const Values values : can_give) {

@@ -63,6 +63,10 @@ Description read_description(const std::filesystem::path& file);
 /// The output of a kind. Throws Error if the network has none; it says what there is.
 const Output& output_of(const Description& description, Output::Kind kind);
 
+/// The channels of some classes. Throws Error if the output lacks one of them; it names the nearest one.
+std::vector<std::size_t> channels_of_classes(const Description& description, const Output& output,
+                                             const std::vector<std::string>& names);
+
 /// The values of the network's input that its node can give. Throws Error if the network wants others.
 void expect_values(const Description& description, std::initializer_list<Values> can_give, const std::string& node);
 

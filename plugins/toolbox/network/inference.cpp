@@ -178,7 +178,14 @@ Network::Network(Description description) : model_(std::make_unique<Model>(std::
       throw Error(model_->description.model.string() + ": has no output '" + output.layer + "', which " +
                   model_->description.file.filename().string() + " names; " + suggestion(output.layer, layers));
 }
+Network::Network(Network&&) noexcept = default;
 Network::~Network() = default;
+
+Network read_for_views(const std::filesystem::path& file, const std::string& node) {
+  Network network(read_description(file));
+  expect_values(network.description(), {Values::line_integrals, Values::grey_values}, node);
+  return network;
+}
 
 const Description& Network::description() const { return model_->description; }
 

@@ -17,6 +17,7 @@ class Network {
  public:
   /// Throws Error if the file is not a model that OpenCV reads, or if the model lacks an output of the description.
   explicit Network(Description description);
+  Network(Network&&) noexcept;
   ~Network();
 
   const Description& description() const;
@@ -30,6 +31,10 @@ class Network {
   struct Model;
   std::unique_ptr<Model> model_;
 };
+
+/// The network for a node that takes views. Throws Error as read_description() and Network do, or if the network does
+/// not take the values of views.
+Network read_for_views(const std::filesystem::path& file, const std::string& node);
 
 /// (value - low) / (high - low) by the method, negated first where the network wants bone dark. `counts`: CV_8U, 0
 /// where a pixel does not count for the scale; empty: all count. A constant image becomes 0.

@@ -69,6 +69,14 @@ TEST(Usable, TakesNoLimbOrBrightCornerForACollimator) {
   EXPECT_FALSE(field_of(grey));
 }
 
+TEST(Usable, TakesNoArcInTheLitFieldOfARectangularCollimatorForOne) {
+  cv::Mat grey(400, 480, CV_32F, cv::Scalar(8000));
+  for (int v = 20; v < 380; ++v)
+    for (int u = 20; u < 460; ++u)
+      grey.at<float>(v, u) = std::hypot(u - 243.4, v - 236.2) < 160 ? 50000.0f : 15000.0f;  // a thick limb, say
+  EXPECT_FALSE(field_of(grey));
+}
+
 TEST(Usable, LeavesAMarginEverywhere) {
   marrow::View view;
   const cv::Mat grey = collimated(170, 1500);

@@ -91,6 +91,17 @@ TEST(Extremes, OfALevelMoveWithTheBone) {
   EXPECT_GT(off_without_level, 2) << "the CT's axes are no longer the bone's";
 }
 
+/// A body that is widest from the right to the left: its long axis is the CT's x.
+TEST(Extremes, OfTheCtsAxesLieInTheCtsDirectionsWhateverTheShape) {
+  const Mesh wide = analytic::mesh_of({{{5, 0, 0}, {90, 30, 40}}});
+  shipped::Options top{
+      {"names", Names{"top"}}, {"outward", Numbers{0}}, {"back", Numbers{0}}, {"up", Numbers{1}}, {"cap_mm", 1.0}};
+  const Vector3d along_the_body = points_of(wide, top).at("top");
+  EXPECT_NEAR(std::abs(along_the_body.x() - 5), 90, 1);
+  top["directions_of"] = std::string("ct");
+  EXPECT_LT((points_of(wide, top).at("top") - Vector3d(5, 0, 40)).norm(), 1.0);
+}
+
 TEST(Extremes, AreRefusedWhereTheyAreNotDetermined) {
   const auto refusal = [&](const shipped::Options& given) {
     return shipped::refusal("points.extremes", {{"model", shipped::item(surface())}}, given);

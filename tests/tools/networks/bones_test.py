@@ -44,7 +44,7 @@ class Planes(unittest.TestCase):
         for image, classes, borders, inside in tiles:
             shown = inside[0] > 0
             bone, background = ((classes == i) & shown for i in (1, 0))
-            self.assertGreater(image[0][bone].mean(), image[0][background].mean() + 0.5)
+            self.assertGreater(image[0][bone].mean(), image[0][background].mean() + 0.3)
             edge = cv2.morphologyEx(bone.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((5, 5), np.uint8)) > 0
             on_border = borders[0].astype(bool) & shown
             self.assertGreater(np.mean(edge[on_border]), 0.9)

@@ -50,6 +50,17 @@ def write_case(data, seed):
     write_mha(folder / "truth.mha", bone * 1450.0)
 
 
+class Weights(unittest.TestCase):
+    def test_only_a_narrow_gap_counts_more(self):
+        bone = np.zeros((40, 60), np.float32)
+        bone[10:30, 5:20] = bone[10:30, 24:40] = bone[10:30, 52:60] = 1  # 4 and 12 pixels apart
+        weights = slices.weights_of(bone)
+        self.assertTrue((weights[14:26, 20:24] == slices.GAP_WEIGHT).all())
+        self.assertTrue((weights[14:26, 41:51] == 1).all())
+        self.assertTrue((weights[bone > 0] == 1).all())
+        self.assertTrue((weights[:8] == 1).all())
+
+
 class Drawing(unittest.TestCase):
     def test_depends_on_the_seed_alone(self):
         self.assertEqual(scanned.settings_of(1000), scanned.settings_of(1000))

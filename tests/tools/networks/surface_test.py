@@ -6,6 +6,7 @@ import pathlib
 import subprocess
 import tempfile
 import unittest
+import unittest.mock
 
 import network_cases  # skips where a package is missing
 import numpy as np
@@ -50,6 +51,38 @@ class Points(unittest.TestCase):
         spread = np.ptp(np.array(list(points.values())), axis=0)
         self.assertLess(spread.min(), 1.5)  # the middle of 60000 random points is not exactly the box's
         self.assertGreater(np.sort(spread)[1], 15)
+
+
+def volume_of(corners, triangles):
+    a, b, c = (corners[triangles[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
+
+
+class Holes(unittest.TestCase):
+    def test_a_closed_surface_stays_as_it_is(self):
+        corners, triangles = box([60, 30, 20])
+        same_corners, same_triangles, holes = surface_points.closed(corners, triangles)
+        self.assertEqual(holes, 0)
+        self.assertIs(same_corners, corners)
+        self.assertIs(same_triangles, triangles)
+
+    def test_flat_holes_are_closed_to_the_same_volume(self):
+        with unittest.mock.patch.object(surface_points, "LARGEST_HOLE", 1):
+            corners, triangles = box([60, 30, 20], (5, -7, 9))
+            for missing, count in (([0, 1], 1), ([3], 1), ([0, 3], 2)):  # a face, a triangle, triangles of two faces
+                *result, holes = surface_points.closed(corners, np.delete(triangles, missing, axis=0))
+                self.assertEqual(holes, count)
+                self.assertAlmostEqual(volume_of(*result), 60 * 30 * 20)
+
+    def test_a_large_hole_is_refused(self):
+        corners, triangles = box([60, 30, 20])
+        with self.assertRaisesRegex(SystemExit, "a hole of 60.0 mm; close it, or give a closed surface"):
+            surface_points.closed(corners, triangles[2:])
+
+    def test_a_border_that_is_no_ring_is_refused(self):
+        fin = np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]])
+        with self.assertRaisesRegex(SystemExit, "a border that is no ring"):
+            surface_points.closed(np.eye(5, 3), fin)
 
 
 class Shadows(unittest.TestCase):

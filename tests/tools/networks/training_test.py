@@ -70,6 +70,19 @@ class Network(unittest.TestCase):
         self.assertTrue(torch.equal(far, limit))
 
 
+class Settling(unittest.TestCase):
+    def test_batch_norms_take_the_mean_statistics_of_batches_under_todays_weights(self):
+        network = small()
+        first, norm = network.down[0][0], network.down[0][1]  # the limits add 1 to the image
+        training.settle(network, batch, seed=1)
+        images = [batch(np.random.default_rng([1, i, 1]))[0] for i in range(training.SETTLING)]
+        with torch.no_grad():
+            mean = torch.stack([first(image + 1).mean((0, 2, 3)) for image in images]).mean(0)
+        self.assertTrue(torch.allclose(norm.running_mean, mean, atol=1e-5))
+        training.settle(network, batch, seed=1)  # nothing is left of what was there before
+        self.assertTrue(torch.allclose(norm.running_mean, mean, atol=1e-5))
+
+
 class Loop(InAFolder):
     def test_the_loss_falls_and_the_same_seed_gives_the_same_network(self):
         network, losses = trained(self.folder)
