@@ -9,11 +9,13 @@ that the page names, so that the page needs no other file.
 Without three.js, pages show everything but the 3D views, and say what is missing.
 """
 import argparse
+import os
 import pathlib
 import re
 import subprocess
 
 THREE = pathlib.Path("/usr/share/javascript/three/three.module.js")  # Debian's libjs-three
+LIBRARIES = "/usr/share/nodejs:/usr/share/javascript"  # where Debian's packages put the libraries that scripts import
 FLAGS = "--bundle --minify --format=iife --target=es2020 --charset=utf8 --log-level=warning --loader:.md=text".split()
 
 
@@ -22,7 +24,9 @@ def bundle(entry, three=THREE):
     given = ["--alias:three=%s" % three]
     if not three.exists():
         given = ["--alias:three=data:text/javascript,", "--log-override:import-is-undefined=silent"]
-    done = subprocess.run(["esbuild", str(entry), *FLAGS, *given], capture_output=True, encoding="utf-8")
+    environment = {**os.environ, "NODE_PATH": LIBRARIES}
+    command = ["esbuild", str(entry), *FLAGS, *given]
+    done = subprocess.run(command, capture_output=True, encoding="utf-8", env=environment)
     if done.returncode or done.stderr:
         raise SystemExit(done.stderr)
     return done.stdout
