@@ -110,11 +110,7 @@ def points_network(name, names, kernel=(0.6, 0, 0)):
     weights = [[[[0, 0, 0], list(kernel), [0, 0, 0]]] for _ in names]
     layer, tensors = onnx.convolution("image", "points", weights, [0] * len(names))
     path.with_suffix(".onnx").write_bytes(onnx.model([layer], tensors, {"points": (len(names), 64, 64)}, 64, 64))
-    path.write_text(
-        "marrow-network: 1\nname: moved\nhelp: for tests\nversion: 1.0.0\nlicence: Apache-2.0\n"
-        "trained: {data: nothing, good_for: tests, not_for: anything else}\n"
-        "input: {values: line_integrals, bone: bright, pixel_mm: 2, size_px: [64, 64], overlap_px: 16,\n"
-        "  normalise: {method: percentiles, low: 1, high: 99}}\n"
-        "outputs: {heat_maps: {layer: points, names: [%s], activation: none}}\n" % ", ".join(names)
-    )
+    text = NETWORK.replace("pixel_mm: 4", "pixel_mm: 2").replace("[32, 32]", "[64, 64]").replace("px: 8", "px: 16")
+    heat_maps = "heat_maps: {layer: points, names: [%s], activation: none}" % ", ".join(names)
+    path.write_text(text.replace("edge_strength: {layer: maps, activation: sigmoid}", heat_maps))
     return str(path)
