@@ -51,7 +51,7 @@ export function drawDistribution(data, metricIndex, kind, width) {
     width,
     height: ROW_HEIGHT * rows.length + 62,
     label: 'Distribution of ' + metric.label + ', one row for each variant; the numbers are in the table of the result',
-    x: {kind, domain: Plots.domain(all.concat(drawn ? limit : []), kind, true), title: axisTitle(metric)}
+    x: {kind, domain: Plots.domain(all.concat(drawn ? limit : []), kind), title: axisTitle(metric)}
   });
   if (drawn) {
     root.append(svg('line', {
@@ -153,7 +153,7 @@ export function drawPairs(data, metricIndex, kind, width) {
   const metric = data.metrics[metricIndex], variants = compared(data),
         columns = Math.max(1, Math.min(variants.length, Math.floor(width / 250)));
   const all = variants.map((variant) => Data.pairedValues(data, variant, metricIndex));
-  const domain = Plots.domain(all.flat().flatMap((item) => [item.value, item.base]), kind, true);
+  const domain = Plots.domain(all.flat().flatMap((item) => [item.value, item.base]), kind);
   return el(
       'div', {class: 'panels', style: 'grid-template-columns: repeat(' + columns + ', 1fr)'},
       variants.map((variant, i) => {
