@@ -73,7 +73,7 @@ class RankingTest(PageTest):
         rows = self.rows("#paired")
         self.assertEqual([row[:2] for row in rows], [[b, a], [c, b], [d, c]])
         self.assertEqual(rows[1][3], b + " fails more often")
-        self.assertEqual(rows[1][4], "[%s’s failure, −0.500]" % b)
+        self.assertEqual(rows[1][4], "0.500\u00a0mm better to %s’s failure" % b)
         self.assertIn("lost 0 / 7", rows[1][8])
 
     def test_effects_have_no_p(self):

@@ -137,12 +137,12 @@ export function drawDifferences(data, metricIndex, kind, width) {
                     Data.pairName(data, data.pairOf(item.cell)) + '\nbaseline ' + number(item.base) + ', ' +
                         data.variants[variant].name + ' ' + withUnit(item.value, metric.unit)))));
     const {low, high, difference, sentence} = found[i] || {};
-    const has_interval = Number.isFinite(low) || Number.isFinite(high);
+    const is_given = (found[i] || {}).has_interval !== false && (Number.isFinite(low) || Number.isFinite(high));
     const ends = [[low, area.left], [high, area.right]].map(
         ([bound, edge]) => (Number.isFinite(bound) ? x(bound) : edge));  // a failure lies beyond the edge
     root.append(
         svg('g', {class: 'estimate', 'data-tip': sentence || ''},
-            has_interval && svg('line', {x1: ends[0], x2: ends[1], y1: middle, y2: middle, 'stroke-width': 4}),
+            is_given && svg('line', {x1: ends[0], x2: ends[1], y1: middle, y2: middle, 'stroke-width': 4}),
             Number.isFinite(difference) && svg('circle', {cx: x(difference), cy: middle, r: 5})));
   });
   return root;

@@ -1,14 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // What all plots share: axes, marks, legends, and drawing again when the width changes. Scales, axes and shapes are
-// d3's. Ours are the frame about them, the ticks of logarithmic scales, and marks that differ in shape and colour.
+// d3's; only the files that are used, as the packages do not let esbuild leave out the others. Ours are the frame about
+// them, the ticks of logarithmic scales, and marks that differ in shape and colour.
+import './notices.js';
+
 import {axisBottom, axisLeft} from 'd3-axis';
-import {scaleLinear, scaleLog, scaleSymlog} from 'd3-scale';
+import scaleLinear from 'd3-scale/src/linear.js';
+import scaleLog from 'd3-scale/src/log.js';
+import scaleSymlog from 'd3-scale/src/symlog.js';
 import {select} from 'd3-selection';
-import * as Shape from 'd3-shape';
+import area from 'd3-shape/src/area.js';
+import line from 'd3-shape/src/line.js';
+import symbol, {symbols} from 'd3-shape/src/symbol.js';
 
 import {el, number, svg} from './dom.js';
 
-const MARKERS = ['Circle', 'Square', 'Triangle', 'Diamond', 'Cross'].map((name) => Shape['symbol' + name]);
+const [CIRCLE, CROSS, DIAMOND, SQUARE, , TRIANGLE] = symbols;
+const MARKERS = [CIRCLE, SQUARE, TRIANGLE, DIAMOND, CROSS];
 const DASHES = ['none', '7 3', '2 3', '9 3 2 3'];
 
 export const colour = (variant) => 'var(--variant-' + (variant % 7 + 1) + ')';
@@ -99,7 +107,7 @@ export function frame({width, height, x, y, label, format}) {
 
 // A mark. Its shape also tells the variants apart, not only its colour.
 export function marker(variant, x, y, size, attributes) {
-  const shape = Shape.symbol().type(MARKERS[variant % MARKERS.length]).size(Math.PI * size ** 2);
+  const shape = symbol().type(MARKERS[variant % MARKERS.length]).size(Math.PI * size ** 2);
   const place = 'translate(' + x.toFixed(1) + ' ' + y.toFixed(1) + ')';
   return svg('path', {d: shape(), transform: place, fill: colour(variant), ...attributes});
 }
@@ -129,14 +137,14 @@ export const polyline = (points, variant, attributes) => svg('path', {
   'stroke-linejoin': 'round',
   'stroke-linecap': 'round',
   'stroke-dasharray': dash(variant),
-  d: Shape.line().defined(is_known)(points),
+  d: line().defined(is_known)(points),
   ...attributes
 });
 
 // The area between two curves, [x, lower, upper] each in pixels, where both are known.
 export const band = (points, attributes) => svg('path', {
   class: 'band',
-  d: Shape.area()
+  d: area()
          .x(([x]) => x)
          .y0(([, lower]) => lower)
          .y1(([, , upper]) => upper)
