@@ -122,6 +122,7 @@ def comparison_of(cells, variant, metric):
         "difference": middle,
         "fails_more": None,
         "has_interval": True,
+        "is_shown": is_shown,
         "low": low,
         "high": high,
         "p": p,

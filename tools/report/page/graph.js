@@ -7,13 +7,14 @@ import {monotoneY} from 'd3-shape/src/curve/monotone.js';
 import line from 'd3-shape/src/line.js';
 import * as Dagre from 'dagre';
 
-import {el, svg} from './dom.js';
+import {button, el, svg} from './dom.js';
 
 const BOX = {
   width: 186,
   height: 46,
   line: 16
 };
+const SMALLEST = 0.7;  // the scale of the drawing at which its text can still be read
 const GAPS = {
   nodesep: 26,
   edgesep: 12,
@@ -159,14 +160,23 @@ function about(node) {
   ].filter(Boolean);
 }
 
+// For narrow screens, where a drawing would have to be scrolled sideways: each node with what it uses.
+const list = (graph, choose) => el('ul', {class: 'node-list'}, graph.nodes.map((node) => {
+  const from = [...new Set((graph.edges || []).filter((edge) => edge.to === node.id).map((edge) => edge.from))];
+  const differs = Object.entries(node.differs || {}).map(([name, text]) => name + ': ' + text);
+  return el(
+      'li', {}, button(node.id, () => choose(node), {class: 'link'}), ' ', el('code', {}, node.uses),
+      from.length > 0 && el('div', {class: 'note'}, 'from ' + from.join(', ')),
+      differs.length > 0 && el('div', {class: 'note'}, 'differs: ' + differs.join('; ')));
+}));
+
 // chose(node) is called for a node that is clicked. Without it, the node's options are shown below the graph.
 export function draw(graph, chose) {
   const {boxes, chains, width, height} = layOut(graph), lines = chains.map(drawLine);
   const root = svg('svg', {
     class: 'graph',
     viewBox: '0 0 ' + width + ' ' + height,
-    width,
-    height,
+    style: 'max-width: ' + width + 'px; min-width: ' + SMALLEST * width + 'px',
     role: 'group',
     'aria-label': 'The pipeline\'s nodes'
   });
@@ -185,5 +195,10 @@ export function draw(graph, chose) {
   const box = el('div', {class: 'scroll graph-box', tabindex: 0, role: 'region', 'aria-label': 'Pipeline'}, root);
   requestAnimationFrame(
       () => (box.scrollLeft = (box.scrollWidth - box.clientWidth) / 2));  // on a narrow screen: the middle first
-  return el('div', {}, box, chose ? '' : details);
+  if (chose) return el('div', {}, box);
+  const show = (node) => {
+    details.replaceChildren(...about(node));
+    details.scrollIntoView({block: 'nearest'});
+  };
+  return el('div', {}, box, list(graph, show), details);
 }
