@@ -120,15 +120,12 @@ function drawLine({edge, chain}) {
 
 function drawNode({node, x, y, height}, chosen) {
   const differs = Object.entries(node.differs || {}), left = x - BOX.width / 2, top = y - height / 2;
-  const about = node.id + ', uses ' + node.uses +
-      (differs.length ? ', differs in ' + differs.map((entry) => entry[0]).join(', ') : '');
   const choose = () => chosen(node, group);
   const group =
       svg('g', {
         class: 'node' + (differs.length ? ' differs' : ''),
         tabindex: 0,
         role: 'button',
-        'aria-label': about,
         'data-node': node.id,
         onclick: choose,
         onkeydown: (event) => (event.key === 'Enter' || event.key === ' ') && (event.preventDefault(), choose())
@@ -192,7 +189,8 @@ export function draw(graph, chose) {
     return undefined;
   };
   root.append(...lines, ...boxes.map((item) => drawNode(item, chosen)));
-  const box = el('div', {class: 'scroll graph-box', tabindex: 0, role: 'region', 'aria-label': 'Pipeline'}, root);
+  const box = el(
+      'div', {class: 'scroll graph-box', tabindex: 0, role: 'region', 'aria-label': 'Drawing of the pipeline'}, root);
   requestAnimationFrame(
       () => (box.scrollLeft = (box.scrollWidth - box.clientWidth) / 2));  // on a narrow screen: the middle first
   if (chose) return el('div', {}, box);

@@ -294,10 +294,13 @@ function summary(data) {
   const verdict = judged && section('verdict', 'Verdict', null, judged);
   const head = section(
       'summary', 'Result', null,
-      ...(data.is_run ?
-              (cell ? [Detail.reason(cell), Detail.absent(cell), Detail.values(data, cell), ...Detail.figures(data)] :
-                      []) :
-              [Leaderboard.table(data), Summary.verdicts(data), Verdict.table(data)]),
+      ...(data.is_run ? (cell ?
+                             [
+                               Detail.reason(cell), Detail.absent(cell), Detail.values(data, cell),
+                               el('div', {class: 'figure-tables'}, Detail.figures(data))
+                             ] :
+                             []) :
+                        [Leaderboard.table(data), Summary.verdicts(data), Verdict.table(data)]),
       experiment.help && el('p', {class: 'lead'}, experiment.help), Summary.rules(data));
   return [
     el('div', {class: 'head'}, el('p', {class: 'kicker'}, data.is_run ? 'Run' : 'Comparison'),
@@ -307,7 +310,14 @@ function summary(data) {
   ];
 }
 
-function build(data) {
+// Lets the browser show what is there. A page that nobody sees draws no frames, and goes on after a while.
+const frame = () => new Promise((done) => {
+  requestAnimationFrame(() => setTimeout(done));
+  setTimeout(done, 200);
+});
+
+// The answer is shown first; all else takes longer.
+async function build(data) {
   const {experiment} = data, many = !data.is_run, main = document.getElementById('top');
   document.title = (experiment.name || 'marrow report') + ' · marrow';
   const add = (...parts) => main.append(...parts.flat(2).filter(Boolean));  // at once: figures need their width
@@ -316,6 +326,7 @@ function build(data) {
     return;
   }
   add(summary(data));
+  await frame();
   if (many && data.metrics.length)
     add(effects(data), tuning(data), response(data), distributions(data), paired(data), capture(data), byCase(data));
   add(sequence(data));
@@ -360,11 +371,11 @@ function followScroll() {
   document.querySelectorAll('main > section').forEach((node) => seen.observe(node));
 }
 
-function start() {
+async function start() {
   startTheme();
   Dom.startTooltip();
   try {
-    build(Data.load());
+    await build(Data.load());
     followScroll();
   } catch (error) {
     document.getElementById('top').prepend(

@@ -92,6 +92,7 @@ export class Comparer {
         el('div', {
           class: 'stage',
           tabindex: 0,
+          role: 'group',
           'aria-label': 'Pictures: arrow keys move the wipe, the space bar switches in a blink'
         },
            el('figure', {class: 'layer-a'}, this.images[0], this.labels[0]),
@@ -191,13 +192,13 @@ export class Comparer {
 // All pictures of a cell, small; a click shows one in the full width.
 export function gallery(data, cell) {
   return el('div', {class: 'gallery'}, cell.pictures.map((entry) => {
-    const button = el(
-        'button', {
+    const button =
+        el('button', {
           type: 'button',
           'aria-expanded': 'false',
           onclick: () => button.setAttribute('aria-expanded', String(button.classList.toggle('large')))
         },
-        el('img', {src: data.pictures[entry.picture], alt: entry.name, loading: 'lazy'}), el('span', {}, entry.name));
+           el('img', {src: data.pictures[entry.picture], alt: '', loading: 'lazy'}), el('span', {}, entry.name));
     return button;
   }));
 }
