@@ -64,7 +64,7 @@ cv::Mat draw(const marrow::View& view, const std::string& title, const std::vect
              const marrow::EdgeMap* edges, const marrow::ShaftLines* lines, const cv::Rect& part,
              const Options& options) {
   Panel panel = make_panel(view, part, options.size_px, contrast_of(options.contrast));
-  if (edges) draw_edges(panel, *edges, kPurple);
+  if (edges) draw_edges(panel, *edges, kVermilion);
   if (lines)
     for (const marrow::LineSegment& line : {lines->left, lines->right}) draw_segment(panel, line, kGreen, 1);
   for (const Layer& layer : layers) draw_outline(panel, layer, options.contour_spacing_px);
@@ -80,16 +80,16 @@ marrow::Picture overlay(const marrow::Pose& pose, const marrow::OutlineProjector
   const auto add = [&](const char* text, const cv::Scalar& colour, int thickness, const marrow::RigidTransform& at) {
     layers.push_back(make_layer(text, colour, thickness, projector, view, at, options));
   };
-  if (truth) add("truth", kYellow, 3, truth->world_from_model);
+  if (truth) add("truth", kYellow, 4, truth->world_from_model);
   std::vector<Layer> after = layers;
-  if (start) add("start", kOrange, 1, start->world_from_model);
+  if (start) add("start", kOrange, 2, start->world_from_model);
   const std::vector<Layer> before = layers;
-  add("result", kSkyBlue, 1, pose.world_from_model);
+  add("result", kSkyBlue, 2, pose.world_from_model);
 
   std::vector<LegendItem> legend;
   for (const Layer& layer : layers) legend.push_back({layer.text, layer.colour});
   if (lines) legend.push_back({"shaft lines", kGreen});
-  if (edges) legend.push_back({"edges", kPurple});
+  if (edges) legend.push_back({"edges", kVermilion});
 
   const cv::Rect part = options.zoom ? region(view, layers) : whole_image(view);
   after.push_back(layers.back());

@@ -40,9 +40,9 @@ marrow::LineSegment mid_line(const marrow::ShaftLines& lines) {
 marrow::Picture shaft(const marrow::ShaftLines& lines, const marrow::View& view, const marrow::EdgeMap* edges,
                       const Options& options) {
   Panel panel = make_panel(view, whole_image(view), options.size_px, contrast_of(options.contrast));
-  if (edges) draw_edges(panel, *edges, kPurple);
+  if (edges) draw_edges(panel, *edges, kVermilion);
   std::vector<LegendItem> legend{{describe(lines), kSkyBlue}};
-  if (edges) legend.push_back({"edges", kPurple});
+  if (edges) legend.push_back({"edges", kVermilion});
   const std::size_t count = std::min(lines.rejected.size(), std::size_t(options.rejected));
   for (std::size_t i = 0; i < count; ++i) {
     const marrow::ShaftLines::Rejected& pair = lines.rejected[i];

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Modules of the pages for tests that call their functions, in a browser or in node."""
+import os
 import subprocess
 
 from harness import SOURCE
@@ -17,5 +18,6 @@ def modules(**paths):
         capture_output=True,
         encoding="utf-8",
         check=True,
+        env={**os.environ, "NODE_PATH": "/usr/share/nodejs:/usr/share/javascript"},
     ).stdout
     return "%s\nconst {%s} = modules;\n" % (bundled, ", ".join(paths))

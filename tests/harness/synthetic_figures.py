@@ -110,20 +110,23 @@ def comparison_of(cells, variant, metric):
     p = math.erfc(abs(worse - count / 2) / math.sqrt(count / 4) / math.sqrt(2))
     low, high = differences[max(0, int(count / 2 - spread))], differences[min(count - 1, int(count / 2 + spread))]
     name, what = VARIANTS[variant][0], METRICS[metric]
-    verdict = "is worse than" if low > 0 else "is better than" if high < 0 else "cannot be told from"
     middle = quantile(differences, 0.5)
+    amount = lambda value: "%.2f %s %s" % (abs(value), what["unit"], "worse" if value > 0 else "better")
+    bounds = sorted((low, high), key=lambda value: value if middle > 0 else -value)
+    is_shown = low * high > 0 and 3 * p < 0.05
+    interval = "%.2f to %.2f" % tuple(map(abs, bounds)) if low * high > 0 else " to ".join(map(amount, bounds))
     return {
         "variant": name,
         "metric": what["name"],
         **counts,
         "difference": middle,
         "fails_more": None,
+        "has_interval": True,
+        "is_shown": is_shown,
         "low": low,
         "high": high,
         "p": p,
         "p_holm": min(1, 3 * p),
-        "sentence": (
-            "%s %s %s in %s: median difference %+.2f %s, 95 %% interval %+.2f to %+.2f, p = %.2g (Holm), %d pairs."
-            % (name, verdict, VARIANTS[0][0], what["label"], middle, what["unit"], low, high, min(1, 3 * p), count)
-        ),
+        "sentence": "%s, %s: %s%s, 95 %% interval %s, 12 cases, p = %.2g"
+        % (name, what["label"], "" if is_shown else "no difference shown: ", amount(middle), interval, min(1, 3 * p)),
     }

@@ -211,6 +211,7 @@ def numbers_tree(compared, metric, unit, other):
         "difference": finite(compared.difference),
         "fails_more": fails_more(compared, metric.higher_is_better, other),
         "difference_of_pairs": compared.median_of_both,
+        "has_interval": compared.has_interval and compared.low < math.inf and compared.high > -math.inf,
         "low": finite(compared.low),
         "high": finite(compared.high),
     }

@@ -43,28 +43,30 @@ def check_amount(checks, what, text, directed, unit):
     return number
 
 
-def check_bound(checks, what, text, value, directed, unit, names, has_failure):
+def check_bound(checks, what, text, value, directed, unit, names, amount):
     if math.isinf(value):
         who = names[0] if (value > 0) == directed.is_worse else names[1]
         return checks.same(KIND, what, text, "a failure of " + who)
     number, *words = text.split()
     contains_zero = directed.low <= 0 <= directed.high
-    checks.shown(KIND, what, number, value, may_be_zero=contains_zero)
-    checks.same(KIND, what + " unit", words, [unit] if has_failure and unit else [])
+    checks.shown(KIND, what, number, abs(value), may_be_zero=contains_zero)
+    has_failure = math.isinf(directed.low) or math.isinf(directed.high)
+    has_direction = directed.low >= 0 and amount is not None and float(amount) != 0
+    expected = [unit] if unit and (has_failure or not has_direction) else []
+    if not has_direction and float(number) != 0:
+        expected.append("worse" if (value > 0) == directed.is_worse else "better")
+    checks.same(KIND, what + " words", words, expected)
 
 
 def check_interval(checks, what, text, directed, unit, names, amount):
     """`amount`: the shown difference; None where that is a failure. `names`: of the variant and the other one."""
-    found = re.fullmatch(r"95 % interval (.*) to (.*?)( \(positive is (?:worse|better)\))?", text)
+    found = re.fullmatch(r"95 % interval (.*) to (.*)", text)
     if not found:
         return checks.same(KIND, what, text, "95 % interval LOW to HIGH")
     has_failure = math.isinf(directed.low) or math.isinf(directed.high)
     bounds = (found[1], directed.low), (found[2], directed.high)
     for name, (shown, value) in zip((" low", " high"), bounds):
-        check_bound(checks, what + name, shown, value, directed, unit, names, has_failure)
-    has_no_word = amount is None or float(amount) == 0
-    said = (found[3] or "").strip()
-    checks.same(KIND, what + " direction", said, "(positive is %s)" % directed.word if has_no_word else "")
+        check_bound(checks, what + name, shown, value, directed, unit, names, amount)
     width = directed.high - directed.low
     if not has_failure and width > 1e-9 * directed.difference:
         checks.that(

@@ -128,11 +128,12 @@ struct CorrectedP {
 
 /// The result of a comparison in words:
 /// "canny, target error: 0.12 mm worse, 95 % interval 0.08 to 0.17, 20 cases, p < 0.001"
-/// "canny, target error: no difference shown: 0.01 mm worse, 95 % interval -0.03 to 0.05, 20 cases, p = 0.62"
-/// The interval is given in the direction that the sentence names, so for "0.01 mm better" a negative bound is worse.
-/// It is the interval of this comparison alone; only p is corrected for the number of comparisons. With too few cases
-/// to reach alpha, the sentence says how many it takes. With too few for an interval, it gives none. The last digit
-/// shown is worth at most a quarter of the interval's width.
+/// "canny, target error: no difference shown: 0.01 mm worse, 95 % interval 0.03 mm better to 0.05 mm worse,
+/// 20 cases, p = 0.62"
+/// Bounds without a word are in the direction that the sentence names. It is the interval of this comparison alone;
+/// only p is corrected for the number of comparisons. With too few cases to reach alpha, the sentence says how many it
+/// takes. With too few for an interval, it gives none. The last digit shown is worth at most a quarter of the
+/// interval's width.
 ///
 /// If runs failed, the sentence says so, how many cases are compared, and what an infinite bound means:
 /// "canny, target error: 0.12 mm worse, 95 % interval 0.08 mm to a failure of canny, 20 of 22 cases, p = 0.0031; of 22

@@ -76,23 +76,27 @@ struct Directed {
     interval = {-within.upper, -within.lower, within.confidence};
   }
 
-  std::string amount(int decimals) const {
-    const std::string number = fixed_number(difference, decimals);
+  /// "0.03 mm worse", also of a value to the other side, which is "0.03 mm better". 0 is neither.
+  std::string amount_of(double value, int decimals) const {
+    const std::string number = fixed_number(std::abs(value), decimals);
     const std::string text = number + (metric.unit.empty() ? "" : " " + metric.unit);
-    return shows_zero(number) ? text : text + (is_worse ? " worse" : " better");
+    return shows_zero(number) ? text : text + ((value > 0) == is_worse ? " worse" : " better");
+  }
+  std::string amount(int decimals) const { return amount_of(difference, decimals); }
+
+  /// Both bounds have the direction of the difference, so they are numbers only.
+  bool says_direction(int decimals) const {
+    return interval.lower >= 0 && std::isfinite(difference) && !shows_zero(fixed_number(difference, decimals));
   }
   std::string bound(double value, int decimals) const {
-    if (std::isfinite(value)) return fixed_number(value, decimals);
-    return "a failure of " + ((value > 0) == is_worse ? names.variant : names.reference);
+    if (std::isinf(value)) return "a failure of " + ((value > 0) == is_worse ? names.variant : names.reference);
+    if (!says_direction(decimals)) return amount_of(value, decimals);
+    const bool has_failure = std::isinf(interval.lower) || std::isinf(interval.upper);
+    return fixed_number(std::abs(value), decimals) + (has_failure && !metric.unit.empty() ? " " + metric.unit : "");
   }
   std::string range(int decimals) const {
-    const bool has_failure = std::isinf(interval.lower) || std::isinf(interval.upper);
-    const std::string unit = has_failure && !metric.unit.empty() ? " " + metric.unit : "";
-    const auto with_unit = [&](double value) {
-      return bound(value, decimals) + (std::isfinite(value) ? unit : std::string());
-    };
-    return short_number(100 * interval.confidence, 6) + " % interval " + with_unit(interval.lower) + " to " +
-           with_unit(interval.upper);
+    return short_number(100 * interval.confidence, 6) + " % interval " + bound(interval.lower, decimals) + " to " +
+           bound(interval.upper, decimals);
   }
 };
 
@@ -141,15 +145,15 @@ std::string found_text(const Comparison& comparison, const Directed& directed, b
   const int decimals = decimals_of(directed.difference, has_interval ? interval : Interval{-kInfinite, kInfinite});
   std::string text =
       is_failure ? more_failures(directed.names, comparison, directed.is_worse) : directed.amount(decimals);
-  if (has_interval && interval.lower < kInfinite) {
-    text += ", " + directed.range(decimals);
-    if (is_failure || shows_zero(fixed_number(directed.difference, decimals)))
-      text += directed.is_worse ? " (positive is worse)" : " (positive is better)";
-  }
+  if (has_interval && interval.lower < kInfinite) text += ", " + directed.range(decimals);
   if (!is_failure || comparison.cases.neither)
     text += ", " + (comparison.cases.neither ? formatted("{} of ", comparison.compared()) : std::string()) +
             counted(comparison.cases.all(), "case");
   return text;
+}
+
+bool has_interval(const Comparison& comparison) {
+  return comparison.compared() >= fewest_cases(1 - comparison.interval.confidence);
 }
 
 /// The whole sentence after its beginning. `p` is what it says of p, if anything.
@@ -158,8 +162,8 @@ std::string said(const std::string& begin, const Names& names, const Metric& met
   const std::string text = metric.label.empty() ? begin : begin + ", " + metric.label;
   if (!comparison.compared()) return text + ": no case can be compared" + failures_text(names, comparison.runs);
   const Directed directed(names, metric, comparison.median_difference, comparison.interval);
-  const bool has_interval = comparison.compared() >= fewest_cases(1 - directed.interval.confidence);
-  return text + verb + found_text(comparison, directed, has_interval) + p + failures_text(names, comparison.runs) +
+  const bool is_given = has_interval(comparison);
+  return text + verb + found_text(comparison, directed, is_given) + p + failures_text(names, comparison.runs) +
          (std::isinf(directed.difference) ? of_both(names, metric, comparison) : "");
 }
 
@@ -191,8 +195,7 @@ std::string sentence(const std::string& variant, const Metric& metric, const Com
       said(reference.empty() ? variant : variant + " against " + reference, names, metric, comparison,
            is_shown ? ": " : ": no difference shown: ", ", " + p_text(corrected.p, alpha));
   if (!comparison.compared()) return text;
-  const bool has_interval = comparison.compared() >= fewest_cases(1 - comparison.interval.confidence);
-  return text + doubts(comparison, corrected, alpha, has_interval, is_shown);
+  return text + doubts(comparison, corrected, alpha, has_interval(comparison), is_shown);
 }
 
 std::string effect_sentence(const std::string& variant, const std::string& reference, const Metric& metric,

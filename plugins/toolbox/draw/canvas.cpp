@@ -15,7 +15,6 @@ namespace marrow::draw {
 namespace {
 
 constexpr int kShift = 4;  // OpenCV draws at positions of 1/16 pixel
-constexpr int kRowHeight = 24;
 
 /// Whether a position can be drawn. Fixed-point coordinates overflow far outside the canvas.
 bool drawable(cv::Point2d p) { return std::abs(p.x) < 1e5 && std::abs(p.y) < 1e5; }
@@ -114,21 +113,23 @@ void draw_edges(Panel& panel, const EdgeMap& edges, const cv::Scalar& colour) {
 }
 
 cv::Mat with_legend(const cv::Mat& picture, const std::vector<LegendItem>& items) {
-  constexpr int kStroke = 24, kGap = 8;
+  // Pages show a picture smaller than it is, so that the letters of a large one must be larger.
+  const double size = std::clamp(picture.cols / 1100.0, 0.5, 1.2);
+  const int row = int(48 * size), stroke = int(48 * size), gap = int(16 * size);
   std::vector<cv::Point> places;
-  cv::Point at(kGap, 0);
+  cv::Point at(gap, 0);
   for (const LegendItem& item : items) {
-    const int width = kStroke + kGap + text_size(item.text).width + 2 * kGap;
-    if (at.x > kGap && at.x + width > picture.cols) at = {kGap, at.y + kRowHeight};
+    const int width = stroke + gap + text_size(item.text, size).width + 2 * gap;
+    if (at.x > gap && at.x + width > picture.cols) at = {gap, at.y + row};
     places.push_back(at);
     at.x += width;
   }
-  cv::Mat result(picture.rows + (items.empty() ? 0 : at.y + kRowHeight), picture.cols, CV_8UC3, kDark);
+  cv::Mat result(picture.rows + (items.empty() ? 0 : at.y + row), picture.cols, CV_8UC3, kDark);
   picture.copyTo(result(cv::Rect({0, 0}, picture.size())));
   for (std::size_t i = 0; i < items.size(); ++i) {
-    const cv::Point middle(places[i].x, picture.rows + places[i].y + kRowHeight / 2);
-    draw_line(result, middle, middle + cv::Point(kStroke, 0), items[i].colour, 2);
-    draw_text(result, items[i].text, middle + cv::Point(kStroke + kGap, 5), kWhite);
+    const cv::Point middle(places[i].x, picture.rows + places[i].y + row / 2);
+    draw_line(result, middle, middle + cv::Point(stroke, 0), items[i].colour, int(6 * size));
+    draw_text(result, items[i].text, middle + cv::Point(stroke + gap, int(10 * size)), kWhite, size);
   }
   return result;
 }

@@ -33,25 +33,27 @@ TEST(Sentence, NamesADifference) {
 }
 
 TEST(Sentence, SaysWhereNoneIsShown) {
-  EXPECT_EQ(sentence("canny", unnamed, comparison_of(0.0112, -0.031, 0.0521), {0.6213}),
-            "canny: no difference shown: 0.01 mm worse, 95 % interval -0.03 to 0.05, 20 cases, p = 0.62");
+  EXPECT_EQ(
+      sentence("canny", unnamed, comparison_of(0.0112, -0.031, 0.0521), {0.6213}),
+      "canny: no difference shown: 0.01 mm worse, 95 % interval 0.03 mm better to 0.05 mm worse, 20 cases, p = 0.62");
 }
 
 TEST(Sentence, CountsInTheDirectionThatItNames) {
   EXPECT_EQ(sentence("canny", unnamed, comparison_of(-0.1234, -0.1711, -0.081), {0.002}),
             "canny: 0.12 mm better, 95 % interval 0.08 to 0.17, 20 cases, p = 0.0020");
-  EXPECT_EQ(sentence("canny", unnamed, comparison_of(-0.0112, -0.0521, 0.031), {0.6213}),
-            "canny: no difference shown: 0.01 mm better, 95 % interval -0.03 to 0.05, 20 cases, p = 0.62");
+  EXPECT_EQ(
+      sentence("canny", unnamed, comparison_of(-0.0112, -0.0521, 0.031), {0.6213}),
+      "canny: no difference shown: 0.01 mm better, 95 % interval 0.03 mm worse to 0.05 mm better, 20 cases, p = 0.62");
   EXPECT_EQ(sentence("canny", {"overlap", "", true}, comparison_of(0.1234, 0.081, 0.1711), {0.002}),
             "canny, overlap: 0.12 better, 95 % interval 0.08 to 0.17, 20 cases, p = 0.0020");
   EXPECT_EQ(sentence("canny", unnamed, comparison_of(0, -0.04, 0.05), {1}),
-            "canny: no difference shown: 0.00 mm, 95 % interval -0.04 to 0.05 (positive is worse), 20 cases, p = 1");
+            "canny: no difference shown: 0.00 mm, 95 % interval 0.04 mm better to 0.05 mm worse, 20 cases, p = 1");
   EXPECT_EQ(sentence("canny", unnamed, comparison_of(-0.00001, -0.04, 0.05), {1}),
-            "canny: no difference shown: 0.00 mm, 95 % interval -0.05 to 0.04 (positive is better), 20 cases, p = 1");
+            "canny: no difference shown: 0.00 mm, 95 % interval 0.05 mm worse to 0.04 mm better, 20 cases, p = 1");
   EXPECT_EQ(sentence("canny", unnamed, comparison_of(2.0 / 9, 2.0 / 9 - 1e-16, 2.0 / 9 + 1e-16), {1e-9}),
             "canny: 0.22 mm worse, 95 % interval 0.22 to 0.22, 20 cases, p < 0.001");
   EXPECT_EQ(sentence("canny", unnamed, comparison_of(0, 0, 0), {1}),
-            "canny: no difference shown: 0 mm, 95 % interval 0 to 0 (positive is worse), 20 cases, p = 1");
+            "canny: no difference shown: 0 mm, 95 % interval 0 mm to 0 mm, 20 cases, p = 1");
 }
 
 TEST(Sentence, SaysThatTooFewCasesCannotShowAnything) {
@@ -89,9 +91,10 @@ TEST(Sentence, ShowsNothingWhereRanksAndMedianContradict) {
 }
 
 TEST(Sentence, SaysThatTheIntervalContainsZeroThoughPIsSmall) {
-  EXPECT_EQ(sentence("canny", unnamed, comparison_of(0.1, -0.1, 0.3), {0.01}),
-            "canny: no difference shown: 0.1 mm worse, 95 % interval -0.1 to 0.3, 20 cases, p = 0.010; the interval "
-            "contains 0, look at the single cases");
+  EXPECT_EQ(
+      sentence("canny", unnamed, comparison_of(0.1, -0.1, 0.3), {0.01}),
+      "canny: no difference shown: 0.1 mm worse, 95 % interval 0.1 mm better to 0.3 mm worse, 20 cases, p = 0.010; "
+      "the interval contains 0, look at the single cases");
 }
 
 /// `lost` cases in which only the variant failed, and `reference_lost` in which only the baseline did.
@@ -127,13 +130,13 @@ TEST(Sentence, SaysFirstWhoFailsMoreWhereTheMedianIsAFailure) {
             "0.20 mm better");
   EXPECT_EQ(sentence("canny", target_error, with_failures(comparison_of(-infinite, -infinite, -0.31, 31), 0, 22, 1),
                      {0.0001}),
-            "canny, target error: the baseline fails more often, in 22 of 30 cases, 95 % interval 0.31 mm to a failure "
-            "of the baseline (positive is better), 30 of 31 cases, p < 0.001; of 31 runs, only canny failed in 0, only "
+            "canny, target error: the baseline fails more often, in 22 of 30 cases, 95 % interval 0.31 mm better to a "
+            "failure of the baseline, 30 of 31 cases, p < 0.001; of 31 runs, only canny failed in 0, only "
             "the baseline in 22, both in 1; where both have a value, in 8 cases, the median is 0.20 mm better");
   EXPECT_EQ(
       sentence("canny", unnamed, with_failures(comparison_of(infinite, -0.2, infinite, 30), 20, 0, 0), {0.0001}),
-      "canny: no difference shown: fails more often than the baseline, in 20 of 30 cases, 95 % interval -0.20 mm "
-      "to a failure of canny (positive is worse), p < 0.001; of 30 runs, only canny failed in 20, only the "
+      "canny: no difference shown: fails more often than the baseline, in 20 of 30 cases, 95 % interval 0.20 mm "
+      "better to a failure of canny, p < 0.001; of 30 runs, only canny failed in 20, only the "
       "baseline in 0, both in 0; where both have a value, in 10 cases, the median is 0.20 mm better; the interval "
       "contains 0, look at the single cases");
 }

@@ -125,7 +125,7 @@ TEST(Overlay, DrawsEdgesAndShaftLines) {
   const cv::Mat picture = overlay(pose_at(0), {{"edges", shipped::item(edges)}, {"lines", shipped::item(lines)}});
   EXPECT_TRUE(has(picture, {61, 151}, kGreen));
   EXPECT_TRUE(has(picture, {91, 151}, kGreen));
-  EXPECT_TRUE(has(picture, {451, 211}, {166, 124, 147})) << "halfway between grey and the colour of edges";
+  EXPECT_TRUE(has(picture, {451, 211}, {170, 111, 64})) << "halfway between grey and the colour of edges";
 }
 
 TEST(Overlay, SaysWhenTheOutlineIsOutside) {

@@ -88,7 +88,7 @@ class GlossaryTest(PageTest):
 
     def test_the_figures_of_a_run_are_explained(self):
         data = synthetic.run()
-        names = ["rotation_deg", "mtre_mm", "matched_percent", "unheard_of_mm"]
+        names = ["rotation_deg", "mtre_mm", "matched_percent", "unheard_of_mm", "frontal_median_px"]
         rows = [{"name": name, "unit": "", "values": [1]} for name in names]
         data["figures"] = [{"name": "errors", "columns": ["final"], "rows": rows}]
         self.browser.open(self.write("figures", data))
@@ -97,6 +97,7 @@ class GlossaryTest(PageTest):
             " [head.textContent, (head.querySelector('.term') || {dataset: {}}).dataset.tip || null])"
         )
         wanted = [self.entries["rotation"], self.entries["mtre"], self.entries["matched"], None]
+        wanted.append("In “frontal” alone: " + self.entries["median"])
         self.assertEqual(tips, [list(pair) for pair in zip(names, wanted)])
 
     def test_every_entry_is_found_by_its_name(self):

@@ -51,7 +51,7 @@ class Module:
         self.path, text = path, path.read_text()
         self.named, self.spaces, self.imports = [], {}, []
         for found in IMPORT.finditer(text):
-            if found["path"] == "three" or found["path"].endswith(".md"):
+            if not found["path"].startswith(".") or found["path"].endswith(".md"):  # a library, or a text
                 continue
             target = (path.parent / found["path"]).resolve()
             self.imports.append(target)

@@ -51,7 +51,7 @@ class RankingTest(PageTest):
         data["effects"] = [{key: value for key, value in effect.items() if key not in ("p", "p_holm")}]
         self.first = first
         self.browser.open(self.write("ranking", data))
-        self.eventually(lambda: len(self.rows("#ranking")), 4)
+        self.eventually(lambda: len(self.rows("#summary")), 4)
 
     def rows(self, section):
         cells = "(row) => [...row.cells].map((cell) => cell.innerText.trim())"
@@ -61,19 +61,40 @@ class RankingTest(PageTest):
     def test_best_first_with_groups_and_failures(self):
         self.page()
         a, b, c, d = self.names
-        rows = self.rows("#ranking")
-        self.assertEqual([row[:3] for row in rows], [["1", c, "a"], ["2", a, "ab"], ["3", b, "b"], ["4", d, "–"]])
-        self.assertEqual([row[3] for row in rows], ["0.500", "0.750", "0.800", "a failure"])
-        self.assertEqual([row[4] for row in rows], ["0", "1", "2", "60"])
-        self.assertEqual(self.texts("#ranking .ranking"), ["best in " + self.first])
+        rows = self.rows("#summary .leaderboard")
+        self.assertEqual([row[:2] for row in rows], [["1", "a"], ["2", "ab"], ["3", "b"], ["4", "–"]])
+        self.assertEqual([row[2].split("\n")[0].removesuffix("baseline") for row in rows], [c, a, b, d])
+        heads = [head.split(" mm")[0] for head in self.texts("#summary .leaderboard th")]
+        of = lambda title: [row[heads.index(title)] for row in rows]
+        self.assertEqual(of("Median of all runs"), ["0.500", "0.750", "0.800", "a failure"])
+        self.assertEqual(of("Lost"), ["0", "1", "2", "60"])
+        self.assertEqual(self.texts("#summary .ranking"), ["best in " + self.first])
+        table, sentences = self.browser.js(
+            "return ['.leaderboard', '.verdicts'].map((one) => document.querySelector('#summary ' + one).offsetTop)"
+        )
+        self.assertLess(table, sentences, "the table comes first")
+
+    def test_without_a_ranking_the_best_comes_first(self):
+        data = synthetic.comparison()
+        self.browser.open(self.write("board", data))
+        rates = [one["success"]["rate"] for one in data["summary"]]
+        names = [data["variants"][i]["name"] for i in sorted(range(len(rates)), key=lambda i: -rates[i])]
+        shown = [row[0].split("\n")[0].removesuffix("baseline") for row in self.rows("#summary .leaderboard")]
+        self.assertEqual(shown, names)
+        for row in self.rows("#summary .leaderboard"):
+            item = [one for one in data["comparisons"] if row[0].startswith(one["variant"])][:1]
+            wanted = "baseline" if not item else "worse" if item[0]["is_shown"] else "no difference shown"
+            self.assertIn(wanted, row[3])
 
     def test_all_pairs_name_both(self):
         self.page()
         a, b, c, d = self.names
-        rows = self.rows("#paired")
+        self.assertFalse(self.browser.js("return document.querySelector('.all-pairs').open"), "only where asked")
+        self.browser.js("document.querySelector('.all-pairs').open = true")
+        rows = self.rows("#paired .all-pairs")
         self.assertEqual([row[:2] for row in rows], [[b, a], [c, b], [d, c]])
         self.assertEqual(rows[1][3], b + " fails more often")
-        self.assertEqual(rows[1][4], "[%s’s failure, −0.500]" % b)
+        self.assertEqual(rows[1][4], "0.500\u00a0mm better to %s’s failure" % b)
         self.assertIn("lost 0 / 7", rows[1][8])
 
     def test_effects_have_no_p(self):

@@ -200,7 +200,7 @@ class ReportTest(PageTest):
         self.assertEqual(self.texts(".verdict figcaption"), ["overlay/distal/frontal", "overlay/distal/lateral"])
         self.assertEqual(self.texts(".verdict .pose caption"), ["pose/distal: world_from_ct"], "of this fragment alone")
         self.assertEqual(self.texts(".verdict .pose tr:first-child td"), ["0.80000", "-0.60000", "0.00000", "12.50 mm"])
-        self.assertIn("0.100, 0.120, 7.10°; 0.200, 0.210, 0.400 mm", self.texts(".verdict .note")[0])
+        self.assertIn("0.100, 0.120, 7.10 deg; 0.200, 0.210, 0.400 mm", self.texts(".verdict .note")[0])
         first = self.browser.js("return document.querySelector('main table').closest('section').id")
         self.assertEqual(first, "verdict", "no other table comes before it")
 

@@ -4,6 +4,7 @@
 
     tests/tools/report/tuning_test.py     exit code 77: skipped, with the reason
 """
+import re
 import sys
 
 from harness import synthetic
@@ -37,12 +38,11 @@ class TuningTest(PageTest):
             **changes,
         }
         self.browser.open(self.write("tuning", data))
-        self.eventually(lambda: len(self.texts("#tuning polyline")), 1)
+        self.eventually(lambda: len(self.texts("#tuning path.line")), 1)
 
     def heights(self, selector):
-        return self.browser.js(
-            "return [...document.querySelector(arguments[0]).points].map((point) => point.y)", selector
-        )
+        path = self.browser.js("return document.querySelector(arguments[0]).getAttribute('d')", selector)
+        return [float(y) for y in re.findall(r"[ML][\d.]+,([\d.]+)", path)]
 
     def tips(self):
         marks = "return [...document.querySelectorAll('#tuning svg [data-tip]')].map((mark) => mark.dataset.tip)"
@@ -53,7 +53,7 @@ class TuningTest(PageTest):
 
     def test_each_point_and_the_best_so_far(self):
         self.page()
-        best = self.heights("#tuning polyline")
+        best = self.heights("#tuning path.line")
         self.assertEqual(len(best), 5)
         self.assertEqual(best[1], best[2], "the third point is no better")
         self.assertLess(best[0], best[1], "lower figures lie lower on the page")
@@ -105,7 +105,7 @@ class TuningTest(PageTest):
 
     def test_higher_may_be_better(self):
         self.page(higher_is_better=True, best=0)
-        self.assertEqual(len(set(self.heights("#tuning polyline"))), 1, "none is better than the first")
+        self.assertEqual(len(set(self.heights("#tuning path.line"))), 1, "none is better than the first")
 
     def test_without_tuning_there_is_no_section(self):
         self.browser.open(self.comparison)

@@ -17,6 +17,13 @@ json who_fails_more(const compare::Comparison& comparison, bool higher_is_better
   return (comparison.median_difference > 0) != higher_is_better ? "variant" : other;
 }
 
+/// Whether a sentence about the comparison gives its interval: not with too few cases, nor between two failures.
+bool has_interval(const compare::Comparison& comparison) {
+  const compare::Interval& interval = comparison.interval;
+  return comparison.compared() >= compare::fewest_cases(1 - interval.confidence) &&
+         (std::isfinite(interval.lower) || std::isfinite(interval.upper) || interval.lower < interval.upper);
+}
+
 /// The numbers of a comparison, without p. `other` is the word for the one that the variant is compared with.
 json numbers_of(const compare::Comparison& comparison, bool higher_is_better, const std::string& other) {
   const bool is_baseline = other == "baseline";
@@ -32,6 +39,7 @@ json numbers_of(const compare::Comparison& comparison, bool higher_is_better, co
           {"difference", comparison.compared() ? bound_json(comparison.median_difference) : json()},
           {"fails_more", who_fails_more(comparison, higher_is_better, other)},
           {"difference_of_pairs", comparison.median_of_both ? json(*comparison.median_of_both) : json()},
+          {"has_interval", has_interval(comparison)},
           {"low", bound_json(comparison.interval.lower)},
           {"high", bound_json(comparison.interval.upper)}};
 }

@@ -31,7 +31,7 @@ function columns(data) {
   const named = (title, texts, rank, place) =>
       ({title, key: (c) => rank[place(c)], cell: (c) => texts[place(c)], width: longest(texts, title.length, 26)});
   const figure = (title, key, unit) =>
-      ({title, key, cell: (c) => number(key(c)), number: true, unit, width: longest([title + (unit || '')], 8, 16)});
+      ({title, key, cell: (c) => number(key(c)), number: true, unit, width: longest(title.split(' '), 7, 11)});
   const id = (c) => (byVariant[c.variant] * cases.length + byCase[c.case]) * starts.length + byStart[c.start];
   const button = (c) => Dom.button(String(c.id), () => Detail.open(data, c), {class: 'link', title: c.id});
   const outcome = {title: 'Outcome', key: (c) => Data.outcome(c), cell: Detail.outcomeBadge, width: 9};
@@ -39,8 +39,7 @@ function columns(data) {
   const contents = (c) => Data.kinds(data, c).map((kind) => NAMES[kind]).filter(Boolean).join(', ');
   return [
     {title: 'Cell', key: id, cell: button, width: longest(data.cells.map((c) => c.id), 6, 30)},
-    named('Variant', variants, byVariant, (c) => c.variant), named('Case', cases, byCase, (c) => c.case),
-    named('Start', starts, byStart, (c) => c.start), outcome,
+    named('Case', cases, byCase, (c) => c.case), named('Start', starts, byStart, (c) => c.start), outcome,
     ...(data.cells.some((c) => c.verdict) ?
             [
               {title: 'Verdict', key: (c) => c.verdict || '', cell: (c) => Verdict.badge(c.verdict), width: 9},
@@ -51,7 +50,7 @@ function columns(data) {
     ...data.metrics.map((metric, i) => figure(metric.label, (c) => c.values[i], metric.unit)),
     figure('Time', (c) => c.seconds, 's'),
     {...figure('Evaluations', (c) => c.evaluations), cell: (c) => String(c.evaluations ?? '–')},
-    {title: 'Kept', key: contents, cell: (c) => el('small', {}, contents(c)), width: 18}
+    {title: 'Kept', key: contents, cell: (c) => el('small', {}, contents(c)), width: 14}
   ];
 }
 

@@ -1,26 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which variants differ, how they rank, and what each factor of a matrix does.
-import {el, number, probability, withUnit} from './dom.js';
-import * as Plots from './plots.js';
+// Which variants differ, and what each factor of a matrix does.
+import {difference, interval, other} from './differences.js';
+import {el, probability} from './dom.js';
 import * as Summary from './summary.js';
-
-const other = (item) => item.reference ?? 'the baseline';
-
-// The median difference. If failures decide, says who fails more often.
-function difference(item, unit) {
-  if (Number.isFinite(item.difference)) return withUnit(item.difference, unit);
-  if (!item.fails_more) return '–';
-  return item.fails_more === 'variant' ? 'fails more often' : other(item) + ' fails more often';
-}
-
-// A bound that is not a number stands for a failure of one of the two. Without both bounds, there are too few cases.
-function interval(item, metric) {
-  if (!Number.isFinite(item.low) && !Number.isFinite(item.high)) return '–';
-  const failure = (is_high) =>
-      (is_high !== Boolean(metric.higher_is_better) ? 'a failure' : other(item) + '’s failure');
-  const bound = (value, is_high) => (Number.isFinite(value) ? number(value) : failure(is_high));
-  return '[' + bound(item.low, false) + ', ' + bound(item.high, true) + ']';
-}
 
 const metricOf = (data, item) => data.metrics.find((one) => one.name === item.metric) || {label: item.metric};
 const nameOf = (data, name) => (data.variants[data.variantIndex(name)] || {name}).name;
@@ -38,7 +20,7 @@ function numbers(data, list) {
     {
       title: 'Difference',
       key: (i) => list[i].difference,
-      cell: (i) => difference(list[i], metricOf(data, list[i]).unit),
+      cell: (i) => difference(list[i], metricOf(data, list[i])),
       number: true
     },
     {
@@ -67,6 +49,7 @@ function numbers(data, list) {
     },
     {
       title: 'In words',
+      wide: true,
       key: (i) => list[i].sentence || '',
       cell: (i) => el('span', {class: 'words'}, list[i].sentence || '')
     },
@@ -79,49 +62,17 @@ function table(data, list, before, caption) {
   return list.length ? Summary.sortable(list.map((_, i) => i), [...before, ...numbers(data, list)], {}, caption) : null;
 }
 
-// Every comparison with the baseline, or with 'compare_all' every pair: the numbers behind the figure of the pairs.
+// Every comparison with the baseline, and behind a line to open, with 'compare_all', those of all pairs.
 export function comparisons(data) {
-  const list = data.all_pairs || data.comparisons;
-  const before = [
-    text('Variant', (i) => nameOf(data, list[i].variant), true),
-    ...(data.all_pairs ? [text('Against', (i) => nameOf(data, list[i].reference))] : []),
-    text('Metric', (i) => metricOf(data, list[i]).label)
-  ];
-  return table(data, list, before, data.all_pairs ? 'Comparisons of all pairs' : 'Comparisons with the baseline');
-}
-
-// Best first; those that share a letter are not told apart.
-function rankingTable(data, ranking) {
-  const {places} = ranking, {label, unit} = metricOf(data, ranking);
-  const all = [
-    {title: 'Rank', key: (i) => places[i].rank, cell: (i) => String(places[i].rank), number: true},
-    {
-      title: 'Variant',
-      key: (i) => places[i].variant,
-      cell: (i) =>
-          el('div', {class: 'variant-name'}, Plots.swatch(data.variantIndex(places[i].variant)),
-             el('strong', {}, nameOf(data, places[i].variant)))
-    },
-    text('Groups', (i) => places[i].group ?? '–'),
-    {
-      title: 'Median of all runs',
-      unit,
-      key: (i) => places[i].median,
-      cell: (i) => (Number.isFinite(places[i].median) ? number(places[i].median) : 'a failure'),
-      number: true
-    },
-    {title: 'Lost', key: (i) => places[i].lost, cell: (i) => String(places[i].lost), number: true},
-  ];
+  const before = (list) =>
+      [text('Variant', (i) => nameOf(data, list[i].variant), true),
+       ...(list === data.all_pairs ? [text('Against', (i) => nameOf(data, list[i].reference))] : []),
+       text('Metric', (i) => metricOf(data, list[i]).label)];
+  const of = (list, caption) => table(data, list || [], before(list), caption);
+  const pairs = of(data.all_pairs, 'Comparisons of all pairs');
   return el(
-      'div', {}, el('p', {class: 'ranking'}, ranking.sentence),
-      Summary.sortable(places.map((_, i) => i), all, {}, 'Ranking by ' + label));
-}
-
-export function rankings(data) {
-  if (!data.rankings) return null;
-  const place = el('div'), show = (metric) => place.replaceChildren(rankingTable(data, data.rankings[metric]));
-  show(0);
-  return el('div', {}, Summary.metricBar(data, show), place);
+      'div', {}, of(data.comparisons, 'Comparisons with the baseline'),
+      pairs && el('details', {class: 'all-pairs'}, el('summary', {}, 'All pairs of variants'), pairs));
 }
 
 export function effects(data) {

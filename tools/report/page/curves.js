@@ -21,9 +21,9 @@ function drawConvergence(data, cells, each, width) {
     width,
     height: 300,
     label: 'Cost against evaluations',
-    x: {domain: Plots.domain(series.flatMap((item) => item.at), 'linear', true), title: 'evaluations of the cost'},
+    x: {domain: Plots.domain(series.flatMap((item) => item.at), 'linear'), title: 'evaluations of the cost'},
     y: {
-      domain: Plots.domain(series.flatMap((item) => item.costs), 'linear', each),
+      domain: Plots.domain(series.flatMap((item) => item.costs), 'linear'),
       title: each ? 'cost, each scaled to 0–1' : 'cost'
     }
   });
@@ -49,10 +49,7 @@ function drawLandscape(data, axis, unit, entries, each, width) {
       domain: Plots.domain(series.flatMap((item) => item.profile.offsets), 'linear'),
       title: 'offset from the result (' + unit + ')'
     },
-    y: {
-      domain: Plots.domain(series.flatMap((item) => item.shown), 'linear', each),
-      title: each ? 'cost, scaled' : 'cost'
-    }
+    y: {domain: Plots.domain(series.flatMap((item) => item.shown), 'linear'), title: each ? 'cost, scaled' : 'cost'}
   });
   root.append(svg('line', {class: 'zero', x1: x(0), x2: x(0), y1: box.top, y2: box.bottom}));
   for (const {cell, profile, shown} of series) {

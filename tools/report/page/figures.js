@@ -51,7 +51,7 @@ export function drawDistribution(data, metricIndex, kind, width) {
     width,
     height: ROW_HEIGHT * rows.length + 62,
     label: 'Distribution of ' + metric.label + ', one row for each variant; the numbers are in the table of the result',
-    x: {kind, domain: Plots.domain(all.concat(drawn ? limit : []), kind, true), title: axisTitle(metric)}
+    x: {kind, domain: Plots.domain(all.concat(drawn ? limit : []), kind), title: axisTitle(metric)}
   });
   if (drawn) {
     root.append(svg('line', {
@@ -137,12 +137,12 @@ export function drawDifferences(data, metricIndex, kind, width) {
                     Data.pairName(data, data.pairOf(item.cell)) + '\nbaseline ' + number(item.base) + ', ' +
                         data.variants[variant].name + ' ' + withUnit(item.value, metric.unit)))));
     const {low, high, difference, sentence} = found[i] || {};
-    const has_interval = Number.isFinite(low) || Number.isFinite(high);
+    const is_given = (found[i] || {}).has_interval !== false && (Number.isFinite(low) || Number.isFinite(high));
     const ends = [[low, area.left], [high, area.right]].map(
         ([bound, edge]) => (Number.isFinite(bound) ? x(bound) : edge));  // a failure lies beyond the edge
     root.append(
         svg('g', {class: 'estimate', 'data-tip': sentence || ''},
-            has_interval && svg('line', {x1: ends[0], x2: ends[1], y1: middle, y2: middle, 'stroke-width': 4}),
+            is_given && svg('line', {x1: ends[0], x2: ends[1], y1: middle, y2: middle, 'stroke-width': 4}),
             Number.isFinite(difference) && svg('circle', {cx: x(difference), cy: middle, r: 5})));
   });
   return root;
@@ -153,7 +153,7 @@ export function drawPairs(data, metricIndex, kind, width) {
   const metric = data.metrics[metricIndex], variants = compared(data),
         columns = Math.max(1, Math.min(variants.length, Math.floor(width / 250)));
   const all = variants.map((variant) => Data.pairedValues(data, variant, metricIndex));
-  const domain = Plots.domain(all.flat().flatMap((item) => [item.value, item.base]), kind, true);
+  const domain = Plots.domain(all.flat().flatMap((item) => [item.value, item.base]), kind);
   return el(
       'div', {class: 'panels', style: 'grid-template-columns: repeat(' + columns + ', 1fr)'},
       variants.map((variant, i) => {

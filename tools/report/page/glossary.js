@@ -30,7 +30,10 @@ const PHRASES = new RegExp(
 // The meaning of a word, such as the name of a figure with or without its unit; undefined if it is not explained.
 export function meaning(word) {
   const name = plain(word);
-  return ENTRIES.get(name) ?? ENTRIES.get(name.replace(/ (mm|deg|px|percent)$/, ''));
+  const plainly = (text) => ENTRIES.get(text) ?? ENTRIES.get(text.replace(/ (mm|deg|px|percent)$/, ''));
+  if (plainly(name)) return plainly(name);
+  const [first, ...rest] = name.split(' '), general = rest.length ? plainly(rest.join(' ')) : undefined;
+  return general && 'In “' + first + '” alone: ' + general;
 }
 
 // The word, with its meaning to point at.

@@ -1,143 +1,131 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pipeline as a layered drawing: a node is below everything that it uses. What variants change is marked.
-import {el, svg} from './dom.js';
+// The pipeline as a layered drawing: a node is below everything that it uses. What variants change is marked. dagre
+// chooses the places. The boxes are ours, as they show what differs, and keys and screen readers reach them.
+import './notices.js';
+
+import {monotoneY} from 'd3-shape/src/curve/monotone.js';
+import line from 'd3-shape/src/line.js';
+import * as Dagre from 'dagre';
+
+import {button, el, svg} from './dom.js';
 
 const BOX = {
   width: 186,
   height: 46,
-  line: 16,
-  gap: 26,
-  rise: 46
+  line: 16
+};
+const SMALLEST = 0.7;  // the scale of the drawing at which its text can still be read
+const GAPS = {
+  nodesep: 26,
+  edgesep: 12,
+  ranksep: 46,
+  marginx: 6,
+  marginy: 6
 };
 
-// The layer of a node is the length of the longest way to it from a node without inputs. A pipeline has no cycles. The
-// number of nodes limits the rounds for a damaged one that has.
-function layersOf(nodes, edges) {
-  const layer = new Map(nodes.map((node) => [node.id, 0]));
-  for (let round = 0; round < nodes.length; ++round) {
-    let changed = false;
-    for (const {from, to} of edges) {
-      if (layer.get(to) <= layer.get(from) && layer.get(from) + 1 < nodes.length) {
-        layer.set(to, layer.get(from) + 1);
-        changed = true;
-      }
-    }
-    if (!changed) break;
+// Edges between the same two nodes are drawn as one, with all their ports.
+function joined(graph) {
+  const known = new Set(graph.nodes.map((node) => node.id)), edges = new Map();
+  for (const {from, to, port} of graph.edges || []) {
+    if (!known.has(from) || !known.has(to) || from === to) continue;
+    const key = JSON.stringify([from, to]);
+    if (!edges.has(key)) edges.set(key, {from, to, ports: []});
+    if (port) edges.get(key).ports.push(port);
   }
-  for (const node of nodes) {  // a node without inputs is right above its first user
-    const uses = edges.filter((edge) => edge.from === node.id).map((edge) => layer.get(edge.to));
-    if (uses.length && !edges.some((edge) => edge.to === node.id))
-      layer.set(node.id, Math.max(0, Math.min(...uses) - 1));
-  }
-  return layer;
+  return [...edges.values()];
 }
 
-// Rows of items. An edge holds a place in every layer that it crosses, so that edges pass between the boxes. Edges that
-// leave the same node share these places.
-function rowsOf(nodes, edges) {
-  const layer = layersOf(nodes, edges), rows = [];
-  const place = (item, at) => ((rows[at] = rows[at] || []).push(item), item);
-  const items = new Map(
-      nodes.map((node) => [node.id, place({node, above: [], below: [], width: BOX.width}, layer.get(node.id))]));
-  const shared = new Map();
-  const passage = (from, at) => {
-    const key = at + ' ' + from;
-    if (!shared.has(key)) shared.set(key, place({above: [], below: [], width: 8}, at));
-    return shared.get(key);
-  };
+const heightOf = (node) => BOX.height + BOX.line * Object.keys(node.differs || {}).length;
+
+// dagre's plan of items with a width and height: in `plan.node(id)`, the middle {x, y}.
+function planOf(items, ends) {
+  const plan = new Dagre.graphlib.Graph();
+  plan.setGraph(GAPS);
+  for (const [id, {width, height}] of items) plan.setNode(id, {width, height});
+  for (const [from, to] of ends) plan.setEdge(from, to, {});
+  Dagre.layout(plan);
+  return plan;
+}
+
+// The items layer by layer, and the chain of items that each edge runs through. An edge holds a place in every layer
+// that it crosses, so that it passes between the boxes; edges that leave the same node share these places.
+function layersOf(graph) {
+  const edges = joined(graph), ends = new Map();
+  const items = new Map(graph.nodes.map((node) => [node.id, {node, width: BOX.width, height: heightOf(node)}]));
+  const first = planOf(items, edges.map(({from, to}) => [from, to]));
+  const heights = [...new Set(graph.nodes.map(({id}) => first.node(id).y))].sort((a, b) => a - b);
+  const layer = (id) => heights.indexOf(first.node(id).y);
   const chains = edges.map((edge) => {
-    const chain = [items.get(edge.from)];
-    for (let at = layer.get(edge.from) + 1; at < layer.get(edge.to); ++at) chain.push(passage(edge.from, at));
-    chain.push(items.get(edge.to));
-    for (let i = 1; i < chain.length; ++i) {
-      if (!chain[i].above.includes(chain[i - 1])) chain[i].above.push(chain[i - 1]);
-      if (!chain[i - 1].below.includes(chain[i])) chain[i - 1].below.push(chain[i]);
+    const step = layer(edge.from) < layer(edge.to) ? 1 : -1, chain = [edge.from];
+    for (let at = layer(edge.from) + step; at !== layer(edge.to); at += step) {
+      const passage = JSON.stringify([edge.from, at]);
+      if (!items.has(passage)) items.set(passage, {width: 8, height: BOX.height});
+      chain.push(passage);
     }
-    return {edge, chain};
+    chain.push(edge.to);
+    chain.slice(1).forEach((id, i) => ends.set(JSON.stringify([chain[i], id]), [chain[i], id]));
+    return {edge, chain: chain.map((id) => items.get(id))};
   });
-  return {rows: rows.filter(Boolean), chains};
+  const plan = planOf(items, ends.values());
+  for (const [id, item] of items) Object.assign(item, {x: plan.node(id).x, y: plan.node(id).y, near: []});
+  for (const [from, to] of [...ends.values()].map((pair) => pair.map((id) => items.get(id)))) {
+    from.near.push(to);
+    to.near.push(from);
+  }
+  const all = [...items.values()].sort((a, b) => a.x - b.x);
+  const rows = [...new Set(all.map((item) => item.y))].map((y) => all.filter((item) => item.y === y));
+  return {rows, chains, height: plan.graph().height};
 }
 
-const mean = (items, fallback) =>
-    (items.length ? items.reduce((sum, item) => sum + item.x, 0) / items.length : fallback);
-
-function spreadRow(row) {
-  let left = 0;
-  for (const item of row) {
-    item.x = left + item.width / 2;
-    left += item.width + BOX.gap;
-  }
-  const shift = (left - BOX.gap) / 2;
-  for (const item of row) item.x -= shift;
-}
-
-// Each box moves to the mean place of its neighbours. Then boxes that overlap are pushed apart.
-function settle(row, neighbours) {
-  for (const item of row) item.wish = mean(item[neighbours], item.x);
-  row.sort((a, b) => a.wish - b.wish);
-  for (const item of row) item.x = item.wish;
-  for (let round = 0; round < 60; ++round) {
-    let moved = false;
-    for (let i = 1; i < row.length; ++i) {
-      const overlap = (row[i - 1].width + row[i].width) / 2 + BOX.gap - (row[i].x - row[i - 1].x);
-      if (overlap < 0.5) continue;
-      row[i - 1].x -= overlap / 2;
-      row[i].x += overlap / 2;
-      moved = true;
-    }
-    if (!moved) break;
-  }
+// Each item moves to the mean of its neighbours, as far as those beside it leave it place. dagre leaves more space
+// between the items than there is text: a common pipeline was drawn 1400 px wide, and is 950.
+function settle(row) {
+  for (const item of row)
+    if (item.near.length) item.x = item.near.reduce((sum, other) => sum + other.x, 0) / item.near.length;
+  for (let round = 0; round < 60; ++round)
+    row.slice(1).forEach((item, i) => {
+      const overlap = (row[i].width + item.width) / 2 + GAPS.nodesep - (item.x - row[i].x);
+      if (overlap < 0.5) return;
+      row[i].x -= overlap / 2;
+      item.x += overlap / 2;
+    });
 }
 
 function layOut(graph) {
-  const known = new Set(graph.nodes.map((node) => node.id));
-  const {rows, chains} = rowsOf(
-      graph.nodes,
-      (graph.edges || []).filter((edge) => known.has(edge.from) && known.has(edge.to) && edge.from !== edge.to));
-  rows.forEach(spreadRow);
-  for (let round = 0; round < 8; ++round) {
-    rows.forEach((row) => settle(row, 'above'));
-    [...rows].reverse().forEach((row) => settle(row, 'below'));
-  }
-  rows.forEach((row) => settle(row, 'above'));
-  let top = 4;
-  for (const row of rows) {
-    const lines = Math.max(0, ...row.map((item) => (item.node ? Object.keys(item.node.differs || {}).length : 0)));
-    for (const item of row)
-      Object.assign(item, {
-        top,
-        height: BOX.height + (item.node ? BOX.line * Object.keys(item.node.differs || {}).length : lines * BOX.line)
-      });
-    top += BOX.height + BOX.line * lines + BOX.rise;
-  }
-  const all = rows.flat(), left = Math.min(...all.map((item) => item.x - item.width / 2)) - 6;
+  const {rows, chains, height} = layersOf(graph), all = rows.flat();
+  for (let round = 0; round < 12; ++round) rows.forEach(settle);
+  const left = Math.min(...all.map((item) => item.x - item.width / 2)) - GAPS.marginx;
   for (const item of all) item.x -= left;
-  return {all, chains, width: Math.max(...all.map((item) => item.x + item.width / 2)) + 6, height: top - BOX.rise + 6};
+  const width = Math.max(...all.map((item) => item.x + item.width / 2)) + GAPS.marginx;
+  return {boxes: all.filter((item) => item.node), chains, width, height};
 }
 
 const shortened = (text, length) => (text.length > length ? text.slice(0, length - 1) + '…' : text);
 
-function path(chain) {
-  let text = '';
-  for (let i = 1; i < chain.length; ++i) {
-    const [a, b] = [chain[i - 1], chain[i]], from = a.top + a.height, to = b.top, half = (to - from) / 2;
-    text += (i === 1 ? 'M' + a.x + ' ' + from : 'L' + a.x + ' ' + from) + ' C' + a.x + ' ' + (from + half) + ' ' + b.x +
-        ' ' + (to - half) + ' ' + b.x + ' ' + to;
-  }
-  return text;
+const path = line().curve(monotoneY);
+
+// From the lower side of a box, straight through each passage, to the upper side of the other box.
+function drawLine({edge, chain}) {
+  const [first, last] = [chain[0], chain[chain.length - 1]];
+  const side = (item, down) => [item.x, item.y + (down ? item.height / 2 : -item.height / 2)];
+  const through = chain.slice(1, -1).flatMap((item) => [side(item, first.y > last.y), side(item, first.y < last.y)]);
+  const drawn = svg('path', {
+    class: 'edge',
+    d: path([side(first, first.y < last.y), ...through, side(last, first.y > last.y)]),
+    'data-tip': edge.from + ' → ' + edge.to + (edge.ports.length ? ': ' + edge.ports.join(', ') : '')
+  });
+  drawn.ends = [edge.from, edge.to];
+  return drawn;
 }
 
-function drawNode(item, chosen) {
-  const {node, x, top, height} = item, differs = Object.entries(node.differs || {}), left = x - BOX.width / 2;
-  const about = node.id + ', uses ' + node.uses +
-      (differs.length ? ', differs in ' + differs.map((entry) => entry[0]).join(', ') : '');
+function drawNode({node, x, y, height}, chosen) {
+  const differs = Object.entries(node.differs || {}), left = x - BOX.width / 2, top = y - height / 2;
   const choose = () => chosen(node, group);
   const group =
       svg('g', {
         class: 'node' + (differs.length ? ' differs' : ''),
         tabindex: 0,
         role: 'button',
-        'aria-label': about,
         'data-node': node.id,
         onclick: choose,
         onkeydown: (event) => (event.key === 'Enter' || event.key === ' ') && (event.preventDefault(), choose())
@@ -169,27 +157,29 @@ function about(node) {
   ].filter(Boolean);
 }
 
+// For narrow screens, where a drawing would have to be scrolled sideways: each node with what it uses.
+const list = (graph, choose) => el('ul', {class: 'node-list'}, graph.nodes.map((node) => {
+  const from = [...new Set((graph.edges || []).filter((edge) => edge.to === node.id).map((edge) => edge.from))];
+  const differs = Object.entries(node.differs || {}).map(([name, text]) => name + ': ' + text);
+  return el(
+      'li', {}, button(node.id, () => choose(node), {class: 'link'}), ' ', el('code', {}, node.uses),
+      from.length > 0 && el('div', {class: 'note'}, 'from ' + from.join(', ')),
+      differs.length > 0 && el('div', {class: 'note'}, 'differs: ' + differs.join('; ')));
+}));
+
 // chose(node) is called for a node that is clicked. Without it, the node's options are shown below the graph.
 export function draw(graph, chose) {
-  const {all, chains, width, height} = layOut(graph), boxes = all.filter((item) => item.node);
+  const {boxes, chains, width, height} = layOut(graph), lines = chains.map(drawLine);
   const root = svg('svg', {
     class: 'graph',
     viewBox: '0 0 ' + width + ' ' + height,
-    width,
-    height,
+    style: 'max-width: ' + width + 'px; min-width: ' + SMALLEST * width + 'px',
     role: 'group',
     'aria-label': 'The pipeline\'s nodes'
   });
   const details =
       el('div', {class: 'node-details', 'aria-live': 'polite'},
          el('p', {class: 'note'}, 'Choose a node to see its options.'));
-  const lines = chains.map(({edge, chain}) => {
-    const line = svg(
-        'path',
-        {class: 'edge', d: path(chain), 'data-tip': edge.from + ' → ' + edge.to + (edge.port ? '.' + edge.port : '')});
-    line.ends = [edge.from, edge.to];
-    return line;
-  });
   const chosen = (node, group) => {
     root.querySelectorAll('.chosen').forEach((item) => item.classList.remove('chosen'));
     group.classList.add('chosen');
@@ -199,8 +189,14 @@ export function draw(graph, chose) {
     return undefined;
   };
   root.append(...lines, ...boxes.map((item) => drawNode(item, chosen)));
-  const box = el('div', {class: 'scroll graph-box', tabindex: 0, role: 'region', 'aria-label': 'Pipeline'}, root);
+  const box = el(
+      'div', {class: 'scroll graph-box', tabindex: 0, role: 'region', 'aria-label': 'Drawing of the pipeline'}, root);
   requestAnimationFrame(
       () => (box.scrollLeft = (box.scrollWidth - box.clientWidth) / 2));  // on a narrow screen: the middle first
-  return el('div', {}, box, chose ? '' : details);
+  if (chose) return el('div', {}, box);
+  const show = (node) => {
+    details.replaceChildren(...about(node));
+    details.scrollIntoView({block: 'nearest'});
+  };
+  return el('div', {}, box, list(graph, show), details);
 }

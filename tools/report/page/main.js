@@ -10,6 +10,7 @@ import {el} from './dom.js';
 import * as Figures from './figures.js';
 import * as Glossary from './glossary.js';
 import * as Graph from './graph.js';
+import * as Leaderboard from './leaderboard.js';
 import * as OverTime from './over_time.js';
 import * as Parts from './parts.js';
 import * as Passes from './passes.js';
@@ -27,10 +28,12 @@ import * as Tuning from './tuning.js';
 import * as Verdict from './verdict.js';
 
 // A section with a heading and an entry in the list of contents. Parts that are null are left out.
+// How to read it comes after the first part, which is the answer.
 function section(id, title, intro, ...parts) {
+  const [answer, ...rest] = parts.flat().filter(Boolean);
   const node =
-      el('section', {id, 'aria-labelledby': id + '-title'}, el('h2', {id: id + '-title'}, Glossary.term(title)),
-         intro && el('p', {class: 'intro'}, intro), parts);
+      el('section', {id, 'aria-labelledby': id + '-title'}, el('h2', {id: id + '-title'}, Glossary.term(title)), answer,
+         intro && el('p', {class: 'intro'}, intro), rest);
   document.getElementById('contents').append(el('a', {href: '#' + id}, title));
   return node;
 }
@@ -85,16 +88,6 @@ function paired(data) {
           data, [['linear', 'linear'], ['signed', 'log']],
           {label: 'Show', options: [['differences', 'Differences'], ['pairs', 'Pairs']]}, draw),
       Compared.comparisons(data));
-}
-
-function ranking(data) {
-  const found = Compared.rankings(data);
-  return found &&
-      section(
-             'ranking', 'Ranking',
-             'Best first, by the median of all runs; a lost run counts as worse than any other. ' +
-                 'No test tells apart two variants that share a letter.',
-             found);
 }
 
 function effects(data) {
@@ -301,20 +294,30 @@ function summary(data) {
   const verdict = judged && section('verdict', 'Verdict', null, judged);
   const head = section(
       'summary', 'Result', null,
-      ...(data.is_run ?
-              (cell ? [Detail.reason(cell), Detail.absent(cell), Detail.values(data, cell), ...Detail.figures(data)] :
-                      []) :
-              [Summary.verdicts(data), Summary.table(data), Verdict.table(data)]),
-      Summary.rules(data));
+      ...(data.is_run ? (cell ?
+                             [
+                               Detail.reason(cell), Detail.absent(cell), Detail.values(data, cell),
+                               el('div', {class: 'figure-tables'}, Detail.figures(data))
+                             ] :
+                             []) :
+                        [Leaderboard.table(data), Summary.verdicts(data), Verdict.table(data)]),
+      experiment.help && el('p', {class: 'lead'}, experiment.help), Summary.rules(data));
   return [
     el('div', {class: 'head'}, el('p', {class: 'kicker'}, data.is_run ? 'Run' : 'Comparison'),
-       el('h1', {}, experiment.name || 'Unnamed'), experiment.help && el('p', {class: 'lead'}, experiment.help),
+       el('h1', {}, experiment.name || 'Unnamed'),
        el('p', {class: 'facts'}, data.is_run ? Recipes.link(data, 0) : Summary.facts(data))),
     verdict, head
   ];
 }
 
-function build(data) {
+// Lets the browser show what is there. A page that nobody sees draws no frames, and goes on after a while.
+const frame = () => new Promise((done) => {
+  requestAnimationFrame(() => setTimeout(done));
+  setTimeout(done, 200);
+});
+
+// The answer is shown first; all else takes longer.
+async function build(data) {
   const {experiment} = data, many = !data.is_run, main = document.getElementById('top');
   document.title = (experiment.name || 'marrow report') + ' · marrow';
   const add = (...parts) => main.append(...parts.flat(2).filter(Boolean));  // at once: figures need their width
@@ -323,9 +326,9 @@ function build(data) {
     return;
   }
   add(summary(data));
+  await frame();
   if (many && data.metrics.length)
-    add(ranking(data), effects(data), tuning(data), response(data), distributions(data), paired(data), capture(data),
-        byCase(data));
+    add(effects(data), tuning(data), response(data), distributions(data), paired(data), capture(data), byCase(data));
   add(sequence(data));
   add(closer(data));
   if (data.passes.length) add(section('passes', 'Passes', null, ...Passes.draw(data)));
@@ -362,19 +365,17 @@ function followScroll() {
   const seen = new IntersectionObserver((entries) => {
     for (const entry of entries.filter((item) => item.isIntersecting)) {
       links.forEach((link) => link.removeAttribute('aria-current'));
-      const link = links.get(entry.target.id), bar = link.parentElement;
-      link.setAttribute('aria-current', 'true');
-      bar.scrollLeft = link.offsetLeft - bar.offsetLeft - bar.clientWidth / 2 + link.offsetWidth / 2;
+      links.get(entry.target.id).setAttribute('aria-current', 'true');
     }
   }, {rootMargin: '-20% 0px -70% 0px'});
   document.querySelectorAll('main > section').forEach((node) => seen.observe(node));
 }
 
-function start() {
+async function start() {
   startTheme();
   Dom.startTooltip();
   try {
-    build(Data.load());
+    await build(Data.load());
     followScroll();
   } catch (error) {
     document.getElementById('top').prepend(

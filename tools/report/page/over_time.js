@@ -9,34 +9,15 @@ const FIRST = 0, SECOND = 1, DIFFERENCE = 2;
 const timeTitle = (figure) => (figure.time_unit === 's' ? 'time (s)' : 'frame');
 const withUnitTitle = (title, unit) => title + (unit ? ' (' + unit + ')' : '');
 
-// The points of a curve between its gaps.
-function pieces(at, values) {
-  const all = [[]];
-  at.forEach((time, i) => {
-    if (Number.isFinite(values[i]))
-      all[all.length - 1].push([time, values[i]]);
-    else if (all[all.length - 1].length)
-      all.push([]);
-  });
-  return all.filter((piece) => piece.length);
-}
+// A value that is not there is null, which d3 would take for 0.
+const place = (scale, value) => (Number.isFinite(value) ? scale(value) : NaN);
 
-function drawCurve({root, x, y}, at, values, variant, attributes) {
-  for (const piece of pieces(at, values)) {
-    const points = piece.map(([time, value]) => [x(time), y(value)]);
-    root.append(
-        points.length > 1 ? Plots.polyline(points, variant, attributes) : Plots.marker(variant, ...points[0], 2.5));
-  }
-}
+const drawCurve = ({root, x, y}, at, values, variant, attributes) =>
+    root.append(Plots.polyline(at.map((time, i) => [x(time), place(y, values[i])]), variant, attributes));
 
 // Between two curves, where both are known.
-function drawBand({root, x, y}, at, lower, upper, attributes) {
-  const above = pieces(at, upper), below = pieces(at, lower);
-  above.forEach((piece, i) => {
-    const points = [...piece, ...[...below[i]].reverse()].map(([time, value]) => x(time) + ',' + y(value));
-    root.append(svg('polygon', {class: 'band', points: points.join(' '), ...attributes}));
-  });
-}
+const drawBand = ({root, x, y}, at, lower, upper) =>
+    root.append(Plots.band(at.map((time, i) => [x(time), place(y, lower[i]), place(y, upper[i])])));
 
 function plot(figure, width, height, title, values) {
   const all = Plots.frame({
@@ -46,7 +27,7 @@ function plot(figure, width, height, title, values) {
     x: {domain: Plots.domain(figure.at, 'linear'), title: timeTitle(figure)},
     y: {domain: Plots.domain(values, 'linear'), title: withUnitTitle(title, figure.unit)}
   });
-  const [low, high] = all.y.domain;
+  const [low, high] = all.y.domain();
   if (low < 0 && high > 0)
     all.root.append(svg('line', {class: 'zero', x1: all.box.left, x2: all.box.right, y1: all.y(0), y2: all.y(0)}));
   return all;

@@ -21,6 +21,19 @@ function sideControls(data, letter, side, names, many, changed) {
   return [data.variants.length > 1 && variants, many && pictures];
 }
 
+const partsOf = (name) => ({output: name.split('/')[0], view: name.split('/').pop()});
+
+// The names of two pictures that are worth a comparison: of one view, the outline of the result and what it was found
+// by. In the order of the names where there is no outline.
+function defaultPair(names) {
+  const of = (output, view) =>
+      names.find((name) => partsOf(name).output === output && (!view || partsOf(name).view === view));
+  const result = of('result') || of('overlay') || names[0], {view} = partsOf(result);
+  const other = of('edges', view) || of('borders', view) ||
+      names.find((name) => name !== result && partsOf(name).view === view) || names.find((name) => name !== result);
+  return [other || result, result];
+}
+
 export class Comparer {
   // pair: {cells: [per variant]}; this.same: both sides show pictures of the same name
   constructor(data, pair) {
@@ -34,11 +47,8 @@ export class Comparer {
     this.running = !matchMedia('(prefers-reduced-motion: reduce)').matches;
     const with_pictures = pair.cells.map((cell, i) => (cell && cell.pictures.length ? i : -1)).filter((i) => i >= 0);
     const first = with_pictures.includes(data.baseline) ? data.baseline : with_pictures[0];
-    const second = with_pictures.find((i) => i !== first) ?? first;
-    this.sides = [
-      {variant: first, name: this.names[0]},
-      {variant: second, name: this.same ? this.names[0] : this.names[1] || this.names[0]}
-    ];
+    const second = with_pictures.find((i) => i !== first) ?? first, [own, others] = defaultPair(this.names);
+    this.sides = [{variant: first, name: this.same ? others : own}, {variant: second, name: others}];
     this.element = el('div', {class: 'comparer', 'data-mode': this.mode});
     this.build();
   }
@@ -49,7 +59,7 @@ export class Comparer {
         'Mode', [['wipe', 'Wipe'], ['blink', 'Blink'], ['side', 'Side by side']], this.mode,
         (mode) => this.setMode(mode));
     const zoom = Dom.choice('Zoom', ZOOMS, '1', (value) => this.stage.style.setProperty('--zoom', value));
-    const common = Dom.select('Picture', this.names.map((name) => [name, name]), this.names[0], (name) => {
+    const common = Dom.select('Picture', this.names.map((name) => [name, name]), this.sides[0].name, (name) => {
       this.sides.forEach((side) => (side.name = name));
       update();
     });
@@ -82,6 +92,7 @@ export class Comparer {
         el('div', {
           class: 'stage',
           tabindex: 0,
+          role: 'group',
           'aria-label': 'Pictures: arrow keys move the wipe, the space bar switches in a blink'
         },
            el('figure', {class: 'layer-a'}, this.images[0], this.labels[0]),
@@ -168,8 +179,9 @@ export class Comparer {
   }
 
   fit() {
-    const image = this.images.find((item) => item.naturalWidth);
-    if (image) this.stage.style.setProperty('--aspect', image.naturalWidth / image.naturalHeight);
+    const aspects =
+        this.images.filter((item) => item.naturalWidth).map((item) => item.naturalWidth / item.naturalHeight);
+    if (aspects.length) this.stage.style.setProperty('--aspect', Math.min(...aspects));
   }
 
   dispose() {
@@ -180,13 +192,13 @@ export class Comparer {
 // All pictures of a cell, small; a click shows one in the full width.
 export function gallery(data, cell) {
   return el('div', {class: 'gallery'}, cell.pictures.map((entry) => {
-    const button = el(
-        'button', {
+    const button =
+        el('button', {
           type: 'button',
           'aria-expanded': 'false',
           onclick: () => button.setAttribute('aria-expanded', String(button.classList.toggle('large')))
         },
-        el('img', {src: data.pictures[entry.picture], alt: entry.name, loading: 'lazy'}), el('span', {}, entry.name));
+           el('img', {src: data.pictures[entry.picture], alt: '', loading: 'lazy'}), el('span', {}, entry.name));
     return button;
   }));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Response curves: how a figure depends on an option that was swept, with the band of its 95 % interval.
-import {el, number, percent, select, svg} from './dom.js';
+import {el, number, percent, select} from './dom.js';
 import * as Plots from './plots.js';
 
 const labelOf = (data, figure) => {
@@ -30,15 +30,10 @@ function draw(data, curves, width) {
   curves.forEach((curve, i) => {
     const known = curve.points.filter((point) => point.runs);
     const banded = known.filter((point) => Number.isFinite(point.low));
-    const edge = (key) => banded.map((point) => [plot.x(point.value), plot.y(point[key])]);
-    const outline = [...edge('low'), ...edge('high').reverse()];
     plot.root.append(
-        svg('polygon', {
-          class: 'band',
-          fill: Plots.colour(i),
-          'fill-opacity': 0.18,
-          points: outline.map(([x, y]) => x.toFixed(1) + ',' + y.toFixed(1)).join(' ')
-        }),
+        Plots.band(
+            banded.map((point) => [plot.x(point.value), plot.y(point.low), plot.y(point.high)]),
+            {fill: Plots.colour(i), 'fill-opacity': 0.18}),
         Plots.polyline(known.map((point) => [plot.x(point.value), plot.y(point.middle)]), i));
     for (const point of known)
       plot.root.append(

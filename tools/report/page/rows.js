@@ -36,9 +36,9 @@ export class Table {
     });
     this.table =
         el('table', {class: 'sortable cells'},
-           el('colgroup', {}, columns.map((column) => el('col', {style: 'width: ' + (column.width + 3) + 'ch'}))),
+           el('colgroup', {}, columns.map((column) => el('col', {style: 'width: ' + (column.width + 2) + 'ch'}))),
            el('thead', {}, el('tr', {'aria-rowindex': 1}, this.heads)), this.body);
-    this.table.style.width = columns.reduce((sum, column) => sum + column.width + 3, 0) + 'ch';
+    this.table.style.width = columns.reduce((sum, column) => sum + column.width + 2, 0) + 'ch';
     this.space = el('div', {class: 'space'}, this.table);
     this.element =
         el('div', {

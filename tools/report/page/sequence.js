@@ -55,9 +55,6 @@ function drawCurve(way, axis, width) {
       title: 'motion (' + unit + ')'
     }
   });
-  const point = (value, i) => x(i + 1).toFixed(1) + ',' + y(value).toFixed(1);
-  const upper = values.map((value, i) => point(value + spread[i], i)),
-        lower = values.map((value, i) => point(value - spread[i], i)).reverse();
   way.found.forEach((found, i) => {
     if (!found)
       root.append(svg('rect', {
@@ -69,7 +66,7 @@ function drawCurve(way, axis, width) {
         'data-tip': 'frame ' + way.frames[i] + ': the bone is lost'
       }));
   });
-  root.append(svg('polygon', {class: 'band', points: [...upper, ...lower].join(' ')}));
+  root.append(Plots.band(values.map((value, i) => [x(i + 1), y(value - spread[i]), y(value + spread[i])])));
   root.append(Plots.polyline(values.map((value, i) => [x(i + 1), y(value)]), 0));
   const cursor = svg('line', {class: 'cursor', y1: box.top, y2: box.bottom});
   root.append(cursor);

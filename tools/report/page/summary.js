@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The head of the page: what was compared, each result as a sentence, and the table of the variants.
+// The head of the page: what was compared, and each result as a sentence. Tables whose columns sort, for all sections.
 import * as Data from './data.js';
 import {button, el, number, percent, select} from './dom.js';
 import * as Glossary from './glossary.js';
 import * as Plots from './plots.js';
-import * as Recipes from './recipes.js';
-
-const OTHER_RUNS =
-    'The variants have this figure in different runs, so these numbers are not of the same cases and starts.';
 
 const plural = (count, word) => count + ' ' + word + (count === 1 ? '' : 's');
 
@@ -48,91 +44,22 @@ export function rateBar(success) {
       el('span', {class: 'rate-text'}, percent(success.rate), ' ', el('small', {}, success.count + '/' + success.of)));
 }
 
-const spread = (item, unit) =>
-    (item && Number.isFinite(item.median) ?
-         [number(item.median), ' ', el('small', {}, '[' + number(item.q1) + ', ' + number(item.q3) + ']')] :
-         '–');
-
-// With the bounds of the median, where they are known.
-const median = (item) =>
-    (item && Number.isFinite(item.median_low) ?
-         el('span', {'data-tip': '95 % interval ' + number(item.median_low) + ' to ' + number(item.median_high)},
-            spread(item)) :
-         spread(item));
-
-// Runs that failed, and runs that went on without a figure because its node may fail.
-const lost = ({failed, incomplete}) =>
-    [String(failed ?? '–'),
-     incomplete > 0 &&
-         el('small', {'data-tip': 'done, but without a figure whose node may fail'},
-            ' + ' + incomplete + ' incomplete')];
-
 export const countOf = (item) => (item && Number.isFinite(item.of) ? item.count + ' of ' + item.of : '–');
-
-function variantName(data, i) {
-  const variant = data.variants[i], options = Object.entries(variant.options);
-  return el(
-      'div', {class: 'variant-name'}, Plots.swatch(i),
-      el('div', {}, el('strong', {}, variant.name), variant.is_baseline && el('span', {class: 'tag'}, 'baseline'),
-         options.map(
-             ([name, value]) =>
-                 el('code', {class: 'option'},
-                    name + ' = ' + (typeof value === 'string' ? value : JSON.stringify(value)))),
-         Recipes.link(data, i)));
-}
-
-function columns(data, metric) {
-  const of = (i) => data.summary[i] || {}, found = (i) => (of(i).metrics || {})[metric.name] || {};
-  return [
-    {title: 'Variant', key: (i) => data.variants[i].name, cell: (i) => variantName(data, i)},
-    {title: 'Success', key: (i) => -(of(i).success || {}).rate, cell: (i) => rateBar(of(i).success)},
-    {
-      title: 'Median [quartiles]',
-      unit: metric.unit,
-      key: (i) => found(i).median,
-      cell: (i) => median(found(i)),
-      number: true
-    },
-    {
-      title: metric.higher_is_better ? '5th percentile' : '95th percentile',
-      unit: metric.unit,
-      key: (i) => Data.worseEnd(metric, found(i)),
-      cell: (i) => number(Data.worseEnd(metric, found(i))),
-      number: true
-    },
-    {title: 'Worst', unit: metric.unit, key: (i) => found(i).worst, cell: (i) => number(found(i).worst), number: true},
-    {
-      title: 'Of runs',
-      key: (i) => found(i).count,
-      cell: (i) => el('span', {'data-tip': 'runs that have the figure, of all'}, countOf(found(i))),
-      number: true
-    },
-    {title: 'Failed', key: (i) => of(i).failed + of(i).incomplete, cell: (i) => lost(of(i)), number: true},
-    {
-      title: 'Time [quartiles]',
-      unit: 's',
-      key: (i) => (of(i).seconds || {}).median,
-      cell: (i) => spread(of(i).seconds),
-      number: true
-    },
-    {
-      title: 'Evaluations',
-      key: (i) => (of(i).evaluations || {}).median,
-      cell: (i) => String((of(i).evaluations || {}).median ?? '–'),
-      number: true
-    },
-  ];
-}
 
 // A table whose columns sort: rows are indices, a column {title, unit, key, cell, number}.
 export function sortable(rows, all, state, caption) {
   const compare = (a, b) =>
       (typeof a === 'string' ? a.localeCompare(b, undefined, {numeric: true}) :
                                (Number.isFinite(a) ? a : Infinity) - (Number.isFinite(b) ? b : Infinity) || 0);
-  const body = el('tbody');
+  const body = el('tbody', {role: 'rowgroup'});
   const heads = all.map(
       (column, i) =>
-          el('th', {scope: 'col', class: column.number ? 'number' : null, 'data-tip': Glossary.meaning(column.title)},
+          el('th', {
+            scope: 'col',
+            role: 'columnheader',
+            class: column.number ? 'number' : null,
+            'data-tip': Glossary.meaning(column.title)
+          },
              button([column.title, column.unit && el('small', {}, ' ' + column.unit)].filter(Boolean), () => {
                state.down = state.column === i ? !state.down : false;
                state.column = i;
@@ -148,16 +75,18 @@ export function sortable(rows, all, state, caption) {
             state.column !== i ? 'none' :
                 state.down     ? 'descending' :
                                  'ascending'));
-    body.replaceChildren(...sorted.map(
-        (row) =>
-            el('tr', {'data-row': row},
-               all.map((column) => el('td', {class: column.number ? 'number' : null}, column.cell(row))))));
+    body.replaceChildren(
+        ...sorted.map((row) => el('tr', {'data-row': row, role: 'row'}, all.map((column) => {
+                        const kind = [column.number && 'number', column.wide && 'wide'].filter(Boolean).join(' ');
+                        const title = column.title + (column.unit ? ', ' + column.unit : '');
+                        return el('td', {class: kind || null, role: 'cell', 'data-title': title}, column.cell(row));
+                      }))));
   };
   fill();
   return el(
       'div', {class: 'scroll', tabindex: 0, role: 'region', 'aria-label': caption},
-      el('table', {class: 'sortable'}, el('caption', {class: 'hidden'}, caption), el('thead', {}, el('tr', {}, heads)),
-         body));
+      el('table', {class: 'sortable cards', role: 'table'}, el('caption', {class: 'hidden'}, caption),
+         el('thead', {role: 'rowgroup'}, el('tr', {role: 'row'}, heads)), body));
 }
 
 // The choice of a metric; false if there is only one.
@@ -165,18 +94,6 @@ export const metricChoice = (data, changed) => data.metrics.length > 1 &&
     select('Metric', data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => changed(Number(i)));
 export const metricBar = (data, changed) =>
     data.metrics.length > 1 && el('div', {class: 'toolbar'}, metricChoice(data, changed));
-
-export function table(data) {
-  const place = el('div'), state = {};
-  const show = (metric) => place.replaceChildren(
-      sortable(
-          data.variants.map((_, i) => i), columns(data, data.metrics[metric]), state,
-          'Variants: ' + data.metrics[metric].label),
-      ...(data.metrics[metric].same_runs === false ? [el('p', {class: 'note'}, OTHER_RUNS)] : []));
-  if (!data.metrics.length) return null;
-  show(0);
-  return el('div', {}, metricBar(data, show), place);
-}
 
 // Shows which cases are hard: each case's median and successes, with a column for each variant. Without limits of
 // success, it counts the starts that have the figure.

@@ -30,7 +30,7 @@ function draw(tuning, width) {
   const plot = Plots.frame({
     width,
     height: 300,
-    x: {kind: 'linear', domain: [0, scores.length + 1], title: 'points tried'},
+    x: {kind: 'linear', domain: [0.5, scores.length + 0.5], title: 'points tried'},
     y: {
       domain: Plots.domain([...scores, tuning.untuned.score], 'linear'),
       title: 'score' + (tuning.unit ? ' [' + tuning.unit + ']' : '')
@@ -41,8 +41,8 @@ function draw(tuning, width) {
   plot.root.append(
       svg('line', {
         class: 'untuned',
-        x1: plot.x(0),
-        x2: plot.x(scores.length + 1),
+        x1: plot.box.left,
+        x2: plot.box.right,
         y1: level,
         y2: level,
         stroke: Plots.colour(0),

@@ -40,7 +40,7 @@ function pose(entry) {
   const {matrix, deviations} = entry;
   const rows = [0, 1, 2].map(
       (row) =>
-          el('tr', {},
+          el('tr', {}, el('th', {scope: 'row'}, 'xyz'[row]),
              [0, 1, 2, 3].map(
                  (column) =>
                      el('td', {class: 'number'},
@@ -53,8 +53,8 @@ function pose(entry) {
       deviations &&
           el('p', {class: 'note'},
              'Predicted standard deviations about and along the ' +
-                 (entry.has_bone_axes ? 'frontal, lateral and long' : 'x, y and z') + ' axes: ' + text(0, '°') + '; ' +
-                 text(3, ' mm')));
+                 (entry.has_bone_axes ? 'frontal, lateral and long' : 'x, y and z') + ' axes: ' + text(0, ' deg') +
+                 '; ' + text(3, ' mm')));
 }
 
 // The judgement, its reasons, and what would settle it.
@@ -74,7 +74,7 @@ function one(data, cell, verdict) {
           el('div', {class: 'overlays'},
              pictures.map(
                  (entry) =>
-                     el('figure', {}, el('img', {src: data.pictures[entry.picture], alt: entry.name}),
+                     el('figure', {}, el('img', {src: data.pictures[entry.picture], alt: 'X-ray with outlines'}),
                         el('figcaption', {}, entry.name)))),
       poses.map(pose));
 }
