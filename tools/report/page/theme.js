@@ -13,7 +13,7 @@ export function startTheme() {
   const dark = () =>
       (root.dataset.theme ? root.dataset.theme === 'dark' : matchMedia('(prefers-color-scheme: dark)').matches);
   const label = () => (button.textContent = dark() ? 'Light' : 'Dark');
-  button.setAttribute('aria-label', 'Change between light and dark');
+  button.title = 'Change between light and dark';
   if (stored()) root.dataset.theme = stored();
   button.addEventListener('click', () => {
     root.dataset.theme = dark() ? 'light' : 'dark';
