@@ -105,6 +105,23 @@ class PipelineStageTest(PageTest, PipelineBench):
             time.sleep(0.05)
         self.assertIn("high: 6", self.file.read_text())
 
+    def test_names_are_what_is_seen(self):
+        self.show_pipeline()
+        label = "return document.querySelector('[data-node=edges]').getAttribute('aria-label')"
+        self.assertEqual(self.js(label), "edges, edges.canny")
+        self.find("[data-input=level]").send_keys("0.4\t")
+        self.browser.wait("return !document.querySelector('[data-do=run]').disabled", 60)
+        self.assertEqual(self.js(label), "edges, edges.canny, may be stale")
+        self.assertIsNone(self.js("return document.getElementById('theme').getAttribute('aria-label')"))
+
+    def test_a_question_mark_in_the_text_is_typed(self):
+        self.show_pipeline()
+        self.js("%s.focus()" % EDITOR)
+        self.browser.key("?", ":focus")
+        self.assertEqual(self.js("return document.getElementById('dialog').open"), False)
+        self.assertTrue(self.js("return %s.getValue()" % EDITOR).startswith("?marrow"))
+        self.click("[data-do=discard]")
+
     def test_tab_leads_out_of_the_text(self):
         self.show_pipeline()
         self.js("%s.setValue('mine'); %s.focus()" % (EDITOR, EDITOR))

@@ -85,6 +85,7 @@ class Page {
   draw(graph) {
     const focused = document.activeElement && document.activeElement.dataset && document.activeElement.dataset.node;
     this.graph = Graph.draw(graph, (node) => this.choose(node.id)).querySelector('svg');
+    this.graph.querySelectorAll('[data-node]').forEach(PipelineRuns.nameAsSeen);
     this.view.element.hidden = false;
     this.view.set(this.graph);
     this.markChosen();

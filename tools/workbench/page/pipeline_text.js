@@ -58,6 +58,7 @@ export class PipelineText {
     this.editor = CodeMirror(box, {
       mode: 'yaml',
       lineNumbers: true,
+      inputStyle: 'contenteditable',  // screen readers and fingers reach the text itself
       matchBrackets: true,
       screenReaderLabel: 'Text of the pipeline',
       gutters: ['CodeMirror-lint-markers', 'CodeMirror-linenumbers'],
@@ -66,6 +67,9 @@ export class PipelineText {
       // Tab leads on to the next control, as everywhere on the page.
       extraKeys: {Tab: false, 'Shift-Tab': false, 'Ctrl-Space': 'autocomplete'}
     });
+    const field = this.editor.getInputField();
+    field.setAttribute('role', 'textbox');
+    field.setAttribute('aria-multiline', 'true');
     this.editor.on('change', () => this.mark());
     this.editor.on('inputRead', (_, {text}) => {
       if (/^[\w.]$/.test(text[0]) && /\buses:\s*[\w.]+$/.test(this.lineToCursor())) this.editor.showHint();

@@ -55,7 +55,7 @@ function figuresCell(row) {
   const rest = figures.filter((one) => !first.includes(one));
   return [
     el('div', {}, figures[0].column ? figures[0].column + ': ' : '',
-       first.map((one, i) => el('span', {class: 'merit'}, words(one), i + 1 < first.length ? ', ' : ''))),
+       first.map((one, i) => [el('span', {class: 'merit'}, words(one), i + 1 < first.length ? ',' : ''), ' '])),
     rest.length ? el('details', {}, el('summary', {}, rest.length + ' more'),
                      rest.map((one) => el('div', {}, one.column ? one.column + ': ' : '', words(one)))) :
                   ''

@@ -11,6 +11,7 @@ import * as Ask from './server.js';
 import * as Shell from './shell.js';
 
 const MOST_REASONS = 2, MOST_LINES = 4;
+const SAME_POSE = 0.001;  // degrees and mm
 const LIMITS = [
   [0, 'nothing: the last digit counts'], [0.001, '0.001 mm, deg or px; 0.1 % of others'],
   [0.01, '0.01 mm, deg or px; 1 % of others'], [0.1, '0.1 mm, deg or px; 10 % of others']
@@ -44,26 +45,31 @@ function verdictCard(title, folder, verdicts) {
       verdicts.length ? verdicts.map(one) : el('p', {class: 'note'}, 'This run gives no verdict.'));
 }
 
+// "0.42° and 0.31 mm apart", or that the two are the same.
+function distanceOf({rotation_deg, displacement_mm}) {
+  if (rotation_deg < SAME_POSE && displacement_mm < SAME_POSE)
+    return ['the same', ', to less than ' + SAME_POSE + '° and ' + SAME_POSE + ' mm'];
+  return [
+    FigureWords.withUnit(rotation_deg, 'deg') + ' and ' + FigureWords.withUnit(displacement_mm, 'mm') + ' apart', ''
+  ];
+}
+
 // How far each pose of the second run is from that of the first: of the output "pose", or of the first with poses.
 function poseLines(outputs) {
-  const moved = (output) => output.items.filter((item) => item.facts && Number.isFinite(item.facts.rotation_deg));
+  const moved = (output) => output.items.filter(({amount}) => amount && Number.isFinite(amount.rotation_deg));
   const some = outputs.filter((output) => moved(output).length);
   const output = some.find((one) => one.name === 'pose') || some[0];
   if (!output) {
     const pose = outputs.find((one) => one.name === 'pose');
     return pose && pose.identical ? ['Both runs found the same pose.'] : [];
   }
-  return moved(output).map(({place, facts}) => {
-    const along = Number.isFinite(facts.axial_rotation_deg) ?
-        ', of it ' + FigureWords.withUnit(Math.abs(facts.axial_rotation_deg), 'deg') + ' about and ' +
-            FigureWords.withUnit(Math.abs(facts.axial_displacement_mm), 'mm') + ' along the long axis' :
+  return moved(output).map(({place, amount}) => {
+    const [words, more] = distanceOf(amount);
+    const along = !more && Number.isFinite(amount.axial_rotation_deg) ?
+        ': ' + FigureWords.withUnit(Math.abs(amount.axial_rotation_deg), 'deg') + ' about and ' +
+            FigureWords.withUnit(Math.abs(amount.axial_displacement_mm), 'mm') + ' along the long axis' :
         '';
-    return [
-      'The poses' + (place ? ' of ' + place : '') + ' are ',
-      el('strong', {},
-         FigureWords.withUnit(facts.rotation_deg, 'deg') + ' and ' + FigureWords.withUnit(facts.displacement_mm, 'mm')),
-      ' apart' + along + '.'
-    ];
+    return ['The poses' + (place ? ' of ' + place : '') + ' are ', el('strong', {}, words), more + along + '.'];
   });
 }
 

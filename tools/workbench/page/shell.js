@@ -223,8 +223,8 @@ function showKeys() {
 }
 
 function pressed(event) {
-  const types =
-      event.target.matches && event.target.matches('input:not([type="range"],[type="checkbox"]), textarea, select');
+  const types = event.target.matches &&
+      event.target.matches('input:not([type="range"],[type="checkbox"]), textarea, select, [contenteditable="true"]');
   if (document.getElementById('dialog').open) return;
   const name = (event.ctrlKey || event.metaKey ? 'Ctrl+' : '') + (event.altKey ? 'Alt+' : '') +
       (event.shiftKey && event.key.length > 1 ? 'Shift+' : '') + event.key;
