@@ -13,7 +13,7 @@ from harness.modules import TOOLS
 ENTRIES = [TOOLS / "report" / "page" / "main.js", TOOLS / "workbench" / "page" / "main.js"]
 BROWSER = set(
     """
-    AbortController Array Blob Boolean CSS Error Event EventTarget Float32Array Float64Array Image ImageData Infinity
+    AbortController Array Blob Boolean CSS Date Error Event EventTarget Float32Array Float64Array Image ImageData Infinity
     Int16Array Int32Array IntersectionObserver Intl JSON Map Math NaN Number Object OffscreenCanvas Promise RegExp
     ResizeObserver Set
     String URL
@@ -51,7 +51,7 @@ class Module:
         self.path, text = path, path.read_text()
         self.named, self.spaces, self.imports = [], {}, []
         for found in IMPORT.finditer(text):
-            if found["path"] == "three" or found["path"].endswith(".md"):
+            if not found["path"].startswith(".") or found["path"].endswith(".md"):  # a library, or a text
                 continue
             target = (path.parent / found["path"]).resolve()
             self.imports.append(target)

@@ -41,7 +41,7 @@ function faultOfName(name, taken) {
 }
 
 // Asks for the name of a new case, and opens it.
-export async function begin(taken) {
+async function begin(taken) {
   const name = await Shell.dialog('New case', (close) => {
     const fault = el('p', {class: 'reason', role: 'alert', hidden: true});
     const box = el('input', {type: 'text', value: freeName(taken), 'data-do': 'name', spellcheck: 'false'});

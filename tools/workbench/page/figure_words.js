@@ -16,7 +16,7 @@ const WORDS = {
 
 // "rotation" for rotation_deg: the unit stands behind the value.
 const plain = (name) => name.replace(/_(mm|deg|px)$/, '').replaceAll('_', ' ').toLowerCase();
-export const inWords = (name) => WORDS[plain(name)] || plain(name);
+const inWords = (name) => WORDS[plain(name)] || plain(name);
 export const isLessBetter = (name) => LESS_IS_BETTER.includes(plain(name));
 
 // Small for figures that say much.

@@ -20,7 +20,7 @@ const WORDS = {
 export function nameAsSeen(group) {
   const texts = [...group.querySelectorAll('text')];
   for (const one of texts)
-    if (!one.nextSibling || one.nextSibling.nodeType !== Node.TEXT_NODE) one.after(' ');  // keeps the words apart
+    if (!one.nextSibling || one.nextSibling.nodeName !== '#text') one.after(' ');  // keeps the words apart
   group.setAttribute('aria-label', texts.map((one) => one.textContent.trim()).filter(Boolean).join(', '));
 }
 

@@ -67,6 +67,8 @@ export class PipelineText {
       // Tab leads on to the next control, as everywhere on the page.
       extraKeys: {Tab: false, 'Shift-Tab': false, 'Ctrl-Space': 'autocomplete'}
     });
+    for (const bar of box.querySelectorAll('.CodeMirror-vscrollbar, .CodeMirror-hscrollbar'))
+      bar.setAttribute('aria-hidden', 'true');  // they have no name, and keys scroll the text itself
     const field = this.editor.getInputField();
     field.setAttribute('role', 'textbox');
     field.setAttribute('aria-multiline', 'true');

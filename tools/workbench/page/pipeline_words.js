@@ -19,7 +19,7 @@ export function blockFrom(lines, first) {
 }
 
 // The node whose text holds a line: {name, first, last, uses}; null outside of nodes.
-export function nodeAt(lines, line) {
+function nodeAt(lines, line) {
   const section = lines.findIndex((text) => /^nodes:/.test(text));
   if (section < 0 || line <= section) return null;
   const is_end = (text) => /^\S/.test(text) && !isBlank(text);
