@@ -282,6 +282,12 @@ class ResultsPageTest(PageTest, ResultsBench):
             self.assertEqual(self.js("return document.title"), "small · marrow")
         finally:
             driver.switch_to.default_content()
+        self.click("#theme")
+        driver.switch_to.frame(driver.find_element("css selector", "iframe.report"))
+        try:
+            self.browser.wait("return document.documentElement.dataset.theme === 'dark'", 30)
+        finally:
+            driver.switch_to.default_content()
         self.assertIn("marrow show runs/first", self.js("return document.body.textContent"))
         self.assertIn("download=1", self.js("return document.querySelector('[data-do=download]').href"))
 

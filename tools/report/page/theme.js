@@ -23,6 +23,12 @@ export function startTheme() {
     }
     label();
   });
+  // The workbench tells a report in its frame which theme was chosen there.
+  addEventListener('message', ({data}) => {
+    if (!data || data.marrow !== 'theme' || !['light', 'dark'].includes(data.theme)) return;
+    root.dataset.theme = data.theme;
+    label();
+  });
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', label);
   label();
 }

@@ -265,7 +265,8 @@ class Page {
                       [one.item, ...(one.reasons || []).slice(0, 2)].filter(Boolean).join('; '))),
            bad.map(([id, one]) => el('p', {class: 'reason'}, id + ': ' + one.reason)),
            result.faults.filter((text) => !text.includes('not made')).map((text) => el('p', {class: 'reason'}, text)),
-           Dom.command(command)));
+           el('details', {}, el('summary', {}, 'The same on the command line'), Dom.command(command))));
+    this.inputs_part.open = false;
   }
 
   // Shows the outputs of the chosen node, if they are known.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The text of a pipeline in CodeMirror: coloured, with completion, each fault at its line, and the faults listed below.
+import './editor_notices.js';
 import 'codemirror/mode/yaml/yaml.js';
 import 'codemirror/addon/lint/lint.js';
 import 'codemirror/addon/hint/show-hint.js';

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The graph of a pipeline in a frame: dragging moves it, Ctrl+wheel, two fingers and buttons zoom, and a small map
 // shows which part is seen. d3-zoom does the gestures.
+import './editor_notices.js';
+
 import {event, select} from 'd3-selection';
 import {zoom, zoomIdentity} from 'd3-zoom';
 

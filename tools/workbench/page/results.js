@@ -12,6 +12,11 @@ const reportAddress = (folder, more) => 'results/report.html?' + new URLSearchPa
 
 // A report in its frame can load nothing. It asks for its parts by a message, and this page reads them for it.
 function reportFrame(folder, loaded) {
+  const button = document.getElementById('theme');
+  const tellTheme = () => {
+    if (!frame.isConnected) return button.removeEventListener('click', tellTheme);
+    return frame.contentWindow.postMessage({marrow: 'theme', theme: document.documentElement.dataset.theme}, '*');
+  };
   const frame = el('iframe', {
     class: 'report',
     title: 'Report of ' + folder,
@@ -21,6 +26,7 @@ function reportFrame(folder, loaded) {
     onload: () => {
       frame.removeAttribute('aria-busy');
       loaded();
+      tellTheme();
       frame.contentWindow.postMessage({marrow: 'gives parts'}, '*');
     }
   });
@@ -32,6 +38,7 @@ function reportFrame(folder, loaded) {
     frame.contentWindow.postMessage({marrow: 'part', file, text}, '*');
   };
   addEventListener('message', give);
+  button.addEventListener('click', tellTheme);
   return frame;
 }
 
