@@ -69,10 +69,13 @@ std::string Access::fault(const Asked& asked, bool hands_in_token) const {
   return "";
 }
 
-bool Access::take_token(const std::string& token) {
+std::string Access::take_token(const std::string& token) {
   const std::lock_guard lock(mutex_);
-  if (is_taken_ || !is_same(token, token_)) return false;
-  return is_taken_ = true;
+  if (!is_same(token, token_))
+    return "the token in this address is not that of this server; copy the whole address that 'marrow open' printed";
+  if (is_taken_) return "this address was used before; start 'marrow open' again for a new one";
+  is_taken_ = true;
+  return "";
 }
 
 std::string Access::cookie() const { return cookie_name() + "=" + session_ + "; HttpOnly; SameSite=Strict; Path=/"; }

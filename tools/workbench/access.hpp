@@ -32,8 +32,8 @@ class Access {
   /// Why the request is refused, as a sentence for people; empty if it may go on. A request without the cookie may only
   /// hand in the token.
   std::string fault(const Asked& asked, bool hands_in_token) const;
-  /// Whether this is the token, and it is handed in for the first time.
-  bool take_token(const std::string& token);
+  /// Empty if this is the token, and it is handed in for the first time. Otherwise why it opens nothing.
+  std::string take_token(const std::string& token);
   /// The value of Set-Cookie for a browser that handed in the token.
   std::string cookie() const;
 

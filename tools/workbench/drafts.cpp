@@ -6,12 +6,14 @@
 
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 
 #include "marrow/base/descriptor.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/json_text.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/base/text_file.hpp"
+#include "workbench/file_time.hpp"
 #include "workbench/server.hpp"
 
 namespace fs = std::filesystem;
@@ -28,13 +30,28 @@ std::string file_name(const std::string& case_path) {
   return (name.empty() ? "%" : name) + ".jsonl";
 }
 
-/// Appends a line and waits until it is on the disk. On any failure, restores the file and throws Error.
-void append_line(const fs::path& file, const std::string& line) {
+/// The path of the case whose draft has this file's name; the opposite of file_name().
+std::string case_path_of(std::string name) {
+  name.resize(name.size() - std::string(".jsonl").size());
+  if (name == "%") return "";
+  std::string path;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    const bool is_code = name[i] == '%' && i + 2 < name.size();
+    path += !is_code ? name[i] : name.compare(i, 3, "%2F") == 0 ? '/' : '%';
+    if (is_code) i += 2;
+  }
+  return path;
+}
+
+/// Appends a line and waits until it is on the disk. If a crash left `half_bytes` of a line at the end, they go first.
+/// On any failure, restores the file and throws Error.
+void append_line(const fs::path& file, std::uintmax_t half_bytes, const std::string& line) {
   fs::create_directories(file.parent_path());
   const Descriptor descriptor(open(file.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644));
   if (!descriptor.is_open()) throw Error("the draft cannot be kept: " + std::string(std::strerror(errno)));
-  const off_t before = lseek(descriptor, 0, SEEK_END);
-  const bool is_good = write_all(descriptor, line) && fsync(descriptor) == 0;
+  const off_t before = lseek(descriptor, 0, SEEK_END) - off_t(half_bytes);
+  const bool is_good =
+      (half_bytes == 0 || ftruncate(descriptor, before) == 0) && write_all(descriptor, line) && fsync(descriptor) == 0;
   const std::string why = std::strerror(errno);
   if (!is_good && ftruncate(descriptor, before) != 0) {
     // whoever reads the draft skips the half line
@@ -62,11 +79,35 @@ void Drafts::apply(Draft& draft, const json& line) {
 
 void Drafts::append(Draft& draft, const json& line) {
   std::string lines = json_text(line) + "\n";
-  if (draft.bytes == 0)  // the history includes the beginning
+  if (draft.whole_bytes == 0)  // the history includes the beginning
     lines = json_text({{"what", draft.steps[0].what}, {"document", draft.steps[0].document}}) + "\n" + lines;
-  append_line(draft.file, lines);
-  draft.bytes += lines.size();
+  append_line(draft.file, draft.bytes - draft.whole_bytes, lines);
+  draft.bytes = draft.whole_bytes += lines.size();
   apply(draft, line);
+}
+
+Drafts::Draft Drafts::read(const fs::path& file) {
+  Draft draft;
+  draft.file = file;
+  if (!fs::exists(file)) return draft;
+  const std::string text = read_text_file(file, kMostRecordBytes);
+  draft.bytes = text.size();
+  int number = 0;
+  for (std::size_t begin = 0, end; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1) {
+    const std::string place =
+        formatted("the draft .marrow/drafts/{}:{}", printable(file.filename().string()), ++number);
+    const json line = parse_json(text.substr(begin, end - begin), place);
+    if (!line.is_object() || (draft.steps.empty() && !line.contains("document")) ||
+        !line.value("document", json::object()).is_object())
+      throw Error(place + ": this is no change of a case; mend the file, or throw the draft away on the first page");
+    apply(draft, line);
+    draft.whole_bytes = end + 1;
+  }
+  const std::string rest = text.substr(draft.whole_bytes);
+  if (draft.steps.empty() && !rest.empty() && rest[0] != '{')
+    throw Error("the draft .marrow/drafts/" + printable(file.filename().string()) +
+                " holds no changes of a case; throw it away on the first page");
+  return draft;
 }
 
 Drafts::Draft& Drafts::find(const std::string& case_path) {
@@ -76,18 +117,11 @@ Drafts::Draft& Drafts::find(const std::string& case_path) {
   const std::uintmax_t size = fs::file_size(path, error), bytes = error ? 0 : size;
   const auto known = drafts_.find(case_path);
   if (known != drafts_.end() && known->second.bytes == bytes) return known->second;
-  Draft draft;
-  draft.file = path;
-  std::ifstream file(path);
-  for (std::string text; std::getline(file, text);) {
-    const json line = json::parse(text, nullptr, false);
-    if (line.is_object()) apply(draft, line);  // the last line may be half written
-  }
+  Draft draft = read(path);
   if (draft.steps.empty()) {
     draft.steps.push_back({"the beginning", document_of_case(folder_, case_path)});
     draft.saved = fs::exists(folder_.inside(case_path) / "case.yaml") ? 0 : -1;
   }
-  draft.bytes = bytes;
   return drafts_[case_path] = std::move(draft);
 }
 
@@ -111,6 +145,38 @@ json Drafts::shown(const std::string& case_path, const Draft& draft) const {
 json Drafts::open(const std::string& case_path) {
   const std::lock_guard lock(mutex_);
   return shown(case_path, find(case_path));
+}
+
+json Drafts::unsaved() {
+  const std::lock_guard lock(mutex_);
+  json all = json::array();
+  std::error_code error;
+  for (fs::directory_iterator entry(folder_.inside(".marrow/drafts"), error), end; !error && entry != end;
+       entry.increment(error)) {
+    const fs::path& file = entry->path();
+    if (file.extension() != ".jsonl") continue;
+    json row = {{"case", case_path_of(file.filename().string())}, {"changed", time_of_file(file)}};
+    try {
+      const Draft& draft = find(row["case"].get<std::string>());
+      const bool is_case = fs::exists(folder_.inside(row["case"].get<std::string>()) / "case.yaml");
+      if (draft.saved == int(draft.at) || (is_case && draft.at == 0)) continue;
+      row["changes"] = draft.at;
+    } catch (const std::exception& fault) {
+      row["fault"] = printable_lines(fault.what());
+    }
+    all.push_back(std::move(row));
+  }
+  std::sort(all.begin(), all.end(), [](const json& a, const json& b) { return a["changed"] > b["changed"]; });
+  return all;
+}
+
+void Drafts::throw_away(const std::string& case_path) {
+  const std::lock_guard lock(mutex_);
+  folder_.inside(case_path);
+  std::error_code error;
+  if (!fs::remove(folder_.inside(".marrow/drafts") / file_name(case_path), error))
+    throw Error(error ? "the draft cannot be removed: " + error.message() : "there is no draft of this case");
+  drafts_.erase(case_path);
 }
 
 json Drafts::change(const std::string& case_path, int revision, const std::string& what, json document) {

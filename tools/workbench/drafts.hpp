@@ -21,8 +21,15 @@ class Drafts {
   explicit Drafts(const OpenedFolder& folder) : folder_(folder) {}
 
   /// {case, revision, document, undo, redo, is_saved}: `undo` and `redo` name the change that they would undo or redo,
-  /// or are null. A case without a draft begins with its case.yaml, or empty. Throws Error if that cannot be read.
+  /// or are null. A case without a draft begins with its case.yaml, or empty. Throws Error if either cannot be read: a
+  /// draft's file may be damaged, and an empty case in its place would look as if all was lost.
   nlohmann::json open(const std::string& case_path);
+  /// [{case, changed, changes, fault}]: the drafts with changes that are not saved, the newest first. `changed` is a
+  /// time in UTC, `changes` the number that undo reaches. `fault` says why a draft cannot be opened; otherwise it is
+  /// missing.
+  nlohmann::json unsaved();
+  /// Removes the draft; the case's own files stay. Throws Error if there is none.
+  void throw_away(const std::string& case_path);
   /// These change the draft, undo or redo a change, and return what open() now does. They throw Conflict unless
   /// `revision` is the newest, and Error if the change cannot be written; then nothing has changed.
   nlohmann::json change(const std::string& case_path, int revision, const std::string& what, nlohmann::json document);
@@ -37,12 +44,14 @@ class Drafts {
   };
   struct Draft {
     std::filesystem::path file;
-    std::vector<Step> steps;   ///< the first is the beginning
-    std::size_t at = 0;        ///< the step that is shown
-    int revision = 0;          ///< the number of changes
-    int saved = -1;            ///< the step that case.yaml holds; -1: none
-    std::uintmax_t bytes = 0;  ///< size of the file; another size means that another program changed it
+    std::vector<Step> steps;         ///< the first is the beginning
+    std::size_t at = 0;              ///< the step that is shown
+    int revision = 0;                ///< the number of changes
+    int saved = -1;                  ///< the step that case.yaml holds; -1: none
+    std::uintmax_t bytes = 0;        ///< size of the file; another size means that another program changed it
+    std::uintmax_t whole_bytes = 0;  ///< of its whole lines: a crash may leave half a line behind them
   };
+  static Draft read(const std::filesystem::path& file);
   Draft& find(const std::string& case_path);
   Draft& find(const std::string& case_path, int revision);
   static void apply(Draft& draft, const nlohmann::json& line);

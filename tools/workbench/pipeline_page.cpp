@@ -4,6 +4,8 @@
 #include "marrow/base/error.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
+#include "workbench/kept_inputs.hpp"
+#include "workbench/own_pipelines.hpp"
 #include "workbench/pipeline_edit.hpp"
 #include "workbench/pipeline_files.hpp"
 #include "workbench/pipeline_run.hpp"
@@ -16,9 +18,10 @@ using nlohmann::json;
 
 /// What the page keeps between requests. The handlers own it.
 struct PipelinePage {
-  explicit PipelinePage(Workbench& bench) : workbench(bench), files(bench.folder) {}
+  explicit PipelinePage(Workbench& bench) : workbench(bench), files(bench.folder), kept_inputs(bench.folder) {}
   Workbench& workbench;
   PipelineFiles files;
+  KeptInputs kept_inputs;
   LastRuns last_runs;
 };
 using Page = std::shared_ptr<PipelinePage>;
@@ -26,6 +29,7 @@ using Page = std::shared_ptr<PipelinePage>;
 Answer described(const Page& page, json state) {
   describe_pipeline(state, page->workbench);
   state["command"] = command_of_form("check", state["file"], {}, page->workbench);
+  state["kept_inputs"] = page->kept_inputs.of(state["file"]);
   return json_answer(state);
 }
 
@@ -116,12 +120,27 @@ void add_file_requests(Server& server, const Page& page) {
   });
 }
 
+/// What the page offers before a file is open, and while its text is typed.
+void add_offers(Server& server, const Page& page) {
+  server.get("/api/pipeline/own", [](const Request&) { return json_answer(own_pipelines()); });
+  server.post("/api/pipeline/copy", [page](const Request& request) {
+    return json_answer({{"file", copy_of_own_pipeline(request.text("name"), page->workbench.folder)}});
+  });
+  server.get("/api/pipeline/words", [page](const Request&) {
+    json nodes = json::array();
+    for (const std::string& name : page->workbench.catalogue.node_names())
+      nodes.push_back(cli::node_json(*page->workbench.catalogue.find(name)));
+    return json_answer(nodes);
+  });
+}
+
 json inputs_of(const Request& request) { return request.body.value("inputs", json::object()); }
 
 void add_run_requests(Server& server, const Page& page) {
   server.post("/api/pipeline/plan", [page](const Request& request) {
     const std::string file = request.text("file");
     json plan = plan_of(pipeline_of_form(file, inputs_of(request), page->workbench), page->workbench);
+    page->kept_inputs.keep(file, inputs_of(request));
     plan["command"] = command_of_form("plan", file, inputs_of(request), page->workbench);
     plan["run_command"] = command_of_form("run", file, inputs_of(request), page->workbench);
     return json_answer(plan);
@@ -159,6 +178,7 @@ void add_run_requests(Server& server, const Page& page) {
 
 void add_pipeline_page(Server& server, Workbench& workbench) {
   const auto page = std::make_shared<PipelinePage>(workbench);
+  add_offers(server, page);
   add_file_requests(server, page);
   add_run_requests(server, page);
 }

@@ -4,7 +4,6 @@
 
 #include "difference/findings.hpp"
 #include "marrow/base/error.hpp"
-#include "marrow/base/json_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
@@ -12,6 +11,7 @@
 #include "report/cell_material.hpp"
 #include "report/report.hpp"
 #include "run_files.hpp"
+#include "workbench/result_rows.hpp"
 #include "workbench/workbench.hpp"
 
 namespace marrow::workbench {
@@ -19,69 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-constexpr std::size_t kMostRuns = 500;
-
-/// When the file was written, in UTC, for records without their own time.
-std::string time_of(const fs::path& file) {
-  std::error_code error;
-  const auto written = fs::last_write_time(file, error);
-  if (error) return "";
-  const auto clock = std::chrono::file_clock::to_sys(written);
-  const std::time_t seconds =
-      std::chrono::system_clock::to_time_t(std::chrono::time_point_cast<std::chrono::system_clock::duration>(clock));
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text;
-}
-
-json run_row(const fs::path& folder) {
-  const json record = cli::read_record(folder);
-  json verdicts = json::array();
-  for (const NamedVerdict& one : verdicts_in(record)) verdicts.push_back(json_of(one));
-  const std::string finished = record.value("finished", "");
-  return {{"kind", "run"},
-          {"name", record.value("pipeline", "")},
-          {"when", finished.empty() ? time_of(folder / "run.json") : finished},
-          {"status", record.value("status", "")},
-          {"seconds", record.value("seconds", 0.0)},
-          {"verdicts", verdicts},
-          {"figures", cli::figures_of(folder, record)}};
-}
-
-json comparison_row(const fs::path& folder) {
-  if (cli::leads_outside(folder, "comparison.json")) throw Error("its comparison.json is a link that leads elsewhere");
-  const json record = parse_json(read_text_file(folder / "comparison.json", kMostRecordBytes), "comparison.json");
-  if (!record.is_object()) throw Error("its comparison.json holds no object");
-  json sentences = json::array();
-  for (const json& one : record.value("comparisons", json::array()))
-    if (one.is_object()) sentences.push_back(one.value("sentence", ""));
-  return {{"kind", "comparison"},
-          {"name", record.value("experiment", "")},
-          {"when", time_of(folder / "comparison.json")},
-          {"status", "done"},
-          {"verdicts", json::array()},
-          {"sentences", sentences},
-          {"figures", json::array()}};
-}
-
-void add_rows(json& rows, const OpenedFolder& opened, const json& paths, json (*row_of)(const fs::path&)) {
-  for (const json& path : paths) {
-    if (rows.size() >= kMostRuns) return;
-    json row;
-    const fs::path folder = opened.inside(path.get<std::string>());
-    try {
-      row = row_of(folder);
-    } catch (const std::exception& error) {
-      row = {{"kind", "run"}, {"name", ""}, {"when", time_of(folder)}, {"fault", printable_lines(error.what())}};
-    }
-    row["folder"] = path;
-    row["has_report"] = cli::file_of_run(folder, "report.html").has_value();
-    rows.push_back(std::move(row));
-  }
-}
 
 /// The figures of both runs side by side: [{table, column, name, unit, before, now}].
 json figures_side_by_side(const json& before, const json& now) {
@@ -117,19 +54,14 @@ std::vector<std::string> pictures_of(const fs::path& folder, const json& record)
   return pictures;
 }
 
-/// [{folder, kind, name, when, status, seconds, verdicts, figures, has_report, fault}], the newest first. `kind` is run
-/// or comparison. `fault` says why nothing else is known; otherwise it is missing.
-json list_results(const OpenedFolder& folder) {
-  const json contents = folder.contents();
-  json rows = json::array();
-  add_rows(rows, folder, contents["comparisons"], comparison_row);
-  add_rows(rows, folder, contents["runs"], run_row);
-  std::stable_sort(rows.begin(), rows.end(), [](const json& a, const json& b) { return a["when"] > b["when"]; });
-  return rows;
+json verdicts_of(const json& record) {
+  json verdicts = json::array();
+  for (const NamedVerdict& one : verdicts_in(record)) verdicts.push_back(json_of(one));
+  return verdicts;
 }
 
-/// What `marrow diff` finds between two runs, and the pictures that both have: {findings, figures, pictures}. Throws
-/// Error if one of them is not a run.
+/// What `marrow diff` finds between two runs, and the pictures that both have: {findings, figures, pictures, verdicts:
+/// {before, now}}. Throws Error if one of them is not a run.
 json compare_results(const OpenedFolder& opened, const std::string& first, const std::string& second) {
   const fs::path before = opened.inside(first), now = opened.inside(second);
   cli::KnownValues values;
@@ -141,7 +73,8 @@ json compare_results(const OpenedFolder& opened, const std::string& first, const
     if (contains(others, picture)) pictures.push_back(picture);
   return {{"findings", cli::json_of(findings)},
           {"figures", figures_side_by_side(cli::figures_of(before, before_record), cli::figures_of(now, now_record))},
-          {"pictures", pictures}};
+          {"pictures", pictures},
+          {"verdicts", {{"before", verdicts_of(before_record)}, {"now", verdicts_of(now_record)}}}};
 }
 
 /// The file report.html of a run or comparison. A run without one gets one. Throws Error for a comparison without one.

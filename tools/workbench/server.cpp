@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "workbench/server.hpp"
 
-#include <httplib.h>
-
 #include <charconv>
 #include <chrono>
 #include <memory>
@@ -12,6 +10,7 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/reason_of_exception.hpp"
+#include "workbench/http_server.hpp"
 
 namespace marrow::workbench {
 namespace {
@@ -20,7 +19,6 @@ using nlohmann::json;
 
 constexpr std::size_t kMostBytes = 64'000'000;  // of one request: a painted mask of a large image
 constexpr int kMostAtOnce = 48;                 // requests that are being answered
-constexpr int kThreads = 32;
 
 /// Scripts, styles and pictures come from this server alone, and no other site may show the page inside its own.
 constexpr const char* kPolicy =
@@ -44,7 +42,8 @@ void refuse(httplib::Response& response, int status, const std::string& text) {
   response.set_content(json_text(json{{"error", printable_lines(text)}}), "application/json");
 }
 
-/// Sends the content without compression. set_content() would compress it, which takes a second for a page's scripts.
+/// Sends the content without compression. set_content() would compress it anew for each request, which takes a second
+/// for a page's scripts, and ten for a large report.
 void send_whole(const std::shared_ptr<const std::string>& content, const std::string& type,
                 httplib::Response& response) {
   if (content->empty()) return response.set_content("", type);
@@ -58,7 +57,7 @@ Request request_of(const httplib::Request& asked) {
   Request request;
   for (const auto& [name, value] : asked.params) request.parameters[name] = value;
   if (asked.method == "GET") return request;
-  request.body = json::parse(asked.body, nullptr, false);
+  request.body = parse_json(asked.body, "the request");  // limits how deep it is nested
   if (!request.body.is_object()) throw Error("the request is no JSON object");
   return request;
 }
@@ -95,12 +94,12 @@ Answer bytes_answer(std::string bytes, const json& about) {
 }
 
 struct Server::Parts {
-  httplib::Server http;
+  HttpServer http;
   Access access;
   std::atomic<int> at_once = 0;
 
   Parts() {
-    http.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
+    http.new_task_queue = [] { return new GrowingThreads; };
     http.set_payload_max_length(kMostBytes);
     http.set_keep_alive_max_count(1'000'000);  // dragging asks 60 times a second over the same connection
     http.set_tcp_nodelay(true);
@@ -134,10 +133,11 @@ struct Server::Parts {
       return httplib::Server::HandlerResponse::Handled;
     }
     if (!hands_in_token) return httplib::Server::HandlerResponse::Unhandled;
-    if (access.take_token(request.get_param_value("token"))) {
+    const std::string fault_of_token = access.take_token(request.get_param_value("token"));
+    if (fault_of_token.empty()) {
       response.set_header("Set-Cookie", access.cookie());
     } else if (!access.fault(asked_by(request), false).empty()) {
-      refuse(response, 403, "this address was used before; start 'marrow open' again for a new one");
+      refuse(response, 403, fault_of_token);
       return httplib::Server::HandlerResponse::Handled;
     }
     response.set_redirect("/");  // to an address without the token; the browser keeps the part behind '#'

@@ -31,6 +31,11 @@ void add_shell(Server& server, Workbench& workbench) {
     contents["folder"] = workbench.folder.path().string();
     return json_answer(contents);
   });
+  server.get("/api/drafts", [&](const Request&) { return json_answer(workbench.drafts.unsaved()); });
+  server.post("/api/draft/throw-away", [&](const Request& request) {
+    workbench.drafts.throw_away(request.text("case"));
+    return json_answer(json::object());
+  });
   server.get("/api/listing",
              [&](const Request& request) { return json_answer(workbench.folder.listing(request.parameter("path"))); });
   server.get("/api/job", [&](const Request& request) {

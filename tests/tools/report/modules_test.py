@@ -13,7 +13,7 @@ from harness.modules import TOOLS
 ENTRIES = [TOOLS / "report" / "page" / "main.js", TOOLS / "workbench" / "page" / "main.js"]
 BROWSER = set(
     """
-    AbortController Array Blob Boolean CSS Error Event EventTarget Float32Array Float64Array Image ImageData Infinity
+    AbortController Array Blob Boolean CSS Date Error Event EventTarget Float32Array Float64Array Image ImageData Infinity
     Int16Array Int32Array IntersectionObserver Intl JSON Map Math NaN Number Object OffscreenCanvas Promise RegExp
     ResizeObserver Set
     String URL

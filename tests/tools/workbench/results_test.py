@@ -77,6 +77,10 @@ class RequestTest(ResultsBench):
         self.assertEqual(first["verdicts"][0]["judgement"], "doubtful")
         self.assertEqual(first["figures"][0]["rows"], [{"name": "mtre", "unit": "mm", "values": [1.5]}])
         self.assertIn("run it again", known["runs/broken"]["fault"])
+        self.assertEqual((first["case"], first["changes"]), ("", None), "the first run has none before it")
+        self.assertEqual(
+            known["runs/second"]["changes"], [{"what": "edges.noise_high", "before": "5", "now": "9"}], "options only"
+        )
 
     def test_what_differs_is_what_marrow_diff_says(self):
         answer = self.server.json("GET", "/api/results/diff?first=runs/first&second=runs/second")
@@ -187,10 +191,67 @@ class ResultsPageTest(PageTest, ResultsBench):
         )
         self.assertEqual(cells, ["edges", "option noise_high", "5", "9", "the first difference"])
         self.browser.wait(
-            "return [...document.querySelectorAll('.overlays img')].every((one) => one.naturalWidth === 96)"
+            "const pictures = [...document.querySelectorAll('.wipe img')];"
+            "return pictures.length === 2 && pictures.every((one) => one.naturalWidth === 96)"
         )
+        self.browser.key("HOME", ".wiped input")
+        self.assertEqual(self.js("return document.querySelector('.wipe').style.getPropertyValue('--at')"), "0%")
         self.assertIn("marrow diff runs/first runs/second", self.js("return document.body.textContent"))
         self.assertEqual(self.browser.logs()[0], [])
+
+    def test_the_list_is_sorted_and_filtered(self):
+        for name, judgement, mtre in (("first", "wrong", 12.5), ("second", "trusted", 0.25)):
+            run = self.folder / "runs" / name
+            figures = [{"name": "mtre_mm", "unit": "mm", "value": mtre}]
+            (run / "outputs" / "errors.json").write_text(json.dumps({"metrics": figures}))
+            record = json.loads((run / "run.json").read_text())
+            record["outputs"].append({"name": "errors", "files": ["outputs/errors.json"]})
+            verdict = {"output": "verdict", "item": "", "judgement": judgement, "failure_probability": 0.5}
+            record["verdicts"] = [verdict | {"reasons": ["why"], "remedies": []}]
+            (run / "run.json").write_text(json.dumps(record))
+        self.show_results()
+        shown = lambda: self.js("return [...document.querySelectorAll('[data-result]')].map((r) => r.dataset.result)")
+        self.assertEqual(shown(), ["runs/second", "runs/first"], "the newest first")
+        words = self.js("return document.querySelector('[data-result=\"runs/second\"]').closest('tr').innerText")
+        for part in ("edges.noise_high 5 \u2192 9", "trusted", "mTRE 0.250\u00a0mm"):
+            self.assertIn(part, words)
+        head = "[...document.querySelectorAll('.sort')].find((one) => one.textContent === '%s').click()"
+        self.js(head % "Verdict" + ";" + head % "Verdict")
+        self.assertEqual(shown(), ["runs/first", "runs/second"], "the worst first")
+        self.js(head % "Key figures")
+        self.assertEqual(shown(), ["runs/second", "runs/first"], "the smallest error first")
+        self.find("[data-do=filter]").send_keys("wrong")
+        self.assertEqual(shown(), ["runs/first"])
+        self.assertEqual(self.js("return document.querySelector('[data-do=count]').textContent"), "1 of 2")
+        self.find("[data-do=filter]").send_keys("!")
+        self.assertIn("No result passes the filter.", self.js("return document.querySelector('.results').textContent"))
+
+    def test_verdicts_and_the_distance_of_poses_come_first(self):
+        for name in ("first", "second"):
+            run = self.folder / "runs" / name
+            record = json.loads((run / "run.json").read_text())
+            verdict = {"output": "verdict", "item": "distal", "judgement": "doubtful", "failure_probability": 0.25}
+            record["verdicts"] = [verdict | {"reasons": [name + " reason"], "remedies": []}]
+            (run / "run.json").write_text(json.dumps(record))
+        self.show_results("=runs/first&with=runs/second")
+        cards = self.js("return [...document.querySelectorAll('.card')].map((one) => one.innerText)")
+        self.assertEqual(len(cards), 2)
+        for card, name in zip(cards, ("first", "second")):
+            self.assertIn("runs/" + name, card)
+            self.assertIn("DOUBTFUL", card.upper())
+            self.assertIn(name + " reason", card)
+
+    def test_a_report_says_that_it_loads(self):
+        self.show_results()
+        self.js(
+            "new MutationObserver(() => { const says = document.querySelector('.report-box');"
+            "if (says) window.said = (window.said || '') + says.textContent; })"
+            ".observe(document.getElementById('page'), {childList: true, subtree: true})"
+        )
+        self.click("[data-result='runs/first'] a")
+        self.browser.wait("return !!document.querySelector('iframe.report:not([aria-busy])')", 60)
+        self.assertIn("Loading the report", self.js("return window.said"))
+        self.assertEqual(self.js("return document.querySelector('.report-box').textContent"), "")
 
     def test_figures_are_put_side_by_side(self):
         for name, mtre in (("first", 1.5), ("second", 0.25)):
@@ -202,11 +263,14 @@ class ResultsPageTest(PageTest, ResultsBench):
             (run / "run.json").write_text(json.dumps(record))
         self.show_results("=runs/first&with=runs/second")
         cells = self.js("return [...document.querySelectorAll('[data-figure=mtre] td')].map((one) => one.textContent)")
-        self.assertEqual(cells, ["1.50\u00a0mm", "0.250\u00a0mm", "\u22121.25"])
-        self.assertEqual(
-            self.js("return document.querySelector('[data-do=same-figures] summary').textContent"),
-            "The same in both, as rounded here: 1",
+        self.assertEqual(cells, ["1.50\u00a0mm", "0.250\u00a0mm", "\u22121.25\u00a0mm better"])
+        same = "return document.querySelector('[data-do=same-figures] summary').textContent"
+        self.assertEqual(self.js(same), "The same in both: 1")
+        self.js(
+            "const box = document.querySelector('section[aria-label=Figures] select'); box.value = 0.1;"
+            "box.dispatchEvent(new Event('change'))"
         )
+        self.assertEqual(self.js(same), "The same in both: 1", "1.25 mm is more than 0.1 mm")
 
     def test_a_report_is_shown_in_the_page_and_its_script_runs(self):
         self.show_results("=runs/first")
@@ -216,6 +280,12 @@ class ResultsPageTest(PageTest, ResultsBench):
             self.browser.wait("return document.documentElement.dataset.ready === 'true'", 60)
             self.assertEqual(self.js("return self.origin"), "null")
             self.assertEqual(self.js("return document.title"), "small · marrow")
+        finally:
+            driver.switch_to.default_content()
+        self.click("#theme")
+        driver.switch_to.frame(driver.find_element("css selector", "iframe.report"))
+        try:
+            self.browser.wait("return document.documentElement.dataset.theme === 'dark'", 30)
         finally:
             driver.switch_to.default_content()
         self.assertIn("marrow show runs/first", self.js("return document.body.textContent"))

@@ -50,7 +50,12 @@ class ServerTest(BenchTest):
                     self.error(answer),
                     "this browser is not known here; open the address that 'marrow open' printed, or start it again",
                 )
-        self.assertEqual(server.ask("GET", "/?token=" + "0" * 64)[0], 403)
+        wrong = server.ask("GET", "/?token=" + "0" * 64)
+        self.assertEqual(wrong[0], 403)
+        self.assertEqual(
+            self.error(wrong),
+            "the token in this address is not that of this server; copy the whole address that 'marrow open' printed",
+        )
 
     def test_other_hosts_and_pages_of_other_sites_reach_nothing(self):
         server = self.open()
@@ -84,9 +89,14 @@ class ServerTest(BenchTest):
         self.assertFalse((self.folder / ".marrow").exists())
         for method in ("PUT", "DELETE", "OPTIONS"):
             self.assertNotEqual(server.ask(method, "/api/draft/change", body)[0], 200)
-        for broken in (b"", b"{", b"[]", b"\xff"):
+        for broken, fault in (
+            (b"", "the request:1:1: not valid JSON"),
+            (b"{", "the request:1:2: not valid JSON"),
+            (b"[]", "the request is no JSON object"),
+            (b"\xff", "the request:1:1: not valid JSON"),
+        ):
             answer = server.ask("POST", "/api/draft/change", broken)
-            self.assertEqual((answer[0], self.error(answer)), (400, "the request is no JSON object"))
+            self.assertEqual((answer[0], self.error(answer)), (400, fault))
 
     def test_pages_may_load_nothing_from_elsewhere(self):
         server = self.open()
@@ -226,6 +236,55 @@ class DraftTest(BenchTest):
         file = self.folder / ".marrow" / "drafts" / "a.jsonl"
         file.write_text(file.read_text() + '{"what": "half')
         self.assertEqual(self.state(server)["document"], {"n": 1})
+        self.assertEqual(self.change(server, self.state(server)["revision"], "better", n=2)[0], 200)
+        server.close()
+        other = self.open()
+        other.enter()
+        self.assertEqual(self.state(other)["document"], {"n": 2}, "the half line did not spoil the next one")
+
+    def test_a_draft_that_cannot_be_read_is_told_and_can_be_thrown_away(self):
+        drafts = self.folder / ".marrow" / "drafts"
+        drafts.mkdir(parents=True)
+        deep = '{"document": {"a": %s%s}}\n' % ("[" * 200_000, "]" * 200_000)
+        for garbage, fault in (
+            ("garbage\n", "the draft .marrow/drafts/a.jsonl:1:1:1: not valid JSON"),
+            ("garbage", "the draft .marrow/drafts/a.jsonl holds no changes of a case"),
+            ('{"undo": true}\n', "the draft .marrow/drafts/a.jsonl:1: this is no change of a case"),
+            ('{"document": 7}\n', "the draft .marrow/drafts/a.jsonl:1: this is no change of a case"),
+            (deep, "the draft .marrow/drafts/a.jsonl:1: lists and objects are nested more than 64 deep"),
+        ):
+            (drafts / "a.jsonl").write_text(garbage)
+            server = self.open()
+            server.enter()
+            status, _, content = server.ask("GET", "/api/draft?case=a")
+            self.assertEqual(status, 400, garbage[:40])
+            self.assertIn(fault, json.loads(content)["error"])
+            (row,) = server.json("GET", "/api/drafts")
+            self.assertEqual(row["case"], "a")
+            self.assertIn(fault, row["fault"])
+            server.json("POST", "/api/draft/throw-away", {"case": "a"})
+            self.assertEqual(server.json("GET", "/api/drafts"), [])
+            self.assertEqual(self.state(server)["undo"], None)
+            server.close()
+
+    def test_drafts_that_are_not_saved_are_listed(self):
+        server = self.open()
+        server.enter()
+        self.assertEqual(server.json("GET", "/api/drafts"), [])
+        self.change(server, 0, "one", n=1)
+        self.change(server, 1, "two", n=2)
+        name = "cases/7 % ü"
+        server.json("POST", "/api/draft/change", {"case": name, "revision": 0, "what": "x", "document": {}})
+        rows = {row["case"]: row for row in server.json("GET", "/api/drafts")}
+        self.assertEqual(sorted(rows), ["a", name])
+        self.assertEqual((rows["a"]["changes"], rows[name]["changes"]), (2, 1))
+        server.json("POST", "/api/draft/throw-away", {"case": "a"})
+        self.assertEqual([row["case"] for row in server.json("GET", "/api/drafts")], [name])
+        self.assertEqual(self.state(server)["document"]["views"], [], "the case begins anew")
+        answer = server.ask("POST", "/api/draft/throw-away", {"case": "a"})
+        self.assertEqual(json.loads(answer[2])["error"], "there is no draft of this case")
+        answer = server.ask("POST", "/api/draft/throw-away", {"case": "../x"})
+        self.assertIn("leads out of the folder", json.loads(answer[2])["error"])
 
     @unittest.skipUnless(os.geteuid() == 0, "only root can mount a small disk")
     def test_a_full_disk_loses_nothing(self):

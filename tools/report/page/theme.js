@@ -13,7 +13,7 @@ export function startTheme() {
   const dark = () =>
       (root.dataset.theme ? root.dataset.theme === 'dark' : matchMedia('(prefers-color-scheme: dark)').matches);
   const label = () => (button.textContent = dark() ? 'Light' : 'Dark');
-  button.setAttribute('aria-label', 'Change between light and dark');
+  button.title = 'Change between light and dark';
   if (stored()) root.dataset.theme = stored();
   button.addEventListener('click', () => {
     root.dataset.theme = dark() ? 'light' : 'dark';
@@ -21,6 +21,12 @@ export function startTheme() {
       localStorage.setItem('marrow-theme', root.dataset.theme);
     } catch (error) { /* from disk some browsers keep nothing */
     }
+    label();
+  });
+  // The workbench tells a report in its frame which theme was chosen there.
+  addEventListener('message', ({data}) => {
+    if (!data || data.marrow !== 'theme' || !['light', 'dark'].includes(data.theme)) return;
+    root.dataset.theme = data.theme;
     label();
   });
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', label);

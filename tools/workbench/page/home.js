@@ -2,20 +2,42 @@
 // The first page: the contents of the folder.
 import {el} from '../../report/page/dom.js';
 
+import * as Cases from './cases.js';
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
+
+const MOST_SHOWN = 8;
+
+// A card with links to a page; what is more than a few is folded away.
+function card(title, page, paths, none, all) {
+  const rest = paths.slice(MOST_SHOWN);
+  return el(
+      'section', {class: 'card', 'aria-label': title},
+      el('div', {class: 'card-head'}, el('h2', {}, title), all ? el('a', {href: Shell.addressOf(page)}, all) : ''),
+      Shell.links(page, paths.slice(0, MOST_SHOWN), none),
+      rest.length ? el('details', {}, el('summary', {}, rest.length + ' more'), Shell.links(page, rest, '')) : '');
+}
 
 Shell.page('home', {
   title: 'Folder',
   async show(place) {
-    const contents = await Ask.json('api/folder');
-    const list = (title, page, paths, none) => el('section', {}, el('h2', {}, title), Shell.links(page, paths, none));
+    const [contents, drafts] = await Promise.all([Ask.json('api/folder'), Ask.json('api/drafts')]);
+    const path = contents.folder, name = path.split('/').pop() || path;
     place.append(
-        el('div', {class: 'head'}, el('p', {class: 'kicker'}, 'Folder'), el('h1', {}, contents.folder)),
+        el('div', {class: 'head'}, el('h1', {}, name), el('p', {class: 'note path'}, path)),
         contents.is_cut && el('p', {class: 'note'}, 'There are too many files to look at all of them.') || '',
-        list('Cases', 'case', contents.cases, 'There is no case yet.'),
-        list('Pipelines', 'pipeline', contents.pipelines, 'There is no pipeline here.'),
-        list('Runs', 'results', contents.runs, 'There is no run here.'),
-        list('Comparisons', 'results', contents.comparisons, 'There is no comparison here.'));
+        el('div', {class: 'cards'},
+           el('div', {}, Cases.section(contents, drafts),
+              card(
+                  'Runs', 'results', contents.runs, 'There is no run here. The page "Pipeline" makes some.',
+                  contents.runs.length ? 'All with verdicts and figures' : ''),
+              card(
+                  'Comparisons', 'results', contents.comparisons,
+                  'There is no comparison here. marrow compare makes them.')),
+           el('div', {},
+              card(
+                  'Pipelines', 'pipeline', contents.pipelines,
+                  'There is no pipeline here. Copy one of marrow\'s own into this folder.',
+                  'Copy one of marrow\'s own …'))));
   }
 });

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page "Pipeline": the graph, the text beside it, the form of a node, its outputs, and runs.
+// The page "Pipeline": the graph, the text and the form of a node beside each other, its outputs, and runs.
 import * as Dom from '../../report/page/dom.js';
 import {el} from '../../report/page/dom.js';
 import * as Graph from '../../report/page/graph.js';
 
 import * as NodeOutput from './node_output.js';
+import * as PipelineList from './pipeline_list.js';
 import * as PipelineNode from './pipeline_node.js';
 import * as PipelineRuns from './pipeline_runs.js';
-import * as PipelineText from './pipeline_text.js';
+import {PipelineText} from './pipeline_text.js';
+import {GraphView} from './pipeline_view.js';
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
 
@@ -18,8 +20,15 @@ class Page {
     Object.assign(this, {file, state: null, chosen: null, plan: null, lookCount: 0, planCount: 0, graph: null});
     this.inputs = Object.fromEntries(
         [...parameters].filter(([key]) => key.startsWith('in.')).map(([key, value]) => [key.slice(3), value]));
-    this.text = PipelineText.make((text) => this.save(text));
+    this.text = new PipelineText((text) => this.save(text));
+    this.view = new GraphView();
     this.build(place);
+  }
+
+  leave() {
+    clearTimeout(this.timer);
+    this.text.dispose();
+    this.view.dispose();
   }
 
   build(place) {
@@ -27,7 +36,8 @@ class Page {
     this.changes = Shell.undoButtons((way) => this.step(way));
     this.status = el('span', {class: 'note', role: 'status', 'data-do': 'status'});
     this.run = button('Run what is stale', () => this.start(), 'run');
-    this.graphBox = el('div', {});
+    this.noGraph = el('p', {class: 'note'}, 'The graph is drawn when the file has no faults.');
+    this.graphBox = el('div', {class: 'graph-place'}, this.view.element, this.noGraph);
     this.picker = el('div', {class: 'toolbar'});
     this.inputTitle = el('summary', {}, 'Inputs');
     this.inputBox = el('div', {class: 'form'});
@@ -37,17 +47,24 @@ class Page {
     this.result = el('div', {'aria-live': 'polite'});
     const panel = (title, name, ...content) =>
         el('section', {class: 'panel pipeline-' + name, 'aria-label': title}, el('h2', {}, title), content);
+    this.inputs_part = el('details', {class: 'pipeline-inputs'}, this.inputTitle, this.inputBox);
     place.append(
         el('div', {class: 'page-head'}, el('h1', {}, this.file),
            el('div', {class: 'toolbar'}, this.run, this.changes.boxes, this.status)),
-        el('details', {class: 'pipeline-inputs', open: true}, this.inputTitle, this.inputBox), this.result,
-        el('div', {class: 'pipeline-grid'}, panel('Graph', 'graph', this.picker, this.graphBox),
-           panel('Text', 'text', this.text.element), panel('Node', 'node', this.formBox),
+        this.inputs_part, this.result,
+        el('div', {class: 'pipeline-grid'}, panel('Graph', 'graph', this.graphBox, this.picker),
+           panel('Node', 'node', this.formBox), panel('Text', 'text', this.text.element),
            panel('What the node makes', 'output', this.outputBox), panel('Commands', 'commands', this.commands)));
   }
 
+  // Takes over the first state, with the inputs of the last visit and the case that is worked on.
   async load(state) {
+    const present = Shell.presentCase() ? {case: Shell.presentCase()} : {};
+    const known = new Set(state.inputs.map((one) => one.name));
+    for (const [name, value] of Object.entries({...state.kept_inputs, ...present}))
+      if (known.has(name) && this.inputs[name] === undefined) this.inputs[name] = value;
     this.take(state);
+    this.inputs_part.open = this.missing().length > 0;
     await this.refreshPlan();
   }
 
@@ -58,23 +75,19 @@ class Page {
     this.changes.update(state.undo, state.redo);
     if (state.graph) this.draw(state.graph);
     this.graphBox.classList.toggle('outdated', !state.graph);
-    if (!state.graph && !this.graph)
-      this.graphBox.replaceChildren(el('p', {class: 'note'}, 'The graph is drawn when the file has no faults.'));
+    this.view.element.hidden = !this.graph;
+    this.noGraph.hidden = Boolean(this.graph);
     if (JSON.stringify(before && before.inputs) !== JSON.stringify(state.inputs)) this.showInputs();
     this.showPicker();
     this.showForm();
   }
 
   draw(graph) {
-    const scroll = this.graphBox.querySelector('.graph-box'), at = scroll && [scroll.scrollLeft, scroll.scrollTop];
     const focused = document.activeElement && document.activeElement.dataset && document.activeElement.dataset.node;
-    const drawn = Graph.draw(graph, (node) => this.choose(node.id));
-    this.graphBox.replaceChildren(drawn);
-    this.graph = drawn.querySelector('svg');
-    if (at)
-      requestAnimationFrame(() => {
-        [drawn.querySelector('.graph-box').scrollLeft, drawn.querySelector('.graph-box').scrollTop] = at;
-      });
+    this.graph = Graph.draw(graph, (node) => this.choose(node.id)).querySelector('svg');
+    this.graph.querySelectorAll('[data-node]').forEach(PipelineRuns.nameAsSeen);
+    this.view.element.hidden = false;
+    this.view.set(this.graph);
     this.markChosen();
     const again =
         focused && [...this.graph.querySelectorAll('[data-node]')].find((one) => one.dataset.node === focused);
@@ -100,9 +113,18 @@ class Page {
   choose(id) {
     this.chosen = id;
     this.markChosen();
+    this.showInText();
     this.showPicker();
     this.showForm();
     this.look();
+  }
+
+  // Marks the node's text, and moves the graph to its box.
+  showInText() {
+    const node = this.state.nodes[this.chosen];
+    this.text.showNode(node && !node.file ? node.line : null);
+    const box = this.graph && this.graph.querySelector('[data-node="' + CSS.escape(this.chosen || '') + '"]');
+    if (box) this.view.reveal(box);
   }
 
   // The chosen node; null for a node of a body, which this file does not have.
@@ -132,7 +154,7 @@ class Page {
     const [id] = (this.chosen || '').split('/'), outer = this.state.nodes[id];
     if (!outer)
       return this.formBox.replaceChildren(
-          el('p', {class: 'note'}, 'Choose a node in the graph or in the list above it.'));
+          el('p', {class: 'note'}, 'Choose a node in the graph or in the list below it.'));
     const folder = this.file.split('/').slice(0, -1), name = outer.body.endsWith('.yaml') && outer.body;
     return this.formBox.replaceChildren(
         el('p', {}, this.chosen + ' is a node of the body of ' + id + '. ',
@@ -164,6 +186,10 @@ class Page {
                 [el('p', {class: 'note'}, 'This pipeline has no inputs.')]));
   }
 
+  missing() {
+    return this.state.inputs.filter((one) => one.default === null && !this.inputs[one.name]);
+  }
+
   showCommands(...commands) {
     this.commands.replaceChildren(...commands.filter(Boolean).map((text) => Dom.command(text)));
   }
@@ -175,7 +201,7 @@ class Page {
     this.run.disabled = true;
     this.showCommands(this.state.command);
     if (this.state.faults.length) return void (this.status.textContent = 'the file has faults');
-    const missing = this.state.inputs.filter((one) => one.default === null && !this.inputs[one.name]);
+    const missing = this.missing();
     if (missing.length)
       return void (
           this.status.textContent = 'give ' + missing.map((one) => one.name).join(', ') + ' to see what is stale');
@@ -239,7 +265,8 @@ class Page {
                       [one.item, ...(one.reasons || []).slice(0, 2)].filter(Boolean).join('; '))),
            bad.map(([id, one]) => el('p', {class: 'reason'}, id + ': ' + one.reason)),
            result.faults.filter((text) => !text.includes('not made')).map((text) => el('p', {class: 'reason'}, text)),
-           Dom.command(command)));
+           el('details', {}, el('summary', {}, 'The same on the command line'), Dom.command(command))));
+    this.inputs_part.open = false;
   }
 
   // Shows the outputs of the chosen node, if they are known.
@@ -290,6 +317,10 @@ class Page {
     const sent = this.state.text.includes('\r\n') ? text.replaceAll('\n', '\r\n') : text;
     return this.after('api/pipeline/text', {text: sent});
   }
+  saveEdit() {
+    if (this.text.isChanged()) return this.save(this.text.text());
+    return Shell.notice('There is nothing to save: the file holds this text.');
+  }
   step(way) {
     if (this.state[way] !== null && !this.text.isChanged()) return this.after('api/pipeline/' + way);
     return undefined;
@@ -304,9 +335,7 @@ class Page {
           'The file was changed elsewhere. Your edit of the text is not saved; copy it, then discard it.', 'fault');
       const mine = this.text.text();
       this.take(state);
-      const box = this.text.element.querySelector('textarea');
-      box.value = mine;
-      box.dispatchEvent(new Event('input'));
+      this.text.put(mine);
     } else
       this.take(state);
     await this.refreshPlan();
@@ -326,18 +355,10 @@ class Page {
   }
 }
 
-async function list(place) {
-  const {pipelines} = await Ask.json('api/folder');
-  place.append(
-      el('div', {class: 'page-head'}, el('h1', {}, 'Pipelines')),
-      Shell.links(
-          'pipeline', pipelines, 'There is no pipeline in this folder. Make one with: marrow new pipeline NAME'));
-}
-
 Shell.page('pipeline', {
   title: 'Pipeline',
   async show(place, parameters, first) {
-    if (!first) return list(place);
+    if (!first) return PipelineList.show(place);
     const state = await Ask.json('api/pipeline', {file: first});
     if (!place.isConnected) return undefined;  // another page was opened in the meantime
     const mine = page = new Page(place, first, parameters);
@@ -348,14 +369,15 @@ Shell.page('pipeline', {
     return undefined;
   },
   leave() {
-    if (page) clearTimeout(page.timer);
+    if (page) page.leave();
     NodeOutput.clear();
     page = null;
   },
   keys: [
-    ['Ctrl+s', 'save the text', () => page && page.text.isChanged() && page.save(page.text.text())],
+    ['Ctrl+s', 'save the text', () => page && page.saveEdit()],
     ['Ctrl+Enter', 'run what is stale', () => page && page.start()],
     ['Ctrl+z', 'undo', () => page && page.step('undo')], ['Ctrl+y or Ctrl+Z', 'redo', () => page && page.step('redo')],
-    ['Tab, Enter', 'go through the nodes of the graph, choose one']
+    ['Tab, Enter', 'go through the nodes of the graph, choose one'], ['drag, Ctrl+wheel', 'move the graph, zoom it'],
+    ['Ctrl+Space', 'complete a word of the text']
   ]
 });

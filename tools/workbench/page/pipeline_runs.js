@@ -16,6 +16,14 @@ const WORDS = {
   waiting: 'waits'
 };
 
+// The name of a node's box for screen readers: the words in it, so that who speaks to the browser can say what is seen.
+export function nameAsSeen(group) {
+  const texts = [...group.querySelectorAll('text')];
+  for (const one of texts)
+    if (!one.nextSibling || one.nextSibling.nodeName !== '#text') one.after(' ');  // keeps the words apart
+  group.setAttribute('aria-label', texts.map((one) => one.textContent.trim()).filter(Boolean).join(', '));
+}
+
 // Writes a node's state above its box in the graph. Colour only repeats what the words say.
 export function mark(graph, id, state, text, tip) {
   const group = graph && [...graph.querySelectorAll('[data-node]')].find((one) => one.dataset.node === id);
@@ -31,10 +39,9 @@ export function mark(graph, id, state, text, tip) {
       y: Number(box.getAttribute('y')) - 4
     });
     group.append(label);
-    group.dataset.label = group.getAttribute('aria-label');
   }
   label.textContent = text || WORDS[state] || '';
-  group.setAttribute('aria-label', group.dataset.label + (label.textContent ? ', ' + label.textContent : ''));
+  nameAsSeen(group);
   if (tip) group.dataset.tip = tip;
 }
 

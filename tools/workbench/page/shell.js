@@ -9,6 +9,7 @@ import * as Ask from './server.js';
 
 const pages = new Map();  // name: {title, show(place, parameters), keys, leave()}
 let current = null;
+let present_case = '';  // the case that was shown last; it goes along to the other pages
 
 // Adds a page. show(place, parameters, first) fills the element `place`; `first` is what follows the page's name in
 // the address. `keys`: [[key, what it does, action]], where key is as in KeyboardEvent.key, with 'Ctrl+' in front.
@@ -30,14 +31,33 @@ export function go(name, first, more) {
   location.hash = addressOf(name, first, more);
 }
 
+// The links of the bar, and the name of the case that goes along with them.
+function showCase() {
+  for (const link of document.querySelectorAll('#pages a'))
+    link.href = addressOf(link.dataset.page, ['case', 'place'].includes(link.dataset.page) ? present_case : '');
+  const label = document.getElementById('present-case');
+  label.hidden = !present_case;
+  label.href = addressOf('case', present_case);
+  label.textContent = nameOf(present_case);
+}
+
+// The case that is worked on, or ''.
+export const presentCase = () => present_case;
+
 async function show() {
   const {name, first, parameters} = parsed(location.hash), place = document.getElementById('page');
+  if (first && ['case', 'place'].includes(name)) present_case = first;
   if (current && current.leave) current.leave();
   current = pages.get(name);
   document.title = (first ? first + ' · ' : '') + current.title + ' · marrow';
   for (const link of document.querySelectorAll('#pages a'))
-    link.toggleAttribute('aria-current', link.dataset.page === name);
-  const inside = el('div', {class: 'page page-' + name});
+    if (link.dataset.page === name)
+      link.setAttribute('aria-current', 'page');
+    else
+      link.removeAttribute('aria-current');
+  showCase();
+  const loading = el('p', {class: 'loading note', role: 'status'}, 'Loading …');
+  const inside = el('div', {class: 'page page-' + name}, loading);
   place.replaceChildren(inside);
   place.dataset.page = name;
   delete document.documentElement.dataset.ready;
@@ -45,8 +65,9 @@ async function show() {
     await current.show(inside, parameters, first);
   } catch (error) {
     inside.append(el('p', {class: 'fault', role: 'alert'}, error.message));
-    console.error(error);
+    if (!(error instanceof Ask.Refused)) console.error(error);
   }
+  loading.remove();
   document.documentElement.dataset.ready = name;
 }
 
@@ -170,15 +191,40 @@ const size = (bytes) =>
          bytes < 1e6 ? Math.round(bytes / 1e3) + ' kB' :
                        (bytes / 1e6).toFixed(1) + ' MB');
 
-const GENERAL_KEYS = [['?', 'this list'], ['Alt+1 … Alt+9', 'a page'], ['Esc', 'close a dialog']];
+const GENERAL_KEYS = [
+  ['Alt+↓ and Alt+↑', 'the next and the previous section'], ['Ctrl+s', 'save'], ['Alt+1 … Alt+9', 'a page'],
+  ['?', 'this list'], ['Esc', 'close a dialog']
+];
+
+// Moves the focus to the next (1) or the previous (-1) section of the page.
+function jump(by) {
+  const sections = [...document.querySelectorAll('#page section')].filter((one) => one.checkVisibility());
+  if (!sections.length) return;
+  const inside = sections.findLastIndex((one) => one.contains(document.activeElement));
+  const to =
+      sections[(inside < 0 ? (by > 0 ? 0 : sections.length - 1) : inside + by + sections.length) % sections.length];
+  if (!to.hasAttribute('tabindex')) to.setAttribute('tabindex', -1);
+  to.focus({preventScroll: true});
+  to.scrollIntoView({block: 'start'});
+}
+
+// Ctrl+s on a page without an action of its own for it: its button that saves, if it has one.
+function save() {
+  const button = document.querySelector('#page [data-do="save"]:not(:disabled)');
+  if (button)
+    button.click();
+  else
+    notice('There is nothing to save: each change is kept at once.');
+}
+
 function showKeys() {
   const keys = [...((current && current.keys) || []), ...GENERAL_KEYS];
   return dialog('Keys of this page', () => Dom.valueTable(keys.map(([key, does]) => [el('kbd', {}, key), does])));
 }
 
 function pressed(event) {
-  const types =
-      event.target.matches && event.target.matches('input:not([type="range"],[type="checkbox"]), textarea, select');
+  const types = event.target.matches &&
+      event.target.matches('input:not([type="range"],[type="checkbox"]), textarea, select, [contenteditable="true"]');
   if (document.getElementById('dialog').open) return;
   const name = (event.ctrlKey || event.metaKey ? 'Ctrl+' : '') + (event.altKey ? 'Alt+' : '') +
       (event.shiftKey && event.key.length > 1 ? 'Shift+' : '') + event.key;
@@ -195,10 +241,17 @@ function pressed(event) {
   if (types && !event.ctrlKey && !event.metaKey) return;
   if (types && !event.target.matches('select') && /^Ctrl\+[zyZ]$/.test(name)) return;  // the field's own undo
   if (name === '?') return void showKeys();
+  if (event.altKey && /^Arrow(Up|Down)$/.test(event.key) && !event.target.matches('select')) {
+    event.preventDefault();
+    return void jump(event.key === 'ArrowDown' ? 1 : -1);
+  }
   const found = ((current && current.keys) || []).find(([key, , action]) => action && key.split(' or ').includes(name));
-  if (!found) return;
+  if (!found && name !== 'Ctrl+s') return;
   event.preventDefault();
-  found[2](event);
+  if (found)
+    found[2](event);
+  else
+    save();
 }
 
 export function start() {

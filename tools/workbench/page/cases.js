@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+// The cases of the folder and the drafts that are not saved: each is opened, placed, or its draft is thrown away.
+import * as Dom from '../../report/page/dom.js';
+import {el} from '../../report/page/dom.js';
+
+import * as Ask from './server.js';
+import * as Shell from './shell.js';
+
+const MINUTE_MS = 60000, HOUR_MS = 60 * MINUTE_MS, DAY_MS = 24 * HOUR_MS;
+
+// "5 minutes ago" for a time in UTC; the date after a week.
+export function ago(text) {
+  const past_ms = Date.now() - Date.parse(text);
+  if (!Number.isFinite(past_ms)) return '';
+  const count = (one_ms, unit) => {
+    const n = Math.floor(past_ms / one_ms);
+    return n + ' ' + unit + (n === 1 ? '' : 's') + ' ago';
+  };
+  if (past_ms < MINUTE_MS) return 'just now';
+  if (past_ms < HOUR_MS) return count(MINUTE_MS, 'minute');
+  if (past_ms < DAY_MS) return count(HOUR_MS, 'hour');
+  return past_ms < 7 * DAY_MS ? count(DAY_MS, 'day') : text.slice(0, 10);
+}
+
+// The paths that the pages use: the opened folder itself is '.'.
+const known = (paths) => paths.map((path) => path || '.');
+
+// A name for a new case that is still free: case, case-2, ...
+function freeName(taken) {
+  for (let number = 1;; ++number) {
+    const name = number === 1 ? 'case' : 'case-' + number;
+    if (!taken.includes(name)) return name;
+  }
+}
+
+function faultOfName(name, taken) {
+  if (!name) return 'Give the case a name, such as ' + freeName(taken) + '.';
+  if (name.startsWith('/') || name.split('/').some((part) => part.startsWith('.')))
+    return 'A name is a folder below this one, such as cases/7, and no part of it begins with a dot.';
+  return taken.includes(name) ? 'There is a case ' + name + ' already. Give another name, or open that one.' : '';
+}
+
+// Asks for the name of a new case, and opens it.
+async function begin(taken) {
+  const name = await Shell.dialog('New case', (close) => {
+    const fault = el('p', {class: 'reason', role: 'alert', hidden: true});
+    const box = el('input', {type: 'text', value: freeName(taken), 'data-do': 'name', spellcheck: 'false'});
+    const make = () => {
+      const given = box.value.trim().replace(/\/+$/, ''), text = faultOfName(given, taken);
+      fault.hidden = !text;
+      fault.textContent = text;
+      if (!text) close(given);
+    };
+    setTimeout(() => box.select());
+    return el(
+        'form', {
+          onsubmit: (event) => {
+            event.preventDefault();
+            make();
+          }
+        },
+        Dom.labelled('Name: the folder that holds the case', box), fault,
+        el('p', {class: 'note'},
+           'Nothing is written there before you save. Until then each change is kept as a draft.'),
+        el('div', {class: 'toolbar'}, el('button', {type: 'submit', class: 'primary', 'data-do': 'make'}, 'Begin')));
+  });
+  if (name) Shell.go('case', name);
+}
+
+async function throwAway(draft, again) {
+  const sure = await Shell.dialog(
+      'Throw the draft away?',
+      (close) => el(
+          'div', {},
+          el('p', {},
+             draft.fault ? 'The draft of ' + draft.case +' cannot be opened. It is lost then.' :
+                           'The changes of ' + draft.case +' that are not saved are lost then: ' + draft.changes + '.'),
+          el('p', {class: 'note'}, 'What was saved in the case\'s folder stays.'),
+          el('div', {class: 'toolbar'},
+             Dom.button('Throw it away', () => close(true), {class: 'danger', 'data-do': 'throw-away'}),
+             Dom.button('Keep it', () => close(false)))));
+  if (!sure) return;
+  await Shell.guarded(() => Ask.post('api/draft/throw-away', {case: draft.case}));
+  again();
+}
+
+function row(path, is_case, draft, again) {
+  const opens = (page, text, more) => el('a', {href: Shell.addressOf(page, path), ...more}, text);
+  const words = draft &&
+      (draft.fault ?
+           draft.fault :
+           draft.changes + (draft.changes === 1 ? ' change' : ' changes') + ' not saved, ' + ago(draft.changed));
+  return el(
+      'li', {class: 'case-row', 'data-case': path},
+      el('div', {}, opens('case', Shell.nameOf(path), {class: 'name'}),
+         !is_case && el('span', {class: 'tag'}, 'draft') || '',
+         words && el('small', {class: draft.fault ? 'bad' : ''}, words) || ''),
+      el('div', {class: 'actions'},
+         is_case ? opens('place', 'Place', {class: 'as-button', 'aria-label': 'Place ' + Shell.nameOf(path)}) : '',
+         draft ? Dom.button(
+                     'Throw draft away', () => throwAway(draft, again),
+                     {'data-throw': path, 'aria-label': 'Throw draft away: ' + path}) :
+                 ''));
+}
+
+// A section with the cases, the drafts and "New case ..."; it fills itself again after a change.
+export function section(contents, drafts) {
+  const place = el('section', {class: 'cases card', 'aria-label': 'Cases'});
+  const fill = (cases, some) => {
+    const saved = known(cases), of = new Map(some.map((one) => [one.case || '.', one]));
+    const taken = [...new Set([...saved, ...of.keys()])];
+    place.replaceChildren(
+        el('div', {class: 'card-head'}, el('h2', {}, 'Cases'),
+           Dom.button('New case …', () => begin(taken), {class: 'primary', 'data-do': 'new-case'})),
+        taken.length ? el('ul', {class: 'files'},
+                          taken.sort((a, b) => a.localeCompare(b, undefined, {numeric: true}))
+                              .map((path) => row(path, saved.includes(path), of.get(path), again))) :
+                       el('p', {class: 'note'},
+                          'There is no case yet. A case is a CT with bones, and X-rays with their cameras.'));
+  };
+  const again = () =>
+      Shell.guarded(async () => fill((await Ask.json('api/folder')).cases, await Ask.json('api/drafts')));
+  fill(contents.cases, drafts);
+  return place;
+}
