@@ -1,18 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page "Case". Its parts are panels: each shows a part of the draft's document and changes it.
+// The page "Case": a stage with slices, surfaces and X-rays beside each other, a rail of steps, and the tools of the
+// chosen step. Its parts are panels: each shows a part of the draft's document and changes it.
 import {el} from '../../report/page/dom.js';
 
+import * as CaseSteps from './case_steps.js';
 import {CaseDraft} from './draft.js';
 import * as Shell from './shell.js';
 
 const panels = [];
-const keys = [['Ctrl+z', 'undo', () => draft.step('undo')], ['Ctrl+y or Ctrl+Z', 'redo', () => draft.step('redo')]];
-let draft = null, open = [];
+const keys = [
+  ['Ctrl+z', 'undo', () => draft.step('undo')], ['Ctrl+y or Ctrl+Z', 'redo', () => draft.step('redo')],
+  ['1 or 2 or 3 or 4 or 5', 'a step of the rail', (event) => rail.choose(CaseSteps.STEPS[Number(event.key) - 1].name)]
+];
+let draft = null, open = [], rail = null;
 
-// Adds a panel. make(draft) returns {element, update(), dispose()}; update() is called after each change of the
-// draft. Panels with a smaller `order` come first. `more_keys` are as in Shell.page().
-export function panel(title, order, make, more_keys = []) {
-  panels.push({title, order, make});
+// Adds a panel. make(draft) returns {element, update(), dispose(), tools, stage}; update() is called after each change
+// of the draft. `tools`: further parts for the rail's steps, [{step, title, element}]; without `element` the panel has
+// only these. `stage`: its pictures, {slices | surfaces | xrays: element}. Panels with a smaller `order`
+// come first. `more_keys` are as in Shell.page().
+export function panel(title, step, order, make, more_keys = []) {
+  panels.push({title, step, order, make});
   panels.sort((a, b) => a.order - b.order);
   keys.push(...more_keys);
 }
@@ -27,18 +34,41 @@ function bar() {
   return {element: el('div', {class: 'toolbar'}, changes.boxes, state), update};
 }
 
+// The tools of each step; those of one step are shown.
+function toolsOf(parts) {
+  const boxes = CaseSteps.STEPS.map(
+      ({name}) => el(
+          'div', {class: 'case-tools', 'data-of-step': name, hidden: true},
+          parts.filter(({step}) => step === name)
+              .map(({title,
+                     element}) => el('section', {class: 'panel', 'aria-label': title}, el('h2', {}, title), element))));
+  return {boxes, show: (step) => boxes.forEach((box) => (box.hidden = box.dataset.ofStep !== step))};
+}
+
 async function show(place, parameters, first) {
   draft = await CaseDraft.open(first || 'case');
   const head = bar();
-  open = panels.map(({title, make}) => ({title, ...make(draft)}));
+  open = panels.map(({title, step, make}) => ({title, step, ...make(draft)}));
+  const parts =
+      open.flatMap(({title, step, element, tools = []}) => [...(element ? [{title, step, element}] : []), ...tools]);
+  const tools = toolsOf(parts), shown = Object.assign({}, ...open.map((one) => one.stage || {}));
+  shown.slices.querySelector('.slices').append(shown.surfaces);  // the fourth picture beside the three slices
+  const stage =
+      el('div', {class: 'case-stage'},
+         el('section', {class: 'stage-slices', 'aria-label': 'Slices and surfaces'}, shown.slices),
+         el('section', {class: 'stage-xrays', 'aria-label': 'X-ray pictures'}, shown.xrays));
+  rail = CaseSteps.rail(draft, (step) => {
+    tools.show(step);
+    stage.dataset.step = step;
+  });
   place.append(
-      el('div', {class: 'page-head'}, el('h1', {}, draft.path), head.element),
-      el('div', {class: 'panels-of-case'},
-         open.map(({title,
-                    element}) => el('section', {class: 'panel', 'aria-label': title}, el('h2', {}, title), element))));
-  const update = () => [head, ...open].forEach((one) => one.update && one.update());
+      el('div', {class: 'case-side'}, el('div', {class: 'page-head'}, el('h1', {}, draft.path), head.element),
+         rail.element, tools.boxes),
+      stage);
+  const update = () => [head, rail, ...open].forEach((one) => one.update && one.update());
   draft.addEventListener('change', update);
   update();
+  rail.choose(rail.firstOpen());
 }
 
 Shell.page('case', {
