@@ -59,9 +59,10 @@ RigidTransform placement_of(const nlohmann::json& matrix);
 /// The point nearest to the middle rays of all views.
 Eigen::Vector3d common_centre_mm(const List<View>& views);
 
-/// The image as 8 bit: each square of `step_px` pixels becomes its mean. Dark and bright are as in the image; the
-/// darkest and brightest half per cent are cut off.
-std::string grey_bytes(const View& view, int step_px);
+/// The image as 16 bit numbers, low byte first; each square of `step_px` pixels becomes its mean. Whole numbers stay as
+/// they are. Others are spread from the least to the largest value of `like`, so that frames of a sequence are shown
+/// alike. The page makes greys of them.
+std::string number_bytes(const View& view, const View& like, int step_px);
 
 /// What a request wants to see of a bone in a view.
 struct OverlayWish {

@@ -36,7 +36,7 @@ List<SequenceFrame> read_frames(const Workbench& workbench, const PlacedCase& pl
   return outputs_of(call, workbench, job).at("frames").as_list<SequenceFrame>();
 }
 
-/// Some frames of a view as grey_bytes(), one after the other; {frames, bytes}, the bytes of each.
+/// Some frames of a view as number_bytes(), one after the other; {frames, bytes}, the bytes of each.
 Answer frames(const Workbench& workbench, const PlacedCase& placed, const Request& request) {
   constexpr int kMost = 1'000'000, kMostAtOnce = 32, kCoarsest_px = 16;
   ViewFrames view{placed.view(request.parameter("view")).name, request.parameter("images"),
@@ -47,7 +47,7 @@ Answer frames(const Workbench& workbench, const PlacedCase& placed, const Reques
   Job job("", "");
   std::string bytes;
   const auto read = read_frames(workbench, placed, view, first, last, job);
-  for (const SequenceFrame& frame : read) bytes += grey_bytes(frame.views.front(), step_px);
+  for (const SequenceFrame& frame : read) bytes += number_bytes(frame.views.front(), placed.view(view.name), step_px);
   const json about = {{"frames", read.size()}, {"bytes", bytes.size() / read.size()}};
   return bytes_answer(std::move(bytes), about);
 }

@@ -7,7 +7,6 @@
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/domain/quantile.hpp"
 #include "workbench/place.hpp"
 
 namespace marrow::workbench {
@@ -64,16 +63,18 @@ std::string outline_bytes(const OverlayWish& wish, json& about) {
 
 }  // namespace
 
-std::string grey_bytes(const View& view, int step_px) {
-  const cv::Mat small = means_of_squares(view.image.pixels, step_px);
-  std::vector<float> values(small.begin<float>(), small.end<float>());
-  std::erase_if(values, [](float value) { return !std::isfinite(value); });
-  if (values.empty()) return std::string(small.total(), '\0');
-  const double dark = quantile_in_place(values, 0.005),
-               bright = std::max(quantile_in_place(values, 0.995), dark + 1e-9);
-  cv::Mat bytes;
-  small.convertTo(bytes, CV_8U, 255 / (bright - dark), -255 * dark / (bright - dark));
-  return bytes_of_pixels(bytes);
+std::string number_bytes(const View& view, const View& like, int step_px) {
+  cv::Mat small = means_of_squares(view.image.pixels, step_px), numbers;
+  double offset = 0, scale = 1;
+  if (view.image.pixels.depth() == CV_32F) {
+    const cv::Mat is_finite = cv::abs(like.image.pixels) <= 1e30f;  // false for NaN and infinities
+    double most = 0;
+    cv::minMaxLoc(like.image.pixels, &offset, &most, nullptr, nullptr, is_finite);
+    if (most > offset) scale = (most - offset) / 65535;
+    cv::patchNaNs(small, offset);
+  }
+  small.convertTo(numbers, CV_16U, 1 / scale, -offset / scale);
+  return bytes_of_pixels(numbers);
 }
 
 std::string overlay_bytes(const OverlayWish& wish, json& about) {

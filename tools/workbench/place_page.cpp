@@ -102,7 +102,8 @@ void add_place_page(Server& server, Workbench& workbench) {
   server.get("/api/place/image", [cases](const Request& request) {
     const auto placed = cases->find(request.parameter("case"));
     const int step_px = request.number("step_px", 1, kCoarsest_px);
-    return bytes_answer(grey_bytes(placed->view(request.parameter("view")), step_px));
+    const View& view = placed->view(request.parameter("view"));
+    return bytes_answer(number_bytes(view, view, step_px));
   });
   server.post("/api/place/overlay",
               [cases](const Request& request) { return overlay(*cases->find(request.text("case")), request); });

@@ -153,8 +153,16 @@ class PageTest(BenchTest):
         self.browser.wait("return !!document.querySelector(%s)" % json.dumps(selector), seconds)
         return self.browser.driver.find_element("css selector", selector)
 
+    def go_to_step(self, name):
+        """Shows the tools of a step on the page "Case"."""
+        self.browser.driver.find_element("css selector", '[data-step="%s"]' % name).click()
+
     def find_in_sight(self, selector):
+        """On the page "Case", goes to the step whose tools hold the element."""
         element = self.find(selector)
+        step = self.browser.js("return arguments[0].closest('[data-of-step][hidden]')?.dataset.ofStep || null", element)
+        if step:
+            self.go_to_step(step)
         self.browser.js("arguments[0].scrollIntoView({block: 'center'})", element)
         return element
 

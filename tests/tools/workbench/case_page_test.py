@@ -158,6 +158,7 @@ class CasePageTest(PageTest):
         self.assertEqual(self.crosshair(), [x + 2, y + 2, z + 2])
         self.press("sagittal", Keys.ARROW_LEFT, Keys.SHIFT + Keys.PAGE_DOWN)
         self.assertEqual(self.crosshair(), [x - 8, y + 1, z + 2])
+        self.find_in_sight('[data-tool="seed distal"]')
         self.browser.js("document.querySelector('[data-tool=\"seed distal\"]').focus()")
         self.find('[data-tool="seed distal"]').send_keys(Keys.ENTER)
         self.press("axial", Keys.ENTER)
@@ -175,7 +176,7 @@ class CasePageTest(PageTest):
         from selenium.webdriver import ActionChains
 
         self.with_ct()
-        self.click('[aria-label="Go to seed 1 of distal"]')
+        self.click('[aria-label$="go to seed 1 of distal"]')
         self.wait("document.querySelector('[data-slice=axial]').dataset.shown === '11'")
         canvas = self.find_in_sight('[data-slice="axial"]')
         scale = self.browser.js("return arguments[0].clientWidth", canvas) / 40
@@ -199,8 +200,8 @@ class CasePageTest(PageTest):
     def test_a_ct_that_cannot_be_read_is_said_on_the_page(self):
         (self.folder / "scan" / "slice7-107.dcm").write_bytes(b"damaged")
         self.begin(ct={"file": "scan"})
-        self.wait("!!document.querySelector('.ct-panel .fault')")
-        self.assertIn("slice7-107.dcm", self.find(".ct-panel .fault").text)
+        self.wait("!!document.querySelector('.ct-panel div > .fault')")
+        self.assertIn("slice7-107.dcm", self.find_in_sight(".ct-panel div > .fault").text)
         self.assertEqual(self.browser.js("return document.querySelector('.ct-options').open"), True)
 
     def test_of_several_series_one_is_chosen(self):

@@ -21,6 +21,9 @@ def wish(**changes):
     return {**asked, "starts": {"bone": truth(1)}, "keyframes": {}, **changes}
 
 
+BYTES = 2 * 256 * 256  # of a frame: 16 bits for each pixel
+
+
 class RequestsTest(Moving, BenchTest):
     def setUp(self):
         super().setUp()
@@ -51,12 +54,12 @@ class RequestsTest(Moving, BenchTest):
     def test_frames_are_read_where_they_are(self):
         self.assertEqual(self.opened(VIEWS)["result"], {"frames": FRAMES})
         status, headers, content = self.server.ask("GET", self.frames())
-        self.assertEqual((status, json.loads(headers["X-Marrow-About"])), (200, {"bytes": 256 * 256, "frames": 2}))
-        self.assertEqual(len(content), 2 * 256 * 256)
+        self.assertEqual((status, json.loads(headers["X-Marrow-About"])), (200, {"bytes": BYTES, "frames": 2}))
+        self.assertEqual(len(content), 2 * BYTES)
         second = self.server.ask("GET", self.frames(first=3))[2]
-        self.assertEqual(content[256 * 256 :], second)
-        self.assertNotEqual(content[: 256 * 256], second)
-        self.assertEqual(len(self.server.ask("GET", self.frames(first=3, step_px=2))[2]), 128 * 128)
+        self.assertEqual(content[BYTES:], second)
+        self.assertNotEqual(content[:BYTES], second)
+        self.assertEqual(len(self.server.ask("GET", self.frames(first=3, step_px=2))[2]), BYTES // 4)
 
     def test_a_file_with_several_frames_and_a_camera_in_case_yaml(self):
         images = [numpy.full((256, 256), 1000 * (frame + 1)) for frame in range(3)]
@@ -75,8 +78,8 @@ class RequestsTest(Moving, BenchTest):
         self.assertEqual((state["error"], state["result"]), ("", {"frames": 3}))
         content = self.server.ask("GET", self.frames(**film))[2]
         for at, frame in ((0, 2), (1, 3)):
-            row = content[256 * 256 * at :][:256]
-            self.assertEqual(row, b"\xff" * (64 * frame) + b"\0" * (256 - 64 * frame))
+            row = numpy.frombuffer(content[BYTES * at :][:512], "<u2")
+            self.assertEqual(row.tolist(), [60000] * (64 * frame) + [1000 * frame] * (256 - 64 * frame))
         self.assertIn(
             "a pattern chooses files of a folder, but this is not a folder; leave it out",
             self.opened({"frontal": {**film, "pattern": "*.tif"}, "lateral": film})["error"],

@@ -236,7 +236,7 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
     def test_few_images_are_kept_in_memory(self):
         self.place()
         self.js(
-            "const images = marrow.place().sequence.images; images.constructor.MOST_BYTES = 5 * 65536;"
+            "const images = marrow.place().sequence.images; images.constructor.MOST_BYTES = 5 * 131072;"
             "images.blocks.clear(); images.constructor.BLOCK = 1"
         )
         for frame in (1, 2, 3, 4, 5, 6, 1):
@@ -247,8 +247,8 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
             "return blocks.reduce((sum, one) => sum + (one.bytes || 0), 0)"
         )
         time.sleep(0.5)
-        self.assertLessEqual(self.js(held), 5 * 65536)
-        self.assertGreater(self.js(held), 65536)
+        self.assertLessEqual(self.js(held), 5 * 131072)
+        self.assertGreater(self.js(held), 131072)
 
     def test_without_the_sequence_the_case_is_shown_again(self):
         self.place()
@@ -258,7 +258,7 @@ class PageOfSequenceTest(PageOfCase, Moving, PageTest):
         self.browser.wait("return !marrow.place().sequence.isOn")
         self.assertTrue(self.js("return document.querySelector('.place-sequence').hidden"))
         self.assertFalse(self.js("return document.querySelector('[aria-label=Costs]').hidden"))
-        self.assertTrue(self.js("return marrow.place().views.every((view) => view.paint.grey === view.image)"))
+        self.assertTrue(self.js("return marrow.place().views.every((view) => view.shown.numbers === view.image)"))
         self.press("undo")
         self.browser.wait("return marrow.place().sequence.isOn")
 

@@ -119,7 +119,8 @@ class XrayTest(PageTest):
         self.show(self.server, "case=knee", **how)
         self.browser.logs()
         if document and document.get("views"):
-            self.find("[data-check] > *")  # it comes last on the page, and moves everything below it
+            self.find("[data-check] > *")  # it comes last
+            self.go_to_step("xrays")  # the X-rays are larger then
 
     def document(self):
         """The document in the draft's file, as a crash would leave it."""

@@ -22,8 +22,7 @@ class ViewsTest(XrayTest):
         self.find('[data-view-row="frontal"]')
         self.click('[data-do="add-view"]')
         self.click('[data-choose="lateral.png"]')
-        self.click(".add-view summary")
-        for key, value in {"beta_deg": 90, **ARM}.items():
+        for key, value in {"alpha_deg": 0, "beta_deg": 90, **ARM}.items():
             box = self.find('[data-arm="%s"]' % key)
             box.clear()
             box.send_keys(str(value))
@@ -56,7 +55,7 @@ class ViewsTest(XrayTest):
         box = self.find("dialog input")
         box.clear()
         box.send_keys("lateral", Keys.ENTER)
-        self.assertEqual(self.text("dialog .fault"), "There is a “lateral” already.")
+        self.assertEqual(self.text("dialog .fault"), "The name “lateral” is taken.")
         box.clear()
         box.send_keys("oblique", Keys.ENTER)
         self.find('[data-view-row="oblique"]')

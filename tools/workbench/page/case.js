@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page "Case". Its parts are panels: each shows a part of the draft's document and changes it.
+// The page "Case": a stage with slices, surfaces and X-rays beside each other, a rail of steps, and the tools of the
+// chosen step. Its parts are panels: each shows a part of the draft's document and changes it.
 import {el} from '../../report/page/dom.js';
 
+import * as CaseSteps from './case_steps.js';
 import * as Cases from './cases.js';
 import {CaseDraft} from './draft.js';
 import * as Ask from './server.js';
@@ -9,14 +11,17 @@ import * as Shell from './shell.js';
 
 const panels = [];
 const keys = [
-  ['Ctrl+z', 'undo', () => draft && draft.step('undo')], ['Ctrl+y or Ctrl+Z', 'redo', () => draft && draft.step('redo')]
+  ['Ctrl+z', 'undo', () => draft && draft.step('undo')], ['Ctrl+y or Ctrl+Z', 'redo', () => draft && draft.step('redo')],
+  ['1 or 2 or 3 or 4 or 5', 'a step of the rail', (event) => draft && rail.choose(CaseSteps.STEPS[Number(event.key) - 1].name)]
 ];
-let draft = null, open = [];
+let draft = null, open = [], rail = null;
 
-// Adds a panel. make(draft) returns {element, update(), dispose()}; update() is called after each change of the
-// draft. Panels with a smaller `order` come first. `more_keys` are as in Shell.page().
-export function panel(title, order, make, more_keys = []) {
-  panels.push({title, order, make});
+// Adds a panel. make(draft) returns {element, update(), dispose(), tools, stage}; update() is called after each change
+// of the draft. `tools`: further parts for the rail's steps, [{step, title, element}]; without `element` the panel has
+// only these. `stage`: its pictures, {slices | surfaces | xrays: element}. Panels with a smaller `order`
+// come first. `more_keys` are as in Shell.page().
+export function panel(title, step, order, make, more_keys = []) {
+  panels.push({title, step, order, make});
   panels.sort((a, b) => a.order - b.order);
   keys.push(...more_keys);
 }
@@ -37,21 +42,46 @@ async function choose(place) {
   place.append(el('div', {class: 'page-head'}, el('h1', {}, 'Cases')), Cases.section(contents, drafts));
 }
 
+// The tools of each step; those of one step are shown.
+function toolsOf(parts) {
+  const boxes = CaseSteps.STEPS.map(
+      ({name}) => el(
+          'div', {class: 'case-tools', 'data-of-step': name, hidden: true},
+          parts.filter(({step}) => step === name)
+              .map(({title,
+                     element}) => el('section', {class: 'panel', 'aria-label': title}, el('h2', {}, title), element))));
+  return {boxes, show: (step) => boxes.forEach((box) => (box.hidden = box.dataset.ofStep !== step))};
+}
+
 async function show(place, parameters, first) {
   draft = null;
-  if (!first) return choose(place);
+  if (!first) {
+    await choose(place);
+    return;
+  }
   draft = await CaseDraft.open(first);
   const head = bar();
-  open = panels.map(({title, make}) => ({title, ...make(draft)}));
+  open = panels.map(({title, step, make}) => ({title, step, ...make(draft)}));
+  const parts =
+      open.flatMap(({title, step, element, tools = []}) => [...(element ? [{title, step, element}] : []), ...tools]);
+  const tools = toolsOf(parts), shown = Object.assign({}, ...open.map((one) => one.stage || {}));
+  shown.slices.querySelector('.slices').append(shown.surfaces);  // the fourth picture beside the three slices
+  const stage =
+      el('div', {class: 'case-stage'},
+         el('section', {class: 'stage-slices', 'aria-label': 'Slices and surfaces'}, shown.slices),
+         el('section', {class: 'stage-xrays', 'aria-label': 'X-ray pictures'}, shown.xrays));
+  rail = CaseSteps.rail(draft, (step) => {
+    tools.show(step);
+    stage.dataset.step = step;
+  });
   place.append(
-      el('div', {class: 'page-head'}, el('h1', {}, draft.path), head.element),
-      el('div', {class: 'panels-of-case'},
-         open.map(({title,
-                    element}) => el('section', {class: 'panel', 'aria-label': title}, el('h2', {}, title), element))));
-  const update = () => [head, ...open].forEach((one) => one.update && one.update());
+      el('div', {class: 'case-side'}, el('div', {class: 'page-head'}, el('h1', {}, draft.path), head.element),
+         rail.element, tools.boxes),
+      stage);
+  const update = () => [head, rail, ...open].forEach((one) => one.update && one.update());
   draft.addEventListener('change', update);
   update();
-  return undefined;
+  rail.choose(rail.firstOpen());
 }
 
 Shell.page('case', {

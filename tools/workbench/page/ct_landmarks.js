@@ -51,6 +51,7 @@ function rowOf(draft, state, landmark) {
   const tool = {
     key,
     hint: 'Click where ' + name + ' is in the CT. Esc ends.',
+    says: () => 'put ' + name + ' here',
     place(point_mm) {
       place(draft, state, name, point_mm, model_mm ? 'move' : 'place');
       state.setTool(null);
@@ -116,4 +117,4 @@ function make(draft) {
   };
 }
 
-CasePage.panel('Landmarks in the CT', 40, make);
+CasePage.panel('Landmarks in the CT', 'check', 40, make);

@@ -23,11 +23,14 @@ function optionsForm(changed) {
   const offset = number('offset, HU');
   const flips = ['x', 'y', 'z'].map((axis) => Dom.checkbox('flip ' + axis, false, () => {}));
   const series = Dom.labelled('series UID', el('input', {type: 'text'}));
+  const fault = el('p', {class: 'fault', role: 'alert', 'data-fault-of': 'ct-options'});
   function read() {
     const size = sizes.map((field) => numberOf(box(field))), options = {};
-    if (size.some((value) => value !== null)) {
-      if (size.some((value) => !(value > 0)))
-        return void Shell.notice('Give the voxel\'s size along x, y and z, each above 0 mm, or none of them.', 'fault');
+    const is_given = size.some((value) => value !== null), is_whole = size.every((value) => value > 0);
+    fault.textContent =
+        is_given && !is_whole ? 'Give the voxel\'s size along x, y and z, each above 0 mm, or none of them.' : '';
+    if (fault.textContent) return;
+    if (is_given) {
       options.voxel_size_mm = size;
     }
     const flip = ['x', 'y', 'z'].filter((axis, k) => box(flips[k]).checked);
@@ -42,6 +45,7 @@ function optionsForm(changed) {
     flips.forEach((field, k) => (box(field).checked = flip.includes('xyz'[k])));
     box(offset).value = value_offset_hu;
     box(series).value = series_uid;
+    fault.textContent = '';
   }
   const form =
       el('form', {
@@ -51,7 +55,7 @@ function optionsForm(changed) {
           read();
         }
       },
-         sizes, flips, offset, series, el('button', {type: 'submit', 'data-do': 'read-ct'}, 'Read again'));
+         sizes, flips, offset, series, fault, el('button', {type: 'submit', 'data-do': 'read-ct'}, 'Read again'));
   const element =
       el('details', {class: 'ct-options'}, el('summary', {}, 'How it is read'),
          el('p', {class: 'note'}, 'Needed only if its files do not say it, or are wrong.'), form);
@@ -88,7 +92,7 @@ function windowBar(state) {
     element:
         el('div', {class: 'toolbar'},
            el('span', {class: 'field'}, el('span', {}, 'Window'), el('span', {class: 'choice'}, presets, all)),
-           Dom.labelled('level, HU', level), Dom.labelled('width, HU', width)),
+           Dom.labelled('level', level), Dom.labelled('width', width)),
     update() {
       if (document.activeElement !== level) level.value = state.window.level;
       if (document.activeElement !== width) width.value = state.window.width;
@@ -117,23 +121,23 @@ function readout(state, views) {
 }
 
 // The three slices with their tools; shown while there is a CT.
-function slices(state) {
+function slices(draft, state) {
   const views = ['axial', 'coronal', 'sagittal'].map((name) => new SliceView(name, state));
   const bar = windowBar(state), values = readout(state, views);
   const tool = el('p', {class: 'tool-hint', role: 'status'});
   const zoom =
-      el('span', {class: 'field'}, el('span', {}, 'Zoom'),
-         el('span', {class: 'choice'}, Dom.button('Closer', () => all(1.4), {'data-do': 'closer'}),
-            Dom.button('Further', () => all(1 / 1.4), {'data-do': 'further'}),
-            Dom.button('Whole', () => views.forEach((view) => view.fit()), {'data-do': 'whole'})));
+      el('span', {class: 'choice', role: 'group', 'aria-label': 'Zoom'},
+         Dom.button('+', () => all(1.4), {'data-do': 'closer', 'aria-label': 'Closer'}),
+         Dom.button('−', () => all(1 / 1.4), {'data-do': 'further', 'aria-label': 'Further'}),
+         Dom.button('Whole', () => views.forEach((view) => view.fit()), {'data-do': 'whole'}));
   const all = (factor) => views.forEach((view) => view.zoom(factor, view.placeOf(state.cursor_mm)));
   bar.element.append(zoom);
-  const element = el(
-      'div', {}, bar.element, tool, el('div', {class: 'slices'}, views.map((view) => view.element)), values.element,
-      el('p', {class: 'note'},
-         'Click into a slice; then the wheel goes through the slices, and with Ctrl it zooms. Drag: with the right ' +
-             'button for the window, with Shift to move the picture. ',
-         el('kbd', {}, '?'), ' lists the keys.'));
+  const empty =
+      el('div', {class: 'empty-stage'}, el('p', {}, 'The slices of the CT are shown here.'),
+         Dom.button('Choose the CT …', () => Shell.guarded(() => choose(draft)), {'data-do': 'choose-first-ct'}));
+  const foot = el('div', {class: 'slices-foot'}, tool, values.element);
+  const tiles = el('div', {class: 'slices'}, views.map((view) => view.element));
+  const element = el('div', {class: 'ct-slices'}, bar.element, empty, tiles, foot);
   return {
     element,
     views,
@@ -146,12 +150,23 @@ function slices(state) {
       tool.textContent = state.tool ? state.tool.hint : '';
       element.classList.toggle('has-tool', Boolean(state.tool));
     },
+    show(is_there) {
+      for (const one of [bar.element, foot, ...views.map((view) => view.element)]) one.hidden = !is_there;
+      empty.hidden = is_there;
+      tiles.classList.toggle('without-slices', !is_there);
+    },
     dispose: () => views.forEach((view) => view.dispose())
   };
 }
 
+const slicesHelp = () =>
+    el('p', {class: 'note'},
+       'Click into a slice: the crosshair goes there in all three. The wheel goes through the slices, with Ctrl it ' +
+           'zooms. Drag with the right button for the window, with Shift to move the picture. Two fingers zoom. ',
+       el('kbd', {}, '?'), ' lists the keys.');
+
 function make(draft) {
-  const state = CtState.of(draft), shown = slices(state);
+  const state = CtState.of(draft), shown = slices(draft, state);
   const name = el('strong', {'data-ct': ''}), facts = el('span', {class: 'note'}), says = el('div', {});
   const options = optionsForm((more) => draft.change('read the CT in another way', (document) => {
     document.ct = {file: document.ct.file, ...more};
@@ -178,8 +193,10 @@ function make(draft) {
         ...(ct && chosen ? ct.doubts : []).map((doubt) => el('p', {class: 'fault doubt', role: 'status'}, doubt)));
     options.element.hidden = command.hidden = !chosen;
     if (state.fault) options.element.open = true;
+    draft.ct_fault = state.fault;
+    draft.dispatchEvent(new Event('steps'));
     command.replaceChildren(command.firstChild, Dom.command(state.command));
-    shown.element.hidden = !ct;
+    shown.show(Boolean(ct));
     shown.element.inert = state.isReading;
     if ((ct ? ct.name : '') !== reset_for) shown.reset();
     reset_for = ct ? ct.name : '';
@@ -193,7 +210,8 @@ function make(draft) {
   tell();
   let filled = JSON.stringify(draft.document.ct);
   return {
-    element: el('div', {class: 'ct-panel'}, head, options.element, says, shown.element, command),
+    element: el('div', {class: 'ct-panel'}, head, options.element, says, command, slicesHelp()),
+    stage: {slices: shown.element},
     update() {
       const now = JSON.stringify(draft.document.ct);
       if (now !== filled) options.fill(draft.document.ct);
@@ -210,4 +228,4 @@ function make(draft) {
   };
 }
 
-CasePage.panel('CT', 10, make, SliceInput.KEYS);
+CasePage.panel('CT', 'ct', 10, make, SliceInput.KEYS);

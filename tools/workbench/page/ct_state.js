@@ -25,7 +25,8 @@ export class CtState extends EventTarget {
       read: 'null',  // the document's `ct` that was read
       cursor_mm: [0, 0, 0],
       window: {level: 400, width: 1800},
-      tool: null,          // {key, hint, place(point_mm)} or null: a click moves the crosshair
+      // {key, hint, says(value_hu), place(point_mm)} or null: a click moves the crosshair. says(): for the pointer
+      tool: null,
       marks: new Map(),    // name: () => [{key, point_mm, colour, label, moveTo(point_mm), remove()}]
       overlay: null,       // {slice(ct, axis, index) => {key, places, colours} or null}: mixed with the values
       pointed() {},        // gets what is under the pointer: {view, index, value_hu} or null
@@ -89,6 +90,10 @@ export class CtState extends EventTarget {
 
   cursorIndex() {
     return SliceGeometry.index(this.ct, this.cursor_mm);
+  }
+  // The nearest voxel.
+  indexOf(point_mm) {
+    return SliceGeometry.index(this.ct, point_mm).map(Math.round);
   }
   sliceAt(axis) {
     return Math.max(0, Math.min(this.ct.size[axis] - 1, Math.round(this.cursorIndex()[axis])));

@@ -4,6 +4,7 @@ import {button, checkbox, el, labelled, select} from '../../report/page/dom.js';
 
 import * as CasePage from './case.js';
 import {CtState} from './ct_state.js';
+import {CtValues, noBone} from './ct_values.js';
 import {LabelsState} from './labels_state.js';
 import * as PointList from './point_list.js';
 import * as Shell from './shell.js';
@@ -124,22 +125,26 @@ function labelRow(state, labels, label) {
       'p', {class: 'note'}, button(LabelsState.title(segment), () => state.goTo(segment.middle_mm), {class: 'link'}));
 }
 
-function seedList(draft, state, name, seeds) {
+function seedList(draft, state, values, name, seeds) {
   if (!seeds.length) return el('p', {class: 'note'}, 'No seed yet.');
-  return el(
-      'ul', {class: 'points'},
-      seeds.map(
-          (point_mm, i) =>
-              PointList.row(state, 'seed ' + (i + 1) + ' of ' + name, point_mm, seedActions(draft, name, i))));
+  return el('ul', {class: 'points'}, seeds.map((point_mm, i) => {
+    const fault = noBone(values.at(point_mm));
+    return PointList.row(
+        state, 'seed ' + (i + 1) + ' of ' + name, point_mm, seedActions(draft, name, i),
+        fault && el('span', {class: 'fault', role: 'alert', 'data-outside': name}, fault));
+  }));
 }
 
-function fragmentOf(draft, state, labels, [name, fragment], f) {
-  const key = 'seed ' + name, way = wayOf(fragment);
-  const tool = {
-    key,
-    hint: 'Click inside the bone of ' + name + ' to put a seed there. Esc ends.',
-    place: (point_mm) => addSeed(draft, state, name, point_mm)
-  };
+const seedTool = (draft, state, name) => ({
+  key: 'seed ' + name,
+  hint: 'Click inside the bone of ' + name + ' to put a seed there. Esc ends.',
+  says: (value_hu) =>
+      (value_hu === null || value_hu === undefined ? '' : noBone(value_hu) || `seed of ${name}: ${value_hu} HU`),
+  place: (point_mm) => addSeed(draft, state, name, point_mm)
+});
+
+function fragmentOf(draft, state, labels, values, [name, fragment], f) {
+  const key = 'seed ' + name, way = wayOf(fragment), tool = seedTool(draft, state, name);
   const registers = checkbox(
       'register it', fragment.register !== false,
       (is_on) => draft.change(
@@ -159,7 +164,7 @@ function fragmentOf(draft, state, labels, [name, fragment], f) {
          button('Remove', () => remove(draft, state, name), {'aria-label': 'Remove the fragment ' + name})),
       way === 'surface'   ? surfaceRow(draft, name, fragment.surface) :
           way === 'label' ? labelRow(state, labels, fragment.label) :
-                            seedList(draft, state, name, fragment.seeds || []));
+                            seedList(draft, state, values, name, fragment.seeds || []));
 }
 
 // A case gives all of its fragments in the same way.
@@ -173,14 +178,19 @@ function faultOf(draft) {
 function make(draft) {
   const state = CtState.of(draft), labels = LabelsState.of(draft), list = el('ul', {class: 'fragments'});
   const fault = el('p', {class: 'fault', role: 'status'});
-  const add = PointList.nameField('new fragment', 'Add', () => names(draft), (name) => {
-    draft.change('add the fragment ' + name, (document) => {
+  const values = new CtValues(state, () => update());
+  const add = PointList.nameField('new fragment', 'Add', () => names(draft), async (name) => {
+    const is_kept = await draft.change('add the fragment ' + name, (document) => {
       document.fragments = {...(document.fragments || {}), [name]: {seeds: [], register: true}};
     });
+    if (is_kept && state.ct) state.setTool(seedTool(draft, state, name));
   });
+  const outside = () => entries(draft).map(([, {seeds = []}]) => seeds.map((point_mm) => noBone(values.at(point_mm))));
   const renew = PointList.renewed(
-      list, () => [draft.document.fragments, state.tool && state.tool.key, Boolean(state.ct), labels.labels],
-      () => entries(draft).map((entry, f) => fragmentOf(draft, state, labels, entry, f)));
+      list,
+      () =>
+          [draft.document.fragments, state.tool && state.tool.key, state.ct && state.ct.name, labels.labels, outside()],
+      () => entries(draft).map((entry, f) => fragmentOf(draft, state, labels, values, entry, f)));
   const update = () => {
     fault.textContent = faultOf(draft);
     fault.hidden = !fault.textContent;
@@ -209,4 +219,4 @@ function make(draft) {
   };
 }
 
-CasePage.panel('Fragments', 20, make, [['Esc', 'end putting points']]);
+CasePage.panel('Fragments', 'bones', 20, make, [['Esc', 'end putting points']]);

@@ -94,7 +94,7 @@ function rows(draft, state, labels, wanted) {
             el('span', {class: 'note'}, number(segment.volume_ml) + ' ml'),
             fragment ? el('span', {class: 'note'}, 'is the fragment ' + fragment.name) :
                        Dom.button('Add as a fragment', () => add(draft, segment), {
-                         'aria-label': 'Add ' + title + ' as a fragment',
+                         'aria-label': 'Add as a fragment: ' + title,
                          'data-add': segment.number,
                          disabled: Boolean(fault),
                          title: fault
@@ -205,4 +205,4 @@ function make(draft) {
   };
 }
 
-CasePage.panel('Labels', 15, make);
+CasePage.panel('Labels', 'ct', 15, make);

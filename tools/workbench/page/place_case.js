@@ -28,7 +28,7 @@ export class PlacedCase extends PlaceControls {
       costsWanted: false,
       timings: []
     });
-    this.steps = new PlaceSteps((step) => this.goTo(step));
+    this.steps = new PlaceSteps(path, (step) => this.goTo(step));
     this.sequence = new PlaceSequence(this);
   }
 
@@ -43,8 +43,10 @@ export class PlacedCase extends PlaceControls {
     if (!this.isOpen) return;
     this.active = this.views[0];
     this.fill(place);
-    this.steps.add(
-        this.kept() && !draft.is_saved ? 'begin: the draft' : 'begin: ' + about.bones[0].start_is, this.placed);
+    if (!this.steps.restore(this.placed, about.bones.map((bone) => bone.name)))
+      this.steps.add(
+          this.kept() && !draft.is_saved ? 'begin: the draft' : 'begin: ' + about.bones[0].start_is, this.placed);
+    this.steps.views = about.views.map((view) => view.name);
     draft.addEventListener('change', () => this.draftChanged());
     await this.draftChanged();
     if (!this.isOpen) return;
@@ -230,7 +232,7 @@ export class PlacedCase extends PlaceControls {
     try {
       while (this.costsWanted && this.isOpen) {
         this.costsWanted = false;
-        const noted = this.costsFor === true ? this.steps.steps[0] : this.costsFor;
+        const noted = this.costsFor === true ? this.steps.current : this.costsFor;
         this.costsFor = null;
         const poses = noted ? noted.poses : this.placed;
         const costs = await Ask.post('api/place/costs', {case: this.path, poses});
@@ -324,6 +326,8 @@ export class PlacedCase extends PlaceControls {
 
   leave() {
     if (this.keyMoves) this.keep('move');
+    if (this.tiles) this.tiles.dispose();
+    for (const view of this.views || []) view.dispose();
     this.sequence.leave();
     this.stopVerdict();
     this.isOpen = false;

@@ -4,6 +4,8 @@ import {button, checkbox, choice, el, select, slider} from '../../report/page/do
 
 import * as Geometry from './geometry.js';
 import * as Shell from './shell.js';
+import * as Tiles from './tiles.js';
+import * as XrayLook from './xray_look.js';
 
 export class PlaceControls {
   updateBar() {
@@ -11,7 +13,7 @@ export class PlaceControls {
     const {changes, from, state} = this.bar, {draft} = this;
     changes.update(draft.state_undo, draft.state_redo);
     from.disabled = Boolean(this.isRegistering) || !(this.pipeline || this.sequence.isOn);
-    from.textContent = this.sequence.isOn ? 'Track from here' : 'From here';
+    from.textContent = this.sequence.isOn ? 'Track from here' : 'Register from here';
     state.textContent = draft.is_saved ? 'saved' : 'kept as a draft';
   }
 
@@ -24,7 +26,7 @@ export class PlaceControls {
     this.commandPlace = el('div', {class: 'place-command'});
     this.bar = {
       changes: Shell.undoButtons((way) => this.change(way)),
-      from: button('From here', () => this.fromHere(), {'data-do': 'register', class: 'primary'}),
+      from: button('Register from here', () => this.fromHere(), {'data-do': 'register', class: 'primary'}),
       sequence: button(
           'Sequence', () => this.sequence.timeline.toggle(this.bar.sequence),
           {'data-do': 'open-sequence', 'aria-expanded': 'false'}),
@@ -33,13 +35,16 @@ export class PlaceControls {
     const part = (title, ...content) => el('section', {'aria-label': title}, el('h2', {}, title), ...content);
     this.pipelineField = this.pipelineChoice();
     this.ofSequence = part('Keyframes', this.sequence.timeline.list);
-    this.ofOneFrame = [part('Costs', this.steps.costTable), part('Verdict', this.judgeBox(), this.steps.verdict)];
+    this.ofOneFrame = [part('Verdict', this.steps.verdict, this.judgeBox()), part('Costs', this.steps.costTable)];
+    const views = el('div', {class: 'place-views'}, this.views.map((view) => view.element));
+    const {camera} = this.views[0];
+    this.tiles = Tiles.arranged(views, () => camera.width_px / camera.height_px);
     place.append(
-        el('div', {class: 'page-head'}, el('h1', {}, this.path || '(this folder)'),
+        el('div', {class: 'page-head'}, el('h1', {}, Shell.nameOf(this.path)),
            el('div', {class: 'toolbar'}, this.bar.changes.boxes, this.bar.state),
            el('div', {class: 'toolbar'}, this.bar.sequence, this.pipelineField, this.bar.from)),
         this.sequence.timeline.setup, this.tools(), this.sequence.timeline.element,
-        el('div', {class: 'place-work'}, el('div', {class: 'place-views'}, this.views.map((view) => view.element)),
+        el('div', {class: 'place-work'}, views,
            el('aside', {class: 'place-side', 'aria-label': 'The present poses'}, this.ofOneFrame, this.ofSequence,
               part('Steps', this.steps.list), this.commandPlace)));
     this.ofSequence.hidden = true;
@@ -87,7 +92,8 @@ export class PlaceControls {
         el('fieldset', {class: 'place-bones'}, el('legend', {}, 'moved'),
            this.about.bones.map((bone) => this.boneBox(bone)));
     return el(
-        'div', {class: 'toolbar place-tools'}, this.modes, strength, wipe, this.zoomChoice, this.stepChoice, bones);
+        'div', {class: 'toolbar place-tools'}, this.modes, strength, wipe, this.zoomChoice, this.stepChoice, bones,
+        XrayLook.control(() => this.views.forEach((view) => view.relook())));
   }
 
   zoom(factor) {

@@ -9,12 +9,12 @@ export class PlaceFrames {
     Object.assign(this, {casePath, views, sources, frames, blocks: new Map(), stopped: new AbortController()});
   }
 
-  // The images of a frame, {VIEW: Uint8Array}.
+  // The images of a frame, {VIEW: Uint16Array}.
   async get(frame) {
     const block = this.blockOf(frame), at = frame - 1 - block * PlaceFrames.BLOCK;
     const images = await this.load(block);
     return Object.fromEntries(
-        Object.entries(images).map(([name, {bytes, size}]) => [name, new Uint8Array(bytes, at * size, size)]));
+        Object.entries(images).map(([name, {bytes, size}]) => [name, new Uint16Array(bytes, at * size, size / 2)]));
   }
 
   blockOf(frame) {

@@ -3,18 +3,18 @@
 // {bone, points: Float32Array of u, v} for an outline.
 
 export class PlacePaint {
-  // grey: 8 bit pixels of the image, each a square of `step_px` pixels of the X-ray
-  constructor(canvas, grey, width, height, step_px) {
+  // A pixel of the canvas is a square of `step_px` pixels of the X-ray.
+  constructor(canvas, width, height, step_px) {
     Object.assign(this, {canvas, width, height, step_px, layers: new Map(), last: null});
     canvas.width = width;
     canvas.height = height;
     this.context = canvas.getContext('2d', {alpha: false});
     this.image = this.context.createImageData(width, height);
     this.out = new Uint32Array(this.image.data.buffer);
-    this.show(grey);
+    this.show(new Uint8Array(width * height));
   }
 
-  // Another image of the same size.
+  // An image of this size in 8 bit.
   show(grey) {
     this.grey = grey;
     this.base = this.base || new Uint32Array(grey.length);

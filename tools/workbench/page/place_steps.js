@@ -1,23 +1,46 @@
 // SPDX-License-Identifier: Apache-2.0
-// The texts of the page "Place" about poses: the steps that led to the present one, their costs and verdicts.
-import {button, el, number, percent, withUnit} from '../../report/page/dom.js';
+// The steps on the page "Place" that led to the present poses, their costs and verdicts. The browser keeps them as long
+// as its tab, so that they are there again after another page was shown.
+import {button, el, number, withUnit} from '../../report/page/dom.js';
+
+import * as PlaceCosts from './place_costs.js';
+import * as PlaceVerdict from './place_verdict.js';
+
+const MOST_KEPT = 50;
 
 export class PlaceSteps {
   // goTo(step) makes a step's poses the present ones.
-  constructor(goTo) {
-    Object.assign(this, {goTo, steps: [], current: null, present: null});
+  constructor(path, goTo) {
+    Object.assign(this, {key: 'marrow steps of ' + path, goTo, steps: [], views: [], current: null, present: null});
     this.costTable = el('table', {class: 'values place-costs'});
     this.list = el('ol', {class: 'place-steps'});
     this.verdict = el('div', {class: 'place-verdict', role: 'status'});
   }
 
-  // A step: {what, poses, costs, verdicts, deviations}
+  // A step: {what, poses, costs, verdicts, deviations, frame}
   add(what, poses, more) {
     const step = {what, poses: structuredClone(poses), ...more};
     this.steps.push(step);
     this.current = step;
     this.show();
     return step;
+  }
+
+  // Takes the steps of an earlier visit if they lead to these poses. Whether it did.
+  restore(poses, bones) {
+    const kept = JSON.parse(sessionStorage.getItem(this.key) || '[]');
+    const fits = (step) => bones.every((bone) => step.poses[bone]) && Object.keys(step.poses).length === bones.length;
+    this.steps = kept.filter(fits);
+    if (this.find(poses)) return true;
+    this.steps = [];
+    return false;
+  }
+
+  remember() {
+    try {
+      sessionStorage.setItem(this.key, JSON.stringify(this.steps.slice(-MOST_KEPT)));
+    } catch (error) { /* the browser keeps nothing, or has no room: the steps last until the page is left */
+    }
   }
 
   // After "undo" and "redo": the latest step with these poses is the current one.
@@ -29,45 +52,13 @@ export class PlaceSteps {
     return found;
   }
 
-  // The least cost of a bone in any step, by measure.
-  best(bone, measure) {
-    const values =
-        this.steps.filter((step) => step.costs && step.costs[bone]).map((step) => step.costs[bone][measure].value);
-    return values.length ? Math.min(...values) : NaN;
-  }
-
   showCosts(costs, bone) {
     this.present = {costs, bone};
-    if (!costs || !costs[bone]) return this.costTable.replaceChildren();
-    const measures = [['contour', 'contour'], ['grey_values', 'grey values']];
-    const row = (title, cell) =>
-        el('tr', {}, el('th', {scope: 'row'}, title), measures.map(([measure]) => cell(measure, costs[bone][measure])));
-    this.costTable.replaceChildren(
-        el('caption', {}, 'How badly ' + bone + ' fits here'),
-        el('thead', {}, el('tr', {}, el('td', {}), measures.map(([, title]) => el('th', {scope: 'col'}, title)))),
-        el('tbody', {}, row('all views', (measure, {value}) => el('td', {'data-cost': measure}, number(value))),
-           row('against the best step', (measure, {value}) => el('td', {}, this.comparison(value, bone, measure))),
-           Object.keys(costs[bone].contour.views)
-               .map((name) => row(name, (measure, {views}) => el('td', {}, number(views[name]))))));
-  }
-
-  comparison(value, bone, measure) {
-    const best = this.best(bone, measure);
-    if (!Number.isFinite(best)) return '–';
-    return value <= best * 1.0005 ? 'the best' : number(value / best) + ' × the best';
+    PlaceCosts.fill(this.costTable, costs, bone, this.steps, this.views);
   }
 
   showVerdict(verdicts, note) {
-    if (!verdicts) return this.verdict.replaceChildren(el('p', {class: 'note'}, note || 'not judged yet'));
-    this.verdict.replaceChildren(...Object.entries(verdicts).map(
-        ([bone, verdict]) =>
-            el('div', {'data-judgement': verdict.judgement},
-               el('p', {}, el('strong', {}, bone + ': ' + verdict.judgement),
-                  verdict.failure_probability === null ?
-                      '' :
-                      ', probability of a failure ' + percent(verdict.failure_probability)),
-               el('ul', {}, verdict.reasons.map((reason) => el('li', {}, reason))),
-               verdict.remedies.length > 0 && el('p', {}, 'Would settle it: ' + verdict.remedies.join('; ')))));
+    this.verdict.replaceChildren(...PlaceVerdict.shown(verdicts, note));
   }
 
   static deviationText(deviations) {
@@ -94,6 +85,7 @@ export class PlaceSteps {
           deviations && el('small', {class: 'deviations'}, deviations));
     }));
     this.list.scrollTop = this.list.scrollHeight;
+    this.remember();
     if (this.present) this.showCosts(this.present.costs, this.present.bone);
   }
 }

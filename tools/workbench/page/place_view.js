@@ -5,6 +5,8 @@ import {el} from '../../report/page/dom.js';
 
 import {PlacePaint} from './place_paint.js';
 import * as Ask from './server.js';
+import * as XrayLook from './xray_look.js';
+import * as XrayPicture from './xray_picture.js';
 
 export class PlaceView {
   // page: {casePath, style(), poses(), drag(view, drag), dragEnded(), wheel(view, notches), chosen(view)}
@@ -30,11 +32,14 @@ export class PlaceView {
       'aria-label': 'X-ray ' + view.name + ', the bone over it. Arrow keys move the bone.',
       'data-view': view.name
     });
-    made.image = new Uint8Array(bytes);  // of the case
-    made.paint = new PlacePaint(
-        made.canvas, made.image, Math.floor(camera.width_px / step_px), Math.floor(camera.height_px / step_px),
-        step_px);
+    const width_px = Math.floor(camera.width_px / step_px), height_px = Math.floor(camera.height_px / step_px);
+    made.image = new Uint16Array(bytes);  // of the case
+    made.paint = new PlacePaint(made.canvas, width_px, height_px, step_px);
+    made.showImage(made.image);
     made.window = el('div', {class: 'place-window'}, made.canvas);
+    made.factor = 1;
+    made.observer = new ResizeObserver(() => made.fit());
+    made.observer.observe(made.window);
     made.element = el('figure', {class: 'place-view'}, el('figcaption', {}, view.name), made.window);
     made.listen();
     return made;
@@ -54,11 +59,31 @@ export class PlaceView {
     }, {passive: false});
   }
 
+  // The image fills its window, times the zoom. The place in the middle stays.
+  fit() {
+    const {clientWidth: width, clientHeight: height} = this.window, {canvas, paint} = this;
+    if (!width || !height) return;
+    const before = canvas.getBoundingClientRect();
+    const middle = [
+      (this.window.scrollLeft + width / 2) / (before.width || 1),
+      (this.window.scrollTop + height / 2) / (before.height || 1)
+    ];
+    const scale = this.factor * Math.min(width / paint.width, height / paint.height);
+    canvas.style.width = Math.floor(scale * paint.width) + 'px';
+    canvas.style.height = Math.floor(scale * paint.height) + 'px';
+    this.window.scrollTo(middle[0] * scale * paint.width - width / 2, middle[1] * scale * paint.height - height / 2);
+  }
+
   // Shows the image larger, with a place of the X-ray in the middle.
   zoom(factor, [u, v]) {
-    this.canvas.style.width = 100 * factor + '%';
+    this.factor = factor;
+    this.fit();
     const size = this.paint.width * this.step_px / this.canvas.getBoundingClientRect().width;
     this.window.scrollTo(u / size - this.window.clientWidth / 2, v / size - this.window.clientHeight / 2);
+  }
+
+  dispose() {
+    this.observer.disconnect();
   }
 
   // The place in the X-ray under the pointer.
@@ -161,9 +186,16 @@ export class PlaceView {
     }
   }
 
-  // Shows another image than the case's own.
-  showImage(grey) {
-    this.paint.show(grey);
+  // Shows an image: the case's own, or a frame of a sequence.
+  showImage(numbers) {
+    this.shown = {numbers, width_px: this.paint.width, height_px: this.paint.height};
+    this.relook();
+  }
+
+  // Makes greys of the image's numbers as the control says.
+  relook() {
+    const ranges = XrayPicture.rangesOf(this.shown);
+    this.paint.show(XrayPicture.greys(this.shown, XrayLook.windowOf(ranges), XrayLook.curveOf(ranges)));
     this.draw();
   }
 

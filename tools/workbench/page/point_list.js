@@ -14,27 +14,31 @@ export const rounded = (point_mm) => point_mm.map((value) => Math.round(1000 * v
 // One point: buttons that go to it, move it to the crosshair and remove it. `what` names it for screen readers.
 export const row = (state, what, point_mm, {moveTo, remove}, more) =>
     el('li', {class: 'point'},
-       button(words(point_mm) + ' mm', () => state.goTo(point_mm), {class: 'link', 'aria-label': 'Go to ' + what}),
+       button(
+           words(point_mm) + ' mm', () => state.goTo(point_mm),
+           {class: 'link', 'aria-label': words(point_mm) + ' mm, go to ' + what}),
        button(
            'Move here', () => moveTo([...state.cursor_mm]),
-           {'aria-label': 'Move ' + what + ' to the crosshair', title: 'to the crosshair'}),
+           {'aria-label': 'Move here, to the crosshair: ' + what, title: 'to the crosshair'}),
        button('Remove', remove, {'aria-label': 'Remove ' + what}), more);
 
 // A field for a name with a button. taken() lists the names that are in use.
 export function nameField(label, text, taken, chosen) {
-  const box = el('input', {type: 'text', maxlength: 100});
+  const told = el('p', {class: 'fault', role: 'alert'});
+  const box = el('input', {type: 'text', maxlength: 100, oninput: () => (told.textContent = '')});
   const form =
       el('form', {
         class: 'toolbar',
         onsubmit: (event) => {
           event.preventDefault();
           const name = box.value.trim(), fault = faultOf(name, taken());
-          if (fault) return void Shell.notice(fault, 'fault');
+          told.textContent = fault;
+          if (fault) return;
           box.value = '';
           chosen(name);
         }
       },
-         labelled(label, box), el('button', {type: 'submit'}, text));
+         labelled(label, box), el('button', {type: 'submit'}, text), told);
   form.box = box;
   return form;
 }

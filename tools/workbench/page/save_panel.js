@@ -7,6 +7,7 @@ import * as CasePage from './case.js';
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
 
+let save = null;  // saves the case that is shown
 const FRACTURE = ['femur/femur-best', 'A fractured femur:'], ANY_BONE = ['bone/bone', 'Any other bone:'];
 // Pipelines for fractures segment the fragments themselves.
 const pipelinesFor = ({document}) =>
@@ -30,8 +31,10 @@ async function mayLose(draft) {
 function make(draft) {
   const outcome = el('div', {role: 'status', 'data-saved': ''});
   const button = Dom.button('Save the case', () => save(), {'data-do': 'save'});
+  const place = Dom.button(
+      'Place and register', () => Shell.go('place', draft.path || '.'), {class: 'primary', 'data-do': 'place'});
 
-  async function save() {
+  save = async () => {
     await draft.last;  // waits for changes that are being sent
     button.disabled = true;
     outcome.replaceChildren();
@@ -51,11 +54,12 @@ function make(draft) {
              error.message.split('\n').map((line) => line.trim()).filter(Boolean).map((line) => el('li', {}, line))));
     }
     button.disabled = false;
-  }
+  };
 
   const written = ({folder, copied, pipelines}) =>
       [el('p', {}, 'Saved in ', el('strong', {}, folder), copied.length ? '; copied into it: ' + copied.join(', ') : '',
           '.'),
+       el('h3', {}, 'Or in a shell'),
        ...pipelinesFor(draft).flatMap(
            ([name, words]) =>
                [el('p', {class: 'note'}, words),
@@ -69,11 +73,14 @@ function make(draft) {
            el('p', {class: 'note'},
               'Writes case.yaml and landmarks.yaml into the case\'s folder, copies files from elsewhere into it, ' +
                   'and reads the case back before anything is replaced.'),
-           el('div', {class: 'toolbar'}, button), outcome),
+           el('div', {class: 'toolbar'}, button, place), outcome),
+    dispose: () => (save = null),
     update() {
       button.textContent = draft.is_saved ? 'Save again' : 'Save the case';
+      button.classList.toggle('primary', !draft.is_saved);
+      place.hidden = !draft.is_saved;
     }
   };
 }
 
-CasePage.panel('Save', 90, make);
+CasePage.panel('Save', 'save', 45, make, [['Ctrl+s', 'save the case', () => save && save()]]);

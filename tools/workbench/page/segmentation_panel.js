@@ -66,14 +66,17 @@ async function surfaces(segmentation, names, colourOf) {
 class Panel {
   constructor(draft) {
     Object.assign(
-        this,
-        {draft, state: CtState.of(draft), method: 'bone', segmented: '', shownFor: '', isRunning: false, turn: 0});
+        this, {draft, state: CtState.of(draft), chosen: null, segmented: '', shownFor: '', isRunning: false, turn: 0});
     this.solid = new SurfaceView('Surfaces of the fragments; arrow keys turn them');
     this.solid.element.hidden = true;
+    this.none = el('div', {class: 'empty-stage'}, el('p', {}, 'The segmented bones are shown here in 3D.'));
+    this.picture =
+        el('figure', {class: 'slice', 'data-solid': ''}, this.none, this.solid.element,
+           el('figcaption', {}, el('strong', {}, 'Surfaces'), el('span', {class: 'note'}, 'drag to turn')));
     this.threshold = el('input', {type: 'number', class: 'short', value: 250, step: 10});
     const field = labelled('threshold, HU', this.threshold);
     this.how = select('how', METHODS, this.method, (value) => {
-      this.method = value;
+      this.chosen = value;
       this.update();
     });
     this.field = field;
@@ -81,9 +84,8 @@ class Panel {
     this.outcome = el('p', {class: 'note', role: 'status', 'data-segmented': ''});
     this.old = el('p', {class: 'note'});
     this.command = el('details', {hidden: true}, el('summary', {}, 'The same in a shell, once the case is saved'));
-    this.element =
-        el('div', {}, el('div', {class: 'toolbar'}, this.how, field, this.button), this.outcome, this.old,
-           this.solid.element, this.command);
+    this.element = el(
+        'div', {}, el('div', {class: 'toolbar'}, this.how, field, this.button), this.outcome, this.old, this.command);
     this.renewed = () => {
       if (!this.state.ct || this.state.ct.name !== this.segmented) this.state.contours.delete('segmentation');
       this.update();
@@ -98,6 +100,11 @@ class Panel {
 
   fragments() {
     return this.draft.document.fragments || {};
+  }
+
+  // The chosen one. Without a choice: several fragments touch at a fracture, and a threshold would grow past it.
+  get method() {
+    return this.chosen || (Object.keys(this.fragments()).length > 1 ? 'femur' : 'bone');
   }
 
   // Whether labels or surfaces give the fragments, in place of seeds.
@@ -118,6 +125,7 @@ class Panel {
     const meshes = await Shell.guarded(() => surfaces(segmentation, names, colourOf));
     if (!meshes || mine !== this.turn) return;
     this.solid.element.hidden = false;
+    this.none.hidden = true;
     this.solid.set(meshes);
   }
 
@@ -133,6 +141,7 @@ class Panel {
     this.isRunning = true;
     const content = this.content(), asked = {...content, method: this.areGiven() ? 'given' : this.method};
     this.segmented = asked.ct || '';
+    this.outcome.textContent = this.outcome.dataset.segmented = '';
     this.update();
     if (asked.method === 'bone') asked.threshold_hu = Number(this.threshold.value);
     try {
@@ -143,11 +152,20 @@ class Panel {
       });
       this.shownFor = JSON.stringify(content);
     } catch (error) {
-      Shell.notice(error.message, 'fault');
-      if (error.status === 409) this.state.follow(true);
+      this.failed(error);
     }
     this.isRunning = false;
     this.update();
+  }
+
+  // What the coarse grid gave stays, but nothing is computed any more.
+  failed(error) {
+    if (error.status !== 499) Shell.notice(error.message, 'fault');
+    const is_coarse = this.outcome.dataset.segmented === 'coarse';
+    const end = error.status === 499 ? 'It was stopped' : 'It failed';
+    this.outcome.textContent = end + (is_coarse ? '; what is shown comes from a coarse grid.' : '.');
+    this.outcome.dataset.segmented = 'failed';
+    if (error.status === 409) this.state.follow(true);
   }
 
   tellCommand(pipeline, {threshold_hu}) {
@@ -161,6 +179,7 @@ class Panel {
     const are_given = this.areGiven(),
           has_seeds = Object.values(this.fragments()).some(({seeds}) => seeds && seeds.length);
     this.how.hidden = are_given;
+    this.how.box.value = this.method;
     this.field.hidden = are_given || this.method !== 'bone';
     this.button.textContent = are_given ? 'Show the surfaces' : 'Segment';
     this.button.disabled = this.isRunning || !(are_given || (this.state.ct && has_seeds));
@@ -172,7 +191,12 @@ class Panel {
   }
 }
 
-CasePage.panel('Segmentation', 30, (draft) => {
+CasePage.panel('Segmentation', 'bones', 30, (draft) => {
   const panel = new Panel(draft);
-  return {element: panel.element, update: () => panel.update(), dispose: () => panel.dispose()};
+  return {
+    element: panel.element,
+    stage: {surfaces: panel.picture},
+    update: () => panel.update(),
+    dispose: () => panel.dispose()
+  };
 });

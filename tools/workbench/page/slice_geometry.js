@@ -72,6 +72,12 @@ export function whole(ct, plane, width, height) {
   };
 }
 
+// The same view on a canvas of another size. The scale against that of the whole slice stays.
+export function resized(ct, plane, view, width, height) {
+  const scaleOf = (size) => whole(ct, plane, size.width, size.height).scale;
+  return {...view, width, height, scale: view.scale * scaleOf({width, height}) / scaleOf(view)};
+}
+
 // The patient's directions at the right or lower end of the screen: "L", or "LA" if the grid is oblique.
 export function letters(ct, {axis, sign}) {
   const names = [['L', 'R'], ['P', 'A'], ['H', 'F']];

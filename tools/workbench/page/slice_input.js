@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Mouse, touch and keys in a slice.
+import {pinched} from './pinch.js';
 import * as SliceGeometry from './slice_geometry.js';
 
 const placeOf = (view, event) => {
@@ -28,6 +29,10 @@ function moveMark(view, mark) {
   let to = null;
   const moving = () => (to ? [{...mark, point_mm: to}] : []);
   return {
+    cancelled() {
+      view.state.marks.delete('moving');
+      view.state.tell('view');
+    },
     moved(dx, dy, at) {
       to = pointAt(view, at);
       view.state.marks.set('moving', moving);
@@ -42,11 +47,25 @@ function moveMark(view, mark) {
   };
 }
 
+// Two fingers zoom and move the picture.
+function pinch(view, moved, place) {
+  const {factor, around, by} = pinched(view.pointers, moved, place);
+  view.zoom(factor, around);
+  view.pan(...by);
+}
+
 function listenPointer(view) {
   const {canvas} = view;
+  view.pointers = new Map();
   canvas.addEventListener('contextmenu', (event) => event.preventDefault());
   canvas.addEventListener('pointerdown', (event) => {
-    if (!view.state.ct || view.drag) return;
+    if (!view.state.ct) return;
+    view.pointers.set(event.pointerId, placeOf(view, event));
+    if (view.pointers.size > 1) {  // what the first finger began ends here
+      if (view.drag && view.drag.cancelled) view.drag.cancelled();
+      view.drag = null;
+    }
+    if (view.drag || view.pointers.size > 1) return;
     if (event.button === 1) event.preventDefault();  // no scrolling by the wheel's button
     canvas.focus({preventScroll: true});
     canvas.setPointerCapture(event.pointerId);
@@ -55,6 +74,7 @@ function listenPointer(view) {
   });
   canvas.addEventListener('pointermove', (event) => {
     const place = placeOf(view, event), {drag} = view;
+    if (view.pointers.size === 2 && view.pointers.has(event.pointerId)) return pinch(view, event.pointerId, place);
     if (drag && drag.pointer === event.pointerId) {
       if (Math.hypot(place[0] - drag.start[0], place[1] - drag.start[1]) > 3) drag.isFar = true;
       if (drag.isFar) {
@@ -62,10 +82,14 @@ function listenPointer(view) {
         drag.last = place;
       }
     }
-    if (view.state.ct && view.view) view.state.pointed({view, ...view.at(place)});
+    if (!view.state.ct || !view.view) return;
+    const there = view.at(place);
+    view.state.pointed({view, ...there});
+    if (event.pointerType === 'mouse') view.tell(place, there.value_hu);
   });
   const end = (event) => {
     const {drag} = view;
+    view.pointers.delete(event.pointerId);
     if (!drag || drag.pointer !== event.pointerId) return;
     view.drag = null;
     if (drag.ended) drag.ended();
@@ -73,7 +97,10 @@ function listenPointer(view) {
   };
   canvas.addEventListener('pointerup', end);
   canvas.addEventListener('pointercancel', end);
-  canvas.addEventListener('pointerleave', () => view.state.pointed(null));
+  canvas.addEventListener('pointerleave', () => {
+    view.state.pointed(null);
+    view.hint.hidden = true;
+  });
 }
 
 // The wheel scrolls the page until a slice has been clicked.

@@ -11,10 +11,11 @@ export class SliceView {
   constructor(name, state) {
     Object.assign(this, {name, state, slices: new Map(), wanted: null, isAsking: false, drag: null});
     this.canvas = el('canvas', {tabindex: 0, role: 'application', 'data-slice': name});
+    this.hint = el('span', {class: 'cursor-hint', 'aria-hidden': 'true', hidden: true});
     this.slider = el('input', {type: 'range', min: 0, step: 1, 'aria-label': name + ' slice'});
     this.number = el('span', {class: 'note'});
     this.element =
-        el('figure', {class: 'slice'}, this.canvas,
+        el('figure', {class: 'slice'}, el('div', {class: 'slice-box'}, this.canvas, this.hint),
            el('figcaption', {}, el('strong', {}, name[0].toUpperCase() + name.slice(1)), this.slider, this.number));
     this.slider.addEventListener('input', () => this.goToSlice(Number(this.slider.value)));
     this.picture = document.createElement('canvas');  // the slice, a pixel for each voxel
@@ -47,10 +48,8 @@ export class SliceView {
   resized() {
     const {clientWidth: width, clientHeight: height} = this.canvas, {ct} = this.state;
     if (!ct || !width || !height) return;
-    if (!this.view)
-      this.view = SliceGeometry.whole(ct, this.plane, width, height);
-    else
-      Object.assign(this.view, {width, height});
+    this.view = this.view ? SliceGeometry.resized(ct, this.plane, this.view, width, height) :
+                            SliceGeometry.whole(ct, this.plane, width, height);
     const density = devicePixelRatio || 1;
     this.canvas.width = Math.round(width * density);
     this.canvas.height = Math.round(height * density);
@@ -127,6 +126,19 @@ export class SliceView {
   // How many voxels a point is away from this slice.
   distance(point_mm) {
     return Math.abs(SliceGeometry.index(this.state.ct, point_mm)[this.plane.across] - this.wanted);
+  }
+
+  // Says at the pointer what a click does there, and what is there.
+  tell([x, y], value_hu) {
+    const {tool} = this.state, mark = this.markAt([x, y]);
+    const text = mark ? 'drag to move ' + mark.label : tool ? tool.says(value_hu) : '';
+    this.hint.hidden = !text;
+    if (!text) return;
+    this.hint.textContent = text;
+    const {offsetWidth: width, offsetHeight: height} = this.hint;
+    const left = x + 16 + width > this.view.width ? x - 12 - width : x + 16;
+    const top = y + 18 + height > this.view.height ? y - 10 - height : y + 18;
+    this.hint.style.transform = `translate(${Math.max(0, left)}px, ${Math.max(0, top)}px)`;
   }
 
   markAt([x, y]) {

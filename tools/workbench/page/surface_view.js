@@ -8,7 +8,7 @@ import {Orbit} from '../../report/page/orbit.js';
 export class SurfaceView {
   constructor(label) {
     this.canvas = el('canvas', {class: 'surface', tabindex: 0, role: 'img', 'aria-label': label});
-    this.element = el('div', {}, this.canvas);
+    this.element = el('div', {class: 'slice-box'}, this.canvas);
     this.orbit = new Orbit(this.canvas, () => this.draw());
     this.observer = new ResizeObserver(() => this.draw());
     this.observer.observe(this.canvas);

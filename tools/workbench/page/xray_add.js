@@ -4,6 +4,7 @@ import {button, el, labelled} from '../../report/page/dom.js';
 
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
+import {armFields} from './xray_arm.js';
 import * as XrayCameraFile from './xray_camera_file.js';
 
 const is_image = (name) => /\.(png|tiff?|dcm|dicom)$/i.test(name);
@@ -11,42 +12,18 @@ const folderOf = (path) => path.split('/').slice(0, -1).join('/');
 // "frontal.0001" of "a/frontal.0001.png".
 const stem = (path) => path.split('/').pop().replace(/\.[^.]*$/, '');
 
-// The keys of docs/case.md: [key, label, first value, least, most].
-const C_ARM = [
-  ['alpha_deg', 'Cranio-caudal angle, degrees: positive if the detector is towards the head', 0, -90, 90],
-  ['beta_deg', 'Right/left anterior angle, degrees: positive if the detector is on the patient’s left', 0, -180, 180],
-  ['source_to_detector_mm', 'Source to detector, mm', 1000, 1, 10000],
-  ['source_to_isocentre_mm', 'Source to isocentre, mm', 600, 1, 10000],
-  ['pixel_mm', 'Size of a pixel on the detector, mm', 0.3, 0.001, 100]
-];
-
 function freeName(name, taken) {
   if (!taken.includes(name)) return name;
   for (let number = 2;; ++number)
     if (!taken.includes(`${name} ${number}`)) return `${name} ${number}`;
 }
 
-function armFields(known) {
-  const boxes = C_ARM.map(([key, , value, min, max]) => el('input', {
-                            type: 'number',
-                            step: 'any',
-                            required: true,
-                            min,
-                            max,
-                            value: known && known[key] !== undefined ? known[key] : value,
-                            'data-arm': key
-                          }));
-  const element = el('div', {class: 'arm-fields'}, C_ARM.map(([, label], i) => labelled(label, boxes[i])));
-  const values = () => Object.fromEntries(C_ARM.map(([key], i) => [key, Number(boxes[i].value)]));
-  return {element, values};
-}
-
 // Resolves to {name, kind: 'file' | 'header' | 'c_arm', c_arm}, or to undefined.
-function ask(title, image, name, taken, camera) {
+function ask(title, image, name, taken, camera, before) {
   return Shell.dialog(title, (close) => {
     const box = el('input', {type: 'text', value: name, maxlength: 100, 'data-name': 'view'});
     const fault = el('p', {class: 'fault', role: 'alert'});
-    const arm = armFields(camera && camera.c_arm);
+    const arm = armFields(camera && camera.c_arm, before), has_header = /\.(dcm|dicom)$/i.test(image);
     const finish = (kind) => {
       const chosen = box.value.trim();
       if (!chosen) return void (fault.textContent = 'Give the view a name.');
@@ -67,16 +44,17 @@ function ask(title, image, name, taken, camera) {
           }
         },
            arm.element, el('button', {type: 'submit', 'data-camera': 'c_arm'}, 'Use these angles and distances'));
+    if (!has_header) setTimeout(() => arm.first().focus());
     return el(
         'div', {class: 'add-view'}, el('p', {class: 'note'}, image), labelled('Name of the view', box), fault,
         el('h3', {}, 'How was it taken?'),
         el('p', {}, button('Choose a camera file', () => finish('file'), {'data-camera': 'file'}), ' ',
            el('span', {class: 'note'}, 'marrow’s YAML, or a file of XMALab, plastimatch, RTK or xReg')),
-        /\.(dcm|dicom)$/i.test(image) &&
+        has_header &&
             el('p', {}, button('Read the DICOM header', () => finish('header'), {'data-camera': 'header'}), ' ',
                el('span', {class: 'note'}, 'exact to about a degree at best')),
-        el('details', {open: Boolean(camera && camera.c_arm)}, el('summary', {}, 'Angles and distances of a C-arm'),
-           form));
+        el('details', {open: !has_header || Boolean(camera && camera.c_arm)},
+           el('summary', {}, 'Angles and distances of a C-arm'), form));
   });
 }
 
@@ -101,7 +79,9 @@ export async function add(draft) {
   const image = await Shell.choose('X-ray image', {accepts: is_image, at: last ? folderOf(last.image) : ''});
   if (!image) return;
   const taken = (draft.document.views || []).map((view) => view.name), name = freeName(stem(image), taken);
-  const answer = await ask('Add an X-ray', image, name, taken);
+  const before = (draft.document.views || []).findLast(({camera}) => camera && camera.c_arm);
+  const answer =
+      await ask('Add an X-ray', image, name, taken, null, before && {name: before.name, c_arm: before.camera.c_arm});
   if (!answer) return;
   await Shell.guarded(async () => {
     const camera = await cameraFor(answer, image);

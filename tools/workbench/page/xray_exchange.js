@@ -69,9 +69,5 @@ export function make(shared) {
          button(
              'Export', what,
              () => (what === 'result' ? XrayExport.beginResult(shared, told) : XrayExport.begin(shared, what, told)))));
-  return {
-    element:
-        el('div', {class: 'exchange'}, el('h3', {}, 'Files'),
-           el('div', {class: 'toolbar'}, Object.keys(NAMES).map(row)), command)
-  };
+  return {element: el('div', {class: 'exchange'}, el('div', {class: 'toolbar'}, Object.keys(NAMES).map(row)), command)};
 }

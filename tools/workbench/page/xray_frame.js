@@ -2,8 +2,11 @@
 // One X-ray on the screen: zooming, moving and windowing. The tool does everything else.
 import {el, svg} from '../../report/page/dom.js';
 
+import {pinched} from './pinch.js';
 import * as Viewport from './viewport.js';
 import * as XrayImages from './xray_images.js';
+import * as XrayLook from './xray_look.js';
+import * as XrayPicture from './xray_picture.js';
 
 // tool() returns the present tool: {press(frame, pixel, event), arrow(frame, step), key(frame, name), marks(frame)}.
 // press() returns {move(pixel), end(pixel), cancel()}, or nothing: then the pointer moves the image.
@@ -23,26 +26,28 @@ export function make(name, tool) {
   const frame =
       {name, box, overlay, value, entry: null, port: null, window: null, pointer: null, mask: null, element: null};
 
-  // A new image gets its own window; an image of the same size keeps its place.
+  // A new image gets its own window; an image of the same size keeps its place. The old one stays until the new one has
+  // arrived.
   frame.show = (entry) => {
-    if (frame.entry !== entry) frame.picture = frame.shown = null;
-    frame.entry = entry;
-    if (entry.numbers && !frame.shown) {
-      if (!frame.size || frame.size[0] !== entry.width_px || frame.size[1] !== entry.height_px) frame.port = null;
-      frame.size = [entry.width_px, entry.height_px];
-      frame.window = [...entry.range];
-      frame.shown = true;
+    frame.wanted = entry;
+    if (frame.is_visible) XrayImages.hurry(entry);
+    if (frame.entry !== entry && entry.is_ready) {
+      const same = (what) => JSON.stringify(entry[what]) === JSON.stringify((frame.entry || {})[what]);
+      if (!same('width_px') || !same('height_px')) frame.port = null;
+      if (!same('ranges')) frame.window = entry.ranges && XrayLook.windowOf(entry.ranges);
+      Object.assign(frame, {entry, picture: null});
     }
+    frame.draw();
+  };
+  frame.relook = () => {
+    if (!frame.entry || !frame.entry.numbers) return;
+    Object.assign(frame, {window: XrayLook.windowOf(frame.entry.ranges), picture: null});
     frame.draw();
   };
   frame.fit = () => {
     if (!entryIsShown(frame)) return;
     const {flip_u, flip_v} = frame.port || {flip_u: false, flip_v: false};
-    frame.port = {
-      ...Viewport.fitted(frame.entry.width_px, frame.entry.height_px, box.clientWidth, box.clientHeight),
-      flip_u,
-      flip_v
-    };
+    frame.port = {...Viewport.fitted(frame.entry.width_px, frame.entry.height_px, ...sizeOf(box)), flip_u, flip_v};
     frame.draw();
   };
   frame.change = (next) => {
@@ -56,7 +61,7 @@ export function make(name, tool) {
   };
   let is_waiting = false;
   frame.draw = () => {
-    if (is_waiting) return;
+    if (is_waiting || !frame.is_visible) return;
     is_waiting = true;
     requestAnimationFrame(() => {
       is_waiting = false;
@@ -70,30 +75,48 @@ export function make(name, tool) {
   };
   listen(frame, tool);
   const watcher = new ResizeObserver(() => {
-    if (frame.port && box.clientWidth) frame.port = Viewport.resized(frame.port, box.clientWidth, box.clientHeight);
+    if (frame.port && box.clientWidth) frame.port = Viewport.resized(frame.port, ...sizeOf(box));
     frame.draw();
   });
   watcher.observe(box);
-  frame.dispose = () => watcher.disconnect();
+  const sight = new IntersectionObserver(([{isIntersecting}]) => {
+    frame.is_visible = isIntersecting;
+    if (!isIntersecting) return;
+    if (frame.wanted) XrayImages.hurry(frame.wanted);
+    frame.draw();
+  });
+  sight.observe(box);
+  frame.dispose = () => {
+    watcher.disconnect();
+    sight.disconnect();
+  };
   return frame;
+}
+
+// In parts of a CSS pixel; clientWidth is rounded, and a click would be half a pixel off.
+function sizeOf(box) {
+  const {width, height} = box.getBoundingClientRect();
+  return [width, height];
 }
 
 const entryIsShown = ({entry, box}) => entry && entry.numbers && box.clientWidth > 0;
 
 function draw(frame, canvas, tool) {
   const {box, entry} = frame, dots = window.devicePixelRatio || 1;
-  const width = box.clientWidth, height = box.clientHeight;
+  const [width, height] = sizeOf(box);
   canvas.width = Math.round(width * dots);
   canvas.height = Math.round(height * dots);
   frame.overlay.setAttribute('viewBox', `0 0 ${width} ${height}`);
   frame.overlay.replaceChildren();
   if (!entry || !entry.numbers || !frame.port) return;
-  frame.picture = frame.picture || XrayImages.painted(entry, frame.window);
+  frame.picture = frame.picture || XrayPicture.painted(entry, frame.window, XrayLook.curveOf(entry.ranges));
   const pen = canvas.getContext('2d');
-  pen.setTransform(...Viewport.canvasTransform(frame.port, dots));
+  pen.setTransform(...Viewport.canvasTransform(frame.port, canvas.width / width));
   pen.imageSmoothingEnabled = frame.port.zoom < 3;
   pen.drawImage(frame.picture, 0, 0);
+  pen.imageSmoothingEnabled = false;  // a pixel is masked or not
   if (frame.mask) pen.drawImage(frame.mask, 0, 0);
+  canvas.dataset.shown = entry.width_px;
   frame.overlay.append(...tool().marks(frame).filter(Boolean));
 }
 
@@ -167,13 +190,8 @@ const panning = (frame) => ({
 });
 
 function pinch(frame, pointers, moved, place) {
-  const [other] = [...pointers.entries()].filter(([id]) => id !== moved).map(([, at]) => at);
-  const before = pointers.get(moved), size = (at) => Math.hypot(at[0] - other[0], at[1] - other[1]);
-  const middle = (at) => [(at[0] + other[0]) / 2, (at[1] + other[1]) / 2];
-  const by = [0, 1].map((i) => middle(place)[i] - middle(before)[i]);
-  pointers.set(moved, place);
-  frame.change(
-      Viewport.panned(Viewport.zoomed(frame.port, size(place) / Math.max(1, size(before)), middle(before)), by));
+  const {factor, around, by} = pinched(pointers, moved, place);
+  frame.change(Viewport.panned(Viewport.zoomed(frame.port, factor, around), by));
 }
 
 const ARROWS = {

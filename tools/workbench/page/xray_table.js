@@ -132,6 +132,6 @@ export function make(bench) {
     empty.hidden = landmarks.length > 0;
     table.hidden = !landmarks.length;
   };
-  const element = el('div', {class: 'landmark-list'}, el('h3', {}, 'Landmarks'), empty, table, fit.element);
+  const element = el('div', {class: 'landmark-list'}, empty, table, fit.element);
   return {element, update, updateFit: fit.update};
 }

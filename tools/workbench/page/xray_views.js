@@ -1,19 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The panel "X-ray views" of the page "Case": the list of views, their geometry, and its faults.
+// The panel "X-ray views" of the page "Case": the list of views, and what is wrong with their images.
 import * as Dom from '../../report/page/dom.js';
 import {el} from '../../report/page/dom.js';
 
 import * as CasePage from './case.js';
-import * as Geometry from './geometry.js';
-import * as Ask from './server.js';
-import * as Sight from './sight.js';
 import * as XrayAdd from './xray_add.js';
 import * as XrayCameraFile from './xray_camera_file.js';
-import * as XrayFrame from './xray_frame.js';
+import * as XrayCheck from './xray_check.js';
 import * as XrayImages from './xray_images.js';
 import * as XrayTable from './xray_table.js';
-
-const CHECK_PAUSE_ms = 500;
 
 function cameraText(view) {
   const camera = view.camera || {};
@@ -93,106 +88,44 @@ function sidesText(views) {
 const degrees = (value) => value.toFixed(1) + '°';
 const millimetres = (value) => Dom.number(value) + ' mm';
 
-// Numbers that reveal a mistake: [[what, figure]].
-function figuresOf(views) {
-  const rows = [];
-  for (const {view, camera} of views) {
-    const focal = camera.intrinsics[0][0], arm = view.camera && view.camera.c_arm;
-    const opening = 2 * Math.atan(camera.width_px / 2 / focal) * 180 / Math.PI;
-    rows.push([
-      `${view.name}: source to detector`,
-      (arm ? millimetres(arm.source_to_detector_mm) : `${Dom.number(focal)} times the size of a pixel`) +
-          `; the image opens ${degrees(opening)}`
-    ]);
-  }
-  for (let i = 0; i < views.length; ++i)
-    for (let k = i + 1; k < views.length; ++k)
-      rows.push([
-        `Between ${views[i].view.name} and ${views[k].view.name}`,
-        degrees(Sight.angle_deg(views[i].camera, views[k].camera))
-      ]);
-  const met = views.length > 1 && Sight.meeting(views.map((one) => one.camera));
-  if (met)
-    rows.push([
-      'Central rays meet at',
-      `(${met.world_mm.map(XrayFrame.tenths).join(', ')}) mm in the world; they pass each other at ` +
-          millimetres(met.distance_mm)
-    ]);
-  if (met)
-    for (const {view, camera} of views)
-      rows.push([
-        `${view.name}: source to that point`,
-        millimetres(Geometry.length(Geometry.minus(Sight.centralRay(camera).origin, met.world_mm)))
-      ]);
-  return rows;
-}
-
-// Asks marrow to check the cameras when views and landmarks no longer change. Calls told({warnings, command}) or
-// told({fault}).
-function checking(draft, told) {
-  let asked = '', timer = null, aborter = null;
-  return (views) => {
-    const landmarks = (draft.document.landmarks || []).map(({name, pixels}) => {
-      const known = Object.entries(pixels || {}).filter(([view]) => views.some((one) => one.view.name === view));
-      return {name, pixels: Object.fromEntries(known)};
+// The rows of the list. A row is made again only if what it shows has changed.
+function rows(draft, list) {
+  const made = new Map();  // by the view's name: {signature, element}
+  return (views, entries) => {
+    const elements = views.map((view, i) => {
+      const entry = entries[i], signature = JSON.stringify([view, i, views.length, entry.is_ready, entry.fault]);
+      const old = made.get(view.name);
+      if (old && old.signature === signature) return old.element;
+      const element = item(draft, view, i, views.length, entry);
+      made.set(view.name, {signature, element});
+      return element;
     });
-    const body = {views: views.map(({view: {name, image, camera}}) => ({name, image, camera})), landmarks};
-    const text = JSON.stringify(body);
-    if (text === asked) return;
-    asked = text;
-    clearTimeout(timer);
-    if (aborter) aborter.abort();
-    if (!views.length) return told(null);
-    timer = setTimeout(async () => {
-      aborter = new AbortController();
-      try {
-        told(await Ask.post('api/xray/check', body, aborter.signal));
-      } catch (error) {
-        if (error.name !== 'AbortError') told({fault: error.message, warnings: []});
-      }
-    }, CHECK_PAUSE_ms);
+    if (elements.length !== list.children.length || elements.some((one, i) => one !== list.children[i]))
+      list.replaceChildren(...elements);
   };
-}
-
-function checkText(answer) {
-  if (!answer) return [];
-  const lines = answer.fault ? [el('p', {class: 'fault'}, answer.fault)] :
-                               answer.warnings.map((text) => el('p', {class: 'fault', 'data-warning': ''}, text));
-  const error = answer.metrics && answer.metrics.error;
-  if (!lines.length)
-    lines.push(
-        el('p', {class: 'note', 'data-good': ''},
-           error === undefined ?
-               'No fault was found in these cameras.' :
-               `No fault was found in these cameras; the marked landmarks are ${XrayTable.figure(error)} px off.`));
-  if (answer.command)
-    lines.push(el('details', {}, el('summary', {}, 'The same in a shell'), Dom.command(answer.command)));
-  return lines;
 }
 
 function make(draft) {
-  const list = el('ul', {class: 'view-list'});
-  const figures = el('table', {class: 'values', 'data-figures': ''});
+  const list = el('ul', {class: 'view-list'}), show = rows(draft, list);
   const sides = el('p', {class: 'note', 'data-sides': ''});
-  const check = el('div', {role: 'status', 'data-check': ''});
-  const ask = checking(draft, (answer) => check.replaceChildren(...checkText(answer)));
+  const check = XrayCheck.make(draft);
+  let is_waiting = false;
   const update = () => {
-    const views = draft.document.views || [], entries = views.map((view) => XrayImages.of(view, update));
-    const signature = JSON.stringify([views, entries.map((one) => one.is_ready)]);
+    const views = draft.document.views || [], entries = views.map((view) => XrayImages.of(view, soon));
     sides.textContent = sidesText(views);
-    if (signature !== list.dataset.shown) {
-      list.dataset.shown = signature;
-      list.replaceChildren(...views.map((view, i) => item(draft, view, i, views.length, entries[i])));
-    }
-    const known = views.map((view, i) => ({view, camera: entries[i].camera})).filter((one) => one.camera);
-    figures.replaceChildren(el(
-        'tbody', {},
-        figuresOf(known).map(([what, figure]) => el('tr', {}, el('th', {scope: 'row'}, what), el('td', {}, figure)))));
-    if (entries.every((one) => one.is_ready)) ask(known);
+    show(views, entries);
+    check.update(views, entries);
+  };
+  const soon = () => {
+    if (is_waiting) return;
+    is_waiting = true;
+    requestAnimationFrame(() => {
+      is_waiting = false;
+      update();
+    });
   };
   const again = Dom.button('Read again', () => {
     XrayImages.forget();
-    list.dataset.shown = '';
     draft.dispatchEvent(new Event('change'));
   }, {'data-do': 'read-again', title: 'Reads images and cameras from their files again'});
   return {
@@ -200,9 +133,10 @@ function make(draft) {
         el('div', {class: 'xray-views'},
            el('div', {class: 'toolbar'}, Dom.button('Add X-ray', () => XrayAdd.add(draft), {'data-do': 'add-view'}),
               again),
-           list, sides, figures, check),
+           list, sides),
+    tools: [{step: 'check', title: 'Cameras', element: check.element}],
     update
   };
 }
 
-CasePage.panel('X-ray views', 20, make);
+CasePage.panel('X-ray views', 'xrays', 20, make);

@@ -5,10 +5,13 @@ import {el} from '../../report/page/dom.js';
 
 import * as CasePage from './case.js';
 import * as Ask from './server.js';
+import * as Tiles from './tiles.js';
+import * as XrayAdd from './xray_add.js';
 import * as XrayExchange from './xray_exchange.js';
 import * as XrayFrame from './xray_frame.js';
 import * as XrayImages from './xray_images.js';
 import * as XrayLandmarks from './xray_landmarks.js';
+import * as XrayLook from './xray_look.js';
 import * as XrayMasks from './xray_masks.js';
 import * as XrayTable from './xray_table.js';
 
@@ -82,12 +85,13 @@ function toolbar(shared, tools) {
   });
   const number = el('span', {class: 'note'}, size.value + ' px');
   const brush = Dom.labelled('Brush', el('span', {class: 'with-number'}, size, number));
+  const look = XrayLook.control(() => shared.frames.forEach((frame) => frame.relook()));
   const all = Dom.button('Whole images', () => shared.frames.forEach((frame) => frame.fit()), {'data-do': 'fit'});
   const update = () => {
     brush.hidden = !['brush', 'eraser'].includes(shared.tool);
     choice.querySelector('[role="group"]').choose(shared.tool);
   };
-  return {element: el('div', {class: 'toolbar'}, choice, brush, all), update};
+  return {element: el('div', {class: 'toolbar'}, choice, brush, all, look), update};
 }
 
 // A view in the row of X-rays, with its name, its fault, and the value under the pointer.
@@ -100,7 +104,7 @@ function figure(shared, view, tool) {
          el('figcaption', {}, el('span', {}, view.name), frame.value), fault, wait, frame.box);
   frame.update = (next) => {
     const entry = XrayImages.of(next, shared.refresh);
-    wait.hidden = entry.is_ready;
+    wait.hidden = entry.is_ready || Boolean(frame.entry);
     fault.hidden = !entry.fault;
     fault.textContent = entry.fault || '';
     frame.box.hidden = entry.is_ready && !entry.numbers;
@@ -111,7 +115,14 @@ function figure(shared, view, tool) {
 
 function row(shared, tool) {
   const place = el('div', {class: 'xray-row'});
-  const empty = el('p', {class: 'note'}, 'No X-ray yet. Add one above.');
+  const empty =
+      el('div', {class: 'empty-stage'}, el('p', {}, 'The X-rays are shown here.'),
+         Dom.button('Add an X-ray …', () => XrayAdd.add(shared.draft), {'data-do': 'add-first-view'}));
+  const aspect = () => {
+    const entry = [...shared.frames.values()].map((frame) => frame.entry).find((one) => one && one.numbers);
+    return entry ? entry.width_px / entry.height_px : 1;
+  };
+  const tiles = Tiles.arranged(place, aspect);
   const update = () => {
     const views = shared.views(), names = views.map((one) => one.name);
     if ([...shared.frames.keys()].join('\n') !== names.join('\n')) {
@@ -128,8 +139,10 @@ function row(shared, tool) {
     }
     for (const view of views) shared.frames.get(view.name).update(view);
     empty.hidden = views.length > 0;
+    place.hidden = !views.length;
+    tiles.update();
   };
-  return {element: el('div', {}, empty, place), update};
+  return {elements: [empty, place], update, dispose: tiles.dispose};
 }
 
 // Requests the pose from the landmarks when they no longer change.
@@ -183,6 +196,7 @@ function make(draft) {
   const bar = toolbar(shared, tools), views = row(shared, tool), table = XrayTable.make(shared);
   const exchange = XrayExchange.make(shared);
   shared.refresh = () => {
+    bar.element.hidden = !shared.views().length;
     bar.update();
     views.update();
     masks.update();
@@ -194,16 +208,21 @@ function make(draft) {
     table.updateFit();
   });
   return {
-    element: el('div', {class: 'xrays'}, bar.element, views.element, table.element, exchange.element),
+    stage: {xrays: el('div', {class: 'xrays'}, bar.element, views.elements)},
+    tools: [
+      {step: 'check', title: 'Landmarks in the X-rays', element: table.element},
+      {step: 'save', title: 'Files of other programs', element: exchange.element}
+    ],
     update() {
       shared.refresh();
       table.updateFit();
     },
     dispose() {
       XrayLandmarks.commit(shared);
+      views.dispose();
       shared.frames.forEach((frame) => frame.dispose());
     }
   };
 }
 
-CasePage.panel('X-rays', 30, make, [...XrayFrame.KEYS, ...XrayLandmarks.KEYS]);
+CasePage.panel('X-rays', 'xrays', 50, make, [...XrayFrame.KEYS, ...XrayLandmarks.KEYS]);
