@@ -11,8 +11,12 @@ import * as Shell from './shell.js';
 
 const panels = [];
 const keys = [
-  ['Ctrl+z', 'undo', () => draft && draft.step('undo')], ['Ctrl+y or Ctrl+Z', 'redo', () => draft && draft.step('redo')],
-  ['1 or 2 or 3 or 4 or 5', 'a step of the rail', (event) => draft && rail.choose(CaseSteps.STEPS[Number(event.key) - 1].name)]
+  ['Ctrl+z', 'undo', () => draft && draft.step('undo')],
+  ['Ctrl+y or Ctrl+Z', 'redo', () => draft && draft.step('redo')],
+  [
+    '1 or 2 or 3 or 4 or 5', 'a step of the rail',
+    (event) => draft && rail.choose(CaseSteps.STEPS[Number(event.key) - 1].name)
+  ]
 ];
 let draft = null, open = [], rail = null;
 
@@ -39,7 +43,9 @@ function bar() {
 // Lists the cases in the folder and the drafts.
 async function choose(place) {
   const [contents, drafts] = await Promise.all([Ask.json('api/folder'), Ask.json('api/drafts')]);
-  place.append(el('div', {class: 'page-head'}, el('h1', {}, 'Cases')), Cases.section(contents, drafts));
+  place.append(
+      el('div', {class: 'case-list'}, el('div', {class: 'page-head'}, el('h1', {}, 'Cases')),
+         Cases.section(contents, drafts)));
 }
 
 // The tools of each step; those of one step are shown.
