@@ -80,6 +80,7 @@ class Survivors(GivenCase):
                 "runs_both_lost": 0,
                 "difference": None,  # it is a failure
                 "fails_more": "variant",
+                "has_interval": True,
                 # Order statistics: 1 - 2 P(X < 10) with X of 30 fair coins is 95.7 %: from the 10th to the 21st
                 "low": one["low"],
                 "high": None,

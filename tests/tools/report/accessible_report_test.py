@@ -22,7 +22,8 @@ return [...document.querySelectorAll(named)].filter(shown).filter((one) => {
   const name = one.getAttribute('aria-label'), text = words(one.textContent);
   return name !== null && text && !words(name).includes(text);
 }).map(brief)"""
-SAME_LANDMARKS = """const landmarks = 'section[aria-labelledby], section[aria-label], [role=region], nav, main, header, aside';
+SAME_LANDMARKS = """const sections = 'section[aria-labelledby], section[aria-label], [role=region]';
+const landmarks = sections + ', nav, main, header, aside';
 const name = (one) => [one.getAttribute('role') || (one.matches('section') ? 'region' : one.localName),
   one.getAttribute('aria-label') || (document.getElementById(one.getAttribute('aria-labelledby')) || {}).textContent];
 const all = [...document.querySelectorAll(landmarks)].filter(shown).map((one) => [String(name(one)), brief(one)]);
@@ -65,8 +66,9 @@ class AccessibleReportTest(PageTest):
                     self.browser.open(page, width_px)
                     self.assertEqual(self.browser.js("return document.documentElement.scrollWidth"), width_px)
                     self.assertEqual(self.browser.js(COMMON + wide), [])
-                    outside = """return [...document.querySelectorAll('#contents a')].filter((one) =>
-                        one.getBoundingClientRect().right > innerWidth || one.getBoundingClientRect().left < 0).length"""
+                    outside = """const boxes = [...document.querySelectorAll('#contents a')];
+                        return boxes.map((one) => one.getBoundingClientRect())
+                            .filter((box) => box.right > innerWidth || box.left < 0).length"""
                     self.assertEqual(self.browser.js(outside), 0, "each section can be reached")
             if name == "comparison":
                 self.browser.open(page, 1440)

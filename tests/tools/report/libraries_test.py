@@ -34,6 +34,14 @@ class LibrariesTest(PageTest):
         self.assertLessEqual(max(ticks), 20450)
         self.assertIn("20\u202f000", self.texts("#convergence .tick text"), "numbers as everywhere in the page")
 
+    def test_ticks_have_no_more_digits_than_they_need(self):
+        self.browser.open(self.comparison)
+        self.eventually(lambda: bool(self.texts("#capture .tick text")), True)
+        ticks = self.texts("#capture .tick text")
+        self.assertIn("100 %", ticks)
+        self.assertIn("20 %", ticks)
+        self.assertEqual([tick for tick in ticks if "." in tick], [])
+
     def test_the_graph_has_layers(self):
         data = synthetic.run(with_cube=False)
         names = {"a": "", "b": "a", "c": "b", "d": "a c c"}

@@ -72,8 +72,9 @@ class OddPagesTest(PageTest):
         self.browser.wait("return !!marrow.scene")
         nameless = self.browser.js(
             """const controls = 'button, select, input, [role=button], [role=slider], svg[role=img], canvas, img';
-            const named = (item) => item.textContent.trim() || item.matches('button img[alt=""]') || item.getAttribute('aria-label') ||
-              item.getAttribute('alt') || (item.labels && item.labels.length);
+            const beside = 'button img[alt=""]';
+            const named = (item) => item.textContent.trim() || item.matches(beside) ||
+              item.getAttribute('aria-label') || item.getAttribute('alt') || (item.labels && item.labels.length);
             return [...document.querySelectorAll(controls)].filter((item) => !item.closest('dialog') && !named(item))
               .map((item) => item.outerHTML.slice(0, 120))"""
         )

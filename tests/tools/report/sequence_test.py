@@ -85,7 +85,7 @@ class SequenceTest(PageTest):
         self.assertEqual(self.browser.js("return document.querySelectorAll('#sequence .lost').length"), 6)
         heights = self.browser.js(
             "const plot = document.querySelectorAll('#sequence svg.plot')[2];"
-            " return [...plot.querySelector('.band').getAttribute('points').matchAll(/,(\\S+)/g)].map((m) => +m[1])"
+            " return [...plot.querySelector('.band').getAttribute('d').matchAll(/,([\\d.]+)/g)].map((m) => +m[1])"
         )
         spread = [low - high for high, low in zip(heights[:6], heights[:5:-1])]
         self.assertAlmostEqual(spread[3] / spread[0], 10, 1)

@@ -253,7 +253,7 @@ export function captureTable(data, bins) {
   const used = bins[0].map((_, bin) => bin).filter((bin) => bins.some((row) => row[bin].of));
   return el(
       'div', {class: 'scroll'},
-      el('table', {},
+      el('table', {class: 'cards', role: 'table'},
          el('thead', {},
             el('tr', {},
                el('th', {scope: 'col'}, 'Start' + (data.initial_error.unit ? ', ' + data.initial_error.unit : '')),
@@ -263,9 +263,9 @@ export function captureTable(data, bins) {
                 (bin) =>
                     el('tr', {}, el('th', {scope: 'row'}, bins[0][bin].from + '–' + bins[0][bin].to),
                        bins.map(
-                           (row) => el(
-                               'td', {class: 'number'}, row[bin].of ? row[bin].count + ' / ' + row[bin].of : '–', ' ',
-                               row[bin].of ?
-                                   el('small', {}, '[' + percent(row[bin].low) + ', ' + percent(row[bin].high) + ']') :
-                                   '')))))));
+                           (row, i) => el(
+                               'td', {class: 'number', 'data-title': data.variants[i].name},
+                               row[bin].of ? row[bin].count + ' / ' + row[bin].of : '–', ' ',
+                               row[bin].of ? el('small', {}, percent(row[bin].low) + ' to ' + percent(row[bin].high)) :
+                                             '')))))));
 }

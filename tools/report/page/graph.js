@@ -173,10 +173,13 @@ export function draw(graph, chose) {
   const root = svg('svg', {
     class: 'graph',
     viewBox: '0 0 ' + width + ' ' + height,
-    style: 'max-width: ' + width + 'px; min-width: ' + SMALLEST * width + 'px',
+    width,
+    height,
     role: 'group',
     'aria-label': 'The pipeline\'s nodes'
   });
+  if (!chose)  // fits into the page, as far as its text can be read
+    root.style.cssText = 'width: 100%; height: auto; max-width: ' + width + 'px; min-width: ' + SMALLEST * width + 'px';
   const details =
       el('div', {class: 'node-details', 'aria-live': 'polite'},
          el('p', {class: 'note'}, 'Choose a node to see its options.'));

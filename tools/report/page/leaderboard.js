@@ -29,6 +29,9 @@ const lost = ({failed, incomplete}) =>
          el('small', {'data-tip': 'done, but without a figure whose node may fail'},
             ' + ' + incomplete + ' incomplete')];
 
+// Where it does not fit, a name is continued after its dots.
+const breakable = (text) => text.split('.').flatMap((part, i) => (i ? ['.', el('wbr'), part] : [part]));
+
 function variantName(data, i) {
   const variant = data.variants[i], options = Object.entries(variant.options);
   return el(
@@ -36,8 +39,8 @@ function variantName(data, i) {
       el('div', {}, el('strong', {}, variant.name), variant.is_baseline && el('span', {class: 'tag'}, 'baseline'),
          options.map(
              ([name, value]) =>
-                 el('code', {class: 'option'},
-                    name + ' = ' + (typeof value === 'string' ? value : JSON.stringify(value)))),
+                 el('code', {class: 'option'}, breakable(name), ' = ',
+                    breakable(typeof value === 'string' ? value : JSON.stringify(value)))),
          Recipes.link(data, i)));
 }
 

@@ -79,9 +79,8 @@ function tickText(value) {
 
 // An axis with its ticks, their lines across the plot, and its title.
 function drawScale(axis, ticks, format, across_px, place) {
-  const group = svg('g', {class: 'scale', ...place});
-  select(group).call(
-      axis.tickValues(ticks).tickFormat(format || tickText).tickSizeInner(-across_px).tickSizeOuter(0).tickPadding(8));
+  const group = svg('g', {class: 'scale', ...place}), text = (tick) => (format || tickText)(tick);
+  select(group).call(axis.tickValues(ticks).tickFormat(text).tickSizeInner(-across_px).tickSizeOuter(0).tickPadding(8));
   return group;
 }
 
