@@ -2,15 +2,11 @@
 // The page "Case". Its parts are panels: each shows a part of the draft's document and changes it.
 import {el} from '../../report/page/dom.js';
 
-import * as Cases from './cases.js';
 import {CaseDraft} from './draft.js';
-import * as Ask from './server.js';
 import * as Shell from './shell.js';
 
 const panels = [];
-const keys = [
-  ['Ctrl+z', 'undo', () => draft && draft.step('undo')], ['Ctrl+y or Ctrl+Z', 'redo', () => draft && draft.step('redo')]
-];
+const keys = [['Ctrl+z', 'undo', () => draft.step('undo')], ['Ctrl+y or Ctrl+Z', 'redo', () => draft.step('redo')]];
 let draft = null, open = [];
 
 // Adds a panel. make(draft) returns {element, update(), dispose()}; update() is called after each change of the
@@ -31,16 +27,8 @@ function bar() {
   return {element: el('div', {class: 'toolbar'}, changes.boxes, state), update};
 }
 
-// Lists the cases in the folder and the drafts.
-async function choose(place) {
-  const [contents, drafts] = await Promise.all([Ask.json('api/folder'), Ask.json('api/drafts')]);
-  place.append(el('div', {class: 'page-head'}, el('h1', {}, 'Cases')), Cases.section(contents, drafts));
-}
-
 async function show(place, parameters, first) {
-  draft = null;
-  if (!first) return choose(place);
-  draft = await CaseDraft.open(first);
+  draft = await CaseDraft.open(first || 'case');
   const head = bar();
   open = panels.map(({title, make}) => ({title, ...make(draft)}));
   place.append(
@@ -51,7 +39,6 @@ async function show(place, parameters, first) {
   const update = () => [head, ...open].forEach((one) => one.update && one.update());
   draft.addEventListener('change', update);
   update();
-  return undefined;
 }
 
 Shell.page('case', {
