@@ -120,6 +120,8 @@ void GrowingThreads::work() {
   }
 }
 
+void HttpServer::let_many_wait() { ::listen(svr_sock_, int(kMostThreads)); }
+
 bool HttpServer::process_and_close_socket(socket_t socket) {
   Connection connection(socket);
   bool is_good = true, is_closed = false;
@@ -130,7 +132,12 @@ bool HttpServer::process_and_close_socket(socket_t socket) {
     }
     idle = milliseconds(0);
     connection.begin_header();
-    is_good = process_request(connection, false, is_closed, [&](httplib::Request&) { connection.end_header(); });
+    bool has_header = false;  // without it, the answer is a refusal, and what follows is no request
+    const auto at_header = [&](httplib::Request&) {
+      has_header = true;
+      connection.end_header();
+    };
+    is_good = process_request(connection, false, is_closed, at_header) && has_header;
   }
   shutdown(socket, SHUT_RDWR);
   close(socket);

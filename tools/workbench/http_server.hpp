@@ -36,6 +36,11 @@ class GrowingThreads : public httplib::TaskQueue {
 /// The whole header of a request must come within kHeaderDeadline; otherwise the connection is closed. The body may
 /// take longer: Access has seen the header by then.
 class HttpServer : public httplib::Server {
+ public:
+  /// Lets many connections wait to be accepted. The library lets five wait; a browser tries again only after a second.
+  /// Call this after the port is taken.
+  void let_many_wait();
+
  private:
   bool process_and_close_socket(socket_t socket) override;
 };

@@ -197,6 +197,7 @@ void Server::listen(int port) {
   else if (!parts_->http.bind_to_port("127.0.0.1", port))
     port = -1;
   if (port < 0) throw Error("the port is taken, or may not be used; give another with --port, or leave it out");
+  parts_->http.let_many_wait();
   parts_->access.listen_on(port);
 }
 

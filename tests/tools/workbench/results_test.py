@@ -241,6 +241,24 @@ class ResultsPageTest(PageTest, ResultsBench):
             self.assertIn("DOUBTFUL", card.upper())
             self.assertIn(name + " reason", card)
 
+    def test_how_far_poses_are_apart(self):
+        (self.folder / "pose.yaml").write_text(
+            "marrow: 1\nnodes:\n  bone: {uses: simulate.femur}\n  fracture: {uses: simulate.fracture, in: {bone: bone}}\n"
+            "  truth: {uses: simulate.truth, in: {phantom: fracture}}\noutputs: {pose: truth.starts}\n"
+        )
+        for name, turned in (("straight", []), ("turned", ["[0, 0, 2]"]), ("hardly", ["[0, 0, 0.0002]"])):
+            options = [word for value in turned for word in ("--set", "fracture.rotation_deg=" + value)]
+            subprocess.run(
+                [MARROW, "run", "pose.yaml", "--out", "runs/" + name, "--quiet", *options], cwd=self.folder, check=True
+            )
+        line = "return document.querySelector('.pose-difference').textContent"
+        self.show_results("=runs/straight&with=runs/turned")
+        self.assertIn("The poses of distal are 2.00° and ", self.js(line))
+        self.assertTrue(self.js(line).endswith("mm apart."), self.js(line))
+        self.server.close()
+        self.show_results("=runs/straight&with=runs/hardly")
+        self.assertEqual(self.js(line), "The poses of distal are the same, to less than 0.001° and 0.001 mm.")
+
     def test_a_report_says_that_it_loads(self):
         self.show_results()
         self.js(

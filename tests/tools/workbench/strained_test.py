@@ -72,7 +72,7 @@ class StrainedTest(BenchTest):
         self.assertLess(max(self.seconds_of_a_request() for _ in range(5)), 1)
         for thread in threads:
             thread.join()
-        self.assertLess(max(seconds), 15, "each is closed after the time for a header")
+        self.assertLess(max(seconds), 9, "each is closed after the time for a header")
         self.assertEqual(self.server.process.poll(), None)
 
     def test_it_ends_while_connections_trickle(self):

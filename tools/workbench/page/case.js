@@ -4,19 +4,13 @@
 import {el} from '../../report/page/dom.js';
 
 import * as CaseSteps from './case_steps.js';
-import * as Cases from './cases.js';
 import {CaseDraft} from './draft.js';
-import * as Ask from './server.js';
 import * as Shell from './shell.js';
 
 const panels = [];
 const keys = [
-  ['Ctrl+z', 'undo', () => draft && draft.step('undo')],
-  ['Ctrl+y or Ctrl+Z', 'redo', () => draft && draft.step('redo')],
-  [
-    '1 or 2 or 3 or 4 or 5', 'a step of the rail',
-    (event) => draft && rail.choose(CaseSteps.STEPS[Number(event.key) - 1].name)
-  ]
+  ['Ctrl+z', 'undo', () => draft.step('undo')], ['Ctrl+y or Ctrl+Z', 'redo', () => draft.step('redo')],
+  ['1 or 2 or 3 or 4 or 5', 'a step of the rail', (event) => rail.choose(CaseSteps.STEPS[Number(event.key) - 1].name)]
 ];
 let draft = null, open = [], rail = null;
 
@@ -40,14 +34,6 @@ function bar() {
   return {element: el('div', {class: 'toolbar'}, changes.boxes, state), update};
 }
 
-// Lists the cases in the folder and the drafts.
-async function choose(place) {
-  const [contents, drafts] = await Promise.all([Ask.json('api/folder'), Ask.json('api/drafts')]);
-  place.append(
-      el('div', {class: 'case-list'}, el('div', {class: 'page-head'}, el('h1', {}, 'Cases')),
-         Cases.section(contents, drafts)));
-}
-
 // The tools of each step; those of one step are shown.
 function toolsOf(parts) {
   const boxes = CaseSteps.STEPS.map(
@@ -60,12 +46,7 @@ function toolsOf(parts) {
 }
 
 async function show(place, parameters, first) {
-  draft = null;
-  if (!first) {
-    await choose(place);
-    return;
-  }
-  draft = await CaseDraft.open(first);
+  draft = await CaseDraft.open(first || 'case');
   const head = bar();
   open = panels.map(({title, step, make}) => ({title, step, ...make(draft)}));
   const parts =

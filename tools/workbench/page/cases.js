@@ -123,3 +123,13 @@ export function section(contents, drafts) {
   fill(contents.cases, drafts);
   return place;
 }
+
+Shell.page('cases', {
+  title: 'Cases',
+  inBar: false,
+  of: 'case',
+  async show(place) {
+    const [contents, drafts] = await Promise.all([Ask.json('api/folder'), Ask.json('api/drafts')]);
+    place.append(el('div', {class: 'page-head'}, el('h1', {}, 'Cases')), section(contents, drafts));
+  }
+});

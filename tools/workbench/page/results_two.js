@@ -108,6 +108,8 @@ function figuresSection(figures) {
   const known = figures.filter((one) => Number.isFinite(one.before) || Number.isFinite(one.now));
   if (!known.length) return '';
   const place = el('div'), head = ['Figure', 'First run', 'Second run', 'Difference'];
+  const columns = [...new Set(known.map((one) => one.column))];
+  const places = new Map(known.map((one) => [one, columns.indexOf(one.column)]));
   const fill = (limit) => {
     // How many times the limit the two are apart; without a value in one run, as far as can be.
     const size = (one) => {
@@ -115,7 +117,10 @@ function figuresSection(figures) {
       return Number.isFinite(by) ? by / (FigureWords.limitOf(one, limit) || Number.MIN_VALUE) : Infinity;
     };
     const differ = known.filter((one) => size(one) >= 1), same = known.filter((one) => !differ.includes(one));
-    differ.sort((a, b) => FigureWords.rank(a.name) - FigureWords.rank(b.name) || size(b) - size(a));
+    // The last column of a table is the end of a registration, and says more than the stages before it.
+    differ.sort(
+        (a, b) =>
+            FigureWords.rank(a.name) - FigureWords.rank(b.name) || places.get(b) - places.get(a) || size(b) - size(a));
     place.replaceChildren(
         differ.length ? table('Figures that differ', head, differ.map(figureRow), 3) :
                         el('p', {class: 'note'}, 'No figure differs by more than that.'),
@@ -131,19 +136,26 @@ function figuresSection(figures) {
       place);
 }
 
+// The pictures that both runs have, one over the other: all views of an output beside each other.
 function picturesSection(pictures, first, second) {
   if (!pictures.length) return '';
   const address = (folder, name) => 'results/picture.png?' + new URLSearchParams({folder, name});
   const short = (name) => name.replace(/^outputs\//, '').replace(/\.png$/, '');
-  const place = el('div');
-  const show = (name) => place.replaceChildren(
-      wipe({src: address(first, name), text: first}, {src: address(second, name), text: second}, short(name)));
-  const start = pictures.find((name) => name.includes('result')) || pictures.find((name) => name.includes('overlay')) ||
-      pictures[0];
+  const groupOf = (name) => short(name).split('/').slice(0, -1).join('/') || short(name);
+  const groups = [...new Set(pictures.map(groupOf))], place = el('div', {class: 'wipes'});
+  const show = (group) => place.replaceChildren(
+      ...pictures.filter((name) => groupOf(name) === group)
+          .map(
+              (name) => wipe(
+                  {src: address(first, name), text: first}, {src: address(second, name), text: second}, short(name))));
+  const start = groups.find((name) => name.startsWith('result')) || groups.find((name) => name.startsWith('overlay')) ||
+      groups[0];
   show(start);
   return el(
       'section', {'aria-label': 'Pictures'}, el('h2', {}, 'Pictures'),
-      el('div', {class: 'toolbar'}, Dom.select('Picture', pictures.map((name) => [name, short(name)]), start, show)),
+      groups.length > 1 ?
+          el('div', {class: 'toolbar'}, Dom.select('Pictures', groups.map((name) => [name, name]), start, show)) :
+          '',
       place);
 }
 

@@ -7,12 +7,13 @@ import {startTheme} from '../../report/page/theme.js';
 
 import * as Ask from './server.js';
 
-const pages = new Map();  // name: {title, show(place, parameters), keys, leave()}
+const pages = new Map();  // name: {title, show(place, parameters), keys, leave(), inBar, of}
 let current = null;
 let present_case = '';  // the case that was shown last; it goes along to the other pages
 
 // Adds a page. show(place, parameters, first) fills the element `place`; `first` is what follows the page's name in
-// the address. `keys`: [[key, what it does, action]], where key is as in KeyboardEvent.key, with 'Ctrl+' in front.
+// the address. A page that is not in the bar (inBar: false) may belong to one that is (of). `keys`: [[key, what it
+// does, action]], where key is as in KeyboardEvent.key, with 'Ctrl+' in front.
 export function page(name, description) {
   pages.set(name, description);
 }
@@ -20,7 +21,8 @@ export function page(name, description) {
 function parsed(hash) {
   const parameters = new URLSearchParams(hash.replace(/^#/, ''));
   const [name, first] = [...parameters.entries()][0] || ['home', ''];
-  return {name: pages.has(name) ? name : 'home', first, parameters};
+  const wanted = name === 'case' && !first ? 'cases' : name;  // without a name, the page that lists them
+  return {name: pages.has(wanted) ? wanted : 'home', first, parameters};
 }
 
 export const addressOf = (name, first, more) =>
@@ -51,7 +53,7 @@ async function show() {
   current = pages.get(name);
   document.title = (first ? first + ' · ' : '') + current.title + ' · marrow';
   for (const link of document.querySelectorAll('#pages a'))
-    if (link.dataset.page === name)
+    if (link.dataset.page === (current.of || name))
       link.setAttribute('aria-current', 'page');
     else
       link.removeAttribute('aria-current');
