@@ -119,7 +119,7 @@ class StageTest(XrayTest):
     def test_a_seed_outside_of_bone_is_said_at_once(self):
         self.with_ct({"distal": [LOWER, [2, 2, 11]]})
         self.go_to_step("bones")
-        self.wait_text('[data-outside="distal"]', "-1000 HU here is air; bone has more than 150 HU")
+        self.wait_text('[data-outside="distal"]', "-1000 HU is air; bone has more than 150 HU")
         self.assertEqual(self.js("return document.querySelectorAll('[data-outside]').length"), 1)
         # The pointer says the same before the click.
         self.click('[data-tool="seed distal"]')

@@ -87,7 +87,7 @@ function toolbar(shared, tools) {
   const number = el('span', {class: 'note'}, size.value + ' px');
   const brush = Dom.labelled('Brush', el('span', {class: 'with-number'}, size, number));
   const look = XrayLook.control(() => shared.frames.forEach((frame) => frame.relook()));
-  const all = Dom.button('Whole images', () => shared.frames.forEach((frame) => frame.fit()), {'data-do': 'fit'});
+  const all = Dom.button('Whole', () => shared.frames.forEach((frame) => frame.fit()), {'data-do': 'fit'});
   const update = () => {
     brush.hidden = !['brush', 'eraser'].includes(shared.tool);
     choice.querySelector('[role="group"]').choose(shared.tool);
