@@ -141,7 +141,8 @@ json fitted(const Workbench& workbench, const Request& request) {
   try {
     const Fit found = fit(workbench, views, landmarks, fragment);
     std::vector<std::string> warnings = found.pose.warnings;
-    if (found.pose.cost > kDoubtful_px)
+    // A pose may fit because landmarks that contradict it were left out; its warnings name them.
+    if (found.pose.cost > kDoubtful_px || !warnings.empty())
       for (const std::string& sentence : mirrored_view(workbench, views, landmarks, fragment, found.pose.cost))
         warnings.push_back(sentence);
     return {{"world_from_ct", json_of(found.pose.world_from_model)},

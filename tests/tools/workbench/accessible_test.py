@@ -54,6 +54,18 @@ return [...document.querySelectorAll(reached)].filter(
         !one.textContent.trim() && !one.getAttribute('aria-label') && !one.getAttribute('aria-labelledby') &&
         !one.title && !(one.labels && one.labels.length)).map((one) => one.outerHTML.slice(0, 120));
 """
+# Names that lack the words that are seen: who says them to the computer presses nothing. By WCAG 2.1, 2.5.3.
+MISNAMED = """
+const words = (text) => text.toLowerCase().replace(/[^\\p{L}\\p{N} ]/gu, ' ').replace(/ +/g, ' ').trim();
+return [...document.querySelectorAll('a[aria-label], button[aria-label]')].filter(
+    (one) => !words(one.getAttribute('aria-label')).includes(words(one.textContent))).map((one) => one.outerHTML);
+"""
+# Parts of the page that a screen reader lists under the same name.
+SAME_PARTS = """
+const parts = [...document.querySelectorAll('nav, aside, header, section[aria-label]')]
+    .filter((one) => one.checkVisibility()).map((one) => one.localName + ' ' + one.getAttribute('aria-label'));
+return parts.filter((one, i) => parts.indexOf(one) !== i);
+"""
 PAGES = ("home", "case=case", "place=case", "pipeline=femur/femur.yaml", "results=run")
 
 
@@ -101,6 +113,17 @@ class AccessibleTest(PageTest):
                 self.page(page, theme=theme)
                 self.assertEqual(self.browser.js(LOW_CONTRAST), [])
                 self.assertEqual(self.browser.js(UNNAMED), [])
+                self.assertEqual(self.browser.js(MISNAMED), [])
+                self.assertEqual(self.browser.js(SAME_PARTS), [])
+
+    def test_all_steps_of_a_case(self):
+        self.page("case=case")
+        self.browser.js("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+        for step in ("ct", "bones", "xrays", "check", "save"):
+            with self.subTest(step=step):
+                self.go_to_step(step)
+                for what in (LOW_CONTRAST, UNNAMED, MISNAMED, SAME_PARTS):
+                    self.assertEqual(self.browser.js(what), [])
 
     def test_no_page_is_wider_than_the_screen(self):
         for width_px, page in sample(itertools.product((1440, 1024, 400), PAGES), 5):

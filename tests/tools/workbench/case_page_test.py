@@ -120,9 +120,9 @@ class CasePageTest(PageTest):
         marks = yaml.safe_load((case / "landmarks.yaml").read_text())
         self.assertEqual(list(marks["fragments"]["distal"]["points"]), [NASTY])
         self.assertEqual(self.browser.js("return document.querySelectorAll('main b').length"), 0)
-        self.assertEqual(self.find("[data-ct]").text, "mine/ct")
+        self.assertEqual(self.find_in_sight("[data-ct]").text, "mine/ct")
         self.assertEqual(self.browser.js(OUTLINED), True, "the copied CT is the same, so what is shown stays")
-        commands = self.find("[data-saved]").text
+        commands = self.find_in_sight("[data-saved]").text
         self.assertIn("pipelines/bone/bone.yaml case=%s" % case.resolve(), commands)
         environment = {**os.environ, "MARROW_CACHE": str(self.scratch / "store")}
         arguments = ["run", SOURCE / "pipelines/workbench/segment-bone.yaml", "case=%s" % case]

@@ -284,7 +284,7 @@ class CtPageTest(PageTest):
             builder = ActionBuilder(self.browser.driver, duration=0)
             builder.pointer_action.move_to(canvas).pointer_down(2).move_by(dx, dy).pointer_up(2)
             builder.perform()
-            boxes = "[...document.querySelectorAll('.ct-panel input.short')].slice(-2).map((one) => one.value)"
+            boxes = "[...document.querySelectorAll('.ct-slices input.short')].slice(-2).map((one) => one.value)"
             self.browser.wait("return %s.join() === '%s'" % (boxes, ",".join(changed)))
 
     def middle_of_bright(self, name):

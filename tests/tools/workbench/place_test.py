@@ -286,9 +286,23 @@ class PageOfCaseTest(PageOfCase, Placing, PageTest):
         self.assertEqual(self.pose(), two)
         self.js("document.querySelectorAll('.place-steps button')[1].click()")
         self.assertEqual(self.kept(), one)
+        steps = "return [...document.querySelectorAll('.place-steps button')].map((b) => b.textContent)"
+        before = self.js(steps)
         self.show(server, "home")
         self.show(server, "place=case")
         self.assertEqual(self.pose(), one)
+        self.assertEqual(self.js(steps), before)
+
+    def test_greys_change_without_a_request(self):
+        self.place()
+        drawn = lambda: self.js("return marrow.place().views[0].canvas.toDataURL()")
+        pictures = [drawn()]
+        self.browser.logs()
+        for way in ("equalised", "all"):
+            self.js("document.querySelector('.xray-look [data-value=%s]').click()" % way)
+            pictures.append(drawn())
+        self.assertEqual(len(set(pictures)), 3)
+        self.assertEqual([url for url in self.browser.logs()[1] if "api/place/image" in url], [])
 
     def test_the_overlay_is_that_of_the_newest_pose(self):
         server = self.place()

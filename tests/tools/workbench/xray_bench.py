@@ -133,7 +133,8 @@ class XrayTest(PageTest):
         return steps[at]
 
     def text(self, selector):
-        return self.find(selector).text
+        """Also of what the present step does not show."""
+        return self.browser.js("return arguments[0].textContent", self.find(selector)).strip()
 
     def wait_text(self, selector, part, seconds=120):
         self.find(selector, seconds)

@@ -134,7 +134,9 @@ function slices(draft, state) {
   bar.element.append(zoom);
   const empty =
       el('div', {class: 'empty-stage'}, el('p', {}, 'The slices of the CT are shown here.'),
-         Dom.button('Choose the CT …', () => Shell.guarded(() => choose(draft)), {'data-do': 'choose-first-ct'}));
+         Dom.button(
+             'Choose the CT …', () => Shell.guarded(() => choose(draft)),
+             {'data-do': 'choose-first-ct', class: 'primary'}));
   const foot = el('div', {class: 'slices-foot'}, tool, values.element);
   const tiles = el('div', {class: 'slices'}, views.map((view) => view.element));
   const element = el('div', {class: 'ct-slices'}, bar.element, empty, tiles, foot);
@@ -167,7 +169,8 @@ const slicesHelp = () =>
 
 function make(draft) {
   const state = CtState.of(draft), shown = slices(draft, state);
-  const name = el('strong', {'data-ct': ''}), facts = el('span', {class: 'note'}), says = el('div', {});
+  const name = el('strong', {'data-ct': ''}), help = slicesHelp(), facts = el('span', {class: 'note'}),
+        says = el('div', {});
   const options = optionsForm((more) => draft.change('read the CT in another way', (document) => {
     document.ct = {file: document.ct.file, ...more};
     state.read = '';
@@ -191,6 +194,8 @@ function make(draft) {
         ...(state.fault ? [el('p', {class: 'fault', role: 'alert'}, state.fault), ...seriesIn(draft, state.fault)] :
                           []),
         ...(ct && chosen ? ct.doubts : []).map((doubt) => el('p', {class: 'fault doubt', role: 'status'}, doubt)));
+    help.hidden = !ct;
+    name.classList.toggle('none', !chosen);
     options.element.hidden = command.hidden = !chosen;
     if (state.fault) options.element.open = true;
     draft.ct_fault = state.fault;
@@ -210,7 +215,7 @@ function make(draft) {
   tell();
   let filled = JSON.stringify(draft.document.ct);
   return {
-    element: el('div', {class: 'ct-panel'}, head, options.element, says, command, slicesHelp()),
+    element: el('div', {class: 'ct-panel'}, head, options.element, says, command, help),
     stage: {slices: shown.element},
     update() {
       const now = JSON.stringify(draft.document.ct);

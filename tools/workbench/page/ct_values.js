@@ -39,7 +39,8 @@ export class CtValues {
 }
 
 // Why there is no bone where this value is; '' if there may be.
-export const noBone = (value_hu) =>
-    (value_hu === null || value_hu === undefined || value_hu >= BONE_HU ?
-         '' :
-         value_hu + ' HU here is ' + (value_hu < -300 ? 'air' : 'no bone') + '; bone has more than ' + BONE_HU + ' HU');
+export function noBone(value_hu) {
+  if (value_hu === null || value_hu === undefined || value_hu >= BONE_HU) return '';
+  return `${value_hu} HU is ${value_hu < -300 ? 'air' : 'not bone'}`;
+}
+export const ofBone = `bone has more than ${BONE_HU} HU`;

@@ -4,7 +4,7 @@ import {button, checkbox, el, labelled, select} from '../../report/page/dom.js';
 
 import * as CasePage from './case.js';
 import {CtState} from './ct_state.js';
-import {CtValues, noBone} from './ct_values.js';
+import {CtValues, noBone, ofBone} from './ct_values.js';
 import {LabelsState} from './labels_state.js';
 import * as PointList from './point_list.js';
 import * as Shell from './shell.js';
@@ -131,7 +131,7 @@ function seedList(draft, state, values, name, seeds) {
     const fault = noBone(values.at(point_mm));
     return PointList.row(
         state, 'seed ' + (i + 1) + ' of ' + name, point_mm, seedActions(draft, name, i),
-        fault && el('span', {class: 'fault', role: 'alert', 'data-outside': name}, fault));
+        fault && el('span', {class: 'fault', role: 'alert', 'data-outside': name}, fault + '; ' + ofBone));
   }));
 }
 

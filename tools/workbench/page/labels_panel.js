@@ -157,6 +157,7 @@ function make(draft) {
   function update() {
     const file = draft.document.labels, is_there = Boolean(labels.labels) && !labels.isReading;
     name.textContent = file || 'No label map is chosen.';
+    name.classList.toggle('none', !file);
     facts.textContent = labels.isReading ? 'is being read' :
         is_there ? labels.labels.segments.length + ' labels, ' + labels.labels.grid.size.join(' × ') + ' voxels' :
                    '';

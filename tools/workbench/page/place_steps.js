@@ -28,12 +28,19 @@ export class PlaceSteps {
 
   // Takes the steps of an earlier visit if they lead to these poses. Whether it did.
   restore(poses, bones) {
-    const kept = JSON.parse(sessionStorage.getItem(this.key) || '[]');
     const fits = (step) => bones.every((bone) => step.poses[bone]) && Object.keys(step.poses).length === bones.length;
-    this.steps = kept.filter(fits);
+    this.steps = this.remembered().filter(fits);
     if (this.find(poses)) return true;
     this.steps = [];
     return false;
+  }
+
+  remembered() {
+    try {
+      return JSON.parse(sessionStorage.getItem(this.key) || '[]');
+    } catch (error) {
+      return [];
+    }
   }
 
   remember() {

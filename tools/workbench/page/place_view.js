@@ -189,12 +189,13 @@ export class PlaceView {
   // Shows an image: the case's own, or a frame of a sequence.
   showImage(numbers) {
     this.shown = {numbers, width_px: this.paint.width, height_px: this.paint.height};
+    this.ranges = XrayPicture.rangesOf(this.shown);
     this.relook();
   }
 
   // Makes greys of the image's numbers as the control says.
   relook() {
-    const ranges = XrayPicture.rangesOf(this.shown);
+    const {ranges} = this;
     this.paint.show(XrayPicture.greys(this.shown, XrayLook.windowOf(ranges), XrayLook.curveOf(ranges)));
     this.draw();
   }

@@ -2,6 +2,7 @@
 // One slice of the CT on a canvas, and everything that mouse, touch and keys do in it.
 import {el} from '../../report/page/dom.js';
 
+import * as Hint from './cursor_hint.js';
 import * as Shell from './shell.js';
 import * as SliceGeometry from './slice_geometry.js';
 import * as SliceInput from './slice_input.js';
@@ -132,13 +133,7 @@ export class SliceView {
   tell([x, y], value_hu) {
     const {tool} = this.state, mark = this.markAt([x, y]);
     const text = mark ? 'drag to move ' + mark.label : tool ? tool.says(value_hu) : '';
-    this.hint.hidden = !text;
-    if (!text) return;
-    this.hint.textContent = text;
-    const {offsetWidth: width, offsetHeight: height} = this.hint;
-    const left = x + 16 + width > this.view.width ? x - 12 - width : x + 16;
-    const top = y + 18 + height > this.view.height ? y - 10 - height : y + 18;
-    this.hint.style.transform = `translate(${Math.max(0, left)}px, ${Math.max(0, top)}px)`;
+    Hint.show(this.hint, text, [x, y]);
   }
 
   markAt([x, y]) {

@@ -2,17 +2,20 @@
 // One X-ray on the screen: zooming, moving and windowing. The tool does everything else.
 import {el, svg} from '../../report/page/dom.js';
 
+import * as Hint from './cursor_hint.js';
 import {pinched} from './pinch.js';
 import * as Viewport from './viewport.js';
 import * as XrayImages from './xray_images.js';
 import * as XrayLook from './xray_look.js';
 import * as XrayPicture from './xray_picture.js';
 
-// tool() returns the present tool: {press(frame, pixel, event), arrow(frame, step), key(frame, name), marks(frame)}.
+// tool() returns the present tool: {press(frame, pixel, event), arrow(frame, step), key(frame, name), marks(frame),
+// says(frame, pixel)}. says() gives the hint at the pointer.
 // press() returns {move(pixel), end(pixel), cancel()}, or nothing: then the pointer moves the image.
 export function make(name, tool) {
   const canvas = el('canvas', {role: 'img', 'aria-label': 'X-ray ' + name});
   const overlay = svg('svg', {class: 'xray-marks', 'aria-hidden': 'true'});
+  const hint = el('span', {class: 'cursor-hint', 'aria-hidden': 'true', hidden: true});
   const box =
       el('div', {
         class: 'xray-box',
@@ -21,10 +24,21 @@ export function make(name, tool) {
         'data-view': name,
         'aria-label': 'X-ray ' + name + '. Plus and minus zoom, W and L change window and level, arrows move.'
       },
-         canvas, overlay);
+         canvas, overlay, hint);
   const value = el('span', {class: 'xray-value', 'data-value-of': name}, '');
-  const frame =
-      {name, box, overlay, value, entry: null, port: null, window: null, pointer: null, mask: null, element: null};
+  const frame = {
+    name,
+    box,
+    hint,
+    overlay,
+    value,
+    entry: null,
+    port: null,
+    window: null,
+    pointer: null,
+    mask: null,
+    element: null
+  };
 
   // A new image gets its own window; an image of the same size keeps its place. The old one stays until the new one has
   // arrived.
@@ -156,6 +170,7 @@ function listen(frame, tool) {
     if (pointers.size === 2 && pointers.has(event.pointerId)) return pinch(frame, pointers, event.pointerId, place);
     frame.pointer = pixel;
     tell(frame, pixel);
+    Hint.show(frame.hint, event.pointerType === 'mouse' && tool().says ? tool().says(frame, pixel) : '', place);
     if (doing && pointers.has(event.pointerId)) doing.move(pixel, place, last);
     last = place;
     frame.draw();
@@ -168,6 +183,7 @@ function listen(frame, tool) {
   box.addEventListener('pointercancel', up('cancel'));
   box.addEventListener('pointerleave', () => {
     frame.pointer = null;
+    frame.hint.hidden = true;
     frame.value.textContent = '';
     frame.draw();
   });

@@ -207,7 +207,13 @@ export function marks(bench, frame) {
   return shown;
 }
 
+function says(bench, frame, pixel) {
+  const hit = nearest(bench, frame, pixel);
+  return hit ? 'drag to move ' + hit : 'click to mark ' + nameToPlace(bench, frame.name);
+}
+
 export const tool = (bench) => ({
+  says: (frame, pixel) => says(bench, frame, pixel),
   press: (frame, pixel) => press(bench, frame, pixel),
   arrow: (frame, step) => arrow(bench, frame, step),
   key: (frame, name) => key(bench, frame, name)

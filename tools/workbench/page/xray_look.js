@@ -3,7 +3,7 @@
 import * as Dom from '../../report/page/dom.js';
 import {el} from '../../report/page/dom.js';
 
-const WAYS = [['body', 'Body'], ['equalised', 'Equalised'], ['all', 'All values']];
+const WAYS = [['body', 'Body'], ['equalised', 'Equalised'], ['all', 'All']];
 const MEANINGS = {
   body: 'The greys are spread over the body. Air and collimator may be all white and all black.',
   equalised: 'The contrast is the same in all regions, as in the reports. Bone is seen under thick and thin tissue.',
@@ -31,12 +31,13 @@ export function control(changed) {
   const reset = Dom.button('Reset', () => {
     Object.assign(look, {brightness: 0, contrast: 0});
     for (const one of [brightness, contrast]) one.querySelector('input').value = 50;
-    reset.disabled = true;
+    brightness.querySelector('input').focus();
+    reset.hidden = true;
     changed();
-  }, {'data-do': 'reset-greys', disabled: !look.brightness && !look.contrast, title: 'Brightness and contrast'});
+  }, {'data-do': 'reset-greys', hidden: !look.brightness && !look.contrast, title: 'Brightness and contrast'});
   const slider = (name, most) => Dom.slider(name, 0.5 + look[name] / (2 * most), (share) => {
     look[name] = (2 * share - 1) * most;
-    reset.disabled = false;
+    reset.hidden = false;
     changed();
   });
   const brightness = slider('brightness', 0.6), contrast = slider('contrast', 2);

@@ -141,6 +141,7 @@ export function make(shared) {
       frame.draw();
     };
     return {
+      says: () => (value ? 'drag to erase the mask' : 'drag over what must not be used'),
       press(frame, pixel) {
         let last = pixel;
         paint(frame, pixel, pixel);
@@ -182,6 +183,7 @@ export function make(shared) {
 
   // By the keyboard, Enter sets one corner and then the other.
   const rectangle = {
+    says: () => 'drag a box over what must not be used',
     press(frame, pixel) {
       frame.corner = pixel;
       return {

@@ -45,9 +45,10 @@ function bench(draft) {
   return shared;
 }
 
-// A tool has press(frame, pixel, event), arrow(frame, step) and key(frame, name), each optional.
+// A tool has press(frame, pixel, event), arrow(frame, step), key(frame, name) and says(frame, pixel), each optional.
 const LOOK = {};
 const windowing = () => ({
+  says: () => 'drag: contrast and brightness',
   press(frame) {
     const [low, high] = frame.window, width = high - low, middle = (low + high) / 2;
     let begin = null;
@@ -86,7 +87,7 @@ function toolbar(shared, tools) {
   const number = el('span', {class: 'note'}, size.value + ' px');
   const brush = Dom.labelled('Brush', el('span', {class: 'with-number'}, size, number));
   const look = XrayLook.control(() => shared.frames.forEach((frame) => frame.relook()));
-  const all = Dom.button('Whole images', () => shared.frames.forEach((frame) => frame.fit()), {'data-do': 'fit'});
+  const all = Dom.button('Whole', () => shared.frames.forEach((frame) => frame.fit()), {'data-do': 'fit'});
   const update = () => {
     brush.hidden = !['brush', 'eraser'].includes(shared.tool);
     choice.querySelector('[role="group"]').choose(shared.tool);
@@ -115,9 +116,9 @@ function figure(shared, view, tool) {
 
 function row(shared, tool) {
   const place = el('div', {class: 'xray-row'});
-  const empty =
-      el('div', {class: 'empty-stage'}, el('p', {}, 'The X-rays are shown here.'),
-         Dom.button('Add an X-ray …', () => XrayAdd.add(shared.draft), {'data-do': 'add-first-view'}));
+  const empty = el(
+      'div', {class: 'empty-stage'}, el('p', {}, 'The X-rays are shown here.'),
+      Dom.button('Add an X-ray …', () => XrayAdd.add(shared.draft), {'data-do': 'add-first-view', class: 'primary'}));
   const aspect = () => {
     const entry = [...shared.frames.values()].map((frame) => frame.entry).find((one) => one && one.numbers);
     return entry ? entry.width_px / entry.height_px : 1;
