@@ -70,7 +70,7 @@ class TuningTest(PageTest):
             text,
         )
         self.assertIn("the large mark is the chosen one", self.texts("#tuning")[0])
-        self.assertEqual(self.axis_titles(), ["points tried", "score [mm]"], "a capped mean is not called a mean")
+        self.assertEqual(self.axis_titles(), ["points tried", "score (mm)"], "a capped mean is not called a mean")
 
     def test_a_point_says_what_its_score_is_made_of(self):
         """Six runs: 1, 5, 30 and 140 mm, and two that failed. By hand: (1 + 5 + 4 * 20) / 6 = 14.33 is the score, and
