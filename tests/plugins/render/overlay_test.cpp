@@ -105,6 +105,14 @@ TEST(Overlay, DrawsTheResultWhereTheProjectorSays) {
   EXPECT_TRUE(has(picture, {331, 151}, {128, 128, 128})) << "a constant image is mid grey";
 }
 
+TEST(Overlay, OutlinesAreTwoPixelsWide) {
+  const cv::Mat picture = overlay(pose_at(10));
+  int width_px = 0;
+  for (int x = 380; x < 400; ++x) width_px += has(picture, {x, 151}, kSkyBlue);
+  EXPECT_GE(width_px, 2);
+  EXPECT_LE(width_px, 3);
+}
+
 TEST(Overlay, BeforeIsOnTheLeftAndAfterOnTheRight) {
   const cv::Mat picture =
       overlay(pose_at(40), {{"start", shipped::item(pose_at(-40))}, {"truth", shipped::item(marrow::Truth{at(10)})}});

@@ -65,7 +65,13 @@ class AccessibleReportTest(PageTest):
                 with self.subTest(page=name, width_px=width_px):
                     self.browser.open(page, width_px)
                     self.assertEqual(self.browser.js("return document.documentElement.scrollWidth"), width_px)
+                    self.browser.js("document.querySelectorAll('main details').forEach((one) => (one.open = true))")
                     self.assertEqual(self.browser.js(COMMON + wide), [])
+                    cut = """return [...document.querySelectorAll('svg.plot text')].filter((one) => {
+                      const box = one.getBoundingClientRect();
+                      return box.left < 0 || box.right > innerWidth;
+                    }).map((one) => one.textContent)"""
+                    self.assertEqual(self.browser.js(cut), [])
                     outside = """const boxes = [...document.querySelectorAll('#contents a')];
                         return boxes.map((one) => one.getBoundingClientRect())
                             .filter((box) => box.right > innerWidth || box.left < 0).length"""

@@ -80,6 +80,16 @@ class ReportTest(PageTest):
             self.browser.key("ARROW_RIGHT", ".handle")
         self.eventually(clip, "inset(0px 0px 0px 30%) 30")
 
+    def test_a_run_compares_its_outline_with_what_it_was_found_by(self):
+        data = synthetic.run(with_cube=False)
+        pictures = data["cells"][0]["pictures"]
+        one = pictures[0]["picture"]
+        names = ["edges/frontal", "edges/lateral", "overlay/distal/lateral", "result/distal/lateral", "scene/lateral"]
+        data["cells"][0]["pictures"] = [{"name": name, "picture": one} for name in names]
+        self.browser.open(self.write("pair", data))
+        chosen = "return [...document.querySelectorAll('#pictures .comparer select')].map((one) => one.value)"
+        self.assertEqual(self.browser.js(chosen), ["edges/lateral", "result/distal/lateral"], "of one view")
+
     def test_blink_and_side_by_side(self):
         self.browser.open(self.comparison)
         self.browser.show("pictures")

@@ -180,8 +180,8 @@ class SurvivorsTest(PageTest):
         self.eventually(
             tips,
             [
-                "edges.high = 10.0\nmTRE [mm]: 1.00, 95 % interval 0.500 to 1.50\n8 of 8 runs",
-                "edges.high = 20.0\nmTRE [mm]: 2.00\n3 of 8 runs",
+                "edges.high = 10.0\nmTRE (mm): 1.00, 95 % interval 0.500 to 1.50\n8 of 8 runs",
+                "edges.high = 20.0\nmTRE (mm): 2.00\n3 of 8 runs",
             ],
         )
         self.assertEqual(

@@ -4,7 +4,11 @@ import * as Data from './data.js';
 import {el, number, percent, svg, withUnit} from './dom.js';
 import * as Plots from './plots.js';
 
-const ROW_HEIGHT = 66, MOST_POINTS = 400;
+const MOST_POINTS = 400;
+
+// Where the rows of a plot are: on a narrow screen a row's note has a line of its own.
+const rowsFor = (width) => (width < 560 ? {height: 82, middle: 56, has_lines: true} : {height: 66, middle: 40});
+
 
 const axisTitle = (metric) => metric.label + (metric.unit ? ' (' + metric.unit + ')' : '');
 const point = (cell, tip) => ({'data-tip': tip, 'data-cell': cell.id, class: 'point'});
@@ -16,11 +20,12 @@ function thinned(sorted) {
   return sorted.filter((_, i) => i >= sorted.length - 20 || Math.floor(i / step) !== Math.floor((i - 1) / step));
 }
 
-function rowTitle(root, data, variant, top, note) {
-  root.append(svg(
-      'text', {class: 'row-name', x: 8, y: top + 14}, data.variants[variant].name, svg('tspan', {class: 'row-note'}, [
-        '', data.variants[variant].is_baseline && 'baseline', note
-      ].filter((word) => word !== false && word !== undefined).join('\u2002'))));
+function rowTitle(root, data, variant, top, note, {has_lines}) {
+  const {name, is_baseline} = data.variants[variant];
+  const words = [is_baseline && 'baseline', note].filter(Boolean);
+  root.append(
+      svg('text', {class: 'row-name', x: 8, y: top + 14}, name,
+          svg('tspan', {class: 'row-note', ...(has_lines ? {x: 8, dy: 15} : {dx: 9})}, words.join('\u2002'))));
 }
 
 function box(root, x, middle, [low, q1, median, q3, high], tip) {
@@ -40,7 +45,7 @@ function box(root, x, middle, [low, q1, median, q3, high], tip) {
 }
 
 export function drawDistribution(data, metricIndex, kind, width) {
-  const metric = data.metrics[metricIndex];
+  const metric = data.metrics[metricIndex], place = rowsFor(width);
   const rows =
       data.variants.map((_, variant) => Data.valuesOf(data, variant, metricIndex).sort((a, b) => a.value - b.value));
   const all = rows.flatMap((row) => row.map((item) => item.value));
@@ -49,7 +54,7 @@ export function drawDistribution(data, metricIndex, kind, width) {
         drawn = limit !== null && (kind === 'log' || limit <= 3 * all.reduce((a, b) => Math.max(a, b), 0));
   const {root, box: area, x} = Plots.frame({
     width,
-    height: ROW_HEIGHT * rows.length + 62,
+    height: place.height * rows.length + 62,
     label: 'Distribution of ' + metric.label + ', one row for each variant; the numbers are in the table of the result',
     x: {kind, domain: Plots.domain(all.concat(drawn ? limit : []), kind), title: axisTitle(metric)}
   });
@@ -64,9 +69,10 @@ export function drawDistribution(data, metricIndex, kind, width) {
     }));
   }
   rows.forEach((row, variant) => {
-    const top = area.top + variant * ROW_HEIGHT, middle = top + 40, all_runs = data.cellsOf[variant].length,
+    const top = area.top + variant * place.height, middle = top + place.middle, all_runs = data.cellsOf[variant].length,
           lacking = all_runs - row.length;
-    rowTitle(root, data, variant, top, lacking ? lacking + ' of ' + all_runs + ' runs without it, not drawn' : '');
+    rowTitle(
+        root, data, variant, top, lacking ? lacking + ' of ' + all_runs + ' runs without it, not drawn' : '', place);
     thinned(row).forEach(
         (item, i) => root.append(Plots.marker(
             variant, x(item.value), middle + 13 * Plots.spread(i), 3.2,
@@ -100,7 +106,7 @@ function lostText(item) {
 
 // The difference of every pair, and the estimate with its interval.
 export function drawDifferences(data, metricIndex, kind, width) {
-  const metric = data.metrics[metricIndex], variants = compared(data);
+  const metric = data.metrics[metricIndex], variants = compared(data), place = rowsFor(width);
   const rows = variants.map(
       (variant) =>
           Data.pairedValues(data, variant, metricIndex).map((item) => ({...item, difference: item.value - item.base})));
@@ -110,7 +116,7 @@ export function drawDifferences(data, metricIndex, kind, width) {
         unit = 10 ** Math.floor(Math.log10(typical)) || typical;  // for the least double, the power of ten is 0
   const {root, box: area, x} = Plots.frame({
     width,
-    height: ROW_HEIGHT * rows.length + 62,
+    height: place.height * rows.length + 62,
     label: 'Difference of ' + metric.label +
         ' to the baseline, one row for each variant; the numbers are in the table below',
     x: {
@@ -123,11 +129,12 @@ export function drawDifferences(data, metricIndex, kind, width) {
   });
   root.append(svg('line', {class: 'zero', x1: x(0), x2: x(0), y1: area.top, y2: area.bottom}));
   rows.forEach((row, i) => {
-    const variant = variants[i], top = area.top + i * ROW_HEIGHT, middle = top + 40;
+    const variant = variants[i], top = area.top + i * place.height, middle = top + place.middle;
     rowTitle(
         root, data, variant, top,
         row.length + ' pairs, better in ' + row.filter((item) => Data.isBetter(metric, item.value, item.base)).length +
-            lostText(found[i]));
+            lostText(found[i]),
+        place);
     thinned(row.sort((a, b) => a.difference - b.difference))
         .forEach(
             (item, k) => root.append(Plots.marker(
@@ -253,7 +260,7 @@ export function captureTable(data, bins) {
   const used = bins[0].map((_, bin) => bin).filter((bin) => bins.some((row) => row[bin].of));
   return el(
       'div', {class: 'scroll'},
-      el('table', {class: 'cards', role: 'table'},
+      el('table', {class: 'counts cards', role: 'table'},
          el('thead', {},
             el('tr', {},
                el('th', {scope: 'col'}, 'Start' + (data.initial_error.unit ? ', ' + data.initial_error.unit : '')),

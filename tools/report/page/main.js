@@ -83,7 +83,7 @@ function paired(data) {
       'paired', 'Against the baseline',
       'Each case and start, run with a variant and with ' + data.variants[data.baseline].name +
           '. Left of zero the variant is better; right of zero if a higher figure is better. ' +
-          'The black bar is the estimated difference with its 95 % interval.',
+          'The thick bar is the estimated difference with its 95 % interval.',
       metricFigure(
           data, [['linear', 'linear'], ['signed', 'log']],
           {label: 'Show', options: [['differences', 'Differences'], ['pairs', 'Pairs']]}, draw),

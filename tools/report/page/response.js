@@ -6,7 +6,7 @@ import * as Plots from './plots.js';
 const labelOf = (data, figure) => {
   if (figure === 'success') return 'success rate';
   const metric = data.metrics.find((one) => one.name === figure);
-  return metric ? metric.label + (metric.unit ? ' [' + metric.unit + ']' : '') : figure;
+  return metric ? metric.label + (metric.unit ? ' (' + metric.unit + ')' : '') : figure;
 };
 
 // The text at the mark of a point, with its number of runs.

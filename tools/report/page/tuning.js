@@ -33,7 +33,7 @@ function draw(tuning, width) {
     x: {kind: 'linear', domain: [0.5, scores.length + 0.5], title: 'points tried'},
     y: {
       domain: Plots.domain([...scores, tuning.untuned.score], 'linear'),
-      title: 'score' + (tuning.unit ? ' [' + tuning.unit + ']' : '')
+      title: 'score' + (tuning.unit ? ' (' + tuning.unit + ')' : '')
     },
     label: 'score of each point that was tried: ' + tuning.score_rule
   });
