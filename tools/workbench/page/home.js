@@ -44,7 +44,7 @@ Shell.page('home', {
     place.append(
         el('div', {class: 'head'}, el('h1', {}, name), el('p', {class: 'note path'}, path)),
         contents.is_cut && el('p', {class: 'note'}, 'There are too many files to look at all of them.') || '',
-        el('div', {class: 'cards'},
+        el('div', {class: 'card-columns'},
            el('div', {}, Cases.section(contents, drafts),
               card(
                   'Runs', 'results', contents.runs, 'There is no run here. The page "Pipeline" makes some.',

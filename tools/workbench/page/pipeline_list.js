@@ -61,7 +61,7 @@ export async function show(place) {
   const [{pipelines}, own] = await Promise.all([Ask.json('api/folder'), Ask.json('api/pipeline/own')]);
   place.append(
       el('div', {class: 'page-head'}, el('h1', {}, 'Pipelines')),
-      el('div', {class: 'cards'},
+      el('div', {class: 'card-columns'},
          el('section', {class: 'card', 'aria-label': 'In this folder'},
             el('div', {class: 'card-head'}, el('h2', {}, 'In this folder')),
             Shell.links('pipeline', pipelines, 'There is none yet. Copy one of marrow\'s own.')),

@@ -90,15 +90,20 @@ function nameCell(row, chosen, toggle) {
 }
 
 const columns = (chosen, toggle) =>
-    [{title: 'Result', key: (row) => row.folder, cell: (row) => nameCell(row, chosen, toggle)}, {
+    [{title: 'Result', key: (row) => row.folder, cell: (row) => nameCell(row, chosen, toggle), wide: true}, {
       title: 'Case',
       key: (row) => row.case || '\uffff',
       cell: (row) =>
           (row.case ? el('a', {href: Shell.addressOf('case', row.case), class: 'case-of-run'}, row.case) : '–')
     },
-     {title: 'Changed options', key: (row) => (row.changes || []).length, cell: changesCell},
-     {title: 'Verdict', key: severityOf, cell: verdictCell},
-     {title: 'Key figures', key: (row) => (FigureWords.ofRun(row.figures)[0] || {}).value, cell: figuresCell}, {
+     {title: 'Changed options', key: (row) => (row.changes || []).length, cell: changesCell, wide: true},
+     {title: 'Verdict', key: severityOf, cell: verdictCell}, {
+       title: 'Key figures',
+       key: (row) => (FigureWords.ofRun(row.figures)[0] || {}).value,
+       cell: figuresCell,
+       wide: true
+     },
+     {
        title: 'When',
        key: (row) => -Date.parse(row.when),
        cell: (row) => el('time', {datetime: row.when, title: when(row.when)}, ago(row.when))

@@ -183,7 +183,7 @@ export async function show(place, first, second) {
       el('div', {class: 'page-head'}, el('h1', {}, 'Two runs compared'),
          el('div', {class: 'toolbar'}, el('a', {href: '#results='}, 'All results'),
             el('a', {href: Shell.addressOf('results', second, {with: first}), 'data-do': 'swap'}, 'Swap the two'))),
-      el('div', {class: 'cards'}, verdictCard('First', first, verdicts.before),
+      el('div', {class: 'card-columns'}, verdictCard('First', first, verdicts.before),
          verdictCard('Second', second, verdicts.now)),
       ...poseLines(findings.outputs).map((line) => el('p', {class: 'pose-difference'}, line)),
       el('p', {class: 'says', role: 'status'},
