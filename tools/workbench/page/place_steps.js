@@ -14,7 +14,7 @@ export class PlaceSteps {
     Object.assign(this, {key: 'marrow steps of ' + path, goTo, steps: [], views: [], current: null, present: null});
     this.costTable = el('table', {class: 'values place-costs'});
     this.list = el('ol', {class: 'place-steps'});
-    this.verdict = el('div', {class: 'place-verdict', role: 'status'});
+    this.verdict = el('div', {class: 'place-verdict', role: 'status', tabindex: 0, 'aria-label': 'Verdict'});
   }
 
   // A step: {what, poses, costs, verdicts, deviations, frame}

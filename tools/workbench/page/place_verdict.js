@@ -14,7 +14,9 @@ const section = ([bone, {judgement, failure_probability: failure, reasons, remed
        el('p', {class: 'verdict-head'}, bone + ': ', el('strong', {}, judgement)),
        failure !== null && el('p', {}, 'Probability of a failure: ' + failureText(failure)),
        reasons.length > 0 && el('ul', {}, reasons.map((reason) => el('li', {}, reason))),
-       remedies.length > 0 && el('p', {}, 'Would settle it: ' + remedies.join('; ')));
+       remedies.length > 0 &&
+           el('details', {}, el('summary', {}, 'What would settle it'),
+              el('ul', {}, remedies.map((remedy) => el('li', {}, remedy)))));
 
 // What to show for {BONE: verdict}, or for none.
 export const shown = (verdicts, note) =>
