@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""The main way in Firefox: from the first page to a case, its bone registered on the page Place, a pipeline that is run,
-and its report."""
+"""The main way in Firefox: from the first page to a case, its bone registered on the page Place, a pipeline that is
+run, and its report."""
 import os
 import shutil
 import unittest

@@ -80,8 +80,8 @@ class PipelinePageTest(PageTest, PipelineBench):
         )
         self.assertEqual(about, "size of a pixel on the detector; number, at least 0.001 [mm]; default 0.586")
         marked = self.js(
-            "return document.querySelectorAll('.CodeMirror-linebackground.chosen-node:not(.CodeMirror-gutter-background)')"
-            ".length"
+            "return document.querySelectorAll('.CodeMirror-linebackground.chosen-node"
+            ":not(.CodeMirror-gutter-background)').length"
         )
         self.assertEqual(marked, 7, "the lines of the node are marked in the text")
 

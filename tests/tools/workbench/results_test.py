@@ -243,7 +243,8 @@ class ResultsPageTest(PageTest, ResultsBench):
 
     def test_how_far_poses_are_apart(self):
         (self.folder / "pose.yaml").write_text(
-            "marrow: 1\nnodes:\n  bone: {uses: simulate.femur}\n  fracture: {uses: simulate.fracture, in: {bone: bone}}\n"
+            "marrow: 1\nnodes:\n  bone: {uses: simulate.femur}\n"
+            "  fracture: {uses: simulate.fracture, in: {bone: bone}}\n"
             "  truth: {uses: simulate.truth, in: {phantom: fracture}}\noutputs: {pose: truth.starts}\n"
         )
         for name, turned in (("straight", []), ("turned", ["[0, 0, 2]"]), ("hardly", ["[0, 0, 0.0002]"])):
