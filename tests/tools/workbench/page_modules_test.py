@@ -10,6 +10,11 @@ from bench import PageTest, main
 from harness.modules import modules
 from xray_bench import ANGLES, ARM, HEIGHT, MODEL, SHIFT, WIDTH, camera_matrices, pixel
 
+RANGES = """
+    const image = {numbers: Uint16Array.from(given), width_px: 200, height_px: 200};
+    return JSON.stringify(Picture.rangesOf(image));
+    """
+
 
 class ModulesTest(PageTest):
     def js(self, body, argument=None, **paths):
@@ -28,7 +33,7 @@ class ModulesTest(PageTest):
         image[:, :40] = image[:, 160:] = 0
         numbers = numpy.clip(numpy.round(image), 0, 65535).astype(int).ravel().tolist()
         ranges = self.js(
-            "return JSON.stringify(Picture.rangesOf({numbers: Uint16Array.from(given)}))",
+            RANGES,
             numbers,
             Picture="xray_picture",
         )
@@ -40,11 +45,24 @@ class ModulesTest(PageTest):
     def test_an_image_that_is_all_body_is_shown_whole(self):
         numbers = numpy.random.default_rng(4).integers(1000, 50000, 40000).tolist()
         ranges = self.js(
-            "return JSON.stringify(Picture.rangesOf({numbers: Uint16Array.from(given)}))",
+            RANGES,
             numbers,
             Picture="xray_picture",
         )
         self.assertEqual(ranges["body"], ranges["all"])
+
+    def test_thick_bone_is_no_collimator(self):
+        """A dark limb in the middle, which no corner shows."""
+        image = numpy.full((200, 200), 60000)
+        image[:, 60:140] = numpy.linspace(5000, 30000, 80)
+        image[:, 60:90] = 5000
+        ranges = self.js(
+            RANGES,
+            image.ravel().tolist(),
+            Picture="xray_picture",
+        )
+        self.assertEqual(ranges["body"][0], 5000)
+        self.assertLess(ranges["body"][1], 31000)
 
     def test_equalised_contrast_is_the_same_in_dark_and_bright_regions(self):
         """Sixteen greys on a dark and on a bright half."""

@@ -17,24 +17,38 @@ const range = (sorted, low, high) => {
 
 // The windows of an image: `all` shows all numbers, `body` only those of the body. `gamma` is the exponent by which the
 // middle number of the body gets a middle grey: detector values fall exponentially, so bone would be nearly black.
-export function rangesOf({numbers}) {
+export function rangesOf(image) {
+  const {numbers} = image;
   const step = Math.max(1, Math.floor(numbers.length / MOST_SAMPLES));
   const sorted = Uint16Array.from({length: Math.ceil(numbers.length / step)}, (_, i) => numbers[i * step]).sort();
   if (!sorted.length) return {all: [0, 1], body: [0, 1], gamma: 1};
-  const all = range(sorted, 0.01, 0.99), inside = withoutGround(sorted, all);
+  const all = range(sorted, 0.01, 0.99), inside = withoutGround(sorted, all, cornersOf(image));
   if (inside.length < 0.05 * sorted.length) return {all, body: all, gamma: 1};
   const body = range(inside, 0.01, 0.99), middle = (quantile(inside, 0.5) - body[0]) / (body[1] - body[0]);
   const gamma = Math.log(MIDDLE_GREY) / Math.log(Math.max(1e-3, Math.min(0.99, middle)));
   return {all, body, gamma: Math.max(LEAST_GAMMA, Math.min(1, gamma))};
 }
 
+// The middle number of each corner.
+function cornersOf({numbers, width_px, height_px}) {
+  const side = Math.max(1, Math.floor(0.03 * Math.min(width_px, height_px)));
+  return [[0, 0], [width_px - side, 0], [0, height_px - side], [width_px - side, height_px - side]].map(([u, v]) => {
+    const part = [];
+    for (let row = v; row < v + side; ++row)
+      for (let column = u; column < u + side; ++column) part.push(numbers[row * width_px + column]);
+    return quantile(Uint16Array.from(part).sort(), 0.5);
+  });
+}
+
 // The numbers between the two grounds. Air is a narrow peak at the bright end of the histogram, a collimator one at the
-// dark end. Beside such a peak there are few pixels, because the body's edge is thin.
-function withoutGround(sorted, [low, high]) {
+// dark end. Beside such a peak there are few pixels, because the body's edge is thin. A collimator is in corners; thick
+// bone and metal are not.
+function withoutGround(sorted, [low, high], corners) {
   const counts = new Array(BINS).fill(0), width = (high - low) / BINS;
   const binOf = (number) => Math.max(0, Math.min(BINS - 1, Math.floor((number - low) / width)));
   for (const number of sorted) ++counts[binOf(number)];
-  const air = groundOf([...counts].reverse(), sorted.length), field = groundOf(counts, sorted.length);
+  const air = groundOf([...counts].reverse(), sorted.length), dark = groundOf(counts, sorted.length);
+  const field = corners.filter((number) => binOf(number) < dark).length >= 2 ? dark : 0;
   return sorted.filter((number) => binOf(number) >= field && binOf(number) < BINS - air);
 }
 

@@ -40,6 +40,11 @@ async function remove(bench, name) {
   bench.choose(null);
 }
 
+const COLUMNS = [
+  ['seen', 'Seen in (u, v) px'], ['world', 'World, mm'], ['rays', 'Rays apart, mm'], ['off', 'Off, px'],
+  ['fit', 'Fit off, px']
+];
+
 // Tiny numbers are only rounding errors.
 export const figure = (value) => (value === null ? '–' : Math.abs(value) < 0.0005 ? '0.000' : Dom.number(value));
 
@@ -48,8 +53,7 @@ function row(bench, name) {
   const choose = Dom.button(
       name, () => bench.choose(bench.chosen === name ? null : name),
       {'data-choose-landmark': name, 'aria-pressed': 'false', class: 'link'});
-  const cells = ['seen', 'world', 'rays', 'off', 'fit'].map(
-      (what) => el('td', {class: what === 'seen' ? '' : 'number', 'data-cell': what}));
+  const cells = COLUMNS.map(([what, title]) => el('td', {'data-cell': what, 'data-label': title}));
   const [seen, world, rays, off, fit] = cells;
   const element =
       el('tr', {'data-landmark-row': name}, el('th', {scope: 'row'}, choose), cells,
@@ -113,8 +117,7 @@ function useAsStart(bench) {
 export function make(bench) {
   const rows = new Map(), body = el('tbody', {});
   const empty = el('p', {class: 'note'}, 'No landmark yet. Choose the tool “Landmark”, and click a point in an X-ray.');
-  const head = ['Landmark', 'Seen in (u, v) px', 'World, mm', 'Rays apart, mm', 'Off, px', 'Fit off, px'].map(
-      (text, i) => el('th', {scope: 'col', class: i > 1 ? 'number' : ''}, text));
+  const head = ['Landmark', ...COLUMNS.map(([, title]) => title)].map((text) => el('th', {scope: 'col'}, text));
   const table =
       el('div', {class: 'scroll'},
          el('table', {class: 'landmarks'},
