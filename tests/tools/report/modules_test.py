@@ -13,15 +13,13 @@ from harness.modules import TOOLS
 ENTRIES = [TOOLS / "report" / "page" / "main.js", TOOLS / "workbench" / "page" / "main.js"]
 BROWSER = set(
     """
-    AbortController Array Blob Boolean CSS Error Event EventTarget Float32Array Float64Array Image ImageData Infinity
-    Int16Array Int32Array IntersectionObserver Intl JSON Map Math NaN Number Object OffscreenCanvas Promise RegExp
-    Date ResizeObserver Set
-    String URL
-    URLSearchParams Uint16Array Uint32Array Uint8Array WeakMap addEventListener atob cancelAnimationFrame clearInterval
-    clearTimeout console decodeURIComponent devicePixelRatio document encodeURIComponent fetch getComputedStyle
-    getSelection globalThis history innerHeight innerWidth localStorage location matchMedia navigator parent parseFloat
-    parseInt performance removeEventListener requestAnimationFrame setInterval setTimeout structuredClone undefined
-    window
+    AbortController Array Blob Boolean CSS Date Error Event EventTarget Float32Array Float64Array Image ImageData
+    Infinity Int16Array Int32Array IntersectionObserver Intl JSON Map Math NaN Number Object OffscreenCanvas Promise
+    RegExp ResizeObserver Set String URL URLSearchParams Uint16Array Uint32Array Uint8Array Uint8ClampedArray WeakMap
+    addEventListener atob cancelAnimationFrame clearInterval clearTimeout console decodeURIComponent devicePixelRatio
+    document encodeURIComponent fetch getComputedStyle getSelection globalThis history innerHeight innerWidth
+    localStorage location matchMedia navigator parent parseFloat parseInt performance removeEventListener
+    requestAnimationFrame sessionStorage setInterval setTimeout structuredClone undefined window
     """.split()
 )
 KEYWORDS = set(

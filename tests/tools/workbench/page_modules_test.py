@@ -19,7 +19,7 @@ RANGES = """
 class ModulesTest(PageTest):
     def js(self, body, argument=None, **paths):
         """The value of a function's body. `paths` gives it modules of the page, and it calls its argument `given`."""
-        scripts = modules(**{name: "workbench/page/%s.js" % file for name, file in paths.items()})
+        scripts = modules(**paths)
         self.browser.driver.get("about:blank")
         return json.loads(
             self.browser.js(scripts + "const given = JSON.parse(arguments[0]);\n" + body, json.dumps(argument))
@@ -35,7 +35,7 @@ class ModulesTest(PageTest):
         ranges = self.js(
             RANGES,
             numbers,
-            Picture="xray_picture",
+            Picture="workbench/page/xray_picture.js",
         )
         self.assertAlmostEqual(ranges["body"][0], 4000, delta=600)
         self.assertAlmostEqual(ranges["body"][1], 30000, delta=600)
@@ -47,7 +47,7 @@ class ModulesTest(PageTest):
         ranges = self.js(
             RANGES,
             numbers,
-            Picture="xray_picture",
+            Picture="workbench/page/xray_picture.js",
         )
         self.assertEqual(ranges["body"], ranges["all"])
 
@@ -59,7 +59,7 @@ class ModulesTest(PageTest):
         ranges = self.js(
             RANGES,
             image.ravel().tolist(),
-            Picture="xray_picture",
+            Picture="workbench/page/xray_picture.js",
         )
         self.assertEqual(ranges["body"][0], 5000)
         self.assertLess(ranges["body"][1], 31000)
@@ -71,7 +71,7 @@ class ModulesTest(PageTest):
         shown = self.js(
             "return JSON.stringify([...Equalise.equalised(Uint8Array.from(given), 128, 128)])",
             grey.ravel().tolist(),
-            Equalise="xray_equalise",
+            Equalise="workbench/page/xray_equalise.js",
         )
         shown = numpy.array(shown).reshape(128, 128)
         for columns in (slice(8, 56), slice(72, 120)):
@@ -88,16 +88,20 @@ class ModulesTest(PageTest):
             const small = Slices.resized(ct, plane, whole, 200, 300);
             return JSON.stringify([port.zoom, wide.zoom, back.zoom, whole.scale, small.scale]);
             """,
-            Viewport="viewport",
-            Slices="slice_geometry",
+            Viewport="workbench/page/viewport.js",
+            Slices="workbench/page/slice_geometry.js",
         )
         self.assertEqual(got, [6, 12, 6, 10, 5], "3 times the whole image stays 3 times the whole image")
 
     def test_pictures_are_arranged_as_large_as_possible(self):
         for count, aspect, size, columns in ((2, 1, (400, 800), 1), (2, 1, (800, 400), 2), (4, 1, (800, 800), 2)):
-            got = self.js("return JSON.stringify(Tiles.columnsFor(...given))", [count, aspect, *size], Tiles="tiles")
+            got = self.js(
+                "return JSON.stringify(Tiles.columnsFor(...given))",
+                [count, aspect, *size],
+                Tiles="workbench/page/tiles.js",
+            )
             self.assertEqual(got, {"columns": columns, "is_scrolled": False})
-        got = self.js("return JSON.stringify(Tiles.columnsFor(20, 1, 430, 600))", Tiles="tiles")
+        got = self.js("return JSON.stringify(Tiles.columnsFor(20, 1, 430, 600))", Tiles="workbench/page/tiles.js")
         self.assertEqual(got, {"columns": 2, "is_scrolled": True})
 
     def test_costs_are_in_the_order_of_the_case_and_against_the_best(self):
@@ -113,7 +117,7 @@ class ModulesTest(PageTest):
               table.querySelector('[data-cost=contour] small').textContent, fill.style.width]);
             """,
             {"steps": [costs(4), costs(2)], "now": costs(3), "views": views},
-            Costs="place_costs",
+            Costs="workbench/page/place_costs.js",
         )
         self.assertEqual(got, [["all views", *views], "1.50 × the best", "75%"])
 
@@ -121,7 +125,7 @@ class ModulesTest(PageTest):
         got = self.js(
             "return JSON.stringify(given.map(Verdict.failureText))",
             [0, 0.0004, 0.0523, 0.4, 1],
-            Verdict="place_verdict",
+            Verdict="workbench/page/place_verdict.js",
         )
         self.assertEqual(got, ["less than 0.1 %", "less than 0.1 %", "5.2 %", "40 %", "more than 99.9 %"])
 
@@ -149,7 +153,9 @@ class ModulesTest(PageTest):
             }
             for name, place in MODEL.items()
         ]
-        return self.js("return JSON.stringify(Size.advice(...given))", [views, landmarks], Size="xray_pixel_size")
+        return self.js(
+            "return JSON.stringify(Size.advice(...given))", [views, landmarks], Size="workbench/page/xray_pixel_size.js"
+        )
 
     def test_the_pixel_size_that_makes_the_views_agree(self):
         self.assertEqual(self.advice({"frontal": 1.0, "lateral": 1.0}), "")
@@ -163,7 +169,11 @@ class ModulesTest(PageTest):
 
     def test_what_a_case_lacks(self):
         draft = {"is_saved": False, "document": {"fragments": {"distal": {"seeds": []}}, "views": [{"name": "a"}]}}
-        got = self.js("return JSON.stringify(Steps.STEPS.map(({lacks}) => lacks(given)))", draft, Steps="case_steps")
+        got = self.js(
+            "return JSON.stringify(Steps.STEPS.map(({lacks}) => lacks(given)))",
+            draft,
+            Steps="workbench/page/case_steps.js",
+        )
         self.assertEqual(got, ["no CT yet", "no seed in distal", "no camera: a", "needs X-rays", "not saved yet"])
 
 
