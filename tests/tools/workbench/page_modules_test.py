@@ -32,11 +32,7 @@ class ModulesTest(PageTest):
         image[60:140] = random.uniform(4000, 30000, (80, 200))
         image[:, :40] = image[:, 160:] = 0
         numbers = numpy.clip(numpy.round(image), 0, 65535).astype(int).ravel().tolist()
-        ranges = self.js(
-            RANGES,
-            numbers,
-            Picture="workbench/page/xray_picture.js",
-        )
+        ranges = self.js(RANGES, numbers, Picture="workbench/page/xray_picture.js")
         self.assertAlmostEqual(ranges["body"][0], 4000, delta=600)
         self.assertAlmostEqual(ranges["body"][1], 30000, delta=600)
         self.assertEqual(ranges["all"][0], 0)
@@ -44,11 +40,7 @@ class ModulesTest(PageTest):
 
     def test_an_image_that_is_all_body_is_shown_whole(self):
         numbers = numpy.random.default_rng(4).integers(1000, 50000, 40000).tolist()
-        ranges = self.js(
-            RANGES,
-            numbers,
-            Picture="workbench/page/xray_picture.js",
-        )
+        ranges = self.js(RANGES, numbers, Picture="workbench/page/xray_picture.js")
         self.assertEqual(ranges["body"], ranges["all"])
 
     def test_thick_bone_is_no_collimator(self):
@@ -56,11 +48,7 @@ class ModulesTest(PageTest):
         image = numpy.full((200, 200), 60000)
         image[:, 60:140] = numpy.linspace(5000, 30000, 80)
         image[:, 60:90] = 5000
-        ranges = self.js(
-            RANGES,
-            image.ravel().tolist(),
-            Picture="workbench/page/xray_picture.js",
-        )
+        ranges = self.js(RANGES, image.ravel().tolist(), Picture="workbench/page/xray_picture.js")
         self.assertEqual(ranges["body"][0], 5000)
         self.assertLess(ranges["body"][1], 31000)
 
