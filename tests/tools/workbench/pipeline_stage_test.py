@@ -5,24 +5,14 @@ node, inputs are kept, and marrow's own pipelines are copied into the folder."""
 import time
 
 import bench
-from bench import PageTest
 
-from pipeline_bench import PIPELINE, PipelineBench
+from pipeline_bench import PIPELINE, PipelinePage
 
 EDITOR = "document.querySelector('.CodeMirror').CodeMirror"
 SCALE = "return Number(/scale\\(([^)]+)\\)/.exec(document.querySelector('svg.graph').style.transform)[1])"
 
 
-class PipelineStageTest(PageTest, PipelineBench):
-    def setUp(self):
-        super().setUp()
-        self.js = self.browser.js
-
-    def show_pipeline(self, more="", **size):
-        self.server = self.open()
-        self.show(self.server, "pipeline=small.yaml" + more, **size)
-        self.browser.logs()
-
+class PipelineStageTest(PipelinePage):
     def tearDown(self):
         self.assertEqual([one for one in self.browser.logs()[0] if "/api/pipeline/copy" not in one], [])
 

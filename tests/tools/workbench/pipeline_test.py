@@ -7,24 +7,14 @@ import unittest
 import unittest.mock
 
 import bench
-from bench import PageTest
 
 from harness import TEST_PLUGINS
 
-from pipeline_bench import PIPELINE, PipelineBench
+from pipeline_bench import PIPELINE, PipelinePage
 
 
-class PipelinePageTest(PageTest, PipelineBench):
+class PipelinePageTest(PipelinePage):
     """The page in a browser."""
-
-    def setUp(self):
-        super().setUp()
-        self.js = self.browser.js
-
-    def show_pipeline(self, more="", **size):
-        self.server = self.open()
-        self.show(self.server, "pipeline=small.yaml" + more, **size)
-        self.browser.logs()
 
     def value(self, selector):
         return self.js("return document.querySelector(arguments[0]).value", selector)
