@@ -1,12 +1,21 @@
-# marrow_add_plugin(NAME source.cpp [...] [LINK library ...] [FOLDER folder])
+# marrow_add_plugin(NAME source.cpp [...] [LINK library ...] [FOLDER folder] [ONLY_WITH option])
 #
 # Builds the shared library marrow_NAME.so and, by running it, its manifest marrow_NAME.json beside it. Symbols are
-# hidden, so that two plugins with a same-named function or static never meet.
+# hidden, so that two plugins with a same-named function or static never meet. ONLY_WITH: NAME is kind_node, and the
+# library is left out where this option of CMake is off; marrow then says so of the node (not_built.json).
 function(marrow_add_plugin name)
-  cmake_parse_arguments(PARSE_ARGV 1 plugin "" "FOLDER;PACKAGE" "LINK")
+  cmake_parse_arguments(PARSE_ARGV 1 plugin "" "FOLDER;PACKAGE;ONLY_WITH" "LINK")
   set(target plugin_${name})
   if(MARROW_LEFT_OUT AND NOT plugin_FOLDER)
     return()
+  endif()
+  if(plugin_ONLY_WITH)
+    if(NOT ${plugin_ONLY_WITH})
+      string(REGEX REPLACE "^([a-z]+)_(.*)$" "\\1.\\2" node ${name})
+      set_property(GLOBAL APPEND PROPERTY MARROW_NOT_BUILT "\"${node}\": \"${plugin_ONLY_WITH}\"")
+      return()
+    endif()
+    set_property(GLOBAL APPEND PROPERTY MARROW_HEAVY ${target})
   endif()
   add_library(${target} MODULE ${plugin_UNPARSED_ARGUMENTS})
   target_link_libraries(${target} PRIVATE marrow::marrow ${plugin_LINK})
@@ -43,6 +52,17 @@ function(marrow_add_plugin name)
       set(plugin_PACKAGE marrow)
     endif()
     install(TARGETS ${target} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/marrow COMPONENT ${plugin_PACKAGE})
+  endif()
+endfunction()
+
+# marrow_write_not_built(FILE): the nodes that ONLY_WITH has left out so far, each with its option, as JSON. No file where
+# there are none. `marrow doctor` and `marrow check` tell them.
+function(marrow_write_not_built file)
+  get_property(nodes GLOBAL PROPERTY MARROW_NOT_BUILT)
+  file(REMOVE ${file})
+  if(nodes)
+    list(JOIN nodes ", " nodes)
+    file(WRITE ${file} "{${nodes}}\n")
   endif()
 endfunction()
 

@@ -2,7 +2,7 @@
 #include <marrow/domain/mesh.hpp>
 #include <marrow/plugin.hpp>
 
-#include "marrow/mesh/poisson.hpp"
+#include "poisson_surface.hpp"
 #include "marrow/mesh/signs.hpp"
 
 namespace {

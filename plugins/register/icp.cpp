@@ -7,7 +7,7 @@
 
 #include <marrow/domain/decompositions.hpp>
 #include "marrow/base/number_text.hpp"
-#include "marrow/register/closest_points.hpp"
+#include "closest_points.hpp"
 
 namespace {
 

@@ -8,7 +8,7 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/segment/expansion.hpp"
 #include "marrow/segment/fragments.hpp"
-#include "marrow/segment/itk_contour.hpp"
+#include "itk_contour.hpp"
 #include "marrow/segment/seed_points.hpp"
 #include "marrow/toolbox/field/interior.hpp"
 

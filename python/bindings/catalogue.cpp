@@ -126,6 +126,9 @@ void bind_catalogue(py::module_& module) {
       "What a kind does; empty if no library says it.");
   module.def("kind_info", &kind_info, "A kind's contract and the library that brings it; None if there is none.");
   module.def("node_info", &node_info, "All that a manifest says about a node, as a dictionary; None if there is none.");
+  module.def(
+      "remedy_for", [](const std::string& node) { return catalogue()->remedy_for(node); }, py::arg("missing_node"),
+      "What to do where there is no such node; empty if nothing is known of the name.");
   module.def("suggestion", &suggestion, "\"did you mean ...\" for a wrong name, or the known names.");
   module.def(
       "framework_file", [] { return framework_file().string(); }, "marrow's own library.");

@@ -90,7 +90,9 @@ class Kind:
             raise AttributeError(name)
         info = _core.node_info(self._name + "." + name)
         if info is None:
-            raise AttributeError("no node '%s.%s'; %s" % (self._name, name, _core.suggestion(name, self.__dir__())))
+            missing = "%s.%s" % (self._name, name)
+            hint = _core.remedy_for(missing) or _core.suggestion(name, self.__dir__())
+            raise AttributeError("no node '%s'; %s" % (missing, hint))
         return Node(info, _DEFAULTS)
 
     def __dir__(self) -> List[str]:
@@ -118,7 +120,8 @@ def node(name: str, *, summary: Optional[str] = None, **declaration: Any) -> Any
         return declared(name, summary, **declaration)
     info = _core.node_info(name)
     if info is None:
-        raise Error("unknown node '%s'; %s" % (name, _core.suggestion(name, _core.node_names())))
+        hint = _core.remedy_for(name) or _core.suggestion(name, _core.node_names())
+        raise Error("unknown node '%s'; %s" % (name, hint))
     return Node(info, _DEFAULTS)
 
 

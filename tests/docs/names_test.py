@@ -65,8 +65,8 @@ class Names(unittest.TestCase):
         for text, fault in (
             ("The node `edges.cany` finds.", "there is no node 'edges.cany'; did you mean 'edges.canny'?"),
             ("The option `sigma_pix` is.", "no node has the option 'sigma_pix'; did you mean 'sigma_px'?"),
-            ("`window_px` of `edges.sobel`", None),
-            ("`board` of `edges.sobel`", "edges.sobel has no option 'board'"),
+            ("`window_px` of `edges.gradient_mask`", None),
+            ("`board` of `edges.gradient_mask`", "edges.gradient_mask has no option 'board'"),
             ("Give `widnow_px`.", "nothing is named 'widnow_px': no option, port, key or function"),
             ("See `marrow rnu FILE`.", "there is no command 'marrow rnu'; did you mean 'run'?"),
             ("    marrow run a.yaml --sed 2", "marrow run has no option '--sed'; did you mean '--seed'?"),

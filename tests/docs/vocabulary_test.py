@@ -1,32 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/vocabulary.md holds the names of all ports and options, with the types and units that they have, and no other
-names; and a name from before is explained where a pipeline uses it."""
+"""docs/vocabulary.md holds the names of all ports and options that several nodes have, with the types and units that
+they have, and no other names."""
 import collections
-import pathlib
-import re
-import subprocess
 import sys
-import tempfile
 import unittest
 
 from harness import MARROW, SOURCE
 
 sys.path.insert(0, str(SOURCE / "tools" / "site"))
 import catalogue  # noqa: E402
-
-ONE = re.compile(r"`(\w+)` \(([^),]+)(?:, ([^)]+))?\)")  # a name with its type, and its unit if it has one
-
-
-def ports_of(node):
-    return [(port["name"], port["type"].replace("_", " ")) for port in node["inputs"] + node["outputs"]]
-
-
-def options_of(node):
-    return [(one["name"], one["type"], "" if one["unit"] == "1" else one["unit"]) for one in node["options"]]
-
-
-def has(node, part, name):
-    return any(one["name"] == name for one in node[part])
+import own_names  # noqa: E402
 
 
 class Table:
@@ -34,7 +17,6 @@ class Table:
 
     def __init__(self):
         self.ports, self.options, self.twice = {}, {}, []
-        self.own = {}  # by the node: its own ports and options
         of_ports = False
         for line in (SOURCE / "docs" / "vocabulary.md").read_text().splitlines():
             of_ports = line == "## Ports" or of_ports and not line.startswith("## ")
@@ -42,10 +24,8 @@ class Table:
             if not line.startswith("| `"):
                 continue
             name = cells[0].strip("`")
-            if "." in name:
-                self._add(self.own, name, [[(a, b, c) for a, b, c in ONE.findall(cell)] for cell in cells[1:]])
-            elif of_ports:
-                self._add(self.ports, name, set(cells[1].split(", ")))
+            if of_ports:
+                self._add(self.ports, name, {(one,) for one in cells[1].split(", ")})
             else:
                 self._add(self.options, name, {(one, cells[2]) for one in cells[1].split(" or ")})
 
@@ -61,28 +41,20 @@ class Vocabulary(unittest.TestCase):
         cls.nodes = catalogue.Catalogue(MARROW).nodes
         cls.table = Table()
 
-    def check(self, of_node, shared, own):
-        has = collections.defaultdict(set)
-        users = collections.defaultdict(set)
+    def shared(self, of_node):
+        """What each name is that several nodes have."""
+        has, users = collections.defaultdict(set), collections.defaultdict(set)
         for name, node in self.nodes.items():
             for one, *what in of_node(node):
-                has[one].add(what[0] if len(what) == 1 else tuple(what))
+                has[one].add(tuple(what))
                 users[one].add(name)
-        self.assertEqual({one: what for one, what in has.items() if len(users[one]) > 1}, shared)
-        singles = {(min(users[one]), one): what for one, what in has.items() if len(users[one]) == 1}
-        self.assertEqual(singles, own)
+        return {one: what for one, what in has.items() if len(users[one]) > 1}
 
     def test_the_table_holds_each_port(self):
-        own = {(node, name): {kind} for node, (ports, _) in self.table.own.items() for name, kind, _ in ports}
-        self.check(ports_of, self.table.ports, own)
+        self.assertEqual(self.shared(own_names.ports_of), self.table.ports)
 
     def test_the_table_holds_each_option(self):
-        own = {
-            (node, name): {(kind, unit)}
-            for node, (_, options) in self.table.own.items()
-            for name, kind, unit in options
-        }
-        self.check(options_of, self.table.options, own)
+        self.assertEqual(self.shared(own_names.options_of), self.table.options)
 
     def test_an_option_has_one_unit_and_one_type(self):
         self.assertEqual(self.table.twice, [])
@@ -90,22 +62,13 @@ class Vocabulary(unittest.TestCase):
             self.assertEqual(len({unit for _, unit in what}), 1, name)
             self.assertLessEqual(len({kind for kind, _ in what if not kind.startswith("list of ")}), 1, name)
 
-    def test_what_was_called_otherwise_is_explained(self):
-        lines = [line.split() for line in (SOURCE / "plugins" / "renamed.txt").read_text().splitlines()[1:]]
-        folder = tempfile.TemporaryDirectory(prefix="marrow-vocabulary-")
-        self.addCleanup(folder.cleanup)
-        file = pathlib.Path(folder.name) / "old.yaml"
-        for since, of, old, now in lines:
-            said = ""
-            for name, node in self.nodes.items():
-                for part, given in (("options", "with: {%s: 1}"), ("inputs", "in: {%s: a}"), ("outputs", "")):
-                    if (name + ".").startswith(of + ".") and has(node, part, now) and not has(node, part, old):
-                        given = given and ", " + given % old
-                        file.write_text(
-                            "marrow: 1\nnodes:\n  a: {uses: %s%s}\noutputs: {x: a.%s}\n" % (name, given, old)
-                        )
-                        said += subprocess.run([MARROW, "check", file], capture_output=True, text=True).stderr
-            self.assertIn("'%s' is called '%s' since %s" % (old, now, since), said)
+    def test_the_site_tells_the_names_of_one_node(self):
+        rows = own_names.own_names_part(self.nodes).splitlines()
+        (row,) = [row for row in rows if row.startswith("| [`guide.target`]")]
+        self.assertEqual(row, "| [`guide.target`](../nodes/guide.target.md) |  | `max_residual_px` (number, px) |")
+        told = "\n".join(rows)
+        for name in {**self.table.ports, **self.table.options}:
+            self.assertNotIn("`%s` (" % name, told)
 
 
 if __name__ == "__main__":

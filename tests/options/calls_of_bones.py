@@ -28,7 +28,7 @@ def calls(s):
     search = dict(scan_rotation_deg=6, scan_translation_mm=6, candidates=2, max_evaluations=60)
     made = {
         "edges.%s" % name: lambda: ({"view": s.views["frontal"]}, {})
-        for name in ("adaptive_relaxation", "canny", "laplacian_of_gaussian", "prewitt", "roberts", "sobel")
+        for name in ("adaptive_relaxation", "canny", "gradient_mask", "laplacian_of_gaussian")
     }
     made.update(
         {

@@ -97,7 +97,7 @@ int inspect(const std::string& name, bool yaml, bool as_json) {
   const NodeInfo* node = catalogue.find(name);
   if (!node) {
     std::fprintf(stderr, "marrow: error: there is no node '%s'; %s\n", printable(name).c_str(),
-                 printable(suggestion(name, catalogue.node_names())).c_str());
+                 printable(catalogue.hint_for(name, catalogue.node_names())).c_str());
     return 2;
   }
   if (yaml)
@@ -111,7 +111,7 @@ int inspect(const std::string& name, bool yaml, bool as_json) {
 
 int doctor(bool as_json) {
   const Catalogue catalogue;
-  json all = {{"folders", json::array()}, {"libraries", json::array()}};
+  json all = {{"folders", json::array()}, {"libraries", json::array()}, {"not_built", json::array()}};
   int refused = 0;
   if (!as_json) std::printf("Folders searched, in this order (add some with MARROW_PLUGIN_PATH):\n");
   for (const auto& folder : catalogue.folders()) {
@@ -148,6 +148,13 @@ int doctor(bool as_json) {
     else
       print_beside("  REFUSED", printable(library.file.string() + ": it " + library.refused), 11);
     if (!library.note.empty()) print_beside("", "note: " + printable(library.note), 11);
+  }
+  for (const auto& [node, option] : catalogue.not_built())
+    all["not_built"].push_back({{"node", node}, {"option", option}});
+  if (!as_json && !catalogue.not_built().empty()) {
+    std::printf("\nNot built (configure marrow with the option to have them):\n");
+    for (const auto& [node, option] : catalogue.not_built())
+      std::printf("  %s: %s\n", printable(node).c_str(), printable(option).c_str());
   }
   if (as_json)
     print_as_json(all);

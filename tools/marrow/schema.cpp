@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The JSON Schema (draft 7) of pipeline files, made from the nodes that are installed.
 #include <cstdio>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "catalogue_text.hpp"
@@ -16,6 +17,8 @@ using Json = nlohmann::ordered_json;
 Json reference_to(const std::string& definition) { return {{"$ref", "#/definitions/" + definition}}; }
 
 std::string inputs_of(const std::string& kind) { return kind + ".inputs"; }
+
+std::string nodes_of(const std::string& kind) { return kind + ".nodes"; }
 
 Json scalar_schema(const OptionInfo& option) {
   Json value;
@@ -60,20 +63,21 @@ Json inputs_schema(const std::vector<KindPort>& ports) {
   return {{"type", "object"}, {"additionalProperties", false}, {"properties", properties}};
 }
 
-Json if_used(const NodeInfo& node, const Json& schema) {
-  return {{"if", {{"required", {"uses"}}, {"properties", {{"uses", {{"const", node.name}}}}}}}, {"then", schema}};
+Json if_used(const Json& names, const Json& schema) {
+  return {{"if", {{"required", {"uses"}}, {"properties", {{"uses", {{"enum", names}}}}}}}, {"then", schema}};
 }
 
 /// What one node may have: its options, and the inputs of its kind.
 Json node_schema(const NodeInfo& node) {
   Json with = {{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
   for (const OptionInfo& option : node.options) with["properties"][option.name] = option_schema(option);
-  return if_used(node, {{"properties", {{"with", with}, {"in", reference_to(inputs_of(node.kind()))}}}});
+  return if_used(Json::array({node.name}),
+                 {{"properties", {{"with", with}, {"in", reference_to(inputs_of(node.kind()))}}}});
 }
 
-/// What nodes must have in a file that extends no other one.
+/// What nodes must have in a file that extends no other one. Nodes that need the same are told together.
 Json whole_node_schema(const Catalogue& catalogue) {
-  Json all = {reference_to("node_change"), {{"anyOf", {{{"required", {"uses"}}}, {{"required", {"repeat"}}}}}}};
+  std::map<std::string, Json> users;  // by what they need
   for (const std::string& name : catalogue.node_names()) {
     const NodeInfo& node = *catalogue.find(name);
     Json needs = Json::object();
@@ -81,10 +85,14 @@ Json whole_node_schema(const Catalogue& catalogue) {
       if (option.required) needs["with"]["required"].push_back(option.name);
     for (const PortInfo& port : node.inputs)
       if (!port.optional) needs["in"]["required"].push_back(port.name);
-    if (needs.empty()) continue;
+    if (!needs.empty()) users[needs.dump()].push_back(name);
+  }
+  Json all = {reference_to("node_change"), {{"anyOf", {{{"required", {"uses"}}}, {{"required", {"repeat"}}}}}}};
+  for (const auto& [text, names] : users) {
+    const Json needs = Json::parse(text);
     Json sections = Json::array();
-    for (const auto& [section, names] : needs.items()) sections.push_back(section);
-    all.push_back(if_used(node, {{"required", sections}, {"properties", needs}}));
+    for (const auto& [section, required] : needs.items()) sections.push_back(section);
+    all.push_back(if_used(names, {{"required", sections}, {"properties", needs}}));
   }
   return {{"allOf", all}};
 }
@@ -92,8 +100,10 @@ Json whole_node_schema(const Catalogue& catalogue) {
 Json any_node_schema(const Catalogue& catalogue) {
   Json uses = Json::array(), conditions = Json::array();
   for (const std::string& name : catalogue.node_names()) {
-    uses.push_back({{"const", name}, {"description", catalogue.find(name)->summary}});
-    conditions.push_back(node_schema(*catalogue.find(name)));
+    const NodeInfo& node = *catalogue.find(name);
+    const Json of_kind = reference_to(nodes_of(node.kind()));
+    if (uses.empty() || uses.back() != of_kind) uses.push_back(of_kind);
+    conditions.push_back(node_schema(node));
   }
   const Json place = {{"type", "string"}};
   uses.push_back({{"pattern", "\\.ya?ml$"}, {"description", "a pipeline file, whose inputs are options and ports"}});
@@ -172,6 +182,10 @@ Json definitions(const Catalogue& catalogue) {
               {"wire", {{"anyOf", {text, {{"type", "array"}, {"items", text}}, {{"type", "null"}}}}}}};
   for (const std::string& kind : catalogue.kind_names())
     all[inputs_of(kind)] = inputs_schema(catalogue.ports_of_kind(kind));
+  for (const std::string& name : catalogue.node_names()) {
+    const NodeInfo& node = *catalogue.find(name);
+    all[nodes_of(node.kind())]["anyOf"].push_back({{"const", name}, {"description", node.summary}});
+  }
   return all;
 }
 
@@ -182,7 +196,6 @@ Json pipeline_schema(const Catalogue& catalogue) {
        {{"type", "string"}, {"description", "of the folder that a run writes, runs/NAME (default: the file's name)"}}},
       {"extends", {{"type", "string"}, {"description", "pipeline file over which this one puts its own"}}},
       {"set", reference_to("changes")},
-      {"moved", {{"type", "boolean"}, {"description", "this is an old name of the file that it extends"}}},
       {"help", {{"type", "string"}, {"description", "what the pipeline does, and for which data"}}},
       {"only_inside",
        {{"type", "boolean"},
@@ -200,42 +213,25 @@ Json pipeline_schema(const Catalogue& catalogue) {
           {"definitions", definitions(catalogue)}};
 }
 
-std::string on_one_line(const Json& value) {
-  if (!value.is_structured()) return value.dump();
-  std::string text;
-  for (const auto& [name, member] : value.items()) {
-    text += text.empty() ? "" : ", ";
-    text += (value.is_object() ? Json(name).dump() + ": " : "") + on_one_line(member);
-  }
-  return value.is_object() ? "{" + text + "}" : "[" + text + "]";
+/// Whether the members of a value begin a line each: only in the large values around the nodes and definitions, so
+/// that a change of one node changes few lines. What is inside a node stays on one line.
+bool is_broken(const Json& value) {
+  constexpr std::size_t most_bytes = 16000;  // no node's definition is longer
+  return value.is_structured() && value.dump().size() > most_bytes;
 }
 
-/// Puts as much on each line as fits. In a value that does not fit, each map begins a line, and so does each member
-/// that no longer fits. Texts are not broken, so a long description makes a long line.
-std::string laid_out(const Json& value, const std::string& margin, std::size_t column) {
-  constexpr std::size_t columns = 114;  // of 120: more brackets may close at the end
-  const std::string line = on_one_line(value);
-  if (!value.is_structured() || column + line.size() < columns) return line;
-  std::string text(1, line.front());
-  ++column;
-  const std::string inner = margin + " ";
+std::string laid_out(const Json& value) {
+  if (!is_broken(value)) return value.dump();
+  std::string text;
   for (const auto& [name, member] : value.items()) {
-    const std::string start = value.is_object() ? Json(name).dump() + ": " : "";
-    const bool goes_on = !member.is_object() && column + start.size() + on_one_line(member).size() < columns;
-    if (text.size() > 1) text += goes_on ? ", " : ",";
-    if (!goes_on) {
-      text += "\n" + inner;
-      column = inner.size();
-    }
-    const std::string told = laid_out(member, inner, column + start.size());
-    text += start + told;
-    column = told.find('\n') == std::string::npos ? column + start.size() + told.size() + 2 : columns;
+    text += text.empty() ? "\n" : ",\n";
+    text += (value.is_object() ? Json(name).dump() + ":" : "") + laid_out(member);
   }
-  return text + line.back();
+  return value.is_object() ? "{" + text + "\n}" : "[" + text + "\n]";
 }
 
 int schema(const std::filesystem::path& file) {
-  const std::string text = laid_out(pipeline_schema(Catalogue()), "", 0) + "\n";
+  const std::string text = laid_out(pipeline_schema(Catalogue())) + "\n";
   if (file.empty()) {
     std::fputs(text.c_str(), stdout);
     return 0;

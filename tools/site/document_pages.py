@@ -5,6 +5,7 @@ import re
 import shutil
 
 from markdown import ORPHAN, block, sections, toctree
+from own_names import own_names_part
 
 # Captions of the navigation, and the pages under each. A page of docs/ that is not here comes last, under MORE.
 GROUPS = {
@@ -148,6 +149,8 @@ def write(catalogue, facts, folder):
         for place in linked_places(text, source, facts.root):
             bring(place, facts.root.resolve(), folder)
         text = with_links(text, source, facts.root)
+        if page == "docs/vocabulary":
+            text = sections(text, own_names_part(catalogue.nodes))
         if page == "index":
             text = sections(text, navigation(facts.documents, folder))
         (folder / page).parent.mkdir(parents=True, exist_ok=True)

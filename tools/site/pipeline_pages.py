@@ -12,8 +12,8 @@ def page_of(path):
 
 
 def kind_of(document):
-    """pipeline, experiment, or '' for other files and for names that have moved."""
-    if not isinstance(document, dict) or document.get("moved"):
+    """pipeline, experiment, or '' for other files."""
+    if not isinstance(document, dict):
         return ""
     return "pipeline" if "marrow" in document else "experiment" if "experiment" in document else ""
 

@@ -125,7 +125,7 @@ std::string write_placement(const OpenedFolder& folder, const std::string& into,
 json pipelines_from_starts(const Workbench& workbench) {
   std::vector<fs::path> files{workbench_pipeline("register")};
   std::vector<fs::path> shipped;
-  // Those of the families, which have a folder each; a file beside the folders says only where it has moved.
+  // Those of the families, which have a folder each.
   for (const fs::directory_entry& family : fs::directory_iterator(cli::shared_files("pipelines"))) {
     if (!family.is_directory() || family.path().filename() == "workbench") continue;
     for (const fs::directory_entry& entry : fs::directory_iterator(family))

@@ -26,10 +26,4 @@ EdgeMap edges_above_noise(const Prepared& image, const Gradient& gradient, const
   return refined(image, gradient, marked, way);
 }
 
-EdgeMap mask_edges(const View& view, const ThresholdOptions& options, const Kernel& mask, const Context& context) {
-  const Prepared image = prepare(view, std::max(1.0, options.sigma_px), options.logarithm, context);
-  const Gradient gradient = gradient_of(image.values, smoothed_mask(mask, options.sigma_px));
-  return edges_above_noise(image, gradient, options, [&](int u, int v) { return way_to_ridge(gradient, u, v); });
-}
-
 }  // namespace marrow::edges

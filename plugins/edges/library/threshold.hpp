@@ -10,7 +10,7 @@
 
 namespace marrow::edges {
 
-/// See the help texts in declare_mask(). `sigma_px`: standard deviation of the smoothing Gaussian.
+/// See the help texts in declare_thresholds(). `sigma_px`: standard deviation of the smoothing Gaussian.
 struct ThresholdOptions {
   double sigma_px = 1.5;
   bool logarithm = true;
@@ -23,10 +23,6 @@ struct ThresholdOptions {
 EdgeMap edges_above_noise(const Prepared& image, const Gradient& gradient, const ThresholdOptions& options,
                           const WayToEdge& way);
 
-/// Edges by a small mask (Roberts, Prewitt, Sobel) applied to the smoothed image: ridges of the gradient's magnitude.
-/// Throws Error as prepare() does.
-EdgeMap mask_edges(const View& view, const ThresholdOptions& options, const Kernel& mask, const Context& context);
-
 /// Declares the ports and all options except sigma_px.
 template <class Builder>
 auto& declare_thresholds(Builder& node) {
@@ -37,14 +33,6 @@ auto& declare_thresholds(Builder& node) {
               "side of the window of the median, reduced to an odd multiple of 16", at_least(16))
       .option("threshold", &ThresholdOptions::threshold,
               "least magnitude above the window's median, in standard deviations of the noise", at_least(0));
-}
-
-/// Declares the ports and options of a node that calls mask_edges().
-template <class Builder>
-auto& declare_mask(Builder& node) {
-  return declare_thresholds(node.option(
-      "sigma_px", &ThresholdOptions::sigma_px,
-      "standard deviation of the Gaussian that smooths the image first; 0: no smoothing", at_least(0), at_most(10)));
 }
 
 }  // namespace marrow::edges

@@ -57,19 +57,6 @@ void check_sizes(const Distortion& d, const std::string& what) {
 
 }  // namespace
 
-Eigen::VectorXd term_values(int degree, int width_px, int height_px, const Eigen::Vector2d& ideal_px) {
-  const double half = 0.5 * longer_side(width_px, height_px);
-  const double x = (ideal_px.x() - 0.5 * (width_px - 1)) / half, y = (ideal_px.y() - 0.5 * (height_px - 1)) / half;
-  Eigen::VectorXd values(Eigen::Index(terms_of(degree)));
-  values[0] = 1;
-  for (int sum = 1; sum <= degree; ++sum) {
-    const Eigen::Index first = Eigen::Index(terms_of(sum - 1)), before = first - sum;
-    for (int j = 0; j < sum; ++j) values[first + j] = x * values[before + j];
-    values[first + sum] = y * values[before + sum - 1];
-  }
-  return values;
-}
-
 double lattice_step_px(int width_px, int height_px) { return std::max(1.0, longer_side(width_px, height_px) / 32); }
 int lattice_columns(const Distortion& d) { return int(std::ceil((d.width_px - 1) / d.step_px)) + 1; }
 int lattice_rows(const Distortion& d) { return int(std::ceil((d.height_px - 1) / d.step_px)) + 1; }

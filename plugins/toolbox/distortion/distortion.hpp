@@ -38,8 +38,6 @@ struct Distortion {
 
 /// The number of terms of a polynomial of this degree in two variables.
 constexpr std::size_t terms_of(int degree) { return std::size_t(degree + 1) * std::size_t(degree + 2) / 2; }
-/// The values of all terms x^i y^j up to `degree` at an ideal pixel of an image of this size.
-Eigen::VectorXd term_values(int degree, int width_px, int height_px, const Eigen::Vector2d& ideal_px);
 
 /// The distance between the nodes of a lattice for images of this size: a 32nd of the longer side.
 double lattice_step_px(int width_px, int height_px);

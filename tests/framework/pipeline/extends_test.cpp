@@ -130,15 +130,6 @@ TEST_F(ExtendsTest, AnOverrideMayAddANode) {
   EXPECT_EQ(only_fault().hint, "did you mean 'sum'?; a node that is added must be wired to another, by  NODE.in.PORT");
 }
 
-TEST_F(ExtendsTest, AFileThatHasMovedSaysSo) {
-  const Pipeline p = good(extend(kBase, "moved: true\n"));
-  ASSERT_EQ(p.notes.size(), 1u);
-  EXPECT_EQ(p.notes[0], (scratch.path / "p.yaml").string() + " has moved to " + (scratch.path / "base.yaml").string() +
-                            "; its old name will go with the next release");
-  read("marrow: 1\nmoved: true\n" + kBase);
-  expect_fault_in("p.yaml", 2, "'moved' needs the file that takes this one's place", "add  extends: FILE");
-}
-
 TEST_F(ExtendsTest, FaultsOfExtends) {
   extend(kBase, "extends: other.yaml\n");
   expect_fault_in("p.yaml", 3, "'extends' is given twice in the pipeline", "the first is at line 2");

@@ -349,9 +349,9 @@ TEST_F(Keys, WhatMadeADifference) {
   EXPECT_EQ(marrow::difference(before, now),
             "the plugin of edges.canny was rebuilt; option 'blur' is 1, was not there; option 'high' is 80, was 75; "
             "input 'image' changed; input 'region' changed");
-  now.node = "edges.sobel";
+  now.node = "edges.gradient_mask";
   EXPECT_EQ(marrow::difference(before, now),
-            "it uses edges.sobel, used edges.canny; input 'image' changed; input 'region' changed");
+            "it uses edges.gradient_mask, used edges.canny; input 'image' changed; input 'region' changed");
 }
 
 }  // namespace keys_test

@@ -48,7 +48,7 @@ TEST(NearestResult, AnInputThatDidNotChangeIsNoReason) {
 
 TEST(NearestResult, OtherNodesDoNotCount) {
   Store::Last other = made(1, "10", "20", 1);
-  other.provenance.node = "edges.sobel";
+  other.provenance.node = "edges.gradient_mask";
   EXPECT_EQ(reason({other}, other, made(2, "10", "20", 1)), "none");
 }
 

@@ -25,15 +25,11 @@ using marrow::test::message_of;
 
 class Edges : public testing::TestWithParam<std::string> {
  protected:
-  marrow::EdgeMap find_edges(const marrow::View& view) const {
-    return shipped::call("edges." + GetParam(), {{"view", shipped::item(view)}}).at("edges").as<marrow::EdgeMap>();
-  }
+  marrow::EdgeMap find_edges(const marrow::View& view) const { return edges::found(GetParam(), view); }
 };
 
-INSTANTIATE_TEST_SUITE_P(, Edges,
-                         testing::Values("adaptive_relaxation", "canny", "laplacian_of_gaussian", "prewitt", "roberts",
-                                         "sobel"),
-                         [](const auto& node) { return node.param; });
+INSTANTIATE_TEST_SUITE_P(, Edges, testing::ValuesIn(edges::kDetectors),
+                         [](const auto& detector) { return detector.param; });
 
 TEST_P(Edges, LieOnAStraightStepAtAnyOrientation) {
   double largest = 0, sum = 0, largest_turn_deg = 0;

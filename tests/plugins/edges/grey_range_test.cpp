@@ -18,10 +18,6 @@ using marrow::View;
 using marrow::image::grey_range;
 using marrow::image::GreyScale;
 
-const std::vector<std::string> kDetectors{
-    "edges.canny", "edges.adaptive_relaxation", "edges.laplacian_of_gaussian", "edges.prewitt", "edges.roberts",
-    "edges.sobel"};
-
 /// A disc of 40 pixels radius with a line integral of 1.2 before air of 4000, in the shadow of a plate that lets
 /// nothing through. Its edges are blurred a little, so that the logarithm matters.
 View disc(double noise = 20) {
@@ -36,10 +32,10 @@ View disc(double noise = 20) {
 }
 
 struct Found {
-  Found(const std::string& node, const View& view) {
+  Found(const std::string& detector, const View& view) {
     marrow::Context::Hooks hooks;
     hooks.log = [this](std::string_view text, marrow::LogLevel) { lines.emplace_back(text); };
-    edges = shipped::call(node, {{"view", shipped::item(view)}}, {}, marrow::Context(hooks)).at("edges").as<EdgeMap>();
+    edges = edges::found(detector, view, marrow::Context(hooks));
   }
   std::vector<std::string> lines;
   EdgeMap edges;
@@ -96,7 +92,7 @@ TEST(GreyRange, EdgesAreTheSameWithABadPixel) {
   View bad = clean;
   bad.image.pixels = clean.image.pixels.clone();
   bad.image.pixels.at<std::uint16_t>(180, 20) = 65535;
-  for (const std::string& node : kDetectors) {
+  for (const std::string& node : edges::kDetectors) {
     const Found right(node, clean), found(node, bad);
     EXPECT_TRUE(right.lines.empty()) << node;
     ASSERT_EQ(found.lines.size(), 1u) << node;
@@ -116,7 +112,7 @@ TEST(GreyRange, AnOffsetDoesNotMoveEdges) {
   clean.image.pixels.convertTo(shifted.image.pixels, CV_32F, 1, -2000);
   View true_floats = clean;
   clean.image.pixels.convertTo(true_floats.image.pixels, CV_32F);
-  for (const std::string& node : kDetectors) {
+  for (const std::string& node : edges::kDetectors) {
     const Found right(node, true_floats), found(node, shifted);
     EXPECT_TRUE(right.lines.empty()) << node;
     ASSERT_EQ(found.lines.size(), 1u) << node;

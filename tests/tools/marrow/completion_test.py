@@ -92,7 +92,7 @@ class Completion(Case):
         self.assertEqual(self.lines("inspect", "edges."), edges)
         self.assertEqual(self.words("list", "simil"), ["similarity"])
         self.assertEqual(self.words("new", "node", "simil"), ["similarity."])
-        self.assertIn("edges.canny", self.words("conformance", "edges.sobel", "edges.ca"))
+        self.assertIn("edges.canny", self.words("conformance", "edges.gradient_mask", "edges.ca"))
 
     def test_what_the_pipeline_has(self):
         self.assertEqual(self.lines("run", "p.yaml", "n"), ["number=\ta file with a number"])

@@ -45,8 +45,8 @@ class Plugins(Case):
     def test_a_plugin_outside_the_tree_builds_on_the_toolbox(self):
         folder = self.scratch / "mine"
         folder.mkdir()
-        text = (SOURCE / "plugins" / "edges" / "sobel.cpp").read_text()
-        (folder / "mine.cpp").write_text(text.replace("edges.sobel", "edges.mine"))
+        text = (SOURCE / "plugins" / "edges" / "gradient_mask.cpp").read_text()
+        (folder / "mine.cpp").write_text(text.replace("edges.gradient_mask", "edges.mine"))
         (folder / "CMakeLists.txt").write_text(
             "cmake_minimum_required(VERSION 3.25)\nproject(mine CXX C)\n"
             "find_package(marrow REQUIRED COMPONENTS toolbox)\n"

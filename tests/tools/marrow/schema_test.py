@@ -38,14 +38,6 @@ class Schema(SchemaCase):
             self.assertEqual(errors, [], str(path))
             self.assertEqual(marrow("check", path).returncode, 0, str(path))
 
-    def test_old_names_lead_to_the_files(self):
-        for path in (SOURCE / "pipelines").glob("*.yaml"):
-            content = yaml.safe_load(path.read_text())
-            self.assertEqual({**content, "extends": ""}, {"marrow": 1, "extends": "", "moved": True}, path.name)
-            new = path.parent / content["extends"]
-            self.assertEqual(new.name, path.name)
-            self.assertIn(new, shipped(), path.name)
-
     def test_faults_are_found(self):
         good = yaml.safe_load((SOURCE / "pipelines" / "femur" / "femur.yaml").read_text())
         for spoil in (

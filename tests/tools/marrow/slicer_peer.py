@@ -97,7 +97,7 @@ nodes:
   points: {uses: read.landmarks, with: {path: $points, fragment: $fragment}}
   patient: {uses: read.case, with: {path: $patient}}
   view: {uses: part.yaml, with: {camera: $camera, image: $below/image.png, frame: $frame, name: $needed}}
-  edges: {uses: edges.sobel, in: {view: view}, with: {logarithm: $logarithm}}
+  edges: {uses: edges.gradient_mask, in: {view: view}, with: {logarithm: $logarithm}}
 outputs: {ct: ct, surface: surface, start: start, numbers: numbers, points: points, patient: patient.seeds,
   edges: edges}
 """

@@ -143,8 +143,8 @@ std::vector<std::string> nodes_of(const Catalogue& catalogue, const std::string&
       throw Error("the library " + library.file.string() + " is not used: " + library.refused);
   }
   if (names.empty())
-    throw Error("there is no node, kind or library '" + what + "'; " + suggestion(what, catalogue.node_names()) +
-                "; marrow doctor shows the folders searched");
+    throw Error("there is no node, kind or library '" + what + "'; " +
+                catalogue.hint_for(what, catalogue.node_names()) + "; marrow doctor shows the folders searched");
   return names;
 }
 

@@ -58,8 +58,7 @@ NewCommand add_what(CLI::App* command, const std::string& what, const std::strin
   return made;
 }
 
-/// The folders of marrow's own pipelines, one for each family. A file beside them says only where it has moved; the
-/// YAML files of networks are no pipelines.
+/// The folders of marrow's own pipelines, one for each family. The YAML files of networks are no pipelines.
 std::vector<fs::path> families() {
   std::vector<fs::path> found;
   for (const fs::directory_entry& entry : fs::directory_iterator(shared_files("pipelines")))

@@ -95,7 +95,7 @@ OneNode pipeline_of_node(const std::string& name, const std::vector<std::pair<st
                          Diagnostics& diagnostics) {
   const NodeInfo* info = catalogue.find(name);
   if (!info) {
-    diagnostics.add({name}, "unknown node " + in_quotes(name), suggestion(name, catalogue.node_names()));
+    diagnostics.add({name}, "unknown node " + in_quotes(name), catalogue.hint_for(name, catalogue.node_names()));
     return {};
   }
   CallBuilder call(*info, catalogue, diagnostics);

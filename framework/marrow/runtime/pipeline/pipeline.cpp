@@ -86,7 +86,8 @@ class Resolver {
       std::vector<std::string> siblings;
       for (const std::string& name : names)
         if (name.starts_with(kind + ".")) siblings.push_back(name);
-      std::string hint = suggested(diagnostics_, written.uses, siblings.empty() ? names : siblings);
+      std::string hint =
+          diagnostics_.is_full() ? "" : catalogue_.hint_for(written.uses, siblings.empty() ? names : siblings);
       for (const LibraryInfo& library : catalogue_.libraries())
         if (!library.refused.empty() && library.file.stem().string().find(own_name) != std::string::npos)
           hint += "; " + library.file.filename().string() + " was refused: it " + library.refused;
@@ -175,7 +176,7 @@ class Resolver {
       const KindPort* of_others = own ? nullptr : find_named(of_kind, name);
       if (!own && !of_others) {
         diagnostics_.add(value.place, in_quotes(node.info.name) + " has no input " + in_quotes(name),
-                         suggested_for(node.info.name, name, names_of(of_kind), diagnostics_));
+                         suggested(diagnostics_, name, names_of(of_kind)));
         continue;
       }
       // The wire to a port that only other nodes of the kind have is checked, and then left out.

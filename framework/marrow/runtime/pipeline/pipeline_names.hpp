@@ -37,12 +37,9 @@ inline std::string joined(const std::vector<std::string>& list, const char* sepa
 
 /// suggestion() as long as `diagnostics` keeps faults, then an empty text: to compare thousands of unknown names with
 /// thousands of known ones would take long.
-std::string suggested(const Diagnostics& diagnostics, const std::string& wrong, const std::vector<std::string>& known);
-
-/// The hint for an option or port that the node does not have. If it is an old name, the hint gives the new one; else
-/// it is suggested(). A folder of plugins lists the old names in its file renamed.txt. Each line there holds the
-/// version that brought the new name, the node or its kind, the old name and the new name.
-std::string suggested_for(const std::string& node, const std::string& wrong, const std::vector<std::string>& known,
-                          const Diagnostics& diagnostics);
+inline std::string suggested(const Diagnostics& diagnostics, const std::string& wrong,
+                             const std::vector<std::string>& known) {
+  return diagnostics.is_full() ? "" : suggestion(wrong, known);
+}
 
 }  // namespace marrow

@@ -70,7 +70,7 @@ void resolve_options(const WrittenNode& written, PipelineNode& node, InputTexts&
   for (const auto& [name, value] : written.options)
     if (!contains(known, name))
       diagnostics.add(value.place, in_quotes(node.info.name) + " has no option " + in_quotes(name),
-                      suggested_for(node.info.name, name, known, diagnostics));
+                      suggested(diagnostics, name, known));
   for (const OptionInfo& option : node.info.options) {
     OptionValue result = option.default_value;
     Place place;

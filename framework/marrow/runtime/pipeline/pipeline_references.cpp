@@ -60,7 +60,7 @@ Reference resolve_reference(const std::string& text, const Place& place, const s
   if (output < 0) {
     if (parts.size() > 1)
       diagnostics.add(place, "node " + in_quotes(id) + " has no output " + in_quotes(parts[1]),
-                      suggested_for(nodes[index].info.name, parts[1], names_of(outputs), diagnostics));
+                      suggested(diagnostics, parts[1], names_of(outputs)));
     else
       diagnostics.add(place,
                       "node " + in_quotes(id) + " has several outputs" +

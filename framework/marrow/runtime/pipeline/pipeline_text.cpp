@@ -56,8 +56,8 @@ class PipelineReader {
   bool read_keys(const fs::path& file, const YAML::Node& root, StrictYaml& yaml) {
     static const std::vector<std::string> kOfBody{"marrow", "name",  "help",   "only_inside",
                                                   "inputs", "nodes", "outputs"};
-    static const std::vector<std::string> kOfFile{"marrow",      "extends", "moved", "name",    "help",
-                                                  "only_inside", "inputs",  "nodes", "outputs", "set"};
+    static const std::vector<std::string> kOfFile{"marrow", "extends", "name",    "help", "only_inside",
+                                                  "inputs", "nodes",   "outputs", "set"};
     const Place start = is_body_ ? yaml.place(root) : Place{file.string(), 1, 1};
     const fs::path folder = fs::absolute(file).parent_path();
     const std::vector<YamlEntry> entries = yaml.map(root, start, "the pipeline", is_body_ ? &kOfBody : &kOfFile);
@@ -71,8 +71,6 @@ class PipelineReader {
       given.insert(entry.key);
       read_key(entry, layer);
       if (entry.key == "set") changes = changes_in(entry, layer);
-      if (entry.key == "moved" && yaml.boolean(entry.value, entry.place, "moved").value_or(false))
-        note_moved(file, entry.place, yaml);
     }
     apply_changes(pipeline_, std::move(changes), ++layer_, diagnostics_);
     if (root.IsMap() && !given.contains("marrow") && !is_body_)
@@ -109,17 +107,7 @@ class PipelineReader {
     const auto below = extended_file(yaml, entry.value, layers_);
     const bool is_read = below && read_file(*below);
     is_named_ = false;
-    if (below) below_ = *below;
     return is_read;
-  }
-
-  /// A file that holds the place of another one, for those who still use its old name.
-  void note_moved(const fs::path& file, const Place& place, StrictYaml& yaml) {
-    if (pipeline_.files.back() == file)
-      yaml.fault(place, "'moved' needs the file that takes this one's place", "add  extends: FILE");
-    else
-      pipeline_.notes.push_back(file.string() + " has moved to " + below_.string() +
-                                "; its old name will go with the next release");
   }
 
   WrittenPipeline finish(const Place& start) {
@@ -169,7 +157,6 @@ class PipelineReader {
   Diagnostics& diagnostics_;
   WrittenPipeline pipeline_;
   std::vector<fs::path> layers_;  ///< the file, and those that it extends
-  fs::path below_;                ///< the file that the one being read extends
   int layer_ = 0;
   bool is_body_ = false, is_map_ = false, is_named_ = false, has_nodes_ = false, has_outputs_ = false;
 };

@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
 #include "marrow/base/framework_file.hpp"
+#include "marrow/base/names.hpp"
 #include "marrow/base/regular_file.hpp"
+#include "marrow/base/text_file.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/plugins/contract.hpp"
 #include "marrow/runtime/plugins/library_index.hpp"
@@ -33,6 +36,7 @@ Catalogue::Catalogue(std::vector<fs::path> folders) : folders_(std::move(folders
   do {
     enter_names();
   } while (refuse_broken_contracts());
+  enter_not_built();
 }
 
 void Catalogue::find_libraries() {
@@ -78,6 +82,20 @@ void Catalogue::enter_names() {
   }
 }
 
+void Catalogue::enter_not_built() {
+  constexpr std::uintmax_t most_bytes = 1 << 20;
+  for (const fs::path& folder : folders_) {
+    const fs::path file = folder / "not_built.json";
+    if (std::error_code none; !fs::exists(file, none)) continue;
+    try {
+      const auto nodes = nlohmann::json::parse(read_text_file(file, most_bytes), nullptr, false);
+      for (const auto& [node, option] : nodes.items())
+        if (nodes.is_object() && option.is_string() && !find(node)) not_built_.emplace(node, option);
+    } catch (const Error&) {  // it only helps with hints
+    }
+  }
+}
+
 bool Catalogue::refuse_broken_contracts() {
   std::vector<std::string> reasons;
   bool any = false;
@@ -111,6 +129,27 @@ std::vector<std::string> Catalogue::node_names() const {
 const NodeInfo* Catalogue::find(const std::string& name) const {
   const auto found = nodes_.find(name);
   return found == nodes_.end() ? nullptr : &libraries_[found->second.library].nodes[found->second.index];
+}
+
+std::string Catalogue::remedy_for(const std::string& missing_node) const {
+  if (const auto found = not_built_.find(missing_node); found != not_built_.end())
+    return "this build of marrow leaves it out; configure it with -D" + found->second + "=ON";
+  const std::size_t dot = missing_node.find('.');
+  if (dot == std::string::npos) return "";
+  const std::string method = missing_node.substr(dot + 1);
+  for (const auto& [name, entry] : nodes_) {
+    const NodeInfo& node = *find(name);
+    if (node.kind() != missing_node.substr(0, dot)) continue;
+    for (const OptionInfo& option : node.options)
+      if (std::find(option.choices.begin(), option.choices.end(), method) != option.choices.end())
+        return "use " + name + " with " + option.name + ": " + method;
+  }
+  return "";
+}
+
+std::string Catalogue::hint_for(const std::string& missing_node, const std::vector<std::string>& known) const {
+  const std::string remedy = remedy_for(missing_node);
+  return remedy.empty() ? suggestion(missing_node, known) : remedy;
 }
 
 const LibraryInfo* Catalogue::library_of(const std::string& name) const {

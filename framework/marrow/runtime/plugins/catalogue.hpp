@@ -34,6 +34,14 @@ class Catalogue {
   /// nullptr if no library offers it.
   const NodeInfo* find(const std::string& name) const;
   const LibraryInfo* library_of(const std::string& name) const;
+  /// The nodes that options of CMake leave out of this build, each with its option. A folder of libraries tells them in
+  /// its file not_built.json.
+  const std::map<std::string, std::string>& not_built() const { return not_built_; }
+  /// What to do where no library offers this node: to build it, or to take the node of its kind that has the name as a
+  /// choice of an option. Empty if nothing is known of the name.
+  std::string remedy_for(const std::string& missing_node) const;
+  /// The same; if it is empty, the nearest of the known names.
+  std::string hint_for(const std::string& missing_node, const std::vector<std::string>& known) const;
   /// The kinds that libraries declare, and the kinds of nodes whose kind no library declares. Sorted.
   std::vector<std::string> kind_names() const;
   /// nullptr if no library declares it.
@@ -55,6 +63,7 @@ class Catalogue {
  private:
   void find_libraries();
   void enter_names();
+  void enter_not_built();
   /// Returns whether it refused a library. If so, the names must be entered again.
   bool refuse_broken_contracts();
   const Plugin& load_plugin(std::size_t library) const;
@@ -67,6 +76,7 @@ class Catalogue {
   std::map<std::string, Entry> nodes_;
   std::map<std::string, Entry> kinds_;
   std::map<std::string, Entry> writers_;
+  std::map<std::string, std::string> not_built_;
   mutable std::mutex mutex_;
   mutable std::map<std::size_t, std::unique_ptr<Plugin>> loaded_;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/register/closest_points.hpp"
+#include "closest_points.hpp"
 
 #include <pcl/console/print.h>
 #include <pcl/point_cloud.h>

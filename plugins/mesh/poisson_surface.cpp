@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/mesh/poisson.hpp"
+#include "poisson_surface.hpp"
 
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
