@@ -177,10 +177,10 @@ def named_tests(suite):
             yield ".".join(one.id().split(".")[-2:])
 
 
-def main(part=1):
-    """Runs the tests that the command line names; without names, one of `part` of them, the same in each run. Without a
-    browser they are skipped."""
-    if browser.missing():
+def main(part=1, needs_browser=True):
+    """Runs the tests that the command line names; without names, one of `part` of them, the same in each run. Tests
+    that need a browser are skipped without one."""
+    if needs_browser and browser.missing():
         skip(browser.missing())
     names = sys.argv[1:]
     if not names:

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""What the report of a comparison says in numbers, in headless Chromium: of how many runs each number is, in which unit,
-and no number for what is not known; ranking, all pairs and effects of factors; response curves of a sweep; and what an
-optimizer tried.
+"""What the report of a comparison says in numbers, in headless Chromium: of how many runs each number is, in which
+unit, and no number for what is not known; ranking, all pairs and effects of factors; response curves of a sweep; and
+what an optimizer tried.
 
     tests/tools/report/comparisons_test.py     exit code 77: skipped, with the reason
 """
