@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A headless Chromium with what the report's tests need of it, from Debian's chromium, chromium-driver and
+"""A headless Chromium with what tests of pages need of it, from Debian's chromium, chromium-driver and
 python3-selenium."""
+import atexit
+import functools
 import json
 import os
 import pathlib
@@ -19,6 +21,14 @@ def missing():
     if not pathlib.Path("/usr/share/javascript/three/three.module.js").exists():
         absent.append("libjs-three")
     return "missing Debian packages: " + ", ".join(absent) if absent else None
+
+
+@functools.lru_cache
+def shared():
+    """The one browser of this process: to start one takes seconds."""
+    one = Browser()
+    atexit.register(one.close)
+    return one
 
 
 class Browser:
@@ -53,13 +63,7 @@ class Browser:
         """Opens a page from disk, or at an address; the seconds until it says that it is ready."""
         self.driver.get("about:blank")
         self.logs()
-        self.driver.execute_cdp_cmd(
-            "Emulation.setDeviceMetricsOverride",
-            {"width": width_px, "height": height_px, "deviceScaleFactor": 1, "mobile": False},
-        )
-        self.driver.execute_cdp_cmd(
-            "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]}
-        )
+        self.look(width_px, height_px, theme)
         address = str(path) if str(path).startswith("http:") else pathlib.Path(path).resolve().as_uri()
         begin = time.monotonic()
         self.driver.get(address + hash)
@@ -68,6 +72,13 @@ class Browser:
             " !!document.querySelector('#distributions svg.plot .box'))"
         )
         return time.monotonic() - begin
+
+    def look(self, width_px=1440, height_px=900, theme="light"):
+        """The size of the window, and the colours that the person prefers."""
+        size = {"width": width_px, "height": height_px, "deviceScaleFactor": 1, "mobile": False}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        preferred = [{"name": "prefers-color-scheme", "value": theme}]
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": preferred})
 
     def js(self, text, *arguments):
         return self.driver.execute_script(text, *arguments)
@@ -97,23 +108,37 @@ class Browser:
 
         self.driver.find_element(By.CSS_SELECTOR, selector).send_keys(getattr(Keys, name, name))
 
+    def press(self, key, code, modifiers=0):
+        """A key that is pressed wherever the focus is. Modifiers: 1 Alt, 2 Ctrl, 8 Shift."""
+        event = {"type": "keyDown", "modifiers": modifiers, "key": key, "code": code}
+        self.driver.execute_cdp_cmd("Input.dispatchKeyEvent", event)
+
+    def box(self, selector):
+        """[left, top, width, height] of an element in the window."""
+        script = "const r = document.querySelector(arguments[0]).getBoundingClientRect();"
+        return self.js(script + "return [r.left, r.top, r.width, r.height]", selector)
+
+    def mouse(self, kind, at, buttons=0, **more):
+        event = {"type": kind, "x": at[0], "y": at[1], "button": "left", "buttons": buttons, "clickCount": 1, **more}
+        self.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
+
+    def drag_along(self, places, buttons=1, **more):
+        """The mouse pressed at the first place, moved to the others and let go at the last."""
+        self.mouse("mousePressed", places[0], buttons, **more)
+        for place in places[1:]:
+            self.mouse("mouseMoved", place, buttons, **more)
+        self.mouse("mouseReleased", places[-1], **more)
+
     def drag(self, selector, from_fraction, to_fraction):
-        """The mouse pressed at one fraction of an element's width and let go at another."""
-        box = self.js(
-            (
-                "const r = document.querySelector(arguments[0]).getBoundingClientRect(); return [r.left, r.top,"
-                " r.width, Math.min(r.height, innerHeight - r.top)]"
-            ),
-            selector,
-        )
-        at = lambda fraction: {"x": box[0] + fraction * box[2], "y": box[1] + 0.5 * box[3]}
-        send = lambda kind, fraction, buttons: self.driver.execute_cdp_cmd(
-            "Input.dispatchMouseEvent", dict(at(fraction), type=kind, button="left", buttons=buttons, clickCount=1)
-        )
-        send("mousePressed", from_fraction, 1)
-        for i in range(1, 6):
-            send("mouseMoved", from_fraction + (to_fraction - from_fraction) * i / 5, 1)
-        send("mouseReleased", to_fraction, 0)
+        """The same from one fraction of an element's width to another."""
+        left, top, width, height = self.box(selector)
+        y = top + 0.5 * min(height, self.js("return innerHeight") - top)
+        steps = [from_fraction + (to_fraction - from_fraction) * i / 5 for i in range(6)]
+        self.drag_along([(left + step * width, y) for step in steps])
+
+    def touch(self, kind, places=()):
+        points = [{"x": x, "y": y, "id": finger} for finger, (x, y) in enumerate(places)]
+        self.driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
     def logs(self):
         """Since the last call: faults in the console, and addresses that were asked for and are not on this page."""

@@ -6,10 +6,9 @@ readers reach all rows although few are drawn; and each cell has an address.
     tests/tools/report/many_cells_test.py     exit code 77: skipped, with the reason
 """
 import os
-import sys
 
 from harness import synthetic
-from harness.page import BrowserTest, run_tests
+from harness.page import ReportTest, made, main
 
 # Both times are for a machine that does the work below in this time. On one that is slower, or busy, they are longer.
 MOST_SECONDS, MOST_BYTES, MOST_TASK_MS = 3, 20e6, 100
@@ -20,35 +19,31 @@ WORK, WORK_MS = (
     return performance.now() - begin""",
     100,
 )
-ROWS = "return [...document.querySelectorAll('#cells tbody tr')].map((row) => row.dataset.id)"
 
 
-class ManyCellsTest(BrowserTest):
+class ManyCellsTest(ReportTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.data = synthetic.comparison(cases=100, starts=10, variants=10, looked_at=0)
+        cls.data = made(cases=100, starts=10, variants=10, looked_at=0)
         cls.cells = [
             dict(cell, id="/".join([name, cls.data["cases"][cell["case"]], cls.data["starts"][cell["start"]]]))
             for cell in cls.data["cells"]
             for name in [cls.data["variants"][cell["variant"]]["name"]]
         ]
-        cls.page = cls.write("many", synthetic.as_table(cls.data))
-
-    def rows(self):
-        return self.browser.js(ROWS)
+        cls.page = cls.write(synthetic.as_table(cls.data), "many")
 
     def choose_text(self, text):
         self.choose("Text", text, "#cells")
 
     def slowness(self):
         """How many times as long as the limits say everything may take at the moment."""
-        return max(1, self.browser.js(WORK) / WORK_MS)
+        return max(1, self.js(WORK) / WORK_MS)
 
     def longest_task_ms(self, steps):
         """The longest task of the page while it takes these steps, a list of functions in JavaScript, each in a task of
         its own. Tasks below 50 ms are not reported and count as 0."""
-        return self.browser.js(
+        return self.js(
             """const tasks = [0], wait = (ms) => new Promise((done) => setTimeout(done, ms));
             const watcher = new PerformanceObserver((list) => tasks.push(...list.getEntries().map((t) => t.duration)));
             watcher.observe({entryTypes: ['longtask']});
@@ -113,37 +108,32 @@ class ManyCellsTest(BrowserTest):
         finite = [cell for cell in self.cells if cell["values"][0] is not None]
         finite.sort(key=lambda cell: cell["values"][0])
         self.press("mTRE mm", "#cells")
-        self.assertEqual(self.rows()[:10], [cell["id"] for cell in finite[:10]])
+        self.assertEqual(self.ids()[:10], [cell["id"] for cell in finite[:10]])
         self.press("mTRE mm", "#cells")
-        self.assertEqual(self.rows()[:10], [cell["id"] for cell in finite[:-11:-1]])
-        last = self.browser.js("const r = document.querySelector('.rows'); r.scrollTop = r.scrollHeight; return 0")
+        self.assertEqual(self.ids()[:10], [cell["id"] for cell in finite[:-11:-1]])
+        self.the(".rows", "one.scrollTop = one.scrollHeight")
         failed = [cell["id"] for cell in self.cells if cell["values"][0] is None]
-        self.eventually(lambda: self.rows()[-1:], failed[-1:])
+        self.eventually(lambda: self.ids()[-1:], failed[-1:])
         self.choose_text("CASE-07/3")
         wanted = {cell["id"] for cell in self.cells if cell["id"].endswith("/case-07/3")}
-        self.assertEqual((set(self.rows()), len(wanted)), (wanted, 10))
+        self.assertEqual((set(self.ids()), len(wanted)), (wanted, 10))
         self.assertEqual(self.texts("#cells .count"), ["10 of 10,000 runs"])
         self.choose_text("nothing is named so")
-        self.assertEqual((self.rows(), self.texts("#cells .count")), ([], ["No cell fits the filter"]))
-        self.assertEqual(last, 0)
+        self.assertEqual((self.ids(), self.texts("#cells .count")), ([], ["No cell fits the filter"]))
 
     def test_few_rows_are_drawn_and_say_which(self):
         self.browser.open(self.page)
         self.browser.show("cells")
-        count = lambda: self.browser.js("return document.querySelector('#cells table').getAttribute('aria-rowcount')")
+        count = lambda: self.the("#cells table", "one.getAttribute('aria-rowcount')")
         self.assertEqual(count(), "10001")
-        self.assertLess(len(self.rows()), 60)
-        self.browser.js("const r = document.querySelector('.rows'); r.scrollTop = marrow.table.table.row_px * 5000")
-        self.eventually(lambda: self.cells[5000]["id"] in self.rows(), True)
-        self.assertLess(len(self.rows()), 60)
-        place = self.browser.js(
-            """const row = document.querySelector('#cells [data-id="' + arguments[0] + '"]');
-            const head = document.querySelector('#cells thead th').getBoundingClientRect();
-            return [row.getAttribute('aria-rowindex'), row.getBoundingClientRect().top - head.bottom]""",
-            self.cells[5000]["id"],
-        )
-        self.assertEqual(place[0], "5002")  # counted from 1, after the heading
-        self.assertLess(abs(place[1]), 2)  # px: just below the heading, which stays
+        self.assertLess(len(self.ids()), 60)
+        self.the(".rows", "one.scrollTop = marrow.table.table.row_px * 5000")
+        self.eventually(lambda: self.cells[5000]["id"] in self.ids(), True)
+        self.assertLess(len(self.ids()), 60)
+        row = '#cells [data-id="%s"]' % self.cells[5000]["id"]
+        self.assertEqual(self.the(row, "one.getAttribute('aria-rowindex')"), "5002", "from 1, after the heading")
+        (_, top, *_), (_, head, _, height) = self.browser.box(row), self.browser.box("#cells thead th")
+        self.assertLess(abs(top - head - height), 2, "px: just below the heading, which stays")
         self.choose_text("case-07/3")
         self.assertEqual(count(), "11")
 
@@ -153,73 +143,61 @@ class ManyCellsTest(BrowserTest):
             const event = new KeyboardEvent('keydown', how);
             document.activeElement.dispatchEvent(event);
             return [event.defaultPrevented, document.activeElement.type === 'search']"""
-        self.assertEqual(self.browser.js(find), [False, False], "the table is not in sight")
+        self.assertEqual(self.js(find), [False, False], "the table is not in sight")
         self.browser.show("cells")
-        self.assertEqual(self.browser.js(find), [True, True])
-        self.assertEqual(self.browser.js(find), [False, True], "the second time the browser's own comes")
-        focused = lambda: self.browser.js("return document.activeElement.textContent")
+        self.assertEqual(self.js(find), [True, True])
+        self.assertEqual(self.js(find), [False, True], "the second time the browser's own comes")
         press = lambda key: self.browser.key(key, ":focus")
-        self.browser.js("document.querySelector('.rows').focus()")
-        for key, wanted in (
-            ("ARROW_DOWN", 0),
-            ("ARROW_DOWN", 1),
-            ("ARROW_DOWN", 2),
-            ("ARROW_UP", 1),
-            ("END", 9999),
-            ("ARROW_DOWN", 9999),
-            ("ARROW_UP", 9998),
-            ("HOME", 0),
-        ):
+        self.the(".rows", "one.focus()")
+        wanted = {"ARROW_DOWN": [0, 1, 2], "ARROW_UP": [1], "END": [9999]}
+        steps = [(key, row) for key, rows in wanted.items() for row in rows]
+        for key, row in [*steps, ("ARROW_DOWN", 9999), ("ARROW_UP", 9998), ("HOME", 0)]:
             press(key)
-            self.assertEqual(focused(), self.cells[wanted]["id"], key)
+            self.assertEqual(self.text(":focus"), self.cells[row]["id"], key)
         press("PAGE_DOWN")
-        self.assertIn(focused(), [cell["id"] for cell in self.cells[5:40]])
-        reached = "return [...document.querySelectorAll('#cells tbody button')].filter((b) => b.tabIndex === 0).length"
-        self.assertEqual(self.browser.js(reached), 1, "the tabulator stops at one row")
-        self.browser.js("const r = document.querySelector('.rows'); r.scrollTop = r.scrollHeight / 2")
-        self.eventually(lambda: self.browser.js("return document.activeElement.className"), "scroll rows")
+        self.assertIn(self.text(":focus"), [cell["id"] for cell in self.cells[5:40]])
+        reached = self.all("#cells tbody button", "one.tabIndex")
+        self.assertEqual(reached.count(0), 1, "the tabulator stops at one row")
+        self.the(".rows", "one.scrollTop = one.scrollHeight / 2")
+        self.eventually(lambda: self.js("return document.activeElement.className"), "scroll rows")
         press("ARROW_DOWN")
-        self.assertIn(focused(), [cell["id"] for cell in self.cells[4900:5100]])
-        name = focused()
+        name = self.text(":focus")
+        self.assertIn(name, [cell["id"] for cell in self.cells[4900:5100]])
         press("ENTER")
         self.assertIn("Cell " + name, self.texts("#cell .note"))
 
     def test_a_link_opens_a_cell(self):
         cell = next(cell for cell in self.cells if cell["status"] == "done")
-        link = "#cell=" + cell["id"].replace(" ", "%20")
-        self.browser.open(self.page, hash=link)
-        text = self.browser.js("return document.getElementById('cell').innerText")
+        self.browser.open(self.page, hash="#cell=" + cell["id"].replace(" ", "%20"))
+        text = self.the("#cell", "one.innerText")
         command = "marrow cell experiments/edges.yaml '%s'" % cell["id"]
         self.assertIn(command, text)
         self.assertIn("No pictures of this cell are in this report. This makes them, and a page that shows", text)
         self.assertIn(command + " && marrow show 'runs/edges/pictures/%s'" % cell["id"], text)
         failed = next(cell for cell in self.cells if cell["status"] == "failed")
-        self.browser.js("location.hash = arguments[0]", "#cell=" + failed["id"])
-        shown = lambda: failed["id"] in self.browser.js("return document.getElementById('cell').innerText")
-        self.eventually(shown, True)
+        self.js("location.hash = arguments[0]", "#cell=" + failed["id"])
+        self.eventually(lambda: failed["id"] in self.the("#cell", "one.innerText"), True)
         self.assertIn("There are no pictures of this cell, because it failed.", "".join(self.texts("#cell .note")))
         self.press("Next", "#cell")
         after = self.cells[self.cells.index(failed) + 1]["id"].replace(" ", "%20")
-        self.eventually(lambda: self.browser.js("return location.hash"), "#cell=" + after)
+        self.eventually(lambda: self.js("return location.hash"), "#cell=" + after)
         self.press("Close", "#cell")
-        self.eventually(lambda: self.browser.js("return location.hash"), "")
-
-    def test_a_link_to_no_cell_says_so(self):
+        self.eventually(lambda: self.js("return location.hash"), "")
         self.browser.open(self.page, hash="#cell=nobody/case-01/0")
         for name in ("nobody/case-01/0", "100%/case-01/0"):
-            self.browser.js("location.hash = arguments[0]", "#cell=" + name)
+            self.js("location.hash = arguments[0]", "#cell=" + name)
             wanted = "The link asks for the cell “%s”, which this report does not have." % name
             self.eventually(lambda: wanted in "".join(self.texts("#cell p")), True)
-            self.assertIn("VARIANT/CASE/START, for example adaptive relaxation/case-01/0.", self.texts("#cell p")[0])
+            self.assertIn("VARIANT/CASE/START, for example adaptive relaxation/case-01/0.", self.text("#cell p"))
 
     def test_the_command_names_the_folder_of_the_comparison(self):
-        data = synthetic.comparison(cases=1, starts=1, variants=2, looked_at=0)
+        data = made(cases=1, starts=1, variants=2, looked_at=0)
         data["experiment"]["out"] = "-my runs"
         data["variants"][1]["name"] = "-b"
-        self.browser.open(self.write("out", synthetic.as_table(data)), hash="#cell=-b/case-01/0")
-        commands = self.texts("#cell .command code")
-        self.assertEqual(commands[0], "marrow cell experiments/edges.yaml --out './-my runs' -- -b/case-01/0")
+        self.show(synthetic.as_table(data), hash="#cell=-b/case-01/0")
+        command = "marrow cell experiments/edges.yaml --out './-my runs' -- -b/case-01/0"
+        self.assertEqual(self.text("#cell .command code"), command)
 
 
 if __name__ == "__main__":
-    sys.exit(run_tests(sys.argv[1:]))
+    main()

@@ -8,13 +8,10 @@ and from a server; without it the page is whole but for that, and says what is m
 import functools
 import http.server
 import shutil
-import sys
 import threading
 
 from harness import synthetic
-from harness.page import BrowserTest, page_of, run_tests
-
-SOURCES = "return [...document.querySelectorAll('#cell .gallery img')].map((image) => image.naturalWidth)"
+from harness.page import ReportTest, made, main, page_of
 
 
 class Quiet(http.server.SimpleHTTPRequestHandler):
@@ -22,11 +19,11 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
         pass
 
 
-class PartsTest(BrowserTest):
+class PartsTest(ReportTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        data = synthetic.as_table(synthetic.comparison(cases=3, starts=2, variants=2, looked_at=2))
+        data = synthetic.as_table(made(cases=3, starts=2, variants=2, looked_at=2))
         (cls.folder / "whole").mkdir()
         cls.page = cls.folder / "whole" / "report.html"
         cls.page.write_text(page_of(synthetic.put_beside(data, cls.folder / "whole" / "report", [(0, 1)])))
@@ -36,17 +33,20 @@ class PartsTest(BrowserTest):
         cls.link = "#cell=canny/case-01/1"
 
     def check_cell(self):
-        self.eventually(lambda: self.browser.js(SOURCES), [256] * 4)
+        self.eventually(lambda: self.all("#cell .gallery img", "one.naturalWidth"), [256] * 4)
         headings = ["Pictures", "Convergence", "Cost about the result", "3D", "Its recipe"]
         self.assertEqual(self.texts("#cell h3")[-5:], headings)
 
-    def test_nothing_is_loaded_before_it_is_asked_for(self):
+    def test_a_part_is_loaded_once_it_is_asked_for(self):
         self.browser.open(self.page)
         self.assertEqual(self.browser.logs()[1], [self.page.as_uri()])
-        options = "return [...document.querySelector('#pictures .picker select').options].map((o) => o.textContent)"
-        self.assertEqual(self.browser.js(options), ["case-01, start 0", "case-01, start 1"])
-
-    def test_a_cell_that_is_opened_loads_its_part(self):
+        options = self.texts("#pictures .picker label:first-of-type option")
+        self.assertEqual(options, ["case-01, start 0", "case-01, start 1"])
+        self.choose("Case and start", "1", "#pictures")
+        self.eventually(lambda: self.all("#pictures .stage img", "one.naturalWidth"), [256, 256])
+        self.browser.show("scene")
+        self.wait("!!marrow.scene")
+        self.eventually(lambda: self.count("#convergence svg.plot"), 1)
         self.browser.open(self.page, hash=self.link)
         self.check_cell()
         self.assertEqual(self.browser.logs()[1], [self.page.as_uri(), self.part.as_uri()])
@@ -54,15 +54,6 @@ class PartsTest(BrowserTest):
         self.press("adaptive relaxation/case-01/1", "#cells")
         self.check_cell()
         self.assertEqual(self.browser.logs()[1], [], "it is loaded once")
-
-    def test_the_pictures_of_a_case_are_loaded_when_it_is_chosen(self):
-        self.browser.open(self.page)
-        self.choose("Case and start", "1", "#pictures")
-        widths = "return [...document.querySelectorAll('#pictures .stage img')].map((image) => image.naturalWidth)"
-        self.eventually(lambda: self.browser.js(widths), [256, 256])
-        self.browser.show("scene")
-        self.browser.wait("return !!marrow.scene")
-        self.eventually(lambda: len(self.texts("#convergence svg.plot")), 1)
 
     def test_from_a_server(self):
         handler = functools.partial(Quiet, directory=str(self.folder / "whole"))
@@ -77,12 +68,11 @@ class PartsTest(BrowserTest):
 
     def test_a_page_alone_says_what_is_missing(self):
         self.browser.open(self.alone, hash=self.link)
-        size = "%.2f MB" % (self.part.stat().st_size / 1e6)
         why = (
-            "Of case-01, start 1, pictures and curves (%s) are not in this page but in the file report/%s beside it,"
-            " which cannot be loaded. Open report.html where the comparison wrote it, or copy the folder report/ along"
-            " with the page."
-        ) % (size, self.part.name)
+            "Of case-01, start 1, pictures and curves (%.2f MB) are not in this page but in the file report/%s beside"
+            " it, which cannot be loaded. Open report.html where the comparison wrote it, or copy the folder report/"
+            " along with the page."
+        ) % (self.part.stat().st_size / 1e6, self.part.name)
         self.eventually(lambda: self.texts("#cell .note")[1:], [why + " Or make them again:"])
         command = "marrow cell experiments/edges.yaml canny/case-01/1 && marrow show runs/edges/pictures/"
         self.assertIn(command + "canny/case-01/1", self.texts("#cell .command code"))
@@ -90,13 +80,9 @@ class PartsTest(BrowserTest):
         self.choose("Case and start", "1", "#pictures")
         self.eventually(lambda: self.texts("#pictures .note"), [why])
         self.choose("Case and start", "0", "#pictures")
-        self.eventually(lambda: len(self.texts("#pictures .stage img")), 2)
-        self.assertEqual(
-            {fault.split(" - ")[0] for fault in self.browser.logs()[0]},
-            {(self.alone.parent / "report" / self.part.name).as_uri()},
-        )
-
-    def test_a_damaged_part_is_missing(self):
+        self.eventually(lambda: self.count("#pictures .stage img"), 2)
+        faults = {fault.split(" - ")[0] for fault in self.browser.logs()[0]}
+        self.assertEqual(faults, {(self.alone.parent / "report" / self.part.name).as_uri()})
         (self.folder / "damaged" / "report").mkdir(parents=True)
         page = shutil.copy(self.page, self.folder / "damaged" / "report.html")
         (self.folder / "damaged" / "report" / self.part.name).write_text("Parts.take('another', {});")
@@ -115,11 +101,11 @@ class PartsTest(BrowserTest):
         )
         self.browser.open(frame)
         self.browser.driver.switch_to.frame(0)
-        self.browser.wait("return document.documentElement.dataset.ready === 'true'")
+        self.wait("document.documentElement.dataset.ready === 'true'")
         self.press("canny/case-01/1", "#cells")
         self.browser.driver.switch_to.default_content()
-        self.eventually(lambda: self.browser.js("return asked"), [{"marrow": "part", "file": self.part.name}])
-        self.browser.js(
+        self.eventually(lambda: self.js("return asked"), [{"marrow": "part", "file": self.part.name}])
+        self.js(
             "frame.postMessage({marrow: 'part', file: arguments[0], text: arguments[1]}, '*')",
             self.part.name,
             self.part.read_text(),
@@ -130,4 +116,4 @@ class PartsTest(BrowserTest):
 
 
 if __name__ == "__main__":
-    sys.exit(run_tests(sys.argv[1:]))
+    main()

@@ -3,14 +3,16 @@
 """All pages of `marrow open` for people who see little, or use no mouse: contrast by WCAG 2.1 AA in light and dark,
 names for screen readers, and no page wider than a narrow screen."""
 import itertools
-import os
 import pathlib
 import shutil
-import subprocess
 import tempfile
 
-import bench
-from bench import MARROW, SMALL, SOURCE, PageTest, sample, simulate
+from bench import PageTest
+from harness import SOURCE
+from harness.cases import FEMUR, SMALL, simulate
+from harness.page import main
+from harness.program import marrow
+from harness.sample import sample
 
 # Text whose contrast to what is behind it is too low: [ratio, text, its element]. By WCAG 2.1, 1.4.3: 4.5, and 3 for
 # large text. Controls that are switched off, and text over pictures, do not count.
@@ -66,11 +68,13 @@ const parts = [...document.querySelectorAll('nav, aside, header, section[aria-la
     .filter((one) => one.checkVisibility()).map((one) => one.localName + ' ' + one.getAttribute('aria-label'));
 return parts.filter((one, i) => parts.indexOf(one) !== i);
 """
-PAGES = ("home", "case=case", "place=case", "pipeline=femur/femur.yaml", "results=run")
+ALL = (LOW_CONTRAST, UNNAMED, MISNAMED, SAME_PARTS)
+TWO = "results=run&with=again"
+PAGES = ("home", "case=case", "place=case", "pipeline=femur/femur.yaml", "results=run", "results=", TWO)
 
 
 class AccessibleTest(PageTest):
-    """Its folder holds a case, a pipeline and a run, which are made once for both tests."""
+    """Its folder holds a case, a pipeline and runs, which are made once for all tests."""
 
     @classmethod
     def setUpClass(cls):
@@ -78,63 +82,54 @@ class AccessibleTest(PageTest):
         cls.made = pathlib.Path(tempfile.mkdtemp(prefix="marrow-accessible-"))
         cls.addClassCleanup(shutil.rmtree, cls.made, ignore_errors=True)
         folder = cls.made / "folder"
-        shutil.copytree(simulate(cls.made / "simulated", *SMALL) / "case", folder / "case")
+        shutil.copytree(simulate(cls.made / "simulated", *SMALL), folder / "case")
         for name in ("femur", "parts", "verdict"):
             shutil.copytree(SOURCE / "pipelines" / name, folder / name)
-        subprocess.run(
-            [MARROW, "run", "femur/femur.yaml", "case=case", "--out", "run", "--quiet"],
-            check=True,
-            stdout=subprocess.DEVNULL,
-            env={**os.environ, "MARROW_CACHE": str(cls.made / "store")},
-            cwd=folder,
-        )
+        for out in ("run", "again"):
+            environment = {"MARROW_CACHE": str(cls.made / "store")}
+            command = ["run", FEMUR, "case=case", "--out", out, "--quiet"]
+            assert marrow(*command, cwd=folder, extra_environment=environment).returncode == 0
 
     def setUp(self):
         super().setUp()
         for name in ("folder", "store"):  # the store knows what the pages compute of the case
             shutil.copytree(self.made / name, self.scratch / name, dirs_exist_ok=True)
-        self.server = self.open()
-        self.is_entered = False
+        self.open()
 
-    def page(self, page, **how):
+    def page(self, page, **look):
         """The page, when the work that it begins with is done."""
-        if self.is_entered:
-            self.server.address = "http://127.0.0.1:%d/" % self.server.port
-            self.browser.driver.get("about:blank")
-        self.show(self.server, page, **how)
-        self.is_entered = True
-        self.browser.wait("return !document.querySelector('.notice.job, iframe[aria-busy]')", 120)
-        faults = "return [...document.querySelectorAll('.fault')].map((one) => one.textContent).filter(Boolean)"
-        self.assertEqual(self.browser.js(faults), [], page)
+        self.show(page, **look)
+        self.wait("!document.querySelector('.notice.job, iframe[aria-busy]')")
+        self.assertEqual([text for text in self.texts(".fault") if text], [], page)
+        if page.startswith("pipeline"):
+            self.browser.key("ENTER", "[data-node=edges]")
+            self.find("[data-do=fits]")
 
     def test_contrast_and_names_on_all_pages(self):
-        for theme, page in sample(itertools.product(("light", "dark"), PAGES), 4):
+        for theme, page in sample(itertools.product(("light", "dark"), PAGES), 5):
             with self.subTest(page=page, theme=theme):
                 self.page(page, theme=theme)
-                self.assertEqual(self.browser.js(LOW_CONTRAST), [])
-                self.assertEqual(self.browser.js(UNNAMED), [])
-                self.assertEqual(self.browser.js(MISNAMED), [])
-                self.assertEqual(self.browser.js(SAME_PARTS), [])
+                for what in ALL:
+                    self.assertEqual(self.js(what), [])
 
     def test_all_steps_of_a_case(self):
         self.page("case=case")
-        self.browser.js("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+        self.js("document.querySelectorAll('details').forEach((one) => (one.open = true))")
         for step in ("ct", "bones", "xrays", "check", "save"):
             with self.subTest(step=step):
                 self.go_to_step(step)
-                for what in (LOW_CONTRAST, UNNAMED, MISNAMED, SAME_PARTS):
-                    self.assertEqual(self.browser.js(what), [])
+                for what in ALL:
+                    self.assertEqual(self.js(what), [])
 
     def test_no_page_is_wider_than_the_screen(self):
-        for width_px, page in sample(itertools.product((1440, 1024, 400), PAGES), 5):
+        for width_px, page in sample(itertools.product((1440, 1024, 400), PAGES), 8, key=lambda one: one[1]):
             with self.subTest(page=page, width_px=width_px):
                 self.page(page, width_px=width_px)
-                self.assertLessEqual(self.browser.js("return document.documentElement.scrollWidth - innerWidth"), 0)
-                for theme in ("light", "dark") if "MARROW_PICTURES" in os.environ else ():
-                    self.page(page, width_px=width_px, theme=theme)
-                    name = "%s-%d-%s.png" % (page.split("=")[0], width_px, theme)
-                    self.browser.picture(os.path.join(os.environ["MARROW_PICTURES"], name))
+                self.fits()
+                if page.startswith("case"):
+                    self.assertEqual(self.js(UNNAMED), [])
+                self.photograph("%s-%d" % (page.split("=")[0], width_px))
 
 
 if __name__ == "__main__":
-    bench.main(part=1)
+    main()

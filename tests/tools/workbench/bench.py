@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of `marrow open` share: a server on a folder of its own, and a browser that shows it."""
-import atexit
 import http.client
 import json
 import os
@@ -9,40 +8,24 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
-import time
 import unittest
 
-from harness import MARROW, SHARED_CACHE, SOURCE, skip
-from harness import browser as chromium
-from harness.sample import sample
-
-os.environ["MARROW_CACHE"] = tempfile.mkdtemp(prefix="marrow-cache-")  # not the store of the person who runs the tests
-atexit.register(shutil.rmtree, os.environ["MARROW_CACHE"], ignore_errors=True)
-
-SMALL = ["--set", "ct.spacing_mm=[1.2, 1.2, 1.5]", "--set", "ct.range_mm=[0, 300]"]  # 0.8 s instead of 5 s to make
-
-
-def simulate(folder, *arguments, pipeline=SOURCE / "pipelines" / "simulate" / "simulate.yaml"):
-    """Runs a simulation, and returns the folder of its outputs. Equal simulations are computed once for all tests."""
-    environment = {**os.environ, "MARROW_CACHE": str(SHARED_CACHE)}
-    command = [MARROW, "run", pipeline, "--out", folder, "--quiet", *arguments]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment)
-    return folder / "outputs"
+from harness import MARROW
+from harness.page import BrowserTest
+from harness.program import marrow
 
 
 class Server:
     """`marrow open` on a folder. A client without a browser: it has the cookie, and asks as a page does."""
 
     def __init__(self, folder, *arguments):
-        environment = {**os.environ, "MARROW_CACHE": str(pathlib.Path(folder).parent / "store")}
         self.process = subprocess.Popen(
             [MARROW, "open", folder, "--no-browser", *map(str, arguments)],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env=environment,
+            env={**os.environ, "MARROW_CACHE": str(pathlib.Path(folder).parent / "store")},
         )
         for line in self.process.stdout:
             found = re.search(r"http://127\.0\.0\.1:(\d+)/\?token=(\w+)", line)
@@ -79,18 +62,48 @@ class Server:
         assert status == 302, status
         self.cookie = headers["Set-Cookie"].split(";")[0]
 
-    def json(self, method, path, body=None):
-        status, _, content = self.ask(method, path, body)
-        answer = json.loads(content)
-        assert status == 200, answer
-        return answer
+    def bytes(self, path, body=None):
+        """(what is said about the content, the content); with a body, of a POST."""
+        status, headers, content = self.ask("GET" if body is None else "POST", path, body)
+        assert status == 200, content
+        return json.loads(headers["X-Marrow-About"] or "null"), content
+
+    def get(self, path):
+        return json.loads(self.bytes(path)[1])
+
+    def post(self, path, **body):
+        return json.loads(self.bytes(path, body)[1])
+
+    def fault(self, path, body=None, status=400):
+        """The error of an answer that must have this status."""
+        answer = self.ask("GET" if body is None else "POST", path, body)
+        assert answer[0] == status, answer
+        return json.loads(answer[2])["error"]
 
     def finish(self, job):
         """Waits for a job, and returns its state."""
         while True:
-            state = self.json("GET", "/api/job?job=%s&since=0" % job)
+            state = self.get("/api/job?job=%s&since=0" % job)
             if state["state"] != "running":
                 return state
+
+    def job(self, path, **body):
+        """The state of a job at its end."""
+        return self.finish(self.post(path, **body)["job"])
+
+    def done(self, path, **body):
+        """The result of a job that must succeed."""
+        state = self.job(path, **body)
+        assert (state["state"], state["error"]) == ("done", ""), state
+        return state["result"]
+
+    def draft(self, case="mine"):
+        return self.get("/api/draft?case=" + case)
+
+    def change(self, document, case="mine", **more):
+        """The revision of the draft after a change."""
+        asked = {"case": case, "revision": self.draft(case)["revision"], "what": "test", "document": document}
+        return self.post("/api/draft/change", **{**asked, **more})["revision"]
 
     def close(self):
         if self.process.poll() is None:
@@ -114,116 +127,112 @@ class BenchTest(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.scratch, ignore_errors=True)
         self.folder = self.scratch / "folder"
         self.folder.mkdir()
+        self.server = None
 
     def open(self, *arguments, folder=None):
-        server = Server(folder or self.folder, *arguments)
-        self.addCleanup(server.close)
-        return server
+        """A new server, which is that of the test from now on."""
+        self.server = Server(folder or self.folder, *arguments)
+        self.addCleanup(self.server.close)
+        return self.server
+
+    def enter(self, **where):
+        self.open(**where).enter()
+        return self.server
+
+    def marrow(self, *arguments, store="store"):
+        """What the program prints, which must succeed. Its store is that of the server, or another one."""
+        ended = marrow(*arguments, cwd=self.folder, extra_environment={"MARROW_CACHE": str(self.scratch / store)})
+        self.assertEqual(ended.returncode, 0, ended.stderr)
+        return ended.stdout
 
 
-class PageTest(BenchTest):
+class PageTest(BenchTest, BrowserTest):
     """The same with a browser."""
 
-    @classmethod
-    def setUpClass(cls):
-        cls.browser = chromium.Browser()
+    def setUp(self):
+        super().setUp()
+        self.driver = self.browser.driver
 
-    @classmethod
-    def tearDownClass(cls):
-        cls.browser.close()
-
-    def show(self, server, page="home", width_px=1440, height_px=900, theme="light"):
-        """Opens the server's address, and waits for the page."""
-        driver = self.browser.driver
-        driver.execute_cdp_cmd(
-            "Emulation.setDeviceMetricsOverride",
-            {"width": width_px, "height": height_px, "deviceScaleFactor": 1, "mobile": False},
-        )
-        driver.execute_cdp_cmd(
-            "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]}
-        )
-        driver.get(server.address + ("" if page == "home" else "#" + page))
+    def show(self, page="home", **look):
+        """Shows a page of the server, which is started if there is none yet. The browser and the client share the
+        server's cookie: who comes first hands in the token."""
+        server = self.server or self.open()
+        self.browser.look(**look)
+        self.driver.get("about:blank")
+        address = server.address
+        if server.cookie:
+            address = "http://127.0.0.1:%d/" % server.port
+            name, value = server.cookie.split("=", 1)
+            self.driver.execute_cdp_cmd("Network.setCookie", {"name": name, "value": value, "url": address})
+        self.driver.get(address + ("" if page == "home" else "#" + page))
         self.wait_for_page(page.split("=")[0])
+        if not server.cookie:
+            name = "marrow_%d" % server.port  # servers at other ports have cookies here, too
+            server.cookie = "%s=%s" % (name, self.driver.get_cookie(name)["value"])
+        self.browser.logs()  # those of the page before
 
-    def wait_for_page(self, name, seconds=120):
-        self.browser.wait("return document.documentElement.dataset.ready === '%s'" % name, seconds)
+    def wait_for_page(self, name):
+        self.wait("document.documentElement.dataset.ready === '%s'" % name)
 
-    def find(self, selector, seconds=120):
+    def no_faults(self):
+        self.assertEqual(self.browser.logs()[0], [])
+
+    def find(self, selector):
         """Waits for an element."""
-        self.browser.wait("return !!document.querySelector(%s)" % json.dumps(selector), seconds)
-        return self.browser.driver.find_element("css selector", selector)
+        self.wait("!!document.querySelector(%s)" % json.dumps(selector))
+        return self.driver.find_element("css selector", selector)
+
+    def says(self, selector, part):
+        """Waits until one of the elements has this in its text."""
+        self.wait(
+            "[...document.querySelectorAll(%r)].some((one) => one.textContent.includes(%s))"
+            % (selector, json.dumps(part))
+        )
+
+    def do(self, name):
+        """Presses a button that stands for what it does, in sight or not."""
+        self.find("[data-do=%s]" % name)
+        self.the("[data-do=%s]" % name, "one.click()")
+
+    def in_sight(self, selector):
+        """On the page "Case", goes to the step whose tools hold the element."""
+        element = self.find(selector)
+        step = self.js("return arguments[0].closest('[data-of-step][hidden]')?.dataset.ofStep || null", element)
+        if step:
+            self.go_to_step(step)
+        self.js("arguments[0].scrollIntoView({block: 'center'})", element)
+        return element
 
     def go_to_step(self, name):
         """Shows the tools of a step on the page "Case"."""
-        self.browser.driver.find_element("css selector", '[data-step="%s"]' % name).click()
-
-    def find_in_sight(self, selector):
-        """On the page "Case", goes to the step whose tools hold the element."""
-        element = self.find(selector)
-        step = self.browser.js("return arguments[0].closest('[data-of-step][hidden]')?.dataset.ofStep || null", element)
-        if step:
-            self.go_to_step(step)
-        self.browser.js("arguments[0].scrollIntoView({block: 'center'})", element)
-        return element
+        self.driver.find_element("css selector", '[data-step="%s"]' % name).click()
 
     def click(self, selector):
         from selenium.common.exceptions import StaleElementReferenceException
 
         for _ in range(5):
             try:
-                return self.find_in_sight(selector).click()
+                return self.in_sight(selector).click()
             except StaleElementReferenceException:  # the page was drawn again after it was found
                 pass
         self.fail("%s is drawn again and again" % selector)
 
-    def document(self):
-        """The draft of the case 'mine', as the server keeps it."""
-        return self.browser.driver.execute_async_script(
-            "fetch('api/draft?case=mine').then((answer) => answer.json())"
-            ".then((state) => arguments[0](state.document))"
+    def set(self, selector, value, event="change"):
+        """Puts a value into a field, and leaves it."""
+        self.find(selector)
+        self.js(
+            "const one = document.querySelector(arguments[0]); one.value = arguments[1];"
+            "one.dispatchEvent(new Event(arguments[2], {bubbles: true}))",
+            selector,
+            value,
+            event,
         )
 
-    def saved_when(self, condition, seconds=240):
+    def saved_when(self, condition):
         """Waits until the draft of the case 'mine' fulfils a condition, and returns it."""
-        end = time.monotonic() + seconds
-        while not condition(document := self.document()):
-            self.assertLess(time.monotonic(), end, document)
-            time.sleep(0.05)
-        return document
 
-    def wait_for_slices(self):
-        """Waits until all three slices of a CT are drawn."""
-        self.browser.wait(
-            "return document.querySelectorAll('[data-slice]').length === 3 &&"
-            " [...document.querySelectorAll('[data-slice]')].every((one) => one.dataset.shown)",
-            240,
-        )
+        def holds():
+            document = self.server.draft()["document"]
+            return condition(document) and document
 
-    def go_to_slice(self, name, number):
-        self.browser.js(
-            "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'))",
-            self.find('input[aria-label="%s slice"]' % name),
-            number,
-        )
-        self.browser.wait("return document.querySelector('[data-slice=%s]').dataset.shown === '%d'" % (name, number))
-
-
-def named_tests(suite):
-    """The ids of the tests in a suite of unittest, as they are given on the command line: Class.test."""
-    for one in suite:
-        if isinstance(one, unittest.TestSuite):
-            yield from named_tests(one)
-        else:
-            yield ".".join(one.id().split(".")[-2:])
-
-
-def main(part=5):
-    """Runs the tests that the command line names; without names, one of `part` of them, the same in each run."""
-    missing = chromium.missing()
-    if missing:
-        skip(missing)
-    names = sys.argv[1:]
-    if not names:
-        every = list(named_tests(unittest.defaultTestLoader.loadTestsFromModule(sys.modules["__main__"])))
-        names = sample(every, max(3, len(every) // part))
-    unittest.main(argv=sys.argv[:1] + names, verbosity=2)
+        return self.until(holds, "the draft", 240)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small pipeline in a workbench, for the tests of the page "Pipeline"."""
-
-from bench import BenchTest, PageTest
+"""A small pipeline in a workbench, for the tests of the pages "Pipeline" and "Results"."""
+from bench import BenchTest
 
 PIPELINE = """\
 marrow: 1
@@ -30,16 +29,3 @@ class PipelineBench(BenchTest):
         super().setUp()
         self.file = self.folder / "small.yaml"
         self.file.write_text(PIPELINE)
-
-
-class PipelinePage(PageTest, PipelineBench):
-    """The page in a browser."""
-
-    def setUp(self):
-        super().setUp()
-        self.js = self.browser.js
-
-    def show_pipeline(self, more="", **size):
-        self.server = self.open()
-        self.show(self.server, "pipeline=small.yaml" + more, **size)
-        self.browser.logs()
