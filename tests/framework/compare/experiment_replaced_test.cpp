@@ -102,9 +102,4 @@ TEST_F(ExperimentReplaced, OneFolderUnderTwoNames) {
   expect_none(kStart + kVariants + kMetrics);
 }
 
-TEST_F(ExperimentReplaced, OneSeedTwice) {
-  expect_fault(kHead + "cases: {simulate: {pipeline: s.yaml, seeds: [1, 2, 1]}}\n" + kVariants + kMetrics, 3,
-               "two cases are named 'seed-1'", "give each seed once");
-}
-
 }  // namespace experiment_replaced_test

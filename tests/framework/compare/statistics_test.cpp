@@ -103,15 +103,12 @@ TEST(CaptureRange, LostStartsShareTheLastBin) {
   EXPECT_EQ(capture.bins.back().runs, 2u);
 }
 
-TEST(CaptureRange, OfOtherBinsAndRates) {
+TEST(CaptureRange, OfOtherBinsAndRatesAndRefusals) {
   std::vector<StartOutcome> outcomes;
   add(outcomes, 0.5, 9, 10);
   add(outcomes, 1.5, 8, 10);
   EXPECT_EQ(capture_range(outcomes, 1, 0.9).range, 1);
   EXPECT_EQ(capture_range(outcomes, 2, 0.85).range, 1.5);
-}
-
-TEST(CaptureRange, RefusesWhatIsNoDistance) {
   EXPECT_EQ(MESSAGE_OF(capture_range({{nan, true}})),
             "the error of a start is nan, which is no distance; leave runs out whose start is not known");
   EXPECT_EQ(MESSAGE_OF(capture_range({{-1, true}})),

@@ -118,13 +118,9 @@ TEST_F(PipelineTest, OverrideLeavesAliasesAlone) {
   EXPECT_EQ(std::get<double>(p.nodes[0].options[0]), 7.0);
   EXPECT_EQ(std::get<double>(p.nodes[1].options[0]), 2.0);
 }
-TEST_F(PipelineTest, OverrideOfUnknownNode) {
+TEST_F(PipelineTest, FaultsOfOverrides) {
   expect_fault(kTwoNodes, 0, 0, "the pipeline has no node 'cc'", "did you mean 'c'?", {{}, {{"cc.value", "7"}}});
-}
-TEST_F(PipelineTest, OverrideOfUnknownOption) {
   expect_fault(kTwoNodes, 0, 0, "has no option 'valu'", "did you mean 'value'?", {{}, {{"c.valu", "7"}}});
-}
-TEST_F(PipelineTest, OverrideWithoutOption) {
   expect_fault(kTwoNodes, 0, 0, "an override is node.option=value", "", {{}, {{"c", "7"}}});
 }
 

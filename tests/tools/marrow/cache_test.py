@@ -10,7 +10,7 @@ from harness import MARROW
 from harness.program import Case, another_run_makes_all, main, wait_until
 
 NUMBER = "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: 3}}\noutputs: {number: c}\n"
-WRONG_NUMBERS = ("abc", "inf", "nan", "-5", "0,5", "1e12", "")
+WRONG_NUMBERS = ("abc", "-5", "")  # more of them: store_folder_test.cpp
 
 
 class Cache(Case):
