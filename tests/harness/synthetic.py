@@ -1,15 +1,8 @@
-#!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Made-up data of a report, the same at every call: for the report's tests and for looking at its design.
-
-    tests/harness/synthetic.py comparison data.json --cases 12 --starts 5
-    tests/harness/synthetic.py run data.json
-"""
-import argparse
+"""Made-up data of a report, the same at every call."""
 import hashlib
 import json
 import math
-import pathlib
 import random
 
 from harness import SOURCE, shapes
@@ -48,41 +41,33 @@ REASONS = [
 def make_cell(chance, variant, case, start, far_mm, hardness):
     _, _, reach_mm, median_mm, seconds, evaluations = VARIANTS[variant]
     number = "%s-%d-%d" % ("abcdefghij"[variant], case + 1, start)
-    cell = {
-        "id": number,
-        "variant": variant,
-        "case": case,
-        "start": start,
-        "status": "done",
-        "tries": 1,
-        "success": False,
-        "initial_error": far_mm,
-        "seconds": seconds * math.exp(chance.gauss(0, 0.15)),
-        "evaluations": int(evaluations * math.exp(chance.gauss(0, 0.12))),
-        "cached_nodes": 4 if start else 0,
-        "values": [None] * 3,
-        "pictures": [],
-        "convergence": None,
-        "landscape": None,
-        "scene": None,
-        "folder": "cells/" + number,
-    }
+    cell = {"id": number, "variant": variant, "case": case, "start": start, "folder": "cells/" + number}
+    cell.update(status="done", tries=1, success=False, initial_error=far_mm, cached_nodes=4 if start else 0)
+    cell.update(values=[None] * 3, pictures=[], convergence=None, landscape=None, scene=None)
+    cell["seconds"] = seconds * math.exp(chance.gauss(0, 0.15))
+    cell["evaluations"] = int(evaluations * math.exp(chance.gauss(0, 0.12)))
     if chance.random() < 0.012:
         cell.update(status="failed", reason=chance.choice(REASONS), tries=2, seconds=None, evaluations=None)
         return cell
     captured = chance.random() < 1 / (1 + math.exp((far_mm - reach_mm) / 1.2))
-    error = (
-        median_mm * hardness * math.exp(chance.gauss(0, 0.35)) if captured else far_mm * chance.uniform(0.45, 1.1) + 2
-    )
-    cell.update(
-        values=[error, error * chance.uniform(0.5, 0.9), error * chance.uniform(0.8, 1.9)],
-        success=error < METRICS[0]["success_below"],
-    )
+    if captured:
+        error = median_mm * hardness * math.exp(chance.gauss(0, 0.35))
+    else:
+        error = far_mm * chance.uniform(0.45, 1.1) + 2
+    values = [error, error * chance.uniform(0.5, 0.9), error * chance.uniform(0.8, 1.9)]
+    cell.update(values=values, success=error < METRICS[0]["success_below"])
     return cell
 
 
 def small_motion(chance, size):
     return [chance.gauss(0, size) for _ in range(3)], [chance.gauss(0, size) for _ in range(3)]
+
+
+def landscape(axis, unit, variant):
+    steep = 0.02 if "long" in axis else 0.12
+    cost = lambda i: min(4.0, steep * (0.5 * i - 5 - 0.1 * variant) ** 2 + 0.1 * math.sin(2 * i) ** 2)
+    offsets, costs = zip(*((round(0.5 * i - 5, 2), 0.4 + 0.4 * (variant % 2) + cost(i)) for i in range(21)))
+    return {"axis": axis, "unit": unit, "offsets": list(offsets), "costs": list(costs)}
 
 
 def add_material(data, chance, pairs):
@@ -128,44 +113,21 @@ def add_material(data, chance, pairs):
             cell["convergence"] = [
                 [int(steps * i / 40), 0.4 + 6 * math.exp(-i / (5 + variant)) + 0.4 * (variant % 2)] for i in range(41)
             ]
-            cell["landscape"] = [
-                {
-                    "axis": axis,
-                    "unit": unit,
-                    "offsets": [round(0.5 * i - 5, 2) for i in range(21)],
-                    "costs": [
-                        0.4
-                        + 0.4 * (variant % 2)
-                        + min(
-                            4.0,
-                            (0.02 if "long" in axis else 0.12) * (0.5 * i - 5 - 0.1 * variant) ** 2
-                            + 0.1 * math.sin(2 * i) ** 2,
-                        )
-                        for i in range(21)
-                    ],
-                }
-                for axis, unit in AXES
-            ]
+            cell["landscape"] = [landscape(axis, unit, variant) for axis, unit in AXES]
 
 
 def experiment(kind):
-    pipeline = SOURCE / "pipelines" / "femur" / "femur.yaml"
+    of_run = "marrow run pipelines/femur/femur.yaml case=case-01 --seed 7"
     return {
         "name": "edge detectors on the femur",
         "file": "experiments/edges.yaml",
-        "help": (
-            "Does the edge detector or the optimizer change how far a start may lie and how close the result comes?"
-        ),
+        "help": "Does the edge detector or the optimizer change how far a start may lie and how close the result comes?",
         "text": "marrow: 1\npipeline: ../pipelines/femur/femur.yaml\nvariants:\n  canny: {edges.uses: edges.canny}\n",
-        "pipeline_text": pipeline.read_text(),
+        "pipeline_text": (SOURCE / "pipelines/femur/femur.yaml").read_text(),
         "seed": 7,
         "started": "2025-01-01T10:00:00",
         "finished": "2025-01-01T10:41:12",
-        "command": (
-            "marrow compare experiments/edges.yaml --seed 7"
-            if kind == "comparison"
-            else "marrow run pipelines/femur/femur.yaml case=case-01 --seed 7"
-        ),
+        "command": "marrow compare experiments/edges.yaml --seed 7" if kind == "comparison" else of_run,
         "folder": "runs/edges",
         "machine": {"cpu": "Example CPU", "cores": 2, "cpu_level": "x86-64-v3"},
         "plugins": [
@@ -189,37 +151,23 @@ def graph(variants):
             )
             for variant in variants
         }
-        nodes.append(
-            {
-                "id": name,
-                "uses": uses,
-                "options": {"low": 50, "high": 75} if name == "edges" else {},
-                "differs": {key: value for key, value in differs.items() if value},
-            }
-        )
+        differs = {key: value for key, value in differs.items() if value}
+        options = {"low": 50, "high": 75} if name == "edges" else {}
+        nodes.append({"id": name, "uses": uses, "options": options, "differs": differs})
         edges += [{"from": source, "to": name, "port": source} for source in inputs.split()]
     return {"nodes": nodes, "edges": edges}
 
 
 def comparison(cases=12, starts=5, variants=4, looked_at=3):
     chance = random.Random("comparison %d %d" % (cases, starts))
-    data = {
-        "marrow": "0.1.0",
-        "format": 1,
-        "kind": "comparison",
-        "experiment": experiment("comparison"),
-        "metrics": METRICS,
-        "initial_error": {"name": "start.mtre_mm", "unit": "mm"},
-        "variants": [
-            {"name": name, "is_baseline": i == 0, "options": options}
-            for i, (name, options, *_) in enumerate(VARIANTS[:variants])
-        ],
-        "cases": ["case-%02d" % (i + 1) for i in range(cases)],
-        "starts": [str(i) for i in range(starts)],
-        "pictures": {},
-        "geometries": {},
-        "scenes": {},
-    }
+    data = {"marrow": "0.1.0", "format": 1, "kind": "comparison", "experiment": experiment("comparison")}
+    data.update(metrics=METRICS, initial_error={"name": "start.mtre_mm", "unit": "mm"})
+    data["variants"] = [
+        {"name": name, "is_baseline": i == 0, "options": options}
+        for i, (name, options, *_) in enumerate(VARIANTS[:variants])
+    ]
+    data.update(cases=["case-%02d" % (i + 1) for i in range(cases)], starts=[str(i) for i in range(starts)])
+    data.update(pictures={}, geometries={}, scenes={})
     hardness = [math.exp(chance.gauss(0, 0.3)) for _ in range(cases)]
     places = [(case, start, chance.uniform(0.5, 20)) for case in range(cases) for start in range(starts)]
     data["cells"] = [
@@ -242,9 +190,9 @@ def run(with_cube=True):
     """One run: a cube of 40 mm under two cameras of unlike focal lengths, its corners marked in the X-rays."""
     data = comparison(cases=1, starts=1, variants=1, looked_at=1)
     data.update(kind="run", experiment=experiment("run"), summary=[], comparisons=[])
-    cell, mesh = data["cells"][0], shapes.cube()
     if not with_cube:
         return data
+    cell, mesh = data["cells"][0], shapes.cube()
     views = [
         shapes.camera("frontal", "frontal", 360, 240, (1500.0, 1420.0), (171.3, 128.6)),
         shapes.camera("lateral", "lateral", 300, 300, (1500.0, 1500.0), (149.5, 149.5)),
@@ -309,18 +257,3 @@ def put_beside(data, folder, places):
         kinds = ["pictures", "scene", "convergence", "landscape"]
         data["parts"].append({"case": case, "start": start, "file": name, "bytes": len(text), "kinds": kinds})
     return data
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("kind", choices=["comparison", "run"])
-    parser.add_argument("data", type=pathlib.Path)
-    parser.add_argument("--cases", type=int, default=12)
-    parser.add_argument("--starts", type=int, default=5)
-    arguments = parser.parse_args()
-    data = comparison(arguments.cases, arguments.starts) if arguments.kind == "comparison" else run(with_cube=False)
-    arguments.data.write_text(json.dumps(data))
-
-
-if __name__ == "__main__":
-    main()

@@ -15,18 +15,9 @@ VARIANTS = [
     ("gradient", {"edges.uses": "edges.gradient", "edges.high": 80}, 11.0, 0.47, 4.9, 1410),
     ("bobyqa", {"optimizer.uses": "optimizer.bobyqa"}, 11.5, 0.40, 3.2, 610),
 ]
-# Further ones, for large comparisons.
-VARIANTS += [
-    (
-        "high %d" % (60 + 5 * i),
-        {"edges.high": 60 + 5 * i},
-        10.0 + 0.4 * i,
-        0.41 + 0.02 * i,
-        4.0 + 0.2 * i,
-        1400 - 20 * i,
-    )
-    for i in range(6)
-]
+for i in range(6):  # further ones, for large comparisons
+    high, figures = 60 + 5 * i, (10.0 + 0.4 * i, 0.41 + 0.02 * i, 4.0 + 0.2 * i, 1400 - 20 * i)
+    VARIANTS.append(("high %d" % high, {"edges.high": high}, *figures))
 
 
 def quantile(values, fraction):

@@ -5,12 +5,13 @@
 #include <marrow/compare/case_rate.hpp>
 #include <marrow/domain/random.hpp>
 
+#include "tests/framework/compare/intervals.hpp"
 #include "tests/harness/message_of.hpp"
 
 namespace case_rate_test {
 
 using namespace marrow::compare;
-using marrow::test::message_of;
+using intervals::bounds;
 
 /// In the first `failing` cases every run fails; in the others every run succeeds.
 CaseRate all_alike(std::size_t cases, std::size_t failing, std::size_t starts) {
@@ -20,17 +21,12 @@ CaseRate all_alike(std::size_t cases, std::size_t failing, std::size_t starts) {
   return rate;
 }
 
-void expect_same(const Interval& got, const Interval& expected) {
-  EXPECT_EQ(got.lower, expected.lower);
-  EXPECT_EQ(got.upper, expected.upper);
-}
-
 TEST(CaseRate, WithOneStartIsWilsonsInterval) {
   for (const std::size_t failing : {0u, 1u, 7u, 20u}) {
     const CaseRate rate = all_alike(20, failing, 1);
     EXPECT_EQ(rate.effective_runs(), 20);
-    expect_same(rate.interval(), wilson_interval(20 - failing, 20));
-    expect_same(rate.interval(0.9), wilson_interval(20 - failing, 20, 0.9));
+    EXPECT_EQ(bounds(rate.interval()), bounds(wilson_interval(20 - failing, 20)));
+    EXPECT_EQ(bounds(rate.interval(0.9)), bounds(wilson_interval(20 - failing, 20, 0.9)));
   }
 }
 
@@ -40,7 +36,7 @@ TEST(CaseRate, CasesCountOnceWhereTheirStartsEndAlike) {
     EXPECT_EQ(rate.runs(), 200u);
     EXPECT_EQ(rate.successes(), 10 * (20 - failing));
     EXPECT_EQ(rate.effective_runs(), 20);
-    expect_same(rate.interval(), wilson_interval(20 - failing, 20));
+    EXPECT_EQ(bounds(rate.interval()), bounds(wilson_interval(20 - failing, 20)));
   }
 }
 
@@ -54,7 +50,7 @@ TEST(CaseRate, RunsCountEachWhereEveryCaseHasTheSameRate) {
   for (int c = 0; c < 50; ++c)
     for (int s = 0; s < 4; ++s) rate.add(std::to_string(c), s < 2);
   EXPECT_EQ(rate.effective_runs(), 200);
-  expect_same(rate.interval(), wilson_interval(100, 200));
+  EXPECT_EQ(bounds(rate.interval()), bounds(wilson_interval(100, 200)));
 }
 
 TEST(CaseRate, IsTheValueComputedByHand) {
@@ -97,11 +93,10 @@ TEST(CaseRate, OneCaseIsOneRun) {
 }
 
 TEST(CaseRate, RefusesWhatIsNoRate) {
-  EXPECT_EQ(message_of([] { CaseRate().interval(); }),
-            "a success rate of no runs has no interval; give at least one run");
-  EXPECT_EQ(message_of([] { all_alike(2, 1, 2).interval(95); }),
+  EXPECT_EQ(MESSAGE_OF(CaseRate().interval()), "a success rate of no runs has no interval; give at least one run");
+  EXPECT_EQ(MESSAGE_OF(all_alike(2, 1, 2).interval(95)),
             "the confidence is 95.000000; give a fraction between 0 and 1, such as 0.95");
-  EXPECT_EQ(message_of([] { CaseRate().exact_interval(0.95); }),
+  EXPECT_EQ(MESSAGE_OF(CaseRate().exact_interval(0.95)),
             "a success rate of no runs has no interval; give at least one run");
 }
 

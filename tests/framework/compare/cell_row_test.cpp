@@ -7,6 +7,7 @@
 #include "marrow/base/error.hpp"
 #include "marrow/base/hash.hpp"
 #include "marrow/compare/cell.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace cell_row_test {
 
@@ -48,14 +49,7 @@ std::string written(json row) {
   return row.dump();
 }
 
-std::string fault_of(const json& row) {
-  try {
-    marrow::compare::row_from_json(written(row), experiment());
-  } catch (const marrow::Error& error) {
-    return error.what();
-  }
-  return "none";
-}
+std::string fault_of(const json& row) { return MESSAGE_OF(marrow::compare::row_from_json(written(row), experiment())); }
 
 TEST(CellRowText, ComesBackAsItWas) {
   CellRow row = marrow::compare::row_from_json(to_json(good_row()), experiment());
@@ -162,17 +156,17 @@ TEST(CellRowText, ForgedOrDamaged) {
       {json{{"nodes", {{"edges", 1}}}}, "cannot use at() with number"},
       {json{{"key", 5}}, "type must be string"},
   };
-  EXPECT_EQ(fault_of(good), "none");
+  EXPECT_EQ(fault_of(good), "");
   for (const auto& [change, fault] : changes) {
     json row = good;
     row.update(change);
-    EXPECT_NE(fault_of(row).find("not a cell's row: "), std::string::npos) << change;
-    EXPECT_NE(fault_of(row).find(fault), std::string::npos) << change << fault_of(row);
+    EXPECT_HAS(fault_of(row), "not a cell's row: ") << change;
+    EXPECT_HAS(fault_of(row), fault) << change << fault_of(row);
   }
   for (const char* key : {"values", "units", "initial_error_unit", "tries", "nodes", "key", "status"}) {
     json row = good;
     row.erase(key);
-    EXPECT_NE(fault_of(row).find("key '" + std::string(key) + "' not found"), std::string::npos) << fault_of(row);
+    EXPECT_HAS(fault_of(row), "key '" + std::string(key) + "' not found");
   }
 }
 

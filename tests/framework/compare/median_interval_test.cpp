@@ -5,12 +5,14 @@
 #include <marrow/compare/median_interval.hpp>
 #include <marrow/domain/random.hpp>
 
+#include "tests/framework/compare/intervals.hpp"
 #include "tests/harness/message_of.hpp"
 
 namespace median_interval_test {
 
 using namespace marrow::compare;
-using marrow::test::message_of;
+using intervals::bounds;
+using intervals::Bounds;
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
@@ -19,29 +21,23 @@ TEST(OrderStatisticInterval, IsThatOfTheBinomialDistribution) {
   const std::vector<double> values{9, 1, 8, 2, 7, 3, 6, 4, 5};
   for (const double level : {0.0390625, 0.05, 0.17}) {
     const Interval interval = order_statistic_interval(values, level + 1e-12);
-    EXPECT_EQ(interval.lower, 2) << level;
-    EXPECT_EQ(interval.upper, 8) << level;
+    EXPECT_EQ(bounds(interval), Bounds(2, 8)) << level;
     EXPECT_NEAR(interval.confidence, 1 - level, 1e-9);
   }
   EXPECT_EQ(order_statistic_interval(values, 0.039).lower, 1) << "2 / 512 = 0.0039";
-  EXPECT_EQ(order_statistic_interval(values, 0.003).lower, -std::numeric_limits<double>::infinity());
-  EXPECT_EQ(order_statistic_interval(values, 0.003).upper, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(bounds(order_statistic_interval(values, 0.003)), Bounds(-infinite, infinite));
 }
 
 TEST(OrderStatisticInterval, RefusesWhatHasNoMedian) {
-  EXPECT_EQ(message_of([] { order_statistic_interval({}, 0.05); }), "there are no values; give at least one");
-  EXPECT_NE(message_of([] { order_statistic_interval({1}, 0); }).find("between 0 and 1"), std::string::npos);
+  EXPECT_EQ(MESSAGE_OF(order_statistic_interval({}, 0.05)), "there are no values; give at least one");
+  EXPECT_HAS(MESSAGE_OF(order_statistic_interval({1}, 0)), "between 0 and 1");
 }
 
 TEST(OrderStatisticInterval, MayEndInAFailure) {
   // With 6 values, the interval reaches from the smallest to the largest.
-  const Interval interval = order_statistic_interval({1, 2, 3, 4, 5, infinite}, 0.05);
-  EXPECT_EQ(interval.lower, 1);
-  EXPECT_EQ(interval.upper, infinite);
-  EXPECT_NE(message_of([] {
-              order_statistic_interval({1, std::numeric_limits<double>::quiet_NaN()}, 0.05);
-            }).find("value 2 of 2 is nan"),
-            std::string::npos);
+  EXPECT_EQ(bounds(order_statistic_interval({1, 2, 3, 4, 5, infinite}, 0.05)), Bounds(1, infinite));
+  EXPECT_HAS(MESSAGE_OF(order_statistic_interval({1, std::numeric_limits<double>::quiet_NaN()}, 0.05)),
+             "value 2 of 2 is nan");
 }
 
 /// `count` cases with these numbers of runs, in turn.
@@ -65,24 +61,17 @@ TEST(MedianIntervalOf, NeedsAsManyCasesAsCanHoldIt) {
   EXPECT_EQ(median_interval_of(cases_of(6, {1}))->confidence, 0.95);
 }
 
-TEST(MedianIntervalOf, OneRunACaseIsThatOfOrderStatistics) {
-  const Interval interval = *median_interval_of({{9}, {1}, {8}, {2}, {7}, {3}, {6}, {4}, {5}});
-  EXPECT_EQ(interval.lower, 2);
-  EXPECT_EQ(interval.upper, 8);
-}
-
-TEST(MedianIntervalOf, SeveralRunsACaseAreResampled) {
+TEST(MedianIntervalOf, IsThatOfOrderStatisticsForOneRunACaseAndResampledForSeveral) {
+  EXPECT_EQ(bounds(*median_interval_of({{9}, {1}, {8}, {2}, {7}, {3}, {6}, {4}, {5}})), Bounds(2, 8));
   const ValuesOfCases cases = cases_of(9, {3});
-  const Interval interval = *median_interval_of(cases, 0.95, 7), expected = median_of_runs_interval(cases, {7});
-  EXPECT_EQ(interval.lower, expected.lower);
-  EXPECT_EQ(interval.upper, expected.upper);
+  EXPECT_EQ(bounds(*median_interval_of(cases, 0.95, 7)), bounds(median_of_runs_interval(cases, {7})));
 }
 
 TEST(MedianIntervalOf, RefusesWhatHasNoMedian) {
-  EXPECT_EQ(message_of([] { median_interval_of({}); }), "there are no values; give at least one");
-  EXPECT_EQ(message_of([] { median_interval_of({{1}, {}}); }), "a case has no values; leave it out");
-  EXPECT_NE(message_of([] { median_interval_of({{1}, {infinite}}); }).find("value 1 of 1 is inf"), std::string::npos);
-  EXPECT_NE(message_of([] { median_interval_of({{1}}, 95); }).find("0.95"), std::string::npos);
+  EXPECT_EQ(MESSAGE_OF(median_interval_of({})), "there are no values; give at least one");
+  EXPECT_EQ(MESSAGE_OF(median_interval_of({{1}, {}})), "a case has no values; leave it out");
+  EXPECT_HAS(MESSAGE_OF(median_interval_of({{1}, {infinite}})), "value 1 of 1 is inf");
+  EXPECT_HAS(MESSAGE_OF(median_interval_of({{1}}, 95)), "0.95");
 }
 
 }  // namespace median_interval_test

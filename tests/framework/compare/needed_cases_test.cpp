@@ -2,8 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <marrow/base/error.hpp>
+#include <limits>
 #include <marrow/compare/needed_cases.hpp>
+
+#include "tests/harness/message_of.hpp"
 
 namespace needed_cases_test {
 
@@ -54,19 +56,11 @@ TEST(NeededCases, AndDifferencesBelongTogether) {
 }
 
 TEST(NeededCases, RefuseWhatIsNone) {
-  const auto fault_of = [](auto call) -> std::string {
-    try {
-      call();
-    } catch (const marrow::Error& error) {
-      return error.what();
-    }
-    return "none";
-  };
-  EXPECT_EQ(fault_of([] { probability_to_show(1, -1, 20); }),
+  EXPECT_EQ(MESSAGE_OF(probability_to_show(1, -1, 20)),
             "a difference of 1 with a spread of -1; expected two numbers, and a spread of 0 or more");
-  EXPECT_EQ(fault_of([] { cases_to_show(1, 1, 1, 1); }),
+  EXPECT_EQ(MESSAGE_OF(cases_to_show(1, 1, 1, 1)),
             "the probability is 1; give a fraction between 0 and 1, such as 0.8");
-  EXPECT_EQ(fault_of([] { cases_to_show(1, 1, 0); }), "there are no comparisons; give at least one");
+  EXPECT_EQ(MESSAGE_OF(cases_to_show(1, 1, 0)), "there are no comparisons; give at least one");
 }
 
 }  // namespace needed_cases_test

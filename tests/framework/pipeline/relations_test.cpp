@@ -149,19 +149,13 @@ TEST_F(RelationsTest, OverridesBreakAndMend) {
   expect_kept("{uses: test.one_of_two, in: {number: one}, with: {file: a}}", {{"n.file", "''"}});
 }
 
-TEST_F(RelationsTest, EachBrokenRelationIsReported) {
+TEST_F(RelationsTest, EachFaultIsShownOnceWithItsLine) {
   read_node("{uses: test.limits, with: {low: 90, first: 20}}");
   EXPECT_EQ(diagnostics.size(), 2u) << diagnostics.text();
-}
-
-TEST_F(RelationsTest, AnOptionThatCannotBeReadIsReportedOnce) {
   read_node("{uses: test.limits, with: {low: ninety}}");
   expect_shown("expected a number, got 'ninety'");
   read_node("{uses: test.limits, with: {low: 101}}");
   expect_shown("101 is above the most allowed, 100");
-}
-
-TEST_F(RelationsTest, TheLineIsShown) {
   read_node("{uses: test.limits, with: {low: 90}}");
   expect_shown(
       "p.yaml:4:33: error: option 'low' of test.limits is 90, which is above option 'high' (75)\n"
