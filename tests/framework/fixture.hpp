@@ -9,6 +9,7 @@
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/pipeline/pipeline.hpp"
 #include "marrow/runtime/run/executor.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace runtime_fixture {
 

@@ -14,6 +14,11 @@ FEMUR = SOURCE / "pipelines" / "femur" / "femur.yaml"
 SMALL = ["--set", "ct.spacing_mm=[1.2, 1.2, 1.5]", "--set", "ct.range_mm=[0, 300]"]  # runs in 2 seconds instead of 7
 
 
+def sets(changes):
+    """The words that change options of nodes."""
+    return [word for change in changes for word in ("--set", change)]
+
+
 def simulate(folder, *arguments, pipeline="simulate/simulate.yaml"):
     """The folder of a simulated case. The same case is made once for all tests."""
     result = marrow(

@@ -26,9 +26,7 @@ class GivenCase(Case):
                 named = text if isinstance(text, dict) else {"err": text}
                 lines.setdefault(number, []).extend("0,%s,%s,%s,%s" % (variant, start, *item) for item in named.items())
         for number, own in lines.items():
-            folder = self.scratch / "cases" / ("%03d" % number)
-            folder.mkdir(parents=True, exist_ok=True)
-            (folder / "figures.csv").write_text("\n".join(own) + "\n")
+            self.write("cases/%03d/figures.csv" % number, "\n".join(own) + "\n")
 
     def experiment(self, variants, more="", metrics="[figures.err]", pipeline=PIPELINE % "err"):
         self.write("p.yaml", pipeline)
@@ -36,10 +34,12 @@ class GivenCase(Case):
         text += "variants:\n" + "".join("  %s: {n.column: %s}\n" % (name, name) for name in variants)
         return self.write("e.yaml", text + ("" if "timed_cells" in more else "timed_cells: 0\n") + more)
 
-    def compare(self, values, more="", code=0, **others):
-        """What the terminal shows."""
-        self.write_cases(values)
-        file = self.experiment(list(values), more, **others)
-        self.result = self.marrow("compare", file, "--out", "out", "--quiet")
-        self.assertEqual(self.result.returncode, code, self.result.stdout + self.result.stderr)
+    def compare_file(self, *arguments, code=0):
+        """What the terminal shows of the comparison of the experiment that is written."""
+        self.result = self.expect(code, "compare", "e.yaml", "--out", "out", "--quiet", *arguments)
         return self.result.stdout
+
+    def compare(self, values, more="", code=0, arguments=(), **others):
+        self.write_cases(values)
+        self.experiment(list(values), more, **others)
+        return self.compare_file(*arguments, code=code)

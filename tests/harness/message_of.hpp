@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <gtest/gtest.h>
+
 #include <marrow/base/error.hpp>
 #include <string>
 
@@ -16,4 +18,11 @@ std::string message_of(Function function) {
   return "";
 }
 
+inline bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
 }  // namespace marrow::test
+
+/// message_of() of one expression.
+#define MESSAGE_OF(...) ::marrow::test::message_of([&] { (void)(__VA_ARGS__); })
+/// That the text has this part.
+#define EXPECT_HAS(text, part) EXPECT_PRED2(::marrow::test::has, text, part)

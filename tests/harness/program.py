@@ -60,6 +60,15 @@ def another_run_makes_all(store):
         yield
 
 
+def end(process):
+    """Also where a test has ended before it."""
+    process.kill()
+    process.wait()
+    for stream in (process.stdout, process.stderr):
+        if stream:
+            stream.close()
+
+
 class Case(unittest.TestCase):
     """A test with a folder of its own, in which it runs the program.
 
@@ -135,8 +144,7 @@ class Case(unittest.TestCase):
             env={**os.environ, "MARROW_PLUGIN_PATH": plugins, **self.variables()},
             **{**usual, **more}
         )
-        self.addCleanup(process.communicate)
-        self.addCleanup(process.kill)  # where the test ends before
+        self.addCleanup(end, process)
         return process
 
     def write(self, name, content):

@@ -10,7 +10,6 @@
 namespace case_rate_test {
 
 using namespace marrow::compare;
-using marrow::test::message_of;
 
 /// In the first `failing` cases every run fails; in the others every run succeeds.
 CaseRate all_alike(std::size_t cases, std::size_t failing, std::size_t starts) {
@@ -97,11 +96,10 @@ TEST(CaseRate, OneCaseIsOneRun) {
 }
 
 TEST(CaseRate, RefusesWhatIsNoRate) {
-  EXPECT_EQ(message_of([] { CaseRate().interval(); }),
-            "a success rate of no runs has no interval; give at least one run");
-  EXPECT_EQ(message_of([] { all_alike(2, 1, 2).interval(95); }),
+  EXPECT_EQ(MESSAGE_OF(CaseRate().interval()), "a success rate of no runs has no interval; give at least one run");
+  EXPECT_EQ(MESSAGE_OF(all_alike(2, 1, 2).interval(95)),
             "the confidence is 95.000000; give a fraction between 0 and 1, such as 0.95");
-  EXPECT_EQ(message_of([] { CaseRate().exact_interval(0.95); }),
+  EXPECT_EQ(MESSAGE_OF(CaseRate().exact_interval(0.95)),
             "a success rate of no runs has no interval; give at least one run");
 }
 

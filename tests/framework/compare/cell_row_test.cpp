@@ -7,6 +7,7 @@
 #include "marrow/base/error.hpp"
 #include "marrow/base/hash.hpp"
 #include "marrow/compare/cell.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace cell_row_test {
 
@@ -166,13 +167,13 @@ TEST(CellRowText, ForgedOrDamaged) {
   for (const auto& [change, fault] : changes) {
     json row = good;
     row.update(change);
-    EXPECT_NE(fault_of(row).find("not a cell's row: "), std::string::npos) << change;
-    EXPECT_NE(fault_of(row).find(fault), std::string::npos) << change << fault_of(row);
+    EXPECT_HAS(fault_of(row), "not a cell's row: ") << change;
+    EXPECT_HAS(fault_of(row), fault) << change << fault_of(row);
   }
   for (const char* key : {"values", "units", "initial_error_unit", "tries", "nodes", "key", "status"}) {
     json row = good;
     row.erase(key);
-    EXPECT_NE(fault_of(row).find("key '" + std::string(key) + "' not found"), std::string::npos) << fault_of(row);
+    EXPECT_HAS(fault_of(row), "key '" + std::string(key) + "' not found");
   }
 }
 

@@ -13,7 +13,6 @@
 namespace curves_test {
 
 using namespace marrow::compare;
-using marrow::test::message_of;
 
 constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
 
@@ -46,20 +45,15 @@ TEST(PairedCurves, FramesThatOnlyOneHasStay) {
 }
 
 TEST(PairedCurves, RefuseWhatCannotBePaired) {
-  EXPECT_EQ(message_of([] {
-              pair_curves({{1, 2}, {1}}, {{1, 2}, {1, 2}});
-            }),
-            "the first curve has 2 times and 1 values");
-  EXPECT_EQ(message_of([] {
-              pair_curves({{1, 2}, {1, 2}}, {{1, 1}, {1, 2}});
-            }),
+  EXPECT_EQ(MESSAGE_OF(pair_curves({{1, 2}, {1}}, {{1, 2}, {1, 2}})), "the first curve has 2 times and 1 values");
+  EXPECT_EQ(MESSAGE_OF(pair_curves({{1, 2}, {1, 2}}, {{1, 1}, {1, 2}})),
             "the times of the second sequence do not rise: 1 comes after 1");
 }
 
 TEST(MeanOfFrames, RefusesAGap) {
   std::vector<double> values(20, 1);
   values[3] = kGap;
-  EXPECT_NE(message_of([&] { mean_of_frames(values); }), "");
+  EXPECT_NE(MESSAGE_OF(mean_of_frames(values)), "");
 }
 
 TEST(CurveBand, IsAsWideAsTheTrialsScatterAndTheSimultaneousOneIsWider) {
@@ -76,13 +70,11 @@ TEST(CurveBand, IsAsWideAsTheTrialsScatterAndTheSimultaneousOneIsWider) {
 }
 
 TEST(CurveBand, RefusesTooFewTrialsAndUnlikeOnes) {
-  EXPECT_EQ(message_of([] {
-              mean_band(std::vector<std::vector<double>>(5, {1, 2}));
-            }),
+  EXPECT_EQ(MESSAGE_OF(mean_band(std::vector<std::vector<double>>(5, {1, 2}))),
             "a band over trials needs at least 6, got 5");
   std::vector<std::vector<double>> trials(6, {1, 2});
   trials[4] = {1};
-  EXPECT_EQ(message_of([&] { mean_band(trials); }), "the trials have curves of unlike length: 2 and 1 times");
+  EXPECT_EQ(MESSAGE_OF(mean_band(trials)), "the trials have curves of unlike length: 2 and 1 times");
 }
 
 }  // namespace curves_test

@@ -19,8 +19,7 @@ std::string levels_text(const Experiment& experiment) {
 }
 
 TEST_F(ExperimentFiles, FactorsOfAMatrix) {
-  const Experiment e = read(kStart + kMetrics + "matrix:\n  c.value: [1, 2]\n  c.count: [3, 4, 5]\n");
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const Experiment e = read_good(kStart + kMetrics + "matrix:\n  c.value: [1, 2]\n  c.count: [3, 4, 5]\n");
   ASSERT_EQ(e.factors.size(), 2u);
   EXPECT_EQ(e.factors[0].name, "c.value");
   EXPECT_EQ(e.factors[1].levels, (std::vector<std::string>{"3", "4", "5"}));
@@ -29,8 +28,7 @@ TEST_F(ExperimentFiles, FactorsOfAMatrix) {
 }
 
 TEST_F(ExperimentFiles, NamedVariantsAreAFactorOfTheMatrix) {
-  const Experiment e = read(kStart + kVariants + kMetrics + "matrix: {c.count: [3, 4]}\n");
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const Experiment e = read_good(kStart + kVariants + kMetrics + "matrix: {c.count: [3, 4]}\n");
   EXPECT_EQ(e.factors[0].name, "variants");
   EXPECT_EQ(e.factors[0].levels, (std::vector<std::string>{"one", "two"}));
   EXPECT_EQ(levels_text(e), "one+3: 0 0\none+4: 0 1\ntwo+3: 1 0\ntwo+4: 1 1\n");
@@ -39,14 +37,12 @@ TEST_F(ExperimentFiles, NamedVariantsAreAFactorOfTheMatrix) {
 
 TEST_F(ExperimentFiles, PointsOfASweepKeepTheLevels) {
   const Experiment e =
-      read(kStart + kMetrics + "matrix: {c.count: [3, 4]}\nsweep: {options: {c.value: [1, 2]}, grid: 2}\n");
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+      read_good(kStart + kMetrics + "matrix: {c.count: [3, 4]}\nsweep: {options: {c.value: [1, 2]}, grid: 2}\n");
   EXPECT_EQ(levels_text(e), "3+1: 0\n3+2: 0\n4+1: 1\n4+2: 1\n");
 }
 
 TEST_F(ExperimentFiles, AllPairsAreCounted) {
-  const Experiment e = read(kStart + kMetrics + "compare_all: true\nmatrix: {c.count: [3, 4, 5, 6]}\n");
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const Experiment e = read_good(kStart + kMetrics + "compare_all: true\nmatrix: {c.count: [3, 4, 5, 6]}\n");
   EXPECT_TRUE(e.compare_all);
   EXPECT_EQ(marrow::compare::comparison_counts(e).comparisons, 6u);
   EXPECT_EQ(marrow::compare::comparison_counts(e).fewest_cases, 8u);  // 6 * 2 / 2^8 = 0.047

@@ -8,7 +8,7 @@ namespace experiment_faults_test {
 using namespace experiment_files;
 
 const std::string kGood = kStart + kVariants + kMetrics;  // lines 1 to 7
-const std::string kAfterCases = std::string(kVariants) + kMetrics;
+const std::string kAfterCases = kVariants + kMetrics;
 
 class ExperimentFaults : public ExperimentFiles {
  protected:
@@ -20,8 +20,7 @@ class ExperimentFaults : public ExperimentFiles {
   void expect_simulation_fault(const std::string& line, const std::string& message, const std::string& hint = "") {
     const std::string pipeline = line.starts_with("pipeline") ? "" : "    pipeline: s.yaml\n",
                       seeds = line.starts_with("seeds") ? "" : "    seeds: 1..2\n";
-    expect_fault(std::string(kHead) + "cases:\n  simulate:\n    " + line + "\n" + pipeline + seeds + kAfterCases, 5,
-                 message, hint);
+    expect_fault(kHead + "cases:\n  simulate:\n    " + line + "\n" + pipeline + seeds + kAfterCases, 5, message, hint);
   }
 };
 
@@ -31,17 +30,13 @@ const char* const kStartsHere = "the path starts at the experiment's file";
 TEST_F(ExperimentFaults, NoFile) {
   marrow::compare::read_experiment(scratch.path / "none.yaml", test_catalogue(), diagnostics);
   ASSERT_EQ(diagnostics.size(), 1u);
-  EXPECT_NE(
-      diagnostics.text().find(
-          "none.yaml: error: the experiment file cannot be read: No such file or directory\n  hint: check the path"),
-      std::string::npos)
-      << diagnostics.text();
+  EXPECT_HAS(diagnostics.text(),
+             "none.yaml: error: the experiment file cannot be read: No such file or directory\n  hint: check the path");
 }
 
 TEST_F(ExperimentFaults, NoYaml) {
   read("experiment: 1\npipeline: [p.yaml\ncases: {}\n");
-  EXPECT_NE(diagnostics.text().find("e.yaml:2:11: error: this [ is not closed"), std::string::npos)
-      << diagnostics.text();
+  EXPECT_HAS(diagnostics.text(), "e.yaml:2:11: error: this [ is not closed");
   expect_fault("- experiment\n", 1, "the experiment must be a map, got a list of 1", kMapHint);
 }
 
@@ -83,8 +78,7 @@ TEST_F(ExperimentFaults, Inputs) {
                   "set it, as in  export MARROW_NOT_SET=...");
   expect_fault_of("inputs: {x: '$env:'}", "$env: names no environment variable", "write it as  $env:NAME");
   expect_fault_of("inputs: {csae: 1}", "the pipeline has no input 'csae'", "did you mean 'case'?");
-  scratch.write("p.yaml",
-                std::string(kPipeline).insert(std::string(kPipeline).find("{case:") + 1, "x: {type: number}, "));
+  scratch.write("p.yaml", std::string(kPipeline).insert(kPipeline.find("{case:") + 1, "x: {type: number}, "));
   expect_fault_of("inputs: {x: much}", "input 'x': expected a number, got 'much'");
 }
 
@@ -128,10 +122,10 @@ TEST_F(ExperimentFaults, Matrix) {
 }
 
 TEST_F(ExperimentFaults, FaultOfThePipelineIsSaidOnce) {
-  scratch.write("p.yaml", std::string(kPipeline) + "extra: 1\n");
+  scratch.write("p.yaml", kPipeline + "extra: 1\n");
   read(kGood);
   EXPECT_EQ(diagnostics.size(), 1u) << diagnostics.text();
-  EXPECT_NE(diagnostics.text().find("p.yaml:9:1: error: unknown key 'extra'"), std::string::npos) << diagnostics.text();
+  EXPECT_HAS(diagnostics.text(), "p.yaml:9:1: error: unknown key 'extra'");
 }
 
 TEST_F(ExperimentFaults, CasesAreNamedByTheirLastWildcard) {
@@ -172,25 +166,23 @@ TEST_F(ExperimentFaults, Cases) {
   expect_fault(cases("{input: [a], folders: [cases/*]}"), 3, "input: expected a text, got a list of 1");
   read(cases("{input: caes, folders: [cases/*]}"));
   EXPECT_EQ(diagnostics.size(), 2u);
-  EXPECT_NE(diagnostics.text().find("e.yaml:3:1: error: the pipeline has no input 'caes'"), std::string::npos)
-      << diagnostics.text();
-  EXPECT_NE(diagnostics.text().find("p.yaml:2:10: error: input 'case' has no value"), std::string::npos)
-      << diagnostics.text();
+  EXPECT_HAS(diagnostics.text(), "e.yaml:3:1: error: the pipeline has no input 'caes'");
+  EXPECT_HAS(diagnostics.text(), "p.yaml:2:10: error: input 'case' has no value");
 }
 
 TEST_F(ExperimentFaults, InputsBySeedNeedSeeds) {
   for (const std::string line : {"draw: {x: [0, 1]}", "seed_input: [x]"})
-    expect_fault(std::string(kHead) + "cases:\n  folders: [cases/*]\n  " + line + "\n" + kAfterCases, 5,
+    expect_fault(kHead + "cases:\n  folders: [cases/*]\n  " + line + "\n" + kAfterCases, 5,
                  "'" + line.substr(0, line.find(':')) + "' without 'seeds'",
                  "inputs of a simulation that differ between cases stand in 'simulate'");
 }
 
 TEST_F(ExperimentFaults, Simulation) {
-  expect_fault(std::string(kHead) + "cases:\n  simulate: s.yaml\n" + kAfterCases, 4,
-               "'simulate' must be a map, got 's.yaml'", kMapHint);
-  expect_fault(std::string(kHead) + "cases:\n  simulate: {seeds: 1..2}\n" + kAfterCases, 4,
-               "'simulate' does not name its pipeline", "add  pipeline: ../simulate/simulate.yaml");
-  expect_fault(std::string(kHead) + "cases:\n  simulate: {pipeline: s.yaml}\n" + kAfterCases, 4,
+  expect_fault(kHead + "cases:\n  simulate: s.yaml\n" + kAfterCases, 4, "'simulate' must be a map, got 's.yaml'",
+               kMapHint);
+  expect_fault(kHead + "cases:\n  simulate: {seeds: 1..2}\n" + kAfterCases, 4, "'simulate' does not name its pipeline",
+               "add  pipeline: ../simulate/simulate.yaml");
+  expect_fault(kHead + "cases:\n  simulate: {pipeline: s.yaml}\n" + kAfterCases, 4,
                "'simulate' does not say which seeds", "add  seeds: 1..20  or a list");
   expect_simulation_fault("pipelin: s.yaml", "unknown key 'pipelin' in 'simulate'", "did you mean 'pipeline'?");
   expect_simulation_fault("pipeline: q.yaml", "there is no file 'q.yaml'", kStartsHere);
@@ -214,7 +206,7 @@ TEST_F(ExperimentFaults, Seeds) {
     expect_simulation_fault(std::string("seeds: ") + wrong, ranges);
   expect_simulation_fault("seeds: [1, two]", "a seed: expected an integer, got 'two'");
   expect_simulation_fault("seeds: [1, -2]", "a seed must be 0 or more, got -2");
-  expect_fault(std::string(kHead) + "cases:\n  simulate: {pipeline: s.yaml, seeds: [4, 4]}\n" + kAfterCases, 4,
+  expect_fault(kHead + "cases:\n  simulate: {pipeline: s.yaml, seeds: [4, 4]}\n" + kAfterCases, 4,
                "two cases are named 'seed-4'", "give each seed once");
 }
 
@@ -236,9 +228,7 @@ TEST_F(ExperimentFaults, StartsOfANodeThatCannotBeDisplaced) {
   read(kGood + "starts: {node: c, count: 3}\n");
   ASSERT_EQ(diagnostics.size(), 2u) << diagnostics.text();
   for (const char* option : {"rotation_deg", "translation_mm"})
-    EXPECT_NE(diagnostics.text().find("e.yaml:8:1: error: 'test.constant' has no option '" + std::string(option) + "'"),
-              std::string::npos)
-        << diagnostics.text();
+    EXPECT_HAS(diagnostics.text(), "e.yaml:8:1: error: 'test.constant' has no option '" + std::string(option) + "'");
 }
 
 TEST_F(ExperimentFaults, Metrics) {

@@ -11,18 +11,18 @@ namespace experiment_files {
 using runtime_fixture::Scratch;
 using runtime_fixture::test_catalogue;
 
-inline constexpr const char* kPipeline =
+inline const std::string kPipeline =
     "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  c: {uses: test.constant, with: {path: $case, value: 1}}\n"
     "  n: {uses: test.add, in: {a: c, b: c}}\n  f: {uses: test.fail_above, in: {a: n}, with: {value: 9}}\n"
     "  t: {uses: test.truth}\noutputs: {number: n, other: f, truth: t}\n";
-inline constexpr const char* kSimulation =
+inline const std::string kSimulation =
     "marrow: 1\ninputs: {x: {type: number, default: 0}, shape: {type: integer, default: 1}}\nnodes:\n"
     "  c: {uses: test.constant, with: {value: $x, count: $shape}}\noutputs: {case: c}\n";
-inline constexpr const char* kHead = "experiment: 1\npipeline: p.yaml\n";
-inline constexpr const char* kCases = "cases: {folders: [cases/*]}\n";
-inline constexpr const char* kVariants = "variants:\n  one: {}\n  two: {c.value: 2}\n";
-inline constexpr const char* kMetrics = "metrics: [number.value]\n";
-inline const std::string kStart = std::string(kHead) + kCases;  // lines 1 to 3
+inline const std::string kHead = "experiment: 1\npipeline: p.yaml\n";
+inline const std::string kCases = "cases: {folders: [cases/*]}\n";
+inline const std::string kVariants = "variants:\n  one: {}\n  two: {c.value: 2}\n";
+inline const std::string kMetrics = "metrics: [number.value]\n";
+inline const std::string kStart = kHead + kCases;  // lines 1 to 3
 
 /// The file p.yaml and the folders cases/a and cases/b; s.yaml makes cases.
 class ExperimentFiles : public testing::Test {
@@ -41,6 +41,12 @@ class ExperimentFiles : public testing::Test {
   marrow::compare::Experiment read(const std::string& text, std::size_t more_cases = 0) {
     diagnostics = marrow::Diagnostics();
     return marrow::compare::read_experiment(scratch.write("e.yaml", text), nodes, diagnostics, more_cases);
+  }
+  /// read() of a text without a fault.
+  marrow::compare::Experiment read_good(const std::string& text, std::size_t more_cases = 0) {
+    const marrow::compare::Experiment experiment = read(text, more_cases);
+    if (!diagnostics.empty()) throw std::runtime_error(text + diagnostics.text());
+    return experiment;
   }
   /// The last reading gave exactly this fault.
   void expect_only_fault(int line, const std::string& message, const std::string& hint = "") const {

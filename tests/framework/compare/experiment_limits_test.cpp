@@ -23,7 +23,7 @@ class ExperimentLimits : public ExperimentFiles {
     const double seconds =
         double(std::clock() - start) / CLOCKS_PER_SEC;  // of this process, whatever else the machine does
     ASSERT_EQ(diagnostics.size(), 1u) << diagnostics.text().substr(0, 2000);
-    EXPECT_NE(diagnostics.text().find(fault), std::string::npos) << diagnostics.text().substr(0, 2000);
+    EXPECT_HAS(diagnostics.text(), fault);
     EXPECT_LT(seconds, marrow::abi_stamp().sanitizers ? 60 : 20);
   }
   std::string matrix(int keys, int values) {
@@ -38,8 +38,7 @@ class ExperimentLimits : public ExperimentFiles {
 
 TEST_F(ExperimentLimits, Matrix) {
   expect_fault(matrix(8, 10), "e.yaml:5:1: error: the matrix makes 100000000 variants, at most 1000 can be compared");
-  EXPECT_NE(diagnostics.text().find("hint: leave values out, or name the combinations that matter under  variants:"),
-            std::string::npos);
+  EXPECT_HAS(diagnostics.text(), "hint: leave values out, or name the combinations that matter under  variants:");
   expect_fault(matrix(8, 1000), "the matrix makes 1e+24 variants");
   expect_fault(matrix(1, 1001), "the matrix makes 1001 variants");
   EXPECT_EQ(read(matrix(1, 1000)).variants.size(), 1000u) << diagnostics.text().substr(0, 2000);
@@ -53,11 +52,11 @@ TEST_F(ExperimentLimits, VariantsByName) {
 
 TEST_F(ExperimentLimits, Cells) {
   add_displaced_node();
-  const std::string cases = std::string(kHead) + "cases: {seeds: 1..100000}\ninputs: {case: cases/a}\n" + kMetrics;
+  const std::string cases = kHead + "cases: {seeds: 1..100000}\ninputs: {case: cases/a}\n" + kMetrics;
   expect_fault(
       cases + kVariants + "starts: {node: s, count: 6, rotation_deg: 1}\n",
       "e.yaml:1:1: error: 2 variants, 100000 cases and 6 starts are 1200000 cells, at most 1000000 can be compared\n");
-  EXPECT_NE(diagnostics.text().find("hint: take fewer of them, or make several experiments"), std::string::npos);
+  EXPECT_HAS(diagnostics.text(), "hint: take fewer of them, or make several experiments");
   expect_fault(cases + kVariants + "starts: {node: s, count: 100000, rotation_deg: 1}\n", "are 20000000000 cells");
   EXPECT_EQ(read(cases + kVariants + "starts: {node: s, count: 5, rotation_deg: 1}\n").cell_count(), 1000000u)
       << diagnostics.text();
@@ -75,24 +74,20 @@ TEST_F(ExperimentLimits, SeedsAtTheEndOfTheIntegers) {
   for (const char* wrong : {"9223372036854775800..9223372036854775807999", "99999999999999999999..99999999999999999999",
                             "18446744073709551610..18446744073709551615", "1..2x", "1...3", "1 ..3", "+1..3", "0x1..3",
                             "1..3..5", "1..100001", "1xx3", "1.x3", "1x.3", "xx3", "..3", "1..", "12"})
-    expect_fault(std::string(kHead) + "cases: {seeds: " + wrong + "}\ninputs: {case: cases/a}\n" + kVariants + kMetrics,
-                 ranges);
-  const auto e =
-      read(std::string(kHead) + "cases: {seeds: 9223372036854775800..9223372036854775807}\ninputs: {case: cases/a}\n" +
-           kVariants + kMetrics);
+    expect_fault(kHead + "cases: {seeds: " + wrong + "}\ninputs: {case: cases/a}\n" + kVariants + kMetrics, ranges);
+  const auto e = read(kHead + "cases: {seeds: 9223372036854775800..9223372036854775807}\ninputs: {case: cases/a}\n" +
+                      kVariants + kMetrics);
   ASSERT_EQ(e.cases.size(), 8u) << diagnostics.text();
   EXPECT_EQ(e.cases.back().seed, 9223372036854775807u);
-  expect_fault(std::string(kHead) +
-                   "cases: {simulate: {pipeline: s.yaml, seeds: 1..3, draw: {x: [-1.7e308, 1.7e308]}}}\n" + kVariants +
-                   kMetrics,
+  expect_fault(kHead + "cases: {simulate: {pipeline: s.yaml, seeds: 1..3, draw: {x: [-1.7e308, 1.7e308]}}}\n" +
+                   kVariants + kMetrics,
                "the range of 'x' is too wide for a number to be drawn from it");
 }
 
 TEST_F(ExperimentLimits, AHundredThousandCasesAreReadAtOnce) {
   const std::clock_t start = std::clock();
   const auto e =
-      read(std::string(kHead) +
-           "cases: {simulate: {pipeline: s.yaml, seeds: 1..100000, draw: {x: [0, 1]}, seed_input: [shape]}}\n" +
+      read(kHead + "cases: {simulate: {pipeline: s.yaml, seeds: 1..100000, draw: {x: [0, 1]}, seed_input: [shape]}}\n" +
            kVariants + kMetrics);
   EXPECT_EQ(e.cases.size(), 100000u) << diagnostics.text();
   EXPECT_EQ(marrow::compare::cell_of(e, "two/seed-99999/0")->case_index, 99998u);
@@ -104,7 +99,7 @@ TEST_F(ExperimentLimits, NamesThatAreTooLongForAFolder) {
   EXPECT_EQ(read(kStart + kMetrics + "variants:\n  " + longest + ": {}\n").variants.size(), 1u) << diagnostics.text();
   expect_fault(kStart + kMetrics + "variants:\n  " + longer + ": {}\n",
                "e.yaml:6:3: error: a variant's name becomes a file name: '");
-  EXPECT_NE(diagnostics.text().find("it has 101 bytes"), std::string::npos) << diagnostics.text();
+  EXPECT_HAS(diagnostics.text(), "it has 101 bytes");
   expect_fault(kGood + "name: " + std::string(260, 'n') + "\n", "an experiment's name becomes a file name");
   fs::create_directories(scratch.path / "cases" / longer);
   expect_fault(kGood, "e.yaml:3:19: error: a case's name becomes a file name");
@@ -115,7 +110,7 @@ TEST_F(ExperimentLimits, NamesThatTheMatrixComposes) {
                    std::string(40, '0') + "2]\n",
                "e.yaml:5:1: error: the matrix makes a variant's name of 102 bytes of its values; as a folder's name it "
                "may have 100\n");
-  EXPECT_NE(diagnostics.text().find("hint: name the combinations under  variants:"), std::string::npos);
+  EXPECT_HAS(diagnostics.text(), "hint: name the combinations under  variants:");
   // Each variant has its own folder, for any values.
   const auto e = read(kStart + kMetrics + "matrix:\n  c.path: [two, TWO, 'two', two-2, 'a b', a_b]\n");
   EXPECT_EQ(marrow::names_of(e.variants), (std::vector<std::string>{"two", "TWO-3", "two-4", "two-2", "a_b", "a_b-2"}))
@@ -132,8 +127,7 @@ TEST_F(ExperimentLimits, NamesThatAreOneFolderToSomeFileSystems) {
 TEST_F(ExperimentLimits, FoldersWithOddNames) {
   for (const char* name : {"with space", "line\nbreak", "esc\x1b[31m", "not\xffutf8", ".hidden"})
     fs::create_directories(scratch.path / "odd" / name);
-  const auto e = read(std::string(kHead) + "cases: {folders: [odd/*, odd/.hidden]}\n" + kVariants + kMetrics);
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const auto e = read_good(kHead + "cases: {folders: [odd/*, odd/.hidden]}\n" + kVariants + kMetrics);
   EXPECT_EQ(marrow::names_of(e.cases),
             (std::vector<std::string>{"esc%1B[31m", "line%0Abreak", "not%FFutf8", "with space", "%2Ehidden"}));
   EXPECT_EQ(e.cases[1].folder, scratch.path / "odd" / "line\nbreak");
@@ -141,10 +135,10 @@ TEST_F(ExperimentLimits, FoldersWithOddNames) {
 
 TEST_F(ExperimentLimits, FoldersThatCannotBeFound) {
   const auto folders = [](const std::string& pattern) {
-    return std::string(kHead) + "cases:\n  folders:\n  - " + pattern + "\n" + kVariants + kMetrics;
+    return kHead + "cases:\n  folders:\n  - " + pattern + "\n" + kVariants + kMetrics;
   };
   expect_fault(folders(std::string(65536, 'a')), "e.yaml:5:5: error: the cases at '");
-  EXPECT_NE(diagnostics.text().find("more than any path may have"), std::string::npos);
+  EXPECT_HAS(diagnostics.text(), "more than any path may have");
   std::string deep;
   for (int i = 0; i < 32768; ++i) deep += "*/";
   expect_fault(folders("'" + deep + "'"), "more than any path may have");
@@ -157,7 +151,7 @@ TEST_F(ExperimentLimits, FoldersThatCannotBeFound) {
 
 TEST_F(ExperimentLimits, LinksInACircleEnd) {
   for (int i = 0; i < 10; ++i) fs::create_directory_symlink(".", scratch.path / "cases" / ("l" + std::to_string(i)));
-  expect_fault(std::string(kHead) + "cases: {folders: [cases/*/*/*/*/*/*/*/*/*/*/*/*]}\n" + kVariants + kMetrics,
+  expect_fault(kHead + "cases: {folders: [cases/*/*/*/*/*/*/*/*/*/*/*/*]}\n" + kVariants + kMetrics,
                "the search goes through more than 300000 files and folders; do links lead in a circle?");
 }
 
@@ -172,15 +166,12 @@ TEST_F(ExperimentLimits, TheFileItself) {
     marrow::compare::read_experiment(file, test_catalogue(), diagnostics);
     return diagnostics.text();
   };
-  EXPECT_NE(fault(scratch.path).find("error: the experiment file is a folder, not a regular file"), std::string::npos)
-      << diagnostics.text();
-  EXPECT_NE(fault("/dev/zero").find("error: the experiment file is a device, not a regular file"), std::string::npos)
-      << diagnostics.text();
+  EXPECT_HAS(fault(scratch.path), "error: the experiment file is a folder, not a regular file");
+  EXPECT_HAS(fault("/dev/zero"), "error: the experiment file is a device, not a regular file");
   const std::string named = scratch.write("...yaml", kGood).string();
-  EXPECT_NE(fault(named).find("the experiment is named after its file, which becomes a folder's name: '..' cannot be "
-                              "one, it begins with a dot"),
-            std::string::npos)
-      << diagnostics.text();
+  EXPECT_HAS(fault(named),
+             "the experiment is named after its file, which becomes a folder's name: '..' cannot be "
+             "one, it begins with a dot");
   EXPECT_EQ(fault(scratch.write("...yaml", kGood + "name: good\n")), "");
 }
 

@@ -34,7 +34,7 @@ TEST_F(ExperimentReplaced, OptionsOfAVariant) {
 
 TEST_F(ExperimentReplaced, OptionsOfTheDisplacedNode) {
   const std::string starts = "starts: {node: start, count: 2, rotation_deg: 3}\n";  // line 4
-  const std::string end = std::string(kMetrics);
+  const std::string end = kMetrics;
   expect_fault(kStart + starts + "variants: {far: {start.translation_mm: [9, 0, 0]}}\n" + end, 5,
                replaced("the option 'start.translation_mm' is set by variant 'far'", "'starts'", 4));
   expect_fault(kStart + starts + "set: {start.rotation_deg: [9, 0, 0]}\n" + kVariants + end, 5,
@@ -78,8 +78,8 @@ TEST_F(ExperimentReplaced, AVariantThatIsNamedAsATunedPoint) {
 }
 
 TEST_F(ExperimentReplaced, InputsThatAreDrawn) {
-  const std::string simulate = std::string(kHead) + "cases:\n  simulate:\n    pipeline: s.yaml\n    seeds: 1..2\n";
-  const std::string end = std::string(kVariants) + kMetrics;
+  const std::string simulate = kHead + "cases:\n  simulate:\n    pipeline: s.yaml\n    seeds: 1..2\n";
+  const std::string end = kVariants + kMetrics;
   expect_fault(simulate + "    inputs: {x: 4}\n    draw: {x: [0, 1]}\n" + end, 7,
                replaced("the input 'x' is set by 'inputs'", "'draw'", 8));
   expect_fault(simulate + "    inputs: {shape: 4}\n    seed_input: [shape]\n" + end, 7,
@@ -88,7 +88,7 @@ TEST_F(ExperimentReplaced, InputsThatAreDrawn) {
                replaced("the input 'shape' is set by 'draw'", "'seed_input'", 8));
   expect_fault(kStart + "inputs: {case: elsewhere}\n" + end, 4,
                replaced("the input 'case' is set by 'inputs'", "'cases'", 3));
-  expect_fault(std::string(kHead) + "cases: {seeds: 1..2, draw: {case: [0, 1]}}\ninputs: {case: 4}\n" + end, 4,
+  expect_fault(kHead + "cases: {seeds: 1..2, draw: {case: [0, 1]}}\ninputs: {case: 4}\n" + end, 4,
                replaced("the input 'case' is set by 'inputs'", "'draw'", 3));
 }
 
@@ -103,8 +103,8 @@ TEST_F(ExperimentReplaced, OneFolderUnderTwoNames) {
 }
 
 TEST_F(ExperimentReplaced, OneSeedTwice) {
-  expect_fault(std::string(kHead) + "cases: {simulate: {pipeline: s.yaml, seeds: [1, 2, 1]}}\n" + kVariants + kMetrics,
-               3, "two cases are named 'seed-1'", "give each seed once");
+  expect_fault(kHead + "cases: {simulate: {pipeline: s.yaml, seeds: [1, 2, 1]}}\n" + kVariants + kMetrics, 3,
+               "two cases are named 'seed-1'", "give each seed once");
 }
 
 }  // namespace experiment_replaced_test

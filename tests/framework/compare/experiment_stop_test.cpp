@@ -9,7 +9,7 @@ using namespace experiment_files;
 using marrow::compare::Experiment;
 using marrow::compare::StopRule;
 
-const std::string kSimulated = std::string(kHead) + "cases: {simulate: {pipeline: s.yaml, seeds: [1, 7, 3]}}\n";
+const std::string kSimulated = kHead + "cases: {simulate: {pipeline: s.yaml, seeds: [1, 7, 3]}}\n";
 const std::string kGood = kSimulated + kVariants + kMetrics;  // lines 1 to 7
 
 class ExperimentStop : public ExperimentFiles {
@@ -22,8 +22,7 @@ class ExperimentStop : public ExperimentFiles {
     expect_fault(kGood + "stop: {" + rule + "}\n", message, hint);
   }
   StopRule rule(const std::string& text) {
-    const Experiment experiment = read(kGood + "stop: {" + text + "}\n");
-    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+    const Experiment experiment = read_good(kGood + "stop: {" + text + "}\n");
     return experiment.stop.value_or(StopRule());
   }
 };
@@ -31,8 +30,7 @@ class ExperimentStop : public ExperimentFiles {
 const std::string kRest = ", most_cases: 40, look_every: 10";
 
 TEST_F(ExperimentStop, FurtherSeedsFollowTheLargest) {
-  const Experiment experiment = read(kGood, 2);
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const Experiment experiment = read_good(kGood, 2);
   EXPECT_EQ(marrow::names_of(experiment.cases),
             (std::vector<std::string>{"seed-1", "seed-7", "seed-3", "seed-8", "seed-9"}));
   EXPECT_EQ(experiment.cases[4].seed, 9u);
@@ -41,7 +39,7 @@ TEST_F(ExperimentStop, FurtherSeedsFollowTheLargest) {
 }
 
 TEST_F(ExperimentStop, FoldersDoNotBecomeMore) {
-  read(std::string(kHead) + kCases + kVariants + kMetrics, 2);
+  read(kHead + kCases + kVariants + kMetrics, 2);
   ASSERT_EQ(diagnostics.size(), 1u) << diagnostics.text();
   EXPECT_EQ(diagnostics.sorted()[0].message, "further cases need seeds, which these cases do not have");
   EXPECT_EQ(diagnostics.sorted()[0].hint, "use  cases: {simulate: ...}  or  {seeds: 1..20}");
@@ -63,8 +61,7 @@ TEST_F(ExperimentStop, IsReadWithItsDefaults) {
 }
 
 TEST_F(ExperimentStop, LooksStayTheSameWithMoreCases) {
-  const Experiment experiment = read(kGood + "stop: {difference: number.value" + kRest + "}\n", 10);
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const Experiment experiment = read_good(kGood + "stop: {difference: number.value" + kRest + "}\n", 10);
   EXPECT_EQ(experiment.cases.size(), 13u);
   EXPECT_EQ(experiment.stop->looks(), (std::vector<std::size_t>{3, 13, 23, 33, 40}));
 }
@@ -125,7 +122,7 @@ TEST_F(ExperimentStop, FaultsOfNames) {
 }
 
 TEST_F(ExperimentStop, NeedsSeedsAndFewEnoughCells) {
-  expect_fault(std::string(kHead) + kCases + kVariants + kMetrics + "stop: {difference: number.value" + kRest + "}\n",
+  expect_fault(kHead + kCases + kVariants + kMetrics + "stop: {difference: number.value" + kRest + "}\n",
                "'stop' needs cases that are made from seeds, because only these can become more",
                "use  cases: {simulate: ...}  or  {seeds: 1..20}");
 }

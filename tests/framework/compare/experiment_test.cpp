@@ -11,8 +11,7 @@ using namespace experiment_files;
 using marrow::compare::Experiment;
 
 TEST_F(ExperimentFiles, FoldersVariantsAndSuccess) {
-  const Experiment e = read(kStart + kVariants + kMetrics + "success: {number.value: 3}\nbaseline: two\n");
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const Experiment e = read_good(kStart + kVariants + kMetrics + "success: {number.value: 3}\nbaseline: two\n");
   ASSERT_EQ(e.cases.size(), 2u);
   EXPECT_EQ(e.cases[0].name, "a");
   EXPECT_FALSE(e.cases[0].is_simulated);
@@ -34,21 +33,18 @@ TEST_F(ExperimentFiles, APathThroughALinkIsWhatTheSystemFinds) {
   fs::create_directories(scratch.path / "other" / "cases" / "c");
   fs::create_directory_symlink("other/inner", scratch.path / "link");
   fs::copy_file(scratch.path / "p.yaml", scratch.path / "other" / "p.yaml");
-  const Experiment e = read("experiment: 1\npipeline: link/../p.yaml\ncases: {folders: [link/../cases/*]}\n" +
-                            std::string(kVariants) + kMetrics);
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const Experiment e = read_good("experiment: 1\npipeline: link/../p.yaml\ncases: {folders: [link/../cases/*]}\n" +
+                                 kVariants + kMetrics);
   EXPECT_TRUE(fs::equivalent(e.pipeline, scratch.path / "other" / "p.yaml"));
   ASSERT_EQ(e.cases.size(), 1u);
   EXPECT_EQ(e.cases[0].name, "c");
-  EXPECT_EQ(read(std::string(kHead) + "cases: {folders: [cases/*/../*]}\n" + kVariants + kMetrics).cases.size(), 2u)
-      << "each once";
+  EXPECT_EQ(read(kHead + "cases: {folders: [cases/*/../*]}\n" + kVariants + kMetrics).cases.size(), 2u) << "each once";
 }
 
 TEST_F(ExperimentFiles, MetricsHaveNamesForPeople) {
   const Experiment e =
-      read(kStart + kVariants +
-           "metrics:\n  - {figure: number.value, label: Sum}\n  - other.value\nsuccess: {number.value: 3}\n");
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+      read_good(kStart + kVariants +
+                "metrics:\n  - {figure: number.value, label: Sum}\n  - other.value\nsuccess: {number.value: 3}\n");
   ASSERT_EQ(e.metrics.size(), 2u);
   EXPECT_EQ(e.metrics[0].path + " " + e.metrics[0].label, "number.value Sum");
   EXPECT_EQ(e.metrics[0].limit, 3.0);
@@ -57,8 +53,7 @@ TEST_F(ExperimentFiles, MetricsHaveNamesForPeople) {
 
 TEST_F(ExperimentFiles, WhatIsSetForAllComesBeforeWhatAVariantChanges) {
   const std::string set = "set: {f.value: 3, c.word: two, c.uses: test.constant}\n";
-  const Experiment e = read(kStart + set + kVariants + kMetrics);
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const Experiment e = read_good(kStart + set + kVariants + kMetrics);
   const auto text = [&](std::size_t variant) {
     std::string all;
     for (const auto& one : marrow::compare::arguments_of(e, {variant, 0, 0}, e.cases[0].folder).overrides)
@@ -71,8 +66,7 @@ TEST_F(ExperimentFiles, WhatIsSetForAllComesBeforeWhatAVariantChanges) {
 }
 
 TEST_F(ExperimentFiles, MatrixGivesEveryCombination) {
-  const Experiment e = read(kStart + "matrix:\n  c.value: [1, 2, 3]\n  n.uses: [test.add, test.add]\n" + kMetrics);
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const Experiment e = read_good(kStart + "matrix:\n  c.value: [1, 2, 3]\n  n.uses: [test.add, test.add]\n" + kMetrics);
   ASSERT_EQ(e.variants.size(), 6u);
   std::set<std::string> names;
   for (const auto& variant : e.variants) names.insert(variant.name);
@@ -83,8 +77,7 @@ TEST_F(ExperimentFiles, MatrixGivesEveryCombination) {
 TEST_F(ExperimentFiles, StartsMayBeDrawnByTheirDistance) {
   add_displaced_node();
   const Experiment e =
-      read(kStart + kVariants + kMetrics + "starts: {node: s, count: 1000, rotation_deg: 3, distance_mm: 40}\n");
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+      read_good(kStart + kVariants + kMetrics + "starts: {node: s, count: 1000, rotation_deg: 3, distance_mm: 40}\n");
   double mean = 0;
   int below_10 = 0;
   for (const auto& start : e.starts) {
@@ -100,8 +93,7 @@ TEST_F(ExperimentFiles, AShortestDistanceIsGivenToTheNodeToo) {
   add_displaced_node();
   const auto options = [&](const std::string& distance) {
     const Experiment e =
-        read(kStart + kVariants + kMetrics + "starts: {node: s, count: 1, rotation_deg: 3" + distance + "}\n");
-    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+        read_good(kStart + kVariants + kMetrics + "starts: {node: s, count: 1, rotation_deg: 3" + distance + "}\n");
     std::string keys;
     for (const auto& one : marrow::compare::arguments_of(e, {0, 0, 0}, e.cases[0].folder).overrides)
       if (one.key.starts_with("s.")) keys += one.key + " ";
@@ -115,8 +107,7 @@ TEST_F(ExperimentFiles, StartsAreDrawnByTheirProtocol) {
   add_displaced_node();
   const std::string text =
       kStart + kVariants + kMetrics + "starts: {node: s, count: 2000, seed: 7, rotation_deg: 3, translation_mm: 5}\n";
-  const Experiment e = read(text);
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const Experiment e = read_good(text);
   ASSERT_EQ(e.starts.size(), 2000u);
   double longest = 0, mean = 0, x = 0, angle = 0;
   for (const auto& start : e.starts) {
@@ -136,11 +127,11 @@ TEST_F(ExperimentFiles, StartsAreDrawnByTheirProtocol) {
 }
 
 TEST_F(ExperimentFiles, SimulatedCasesDrawTheirInputs) {
-  const Experiment e = read(std::string(kHead) +
-                            "cases: {simulate: {pipeline: s.yaml, seeds: 3..5, set: {c.word: two}, draw: {x: [-2, 2]}, "
-                            "seed_input: [shape]}}\n" +
-                            kVariants + kMetrics);
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const Experiment e =
+      read_good(kHead +
+                "cases: {simulate: {pipeline: s.yaml, seeds: 3..5, set: {c.word: two}, draw: {x: [-2, 2]}, "
+                "seed_input: [shape]}}\n" +
+                kVariants + kMetrics);
   ASSERT_EQ(e.cases.size(), 3u);
   EXPECT_EQ(marrow::compare::simulation_arguments_of(e, 0).overrides.at(0).key, "c.word");
   EXPECT_EQ(e.cases[2].name, "seed-5");
@@ -157,9 +148,8 @@ TEST_F(ExperimentFiles, SimulatedCasesDrawTheirInputs) {
 TEST_F(ExperimentFiles, AnInputMayBeAnEnvironmentVariable) {
   setenv("MARROW_TEST_SHAPE", "7", 1);
   const Experiment e =
-      read(std::string(kHead) +
-           "cases: {simulate: {pipeline: s.yaml, seeds: 1..2, inputs: {shape: $env:MARROW_TEST_SHAPE}}}\n" + kVariants +
-           kMetrics);
+      read(kHead + "cases: {simulate: {pipeline: s.yaml, seeds: 1..2, inputs: {shape: $env:MARROW_TEST_SHAPE}}}\n" +
+           kVariants + kMetrics);
   unsetenv("MARROW_TEST_SHAPE");
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   const marrow::InputValue shape = marrow::compare::simulation_arguments_of(e, 0).inputs.at(0);
@@ -167,8 +157,7 @@ TEST_F(ExperimentFiles, AnInputMayBeAnEnvironmentVariable) {
 }
 
 TEST_F(ExperimentFiles, SeedsAloneAreThoseOfTheRuns) {
-  const Experiment e =
-      read(std::string(kHead) + "cases: {seeds: [4, 9]}\ninputs: {case: cases/a}\n" + kVariants + kMetrics);
+  const Experiment e = read(kHead + "cases: {seeds: [4, 9]}\ninputs: {case: cases/a}\n" + kVariants + kMetrics);
   ASSERT_EQ(e.cases.size(), 2u);
   EXPECT_EQ(e.cases[1].name, "seed-9");
   EXPECT_FALSE(e.cases[1].is_simulated);
@@ -183,9 +172,8 @@ TEST_F(ExperimentFiles, APipelineThatMakesItsDataTakesItsInputsBySeed) {
       "marrow: 1\ninputs: {x: {type: number, default: 0}, shape: {type: integer, default: 1}}\nnodes:\n"
       "  c: {uses: test.constant, with: {value: $x, count: $shape}}\n  n: {uses: test.add, in: {a: c, b: c}}\n"
       "outputs: {number: n}\n");
-  const Experiment e = read(std::string(kHead) + "cases: {seeds: 3..5, draw: {x: [-2, 2]}, seed_input: [shape]}\n" +
-                            kVariants + kMetrics);
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const Experiment e =
+      read_good(kHead + "cases: {seeds: 3..5, draw: {x: [-2, 2]}, seed_input: [shape]}\n" + kVariants + kMetrics);
   const auto input = [&](std::size_t index, std::size_t i) {
     return marrow::compare::arguments_of(e, {0, index, 0}, {}).inputs.at(i);
   };
@@ -203,8 +191,7 @@ TEST_F(ExperimentFiles, PathsStartAtTheExperiment) {
   pipeline.replace(pipeline.find("path: $case"), 11, "path: $file");
   scratch.write("p.yaml", pipeline);
   const Experiment e =
-      read(kStart + "inputs: {file: data.txt}\nvariants:\n  one: {}\n  two: {c.path: cases/a}\n" + kMetrics);
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+      read_good(kStart + "inputs: {file: data.txt}\nvariants:\n  one: {}\n  two: {c.path: cases/a}\n" + kMetrics);
   const auto path = [&](std::size_t variant) {
     const auto p =
         marrow::read_pipeline(e.pipeline, marrow::compare::arguments_of(e, {variant, 0, 0}, e.cases[0].folder),

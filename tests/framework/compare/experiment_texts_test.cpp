@@ -47,7 +47,7 @@ TEST_F(ExperimentTexts, ThatAreMissingAreFaults) {
 }
 
 TEST_F(ExperimentTexts, EmptyPathsAreFaults) {
-  const std::string rest = std::string(kVariants) + kMetrics;
+  const std::string rest = kVariants + kMetrics;
   expect_fault("experiment: 1\npipeline: ''\n" + (kCases + rest), 2, "'pipeline' is empty",
                "name a file; the path starts at the experiment's file");
   expect_fault(kHead + ("cases: {folders: ['']}\n" + rest), 3, "a folder of 'folders' is empty",
@@ -65,9 +65,8 @@ TEST_F(ExperimentTexts, NamesThatLookTheSameAreFaults) {
            {"\u202eone", "a control character"}}) {
     expect_fault(kGood + "variants:\n  one: {}\n  \"" + name + "\": {}\n", 7,
                  "the key '" + name + "' in 'variants' holds " + what, "write it without");
-    expect_fault(
-        std::string(kHead) + kCases + kVariants + "metrics: [{figure: number.value, label: \"" + name + "\"}]\n", 7,
-        "the label '" + name + "' holds " + what, "write it without");
+    expect_fault(kHead + kCases + kVariants + "metrics: [{figure: number.value, label: \"" + name + "\"}]\n", 7,
+                 "the label '" + name + "' holds " + what, "write it without");
   }
   std::filesystem::create_directories(scratch.path / "cases" / "a\u200b");
   const Experiment experiment = read(kGood + kVariants);
@@ -79,8 +78,7 @@ TEST_F(ExperimentTexts, NamesThatLookTheSameAreFaults) {
 /// A draw from [0, 1) is a multiple of 2^-53 (the generator's definition), which no text of six digits is.
 TEST_F(ExperimentTexts, DrawnNumbersKeepAllDigits) {
   const Experiment experiment =
-      read(kHead + ("cases: {simulate: {pipeline: s.yaml, seeds: 1..40, draw: {x: [0, 1]}}}\n" +
-                    std::string(kVariants) + kMetrics));
+      read(kHead + ("cases: {simulate: {pipeline: s.yaml, seeds: 1..40, draw: {x: [0, 1]}}}\n" + kVariants + kMetrics));
   std::set<std::string> texts;
   for (std::size_t i = 0; i < 40; ++i) {
     const std::string text = marrow::compare::simulation_arguments_of(experiment, i).inputs.at(0).value;
@@ -97,8 +95,7 @@ TEST_F(ExperimentTexts, WholeNumbersAreDrawnForIntegers) {
     return kHead + ("cases: {simulate: {pipeline: s.yaml, seeds: 1..40, draw: {shape: " + range + "}}}\n") + kVariants +
            kMetrics;
   };
-  const Experiment experiment = read(with("{range: [1000000, 9000000], whole: true}"));
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const Experiment experiment = read_good(with("{range: [1000000, 9000000], whole: true}"));
   std::set<std::string> texts;
   for (std::size_t i = 0; i < 40; ++i) {
     texts.insert(marrow::compare::simulation_arguments_of(experiment, i).inputs.at(0).value);
@@ -110,8 +107,7 @@ TEST_F(ExperimentTexts, WholeNumbersAreDrawnForIntegers) {
 }
 
 TEST_F(ExperimentTexts, StartsAndSweptValuesAreThoseOfTheRecord) {
-  const Experiment swept = read(kGood + "sweep: {options: {c.value: {range: [0.1, 700], scale: log}}, grid: 7}\n");
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const Experiment swept = read_good(kGood + "sweep: {options: {c.value: {range: [0.1, 700], scale: log}}, grid: 7}\n");
   for (std::size_t i = 0; i < 7; ++i) {
     const auto& variant = swept.variants[i];
     EXPECT_EQ(std::strtod(variant.overrides.at(0).value.c_str(), nullptr), variant.swept.at(0)) << variant.name;
@@ -121,8 +117,7 @@ TEST_F(ExperimentTexts, StartsAndSweptValuesAreThoseOfTheRecord) {
                 "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  c: {uses: test.constant, with: {path: $case}}\n"
                 "  s: {uses: test.displaced}\noutputs: {number: c, s: s}\n");
   const Experiment started =
-      read(kGood + kVariants + "starts: {node: s, count: 9, rotation_deg: 3, distance_mm: 40}\n");
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+      read_good(kGood + kVariants + "starts: {node: s, count: 9, rotation_deg: 3, distance_mm: 40}\n");
   for (std::size_t i = 0; i < 9; ++i) {
     const auto overrides = marrow::compare::arguments_of(started, {0, 0, i}, started.cases[0].folder).overrides;
     const std::string rotation = overrides.at(0).value;  // [a, b, c]

@@ -23,8 +23,7 @@ class ExperimentTune : public ExperimentFiles {
  protected:
   ExperimentTune() : ExperimentFiles(catalogue()) {}
   Experiment good(const std::string& tune, const std::string& more = "") {
-    Experiment experiment = read(kGood + more + "tune: {" + tune + "}\n");
-    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+    Experiment experiment = read_good(kGood + more + "tune: {" + tune + "}\n");
     return experiment;
   }
   void expect_fault(const std::string& tune, const std::string& message, const std::string& hint = "",

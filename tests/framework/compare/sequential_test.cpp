@@ -9,7 +9,6 @@
 namespace sequential_test {
 
 using namespace marrow::compare;
-using marrow::test::message_of;
 
 std::vector<double> equal_shares(std::size_t looks) {
   std::vector<double> shares;
@@ -43,20 +42,17 @@ TEST(Looks, EvenLevelsSpendTheFirstShareAtOnce) {
 }
 
 TEST(Looks, RefuseSharesThatDoNotRise) {
-  EXPECT_EQ(message_of([] { levels_of_looks({}); }), "there are no looks; give at least one");
-  EXPECT_NE(message_of([] {
-              levels_of_looks({0.5, 0.5});
-            }).find("look 2 has seen the share 0.500000 of the cases"),
-            std::string::npos);
-  EXPECT_NE(message_of([] { levels_of_looks({1.1}); }).find("look 1 has seen"), std::string::npos);
-  EXPECT_NE(message_of([] { levels_of_looks({1}, 5); }).find("from 0.001 to 0.5"), std::string::npos);
+  EXPECT_EQ(MESSAGE_OF(levels_of_looks({})), "there are no looks; give at least one");
+  EXPECT_HAS(MESSAGE_OF(levels_of_looks({0.5, 0.5})), "look 2 has seen the share 0.500000 of the cases");
+  EXPECT_HAS(MESSAGE_OF(levels_of_looks({1.1})), "look 1 has seen");
+  EXPECT_HAS(MESSAGE_OF(levels_of_looks({1}, 5)), "from 0.001 to 0.5");
 }
 
 TEST(Looks, AreAtTheFirstCasesAndEveryFew) {
   EXPECT_EQ(looks_at(20, 20, 60), (std::vector<std::size_t>{20, 40, 60}));
   EXPECT_EQ(looks_at(7, 20, 30), (std::vector<std::size_t>{7, 27, 30}));
   EXPECT_EQ(looks_at(5, 1, 5), (std::vector<std::size_t>{5}));
-  EXPECT_NE(message_of([] { looks_at(5, 1, 4); }).find("begin at 5 cases and end at 4"), std::string::npos);
+  EXPECT_HAS(MESSAGE_OF(looks_at(5, 1, 4)), "begin at 5 cases and end at 4");
 }
 
 }  // namespace sequential_test

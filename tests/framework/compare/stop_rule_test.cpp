@@ -13,7 +13,6 @@
 namespace stop_rule_test {
 
 using namespace marrow::compare;
-using marrow::test::message_of;
 
 constexpr int kExperiments = 500;
 
@@ -128,8 +127,8 @@ TEST(StopRule, TheWidestIntervalDecides) {
   EXPECT_EQ(look.looks, 10u);
   EXPECT_FALSE(look_at_widths(plan, 200, {narrow, std::nullopt}).is_met);
   EXPECT_TRUE(look_at_widths(plan, 200, {narrow}).is_last());
-  EXPECT_EQ(message_of([&] { look_at_widths(plan, 50, {narrow}); }), "the rule has no look at 50 cases");
-  EXPECT_EQ(message_of([&] { look_at_widths(plan, 40, {}); }), "there are no variants to look at; give at least one");
+  EXPECT_EQ(MESSAGE_OF(look_at_widths(plan, 50, {narrow})), "the rule has no look at 50 cases");
+  EXPECT_EQ(MESSAGE_OF(look_at_widths(plan, 40, {})), "there are no variants to look at; give at least one");
 }
 
 TEST(StopRule, SaysWhatItFoundAndWhatThatMeans) {
@@ -139,7 +138,7 @@ TEST(StopRule, SaysWhatItFoundAndWhatThatMeans) {
   const LookNames names{"mTRE", "mm", "canny", "sobel"};
   EXPECT_EQ(sentence(rule, look, names).substr(0, 80),
             "look 1 of 10, 20 cases: canny is not shown to differ from sobel in mTRE: p = 1, ");
-  EXPECT_NE(sentence(rule, look, names).find("; --more-cases goes on, with 20 cases a look"), std::string::npos);
+  EXPECT_HAS(sentence(rule, look, names), "; --more-cases goes on, with 20 cases a look");
   look.number = 10;
   look.cases = 200;
   look.p = 0.001;
@@ -152,22 +151,17 @@ TEST(StopRule, SaysWhatItFoundAndWhatThatMeans) {
       "look 10 of 10, 200 cases: canny differs from sobel in mTRE: p = 0.001, below 0.04; the rule says stop. The "
       "median difference is 0.12 mm, within 0.05 to 0.2 mm, which holds with 95 % confidence over all looks");
   look.difference = look.interval.upper = std::numeric_limits<double>::infinity();
-  EXPECT_NE(sentence(rule, look, names).find("The median difference is a failure, within 0.05 mm to a failure, which"),
-            std::string::npos);
+  EXPECT_HAS(sentence(rule, look, names), "The median difference is a failure, within 0.05 mm to a failure, which");
   look.interval.lower = look.interval.upper;
-  EXPECT_NE(sentence(rule, look, names).find("The median difference is a failure, which holds with 95 %"),
-            std::string::npos);
+  EXPECT_HAS(sentence(rule, look, names), "The median difference is a failure, which holds with 95 %");
   look.difference = 0.12;
   look.interval = {0.05, 0.2, 0.96};
   look.is_met = false;
-  EXPECT_NE(sentence(rule, look, names).find("; this was the last look. The median"), std::string::npos);
+  EXPECT_HAS(sentence(rule, look, names), "; this was the last look. The median");
   look.interval.lower = -0.05;
-  EXPECT_NE(sentence(rule, look, names).find(": p = 0.001, below 0.04, but the interval contains 0; this was"),
-            std::string::npos);
+  EXPECT_HAS(sentence(rule, look, names), ": p = 0.001, below 0.04, but the interval contains 0; this was");
   look.interval.lower = 0.05;
-  EXPECT_NE(
-      sentence(rule, look, names).find(": p = 0.001, below 0.04, but the ranks and the median do not agree; this"),
-      std::string::npos);
+  EXPECT_HAS(sentence(rule, look, names), ": p = 0.001, below 0.04, but the ranks and the median do not agree; this");
   rule.goal = StopRule::Goal::width;
   rule.width = 0.1;
   EXPECT_EQ(

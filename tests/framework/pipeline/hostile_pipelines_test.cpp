@@ -82,22 +82,18 @@ TEST_F(PipelineTest, AliasesThatMultiplyAreSaid) {
   read(bomb);
   expect_shown("aliases repeat more than 100000 values");
   read("marrow: 1\nnodes: &a {b: *a}\n");
-  EXPECT_NE(diagnostics.text().find(
-                "p.yaml:2:15: error: cannot be read as YAML: an alias names the list or map that contains it"),
-            std::string::npos)
-      << diagnostics.text();
-  const Pipeline p = read(
+  EXPECT_HAS(diagnostics.text(),
+             "p.yaml:2:15: error: cannot be read as YAML: an alias names the list or map that contains it");
+  const Pipeline p = read_good(
       "marrow: 1\nnodes:\n  c: {uses: test.constant, with: &options {value: 7}}\n  d: {uses: test.constant, with: "
       "*options}\noutputs: {o: c, p: d}\n");
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   EXPECT_EQ(std::get<double>(p.nodes[1].options[0]), 7.0) << "aliases are good for something";
 }
 
 TEST_F(PipelineTest, SecondDocumentAndNulAreSaid) {
   expect_fault(with_key("help: x") + "---\nmarrow: 1\n", 6, 1, "the file goes on after the end of its first document");
   expect_fault(with_key("help: \"a\\0b\""), 2, 7, "a text holds the character NUL (\\0); take it out");
-  read(with_key("help: x") + "...\n# the end\n");
-  EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+  read_good(with_key("help: x") + "...\n# the end\n");
 }
 
 TEST_F(PipelineTest, InputsThatMultiplyAreSaid) {

@@ -8,7 +8,6 @@
 #include "marrow/runtime/pipeline/written_content.hpp"
 #include "marrow/runtime/run/keys.hpp"
 #include "tests/framework/fixture.hpp"
-#include "tests/harness/message_of.hpp"
 
 namespace named_files_test {
 
@@ -29,9 +28,7 @@ class NamedFilesTest : public testing::Test {
       names.push_back(file.name + (file.is_there ? "" : " (nowhere)"));
     return names;
   }
-  std::string fault() {
-    return marrow::test::message_of([&] { marrow::files_named_by(folder); });
-  }
+  std::string fault() { return marrow::test::MESSAGE_OF(marrow::files_named_by(folder)); }
   Scratch scratch;
   fs::path folder = fs::canonical(scratch.path) / "case";
 };

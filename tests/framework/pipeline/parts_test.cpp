@@ -147,7 +147,7 @@ TEST_F(PartsTest, CheckedAloneItsInputsStandThere) {
   EXPECT_TRUE(faults.empty()) << faults.text();
   EXPECT_EQ(ids(p), "to c sum");
   const std::string yaml = marrow::resolved_yaml(p);
-  EXPECT_NE(yaml.find("inputs:\n  to: {type: metrics}\n"), std::string::npos) << yaml;
+  EXPECT_HAS(yaml, "inputs:\n  to: {type: metrics}\n");
   const marrow::PipelineArguments none;
   diagnostics = {};
   marrow::read_pipeline(scratch.path / "part.yaml", none, catalogue(), diagnostics);
@@ -197,7 +197,7 @@ TEST_F(PartsTest, FaultsAreShownWhereTheyAre) {
   whole("  plus: {uses: part.yaml, in: {to: e}}\n");
   expect_fault_in("p.yaml", 3, "there is no node 'e'");
   whole("  a: {uses: part.yaml, in: {to: b}}\n  b: {uses: part.yaml, in: {to: a}}\n", "o: a");
-  EXPECT_NE(only_fault().message.find("these nodes wait for each other in a circle: a/sum, b/sum"), std::string::npos);
+  EXPECT_HAS(only_fault().message, "these nodes wait for each other in a circle: a/sum, b/sum");
 }
 
 TEST_F(PartsTest, ItsTypes) {
@@ -211,7 +211,7 @@ TEST_F(PartsTest, ItsTypes) {
        {"unknown type 'metrix' of input 'a'", "did you mean 'metrics'?",
         "'over' is for inputs of data, and input 'b' is a number", "input 'c' is of type metrics, which has no default",
         "'optional' is for inputs of data, and input 'd' is a text", "give it a  default:  instead"})
-    EXPECT_NE(text.find(wanted), std::string::npos) << wanted << "\n" << text;
+    EXPECT_HAS(text, wanted) << wanted << "\n" << text;
 }
 
 TEST_F(PartsTest, APartOfItself) {
@@ -228,9 +228,9 @@ TEST_F(PartsTest, ManyParts) {
     scratch.write("n" + std::to_string(i + 1) + ".yaml", "marrow: 1\nnodes:\n" + nodes + "outputs: {d: p0}\n");
   }
   whole("  plus: {uses: n6.yaml}\n");
-  EXPECT_NE(diagnostics.text().find("the parts of the pipeline have 20000 nodes or more"), std::string::npos);
+  EXPECT_HAS(diagnostics.text(), "the parts of the pipeline have 20000 nodes or more");
   whole("  plus: {uses: n7.yaml}\n");
-  EXPECT_NE(diagnostics.text().find("parts lie more than 8 deep in each other"), std::string::npos);
+  EXPECT_HAS(diagnostics.text(), "parts lie more than 8 deep in each other");
 }
 
 TEST_F(PartsTest, NamesWithASlash) {

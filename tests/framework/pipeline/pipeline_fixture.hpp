@@ -16,6 +16,12 @@ class PipelineTest : public testing::Test {
     diagnostics = marrow::Diagnostics();
     return marrow::read_pipeline(scratch.write("p.yaml", text), arguments, catalogue(), diagnostics);
   }
+  /// read() of a text without a fault.
+  marrow::Pipeline read_good(const std::string& text, const marrow::PipelineArguments& arguments = {}) {
+    const marrow::Pipeline pipeline = read(text, arguments);
+    if (!diagnostics.empty()) throw std::runtime_error(text + diagnostics.text());
+    return pipeline;
+  }
   virtual const marrow::Catalogue& catalogue() const { return test_catalogue(); }
   /// The fault of the last text that was read. There must be only one.
   marrow::Diagnostic only_fault() const {

@@ -147,7 +147,7 @@ TEST_F(SharedClaimTest, AHolderGivesSignsOfLife) {
   const std::string first = text();
   for (int i = 0; i < 600 && text() == first; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_NE(text(), first);
-  EXPECT_NE(text().find(" 0.300 "), std::string::npos) << text();
+  EXPECT_HAS(text(), " 0.300 ");
 }
 
 TEST_F(SharedClaimTest, AClaimThatAnotherTookOverIsLeftToIt) {

@@ -248,7 +248,7 @@ TEST_F(SharedStoreTest, FoldersThatAreRefused) {
   fs::remove(folder);
   fs::create_directory(folder);
   EXPECT_EQ(Store(folder).prepare(), "") << "a store of one host";
-  EXPECT_NE(fault().find("holds other things"), std::string::npos) << fault();
+  EXPECT_HAS(fault(), "holds other things");
   const auto refused = open();
   offer(*refused, key, 1);
   EXPECT_EQ(refused->complaint(), fault() + "; the shared store is not used");
@@ -256,7 +256,7 @@ TEST_F(SharedStoreTest, FoldersThatAreRefused) {
 
 TEST_F(SharedStoreTest, ASharedStoreIsNoStoreOfOneHost) {
   offer(*open(), key, 1);
-  EXPECT_NE(Store(folder).fault().find("holds other things and is no store of marrow"), std::string::npos);
+  EXPECT_HAS(Store(folder).fault(), "holds other things and is no store of marrow");
 }
 
 TEST_F(SharedStoreTest, ItIsTheOneOfTheEnvironment) {

@@ -109,7 +109,7 @@ TEST_F(StoreTest, AFolderThatCannotBeWrittenIsAWarning) {
     if (event.kind == marrow::RunEvent::Kind::warning) messages += event.text;
   };
   EXPECT_FALSE(marrow::run_pipeline(pipeline, test_catalogue(), settings).failed());
-  EXPECT_NE(messages.find("results are not kept: cannot use the folder"), std::string::npos) << messages;
+  EXPECT_HAS(messages, "results are not kept: cannot use the folder");
 }
 
 }  // namespace store_damage_test

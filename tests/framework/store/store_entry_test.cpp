@@ -69,7 +69,7 @@ TEST_F(StoreEntryTest, WhatWasNotMadeIsNotKept) {
   Value missing = number(1);
   missing.data.reset();
   missing.source = std::make_shared<Never>();
-  EXPECT_NE(store.save(key, {missing}, {}).find("a result that was not made is not kept"), std::string::npos);
+  EXPECT_HAS(store.save(key, {missing}, {}), "a result that was not made is not kept");
   EXPECT_FALSE(fs::exists(file_of(key)));
 }
 

@@ -195,9 +195,9 @@ TEST_F(StoreFolderTest, AMarkerThatWasBeingWrittenIsNoForeignThing) {
 
 TEST_F(StoreFolderTest, AStoreOfAnotherLayoutIsLeftAlone) {
   put(folder / "marrow-store", "marrow store of results, layout 12\n");
-  EXPECT_NE(save(store).find("is a store of another version of marrow"), std::string::npos) << save(store);
+  EXPECT_HAS(save(store), "is a store of another version of marrow");
   put(folder / "marrow-store", "");
-  EXPECT_NE(save(store).find("holds other things"), std::string::npos) << save(store);
+  EXPECT_HAS(save(store), "holds other things");
   EXPECT_EQ(tree(folder).size(), 1u);
 }
 
@@ -209,7 +209,7 @@ TEST_F(StoreFolderTest, AFolderThatOthersMayWriteIsNotUsed) {
   EXPECT_FALSE(Store(folder).find(marrow::hash_of(1)));
   fs::create_directories(scratch.path / "shared");
   chmod((scratch.path / "shared").c_str(), 01777);
-  EXPECT_NE(save(Store(scratch.path / "shared")).find("other users may write to"), std::string::npos);
+  EXPECT_HAS(save(Store(scratch.path / "shared")), "other users may write to");
   EXPECT_TRUE(fs::is_empty(scratch.path / "shared"));
 }
 
@@ -220,11 +220,10 @@ TEST_F(StoreFolderTest, AFolderOfAnotherUserIsNotUsed) {
   ASSERT_EQ(chown(folder.c_str(), 1, 1), 0);
   const std::string expected =
       "the folder " + folder.string() + " belongs to another user, " + (other ? other->pw_name : "user 1");
-  EXPECT_NE(Store(folder).fault().find(expected), std::string::npos) << Store(folder).fault();
+  EXPECT_HAS(Store(folder).fault(), expected);
   EXPECT_FALSE(Store(folder).find(marrow::hash_of(1)));
   fs::create_directory_symlink(folder, scratch.path / "link");
-  EXPECT_NE(save(Store(scratch.path / "link")).find("belongs to another user"), std::string::npos)
-      << "reached by a link";
+  EXPECT_HAS(save(Store(scratch.path / "link")), "belongs to another user") << "reached by a link";
   EXPECT_EQ(Store(folder).collect(0).entries, 0u);
 }
 

@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """A comparison of two variants on two cases, and the program run on it."""
-import os
-import subprocess
-
-from harness import MARROW, TEST_PLUGINS
 from harness.program import Case, wait_until
 
 PIPELINE = """marrow: 1
@@ -17,44 +13,44 @@ DRAWN = "  drawn: {uses: render.curves, in: {metrics: %s}}\n"  # a picture of a 
 HEAD = "experiment: 1\npipeline: p.yaml\ncases: {folders: [cases/*]}\nmetrics: [number.value]\ntimed_cells: 0\n"
 
 
-class Comparison(Case):
+class Compared(Case):
+    """Has an experiment as `self.file`, and compares into the folder `self.out`."""
+
+    pipeline, cases, variants = PIPELINE, "01", "{a: {}, b: {m.value: 5}}"
+
     def setUp(self):
         super().setUp()
-        self.write("p.yaml", PIPELINE)
-        for i in range(2):
-            (self.scratch / "cases" / str(i)).mkdir(parents=True)
-            self.write("cases/%d/data" % i, "case %d" % i)
-        self.environment = dict(
-            os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS), MARROW_CACHE=str(self.scratch / "cache")
-        )
-        self.file = self.experiment("e", "{a: {}, b: {m.value: 5}}")
+        self.out = self.scratch / "out"
+        self.write("p.yaml", self.pipeline)
+        for name in self.cases:
+            self.add_case(name)
+        self.file = self.experiment("e", self.variants)
 
-    def experiment(self, name, variants):
-        return self.write(name + ".yaml", HEAD + "variants: " + variants + "\n")
+    def add_case(self, name):
+        self.write("cases/%s/data" % name, "case " + name)
 
-    def marrow(self, code, *arguments, **more):
-        result = super().marrow(*arguments, **more)
-        self.assertEqual(result.returncode, code, result.stdout + result.stderr)
-        return result
+    def experiment(self, name, variants, head=HEAD):
+        return self.write(name + ".yaml", head + "variants: " + variants + "\n")
 
-    def refused(self, sentence, *arguments, **more):
+    def compare(self, *arguments, status=0, file=None, out="out", **more):
+        return self.expect(status, "compare", file or self.file, "--out", out, *arguments, **more)
+
+    def refused(self, said, *arguments, **more):
         """Says in one sentence why nothing was done."""
-        result = self.marrow(2, *arguments, **more)
-        self.assertIn(sentence, result.stderr)
-        self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+        told = super().refused(said, *arguments, **more)
+        self.assertEqual(len(told.splitlines()), 1, told)
+        return told
 
-    def start(self, *arguments):
-        process = subprocess.Popen(
-            [str(MARROW), *map(str, arguments)],
-            env=self.environment,
-            cwd=self.scratch,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        self.addCleanup(process.wait)
-        self.addCleanup(process.kill)  # where the test ends before
-        return process
+    def refused_both(self, said, *arguments, file=None, **more):
+        """By the whole comparison and by one cell of it."""
+        for command in (["compare", file or self.file], ["cell", file or self.file, "a/0/0"]):
+            self.refused(said, *command, *arguments, **more)
+
+    def figures(self, out="out", column="number.value"):
+        return {cell: row[column] for cell, row in self.rows(out).items()}
+
+    def kept_row(self, cell, out="out"):
+        return self.scratch / out / "cells" / cell / "cell.json"
 
     def wait_for(self, path):
         wait_until(path.exists, "%s did not come" % path)
@@ -62,3 +58,15 @@ class Comparison(Case):
     def slow(self):
         """An experiment with a cell that hangs until its time limit."""
         return self.experiment("slow", "{hang: {m.how: hang}}")
+
+
+class Comparison(Compared):
+    """Its `marrow` takes the expected status first."""
+
+    def marrow(self, code, *arguments, **more):
+        result = super().marrow(*arguments, **more)
+        self.assertEqual(result.returncode, code, result.stdout + result.stderr)
+        return result
+
+    def expect(self, status, *arguments, **more):
+        return self.marrow(status, *arguments, **more)

@@ -7,34 +7,26 @@ from harness.given_cases import GivenCase
 from harness.program import main
 
 NORMAL = statistics.NormalDist()
+PLAIN = [1 + 0.1 * i for i in range(8)]
 DIFFERENCES = [0.1, 0.3, 0.2, 0.4, 0.2, 0.1, 0.3, 0.2]
 SPREAD = statistics.stdev(DIFFERENCES)  # 0.1035
+OTHERS = [one + more for one, more in zip(PLAIN, DIFFERENCES)]
+DRY = ["compare", "e.yaml", "--out", "out", "--dry-run"]
 
 
 class Needed(GivenCase):
-    def values(self):
-        plain = [1 + 0.1 * i for i in range(8)]
-        pairs = zip(plain, DIFFERENCES)
-        return {"a": ["%.3f mm" % one for one in plain], "b": ["%.3f mm" % (one + more) for one, more in pairs]}
-
-    def dry_run(self, *arguments, code=0):
-        result = self.marrow("compare", self.scratch / "e.yaml", "--out", "out", "--dry-run", *arguments)
-        self.assertEqual(result.returncode, code, result.stderr)
-        return result
-
-    def test_nothing_is_known_before_cells_are_done(self):
-        self.write_cases(self.values())
+    def test_what_the_cases_show_and_how_many_others_take(self):
+        self.write_cases({name: ["%.3f mm" % value for value in ones] for name, ones in (("a", PLAIN), ("b", OTHERS))})
         self.experiment(["a", "b"])
         self.assertIn(
             "which differences these cases show is known when three cases are done with two variants\n"
             "a difference of 0.1 in figures.err: how many cases it takes is known when three cases are done with two"
             " variants\n",
-            self.dry_run("--difference", "0.1").stdout,
+            self.printed(*DRY, "--difference", "0.1"),
         )
-
-    def test_what_the_cases_show_and_how_many_others_take(self):
-        self.compare(self.values())
-        said = self.dry_run("--difference", "0.05", "--difference", "figures.err=0.2").stdout
+        first = self.expect(0, "compare", "e.yaml", "--out", "out").stderr.splitlines()[0]
+        self.assertEqual(first, "  0 of 16 cells", "before the first cell ends")
+        said = self.printed(*DRY, "--difference", "0.05", "--difference", "figures.err=0.2")
         self.assertIn(
             "differences that 8 cases show with a probability of about 80 %, by the cells that are done:\n", said
         )
@@ -51,26 +43,16 @@ class Needed(GivenCase):
         self.assertIn(int(takes[1]), range(6, 13), said)
 
     def test_what_is_no_difference(self):
-        self.write_cases(self.values())
+        self.write_cases({"a": ["1 mm"], "b": ["2 mm"]})
         self.experiment(["a", "b"])
-        told = self.dry_run("--difference", "figures.er=0.1", code=2).stderr
-        self.assertIn("--difference: the experiment has no figure 'figures.er'; did you mean 'figures.err'?", told)
-        for text in ("much", "0", "-1", "figures.err=", "nan"):
-            told = self.dry_run("--difference", text, code=2).stderr
-            self.assertIn(
-                "--difference: '%s' is no difference; write an amount above 0 in the figure's unit" % text, told
-            )
-        result = self.marrow("compare", self.scratch / "e.yaml", "--difference", "1")
-        self.assertEqual(result.returncode, 2)
-        self.assertIn(
-            "--difference says how many cases a difference takes, without running any; add --dry-run", result.stderr
+        said = "--difference: '%s' is no difference; write an amount above 0 in the figure's unit"
+        unknown = "--difference: the experiment has no figure 'figures.er'; did you mean 'figures.err'?"
+        wants_dry = "--difference says how many cases a difference takes, without running any; add --dry-run"
+        self.refusals(
+            (unknown, *DRY, "--difference", "figures.er=0.1"),
+            *((said % text, *DRY, "--difference", text) for text in ("much", "0", "-1", "figures.err=", "nan")),
+            (wants_dry, "compare", "e.yaml", "--difference", "1"),
         )
-
-    def test_the_first_line_comes_before_the_first_cell_ends(self):
-        self.write_cases(self.values())
-        result = self.marrow("compare", self.experiment(["a", "b"]), "--out", "out")
-        self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertEqual(result.stderr.splitlines()[0], "  0 of 16 cells")
 
 
 if __name__ == "__main__":

@@ -3,10 +3,10 @@
 import base64
 import json
 import random
-
-from harness.program import Case, main
+import shutil
 
 from harness import shapes
+from harness.program import Case, SharedCase, main
 
 PICTURES = """marrow: 1
 inputs: {case: {type: path}}
@@ -32,44 +32,41 @@ variants: %s
 """
 
 
-class Page(Case):
-    def marrow(self, *arguments):
-        result = super().marrow(*arguments)
-        self.assertEqual(result.returncode, 0, result.stderr)
-
+class Pages(Case):
     def compare(self, *arguments):
-        self.marrow("compare", "e.yaml", "--out", "out", "--quiet", *arguments)
-        self.page = self.scratch / "out" / "report.html"
-        return self.page_data(self.page)
+        self.expect(0, "compare", "e.yaml", "--out", "out", "--quiet", *arguments)
+        return self.page_data()
 
-    def with_pictures(self):
+
+class WithPictures(SharedCase, Pages):
+    """Of four cases, under two variants: made once, and then only the page is."""
+
+    def make(self):
         noise = random.Random(7)
         for case in "abcd":
-            (self.scratch / "cases" / case).mkdir(parents=True)
             url = shapes.picture(200, 200, bytes(noise.randrange(256) for _ in range(40000)), 1)
-            (self.scratch / "cases" / case / "picture.png").write_bytes(base64.b64decode(url.split(",")[1]))
+            self.write("cases/%s/picture.png" % case, base64.b64decode(url.split(",")[1]))
         self.write("p.yaml", PICTURES)
         self.write("e.yaml", EXPERIMENT % ("{folders: [cases/*], input: case}", "picture", "{x: {}, y: {m.value: 2}}"))
+        self.report = self.scratch / "out" / "report"
 
     def parts(self):
-        return sorted((self.scratch / "out" / "report").glob("*"))
+        return sorted(path.name for path in self.report.glob("*"))
 
     def test_all_fits(self):
-        self.with_pictures()
         data = self.compare()
         self.assertEqual((data["parts"], len(data["materials"]), len(data["pictures"])), ([], 8, 4))
-        self.assertFalse((self.scratch / "out" / "report").exists())
+        self.assertFalse(self.report.exists())
         self.assertEqual(data["experiment"]["out"], "out")
 
-    def test_nothing_fits(self):
-        self.with_pictures()
+    def test_nothing_fits_and_as_many_as_fit(self):
         data = self.compare("--page-mb", "0.001")
         self.assertEqual((data["materials"], data["pictures"]), ([], {}))
         self.assertEqual(sorted((part["case"], part["start"]) for part in data["parts"]), [(i, 0) for i in range(4)])
-        self.assertEqual([path.name for path in self.parts()], sorted(part["file"] for part in data["parts"]))
+        self.assertEqual(self.parts(), sorted(part["file"] for part in data["parts"]))
         for part in data["parts"]:
             self.assertEqual(part["kinds"], ["pictures"])
-            first, content, last = (self.scratch / "out" / "report" / part["file"]).read_text().splitlines()
+            first, content, last = (self.report / part["file"]).read_text().splitlines()
             self.assertEqual((first, last), ('Parts.take("%s",' % part["file"], ");"))
             self.assertEqual(len(content), part["bytes"])
             content = json.loads(content)
@@ -78,40 +75,38 @@ class Page(Case):
             named = {entry["picture"] for cell in content["materials"] for entry in cell["pictures"]}
             self.assertEqual(named, set(content["pictures"]))
 
-    def test_as_many_as_fit(self):
-        self.with_pictures()
-        data = self.compare("--page-mb", "0.001")
-        limit = self.page.stat().st_size + 2.5 * data["parts"][0]["bytes"]
-        (self.scratch / "out" / "report" / "notes.txt").write_text("mine")
+        page = self.scratch / "out" / "report.html"
+        limit = page.stat().st_size + 2.5 * data["parts"][0]["bytes"]
+        notes = self.write("out/report/notes.txt", "mine")
         data = self.compare("--page-mb", str(limit / 1e6))
-        self.assertLessEqual(self.page.stat().st_size, limit)
+        self.assertLessEqual(page.stat().st_size, limit)
         inside = {cell["case"] for cell in data["materials"]}
         self.assertEqual((len(inside), {part["case"] for part in data["parts"]}), (2, set(range(4)) - inside))
-        others = [path.name for path in self.parts() if path.name != "notes.txt"]
+        others = [name for name in self.parts() if name != notes.name]
         self.assertEqual(others, sorted(part["file"] for part in data["parts"]), "those of an earlier page go")
         self.compare()
-        self.assertEqual([path.name for path in self.parts()], ["notes.txt"])
+        self.assertEqual(self.parts(), [notes.name])
+        shutil.rmtree(self.report)
 
     def test_pictures_of_a_cell_that_has_none(self):
-        self.with_pictures()
+        shutil.rmtree(self.scratch / "out", ignore_errors=True)
         data = self.compare("--shown", "0")
         self.assertEqual((data["materials"], data["parts"], data["pictures"]), ([], [], {}))
         # The commands that the page gives for such a cell.
-        self.marrow("cell", data["experiment"]["file"], "--out", data["experiment"]["out"], "y/b/0")
-        self.marrow("show", data["experiment"]["folder"] + "/pictures/y/b/0")
-        shown = self.page_data(self.scratch / "out" / "pictures" / "y" / "b" / "0" / "report.html")
-        self.assertEqual(len(shown["pictures"]), 1)
+        self.expect(0, "cell", data["experiment"]["file"], "--out", data["experiment"]["out"], "y/b/0")
+        self.expect(0, "show", data["experiment"]["folder"] + "/pictures/y/b/0")
+        self.assertEqual(len(self.page_data("out/pictures/y/b/0/report.html")["pictures"]), 1)
 
+
+class Shown(Pages):
     def test_worst_median_failed_and_best_are_shown(self):
         self.write("p.yaml", NUMBERS)
         self.write("e.yaml", EXPERIMENT % ("{seeds: 1..9}", "", "{x: {m.value: 1000003}}"))
         self.compare()
         values = sorted((float(row["number.value"]), number) for number, row in enumerate(self.rows().values()))
         limit = (values[6][0] + values[7][0]) / 2
-        self.write(
-            "e.yaml",
-            EXPERIMENT % ("{seeds: 1..9}", "", "{x: {m.value: %r}, y: {m.value: %r}}" % (limit, values[-1][0] + 1)),
-        )
+        variants = "{x: {m.value: %r}, y: {m.value: %r}}" % (limit, values[-1][0] + 1)
+        self.write("e.yaml", EXPERIMENT % ("{seeds: 1..9}", "", variants))
         failed = min((7, 8), key=lambda rank: values[rank][1])  # the first one in x
         for most, wanted in (("1", [6]), ("2", [6, 3]), ("3", [6, 3, failed]), ("4", [6, 3, failed, 0])):
             data = self.compare("--shown", most)

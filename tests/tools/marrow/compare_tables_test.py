@@ -8,9 +8,9 @@ import shlex
 import shutil
 import subprocess
 
-from harness.program import IS_SANITIZED, Case, main
-
+from compare_cases import HEAD, Compared
 from harness.modules import modules
+from harness.program import IS_SANITIZED, main
 
 PIPELINE = """marrow: 1
 inputs: {case: {type: path}}
@@ -19,28 +19,43 @@ nodes:
   k: {uses: test.misbehave, in: {a: m}}
 outputs: {number: k}
 """
+WARNING = """marrow: 1
+inputs: {case: {type: path}}
+nodes:
+  m: {uses: test.constant, with: {value: 1, path: $case}}
+  w: {uses: test.warn}
+  n: {uses: test.add, in: {a: m, b: w}}
+outputs: {number: n}
+"""
+SIMULATION = """marrow: 1
+inputs: {x: {type: number}, shape: {type: integer}}
+nodes:
+  c: {uses: test.constant, with: {value: $x, count: $shape}}
+outputs: {case: c}
+"""
+DRAWN = "simulate: {pipeline: s.yaml, seeds: 1..%d, seed_input: [shape], draw: {x: [0, 1]}}"
+WORDS = ["plain/a-b_c.yaml", "it's", "$(x)", "`x`", "a b", "a;b", "", "*", "~", "=ls", "new\nline", "\\", "é", "-x"]
 
 
-class Tables(Case):
-    def experiment(self, name, cases, rest):
-        self.write("p.yaml", PIPELINE)
-        for case in cases:
-            (self.scratch / "cases" / case).mkdir(parents=True, exist_ok=True)
-        return self.write(
-            name,
-            "experiment: 1\nname: e\npipeline: p.yaml\ncases: {folders: [cases/*]}\nmetrics:"
-            " [number.value]\ntimed_cells: 0\n" + rest,
-        )
+def printed(command, **more):
+    return subprocess.run(command, capture_output=True, text=True, **more).stdout
 
-    def test_no_field_is_a_formula(self):
+
+class Tables(Compared):
+    pipeline, cases = PIPELINE, ("a",)
+
+    def test_no_field_is_a_formula_and_no_terminal_obeys_it(self):
         cases = ["=1+1", "+1", "-x", "@SUM(A1)", 'a "quoted", one', "plain", "-5"]
-        file = self.experiment(
-            "e.yaml", cases, "variants: {'=cmd|x': {}, b: {m.word: two, m.value: -5}, broken: {k.how: error}}\n"
+        shutil.rmtree(self.scratch / "cases")
+        for name in cases:
+            self.add_case(name)
+        variants = (
+            '{"=cmd|x": {}, b: {m.word: two, m.value: -5}, broken: {k.how: error, k.text: "\\e[31mred\\nnext line"}}'
         )
-        result = self.marrow("compare", file, "--out", "out")
-        self.assertEqual(result.returncode, 0, result.stderr)
-        text = (self.scratch / "out" / "cells.csv").read_text()
-        rows = list(csv.reader(text.splitlines()))
+        self.experiment("e", variants, HEAD.replace("[number.value]", "[number.twice, number.value]"))
+        self.compare()
+        text = self.read("out/cells.csv")
+        rows = list(csv.reader(open(self.out / "cells.csv", newline="")))
         for field in (field for row in rows for field in row):
             if field[:1] in ("=", "+", "-", "@"):
                 float(field)  # a number is none
@@ -49,109 +64,64 @@ class Tables(Case):
         self.assertIn('"a ""quoted"", one"', text)
         self.assertEqual({row[rows[0].index("m.value")] for row in rows[1:]}, {"", "-5"})
         self.assertEqual({len(row) for row in rows}, {len(rows[0])})
-
-    def test_each_figure_is_that_of_its_name(self):
-        file = self.experiment("e.yaml", ["a"], "variants: {a: {}}\n")
-        file.write_text(file.read_text().replace("metrics: [number.value]", "metrics: [number.twice, number.value]"))
-        self.assertEqual(self.marrow("compare", file, "--out", "out").returncode, 0)
-        (row,) = self.rows().values()
-        self.assertEqual((row["number.twice"], row["number.value"]), ("4", "2"))
-
-    def test_no_terminal_obeys_a_field(self):
-        file = self.experiment(
-            "e.yaml", ["a"], 'variants: {a: {}, b: {k.how: error, k.text: "\\e[31mred\\nnext line"}}\n'
-        )
-        self.assertEqual(self.marrow("compare", file, "--out", "out").returncode, 0)
-        text = (self.scratch / "out" / "cells.csv").read_text()
         self.assertNotIn("\x1b", text)
         self.assertIn("\\x1b[31mred\nnext line", text)
+        # Each figure is that of its name.
+        row = self.rows()["'=cmd|x/plain/0"]
+        self.assertEqual((row["number.twice"], row["number.value"]), ("4", "2"))
 
     def test_the_commands_of_a_report_are_quoted(self):
-        file = self.experiment("it's $(touch hurt) ; x.yaml", ["a"], "variants: {one: {}}\n")
+        file = self.experiment("it's $(touch hurt) ; x", "{one: {}}")
         out = self.scratch / "out `touch hurt` & y"
-        self.assertEqual(self.marrow("compare", file.name, "--out", out).returncode, 0)
+        self.expect(0, "compare", file.name, "--out", out)
         command = self.page_data(out / "report.html")["experiment"]["command"]
         self.assertEqual(shlex.split(command), ["marrow", "compare", file.name, "--out", str(out)])
-        said = subprocess.run(
-            ["/bin/sh", "-c", command.replace("marrow compare", "printf '%s\\n'", 1)],
-            capture_output=True,
-            text=True,
-            cwd=self.scratch,
-        ).stdout
+        said = printed(["/bin/sh", "-c", command.replace("marrow compare", "printf '%s\\n'", 1)], cwd=self.scratch)
         self.assertEqual(said.splitlines(), [file.name, "--out", str(out)])
         run = self.scratch / "-run $x"
-        self.assertEqual(self.marrow("run", "p.yaml", "case=cases/a", "--out", run).returncode, 0)
-        self.assertEqual(self.marrow("show", "--", run.name).returncode, 0)
-        self.assertEqual(
-            shlex.split(self.page_data(run / "report.html")["experiment"]["command"]), ["marrow", "rerun", "./-run $x"]
-        )
+        self.expect(0, "run", "p.yaml", "case=cases/a", "--out", run)
+        self.expect(0, "show", "--", run.name)
+        command = self.page_data(run / "report.html")["experiment"]["command"]
+        self.assertEqual(shlex.split(command), ["marrow", "rerun", "./-run $x"])
         self.assertFalse((self.scratch / "hurt").exists())
 
     def test_the_page_quotes_as_well(self):
         if not (shutil.which("node") and shutil.which("esbuild")):
             self.skipTest("needs node and esbuild")
-        words = [
-            "plain/a-b_c.yaml",
-            "it's",
-            "$(x)",
-            "`x`",
-            "a b",
-            "a;b",
-            "",
-            "*",
-            "~",
-            "=ls",
-            "new\nline",
-            "\\",
-            "\u00e9",
-            "-x",
-        ]
-        quoted = "\nconsole.log(JSON.stringify(%s.map((w) => [Dom.shellWord(w), Dom.shellPath(w)])));" % json.dumps(
-            words
-        )
-        script = modules(Dom="report/page/dom.js") + quoted
-        pairs = json.loads(subprocess.run(["node", "-e", script], capture_output=True, text=True, check=True).stdout)
-        for word, (quoted, path) in zip(words, pairs):
-            said = subprocess.run(
-                ["/bin/sh", "-c", "printf '%%s|' %s %s" % (quoted, path)], capture_output=True, text=True
-            ).stdout
-            self.assertEqual(said, "%s|%s|" % (word, "./-x" if word == "-x" else word))
+        quoted = "%s.map((word) => [Dom.shellWord(word), Dom.shellPath(word)])" % json.dumps(WORDS)
+        script = modules(Dom="report/page/dom.js") + "\nconsole.log(JSON.stringify(%s));" % quoted
+        pairs = json.loads(printed(["node", "-e", script], check=True))
+        shown = "; ".join("printf '%%s|%%s\\0' %s %s" % tuple(pair) for pair in pairs)
+        said = printed(["/bin/sh", "-c", shown]).split("\0")
+        for word, (quoted, _), text in zip(WORDS, pairs, said):
+            self.assertEqual(text, "%s|%s" % (word, "./-x" if word == "-x" else word))
             self.assertEqual(quoted == word, word in ("plain/a-b_c.yaml", "-x"))
 
     def test_a_dry_run_of_many_cases(self):
-        self.write(
-            "p.yaml",
-            (
-                "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  m: {uses: test.constant, with: {value: 1, path:"
-                " $case}}\n  w: {uses: test.warn}\n  n: {uses: test.add, in: {a: m, b: w}}\noutputs: {number: n}\n"
-            ),
-        )
-        self.write(
-            "s.yaml",
-            (
-                "marrow: 1\ninputs: {x: {type: number}, shape: {type: integer}}\nnodes:\n  c: {uses: test.constant,"
-                " with: {value: $x, count: $shape}}\noutputs: {case: c}\n"
-            ),
-        )
-        head = "experiment: 1\npipeline: p.yaml\nmetrics: [number.value]\nvariants: {a: {}, b: {m.value: 2}}\n"
-        cases = "cases: {simulate: {pipeline: s.yaml, seeds: 1..%d, seed_input: [shape], draw: {x: [0, 1]}}}\n"
-        few = self.marrow("compare", self.write("few.yaml", head + cases % 500), "--dry-run")
+        self.write("p.yaml", WARNING)
+        self.write("s.yaml", SIMULATION)
+
+        def said(count, lines):
+            head = HEAD.replace("folders: [cases/*]", DRAWN % count).replace("timed_cells: 0\n", "")
+            file = self.experiment("n%d" % count, "{a: {}, b: {m.value: 2}}", head)
+            return self.printed("compare", file, "--dry-run").splitlines()[:lines]
+
+        takes = "1 comparison with the baseline, for which a difference takes at least 6 cases"
         self.assertEqual(
-            few.stdout.splitlines()[:4],
+            said(500, 4),
             [
                 "1000 cells: 2 variants, 500 cases, 1 starts",
-                "1 comparison with the baseline, for which a difference takes at least 6 cases",
+                takes,
                 "500 cases to simulate",
                 "3000 evaluations of nodes: 999 shared, 0 cached, 2001 to make",
             ],
         )
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        many = self.marrow("compare", self.write("many.yaml", head + cases % 100000), "--dry-run")
         self.assertEqual(
-            many.stdout.splitlines()[:5],
+            said(100000, 5),
             [
                 "200000 cells: 2 variants, 100000 cases, 1 starts",
-                "1 comparison with the baseline, for which a difference takes at least 6 cases",
+                takes,
                 "looked at: 500 cases and 1 starts, evenly spread; by them there are about",
                 "100000 cases to simulate",
                 "600000 evaluations of nodes: 199999 shared, 0 cached, 400001 to make",
@@ -162,27 +132,22 @@ class Tables(Case):
         if not IS_SANITIZED:
             self.assertLess(after.ru_maxrss, max(before.ru_maxrss, 200000), "kilobytes")
 
-    def test_a_matrix_that_cannot_be_run(self):
+    def test_experiments_that_cannot_be_run(self):
         axes = "".join("  m.o%d: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]\n" % i for i in range(8))
-        file = self.experiment("e.yaml", ["a"], "matrix:\n" + axes)
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-        result = self.marrow("compare", file, "--dry-run")
-        self.assertEqual(result.returncode, 2)
-        self.assertIn(
-            "e.yaml:7:1: error: the matrix makes 100000000 variants, at most 1000 can be compared", result.stderr
-        )
+        self.write("e.yaml", HEAD + "matrix:\n" + axes)
+        told = self.expect(2, "compare", "e.yaml", "--dry-run").stderr
+        self.assertIn("e.yaml:6:1: error: the matrix makes 100000000 variants, at most 1000 can be compared", told)
         self.assertLess(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before, 20)
-
-    def test_a_name_that_is_too_long(self):
-        file = self.experiment("e.yaml", ["a"], "variants:\n  good: {}\n  %s: {}\n" % ("n" * 260))
-        result = self.marrow("compare", file, "--out", "out")
-        self.assertEqual(result.returncode, 2)
-        self.assertIn("e.yaml:9:3: error: a variant's name becomes a file name", result.stderr)
-        self.assertIn("it has 260 bytes", result.stderr)
-        self.assertFalse((self.scratch / "out").exists())
+        self.write("e.yaml", HEAD + "variants:\n  good: {}\n  %s: {}\n" % ("n" * 260))
+        told = self.compare(status=2).stderr
+        self.assertIn("e.yaml:8:3: error: a variant's name becomes a file name", told)
+        self.assertIn("it has 260 bytes", told)
+        self.assertFalse(self.out.exists())
 
     def test_cells_that_are_none(self):
-        file = self.experiment("e.yaml", ["a", "b"], "variants: {one: {}, two: {}}\n")
+        self.add_case("b")
+        file = self.experiment("e", "{one: {}, two: {}}")
         for name, fault in {
             "one": "write it as VARIANT/CASE/START, for example one/a/0",
             "tow/a/0": "there is no variant 'tow'; did you mean 'two'?",
@@ -192,9 +157,7 @@ class Tables(Case):
             "/": "write it as",
             "//": "there is no variant ''",
         }.items():
-            result = self.marrow("cell", file, name, "--out", "out")
-            self.assertEqual(result.returncode, 2)
-            self.assertIn("the experiment has no cell '%s': %s" % (name, fault), result.stderr)
+            self.refused("the experiment has no cell '%s': %s" % (name, fault), "cell", file, name, "--out", "out")
 
 
 if __name__ == "__main__":

@@ -11,31 +11,35 @@ REFUSED = (
 )
 STARTS = """starts: {node: s, count: 2}
 initial_error: from.start_deg
+success: {figures.err: 2}
 """
 FROM = """  e: {uses: test.given_figures, in: {start: s}, with: {table: $case, column: start, names: [start_deg]}}
 outputs: {from: e, figures: n}
 """
+STOP = "stop: {difference: figures.err, most_cases: 16, look_every: 8}\n"
+TUNE = """tune: {options: {n.at: [0, 1]}, failed_as: 9, optimizer: {uses: optimizer.nelder_mead}, points: 4,
+  training_cases: 2}
+"""
 
 
 class Units(GivenCase):
-    def test_metres_and_millimetres(self):
-        self.compare(METRES, code=2)
-        self.assertEqual(self.result.stderr, REFUSED % "the unit 'm'")
-        self.assertEqual(self.result.stdout, "")
-        for name in ("cells.csv", "comparison.json", "report.html"):
-            self.assertFalse((self.scratch / "out" / name).exists(), name)
+    def assert_refused(self, *said):
+        for text in said:
+            self.assertIn(text, self.result.stderr)
 
-    def test_a_unit_that_is_missing(self):
-        self.compare({"a": ["2 mm"] * 2, "b": ["2 mm", "0.003"]}, code=2)
-        self.assertEqual(self.result.stderr, REFUSED % "no unit")
-
-    def test_a_cell_without_the_figure_has_none(self):
-        self.compare({"a": ["2 mm"] * 2, "b": ["fail", "3 mm"]})
+    def test_different_units_are_refused_and_a_lost_cell_has_none(self):
+        for values, said in (
+            (METRES, REFUSED % "the unit 'm'"),
+            ({"a": ["2 mm"] * 3, "b": ["2 mm", "0.003", "4 mm"]}, REFUSED % "no unit"),
+        ):
+            self.assertEqual(self.compare(values, code=2), "")
+            self.assertEqual(self.result.stderr, said)
+            for name in ("cells.csv", "comparison.json", "report.html"):
+                self.assertFalse((self.scratch / "out" / name).exists(), name)
+        self.compare({"a": ["2 deg", "3 mm", "4 mm"]}, code=2)
+        self.assert_refused("'figures.err' has the unit 'deg' in the cell a/000/0 and the unit 'mm' in")
+        self.compare({"a": ["2 mm"] * 3, "b": ["fail", "3 mm", "4 mm"]})
         self.assertEqual(self.answer()["metrics"][0]["unit"], "mm")
-
-    def test_units_within_one_variant(self):
-        self.compare({"a": ["2 deg", "3 mm"]}, code=2)
-        self.assertIn("'figures.err' has the unit 'deg' in the cell a/000/0 and the unit 'mm' in", self.result.stderr)
 
     def test_at_a_look(self):
         # The table says it of row SEED; the cases of the first look all agree.
@@ -45,107 +49,79 @@ class Units(GivenCase):
             for column in "ab"
         ]
         table = self.write("figures.csv", "\n".join(lines) + "\n")
-        pipeline = PIPELINE % "err" + "\n"
-        pipeline = pipeline.replace("inputs: {case: {type: path}}", "inputs: {row: {type: integer}}")
+        pipeline = PIPELINE.replace("inputs: {case: {type: path}}", "inputs: {row: {type: integer}}") % "err"
         pipeline = pipeline.replace("table: $case", "table: %s, row: $row" % table)
-        rule = "stop: {difference: figures.err, most_cases: 16, look_every: 8}\n"
-        file = self.experiment("ab", rule, pipeline=pipeline)
-        file.write_text(file.read_text().replace("{folders: [cases/*]}", "{seeds: 1..8, seed_input: [row]}"))
-        self.assertEqual(self.marrow("compare", file, "--out", "out", "--quiet").returncode, 0)
-        result = self.marrow("compare", file, "--out", "out", "--quiet", "--more-cases", "8")
-        self.assertEqual(result.returncode, 2, result.stdout)
-        self.assertIn("has the unit 'mm' in the cell a/seed-1/0 and the unit 'm' in the cell b/seed-9/0", result.stderr)
+        text = self.experiment("ab", STOP, pipeline=pipeline).read_text()
+        self.write("e.yaml", text.replace("{folders: [cases/*]}", "{seeds: 1..8, seed_input: [row]}"))
+        self.compare_file()
+        self.compare_file("--more-cases", "8", code=2)
+        self.assert_refused("has the unit 'mm' in the cell a/seed-1/0 and the unit 'm' in the cell b/seed-9/0")
 
     def test_where_a_cluster_left_the_rows(self):
         self.write_cases(METRES)
         file = self.experiment(METRES)
-        planned = self.marrow("compare", file, "--out", "out", "--emit", "parallel")
-        self.assertEqual(planned.returncode, 0, planned.stderr)
-        for variant in METRES:
-            for case in ("000", "001", "002"):
-                result = self.marrow("cell", file, "%s/%s/0" % (variant, case), "--out", "out")
-                self.assertEqual(result.returncode, 0, result.stderr)
-        result = self.marrow("compare", file, "--out", "out", "--gather")
-        self.assertEqual(result.returncode, 2, result.stdout + result.stderr)
-        self.assertIn(REFUSED % "the unit 'm'", result.stderr)
+        self.expect(0, "compare", file, "--out", "out", "--emit", "parallel")
+        for cell in ("%s/%03d/0" % (variant, case) for variant in METRES for case in range(3)):
+            self.expect(0, "cell", file, cell, "--out", "out")
+        self.refused(REFUSED % "the unit 'm'", "compare", file, "--out", "out", "--gather")
 
     def test_in_a_tuning(self):
-        # Only the second training case is in metres.
-        self.write_cases({"a": ["2 mm", "0.003 m", "4 mm", "5 mm"]})
-        tune = "tune: {options: {n.at: [0, 1]}, failed_as: 9, optimizer: {uses: optimizer.nelder_mead}, points: 4,"
-        file = self.experiment(["a"], tune + " training_cases: 2}\n")
-        result = self.marrow("compare", file, "--out", "out", "--quiet")
-        self.assertEqual(result.returncode, 2, result.stdout + result.stderr)
-        self.assertIn(
-            "'figures.err' has the unit 'mm' in the cell a/000/0 and the unit 'm' in the cell a/001/0", result.stderr
-        )
+        self.compare({"a": ["2 mm", "0.003 m", "4 mm", "5 mm"]}, TUNE, code=2)  # the second training case is in metres
+        self.assert_refused("'figures.err' has the unit 'mm' in the cell a/000/0 and the unit 'm' in the cell a/001/0")
 
 
 class StartErrors(GivenCase):
-    def starts_of(self, unit, more=""):
-        values = {
-            "a": ["1 mm"] * 3,
-            "b": ["3 mm"] * 3,
-            "start": [{"start_deg": "1.5 " + unit}] * 2 + [{"start_deg": "5 deg"}],
-        }
-        self.write_cases(values)
-        pipeline = (PIPELINE % "err").replace("outputs: {figures: n}\n", FROM)
-        return self.experiment("ab", STARTS + more, pipeline=pipeline)
+    def compare_starts(self, unit, code=0):
+        """Of three cases, one from 5 deg and two from 1.5 in the unit."""
+        of_start = [{"start_deg": "1.5 " + unit}] * 2 + [{"start_deg": "5 deg"}]
+        self.write_cases({"a": ["1 mm"] * 3, "b": ["3 mm"] * 3, "start": of_start})
+        self.experiment("ab", STARTS, pipeline=(PIPELINE % "err").replace("outputs: {figures: n}\n", FROM))
+        return self.compare_file(code=code)
 
     def test_a_capture_range_in_degrees(self):
-        file = self.starts_of("deg", "success: {figures.err: 2}\n")
-        result = self.marrow("compare", file, "--out", "out", "--quiet")
-        self.assertEqual(result.returncode, 0, result.stderr)
-        table = result.stdout[result.stdout.index("Capture range") :]
-        self.assertTrue(
-            table.startswith(
-                "Capture range: success over from.start_deg [deg], in bins of 2 deg, with 95 % intervals\n"
-                "start            a                  b\n"
-                "0 to 2           4/4 (34 to 100 %)  0/4 (0 to 66 %)\n"  # of two cases: Wilson's of 2
-            ),
-            table,
+        told = self.compare_starts("deg")
+        self.assertIn(
+            "\nCapture range: success over from.start_deg [deg], in bins of 2 deg, with 95 % intervals\n"
+            "start            a                  b\n"
+            "0 to 2           4/4 (34 to 100 %)  0/4 (0 to 66 %)\n",  # of two cases: Wilson's of 2
+            told,
         )
-        self.assertIn("\n95 % or more to  at least 5         0\n", table)
+        self.assertIn("\n95 % or more to  at least 5         0\n", told)
         answer = self.answer()
         self.assertEqual(answer["initial_error"], {"name": "from.start_deg", "unit": "deg"})
         self.assertEqual(self.page_data()["initial_error"], answer["initial_error"])
         self.assertEqual([variant["capture"]["range"] for variant in answer["variants"]], [5, 0])
-        self.assertEqual(
-            answer["variants"][0]["capture"]["bins"][1],
-            {"from": 2, "to": 4, "count": 0, "of": 0, "rate": None, "low": None, "high": None},
-        )
+        empty = {"from": 2, "to": 4, "count": 0, "of": 0, "rate": None, "low": None, "high": None}
+        self.assertEqual(answer["variants"][0]["capture"]["bins"][1], empty)
 
     def test_start_errors_in_two_units(self):
-        file = self.starts_of("rad", "success: {figures.err: 2}\n")
-        result = self.marrow("compare", file, "--out", "out", "--quiet")
-        self.assertEqual(result.returncode, 2, result.stdout)
-        self.assertIn(
-            "the figure 'from.start_deg' has the unit 'rad' in the cell a/000/0 and the unit 'deg' in the cell a/002/0",
-            result.stderr,
+        self.compare_starts("rad", code=2)
+        said = (
+            "the figure 'from.start_deg' has the unit 'rad' in the cell a/000/0 and the unit 'deg' in the cell a/002/0"
         )
+        self.assertIn(said, self.result.stderr)
 
 
 class HigherIsBetter(GivenCase):
-    def test_it_is_the_fifth_percentile(self):
+    def test_it_is_the_fifth_percentile_else_the_95th(self):
         # 0 to 20: numpy.percentile(range(21), 5) is 1, and the worst is 0.
-        values = {"a": ["%d %%" % i for i in range(21)]}
-        told = self.compare(values, metrics="[{figure: figures.err, better: higher, label: overlap}]")
+        names = ["overlap", "err"]
+        told = self.compare(
+            {"a": [{"overlap": "%d %%" % i, "err": "%d mm" % i} for i in range(21)]},
+            metrics="[{figure: figures.overlap, better: higher, label: share}, figures.err]",
+            pipeline=PIPELINE % ", ".join(names),
+        )
         self.assertIn(
-            "\noverlap [%], figures.err\n"
+            "\nshare [%], figures.overlap\n"
             "    runs   median    25 %     75 %     5 %   worst  median, 95 % interval\n"
             "a  21/21  10.0000  5.0000  15.0000  1.0000  0.0000  ",
             told,
         )
-        figure = self.answer()["variants"][0]["metrics"]["figures.err"]
-        self.assertEqual((figure["p5"], figure["worst"]), (1, 0))
-        self.assertNotIn("p95", figure)
-
-    def test_else_it_is_the_95th(self):
-        told = self.compare({"a": ["%d mm" % i for i in range(21)]})
         self.assertIn("     75 %     95 %    worst  ", told)
-        figure = self.answer()["variants"][0]["metrics"]["figures.err"]
-        self.assertEqual((figure["p95"], figure["worst"]), (19, 20))
-        self.assertNotIn("p5", figure)
+        higher, lower = (self.answer()["variants"][0]["metrics"]["figures." + name] for name in names)
+        self.assertEqual((higher["p5"], higher["worst"], lower["p95"], lower["worst"]), (1, 0, 19, 20))
+        self.assertNotIn("p95", higher)
+        self.assertNotIn("p5", lower)
 
 
 if __name__ == "__main__":

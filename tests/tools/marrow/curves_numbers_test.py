@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every figure of `marrow curves`, computed again by numpy and scipy on made sequences whose truth is known."""
-from curves_cases import Curves, table
+from curves_cases import Curves
 from harness import need_scipy
 from harness.program import main
 
@@ -31,9 +31,8 @@ def interval_of_mean(d):
 class Numbers(Curves):
     def pair(self, first, second, times=None):
         times = numpy.arange(len(first)) / RATE_HZ if times is None else times
-        table(self.scratch / "a.csv", {"time_s": times, "x_mm": first})
-        table(self.scratch / "b.csv", {"time_s": times[: len(second)], "x_mm": second})
-        return self.compared("a.csv", "b.csv")["x_mm"]
+        files = self.two({"time_s": times, "x_mm": first}, {"time_s": times[: len(second)], "x_mm": second})
+        return self.compared(*files)["x_mm"]
 
     def test_all_statistics_with_gaps_an_outlier_and_another_length(self):
         random = numpy.random.default_rng(4)
@@ -96,10 +95,8 @@ class Numbers(Curves):
         names = ["f%d" % i for i in range(500)]
         for memory in (0, 0.5, 0.8):
             with self.subTest(memory):
-                for name in ("a.csv", "b.csv"):
-                    noise = autoregressive(random, 500, 250, memory)
-                    table(self.scratch / name, {"frame": range(1, 251), **dict(zip(names, noise))})
-                figures = self.compared("a.csv", "b.csv")
+                noise = lambda: dict(zip(names, autoregressive(random, 500, 250, memory)))
+                figures = self.compared(*self.two(*({"frame": range(1, 251), **noise()} for _ in range(2))))
                 held = [low <= 0 <= high for low, high in (figures[name]["bias_interval"] for name in names)]
                 print("AR(1) %g: the interval held 0 in %.1f %%" % (memory, 100 * numpy.mean(held)))
                 self.assertGreater(numpy.mean(held), 0.92)
@@ -112,11 +109,9 @@ class Bands(Curves):
         frames = range(1, len(base) + 1)
         for i, difference in enumerate(differences):
             for folder, values in (("a", base), ("b", difference)):
-                run = self.scratch / folder / ("t%02d" % i)
-                names = ["f%d" % k for k in range(len(values))] if values.ndim > 1 else ["f"]
-                columns = dict(zip(names, numpy.atleast_2d(values)))
-                table(run / "outputs" / "c.csv", {"frame": frames, **columns})
-                self.write("%s/t%02d/run.json" % (folder, i), '{"outputs": [{"files": ["outputs/c.csv"]}]}')
+                run = "%s/t%02d/" % (folder, i)
+                self.table(run + "outputs/c.csv", {"frame": frames, "f": values})
+                self.write(run + "run.json", '{"outputs": [{"files": ["outputs/c.csv"]}]}')
 
     def figure(self):
         return self.answer_of("a", "b")["trials"][0]["figures"][0]

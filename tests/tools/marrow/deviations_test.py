@@ -26,7 +26,7 @@ TRUE_FACTORS = {"first": [2, 1, 0.5, 1, 1.5, 3], "final": [1, 0.7, 1.2, 4, 0.25,
 def rows(count):
     chance = random.Random(1)
     made = []
-    for i in range(count):
+    for _ in range(count):
         row = {}
         for stage, factors in TRUE_FACTORS.items():
             row["errors.distal.%s.mtre_mm" % stage] = "0.1"
@@ -46,27 +46,22 @@ def printed(call, *arguments):
 
 
 class Deviations(unittest.TestCase):
-    def test_the_factors_are_those_of_the_errors(self):
-        text = printed(DEVIATIONS.print_factors, rows(4000))
-        found = {
-            name: list(map(float, re.findall(r"[\d.]+", numbers)))
+    def test_the_factors_and_the_shares_are_those_of_the_errors(self):
+        many = rows(4000)
+        text = printed(DEVIATIONS.print_factors, many)
+        found = [
+            (name, list(map(float, re.findall(r"[\d.]+", numbers))))
             for name, numbers in re.findall(r"(\w+): \[(.*)\]", text)
-        }
-        wanted = {
-            "first_rotation_factors": TRUE_FACTORS["first"][:3],
-            "first_translation_factors": TRUE_FACTORS["first"][3:],
-            "rotation_factors": TRUE_FACTORS["final"][:3],
-            "translation_factors": TRUE_FACTORS["final"][3:],
-        }
-        self.assertEqual(list(found), list(wanted))
-        for name, factors in wanted.items():
-            for got, expected in zip(found[name], factors):
+        ]
+        names = ("first_rotation", "first_translation", "rotation", "translation")
+        first, final = TRUE_FACTORS["first"], TRUE_FACTORS["final"]
+        self.assertEqual([name for name, _ in found], [name + "_factors" for name in names])
+        for (name, factors), wanted in zip(found, (first[:3], first[3:], final[:3], final[3:])):
+            for got, expected in zip(factors, wanted):
                 self.assertAlmostEqual(got / expected, 1, delta=0.06, msg=name)
-
-    def test_shares_within_one_and_two_deviations(self):
-        text = printed(DEVIATIONS.print_stage, rows(4000), "first")
+        # Within one and two deviations: twice, as, half as large as predicted, and so on: of the normal distribution.
+        text = printed(DEVIATIONS.print_stage, many, "first")
         shares = [tuple(map(int, pair)) for pair in re.findall(r"(\d+) %\s+(\d+) %", text)]
-        # Twice, as, half as large as predicted, and so on: of the normal distribution.
         expected = [(38, 68), (68, 95), (95, 100), (68, 95), (50, 82), (26, 50)]
         self.assertEqual(len(shares), len(expected))
         for got, wanted in zip(shares, expected):
@@ -81,8 +76,7 @@ class Deviations(unittest.TestCase):
         # small errors lie within one deviation and none of the large ones within two.
         halves = [5 * ratio if i % 2 else ratio for i, ratio in enumerate([1, 1.1, 0.9, 1.2] * 10)]
         self.assertEqual(DEVIATIONS.shares_of_others(halves, 2), [0.5, 0.5])
-
-    def test_the_shares_of_others_are_printed_with_a_fit(self):
+        # They are printed with a fit.
         self.assertNotIn("by factors of others", printed(DEVIATIONS.print_stage, rows(200), "first"))
         text = printed(DEVIATIONS.print_stage, rows(1000), "first", True)
         shares = re.findall(r"(\d+) %, +(\d+) %$", text, re.M)

@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of comparing and repeating runs share: pipelines, and runs of them into folders."""
-import json
-
 from harness import BUILD, TEST_PLUGINS
-from harness.program import Case, marrow
+from harness.program import Case
 
 VERSIONS = BUILD / "tests" / "plugin_versions"
 CHAIN = """marrow: 1
@@ -18,40 +16,45 @@ outputs: {sum: sum, drawn: drawn}
 
 
 class Runs(Case):
+    has_own_store = False
+
     def setUp(self):
         super().setUp()
         self.plugins = [TEST_PLUGINS]
         self.environment = {}
 
-    def marrow(self, *arguments, **more):
-        return marrow(
-            *arguments, plugins=self.plugins, extra_environment=self.environment, **{"cwd": self.scratch, **more}
-        )
-
     def run_into(self, name, text, *arguments, code=0):
-        result = self.marrow("run", self.write("p.yaml", text), "--out", name, "--quiet", *arguments)
-        self.assertEqual(result.returncode, code, result.stderr)
+        self.expect(code, "run", self.write("p.yaml", text), "--out", name, "--quiet", *arguments)
 
     def diff(self, code, *arguments):
-        result = self.marrow("diff", *arguments)
-        self.assertEqual(result.returncode, code, result.stdout + result.stderr)
+        result = self.expect(code, "diff", *arguments)
         self.assertEqual(result.stderr, "")
         return result.stdout
 
-    def expect(self, code, text):
+    def expect_diff(self, code, text):
         """That the difference of the runs a and b is told in these words."""
         self.assertEqual(self.diff(code, "a", "b"), "first run (was): a\nsecond run (is): b\n\n" + text)
 
+    def run_both(self, first, second, *arguments, status=0):
+        """Runs of two texts into a and b; the second has these arguments, and ends with this status."""
+        self.run_into("a", first)
+        self.run_into("b", second, *arguments, code=status)
+
+    def diff_of(self, code, *texts, **more):
+        self.run_both(*texts, **more)
+        return self.diff(code, "a", "b")
+
+    def expect_diff_of(self, code, text, *texts, **more):
+        self.run_both(*texts, **more)
+        self.expect_diff(code, text)
+
     def use_version(self, version, extra=b""):
         """A plugin that is built again under its old name. `extra` bytes at its end only give it another build id."""
-        folder = self.scratch / "plugins"
-        folder.mkdir(exist_ok=True)
-        (folder / "marrow_versions.so").unlink(missing_ok=True)
-        (folder / "marrow_versions.so").write_bytes(
-            (VERSIONS / ("marrow_test_versions_%d.so" % version)).read_bytes() + extra
-        )
-        self.plugins = [folder, TEST_PLUGINS]
+        (self.scratch / "plugins" / "marrow_versions.so").unlink(missing_ok=True)
+        library = VERSIONS / ("marrow_test_versions_%d.so" % version)
+        self.write("plugins/marrow_versions.so", library.read_bytes() + extra)
+        self.plugins = [self.scratch / "plugins", TEST_PLUGINS]
 
     def build_ids(self, a="a", b="b"):
-        ids = [json.loads((self.scratch / name / "run.json").read_text())["plugins"] for name in (a, b)]
+        ids = [self.json(name + "/run.json")["plugins"] for name in (a, b)]
         return [next(plugin["build_id"][:8] for plugin in one if plugin["file"] == "marrow_versions.so") for one in ids]

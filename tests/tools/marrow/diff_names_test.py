@@ -21,42 +21,35 @@ SAME = "identical: all 2 nodes came out the same\n"
 
 
 class Names(Runs):
+    def run_on(self, run, name, content):
+        self.write(name, content)
+        self.run_into(run, READ, "data=" + name.split("/")[0])
+
     def also_changed(self, was, now, how):
-        return SAME + "Also changed: node 'read': option 'path' is %s, was %s, %s (with the same result)\n" % (
-            self.scratch / now,
-            self.scratch / was,
-            how,
-        )
+        paths = self.scratch / now, self.scratch / was
+        changed = "Also changed: node 'read': option 'path' is %s, was %s, %s (with the same result)\n"
+        return SAME + changed % (*paths, how)
 
     def test_a_file_under_another_name(self):
-        self.write("f.txt", "content")
-        self.write("g.txt", "content")
-        self.write("other.txt", "another")
-        self.run_into("a", READ, "data=f.txt")
-        self.run_into("b", READ, "data=g.txt")
-        self.expect(0, self.also_changed("f.txt", "g.txt", "another name for the same content"))
+        self.run_on("a", "f.txt", "content")
+        self.run_on("b", "g.txt", "content")
+        self.expect_diff(0, self.also_changed("f.txt", "g.txt", "another name for the same content"))
         self.write("g.txt", "changed since")  # what the second run read is no longer known
-        self.expect(0, self.also_changed("f.txt", "g.txt", "and the contents differ, or the names"))
+        self.expect_diff(0, self.also_changed("f.txt", "g.txt", "and the contents differ, or the names"))
         (self.scratch / "g.txt").unlink()
-        self.expect(0, self.also_changed("f.txt", "g.txt", "and the contents differ, or the names"))
-        self.run_into("c", READ, "data=other.txt")
+        self.expect_diff(0, self.also_changed("f.txt", "g.txt", "and the contents differ, or the names"))
+        self.run_on("c", "other.txt", "another")
         self.assertIn(", and the contents differ (with the same result)\n", self.diff(0, "a", "c"))
 
     def test_a_file_of_a_folder_under_another_name(self):
-        for folder, name in (("x", "f.txt"), ("y", "f.txt"), ("z", "g.txt")):
-            (self.scratch / folder).mkdir()
-            self.write("%s/%s" % (folder, name), "content")
-            self.run_into("of-" + folder, READ, "data=" + folder)
+        for name in ("x/f.txt", "y/f.txt", "z/g.txt"):
+            self.run_on("of-" + name[0], name, "content")
         self.assertTrue(self.diff(0, "of-x", "of-y").endswith("\n\n" + SAME), "a folder counts by what is in it")
-        self.assertTrue(
-            self.diff(0, "of-x", "of-z").endswith(self.also_changed("x", "z", "another name for the same content"))
-        )
+        said = self.also_changed("x", "z", "another name for the same content")
+        self.assertTrue(self.diff(0, "of-x", "of-z").endswith(said))
 
     def test_a_node_that_is_there_without_need(self):
-        self.run_into("a", CHOICE)
-        self.run_into("b", CHOICE, "--set", "sum.in.a=other")
-        self.expect(
-            1,
+        said = (
             "First difference: node 'sum' (test.add)\n"
             "  why: input 'a' is wired to other (node 'other' was not needed), was wired to one (node 'one' is not"
             " needed)\n"
@@ -65,21 +58,20 @@ class Names(Runs):
             "Not needed in the second run: one\n"
             "Not needed in the first run: other\n\n"
             "Outputs that differ\n"
-            "  sum  as above\n",
+            "  sum  as above\n"
         )
+        self.expect_diff_of(1, said, CHOICE, CHOICE, "--set", "sum.in.a=other")
 
     def test_a_node_under_another_name(self):
-        self.run_into("a", CHOICE)
-        self.run_into("b", CHOICE.replace("one", "first"))
-        self.expect(
-            1,
+        said = (
             "What took part in both runs came out the same: 1 node\n"
             "Only in the first run: one\n"
             "Only in the second run: first\n"
             "Also changed: node 'sum': input 'a' is wired to first (there was no node 'first'), was wired to one"
             " (there is no node 'one') (with the same result)\n\n"
-            "Outputs that are the same: sum\n",
+            "Outputs that are the same: sum\n"
         )
+        self.expect_diff_of(1, said, CHOICE, CHOICE.replace("one", "first"))
 
 
 if __name__ == "__main__":

@@ -37,7 +37,7 @@ class Editor(Case):
     @classmethod
     def setUpClass(cls):
         cls.schema = json.loads(marrow("schema").stdout)
-        cls.nodes = json.loads(marrow("list", "--json").stdout)
+        cls.all_nodes = json.loads(marrow("list", "--json").stdout)
 
     def ask(self, *nodes):
         """What the editor shows for each node, at the mark in it; the mark itself is not part of the file."""
@@ -45,64 +45,50 @@ class Editor(Case):
         for node in nodes:
             text = json.dumps({"marrow": 1, "nodes": {"one": node}, "outputs": {"all": "one"}})
             questions.append({"text": text.replace(MARK, ""), "at": text.index(MARK)})
-        answers = subprocess.run(
-            ["node", EDITOR / "ask.cjs"],
-            cwd=INSTALLED,
-            input=json.dumps({"schema": self.schema, "questions": questions}),
-            capture_output=True,
-            text=True,
-            timeout=300,
-        )
+        asked = json.dumps({"schema": self.schema, "questions": questions})
+        usual = {"cwd": INSTALLED, "capture_output": True, "text": True, "timeout": 300}
+        answers = subprocess.run(["node", EDITOR / "ask.cjs"], input=asked, **usual)
         self.assertEqual(answers.returncode, 0, answers.stderr)
         return json.loads(answers.stdout)
 
-    def test_uses_completes_the_names_of_all_nodes(self):
-        (answer,) = self.ask({"uses": MARK})
-        self.assertEqual(set(answer["completions"]), {json.dumps(node["name"]) for node in self.nodes})
-
-    def test_each_node_completes_its_options_and_the_inputs_of_its_kind(self):
+    def test_names_options_and_inputs_of_all_nodes_are_completed(self):
         inputs = {}
-        for node in self.nodes:
+        for node in self.all_nodes:
             kind = node["name"].split(".")[0]
             inputs.setdefault(kind, set()).update(port["name"] for port in node["inputs"])
-        answers = self.ask(
-            *({"uses": node["name"], word: {MARK: ""}} for node in self.nodes for word in ("with", "in"))
-        )
-        for i, node in enumerate(self.nodes):
-            options, ports = (set(answer["completions"]) for answer in answers[2 * i : 2 * i + 2])
+        words = [{"uses": node["name"], word: {MARK: ""}} for node in self.all_nodes for word in ("with", "in")]
+        names, *answers = (set(answer["completions"]) for answer in self.ask({"uses": MARK}, *words))
+        self.assertEqual(names, {json.dumps(node["name"]) for node in self.all_nodes})
+        for node, options, ports in zip(self.all_nodes, answers[::2], answers[1::2]):
             self.assertEqual(options, {option["name"] for option in node["options"]}, node["name"])
             self.assertGreaterEqual(ports, inputs[node["name"].split(".")[0]], node["name"])
 
-    def test_a_value_completes_with_its_default_or_its_choices(self):
-        number, truth, choice = self.ask(
-            {"uses": "edges.canny", "with": {"sigma_px": MARK}},
-            {"uses": "edges.canny", "with": {"logarithm": MARK}},
-            {"uses": "simulate.clutter", "with": {"knee": MARK}},
-        )
-        self.assertEqual(set(number["completions"]), {"1.5"})
-        self.assertEqual(set(truth["completions"]), {"true", "false"})
-        self.assertEqual(set(choice["completions"]), {'"off"', '"mild"', '"usual"', '"bad"'})
-
-    def test_hover_shows_help_range_and_unit(self):
-        option, port, summary = self.ask(
-            {"uses": "edges.canny", "with": {MARK + "sigma_px": 1}},
-            {"uses": "edges.canny", "in": {MARK + "view": "x"}},
-            {"uses": MARK + "edges.canny"},
-        )
-        canny = next(node for node in self.nodes if node["name"] == "edges.canny")
-        self.assertEqual(option["hover"], "standard deviation of the Gaussian derivative (number, 0.7 to 10 [px])")
-        self.assertIn("X-ray view", port["hover"])
-        self.assertEqual(summary["hover"], canny["summary"])
-
-    def test_faults_are_marked(self):
+    def test_values_are_completed_help_is_shown_and_faults_are_marked(self):
+        canny = next(node for node in self.all_nodes if node["name"] == "edges.canny")
         good = {"uses": "edges.canny", "with": {"sigma_px": 1}, "in": {"view": "$view" + MARK}}
-        nothing, unknown, outside, unwired = self.ask(
-            good, {**good, "with": {"sigma": 1}}, {**good, "with": {"sigma_px": 100}}, {"uses": "edges.canny" + MARK}
+        sigma = "standard deviation of the Gaussian derivative (number, 0.7 to 10 [px])"
+        rows = (
+            # A value completes with its default or its choices.
+            ("completions", {"uses": "edges.canny", "with": {"sigma_px": MARK}}, ["1.5"]),
+            ("completions", {"uses": "edges.canny", "with": {"logarithm": MARK}}, ["false", "true"]),
+            (
+                *("completions", {"uses": "simulate.clutter", "with": {"knee": MARK}}),
+                ['"bad"', '"mild"', '"off"', '"usual"'],
+            ),
+            # What the pointer is over shows help, range and unit.
+            ("hover", {"uses": "edges.canny", "with": {MARK + "sigma_px": 1}}, sigma),
+            ("hover", {"uses": MARK + "edges.canny"}, canny["summary"]),
+            ("faults", good, []),
+            ("faults", {**good, "with": {"sigma": 1}}, ["Property sigma is not allowed."]),
+            ("faults", {**good, "with": {"sigma_px": 100}}, ["Value is above the maximum of 10."]),
+            ("faults", {"uses": "edges.canny" + MARK}, ['Missing property "in".']),
         )
-        self.assertEqual(nothing["faults"], [])
-        self.assertEqual(unknown["faults"], ["Property sigma is not allowed."])
-        self.assertEqual(outside["faults"], ["Value is above the maximum of 10."])
-        self.assertEqual(unwired["faults"], ['Missing property "in".'])
+        port = {"uses": "edges.canny", "in": {MARK + "view": "x"}}
+        *answers, of_port = self.ask(*(node for _, node, _ in rows), port)
+        for (key, node, expected), answer in zip(rows, answers):
+            found = sorted(set(answer[key])) if key == "completions" else answer[key]
+            self.assertEqual(found, expected, node)
+        self.assertIn("X-ray view", of_port["hover"])
 
 
 if __name__ == "__main__":

@@ -41,16 +41,18 @@ class Called(Export):
     def makes(self, code, *files, events=()):
         """The program writes these files, says these events, and ends with this code."""
         shutil.rmtree(self.scratch / "made", ignore_errors=True)
+        (self.scratch / "made").mkdir()
         outputs = {}
         for name in files:
-            place = self.scratch / "made" / name
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_text(name)
+            self.write("made/" + name, name)
             outputs.setdefault(name.split("/")[0], []).append("outputs/" + name)
-        (self.scratch / "made").mkdir(exist_ok=True)
         lines = [*events, {"event": "ended", "files": outputs}]
         self.write("says", "".join(json.dumps(line) + "\n" for line in lines))
         self.write("fake", FAKE % {"folder": self.scratch, "code": code}).chmod(0o755)
+
+    def given(self):
+        """The words that the program was called with."""
+        return self.read("arguments").splitlines()
 
     def call(self, *words, **environment):
         return self.module.called(words, {"MARROW": str(self.scratch / "fake"), **environment})
@@ -64,29 +66,28 @@ class Called(Export):
         of_slicer = {"LD_LIBRARY_PATH": "/slicer/lib", "PYTHONHOME": "/slicer/python", "PYTHONPATH": "/slicer/site"}
         called = self.call(*words, "--item_stage", "final", **of_slicer)
         self.assertEqual((called.returncode, called.stderr), (0, ""))
-        given = (self.scratch / "arguments").read_text().splitlines()
+        given = self.given()
         pipeline = self.module.program.with_name("simulated_femur.yaml")
         self.assertEqual(given[:4], ["run", str(pipeline), "shape_seed=4", "variation=-1e-05"])
         self.assertEqual(given[4:-1], ["--only", "errors", "--json", "--quiet", "--out"])
         self.assertFalse(pathlib.Path(given[-1]).exists())  # the run's folder does not stay
-        self.assertEqual((self.scratch / "x.json").read_text(), "errors/distal/final.json")
-        environment = (self.scratch / "environment").read_text()
-        self.assertNotIn("/slicer/", environment)
+        self.assertEqual(self.read("x.json"), "errors/distal/final.json")
+        self.assertNotIn("/slicer/", self.read("environment"))
 
     def test_booleans_are_always_said_because_slicer_leaves_out_what_is_false(self):
         self.write("part.yaml", PART)
         self.module = self.export(KINDS, "kinds.yaml")
         for words, wanted in ((["--logarithm"], "logarithm=true"), ([], "logarithm=false")):
             self.call(*words, "--run_folder", "run", "--needed", "x")
-            self.assertIn(wanted, (self.scratch / "arguments").read_text().splitlines())
+            self.assertIn(wanted, self.given())
             shutil.rmtree(self.scratch / "run")
 
     def test_the_folder_of_the_run_stays_if_it_is_named(self):
         called = self.call("--run_folder", "all", "--output_errors", self.target, "--item_stage", "first")
         self.assertEqual((called.returncode, called.stderr), (0, ""))
-        self.assertNotIn("--only", (self.scratch / "arguments").read_text())
+        self.assertNotIn("--only", self.given())
         self.assertEqual(self.target.read_text(), "errors/distal/first.json")
-        self.assertEqual((self.scratch / "all/outputs/pose/distal.yaml").read_text(), "pose/distal.yaml")
+        self.assertEqual(self.read("all/outputs/pose/distal.yaml"), "pose/distal.yaml")
 
     def test_marrows_code_is_the_modules(self):
         for code in (0, 1, 2, 3, 130):
@@ -95,10 +96,9 @@ class Called(Export):
             called = self.call("--output_errors", self.target)
             self.assertEqual((called.returncode, called.stderr), (code, ""))
             self.assertTrue(self.target.exists())
-        self.makes(1)
-        self.assert_said(1, "the run made nothing for --output_errors", "--output_errors", self.target)
-        self.makes(0)
-        self.assert_said(1, "the run made nothing for --output_errors", "--output_errors", self.target)
+        for code in (1, 0):
+            self.makes(code)
+            self.assert_said(1, "the run made nothing for --output_errors", "--output_errors", self.target)
 
     def test_events_become_what_slicer_reads(self):
         events = [
@@ -124,30 +124,20 @@ class Called(Export):
         )
 
     def test_faults_of_a_call(self):
-        self.assert_said(
-            2, "there is no parameter '--output_pos'; did you mean '--output_pose'?", "--output_pos", "x.tfm"
-        )
-        self.assert_said(2, "there is no parameter 'zzz'; --xml shows all", "zzz")
-        self.assert_said(2, "the parameter '--output_pose' is given without a value", "--output_pose")
-        self.assert_said(
-            2,
-            "no result is asked for; give one of: --output_verdict, --output_pose, --output_errors, --output_overlay, "
-            "--run_folder",
-            *("--shape_seed", "2"),
-        )
-        self.assert_said(2, "--output_pose is a file that ends with .tfm, not pose.h5", "--output_pose", "pose.h5")
-        self.assert_said(
-            1,
-            "--output_errors takes one item, and 2 fit: there are distal/final, distal/first; choose by "
-            "--item_fragment, --item_stage",
-            *("--output_errors", self.target),
-        )
-        self.assert_said(
-            1,
-            "--output_errors takes one item, and none fits: there are distal/final, distal/first; choose by "
-            "--item_fragment, --item_stage",
-            *("--output_errors", self.target, "--item_stage", "second"),
-        )
+        errors = ["--output_errors", self.target]
+        items = "there are distal/final, distal/first; choose by --item_fragment, --item_stage"
+        results = "--output_verdict, --output_pose, --output_errors, --output_overlay, --run_folder"
+        for code, text, *words in (
+            (2, "there is no parameter '--output_pos'; did you mean '--output_pose'?", "--output_pos", "x.tfm"),
+            (2, "there is no parameter 'zzz'; --xml shows all", "zzz"),
+            (2, "the parameter '--output_pose' is given without a value", "--output_pose"),
+            (2, "no result is asked for; give one of: " + results, "--shape_seed", "2"),
+            (2, "--output_pose is a file that ends with .tfm, not pose.h5", "--output_pose", "pose.h5"),
+            (1, "--output_errors takes one item, and 2 fit: " + items, *errors),
+            (1, "--output_errors takes one item, and none fits: " + items, *errors, "--item_stage", "second"),
+        ):
+            with self.subTest(text):
+                self.assert_said(code, text, *words)
         self.assertFalse(self.target.exists())
 
     def test_marrow_is_found_where_it_was_else_in_path(self):

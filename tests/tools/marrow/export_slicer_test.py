@@ -44,14 +44,46 @@ VTP = """<?xml version="1.0"?>
 <DataArray type="Int64" Name="offsets" format="ascii">3 6 9 12</DataArray></Polys>
 </Piece></PolyData></VTKFile>
 """
+NRRD = """NRRD0004
+type: float
+dimension: 3
+space: left-posterior-superior
+sizes: 2 2 2
+space directions: (0.5,0,0) (0,0.75,0) (0,0,2)
+kinds: domain domain domain
+endian: little
+encoding: raw
+space origin: (-10,20.5,30)
+
+"""
+# What becomes of KINDS: name, tag, ends of files, default and channel. Slicer would save the inverse of `numbers`.
+PARAMETERS = """ct image .nrrd - input
+surface geometry .vtp - input
+start transform .tfm - input
+numbers file - - input
+points pointfile .mrk.json - input
+patient directory - - input
+below directory - data input
+camera file - a.camera.yaml input
+offset_hu double - 0.00002 -
+frame integer - 3 -
+logarithm boolean - true -
+coordinates string-enumeration - world -
+fragment string - distal -
+needed string - - -
+output_ct image .mha - output
+output_surface geometry .vtp - output
+output_start transform .tfm - output
+output_numbers transform .tfm - output
+output_points pointfile .mrk.json - output
+output_patient pointfile .mrk.json - output
+output_edges file .png - output
+item_fragment string - - -
+run_folder directory - - output
+"""
 
 
 class Made(Export):
-    def refused(self, *arguments):
-        result = self.marrow("export", "slicer", *arguments)
-        self.assertEqual(result.returncode, 2, result.stdout)
-        return result.stderr.strip().removeprefix("marrow: error: ")
-
     def assert_valid(self, description, name):
         try:
             from lxml import etree
@@ -69,21 +101,14 @@ class Simulated(Made):
         self.assertEqual(module.program.name, "simulated_femur")
         self.assert_valid(module.xml, module.program.name)
 
-        inputs = ("fracture_seed=3", "rotation_axial_deg=-4.5")
-        ran = self.marrow("run", "simulated-femur.yaml", *inputs, "--out", "run", "--quiet")
-        self.assertEqual(ran.returncode, 0, ran.stderr)
-        pose = yaml.safe_load((self.scratch / "run/outputs/pose/distal.yaml").read_text())["matrix"]
-
-        called = module.run(
-            {"MARROW_CACHE": str(self.scratch / "other-cache")},
-            fracture_seed="3",
-            rotation_axial_deg="-4.5",
-            output_pose=True,
-            output_overlay=self.scratch / "overlay.png",
-            output_errors=self.scratch / "errors.json",
-            item_view="lateral",
-            item_stage="final",
-        )
+        inputs = {"fracture_seed": "3", "rotation_axial_deg": "-4.5"}
+        given = ["%s=%s" % item for item in inputs.items()]
+        self.expect(0, "run", "simulated-femur.yaml", *given, "--out", "run", "--quiet")
+        pose = yaml.safe_load(self.read("run/outputs/pose/distal.yaml"))["matrix"]
+        files = {"output_overlay": "overlay.png", "output_errors": "errors.json"}
+        items = {"item_view": "lateral", "item_stage": "final"}
+        environment = {"MARROW_CACHE": str(self.scratch / "other-cache")}
+        called = module.run(environment, **inputs, **files, **items, output_pose=True)
         self.assertEqual((called.returncode, called.stderr), (0, ""))
         found = read_tfm(module.temporary_file("output_pose"))  # from the world to the CT, as Slicer saves it
         product = matrix_product(pose, found)
@@ -91,29 +116,23 @@ class Simulated(Made):
             self.assertAlmostEqual(product[i][k], float(i == k), 9)
         self.assertGreater(abs(pose[0][3]), 1)  # the identity would also be its own inverse
 
-        outputs = self.scratch / "run" / "outputs"
-        self.assertEqual(
-            self.without_recipe(self.scratch / "overlay.png"),
-            self.without_recipe(outputs / "overlay/distal/lateral.png"),
-        )
-        self.assertEqual(
-            (self.scratch / "errors.json").read_bytes(), (outputs / "errors/distal/final.json").read_bytes()
-        )
+        overlays = map(self.without_recipe, ("overlay.png", "run/outputs/overlay/distal/lateral.png"))
+        self.assertEqual(*overlays)
+        self.assertEqual(self.read("errors.json"), self.read("run/outputs/errors/distal/final.json"))
         self.assert_progress(called.stdout)
         self.assertRegex(called.stdout, r"(?m)^verdict \(distal\): trusted: ")
         self.assertFalse((self.scratch / "runs").exists())
 
     def without_recipe(self, picture):
         """The bytes of a picture without its recipe: that of the module makes only the outputs that are asked for."""
-        result = self.marrow("recipe", "--remove", picture, "--out", "bare.png")
-        self.assertEqual(result.returncode, 0, result.stderr)
+        self.expect(0, "recipe", "--remove", picture, "--out", "bare.png")
         return (self.scratch / "bare.png").read_bytes()
 
     def assert_progress(self, output):
         values = progress(output)
         self.assertEqual(values, sorted(values))
         self.assertEqual(values[-1], 1)
-        nodes = len(yaml.safe_load((self.scratch / "simulated-femur.yaml").read_text())["nodes"])
+        nodes = len(yaml.safe_load(self.read("simulated-femur.yaml"))["nodes"])
         self.assertEqual(len(set(values)), nodes + 1)  # and the writer; calls of one node for two views are one step
         started, ended = output.count("<filter-start>"), output.count("<filter-end>")
         self.assertEqual(started, ended)
@@ -127,39 +146,16 @@ class Kinds(Made):
         module = self.export(KINDS)
         self.assert_valid(module.xml, module.program.name)
         self.assertEqual(module.program.name, "all_kinds")
-        said = {
-            name: (one.tag, one.get("fileExtensions"), one.findtext("default"), one.findtext("channel"))
-            for name, one in module.parameters.items()
-        }
-        here = self.scratch
-        self.assertEqual(
-            said,
-            {
-                "ct": ("image", ".nrrd", None, "input"),
-                "surface": ("geometry", ".vtp", None, "input"),
-                "start": ("transform", ".tfm", None, "input"),
-                "numbers": ("file", None, None, "input"),  # Slicer would save the inverse
-                "points": ("pointfile", ".mrk.json", None, "input"),
-                "patient": ("directory", None, None, "input"),
-                "below": ("directory", None, str(here / "data"), "input"),
-                "camera": ("file", None, str(here / "a.camera.yaml"), "input"),
-                "offset_hu": ("double", None, "0.00002", None),
-                "frame": ("integer", None, "3", None),
-                "logarithm": ("boolean", None, "true", None),
-                "coordinates": ("string-enumeration", None, "world", None),
-                "fragment": ("string", None, "distal", None),
-                "needed": ("string", None, None, None),
-                "output_ct": ("image", ".mha", None, "output"),
-                "output_surface": ("geometry", ".vtp", None, "output"),
-                "output_start": ("transform", ".tfm", None, "output"),
-                "output_numbers": ("transform", ".tfm", None, "output"),
-                "output_points": ("pointfile", ".mrk.json", None, "output"),
-                "output_patient": ("pointfile", ".mrk.json", None, "output"),
-                "output_edges": ("file", ".png", None, "output"),
-                "item_fragment": ("string", None, None, None),
-                "run_folder": ("directory", None, None, "output"),
-            },
-        )
+        places = {"below": str(self.scratch / "data"), "camera": str(self.scratch / "a.camera.yaml")}
+        expected = []
+        for line in PARAMETERS.splitlines():
+            name, *of_name = ("" if word == "-" else word for word in line.split())
+            expected.append([name, *of_name[:2], places.get(name, of_name[2]), of_name[3]])
+        found = []
+        for name, one in module.parameters.items():
+            texts = [one.get("fileExtensions"), one.findtext("default"), one.findtext("channel")]
+            found.append([name, one.tag, *(text or "" for text in texts)])
+        self.assertEqual(found, expected)
         choices = [one.text for one in module.parameters["coordinates"].findall("element")]
         self.assertEqual(choices, ["ct", "world"])
         self.assertIn(b"<description>Text with &lt;tags&gt; &amp; &quot;quotes&quot;.</description>", module.xml)
@@ -170,38 +166,24 @@ class Kinds(Made):
         self.assertIn("femur-best.yaml", [file.name for file in files])
         for file in files:
             out = self.scratch / file.parent.name / file.stem
-            result = self.marrow("export", "slicer", file, "--out", out)
-            self.assertEqual((result.returncode, result.stderr), (0, ""))
+            self.assertEqual(self.expect(0, "export", "slicer", file, "--out", out).stderr, "")
             name = re.sub("[^a-z0-9]", "_", file.stem)
             self.assert_valid((out / (name + ".xml")).read_bytes(), name)
-            result = self.marrow("check", out / (name + ".yaml"))
-            self.assertEqual((result.returncode, result.stderr), (0, ""))
+            self.assertEqual(self.expect(0, "check", out / (name + ".yaml")).stderr, "")
 
     @needs("numpy", "vtk")
     def test_files_of_slicer_go_in_and_come_out(self):
         module = self.export(EXCHANGE)
-        header = (
-            "NRRD0004\ntype: float\ndimension: 3\nspace: left-posterior-superior\nsizes: 2 2 2\n"
-            "space directions: (0.5,0,0) (0,0.75,0) (0,0,2)\nkinds: domain domain domain\nendian: little\n"
-            "encoding: raw\nspace origin: (-10,20.5,30)\n\n"
-        )
         values = [-1000, 0, 20, 300, 1200, 1300.5, 7, 8]
-        (self.scratch / "ct.nrrd").write_bytes(header.encode() + struct.pack("<8f", *values))
-        self.write("surface.vtp", VTP)
-        self.write("start.tfm", TFM)
         points = [{"label": "a%d" % i, "position": point} for i, point in enumerate(POINTS)]
         markups = {"markups": [{"type": "Fiducial", "coordinateSystem": "LPS", "controlPoints": points}]}
-        self.write("points.mrk.json", json.dumps(markups))
-        called = module.run(
-            ct=self.scratch / "ct.nrrd",
-            surface=self.scratch / "surface.vtp",
-            start=self.scratch / "start.tfm",
-            points=self.scratch / "points.mrk.json",
-            output_ct=True,
-            output_surface=True,
-            output_start=True,
-            output_points=True,
-        )
+        files = {
+            "ct": self.write("ct.nrrd", NRRD.encode() + struct.pack("<8f", *values)),
+            "surface": self.write("surface.vtp", VTP),
+            "start": self.write("start.tfm", TFM),
+            "points": self.write("points.mrk.json", json.dumps(markups)),
+        }
+        called = module.run(**files, **{"output_" + name: True for name in files})
         self.assertEqual((called.returncode, called.stderr), (0, ""))
         found, keys = read_mha(module.temporary_file("output_ct"))
         self.assertEqual(found.flatten().tolist(), values)
@@ -223,51 +205,46 @@ class Kinds(Made):
         self.assertEqual([one["position"] for one in written["controlPoints"]], POINTS)
 
 
-class Refused(Made):
+class Refused(Export):
     def test_nothing_is_written_over(self):
         self.export(EXCHANGE)
+        modules = self.scratch / "modules"
+        kept = lambda: {file: file.read_bytes() for file in modules.iterdir()}
         for name in ("exchange", "exchange.xml", "exchange.yaml"):
-            kept = {file: file.read_bytes() for file in (self.scratch / "modules").iterdir()}
-            self.assertIn(
-                "it exists already, and nothing was written", self.refused("exported.yaml", "--out", "modules")
-            )
-            self.assertEqual({file: file.read_bytes() for file in (self.scratch / "modules").iterdir()}, kept)
-            (self.scratch / "modules" / name).unlink()
+            before = kept()
+            said = "it exists already, and nothing was written"
+            self.refused(said, "export", "slicer", "exported.yaml", "--out", "modules")
+            self.assertEqual(kept(), before)
+            (modules / name).unlink()
 
-    def test_a_part_and_names_that_clash(self):
-        part = "marrow: 1\ninputs: {model: {type: mesh}}\nnodes: {obj: {uses: write.obj, in: {mesh: model}}}\n"
-        self.write("part.yaml", part + "outputs: {obj: obj}\n")
-        self.assertEqual(
-            self.refused("part.yaml", "--out", "modules"),
-            "part.yaml: its input 'model' is data of type mesh, which only another pipeline can give; export the "
-            "pipeline that uses this one",
-        )
-        text = (
-            "marrow: 1\ninputs: {output_it: {type: path}}\nnodes: {it: {uses: read.pose, with: {path: $output_it}}}\n"
-        )
-        self.write("same.yaml", text + "outputs: {it: it}\n")
-        self.assertEqual(
-            self.refused("same.yaml", "--out", "modules"),
-            "same.yaml: two inputs or outputs would be the parameter 'output_it' of the module; rename one of them",
-        )
-        nodes = "marrow: 1\nnodes: {slicer_a: {uses: read.pose, with: {path: x.yaml}}}\n"
-        self.write("node.yaml", nodes + "outputs: {a: slicer_a}\n")
-        self.assertEqual(
-            self.refused("node.yaml", "--out", "modules"),
-            "node.yaml: the module adds a node 'slicer_a', and the pipeline has one already; rename it",
-        )
-        nodes = "marrow: 1\nnodes: {a: {uses: read.pose, with: {path: x.yaml}}}\n"
-        self.write("output.yaml", nodes + "outputs: {a: a, slicer_a: a}\n")
-        self.assertEqual(
-            self.refused("output.yaml", "--out", "modules"),
-            "output.yaml: the module adds an output 'slicer_a', and the pipeline has one already; rename it",
-        )
+    def test_a_part_names_that_clash_and_a_fault(self):
+        pose = "{uses: read.pose, with: {path: %s}}"
+        for inputs, node, outputs, said in (
+            (
+                *("{model: {type: mesh}}", "a: {uses: write.obj, in: {mesh: model}}", "a: a"),
+                "its input 'model' is data of type mesh, which only another pipeline can give; export the pipeline "
+                "that uses this one",
+            ),
+            (
+                *("{output_a: {type: path}}", "a: " + pose % "$output_a", "a: a"),
+                "two inputs or outputs would be the parameter 'output_a' of the module; rename one of them",
+            ),
+            (
+                *("{}", "slicer_a: " + pose % "x.yaml", "a: slicer_a"),
+                "the module adds a node 'slicer_a', and the pipeline has one already; rename it",
+            ),
+            (
+                *("{}", "a: " + pose % "x.yaml", "a: a, slicer_a: a"),
+                "the module adds an output 'slicer_a', and the pipeline has one already; rename it",
+            ),
+        ):
+            with self.subTest(said):
+                self.write("p.yaml", "marrow: 1\ninputs: %s\nnodes: {%s}\noutputs: {%s}\n" % (inputs, node, outputs))
+                told = self.expect(2, "export", "slicer", "p.yaml", "--out", "modules").stderr
+                self.assertEqual(told, "marrow: error: p.yaml: %s\n" % said)
+        faulty = ("marrow: 1\nnodes: {a: {uses: read.poze}}\noutputs: {a: a}\n", 2, 19, "unknown node 'read.poze'")
+        self.faults(faulty, command=("export", "slicer", "--out", "modules"))
         self.assertFalse((self.scratch / "modules").exists())
-
-    def test_a_faulty_pipeline(self):
-        self.write("faulty.yaml", "marrow: 1\nnodes: {a: {uses: read.poze}}\noutputs: {a: a}\n")
-        self.assertIn("faulty.yaml:2:19: error: unknown node 'read.poze'", self.refused("faulty.yaml", "--out", "m"))
-        self.assertFalse((self.scratch / "m").exists())
 
 
 if __name__ == "__main__":
